@@ -12,8 +12,9 @@ Comments `# pressure_Pa: …`, `# temperature_degC: …` and `# start: …` say 
 quartz laboratory with `%` comments and a last comment `time [s], power [dBm]` is read as it is.
 """
 
+import datetime
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from math import pi
 from pathlib import Path
@@ -39,6 +40,7 @@ POWERS = ("power_dBm", "power_dB")
 KNOWN = ("time_s", *RAW, *(name for pair in (*POLAR, *CARTESIAN) for name in pair), *POWERS)
 NOTES = ("reference_frequency_Hz", "pressure_Pa", "temperature_degC")
 NOTE = re.compile(r"^\W*(\w+):\s*([-+.\deE]+)\s*$")
+START = re.compile(r"^\W*(?:start|Date and time):\s*(\d{4}-\d\d-\d\d\S*(?: \d\d:\S+)?)\s*$")
 FOREIGN = {
     "Frequency [Hz]": ("reference_frequency_Hz", 1.0, 0.0),
     "Temperature [K]": ("temperature_degC", 1.0, -273.15),
@@ -206,12 +208,26 @@ def _read(path: str | Path) -> tuple[Columns, dict[str, float]]:
         raise InputError(
             f"{path}: only time_s; a decay needs {RAW[0]}, {POLAR[0][0]} with {POLAR[0][1]}, or {POWERS[0]} beside it."
         )
-    notes = {}
+    notes = _read_start(path, table.comments)
     for comment in table.comments:
         match = NOTE.match(comment)
         if match and match[1] in NOTES:
             notes[match[1]] = float(match[2])
     return table, notes
+
+
+def _read_start(path: str | Path, comments: Iterable[str]) -> dict[str, float]:
+    """Return the moment of a comment `start: 2026-03-01T10:00:00` as seconds since 1970."""
+    for comment in comments:
+        if match := START.match(comment):
+            try:
+                moment = datetime.datetime.fromisoformat(match[1])
+            except ValueError:
+                raise InputError(
+                    f"{path}: the comment '{comment}' holds no date and time such as 2026-03-01T10:00:00."
+                ) from None
+            return {"start_s": (moment if moment.tzinfo else moment.replace(tzinfo=datetime.UTC)).timestamp()}
+    return {}
 
 
 def _read_trace(path: str | Path) -> tuple[Columns, dict[str, float]]:
@@ -223,7 +239,7 @@ def _read_trace(path: str | Path) -> tuple[Columns, dict[str, float]]:
         raise InputError(
             f"{path}: comments with % are read of traces whose last comment is 'time [s], power [dBm]' only; give the file a header line."
         )
-    notes = {}
+    notes = _read_start(path, comments)
     for comment in comments:
         name, _, text = comment.partition(":")
         if name in FOREIGN:
@@ -300,43 +316,3 @@ def with_decay(instrument: "Instrument", decay: Decay, harmonic: int = 2) -> "In
     if "inverse_q" in e:
         sizes["loss.inverse_q"] = {"value": e["inverse_q"].value, "sd": e["inverse_q"].sd}
     return instrument.with_values(sizes)
-
-
-@dataclass(frozen=True)
-class GasLaw:
-    """1/Q over pressure, 1/Q = 1/Q₀ + s p: free-molecular gas takes momentum in proportion to its pressure.
-
-    Values with their standard deviations from the scatter of the decays about the line.
-    """
-
-    inverse_q0: float
-    inverse_q0_sd: float
-    slope: float
-    slope_sd: float
-    scatter: float
-
-
-def fit_gas(decays: Sequence[Decay]) -> GasLaw | None:
-    """Fit 1/Q over pressure to decays that say both; None of fewer than four or of one pressure.
-
-    The scatter between decays is far more than each one's interval, so it is taken as a part of 1/Q: weights 1/(1/Q)².
-    """
-    import numpy as np
-
-    rows = [
-        (d.notes["pressure_Pa"], d.inverse_q.value)
-        for d in decays
-        if d.inverse_q is not None and "pressure_Pa" in d.notes
-    ]
-    if len(rows) < 4 or len({p for p, _ in rows}) < 3:
-        return None
-    p, y = np.array(rows).T
-    weight = 1 / y
-    X = np.stack([np.ones_like(p), p], axis=1)
-    for _ in range(20):  # the weight of a row is that of the line there, not of its own error
-        found = np.linalg.lstsq(X * weight[:, None], y * weight, rcond=None)[0]
-        weight = 1 / np.maximum(X @ found, 0.1 * y)
-    r = (y - X @ found) * weight
-    scatter = float(np.sqrt(np.sum(r**2) / (len(rows) - 2)))
-    sd = scatter * np.sqrt(np.diag(np.linalg.inv((X * weight[:, None]).T @ (X * weight[:, None]))))
-    return GasLaw(float(found[0]), float(sd[0]), float(found[1]), float(sd[1]), scatter)

@@ -1,9 +1,10 @@
 """`hrg fit ringdown`: frequencies, Q and axes from free decays.
 
-With --json one object, schema `hrg.fit-ringdown/1`: `decays` (a list: `data`, `window_s`, `frequency_Hz`, `q` with `q_low` and
+With --json one object, schema `hrg.fit-ringdown/2`: `decays` (a list: `data`, `window_s`, `frequency_Hz`, `q` with `q_low` and
 `q_high`, `estimates` (rows of `name`, `value`, `sd`, `low`, `high`), `noise`, `widening` of the Cramér–Rao bound,
-`interference_Hz`, `remarks`), `gas` (1/Q over pressure: `inverse_q0`, `slope_per_Pa`, their `_sd`, `scatter`; null without
-pressures), `saved`.
+`interference_Hz`, `remarks`), `laws` (of four decays or more: `frequency_Hz`, relative, and `inverse_q`, each with `level`,
+`terms` (rows of `term`, `value`, `sd`, `low`, `high`, per K, Pa, squared amplitude or day), `sessions_s`, `scatter` and
+`left_out_rows`), `saved`.
 """
 
 from pathlib import Path
@@ -13,12 +14,14 @@ import numpy as np
 
 from studies.cli.arguments import Harmonic
 from studies.cli.output import answers, say
+from studies.decays import fit_laws, is_table, read_table, table_of, write_decays
 from studies.errors import InputError
 from studies.instrument.card import load_card, save_card
 from studies.law import law_of
 from studies.reports import style
+from studies.reports.decays import law_chapter, law_row
 from studies.results import Chapter, Column, Drawing, Figure, Result, Sentence, Table
-from studies.ringdown import Decay, GasLaw, fit_gas, read_decay, with_decay
+from studies.ringdown import Decay, read_decay, with_decay
 
 QUANTITIES = {
     "frequency_1_Hz": "frequency of the upper mode (Hz)",
@@ -50,23 +53,25 @@ DECAY = (
     Column("window_s", "free decay", "s", interval=("window_s.0", "window_s.1")),
     Column("widening", "interval / Cramér–Rao bound", digits=2),
 )
-GAS = (
-    Column("inverse_q0", "1/Q without gas", error="inverse_q0_sd"),
-    Column("slope_per_Pa", "d(1/Q)/dp", "1/Pa", error="slope_per_Pa_sd"),
-    Column("scatter", "scatter between decays", "%", digits=2, scale=100.0),
-)
 
 
-@answers("hrg.fit-ringdown/1")
+@answers("hrg.fit-ringdown/2")
 def fit_ringdown(
-    *data: str, card: str | None = None, frequency: float | None = None, harmonic: Harmonic = 2, save: str | None = None
+    *data: str,
+    card: str | None = None,
+    frequency: float | None = None,
+    harmonic: Harmonic = 2,
+    save: str | None = None,
+    out: str | None = None,
 ) -> Result:
     """Fit frequencies, Q and the axes of elasticity and damping to ring-downs, with 90 % intervals.
 
     A file holds one decay: time_s and pickoff_cos_V (and pickoff_sin_V) as raw samples; from a lock-in amplifier
     amplitude_cos_V with phase_cos_deg, or in_phase_cos_V with out_of_phase_cos_V (and the same with sin); or power_dB or power_dBm. The drive, the release transient and the noise floor are
-    found and left out. Several files are several decays of one resonator; with '# pressure_Pa:' comments, 1/Q is fitted
-    against pressure.
+    found and left out. Several files are several decays of one resonator: with comments such as '# pressure_Pa: 0.01',
+    '# temperature_degC: 22.5' and '# start: 2026-03-01T10:00:00', frequency and 1/Q are fitted against pressure, temperature and
+    time (ageing, or steps between sessions). A table of earlier results does the same: frequency_Hz or inverse_q beside
+    time_s, housing_temperature_degC, pressure_Pa or vibration_amplitude_V; with a column decay, rows are readings within one decay.
 
     Parameters
     ----------
@@ -78,6 +83,8 @@ def fit_ringdown(
         Carrier or reference frequency in Hz, in place of the file's comment.
     save : str
         Write the card with the split, its axis, 1/Q and the damping axis of the first decay.
+    out : str
+        Write a record with a row for each decay (temperature, frequency, 1/Q), for hrg calibrate and hrg diagnose.
     """
     if not data:
         raise InputError("name at least one file (CSV) with a free decay.")
@@ -88,33 +95,42 @@ def fit_ringdown(
     if instrument is not None:
         T = instrument.reference_temperature
         expected = float(law_of(instrument, T - 5, T + 5).frequency(T))
+    tables = [path for path in data if is_table(path)]
+    if tables and (len(data) > 1 or save is not None):
+        raise InputError(f"{tables[0]}: a table of decays must be fitted alone, without --save; leave out the rest.")
     decays = []
-    for path in data:
+    for path in data if not tables else ():
         say(f"fitting {path}")
         decays.append(read_decay(path, frequency=frequency, harmonic=harmonic, expected=expected))
-    gas = fit_gas(decays)
+    table = read_table(tables[0]) if tables else table_of(decays)
+    laws = fit_laws(table)
+    if tables and not laws:
+        raise InputError(
+            f"{tables[0]}: no law can be fitted; a table of decays needs four readings or more of frequency_Hz or inverse_q that vary with a column beside them."
+        )
     if save is not None and instrument is not None:
         save_card(with_decay(instrument, decays[0], harmonic), save)
         say(f"card: {save}")
+    if out is not None:
+        write_decays(table, out)
+        say(f"record: {out}")
     rows = [_row(decay) for decay in decays]
-    law = None if gas is None else _gas_row(gas)
     remarks = [Sentence(f"{row['file']}: {' '.join(row['remarks'])}", "warning") for row in rows if row["remarks"]]
     values = [Table(f"Ring-down {row['file']}", row["estimates"], ESTIMATE) for row in rows]
     return Result(
-        {"schema": "hrg.fit-ringdown/1", "decays": rows, "gas": law, "saved": save},
+        {
+            "schema": "hrg.fit-ringdown/2",
+            "decays": rows,
+            "laws": {name: law_row(name, law) for name, law in laws.items()},
+            "saved": save,
+        },
         "Ring-down",
-        f"Free decay of {data[0]}." if len(data) == 1 else f"{len(data)} free decays of one resonator.",
+        f"Free decay of {data[0]}." if len(data) == 1 and not tables else "Free decays of one resonator.",
         [
             *(values if len(rows) <= 3 else []),
             Table("Decays", rows, DECAY),
-            Table(
-                "1/Q against pressure, 1/Q₀ + s p",
-                [law] if law else [],
-                GAS,
-                "±: one standard deviation, from the scatter.",
-            ),
-            *([Figure(lambda: _draw_pressure(decays, gas), "1/Q against pressure.")] if gas else []),
             *remarks,
+            law_chapter(laws, table),
             Chapter("Records and fits", [_figure(decay) for decay in decays]),
         ],
     )
@@ -143,16 +159,6 @@ def _row(decay: Decay) -> dict[str, Any]:
     }
 
 
-def _gas_row(gas: GasLaw) -> dict[str, float]:
-    return {
-        "inverse_q0": gas.inverse_q0,
-        "inverse_q0_sd": gas.inverse_q0_sd,
-        "slope_per_Pa": gas.slope,
-        "slope_per_Pa_sd": gas.slope_sd,
-        "scatter": gas.scatter,
-    }
-
-
 def _figure(decay: Decay) -> Figure:
     return Figure(lambda: _draw(decay), f"{Path(decay.path).name}: record, fitted decay (orange), residual.")
 
@@ -167,18 +173,4 @@ def _draw(decay: Decay) -> Drawing:
             top.plot(time[rows], values[rows], ".", markersize=1.5)
             top.plot(time[rows], fitted[rows], color=style.ORANGE, linewidth=1)
             bottom.plot(time[rows], np.real(residual[rows]), ".", markersize=1.5)
-    return drawn
-
-
-def _draw_pressure(decays: list[Decay], gas: GasLaw | None) -> Drawing:
-    assert gas is not None
-    points = [
-        (d.notes["pressure_Pa"], d.inverse_q) for d in decays if d.inverse_q is not None and "pressure_Pa" in d.notes
-    ]
-    p = np.array([pressure for pressure, _ in points])
-    y = np.array([(q.value, q.value - q.low, q.high - q.value) for _, q in points])
-    with style.figure(x="pressure (Pa)", y="1/Q") as (drawn, axes):
-        axes.errorbar(p, y[:, 0], y[:, 1:].T, fmt="o", color=style.BLUE, markersize=4)
-        grid = np.geomspace(max(p[p > 0].min() / 2, 1e-12), p.max() * 1.5, 200)
-        axes.loglog(grid, gas.inverse_q0 + gas.slope * grid, color=style.ORANGE)
     return drawn

@@ -97,6 +97,7 @@ def test_decays_over_pressure_give_the_gas_law(tmp_path, capsys):
         comments = [f"pressure_Pa: {p:.6g}", "reference_frequency_Hz: 2e5"]
         paths.append(write(tmp_path / f"p{k}.csv", {"time_s": t, "power_dBm": power}, comments))
     assert main(["fit", "ringdown", *paths, "--json"]) == 0
-    gas = json.loads(capsys.readouterr().out)["gas"]
-    assert gas["inverse_q0"] == pytest.approx(1e-7, rel=0.03)
-    assert gas["slope_per_Pa"] == pytest.approx(5e-5, rel=0.03)
+    law = json.loads(capsys.readouterr().out)["laws"]["inverse_q"]
+    assert law["level"] == pytest.approx(1e-7, rel=0.03)
+    assert law["terms"][0]["term"] == "pressure"
+    assert law["terms"][0]["value"] == pytest.approx(5e-5, rel=0.03)
