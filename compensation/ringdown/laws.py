@@ -184,7 +184,7 @@ def _misfit(rows: Rows, columns: Mapping[str, Real], loss: bool) -> tuple[float,
     found, weight, _ = _solve(X, Rows(value, sd, np.arange(n), time, {}), loss)
     z = np.abs((value - X @ found) * weight)
     after = ((value - X @ found) * weight)[np.argsort(time)]
-    persistence = float(np.clip(after[1:] @ after[:-1] / max(after @ after, 1e-300), 0.0, 0.9))
+    persistence = float(np.clip(after[1:] @ after[:-1] / max(float(after @ after), 1e-300), 0.0, 0.9))
     square = np.where(z < ROBUST, z**2, 2 * ROBUST * z - ROBUST**2)
     return float(n * np.log(np.mean(square)) - 2 * np.sum(np.log(weight))), (1 + persistence) / (1 - persistence), k
 
@@ -219,7 +219,7 @@ def _covariance(X: Real, residual: Real, weight: Real, rows: Rows) -> Real:
     began = np.full(decays.max() + 1, np.inf)
     np.minimum.at(began, decays, rows.time)
     order = np.argsort(np.argsort(began, kind="stable"))[decays]
-    middle, alone = _long_run(order, scores), _long_run(order, scores, beside=False)
+    middle, alone = _long_run(order, scores), _long_run(order, scores, neighbours=False)
     # what a value takes out of its session falls from the sum of neighbours: it must not count as noise that cancels
     short = np.sqrt(np.maximum(np.diag(alone) / np.maximum(np.diag(middle), 1e-300), 1.0))
     middle = middle * np.outer(short, short) if np.all(np.isfinite(short)) else alone
@@ -239,11 +239,11 @@ def _places(rows: Rows) -> Whole:
     return place
 
 
-def _long_run(group: Whole, scores: Real, beside: bool = True) -> Real:
+def _long_run(group: Whole, scores: Real, neighbours: bool = True) -> Real:
     """Return Σ S_i S_jᵀ over sums of scores by group, those of neighbours with a weight that falls to 0 at √N."""
     sums = np.stack([np.bincount(group, column) for column in scores.T], axis=1)
     found = sums.T @ sums
-    reach = int(sqrt(len(sums))) if beside and len(sums) >= NEIGHBOURS else 0
+    reach = int(sqrt(len(sums))) if neighbours and len(sums) >= NEIGHBOURS else 0
     for lag in range(1, reach + 1):
         beside = sums[lag:].T @ sums[:-lag]
         found = found + (1 - lag / (reach + 1)) * (beside + beside.T)

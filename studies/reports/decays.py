@@ -1,5 +1,6 @@
 """Laws of many decays as rows, tables and pictures."""
 
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -68,10 +69,10 @@ def law_chapter(laws: "dict[str, Law]", decays: "Decays") -> Chapter:
         if law.terms:
             parts.append(
                 Figure(
-                    lambda name=name, law=law: _draw(name, law, decays),
+                    partial(_draw, name, law, decays),
                     f"{TITLES[name]} of every decay and the law (orange crosses).",
                 )
-            )  # type: ignore[misc]
+            )
     return Chapter("Over many decays", parts)
 
 
