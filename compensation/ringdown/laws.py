@@ -241,10 +241,10 @@ def _places(rows: Rows) -> Whole:
 
 def _long_run(group: Whole, scores: Real, neighbours: bool = True) -> Real:
     """Return Σ S_i S_jᵀ over sums of scores by group, those of neighbours with a weight that falls to 0 at √N."""
-    sums = np.stack([np.bincount(group, column) for column in scores.T], axis=1)
-    found = sums.T @ sums
+    sums: Real = np.stack([np.bincount(group, column) for column in scores.T], axis=1)
+    found: Real = sums.T @ sums
     reach = int(sqrt(len(sums))) if neighbours and len(sums) >= NEIGHBOURS else 0
     for lag in range(1, reach + 1):
         beside = sums[lag:].T @ sums[:-lag]
-        found = found + (1 - lag / (reach + 1)) * (beside + beside.T)
+        found += (1 - lag / (reach + 1)) * (beside + beside.T)
     return np.asarray(found)
