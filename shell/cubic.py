@@ -19,6 +19,7 @@ from math import isfinite, pi, sqrt
 import numpy as np
 
 from shell.assembly import lay_system
+from shell.crystal import Crystal, hill
 from shell.eigen import Factor, Iteration, whole_pattern
 from shell.elastic import Elastic
 from shell.errors import ShellError
@@ -56,9 +57,9 @@ class Cubic:
 
     @property
     def isotropic(self) -> Elastic:
-        """The mean over all directions (Voigt)."""
-        bulk, G = (self.C11 + 2 * self.C12) / 3, (self.C11 - self.C12 + 3 * self.C44) / 5
-        return Elastic(9 * bulk * G / (3 * bulk + G), (3 * bulk - 2 * G) / (6 * bulk + 2 * G), self.rho)
+        """The mean over all directions (Voigt-Reuss-Hill)."""
+        constants = {"C11": self.C11, "C12": self.C12, "C44": self.C44}
+        return Elastic(*hill(Crystal("cubic", "[001]", 0.0, constants).stiffness()), self.rho)
 
 
 @dataclass(frozen=True)

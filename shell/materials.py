@@ -10,16 +10,20 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from shell.constants import zero_Celsius
+from shell.crystal import AXES, SYSTEMS, Crystal
 from shell.elastic import Elastic
 from shell.errors import ShellError
 from shell.property import FORMS, LISTS, PROPERTIES, ROOM, SIGNED, Array, Property, coefficient_names
 from shell.quadrature import gauss
+
+if TYPE_CHECKING:
+    from shell.cubic import Cubic
 
 ELASTIC = ("shear_modulus", "youngs_modulus", "poisson_ratio")
 _SHIPPED = Path(__file__).with_name("materials.toml")
@@ -57,6 +61,7 @@ class Material:
     reference : float, K
         Temperature about which the deviations of the law and their prior count.
     constant : properties given at one temperature only: nobody says how they change with it.
+    crystal : whose mean over all directions the elastic properties are.
     """
 
     name: str
@@ -68,6 +73,24 @@ class Material:
     note: str = ""
     reference: float = ROOM
     constant: tuple[str, ...] = ()
+    crystal: Crystal | None = None
+
+    @property
+    def caveats(self) -> tuple[str, ...]:
+        """What every answer with this material must say: a modulus taken as constant, a crystal."""
+        moduli = " and ".join(name.replace("youngs", "Young's").replace("_", " ") for name in self.constant)
+        flat = f"No source states how the {moduli} of {self.name} changes with temperature: taken as constant."
+        known = not self.constant or "expansion" in self.constant  # else given in the card, which says so itself
+        return (() if known else (flat,)) + ((f"{self.name}: {self.crystal.note}",) if self.crystal else ())
+
+    def cubic(self, temperature: float) -> "Cubic | None":
+        """The crystal at a temperature (K), where its modes can be solved as one: cubic, [001] along the axis."""
+        if self.crystal is None or self.crystal.axis != "[001]":
+            return None
+        from shell.cubic import Cubic
+
+        C = self.crystal.stiffness(temperature - zero_Celsius - self.crystal.at)
+        return Cubic(float(C[0, 0]), float(C[0, 1]), float(C[3, 3]), float(self.value("density", temperature)))
 
     def value(self, name: str, temperature: ArrayLike) -> NDArray[np.float64]:
         """Return a property at temperatures in kelvin; E, G and nu are derived from the two that are stated.
@@ -210,7 +233,8 @@ class Material:
                 numbers = {"value": value, "at_degC": reference - zero_Celsius}
                 properties[name] = Property("constant", numbers, source="given value", relative=name not in SIGNED)
         properties = {name: replace(found, reference=reference) for name, found in properties.items()}
-        return replace(self, properties=properties, reference=reference)
+        crystal = None if set(given) & set(ELASTIC) else self.crystal
+        return replace(self, properties=properties, reference=reference, crystal=crystal)
 
     def _growth_since_density(self, T: NDArray[np.float64]) -> NDArray[np.float64]:
         if "expansion" not in self.properties:
@@ -284,7 +308,8 @@ def _read_material(where: str, name: str, entry: Any) -> Mapping[str, Material]:
 
 
 def _read_law(where: str, name: str, law: str, entry: Any) -> Material:
-    _check_keys(where, entry, ("source", "note", "range_degC", *PROPERTIES), required=("source", "range_degC"))
+    known = ("source", "note", "range_degC", "crystal", *PROPERTIES)
+    _check_keys(where, entry, known, required=("source", "range_degC"))
     span = entry["range_degC"]
     if not (isinstance(span, list) and len(span) == 2 and all(_is_number(x) for x in span) and span[0] < span[1]):
         raise ShellError(f"{where}: range_degC must be [lowest, highest], not {span!r}.")
@@ -292,9 +317,44 @@ def _read_law(where: str, name: str, law: str, entry: Any) -> Material:
     if low < 0:
         raise ShellError(f"{where}: range_degC begins below absolute zero.")
     found = {p: _read_property(f"{where}: {p}", p, entry[p], span) for p in PROPERTIES if p in entry}
+    crystal = _read_crystal(f"{where}: crystal", entry["crystal"]) if "crystal" in entry else None
+    if crystal is not None:
+        if any(p in found for p in ELASTIC):
+            raise ShellError(f"{where}: give a crystal or {', '.join(ELASTIC)}, not both.")
+        found |= crystal.properties()
+        for p in ("youngs_modulus", "poisson_ratio"):
+            _check_sign(f"{where}: {p} of the crystal", p, found[p], span)
     if all(p in found for p in ELASTIC):
         raise ShellError(f"{where}: give two of {', '.join(ELASTIC)}; the third follows.")
-    return Material(name, law, low, high, found, str(entry["source"]), str(entry.get("note", "")))
+    flat = tuple(p for p in ELASTIC[:2] if p in found and found[p].form == "constant" and not found[p].unsettled[1])
+    return Material(
+        name, law, low, high, found, str(entry["source"]), str(entry.get("note", "")), constant=flat, crystal=crystal
+    )
+
+
+def _read_crystal(where: str, entry: Any) -> Crystal:
+    maps = ("slope", "curvature", "uncertainty", "slope_uncertainty")
+    _check_keys(where, entry, None, required=("system", "axis", "at_degC"))
+    system = entry["system"]
+    if system not in SYSTEMS:
+        raise ShellError(f"{where}: unknown system '{system}'{_nearest(str(system), SYSTEMS)}")
+    if entry["axis"] not in AXES[system]:
+        raise ShellError(f"{where}: the axis of a {system} crystal is one of {', '.join(AXES[system])}.")
+    _check_keys(where, entry, ("system", "axis", "at_degC", *SYSTEMS[system], *maps), required=SYSTEMS[system])
+    tables = [entry.get(key, {}) for key in maps]
+    for key, table in zip(maps, tables, strict=True):
+        _check_keys(f"{where} {key}", table, SYSTEMS[system])
+    constants = {key: entry[key] for key in SYSTEMS[system]}
+    if not all(_is_number(x) for table in (constants, *tables) for x in (*table.values(), entry["at_degC"])):
+        raise ShellError(f"{where}: constants, slopes, curvatures, uncertainties and at_degC must be numbers.")
+    if not set(tables[3]) <= set(tables[0]):
+        raise ShellError(f"{where}: slope_uncertainty names a constant without a slope; add the slope.")
+    found = Crystal(system, entry["axis"], float(entry["at_degC"]), constants, *tables)
+    if not (np.linalg.eigvalsh(found.stiffness()) > 0).all():
+        raise ShellError(
+            f"{where}: these constants are not those of a stable crystal; check their signs and units (Pa)."
+        )
+    return found
 
 
 def _read_property(where: str, name: str, entry: Any, span: list[float]) -> Property:

@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     from shell.levels import Theory
     from studies.instrument.card import Instrument
 
-SLOPE_KEYS = {"youngs_modulus": "log_slope_per_K", "expansion": "value"}
+SLOPE_KEYS = {"youngs_modulus": "log_slope_per_K", "shear_modulus": "log_slope_per_K", "expansion": "value"}
 
 
 def law_of(
@@ -42,13 +42,16 @@ def law_of(
 
 def unknown_slope(instrument: "Instrument") -> str:
     """Say why the slope of the frequency is not known, and which keys would tell it; empty where it is known."""
+    from shell.materials import read_materials
+
     missing = () if instrument.polynomial is not None else instrument.material.constant
-    named = {"youngs_modulus": "Young's modulus", "expansion": "expansion"}
+    named = {"youngs_modulus": "Young's modulus", "shear_modulus": "shear modulus", "expansion": "expansion"}
+    said = "no source states" if instrument.material.name in read_materials() else "the card does not say"
     keys = {name: f"[material.deviation.{name}] {key} (1/K)" for name, key in SLOPE_KEYS.items()}
     if not missing:
         return ""
     return (
-        f"the card does not say how the {' and the '.join(named[name] for name in missing)} of"
+        f"{said} how the {' and the '.join(named[name] for name in missing)} of"
         f" '{instrument.material.name}' change{'s' if len(missing) == 1 else ''} with temperature, so the slope of the"
         f" frequency is not known. Give {' and '.join(keys[name] for name in missing)}, or a material of the table"
         " (hrg materials) or of your own ('file')."

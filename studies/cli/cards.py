@@ -2,7 +2,8 @@
 
 from typing import TYPE_CHECKING, Any
 
-from studies.cli.output import answers
+from studies.cli.arguments import Card, Harmonic
+from studies.cli.output import answers, say
 from studies.results import Column, Facts, Result, Table
 
 if TYPE_CHECKING:
@@ -118,18 +119,26 @@ def _show_values(card: str) -> Result:
     )  # fmt: skip
 
 
-@answers("hrg.materials-list/1")
-def materials(name: str = "") -> Result:
-    """List the materials and their published laws.
+@answers("hrg.materials-list/1; hrg.materials-compared/1 with --compare")
+def materials(name: str = "", *, compare: bool = False, card: Card = "", harmonic: Harmonic = 2) -> Result:
+    """List the materials and their published laws, or compare them in one geometry.
 
     Parameters
     ----------
     name : str
         Show one material's laws with their properties, sources and ranges.
+    compare : bool
+        Compare all laws in the geometry of --card (free-dome unless given): frequency, its slope, thermoelastic Q and what the surface must be.
     """
     from shell.materials import read_materials
     from studies.errors import InputError, nearest
 
+    if card and not compare:
+        raise InputError(f"--card {card}: it belongs to --compare; add that.")
+    if compare:
+        if name:
+            raise InputError(f"--compare compares all materials; leave out '{name}'.")
+        return _compare(card or "free-dome", harmonic)
     table = read_materials()
     if name and name not in table:
         raise InputError(f"unknown material '{name}'{nearest(name, table)}")
@@ -152,6 +161,60 @@ def materials(name: str = "") -> Result:
             *(part for law in laws if name for part in _law_tables(law)),
         ],
     )
+
+
+COMPARED = (
+    Column("material", "material"),
+    Column("law", "law"),
+    Column("frequency_Hz", "f", "Hz", error="frequency_sd_Hz"),
+    Column("slope_ppm_per_degC", "TCF", "ppm/°C", error="slope_sd_ppm_per_degC"),
+    Column("thermoelastic_q", "thermoelastic Q", digits=3),
+    Column("surface_q", "Q of the surface", digits=3),
+    Column("surface_layer_pm", "surface worth", "pm", ".3g"),
+)
+WORTH = (
+    "Thermoelastic Q: of the heat flow alone. Q of the surface: where a source states a surface layer's depth times loss. Surface worth: the"
+    " depth times loss of a surface layer that loses as much as the heat flow; a better surface gains little. Empty: no source states what it"
+    " needs (below)."
+)
+
+
+def _compare(card: str, harmonic: int) -> Result:
+    from shell.constants import zero_Celsius
+    from studies.errors import naming
+    from studies.instrument.card import load_card
+    from studies.material_choice import compare_materials
+
+    instrument = load_card(card)
+    T = instrument.reference_temperature
+    with naming(instrument.path):
+        found = compare_materials(instrument.resonator, T, harmonic, say)
+    rows = [
+        {
+            "material": one.material,
+            "law": one.law,
+            "frequency_Hz": one.frequency,
+            "frequency_sd_Hz": one.frequency_sd,
+            "slope_ppm_per_degC": 1e6 * one.slope,
+            "slope_sd_ppm_per_degC": 1e6 * one.slope_sd,
+            "thermoelastic_q": one.thermoelastic_q,
+            "surface_q": one.surface_q,
+            "surface_layer_pm": 1e12 * one.layer,
+            "remarks": list(one.remarks),
+        }
+        for one in found
+    ]
+    remarks = [{"material": one.material, "law": one.law, "remark": text} for one in found for text in one.remarks]
+    head = {"card": instrument.name, "harmonic": harmonic, "temperature_degC": T - zero_Celsius}
+    return Result(
+        {"schema": "hrg.materials-compared/1", **head, "materials": rows},
+        f"Materials in the geometry of {instrument.name}",
+        f"Mode n = {harmonic} at {head['temperature_degC']:g} °C in one geometry, by thermoelastic Q; ± one standard deviation.",
+        [
+            Table(f"Geometry of {instrument.name}, n = {harmonic}", rows, COMPARED, WORTH),
+            Table("Not stated, or taken as", remarks, [Column("material", "material"), Column("law", "law"), Column("remark", "remark")]),
+        ],
+    )  # fmt: skip
 
 
 def _law_tables(law: "Material") -> list[Table]:
@@ -217,6 +280,7 @@ def _describe(law: "Material") -> "dict[str, Any]":
         "range_degC": [law.lowest - zero_Celsius, law.highest - zero_Celsius],
         "source": law.source,
         "note": law.note,
+        "caveats": list(law.caveats),
         "lacks": _lacking(law),
         "prior": {
             "coefficients": list(law.prior.names),

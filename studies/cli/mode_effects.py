@@ -148,13 +148,20 @@ def _films(m: Mode, asked: Asked) -> list[Entry] | None:
 
 def _crystal(m: Mode, asked: Asked) -> Entry | None:
     """Both modes of a lowest pair n >= 2 but multiples of 4."""
-    crystal = asked.instrument.keys("material").cubic
+    given, material = asked.instrument.keys("material").cubic, asked.instrument.material
+    crystal = given or material.cubic(asked.T)
     if crystal is None or m.theory != "solid" or m.harmonic < 2 or m.harmonic % 4 == 0 or m.index:
         return None
     from shell.cubic import solve_cubic
+    from shell.errors import ShellError
 
     assert m.resonator is not None
-    pair = solve_cubic(m.resonator, crystal, m.harmonic, asked.tolerance)
+    try:
+        pair = solve_cubic(m.resonator, crystal, m.harmonic, asked.tolerance)
+    except ShellError:
+        if given is not None:
+            raise
+        return None  # of a stem or a clamp; the material's caveat says so
     return {
         "antinode_along_100_Hz": pair.along_100,
         "other_Hz": pair.along_110,
@@ -227,7 +234,7 @@ MISMATCH = (
     " and deformation. The frequencies above do not include it; those of hrg tcf and of simulations do."
 )
 BARE = "By stiffness and mass, to first order in the thickness. The frequencies above are those of the bare wall."
-VOIGT = "[001] along the axis. The table above and every other command use the isotropic (Voigt) mean of the elastic constants."
+VOIGT = "[001] along the axis. The table above and every other command use the isotropic (Voigt-Reuss-Hill) mean of the elastic constants."
 
 
 def effect_tables(modes: list[dict[str, Any]], asked: Asked) -> list[Table]:

@@ -6,13 +6,15 @@ import json as json_module
 import math
 import sys
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Annotated, Any
 
 from cyclopts import Parameter
 
 from studies.errors import InputError
 from studies.files.paths import guarded
-from studies.results import Result
+from studies.instrument.caveats import caveats_of
+from studies.results import Result, Sentence
 from studies.results.terminal import print_result
 
 
@@ -34,8 +36,11 @@ def answers(schema: str, page: bool = True) -> Callable[[Callable[..., Result]],
             report = options.pop("report", None)
             if report is not None and not report.lower().endswith((".html", ".htm", "/dev/null")):
                 raise InputError(f"--report {report}: a report is an HTML page; give a name that ends in .html.")
-            with guarded({**own.bind(*arguments, **options).arguments, "report": report}):
+            with guarded({**own.bind(*arguments, **options).arguments, "report": report}) as read:
                 result = command(*arguments, **options)
+                if caveats := caveats_of(read):
+                    parts = [*result.parts, *(Sentence(text, "note") for text in caveats)]
+                    result = replace(result, payload=result.payload | {"caveats": caveats}, parts=parts)
                 if report is not None:
                     from studies.files.writing import write_text
                     from studies.results.page import render_result

@@ -35,8 +35,8 @@ _written: set[str] | None = None  # while a command runs; from Python a file may
 
 
 @contextmanager
-def guarded(arguments: Mapping[str, Any]) -> Iterator[None]:
-    """Keep what a command reads from being overwritten by what it writes, while it runs.
+def guarded(arguments: Mapping[str, Any]) -> Iterator[list[Path]]:
+    """Keep what a command reads from being overwritten by what it writes, while it runs; gives what it reads.
 
     Raises
     ------
@@ -47,9 +47,11 @@ def guarded(arguments: Mapping[str, Any]) -> Iterator[None]:
     words = [word for name, value in arguments.items() if name not in OUTPUTS for word in _words(value)]
     global _written
     _written = set()
+    read = []
     try:
         for word in words:
             for path in _read_with(word):
+                read.append(path)
                 _read.setdefault(
                     _identity(path), word if _identity(path) == _identity(Path(word)) else f"{path} of {word}"
                 )
@@ -62,7 +64,7 @@ def guarded(arguments: Mapping[str, Any]) -> Iterator[None]:
                 raise InputError(
                     f"{seen[_identity(Path(value))]} and {given}: two outputs would be one file; name two files."
                 )
-        yield
+        yield read
     finally:
         _read.clear()
         _written = None

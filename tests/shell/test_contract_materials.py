@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.constants import zero_Celsius
 
+from shell.crystal import Crystal, bounds_of
 from shell.errors import ShellError
 from shell.materials import ELASTIC, PROPERTIES, constant_material, find_material, read_materials
 
@@ -106,6 +107,15 @@ def test_expansion_conserves_mass():
         ),
         ('schema = "hrg.materials/1"\n[x', ["TOML"]),
         *(
+            (f'schema = "hrg.materials/1"\n[x.laws.a]\nsource="s"\nrange_degC=[0, 9]\ncrystal={{{crystal}}}', words)
+            for crystal, words in (
+                ('system="cubic",axis="[001]",at_degC=20,C11=1e11,C12=2e11,C44=1e11', ["stable"]),
+                ('system="cubic",axis="c",at_degC=20,C11=1e11,C12=2e10,C44=1e11', ["axis", "[111]"]),
+                ('system="cubic",axis="[001]",at_degC=20,C11=1e11,C12=2e10', ["C44", "missing"]),
+                ('system="cube",axis="[001]",at_degC=20', ["cube", "cubic"]),
+            )
+        ),
+        *(
             (f'schema = "hrg.materials/1"\n[x.laws.a]\nsource="s"\nrange_degC=[0, 9]\nyoungs_modulus={{{law}}}', words)
             for law, words in (
                 ('form="table",temperature_degC=[0,9],values=3', ["values", "list"]),
@@ -143,6 +153,53 @@ def test_constant_material_does_not_change():
     law = constant_material("m", 70e9, 0.3, 2700.0)
     assert law.elastic(250.0) == law.elastic(350.0)
     assert all(name in law.properties for name in ELASTIC[1:])
+
+
+@pytest.mark.parametrize(
+    ("name", "E", "nu", "percent"),
+    [
+        (
+            "diamond",
+            1143.0,
+            0.0691,
+            0.2,
+        ),  # Klein and Cardinale 1993, Diamond Relat. Mater. 2, 918: the mean of the crystal
+        ("silicon", 162.9, 0.223, 0.2),  # polycrystal, Hill: K = 97.8, G = 66.6 GPa (Simmons and Wang 1971)
+        ("sapphire", 402.5, 0.234, 0.5),  # K = 251.8, G = 163.1 GPa (Simmons and Wang 1971)
+    ],
+)
+def test_published_means_of_crystals(name, E, nu, percent):
+    mean = find_material(name).elastic(298.15)
+    assert pytest.approx(E, rel=percent / 100) == mean.E / 1e9
+    assert pytest.approx(nu, abs=0.002) == mean.nu
+
+
+def test_limits_a_crystal_without_anisotropy_is_its_own_mean_and_follows_its_constants():
+    crystal = Crystal(
+        "cubic", "[001]", 25.0, {"C11": 100e9, "C12": 40e9, "C44": 30e9}, dict.fromkeys(("C11", "C12", "C44"), -1e-4)
+    )
+    E, nu = (crystal.properties()[name] for name in ("youngs_modulus", "poisson_ratio"))
+    assert crystal.spread == pytest.approx(0, abs=1e-15)
+    assert E(298.15) == pytest.approx(2 * 30e9 * (1 + 40 / 140), rel=1e-12)
+    assert E(308.15) / E(298.15) == pytest.approx(1 - 1e-3, rel=1e-6)
+    assert nu(308.15) == pytest.approx(40 / 140, rel=1e-12)
+
+
+def test_limits_voigt_and_reuss_of_a_cubic_crystal():
+    """Closed forms: 5 G_V = C11 - C12 + 3 C44, G_R = 5 (C11 - C12) C44/(4 C44 + 3 (C11 - C12)), K alike."""
+    a, b, c = 165.7, 63.9, 79.6
+    voigt, reuss = bounds_of(Crystal("cubic", "[001]", 25.0, {"C11": a, "C12": b, "C44": c}).stiffness())
+    assert voigt == pytest.approx(((a + 2 * b) / 3, (a - b + 3 * c) / 5))
+    assert reuss == pytest.approx(((a + 2 * b) / 3, 5 * (a - b) * c / (4 * c + 3 * (a - b))))
+
+
+def test_contract_a_modulus_without_a_law_is_constant_and_says_so():
+    for name in ("ule", "zerodur", "sapphire", "ti-6al-4v"):
+        assert find_material(name).constant == ("youngs_modulus",)
+        assert "taken as constant" in find_material(name).caveats[0]
+    assert not find_material("fused-silica").caveats
+    assert "n = 2 splits" in find_material("silicon", "axis-001").caveats[0]
+    assert find_material("silicon", "axis-001").rescaled(293.15, youngs_modulus=150e9).crystal is None
 
 
 @pytest.mark.parametrize("lowest", [-79.8, -60.0, -45.3])

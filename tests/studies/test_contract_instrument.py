@@ -44,6 +44,7 @@ COMMANDS = {
     "loop": ["loop", "CARD"],
     "cards": ["cards", "CARD"],
     "modes": ["modes", "CARD"],
+    "materials": ["materials", "--compare", "--card", "CARD"],
     "compare": ["compare", "free-dome", "CARD"],
     "tcf": ["tcf", "CARD"],
     "thermal": ["thermal", "CARD", "soak 20 1h"],
