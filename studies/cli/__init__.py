@@ -76,10 +76,15 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "study status": ("studies.cli.study:status", "Show the progress of a study and its failed cases."),
     "study report": ("studies.cli.study:report", "Write a page: results, sensitivities, yield and provenance."),
     "study export": ("studies.cli.study:export", "Export the results as CSV, with a file of units."),
+    "optimise": (
+        "studies.cli.optimise:optimise",
+        "Find dimensions for objectives under constraints, with tolerances.",
+    ),
     "compare": ("studies.cli.compare:compare", "Compare designs: differences between cards and their effects."),
     "cards": ("studies.cli.cards:cards", "List the built-in instrument cards, or the uncertain values of a card."),
     "keys": ("studies.cli.keys:keys", "List the keys of a card, map, model or limits file: units, defaults, bounds."),
     "card new": ("studies.cli.new:card", "Write a card template."),
+    "design new": ("studies.cli.new:design", "Write a task for hrg optimise."),
     "study new": ("studies.cli.new:study", "Write a study template."),
     "materials": ("studies.cli.cards:materials", "List the materials and their published laws."),
     "effects": ("studies.cli.effects:effects", "List the physical effects for diagnosis and cards."),
@@ -202,7 +207,19 @@ def _say_unused(unused: Sequence[str], words: Sequence[str]) -> str:
 PROFILE_WORDS = ("soak", "step", "ramp", "staircase", "cycle")
 CHAPTERS = {
     # of the list of commands
-    "Design a resonator": ("modes", "tcf", "loss", "loop", "compare", "render", "mesh", "study", "derive"),
+    "Design a resonator": (
+        "modes",
+        "tcf",
+        "loss",
+        "loop",
+        "compare",
+        "optimise",
+        "design",
+        "render",
+        "mesh",
+        "study",
+        "derive",
+    ),
     "Manufacture": ("scan", "trim", "electrodes"),
     "Simulate and import": ("simulate", "twin", "thermal", "import", "show", "export"),
     "Calibrate, diagnose and accept": ("calibrate", "diagnose", "effects", "acceptance"),
@@ -211,6 +228,7 @@ CHAPTERS = {
 }
 GROUPS = {
     "card": "Write your own card.",
+    "design": "Write a design task.",
     "fit": "Fit a compensation model to measured data.",
     "study": "Parametric studies: create, run, monitor, report, export.",
 }

@@ -28,7 +28,7 @@ def keys(kind: str = "card", *, table: str = "") -> Result:
     Parameters
     ----------
     kind : str
-        card, study, map (of hrg import), model (of hrg fit and hrg compensate) or limits (of hrg acceptance).
+        card, study, design (of hrg optimise), map (of hrg import), model (of hrg fit and hrg compensate) or limits (of hrg acceptance).
     table : str
         Only the keys of this table and the tables in it, such as thermal or loss.film.
     """
@@ -63,6 +63,7 @@ KINDS = {
     # what people write: the class that declares its keys
     "card": "studies.instrument.card:Head",
     "study": "studies.sweeps.keys:StudyKeys",
+    "design": "studies.design.keys:DesignKeys",
     "map": "studies.importing.mapping:ImportMap",
     "model": "studies.models.file:ModelKeys",
     "limits": "studies.acceptance.limits:Limits",

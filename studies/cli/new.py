@@ -11,11 +11,14 @@ import tomli_w
 from cyclopts import Parameter
 
 from studies.cli.output import say
+from studies.design.keys import DesignKeys
+from studies.design.task import shipped_tasks
 from studies.errors import InputError
 from studies.files.reading import find_shipped, read_bytes
 from studies.files.writing import write_text
 from studies.instrument.card import build_instrument, load_card, spell_card
 from studies.instrument.registry import card_tables
+from studies.schema.keys import Keys
 from studies.schema.reference import write_form
 from studies.sweeps.keys import StudyKeys
 from studies.sweeps.spec import shipped_specs
@@ -46,12 +49,12 @@ def card(path: str, *, like: str = "hrg-30mm", name: str | None = None) -> int:
     return 0
 
 
-def study(
-    path: str,
-    *,
-    like: str = "dimension-tolerance",
-    card_: Annotated[str | None, Parameter(name="--card")] = None,
-) -> int:
+OtherCard = Annotated[
+    str | None, Parameter(name="--card", help="The card: a built-in one, or a path relative to the file.")
+]
+
+
+def study(path: str, *, like: str = "dimension-tolerance", card_: OtherCard = None) -> int:
     """Write a template for the spec of a study.
 
     Parameters
@@ -60,19 +63,37 @@ def study(
         The spec (TOML) to write; an existing file is not overwritten.
     like : str
         A built-in study: frequency-over-temperature, dimension-tolerance, dimension-influence, split-tolerance.
-    card_ : str
-        The card to study: a built-in one, or a path relative to the spec.
     """
+    _copy(path, find_shipped(like, shipped_specs(), "study"), card_, StudyKeys, "study")
+    say(f"{path}: written as a copy of {like}. Edit it, then run: hrg study run {path} --dry-run")
+    return 0
+
+
+def design(path: str, *, like: str = "dome-8khz", card_: OtherCard = None) -> int:
+    """Write a template of a task for hrg optimise.
+
+    Parameters
+    ----------
+    path : str
+        The task (TOML) to write; an existing file is not overwritten.
+    like : str
+        A worked design: dome-8khz, light-cylinder, robust-dome.
+    """
+    _copy(path, find_shipped(like, shipped_tasks(), "design"), card_, DesignKeys, "design")
+    say(f"{path}: written as a copy of {like}. Edit it, then run: hrg optimise {path} --out FOLDER")
+    return 0
+
+
+def _copy(path: str, source: Path, card_: str | None, keys: type[Keys], kind: str) -> None:
+    """Write a copy of a shipped file, for another card if one is given, with all entries that it may have as comments."""
     _refuse_existing(path)
-    text = read_bytes(find_shipped(like, shipped_specs(), "study")).decode("utf-8-sig")
+    text = read_bytes(source).decode("utf-8-sig")
     if card_ is not None:
         stated = tomllib.loads(text)["card"]
         old, new = (tomli_w.dumps({"card": one}).rstrip("\n") for one in (stated, card_))
         text = text.replace(old, new)
-    form = ["All entries of a study, by example:", *write_form([(StudyKeys, "")])]
+    form = [f"All entries of a {kind}, by example:", *write_form([(keys, "")])]
     write_text(path, "\n".join([text.rstrip("\n"), "", *(f"# {line}".rstrip() for line in form)]) + "\n")
-    say(f"{path}: written as a copy of {like}. Edit it, then run: hrg study run {path} --dry-run")
-    return 0
 
 
 def _refuse_existing(path: str) -> None:

@@ -23,7 +23,7 @@ OUTPUTS = {
     "map_file": "--map",
     "state_space": "--state-space",
 }
-SHIPPED = ("cards", "sweeps/templates")
+SHIPPED = ("cards", "sweeps/templates", "examples")
 STORE, STORE_FILES = "study.store", ("study.store", "lock")
 RECORDS = tuple(
     f"{folder}*.{kind}" for folder in ("", "*/") for kind in ("csv", "parquet", "toml")

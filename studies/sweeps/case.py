@@ -1,15 +1,19 @@
 """One design of a study: the instrument with its parameters set, and the modes that its quantities share."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 from shell.constants import zero_Celsius
+from studies.errors import InputError
 from studies.instrument.card import Instrument
 
 if TYPE_CHECKING:
+    from shell.elastic import Elastic
     from shell.levels import Theory
     from shell.modes import Mode
+    from shell.resonator import Resonator
 
 
 @dataclass
@@ -20,10 +24,13 @@ class Case:
     ----------
     instrument : the card with this design's parameters.
     parameters : every parameter of the study by name, in the unit of its name.
+    on_the_way : the instrument at a place 0 ... 1 of the way from the start of a search to this design, where modes keep
+        their names by their shapes; None where they have them by their order.
     """
 
     instrument: Instrument
     parameters: Mapping[str, Any]
+    on_the_way: "Callable[[float], Instrument] | None" = None
     _solved: dict[tuple[int, str, float], "tuple[Mode, ...]"] = field(default_factory=dict, repr=False)
 
     def temperature(self, given: float | None) -> float:
@@ -41,3 +48,35 @@ class Case:
             resonator, elastic = self.instrument.at(temperature)
             self._solved[key] = solve_modes(resonator, elastic, harmonic, count, theory)
         return self._solved[key]
+
+    def mode(self, harmonic: int, index: int, theory: "Theory", temperature: float) -> "Mode":
+        """Return one mode of a harmonic: by its order, or the one that the start's becomes on the way to this design."""
+        if self.on_the_way is None:
+            return self.modes(harmonic, index + 1, theory, temperature)[index]
+        from shell.following import follow
+
+        along = self.on_the_way
+
+        def solve(place: float, count: int) -> "tuple[Mode, ...]":
+            if place == 1.0:
+                return self.modes(harmonic, count, theory, temperature)
+            return _solve_once(*along(place).at(temperature), harmonic, count, theory)
+
+        return follow(solve, solve(0.0, index + 1)[index])
+
+    def require_lowest(self, harmonic: int, theory: "Theory", temperature: float) -> None:
+        """Refuse a design in which another mode has come below the followed one: what is asked is of the lowest."""
+        if self.on_the_way is not None and (k := self.mode(harmonic, 0, theory, temperature).index):
+            raise InputError(
+                f"the mode n = {harmonic} of the start is no longer the lowest of its harmonic but number {k + 1}."
+            )
+
+
+@lru_cache(maxsize=32)
+def _solve_once(
+    resonator: "Resonator", elastic: "Elastic", harmonic: int, count: int, theory: "Theory"
+) -> "tuple[Mode, ...]":
+    """Modes of a design that many others are held against."""
+    from shell.modes import solve_modes
+
+    return solve_modes(resonator, elastic, harmonic, count, theory)

@@ -36,13 +36,17 @@ class Row(NamedTuple):
 
 @dataclass(frozen=True)
 class WorkPlan:
-    """What a worker must know of a study; without families small, so that it travels with every task."""
+    """What a worker must know of a study; without families small, so that it travels with every task.
+
+    start : the design of a search from which modes are followed by their shapes; None where they go by their order.
+    """
 
     instrument: Instrument
     coding: tuple[tuple[str, tuple[str, ...]], ...]
     asked: "tuple[Quantity, ...]"
     families: "Families | None" = None
     derived: "tuple[Derived, ...]" = ()
+    start: Mapping[str, Any] | None = None
 
     @classmethod
     def of(cls, study: "Study", families: "Families | None" = None) -> "WorkPlan":
@@ -106,7 +110,7 @@ def evaluate_case(plan: WorkPlan, parameters: Mapping[str, Any]) -> Row:
     with warnings.catch_warnings(record=True) as heard:
         warnings.simplefilter("always")
         try:
-            case = Case(set_parameters(plan.instrument, parameters, plan.derived), parameters)
+            case = _make_case(plan, parameters)
         except UNUSABLE_INPUT as error:
             return failed_row(plan, "failed", str(error))
         for asked in plan.asked:
@@ -121,6 +125,21 @@ def evaluate_case(plan: WorkPlan, parameters: Mapping[str, Any]) -> Row:
     status = "failed" if reasons else "ok"
     seconds = time.perf_counter() - began
     return Row(status, " ".join([*reasons, *remarks]), tuple(values), tuple(errors), seconds)
+
+
+def _make_case(plan: WorkPlan, parameters: Mapping[str, Any]) -> Case:
+    start = plan.start
+
+    def on_the_way(place: float) -> Instrument:
+        assert start is not None
+        between = {
+            name: value if isinstance(value, str) else start[name] + place * (value - start[name])
+            for name, value in parameters.items()
+        }
+        return set_parameters(plan.instrument, between, plan.derived)
+
+    instrument = set_parameters(plan.instrument, parameters, plan.derived)
+    return Case(instrument, parameters, None if start is None else on_the_way)
 
 
 def failed_row(plan: WorkPlan, status: str, reason: str) -> Row:

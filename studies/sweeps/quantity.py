@@ -12,7 +12,10 @@ if TYPE_CHECKING:
     from shell.modes import Mode
     from studies.sweeps.case import Case
 
-SUFFIXES = {"Hz": "_Hz", "ppm/°C": "_ppm_per_degC", "°C": "_degC", "s": "_s", "°": "_deg", "1": ""}
+SUFFIXES = {
+    "Hz": "_Hz", "ppm/°C": "_ppm_per_degC", "°C": "_degC", "s": "_s", "°": "_deg", "g": "_g", "mm": "_mm",
+    "°/h": "_deg_per_h", "°/√h": "_deg_per_rt_h", "Hz/µm": "_Hz_per_um", "1": "",
+}  # fmt: skip
 
 
 class Number(NamedTuple):
@@ -113,5 +116,4 @@ class OvertoneQuantity(ModeQuantity, frozen=True, kw_only=True):
 
     def mode(self, case: "Case") -> "Mode":
         """Return the mode of a design."""
-        at = case.temperature(self.temperature_degC)
-        return case.modes(self.harmonic, self.index + 1, self.theory, at)[self.index]
+        return case.mode(self.harmonic, self.index, self.theory, case.temperature(self.temperature_degC))

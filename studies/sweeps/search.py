@@ -38,8 +38,15 @@ class SearchFailed(RuntimeError):
 class Explorer:
     """Designs of a study, rows as in its design, computed when the store lacks them."""
 
-    def __init__(self, study: "Study", plan: "WorkPlan", workers: "Workers", store: "Store") -> None:
-        self.study, self.plan, self.workers, self.store = study, plan, workers, store
+    def __init__(
+        self,
+        study: "Study",
+        plan: "WorkPlan",
+        workers: "Workers",
+        store: "Store",
+        progress: Progress = Progress(),  # noqa: B008 that shows nothing
+    ) -> None:
+        self.study, self.plan, self.workers, self.store, self.progress = study, plan, workers, store, progress
         self.columns = [column.name for column in study.columns]
 
     def cases(self, designs: Array) -> "list[Stored]":
@@ -49,7 +56,7 @@ class Explorer:
             rows, size = np.array(list(lacking.values())), BATCH_VECTORISED if self.plan.families else 1
             parts = np.split(rows, range(size, len(rows), size))
             batches = deque(Batch(np.full(len(part), -1), part) for part in parts)
-            compute(self.plan, batches, self.workers, self.store, Progress())
+            compute(self.plan, batches, self.workers, self.store, self.progress)
         found = [self.store.find(design) for design in designs]
         return [case for case in found if case is not None]
 

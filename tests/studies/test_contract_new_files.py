@@ -1,4 +1,4 @@
-"""`hrg card new` and `hrg study new`: what they write is valid, complete and never written over something."""
+"""`hrg card new`, `hrg study new` and `hrg design new`: what they write is valid, complete and never written over something."""
 
 import tomllib
 from pathlib import Path
@@ -47,7 +47,7 @@ def test_the_lines_of_the_forms_can_be_set(tmp_path):
     assert tried > 15
 
 
-@pytest.mark.parametrize("words", [["card", "new"], ["study", "new"]])
+@pytest.mark.parametrize("words", [["card", "new"], ["study", "new"], ["design", "new"]])
 def test_every_commented_line_is_toml(tmp_path, words):
     """All forms uncommented, each table as a document of its own, parse; the lines come from the declarations."""
     path = tmp_path / "mine.toml"

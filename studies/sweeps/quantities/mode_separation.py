@@ -3,7 +3,7 @@
 from typing import Annotated
 
 from shell.separation import nearest_mode
-from studies.schema.keys import number
+from studies.schema.keys import number, says
 from studies.sweeps.case import Case
 from studies.sweeps.quantity import Column, ModeQuantity, Number
 
@@ -13,24 +13,42 @@ class ModeSeparation(ModeQuantity, frozen=True, kw_only=True, tag="mode-separati
 
     highest: Annotated[int, number("highest harmonic that is searched", least=0, most=20)] = 4
     each: Annotated[int, number("modes of each harmonic that are solved at least", least=1, most=10)] = 2
+    distances: Annotated[bool, says("a column besides for the distance of each of these modes")] = False
 
     def list_columns(self) -> tuple[Column, ...]:
         """Return the columns of the distance and of the other mode's harmonic."""
         stem = self.stem("separation")
+        each = [
+            Column(f"{stem}_of_n{n}_{k}", "Hz", f"distance of n = {n}, mode {k} from {self.words}")
+            for n, k in self._others
+        ]
         return (
             Column(stem, "Hz", f"distance of the nearest other mode from {self.words}"),
             Column(f"{stem}_nearest_harmonic", "1", f"harmonic of the mode nearest to {self.words}"),
+            *each,
         )
 
     def evaluate(self, case: Case) -> tuple[Number, ...]:
         """Return distance and harmonic."""
         at = case.temperature(self.temperature_degC)
-        own = case.modes(self.harmonic, 1, self.theory, at)[0]
+        own = case.mode(self.harmonic, 0, self.theory, at)
         nearest = nearest_mode(
             lambda n, count: case.modes(n, count, self.theory, at), own, range(self.highest + 1), self.each
         )
         error = sum(mode.frequency * mode.relative_error_estimate for mode in (own, nearest))
-        return (Number(nearest.frequency - own.frequency, error), Number(float(nearest.harmonic), 0.0))
+        each = []
+        for n, k in self._others:
+            found = case.modes(n, self.each, self.theory, at)
+            others = [mode for mode in found if (n, mode.index) != (own.harmonic, own.index)]
+            each.append(Number(others[k].frequency - own.frequency))
+        return (Number(nearest.frequency - own.frequency, error), Number(float(nearest.harmonic), 0.0), *each)
+
+    @property
+    def _others(self) -> list[tuple[int, int]]:
+        """Harmonic and place of every mode that has a column of its own."""
+        if not self.distances:
+            return []
+        return [(n, k) for n in range(self.highest + 1) for k in range(self.each - (n == self.harmonic))]
 
 
 QUANTITY = ModeSeparation

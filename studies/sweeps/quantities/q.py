@@ -1,12 +1,17 @@
 """Q of a mode from its loss budget, and the share that heat takes of its loss."""
 
-from studies.loss.model import loss_model
+from typing import Annotated
+
+from studies.schema.keys import says
 from studies.sweeps.case import Case
+from studies.sweeps.quantities.loss import find_budget
 from studies.sweeps.quantity import Column, ModeQuantity, Number
 
 
 class QualityFactor(ModeQuantity, frozen=True, kw_only=True, tag="q"):
     """Q from the loss budget of the card: heat, bulk, surface, films, gas, activated losses and mount."""
+
+    anchor: Annotated[bool, says("compute what a balanced mode sends down its stem, half a second a design")] = False
 
     def list_columns(self) -> tuple[Column, ...]:
         """Return the columns of Q and of the share of heat."""
@@ -18,8 +23,7 @@ class QualityFactor(ModeQuantity, frozen=True, kw_only=True, tag="q"):
 
     def evaluate(self, case: Case) -> tuple[Number, ...]:
         """Return both."""
-        T = case.temperature(self.temperature_degC)
-        budget = loss_model(case.instrument, self.harmonic, self.theory).budget(T)
+        budget = find_budget(case, self, self.anchor)
         total = float(budget.inverse_q[0])
         warm = sum(float(part.inverse_q[0]) for part in budget.parts if part.name == "thermoelastic")
         return Number(1 / total), Number(warm / total)

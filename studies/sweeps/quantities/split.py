@@ -29,7 +29,7 @@ class Split(ModeQuantity, frozen=True, kw_only=True, tag="split"):
         from studies.splitting import SplitPair
 
         T = case.temperature(self.temperature_degC)
-        whole = SplitPair(case.instrument, case.modes(self.harmonic, 1, self.theory, T)[0], T)
+        whole = SplitPair(case.instrument, case.mode(self.harmonic, 0, self.theory, T), T)
         split = whole.of_every_order() if self.order == "every" else whole.split
         return Number(split.hertz), Number(math.degrees(split.slow_axis))
 

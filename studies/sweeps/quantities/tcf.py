@@ -21,6 +21,7 @@ class TemperatureCoefficient(ModeQuantity, frozen=True, kw_only=True, tag="tcf")
         """Return the sum and its parts."""
         check_slope_known(case.instrument)
         T = case.temperature(self.temperature_degC)
+        case.require_lowest(self.harmonic, self.theory, T)
         law = law_of(case.instrument, T, T, self.theory, self.harmonic)
         found, level = law.parts(T), STEEPEST * law.solver_error
         of_nu = level * abs(float(law.material.slope("poisson_ratio", T)))

@@ -22,7 +22,7 @@ def asked(name, **given):
 
 @pytest.fixture(scope="module")
 def case():
-    return Case(load_card("hrg-30mm"), {})
+    return Case(load_card("hrg-30mm-loops"), {})  # which has all that a quantity may ask for
 
 
 @pytest.mark.parametrize("name", COMPUTED)

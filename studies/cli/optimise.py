@@ -1,0 +1,227 @@
+"""`hrg optimise`: dimensions for objectives under constraints, with tolerances.
+
+Schema hrg.optimise/1: `design`, `card`, `evaluations`, `failed`; `parameters`: rows of `name`, `start`, `best`, `low`, `high`, `at_bound`;
+`columns`: rows of `column`, `label`, `unit`, `start`, `interpolant`, `best` and `verified` (solved once more from the card);
+`constraints`: rows of `column`, `kind` (least or most), `limit`, `value`, `room`, `margin`, `active`, `price` (what the objective gains for one
+unit of the column; of several objectives in parts of their ranges; null where the limit holds nothing back); `front`: rows by the names of parameters and wanted
+columns; `tolerances`: rows of `column`, `value`, `worst_case` (±, first order), `sd`, `low` and `high` of the full solves that check it,
+`passed`; `out`, `best_card`.
+"""
+
+from collections import Counter
+from math import isfinite
+from operator import itemgetter
+from pathlib import Path
+from typing import Any
+
+from studies.cli.output import answers
+from studies.design.answer import Answer
+from studies.design.run import CARD, TABLE, best_instrument
+from studies.design.run import optimise as find_best
+from studies.errors import InputError
+from studies.reports import design as pictures
+from studies.reports.digits import plain
+from studies.results import Chapter, Column, Facts, Figure, Result, Sentence, Table
+
+
+@answers("hrg.optimise/1")
+def optimise(design: str, *, out: str, workers: int | None = None, quiet: bool = False) -> Result:
+    """Find dimensions of a resonator for objectives under constraints; every answer is verified by full solves.
+
+    Run again with the same folder to resume: designs that are computed are never computed again, and objectives, limits and bounds
+    may change between runs.
+
+    Parameters
+    ----------
+    design : str
+        A TOML file with schema = "hrg.design/1", or the name of a worked design: dome-8khz, light-cylinder, robust-dome.
+        hrg design new FILE writes one to start from; hrg keys design lists its keys.
+    out : str
+        Folder for the best design as a card (best.toml), all designs (evaluations.csv) and the store.
+    workers : int
+        Processes on this machine; default: one per core.
+    quiet : bool
+        Show no progress.
+    """
+    if workers is not None and workers < 1:
+        raise InputError(f"--workers {workers}: must be at least 1.")
+    try:
+        found = find_best(design, out, workers=workers, show_progress=not quiet)
+    except KeyboardInterrupt:
+        raise KeyboardInterrupt(
+            f"interrupted; finished designs are kept in {out}. Run the same command again to resume."
+        ) from None
+    payload: dict[str, Any] = {
+        "schema": "hrg.optimise/1",
+        "design": found.task.name,
+        "card": found.task.study.instrument.name,
+        "evaluations": found.evaluations,
+        "failed": len(found.failures),
+        "parameters": _parameters(found),
+        "columns": _columns(found),
+        "constraints": _constraints(found),
+        "front": _front(found),
+        "tolerances": _tolerances(found),
+        "out": out,
+        "best_card": str(Path(out) / CARD),
+    }
+    count = len(found.task.keys.objective)
+    lead = (
+        f"{_number(found.task.free, 'parameter')}, {_number(count, 'objective')}, {_number(len(found.limits), 'limit')}:"
+        f" {found.evaluations} designs solved in full."
+    )
+    return Result(payload, f"Design {found.task.name}", lead, _parts(found, payload))
+
+
+def _parameters(found: Answer) -> list[dict[str, Any]]:
+    rows = []
+    for p, start, best, free in zip(
+        found.task.study.parameters, found.start, found.best, range(len(found.best)), strict=True
+    ):
+        if free < found.task.free:
+            near = 1e-3 * (p.high - p.low)
+            at = "low" if best - p.low < near else "high" if p.high - best < near else None
+            rows.append(
+                {
+                    "name": p.name,
+                    "start": float(start),
+                    "best": float(best),
+                    "low": p.low,
+                    "high": p.high,
+                    "at_bound": at,
+                }
+            )
+    return rows
+
+
+def _columns(found: Answer) -> list[dict[str, Any]]:
+    wanted = set(found.task.wanted)
+    rows = [
+        {
+            "column": column.name,
+            "label": column.label,
+            "unit": column.unit,
+            "start": float(found.before[k]),
+            "interpolant": float(found.foretold[k]),
+            "best": float(found.after[k]),
+            "verified": float(found.verified[k]),
+        }
+        for k, column in enumerate(found.task.study.columns)
+        if "_of_n" not in column.name and not column.name.endswith("nearest_harmonic")
+    ]
+    return sorted(rows, key=lambda row: row["column"] not in wanted)
+
+
+def _constraints(found: Answer) -> list[dict[str, Any]]:
+    return [
+        {
+            "column": one.column,
+            "kind": "most" if one.sign > 0 else "least",
+            "limit": one.limit,
+            "value": one.value,
+            "room": one.room,
+            "margin": one.margin,
+            "active": one.price is not None,
+            "price": one.price,
+        }
+        for one in found.limits
+    ]
+
+
+def _front(found: Answer) -> list[dict[str, Any]]:
+    if len(found.task.keys.objective) < 2:
+        return []
+    names = found.task.study.names[: found.task.free]
+    return [
+        {
+            **dict(zip(names, design.tolist(), strict=False)),
+            **{column: float(values[found.place(column)]) for column in found.task.wanted},
+        }
+        for design, values in zip(found.front, found.front_values, strict=True)
+    ]
+
+
+def _tolerances(found: Answer) -> list[dict[str, Any]]:
+    return [
+        {
+            "column": one.column,
+            "value": one.value,
+            "worst_case": one.first_order,
+            "sd": one.sd,
+            "low": one.low,
+            "high": one.high,
+            "passed": one.passed,
+        }
+        for one in found.spreads
+    ]
+
+
+def _parts(found: Answer, payload: dict[str, Any]) -> list[Any]:
+    unit = {row["column"]: f" {row['unit']}" if row["unit"] != "1" else "" for row in payload["columns"]}
+    label = {row["column"]: row["label"] for row in payload["columns"]}
+
+    def named(column: str) -> str:
+        return f"{label[column]}{unit[column].replace(' ', ' (', 1) + ')' if unit[column] else ''}"
+
+    facts = []
+    for goal in found.task.keys.objective:
+        k = found.place(goal.column)
+        facts.append(
+            (label[goal.column], f"{plain(found.after[k])}{unit[goal.column]}", f"before: {plain(found.before[k])}")
+        )
+    reasons = Counter(reason for _, reason in found.failures)
+    several = len(found.task.keys.objective) > 1
+    price = "price, parts of the ranges" if several else f"price, {label[found.task.keys.objective[0].column]} per unit"
+    words = "" if all(_agree(row) for row in payload["columns"]) else " The solve from the card differs: see the table."
+    keys = found.task.study.names[: found.task.free]
+    front = [Column(itemgetter(name), name.removeprefix("resonator."), digits=5) for name in keys]
+    front += [Column(itemgetter(name), named(name), digits=6) for name in found.task.wanted]
+    return [
+        Chapter("The design", [
+            Facts(facts),
+            Sentence(f"{payload['best_card']} is the best design as a card; {TABLE} beside it has all {found.evaluations} designs.{words}"),
+            Table("Parameters", payload["parameters"], [
+                Column(lambda row: row["name"].removeprefix("resonator."), "parameter"), Column("start", "before", digits=7), Column("best", "best", digits=7),
+                Column("low", "lowest"), Column("high", "highest"), Column("at_bound", "at bound"),
+            ]),
+            Table("Before and after", payload["columns"], [
+                Column("label", "quantity"), Column(lambda row: row["unit"] if row["unit"] != "1" else None, "unit"), Column("start", "before", digits=6), Column("interpolant", "best, by the interpolant", digits=7),
+                Column("best", "best, full solve", digits=7),
+            ], "The interpolant goes through all other designs; full solve: the design itself, solved again from its card with the same result."
+               " A separation counts by its magnitude; its sign says on which side the nearest mode is."),
+            Figure(lambda: pictures.section(best_instrument(found)), "Section of the best design, at rest and at full swing."),
+        ]),
+        Chapter("Constraints", [
+            Table("Limits and what they cost", payload["constraints"], [
+                Column(lambda row: named(row["column"]), "quantity"), Column("kind", "limit is"), Column("limit", "limit", digits=7), Column("value", "value", digits=7),
+                Column("room", "room", digits=3), Column(lambda row: row["margin"] or None, "margin for tolerances", digits=3), Column("price", price, digits=3),
+            ], "Price: what the objective would gain if the limit gave way by one unit of its column, to first order and before rounding; empty where the limit holds"
+               " nothing back."),
+        ]),
+        Chapter("Front", [
+            *([Sentence("One design is best in every objective: they do not conflict here.")] if several and len(payload["front"]) == 1 else []),
+            *([Figure(lambda: pictures.front(found), "All designs that keep the constraints, and those that no other beats.")] if several else []),
+            Table("Designs that no other beats", payload["front"], front),
+        ]),
+        Chapter("Tolerances", [
+            Table("What the tolerances do", payload["tolerances"], [
+                Column(lambda row: named(row["column"]), "quantity"), Column("value", "value", digits=6), Column("worst_case", "worst case ±", digits=3), Column("sd", "standard deviation", digits=3),
+                Column("value", "full solves", digits=6, interval=("low", "high")), Column("passed", "within limits", "%", ".1f", scale=100.0),
+            ], "Worst case and standard deviation to first order; full solves: the extremes among the worst corners and designs drawn from the tolerances."),
+        ]),
+        Chapter("Search", [
+            Figure(lambda: pictures.history(found), "Objective and excess over the limits of the designs, in the order in which they were computed."),
+            Table("Designs that could not be computed", [{"reason": reason, "designs": count} for reason, count in reasons.most_common(8)], [
+                Column("designs", "designs"), Column("reason", "reason"),
+            ], where="page"),
+        ]),
+    ]  # fmt: skip
+
+
+def _number(count: int, what: str) -> str:
+    return f"{count} {what}{'s' * (count != 1)}"
+
+
+def _agree(row: dict[str, Any]) -> bool:
+    """Whether the best design's column is the same solved again."""
+    return not isfinite(row["verified"]) or abs(row["verified"] - row["best"]) <= 1e-9 * abs(row["best"])

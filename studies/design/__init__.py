@@ -1,0 +1,1 @@
+"""Designing: dimensions for objectives under constraints, by full solves alone, with tolerances and a front."""

@@ -1,0 +1,108 @@
+"""A task run or resumed in its folder: the store of all its designs, `best.toml` and `evaluations.csv`."""
+
+from contextlib import nullcontext
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from studies.design.answer import Answer, answer
+from studies.design.task import Task, read_task
+from studies.files.writing import write_text
+from studies.instrument.card import Instrument, load_card, save_card
+from studies.sweeps.canonical import PHYSICS_VERSION, digest, spell_material
+from studies.sweeps.evaluate import WorkPlan
+from studies.sweeps.opening import claim_store
+from studies.sweeps.parameters import set_parameters
+from studies.sweeps.progress import Progress, shown_progress
+from studies.sweeps.provenance import describe_environment
+from studies.sweeps.run import cores
+from studies.sweeps.search import Explorer
+from studies.sweeps.store import Store, memory_store
+from studies.sweeps.workers import Here, Pool
+
+CARD, TABLE = "best.toml", "evaluations.csv"
+
+
+def optimise(
+    source: str | Path, out: str | Path | None = None, *, workers: int | None = None, show_progress: bool = False
+) -> Answer:
+    """Find the best design of a task, or resume where an earlier run stopped.
+
+    Parameters
+    ----------
+    source : path of a task, or the name of one that ships.
+    out : folder for the store, the best design as a card and the table of all designs; without it nothing is kept.
+    workers : processes; one for every core unless given. More than one need the guard `if __name__ == "__main__":`.
+    show_progress : bool
+
+    Raises
+    ------
+    InputError
+        An unusable task; constraints that no design keeps; a folder with the designs of another task.
+    """
+    task = read_task(source)
+    study = task.study
+    plan = replace(WorkPlan.of(study), start=dict(zip(study.names, task.start.tolist(), strict=True)))
+    store = memory_store() if out is None else claim_store(out)
+    count = workers or cores()
+    crew = Here() if count == 1 else Pool(count)
+    outcome = "stopped"
+    try:
+        _describe(store, task)
+        store.begin_run(describe_environment())
+        most = task.keys.search.evaluations
+        with shown_progress(most, 0) if show_progress else nullcontext(Progress()) as progress:
+            found = answer(task, Explorer(study, plan, crew, store, progress), plan)
+        outcome = "finished"
+    finally:
+        crew.close()
+        store.end_run(outcome)
+        store.close()
+    if out is not None:
+        path = Path(out) / CARD
+        save_card(best_instrument(found), path)
+        load_card(path)  # what is handed out can be read
+        write_text(Path(out) / TABLE, "\n".join(_table(found)) + "\n")
+    return found
+
+
+def best_instrument(found: Answer) -> Instrument:
+    """Return the instrument of the best design, under the task's name."""
+    study = found.task.study
+    instrument = set_parameters(study.instrument, found.named(found.best), study.derived)
+    return replace(instrument, name=f"{found.task.name}, best design")
+
+
+def _describe(store: Store, task: Task) -> None:
+    """Say what the designs in a store depend on: neither objectives nor bounds are part of it."""
+    study = task.study
+    physics = {
+        "card": {k: v for k, v in study.instrument.content.items() if k not in ("schema", "name", "note")},
+        "material_laws": digest(spell_material(study.instrument.material)),
+        "quantity": study.content["quantity"],
+        "parameters": list(study.names),
+        "start": task.start.tolist(),
+        "derived": study.content["derived"],
+        "physics_version": PHYSICS_VERSION,
+    }
+    identity = {**physics, "base": digest(physics), "design": ""}
+    store.check_same(identity)
+    instrument = {"name": study.instrument.name, "content": study.instrument.content, "path": study.instrument.path}
+    store.describe(
+        {
+            "identity": identity,
+            "spec": study.content,
+            "instrument": instrument,
+            "folder": study.folder,
+            "cases": 0,
+            "repeats": [],
+        }
+    )
+
+
+def _table(found: Answer) -> list[str]:
+    """Return every design with its columns as lines of CSV."""
+    rows = np.hstack([found.designs, found.values])
+    head = ",".join([*found.task.study.names, *found.task.columns])
+    return [head, *(",".join(f"{value:.15g}" for value in row) for row in rows)]

@@ -1,0 +1,284 @@
+"""The search for the best design: full solves, an interpolant through them, steps on it, and full solves again.
+
+First designs are drawn over the whole box. Steps on the interpolant through all of them, from several starts, look for the best
+region; then a star of designs about the best one renews the interpolant within a box that shrinks (a trust region), so that its
+slopes become those of full solves. Every design is kept in the store, and the path is the same every time: run again, it walks
+over what is there.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import qmc
+
+from studies.design.goals import Goals, Scalar, lay_goals, step
+from studies.design.interpolant import Interpolant, interpolate
+from studies.design.task import Task
+from studies.errors import InputError
+from studies.sweeps.search import Explorer
+
+Array = NDArray[np.float64]
+TOGETHER = 4  # designs that are computed together
+ROUNDS = 6  # over the whole box, at most
+BOXES = (0.15, 0.04, 0.01)  # half widths of the trust region, in parts of the ranges
+REFINED = 8  # steps within boxes of one size, at most
+ENOUGH = 3  # regions that lead to one place
+STARTS = 24  # of every step on the interpolant over the whole box
+NEAR = 6.0  # half widths within which designs make the interpolant of a trust region
+GAIN = 1e-5  # of an objective's spread: less is none
+ASIDE = 0.05  # step of a parameter that is not free, in parts of its range
+MOST_CORNERS = 256  # of the grid of steps about a design
+
+
+class Search:
+    """The designs seen so far and what becomes of them.
+
+    Attributes
+    ----------
+    x : (m, parameters) designs that have values, in parts of the ranges. values : (m, columns).
+    seen : every design looked at, in order, with its values or None.
+    """
+
+    def __init__(self, task: Task, explorer: Explorer) -> None:
+        self.task, self.explorer = task, explorer
+        self.low = np.array([p.low for p in task.study.parameters])
+        self.width = np.array([p.high - p.low for p in task.study.parameters])
+        self.steps = np.array([one.step or 0.0 for one in task.keys.parameter])
+        self.start = (task.start - self.low) / self.width
+        self.rng = np.random.default_rng(task.keys.search.seed)
+        self.x = np.empty((0, len(self.low)))
+        self.values = np.empty((0, len(task.columns)))
+        self.seen: dict[bytes, Array | None] = {}
+        self.failures: list[tuple[Array, str]] = []
+        self._draw_first()
+        self.goals: Goals = lay_goals(task, self.values, self.values[0])
+        self.margins = np.zeros(len(task.columns))
+
+    @property
+    def spent(self) -> bool:
+        """Whether as many designs were computed as the task allows."""
+        return len(self.seen) >= self.task.keys.search.evaluations
+
+    def look(self, points: Sequence[Array]) -> None:
+        """Compute designs at points, all together."""
+        designs = [self._design(x) for x in points]
+        new = {design.tobytes(): (design, x) for design, x in zip(designs, points, strict=True)}
+        new = {key: one for key, one in new.items() if key not in self.seen}
+        if not new:
+            return
+        cases = self.explorer.cases(np.array([design for design, _ in new.values()]))
+        for (key, (_, x)), case in zip(new.items(), cases, strict=True):
+            good = bool(np.isfinite(case.values).all())
+            self.seen[key] = case.values if good else None
+            if good:
+                self.x, self.values = np.vstack([self.x, x]), np.vstack([self.values, case.values])
+            else:
+                self.failures.append((x, case.remark))
+
+    def rank(self, scalar: Scalar) -> list[int]:
+        """Return the designs from the best on: those that keep all limits by what is wanted, then the others by their excess."""
+        keys = [(self.goals.violation(v, self.margins), scalar(self.goals.objectives(v))) for v in self.values]
+        return sorted(np.flatnonzero(self._is_plain()).tolist(), key=lambda k: keys[k])
+
+    def single(self, i: int) -> Scalar:
+        """Return objective i alone, over its spread."""
+        spread = np.array([self.goals.objectives(v) for v in self.values]).std(axis=0)
+        weights = np.zeros(len(self.task.keys.objective))
+        weights[i] = 1.0
+        return Scalar(weights, np.zeros_like(weights), np.maximum(spread, 1e-300))
+
+    def explore(self, scalar: Scalar) -> list[int]:
+        """Look for good regions of the whole box, and return the best design of each, the best first."""
+        task, idle = self.task, 0
+        low, high = self._box(self.start, 2.0)
+        for _ in range(ROUNDS):
+            order = self.rank(scalar)
+            before = self._merit(order[0], scalar)
+            surface = self._surface(np.flatnonzero(self._is_plain()))
+            starts = [self.x[k] for k in order[: STARTS // 3]]
+            while len(starts) < STARTS:
+                starts.append(np.where(np.arange(len(low)) < task.free, self.rng.random(len(low)), self.start))
+            found = [self._step(surface, scalar, x, low, high) for x in starts]
+            chosen: list[Array] = []
+            for _, x in sorted(found, key=lambda one: one[0]):
+                other = all(np.abs(x - one).max() > BOXES[0] for one in chosen)
+                if other and np.abs(x - self.x).max(axis=1).min() > BOXES[-1]:
+                    chosen.append(x)
+            self.look(chosen[:TOGETHER])
+            idle = 0 if self._gained(before, scalar) else idle + 1
+            if idle == 2 or self.spent or not chosen:
+                break
+        regions: list[int] = []
+        for k in self.rank(scalar):
+            if all(np.abs(self.x[k] - self.x[j]).max() > 2 * BOXES[0] for j in regions):
+                regions.append(k)
+        return regions[: task.keys.search.starts]
+
+    def descend(self, scalar: Scalar, best: int, boxes: Sequence[float] = BOXES) -> int:
+        """Improve a design within boxes that move with it and shrink, and return the place of the best one found."""
+        for half in boxes:
+            centre, idle = np.full_like(self.start, np.inf), 0
+            for _ in range(REFINED):
+                if np.abs(self.x[best] - centre).max() > half:
+                    centre = self.x[best]
+                    self.margins = self.goals.margins(self.values[best], self.slopes(best, half))
+                surface = self.local(self.x[best], half)
+                best = self._best_near(best, half, scalar)
+                before = self._merit(best, scalar)
+                _, x = self._step(surface, scalar, self.x[best], *self._box(self.x[best], half))
+                self.look([x])
+                best = self._best_near(best, half, scalar)
+                idle = 0 if self._gained(before, scalar, best) else idle + 1
+                if self.spent or idle == 2:
+                    break
+        return best
+
+    def best(self, scalar: Scalar) -> int:
+        """Return the best design that is found from several regions, each descended into at first, the best to the end.
+
+        Three regions that lead to one place are enough.
+        """
+        found: list[int] = []
+        for k in self.explore(scalar):
+            found.append(self.descend(scalar, k, BOXES[:1]))
+            apart = np.abs(self.x[found] - self.x[found[-1]]).max(axis=1)
+            if (apart < BOXES[0]).sum() == ENOUGH or self.spent:
+                break
+        return self.descend(scalar, min(found, key=lambda k: self._merit(k, scalar)), BOXES[1:])
+
+    def _best_near(self, best: int, half: float, scalar: Scalar) -> int:
+        near = np.flatnonzero(self._is_plain() & (np.abs(self.x - self.x[best]).max(axis=1) <= half + 1e-9))
+        return int(min(near, key=lambda k: self._merit(int(k), scalar)))
+
+    def settle(self, scalar: Scalar, best: int) -> int:
+        """Return the best design whose parameters are whole steps, where the task asks for steps."""
+        if not self.steps.any():
+            return best
+        for _ in range(REFINED):
+            surface = self.local(self.x[best], BOXES[-1])
+            x = self.x[best]
+            if not self._is_settled(x):
+                _, x = self._step(surface, scalar, x, *self._box(x, BOXES[-1]))
+            judged = [(self._judge(surface, scalar, one), one) for one in self._corners(x)]
+            self.look([one for _, one in sorted(judged, key=lambda pair: pair[0])[:TOGETHER]])
+            found = next((k for k in self.rank(scalar) if self._is_settled(self.x[k])), best)
+            if found == best:
+                break
+            best = found
+        return best
+
+    def local(self, centre: Array, half: float) -> Interpolant:
+        """Return the interpolant through the designs about a centre; those that are next to it where these are too few."""
+        plain = np.flatnonzero(self._is_plain())
+        apart = np.abs(self.x[plain] - centre).max(axis=1)
+        count = max(int((apart <= NEAR * half).sum()), 2 * self.task.free + 2)
+        return self._surface(plain[np.argsort(apart, kind="stable")[:count]])
+
+    def slopes(self, best: int, half: float) -> Array:
+        """Return the slopes of all columns as they count by every parameter, (columns, parameters), from a star of full solves.
+
+        Free parameters are moved by `half`, the others by a part of their tolerance: towards the middle of the box, in the last
+        and smallest star to both sides; the other way where a design cannot be computed.
+        """
+        x, count, last = self.x[best], len(self.low), half <= BOXES[-1]
+        by = np.where(np.arange(count) < self.task.free, half, ASIDE) * np.where(x <= 0.5, 1.0, -1.0)
+        sides = [x + side * move for move in np.diag(by) for side in ((1.0, -1.0) if last else (1.0,))]
+        self.look([one for one in sides if (one >= 0).all() and (one <= 1).all()])
+        found = np.zeros((len(self.task.columns), count))
+        here = (0.0, self.goals.count(self.values[best]))
+        for k, move in enumerate(np.diag(by)):
+            if self._value(x + move) is None and (x - move <= 1).all() and (x - move >= 0).all():
+                self.look([x - move])
+            known = [(side * by[k], self._value(x + side * move)) for side in (1.0, -1.0)]
+            ends = [(at, self.goals.count(value)) for at, value in known if value is not None]
+            if ends:
+                (one, f), (other, g) = (*ends, here)[:2]
+                found[:, k] = (f - g) / (one - other)
+        return found
+
+    def _draw_first(self) -> None:
+        """Compute the first design and some drawn over the box; InputError where the first one, or most of them, cannot be."""
+        self.look([self.start])
+        if self.failures:
+            raise InputError(f"the first design cannot be computed: {self.failures[0][1]}")
+        free = self.task.free
+        drawn = qmc.LatinHypercube(free, rng=self.rng).random(max(2 * free + 4, 8))
+        self.look([np.append(x, self.start[free:]) for x in drawn])
+        if len(self.failures) > len(drawn) / 2:
+            raise InputError(
+                f"{len(self.failures)} of {len(drawn)} designs drawn between the bounds cannot be computed; narrow the bounds,"
+                f" or tie lengths with [[derived]]. The first of them: {self.failures[0][1]}"
+            )
+        for one in self.task.keys.objective:
+            column = self.values[:, self.task.columns.index(one.column)]
+            if np.ptp(column) <= 1e-12 * np.abs(column).max():
+                why = "The card states no such part of the loss." if column[0] == 0 else ""
+                raise InputError(
+                    f"the objective '{one.column}' is {column[0]:g} whatever the free parameters are; leave it out. {why}".strip()
+                )
+
+    def _surface(self, places: NDArray[np.intp]) -> Interpolant:
+        return interpolate(self.x[places, : self.task.free], self.goals.count(self.values[places]))
+
+    def _step(
+        self, surface: Interpolant, scalar: Scalar, x: Array, low: Array, high: Array
+    ) -> tuple[tuple[float, float], Array]:
+        free = self.task.free
+        pieces = self.goals.pieces(scalar, surface(x[:free])[0], self.margins)
+        found, over, t = step(surface, pieces, np.clip(x, low, high)[:free], low[:free], high[:free])
+        return (over, t), np.append(found, self.start[free:])
+
+    def _judge(self, surface: Interpolant, scalar: Scalar, x: Array) -> tuple[float, float]:
+        z = surface(x[: self.task.free])[0]
+        values = np.where(self.goals.logarithmic, np.exp(np.where(self.goals.logarithmic, z, 0.0)), z)
+        return self.goals.violation(values, self.margins), scalar(self.goals.objectives(values))
+
+    def _merit(self, k: int, scalar: Scalar) -> tuple[float, float]:
+        return self.goals.violation(self.values[k], self.margins), scalar(self.goals.objectives(self.values[k]))
+
+    def _gained(self, before: tuple[float, float], scalar: Scalar, now: int | None = None) -> bool:
+        over, t = self._merit(self.rank(scalar)[0] if now is None else now, scalar)
+        return over < 0.9 * before[0] or (over == before[0] == 0 and t < before[1] - GAIN)
+
+    def _box(self, centre: Array, half: float) -> tuple[Array, Array]:
+        """Return a box about a design within the bounds; what is not free stays."""
+        free = np.arange(len(centre)) < self.task.free
+        low, high = np.maximum(centre - half, 0.0), np.minimum(centre + half, 1.0)
+        return np.where(free, low, self.start), np.where(free, high, self.start)
+
+    def _value(self, x: Array) -> Array | None:
+        return self.seen.get(self._design(x).tobytes())
+
+    def _design(self, x: Array) -> Array:
+        return np.asarray(np.round(self.low + x * self.width, 12))
+
+    def _is_plain(self) -> NDArray[np.bool_]:
+        """Return which designs have everything that is not free where it belongs."""
+        return np.asarray((self.x[:, self.task.free :] == self.start[self.task.free :]).all(axis=1))
+
+    def _corners(self, x: Array) -> list[Array]:
+        """Return the designs of whole steps about one: of a settled one its neighbours, of another the corners around."""
+        choices: list[list[float]] = []
+        settled = self._is_settled(x)
+        for k in range(len(x)):
+            value = self.low[k] + x[k] * self.width[k]
+            if k >= self.task.free or not self.steps[k]:
+                choices.append([value])
+                continue
+            inside = self.low[k] - 1e-9 * self.width[k], self.low[k] + (1 + 1e-9) * self.width[k]
+            whole = value / self.steps[k]
+            near = (round(whole) - 1, round(whole), round(whole) + 1) if settled else (np.floor(whole), np.ceil(whole))
+            found = [float(n * self.steps[k]) for n in near if inside[0] <= n * self.steps[k] <= inside[1]]
+            choices.append(found or [value])
+        count = int(np.prod([len(one) for one in choices]))
+        grid = range(count) if count <= MOST_CORNERS else self.rng.choice(count, MOST_CORNERS, replace=False)
+        shape = tuple(len(one) for one in choices)
+        rows = [[one[i] for one, i in zip(choices, np.unravel_index(int(k), shape), strict=True)] for k in grid]
+        return [(np.array(row) - self.low) / self.width for row in rows]
+
+    def _is_settled(self, x: Array) -> bool:
+        free, steps = self.task.free, self.steps
+        values = (self.low + x * self.width)[:free]
+        off = np.abs(values - np.round(values / np.where(steps > 0, steps, 1.0)) * steps)
+        return bool((off[steps > 0] < 1e-9 * self.width[:free][steps > 0]).all())

@@ -1,0 +1,175 @@
+"""A design task, read and checked: a study of its designs, and what their columns are wanted to be."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studies.design.keys import SCHEMA, DesignKeys, Objective, Tolerance
+from studies.errors import InputError, nearest
+from studies.files.reading import find_shipped, list_shipped
+from studies.instrument.card import load_card
+from studies.schema.reader import read_keys, read_toml
+from studies.sweeps.definition import Study
+from studies.sweeps.keys import Requirement
+from studies.sweeps.parameters import find_nominal
+from studies.sweeps.quantities import library
+from studies.sweeps.spec import check_study
+
+Array = NDArray[np.float64]
+MOST_HARMONIC = 12  # up to which a column finds its quantity
+NEIGHBOURS: dict[str, Any] = {"name": "mode-separation", "distances": True, "each": 3}
+
+
+@dataclass(frozen=True)
+class Task:
+    """A checked task.
+
+    Attributes
+    ----------
+    keys : as written.
+    study : its parameters are the free ones, then those that have a tolerance only; its quantities all that is asked.
+    free : how many of the parameters are free.
+    start : the first design, array (parameters,).
+    """
+
+    keys: DesignKeys
+    name: str
+    study: Study
+    free: int
+    start: Array
+
+    @property
+    def columns(self) -> list[str]:
+        """The names of all columns."""
+        return [column.name for column in self.study.columns]
+
+    @property
+    def wanted(self) -> list[str]:
+        """The columns of objectives and constraints, each once."""
+        return list(dict.fromkeys(goal.column for goal in _goals(self.keys)))
+
+    def unit(self, column: str) -> str:
+        """The unit of a column, as people read it; nothing where it is 1."""
+        found = next(one.unit for one in self.study.columns if one.name == column)
+        return "" if found == "1" else found
+
+    def tolerance(self, name: str) -> Tolerance | None:
+        """The tolerance of a parameter."""
+        return next((one for one in self.keys.tolerance if one.name == name), None)
+
+
+def read_task(source: str | Path) -> Task:
+    """Read a task from a TOML file, or by the name of one that ships.
+
+    Raises
+    ------
+    InputError
+        An unknown key, parameter or column (the nearest is named), a value of the wrong type or out of range.
+    """
+    path = find_shipped(source, shipped_tasks(), "design")
+    content, where = read_toml(path, SCHEMA), str(path)
+    keys = read_keys(content, DesignKeys, where)
+    for table, members in (("parameter", keys.parameter), ("objective", keys.objective)):
+        if not members:
+            raise InputError(f"{where}: a design needs at least one [[{table}]].")
+    beside = path.parent / keys.card
+    instrument = load_card(beside if keys.card.endswith(".toml") else keys.card)
+    for name in keys.fixed or {}:
+        find_nominal(instrument, name, f"{where}: fixed")
+    instrument = instrument.with_values(keys.fixed or {})
+    free = {one.name for one in keys.parameter}
+    parameters: list[dict[str, Any]] = []
+    start = []
+    for number, one in enumerate(keys.parameter, 1):
+        place = f"{where} [[parameter]] number {number}"
+        in_card = find_nominal(instrument, one.name, place)
+        if isinstance(in_card, str) or (in_card is None and one.start is None):
+            raise InputError(f"{place} '{one.name}' has no number in the card; give start = ..., or another key.")
+        value = one.start if one.start is not None else min(max(float(in_card or 0.0), one.low), one.high)
+        parameters.append({"name": one.name, "low": one.low, "high": one.high, "nominal": value})
+        start.append(value)
+    for also in keys.tolerance:
+        if also.name not in free:
+            parameters.append({"name": also.name, "tolerance": also.most})
+            start.append(float(find_nominal(instrument, also.name, f"{where} [[tolerance]]") or 0.0))
+    spec = {
+        "name": keys.name or path.stem,
+        "card": keys.card,
+        "sampling": {"method": "one-at-a-time"},
+        "parameter": parameters,
+        "derived": content.get("derived", []),
+        "quantity": list(_quantities(keys, content, where)),
+    }
+    study = check_study(spec, instrument, where, str(path.parent.resolve()), path.read_text(encoding="utf-8-sig"))
+    if study.functions:
+        raise InputError(f"{where}: a design asks for no Python function; use hrg study for that.")
+    task = Task(keys, keys.name or path.stem, study, len(free), np.array(start))
+    for goal in _goals(keys):
+        _check_magnitude(goal, where)
+    return task
+
+
+def shipped_tasks() -> dict[str, Path]:
+    """Return name -> path of the worked designs that ship with the package."""
+    return list_shipped(Path(__file__).parents[1] / "examples")
+
+
+def is_magnitude(column: str) -> bool:
+    """Whether a column counts by its magnitude: the distance of the nearest mode, whose sign says on which side it is."""
+    return "separation_n" in column and column.endswith("_Hz") and "_of_n" not in column
+
+
+def _goals(keys: DesignKeys) -> list[Objective | Requirement]:
+    """Return all that is wanted of columns."""
+    return [*keys.objective, *keys.constraint]
+
+
+def _check_magnitude(goal: Objective | Requirement, where: str) -> None:
+    """The distance of the nearest mode can be held above something, or be made large: nothing else is smooth."""
+    if not is_magnitude(goal.column):
+        return
+    wrong = goal.goal != "greatest" if isinstance(goal, Objective) else goal.low is None or goal.high is not None
+    if wrong:
+        raise InputError(f"{where}: '{goal.column}' takes goal = 'greatest', or a constraint with low alone.")
+
+
+def _quantities(keys: DesignKeys, content: Mapping[str, Any], where: str) -> Iterator[dict[str, Any]]:
+    """Yield the tables of all quantities: those of the file, and for columns that these do not give those found by name."""
+    known: dict[str, dict[str, Any]] = {}
+    for quantity, written in zip(keys.quantity, content.get("quantity", []), strict=True):
+        table = {**NEIGHBOURS, **written} if quantity.name == "mode-separation" else written
+        known |= dict.fromkeys((column.name for column in quantity.columns), table)
+        yield table
+    found = _by_column()
+    tables = ["objective"] * len(keys.objective) + ["constraint"] * len(keys.constraint)
+    numbers = [*range(1, len(keys.objective) + 1), *range(1, len(keys.constraint) + 1)]
+    for heading, number, goal in zip(tables, numbers, _goals(keys), strict=True):
+        column = goal.column
+        if column in known:
+            continue
+        if column not in found:
+            words = nearest(column, {**known, **found})
+            raise InputError(f"{where} [[{heading}]] number {number}: column = '{column}' is unknown{words}")
+        new = found[column]
+        known |= {other: new for other, one in found.items() if one == new}
+        yield new
+
+
+def _by_column() -> dict[str, dict[str, Any]]:
+    """Return the table that gives a column, of every quantity with its default keys and every harmonic."""
+    found: dict[str, dict[str, Any]] = {}
+    for name, quantity in library().items():
+        if name == "python":
+            continue
+        base: dict[str, Any] = NEIGHBOURS if name == "mode-separation" else {"name": name}
+        harmonics = [2, *range(2), *range(3, MOST_HARMONIC + 1)] if "harmonic" in quantity.__struct_fields__ else [None]
+        for n in harmonics:
+            table = base if n in (None, 2) else {**base, "harmonic": n}
+            asked = quantity(**{key: value for key, value in table.items() if key != "name"})
+            for column in asked.columns:
+                found.setdefault(column.name, table)
+    return found

@@ -1,0 +1,60 @@
+"""A mode keeps its name by its shape: through crossings within a harmonic, past repeated roots, or it is said to have vanished."""
+
+import dataclasses
+
+import pytest
+
+from shell.elastic import Elastic
+from shell.errors import ShellError
+from shell.following import follow, likeness
+from shell.meridian import cylinder, hemisphere
+from shell.modes import solve_modes
+
+METAL = Elastic(190e9, 0.3, 8000.0)
+
+
+def solve_tube(n, heights):
+    """Modes of a cylinder on the way from one height to another."""
+
+    def solve(place, count):
+        height = heights[0] + place * (heights[1] - heights[0])
+        body = cylinder(12.5e-3, 0.6e-3, height, bottom_thickness=1e-3, clamp_radius=3e-3)
+        return solve_modes(body, METAL, n, count, "shell", 1e-3)
+
+    return solve
+
+
+def test_a_shape_is_like_itself_and_unlike_the_others():
+    for n in (0, 1, 2):
+        modes = solve_modes(hemisphere(15e-3, 0.9e-3), Elastic(72.7e9, 0.17, 2203.0), n, 3, "shell", 1e-3)
+        assert likeness(modes[0], modes[0]) == pytest.approx(1.0)
+        assert max(likeness(modes[0], one) for one in modes[1:]) < 0.5
+
+
+def test_twist_and_stretch_cross_and_keep_their_names():
+    # twist does not mix with the axial motion of n = 0, so these two cross: the second twist comes below the second axial mode
+    solve = solve_tube(0, (30e-3, 42e-3))
+    before, after = solve(0.0, 3), solve(1.0, 3)
+    assert [m.label for m in before] == ["axial", "torsion", "axial"]
+    assert [m.label for m in after] == ["axial", "torsion", "torsion"]
+    followed = follow(solve, before[2])
+    assert (followed.label, followed.index) == ("axial", 3)
+    assert follow(solve, before[1]).index == 1
+
+
+def test_a_design_far_away_is_reached_step_by_step():
+    solve = solve_tube(2, (8e-3, 40e-3))
+    assert follow(solve, solve(0.0, 1)[0]).index == 0
+
+
+def test_of_a_repeated_root_one_shape_is_found():
+    solve = solve_tube(0, (30e-3, 30e-3))
+    known, twin = solve(0.0, 2)
+    mixed = [dataclasses.replace(one, frequency=known.frequency * (1 + 1e-6 * one.index)) for one in (twin, known)]
+    assert follow(lambda place, count: mixed, known).label == known.label
+
+
+def test_a_mode_that_vanishes_is_named():
+    axial, torsion = solve_tube(0, (30e-3, 30e-3))(0.0, 2)
+    with pytest.raises(ShellError, match="vanished or changed its shape"):
+        follow(lambda place, count: [torsion], axial)

@@ -1,0 +1,143 @@
+"""`hrg optimise`: bad tasks are named with the mend, a run resumes, the best design is a card that holds what was asked."""
+
+import json
+import tomllib
+
+import pytest
+
+from studies.cli import main
+from studies.design.run import optimise
+from studies.design.task import read_task, shipped_tasks
+from studies.instrument.card import load_card
+from studies.sweeps.case import Case
+from studies.sweeps.quantities import library
+
+TASK = """
+schema = "hrg.design/1"
+card = "free-dome"
+
+[[parameter]]
+name = "resonator.thickness_mm"
+low = 0.5
+high = 1.4
+step = 0.01
+
+[[parameter]]
+name = "resonator.radius_mm"
+low = 12.0
+high = 18.0
+
+[[quantity]]
+name = "frequency"
+theory = "shell"
+
+[[objective]]
+column = "mass_g"
+
+[[constraint]]
+column = "frequency_n2_Hz"
+low = 5000.0
+high = 5100.0
+"""
+
+
+def write(folder, text=TASK):
+    path = folder / "task.toml"
+    path.write_text(text, encoding="utf-8")
+    return str(path)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ('"mass_g"', '"mas_g"', "column = 'mas_g' is unknown; did you mean 'mass_g'?"),
+        (
+            "thickness_mm",
+            "thicknes_mm",
+            "has no parameter 'resonator.thicknes_mm'; did you mean 'resonator.thickness_mm'?",
+        ),
+        ("low = 0.5\nhigh = 1.4", "low = 1.5\nhigh = 1.4", "low must be below high, not 1.5 and 1.4"),
+        ("high = 18.0", "high = 18.0\nstart = 19.0", "start = 19 lies outside 12 to 18"),
+        ("step = 0.01", "steps = 0.01", "unknown key 'steps'; did you mean 'step'?"),
+        ('column = "mass_g"', 'column = "mass_g"\ngoal = "target"', "target = ... and goal = 'target' belong together"),
+        ('"mass_g"', '"separation_n2_Hz"', "takes goal = 'greatest', or a constraint with low alone"),
+        ("[[objective]]", "[[objectiv]]", "unknown key 'objectiv'; did you mean 'objective'?"),
+    ],
+)
+def test_a_wrong_key_is_named_with_the_mend(tmp_path, capsys, old, new, words):
+    assert main(["optimise", write(tmp_path, TASK.replace(old, new, 1)), "--out", str(tmp_path / "out")]) == 2
+    told = capsys.readouterr().err
+    assert words in told
+    assert told.count("\n") == 1
+
+
+def test_contradicting_limits_and_an_objective_without_value_are_said(tmp_path, capsys):
+    out = ["--out", str(tmp_path / "out"), "--workers", "1", "--quiet"]
+    both = TASK.replace("[[constraint]]", '[[constraint]]\ncolumn = "mass_g"\nhigh = 1.0\n[[constraint]]')
+    assert main(["optimise", write(tmp_path, both), *out]) == 2
+    told = capsys.readouterr().err
+    assert "no design found keeps all constraints" in told
+    assert "mass_g = " in told or "frequency_n2_Hz = " in told
+    constant = TASK.replace('"mass_g"', '"tcf_n2_ppm_per_degC"').replace(
+        'card = "free-dome"', 'card = "free-dome"\nfixed = { "material.name" = "own", "material.youngs_modulus_GPa" = 70.0,'
+        ' "material.poisson_ratio" = 0.2, "material.density_kg_m3" = 2500.0 }'
+    )  # fmt: skip
+    assert main(["optimise", write(tmp_path, constant), "--out", str(tmp_path / "other"), "--workers", "1"]) == 2
+    assert "the slope of the frequency is not known" in capsys.readouterr().err
+    level = (
+        TASK.replace('"mass_g"', '"inverse_q_n2_gas"')
+        + '\n[[quantity]]\nname = "loss"\ntheory = "shell"\nanchor = false\n'
+    )
+    assert main(["optimise", write(tmp_path, level), "--out", str(tmp_path / "third"), "--workers", "1"]) == 2
+    assert "is 0 whatever the free parameters are" in capsys.readouterr().err
+
+
+def test_a_run_resumes_and_the_best_card_holds_what_was_asked(tmp_path, capsys):
+    path, out = write(tmp_path), tmp_path / "out"
+    assert main(["optimise", path, "--out", str(out), "--workers", "1", "--quiet", "--json"]) == 0
+    said = json.loads(capsys.readouterr().out)
+    card = load_card(out / "best.toml")
+    frequency = library()["frequency"](theory="shell").evaluate(Case(card, {}))[0].value
+    assert 5000 <= frequency <= 5100
+    rows = {row["column"]: row for row in said["columns"]}
+    assert rows["frequency_n2_Hz"]["verified"] == pytest.approx(frequency, rel=1e-12)
+    assert rows["frequency_n2_Hz"]["interpolant"] == pytest.approx(frequency, rel=1e-4)
+    best = {row["name"]: row["best"] for row in said["parameters"]}
+    assert best["resonator.thickness_mm"] == pytest.approx(round(best["resonator.thickness_mm"], 2), abs=1e-12)
+    lines = (out / "evaluations.csv").read_text().splitlines()
+    assert len(lines) == said["evaluations"] - said["failed"] + 1
+    size = (out / "study.store").stat().st_size
+    again = optimise(path, out, workers=1)
+    assert again.evaluations == said["evaluations"]
+    assert (out / "study.store").stat().st_size - size < 4000  # the run is noted, nothing is computed
+    heavier = write(tmp_path, TASK.replace("high = 5100.0", "high = 5200.0"))
+    optimise(heavier, out, workers=1)  # other limits, the same designs
+    other = write(tmp_path, TASK.replace("free-dome", "hrg-30mm"))
+    assert main(["optimise", other, "--out", str(out)]) == 2
+    assert "holds results of a study that differs" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("name", sorted(shipped_tasks()))
+def test_worked_designs_can_be_read_and_copied(tmp_path, name):
+    task = read_task(name)
+    assert task.wanted
+    assert main(["design", "new", str(tmp_path / "mine.toml"), "--like", name]) == 0
+    assert tomllib.loads((tmp_path / "mine.toml").read_text())["card"] == task.keys.card
+    assert read_task(tmp_path / "mine.toml").columns == task.columns
+
+
+@pytest.mark.slow
+def test_recovery_dome_at_8_khz(tmp_path):
+    """The example that was asked for: 8 kHz, least loss through the mount, least TCF; wall and stem free."""
+    found = optimise("dome-8khz", tmp_path / "dome")
+    after = dict(zip(found.task.columns, found.after, strict=True))
+    before = dict(zip(found.task.columns, found.before, strict=True))
+    assert abs(after["frequency_n2_Hz"] - 8000) <= 8
+    assert after["frequency_n1_Hz"] >= 3500
+    assert abs(after["separation_n2_Hz"]) >= 500
+    assert after["inverse_q_n2_mount"] < before["inverse_q_n2_mount"] / 5
+    assert after["tcf_n2_ppm_per_degC"] < before["tcf_n2_ppm_per_degC"]
+    assert found.verified == pytest.approx(found.after, rel=1e-9)
+    kept = found.history[:, 0] == 0
+    mount = found.values[kept, found.place("inverse_q_n2_mount")]
+    assert after["inverse_q_n2_mount"] <= 1.05 * mount.min()  # in whole steps of wall and stem
