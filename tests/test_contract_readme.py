@@ -64,6 +64,8 @@ def test_commands_of_the_first_hour_run_in_order(folder, monkeypatch, capsys):
     for line in COMMANDS:
         program, *words = shlex.split(line, comments=True)
         assert program == "hrg"
+        if words[:1] == ["optimise"]:
+            continue  # a minute; tests/studies/design runs this task
         status = main(words)
         said, told = capsys.readouterr()
         if status == 3 and "OpenGL" in told:

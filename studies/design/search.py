@@ -23,6 +23,7 @@ TOGETHER = 4  # designs that are computed together
 ROUNDS = 6  # over the whole box, at most
 BOXES = (0.15, 0.04, 0.01)  # half widths of the trust region, in parts of the ranges
 REFINED = 8  # steps within boxes of one size, at most
+DRAWN = 100  # of which one is looked at because it is far off
 ENOUGH = 3  # regions that lead to one place
 STARTS = 24  # of every step on the interpolant over the whole box
 NEAR = 6.0  # half widths within which designs make the interpolant of a trust region
@@ -105,7 +106,7 @@ class Search:
                 other = all(np.abs(x - one).max() > BOXES[0] for one in chosen)
                 if other and np.abs(x - self.x).max(axis=1).min() > BOXES[-1]:
                     chosen.append(x)
-            self.look(chosen[:TOGETHER])
+            self.look([*chosen[: TOGETHER - 1], self._far_off(surface, scalar)])
             idle = 0 if self._gained(before, scalar) else idle + 1
             if idle == 2 or self.spent or not chosen:
                 break
@@ -114,6 +115,13 @@ class Search:
             if all(np.abs(self.x[k] - self.x[j]).max() > 2 * BOXES[0] for j in regions):
                 regions.append(k)
         return regions[: task.keys.search.starts]
+
+    def _far_off(self, surface: Interpolant, scalar: Scalar) -> Array:
+        """Return, of drawn designs of which the better quarter is expected, the one that is farthest from all known ones."""
+        free = self.task.free
+        drawn = [np.append(x, self.start[free:]) for x in self.rng.random((DRAWN, free))]
+        hopeful = sorted(drawn, key=lambda x: self._judge(surface, scalar, x))[: DRAWN // 4]
+        return max(hopeful, key=lambda x: float(np.linalg.norm(self.x - x, axis=1).min()))
 
     def descend(self, scalar: Scalar, best: int, boxes: Sequence[float] = BOXES) -> int:
         """Improve a design within boxes that move with it and shrink, and return the place of the best one found."""
