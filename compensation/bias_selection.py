@@ -35,6 +35,8 @@ PLAYS = (0.0, 0.02, 0.05, 0.1, 0.2)  # half-widths over the span of the temperat
 # Deviance that each number of a memory must gain: a chance of 0.001 by noise alone (χ² of one degree of freedom).
 WORTH = 10.8
 
+OPPOSITE = 0.5  # of the residual: what changed signs of one run leave where its output has the opposite sign
+
 
 class NoHeldOut(CompensationError):
     """Nothing can be held out: the rest carries no fit, or has not seen its frequencies and rates."""
@@ -114,6 +116,29 @@ def choose_memory(prepare: Callable[[Memory], Sequence[BiasRun]]) -> Memory:
         if deviance < least:
             best, least = memory, deviance
     return best
+
+
+def find_opposite(runs: Sequence[BiasRun], reference: float) -> int | None:
+    """Return the run whose bias has the opposite sign to the others', None where all agree.
+
+    All candidate terms with a constant for each run, B = ±(B₀ᵢ + X k), fit to half the residual or less once the signs
+    of one run are changed. Of two runs either may be the one: the last is returned.
+    """
+    design = BiasDesign(runs, reference)
+    X = np.column_stack([design.constants, design.candidates])
+    X /= np.maximum(np.linalg.norm(X, axis=0), 1e-300)
+
+    def left(run: int | None) -> float:
+        bias = design.bias.copy()
+        if run is not None:
+            bias[design.rows[run]] *= -1.0
+        return float(np.linalg.norm(bias - X @ np.linalg.lstsq(X, bias, rcond=1e-10)[0]))
+
+    if len(runs) < 2:
+        return None
+    turned = [left(k) for k in range(len(runs))]
+    best = len(runs) - 1 if len(runs) == 2 else int(np.argmin(turned))
+    return best if turned[best] < OPPOSITE * left(None) else None
 
 
 def score_held_out(runs: Sequence[BiasRun], method: Method = "guarded") -> HeldOutRows:

@@ -18,6 +18,7 @@ from compensation.bias_selection import (
     NoHeldOut,
     bias_stability,
     choose_memory,
+    find_opposite,
     fit_bias,
     score_held_out,
     score_path,
@@ -67,7 +68,8 @@ class BiasStudy:
     """Everything about one calibration: runs, both methods, `model` of the chosen one, Allan before and after.
 
     `column` is what the bias is a function of; `allan_step` (s) of the series behind the Allan deviations, which short
-    runs do not have (None); `no_held_out` why there is no held-out score.
+    runs do not have (None); `no_held_out` why there is no held-out score; `opposite` the file of a run whose output has
+    the opposite sign to the others'.
     """
 
     output: str
@@ -79,6 +81,7 @@ class BiasStudy:
     after: Stability | None
     allan_step: float
     no_held_out: str
+    opposite: str | None = None
 
     def by(self, method: Method) -> Judged:
         """Return what one method made of the runs."""
@@ -171,7 +174,9 @@ def study_bias(
     after = compensate(model, longest, extrapolate=True)[f"{COMPENSATED}{output}"]
     step, series = unbroken(longest["time_s"], {"before": longest[output], "after": after})
     spectra = [_spectrum(values, step) for values in series.values()]
-    return BiasStudy(output, column, tuple(runs), tuple(judged), model, spectra[0], spectra[1], step, why)
+    odd = find_opposite(runs, fit.reference)
+    opposite = None if odd is None else records[odd].path or f"run {odd + 1}"
+    return BiasStudy(output, column, tuple(runs), tuple(judged), model, spectra[0], spectra[1], step, why, opposite)
 
 
 def _spectrum(values: Array, step: float) -> Stability | None:

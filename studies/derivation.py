@@ -7,7 +7,7 @@ import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import repeat
-from textwrap import fill
+from textwrap import fill, indent
 from typing import Any
 
 import sympy as sp
@@ -57,6 +57,11 @@ class Step:
     title: str
     equations: tuple[sp.Eq, ...]
 
+    @property
+    def heading(self) -> str:
+        """Number, where the paper has one, and title."""
+        return f"({self.number}) {self.title}" if self.number else self.title
+
 
 def read_chain(
     rows: Iterable[tuple[str, str, Any, Any]], edit: Callable[[sp.Expr], sp.Expr] = lambda side: side
@@ -77,12 +82,13 @@ def read_chain(
 
 def emit_text(steps: Sequence[Step]) -> str:
     """Return a chain for a terminal: each equation in two dimensions under its number and title."""
-    blocks = []
-    for step in steps:
-        head = fill(f"({step.number}) {step.title}" if step.number else step.title, WIDTH)
-        drawn = (sp.pretty(_spelt(one), use_unicode=True, num_columns=WIDTH - 4) for one in step.equations)
-        blocks.append("\n\n".join([head, *("\n".join(f"    {line}" for line in text.splitlines()) for text in drawn)]))
+    blocks = [f"{fill(step.heading, WIDTH)}\n\n{indent(draw(step), '    ')}" for step in steps]
     return "\n\n".join(blocks) + "\n"
+
+
+def draw(step: Step) -> str:
+    """Return the equations of a step in two dimensions."""
+    return "\n\n".join(sp.pretty(_spelt(one), use_unicode=True, num_columns=WIDTH - 4) for one in step.equations)
 
 
 def emit_latex(steps: Sequence[Step], title: str) -> str:

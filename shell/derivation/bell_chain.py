@@ -31,7 +31,7 @@ def shorten(equation: sp.Expr) -> sp.Expr:
 def _shape() -> list[Row]:
     ends = "Ends of the domain: faces, a full turn, the mouth (the top is where the stem begins)"
     lengths = "Lengths per φ and around at the height υ (here z), and their derivatives"
-    radii = "Principal radii of the hyperbola; its roots and the minus are lost in print"
+    radii = "Principal radii of the hyperbola; roots and a minus sign are missing in print"
     return [
         ("1", "Meridian: hemisphere, cylinder, hyperbola (height z_a)", None, bell.meridian()),
         ("2", ends, None, bell.domain()),
@@ -43,7 +43,7 @@ def _shape() -> list[Row]:
 def _elasticity() -> list[Row]:
     hooke, strain = bell.hooke_in_three_dimensions(), bell.strains_of_the_body()
     divergence = "Divergence of the stress along φ, υ (here z) and θ; a comma is a derivative"
-    printed = "has terms in ∂ρ₁/∂φ, which vanish on hemisphere and cylinder only, and σ_φθ for σ_φυ once: its excess"
+    printed = "terms in ∂ρ₁/∂φ, which vanish on hemisphere and cylinder only, and σ_φθ instead of σ_φυ once: difference from (7)"
     return [
         ("5", "Hooke's law", " ".join(f"sigma_{name}" for name in hooke), hooke.values()),
         ("6", "Strains of the body (shears are twice the paper's)", " ".join(strain._fields), strain),
@@ -56,27 +56,27 @@ def _motion() -> list[Row]:
     slow, printed = bell_dynamics.slow_accelerations(), bell_dynamics.printed_slow_accelerations()
     excess = [found - ours for found, ours in zip(printed, slow, strict=True)]
     _, *added = bell_dynamics.acceleration_parts()
-    parts = "Acceleration: that of u, and what the rate adds: Coriolis (C), Euler (E), centripetal (N)"
-    force = "Inertial force per area; set equal to (7) it is (15)"
+    parts = "Acceleration of u, and the terms of the rate: Coriolis (C), Euler (E), centripetal (N)"
+    force = "Inertial force per area; equated to (7) it gives (15)"
     rate = "Displacement u_φ, u_υ, u_θ along the three directions, and the rate"
     return [
         ("8-10", rate, _along("Omega"), bell_dynamics.rate_vector()),
         ("11", parts, _along("C", "E", "N"), [component for part in added for component in part]),
-        ("12", "Acceleration of a point, their sum", _along("a"), bell_dynamics.accelerations()),
-        ("13", "The same of a slow, steady rate", _along("a"), slow),
-        ("13 as printed", "has cos φ for sin φ and lacks u_φ in the third: its excess", _along("d"), excess),
+        ("12", "Acceleration of a point: their sum", _along("a"), bell_dynamics.accelerations()),
+        ("13", "Acceleration at a slow, steady rate", _along("a"), slow),
+        ("13 as printed", "cos φ instead of sin φ, and no u_φ in the third: difference from (13)", _along("d"), excess),
         ("14", force, _along("f"), bell_dynamics.inertial_forces()),
     ]
 
 
 def _pattern() -> list[Row]:
     names, plain = "ε_φφ ε_θθ 2ε_φθ", bell.membrane_strains(with_factor=False)
-    parity = "has another parity around than along; from it comes a coupling c₁ of two patterns on a perfect bell"
-    stretch = "would be zero if it did not stretch; on the hemisphere they are"
+    parity = "different parity along and around, which couples (c₁) two patterns on a perfect bell"
+    stretch = "Zero for an inextensional pattern; on the hemisphere they are"
     return [
-        ("19", "The assumed pattern, along the meridian, around and normal", "U V W", bell.rayleigh_functions()),
+        ("19", "Assumed pattern: meridional, circumferential and normal", "U V W", bell.rayleigh_functions()),
         ("17, 18", stretch, names, bell.membrane_strains()),
-        ("", "and without the factor cos(5πφ/φ_b)", names, plain),
+        ("", "Without the factor cos(5πφ/φ_b)", names, plain),
         ("16 as printed", parity, "c_1", bell.coupling_stiffness(bell.printed_patterns())),
     ]
 
@@ -84,18 +84,15 @@ def _pattern() -> list[Row]:
 def _model() -> list[Row]:
     model, (coupling, mass, stiffness) = bell.galerkin_model(), sp.symbols("b m_0 c_0", positive=True)
     energy = 2 * sp.pi * energies.surface_energy_density() * bell.rho_1(phi) * bell.rho_2(phi) * sp.sin(phi)
-    ours = (
-        "Their coefficients per unit of φ, ours (Galerkin by Lagrange's equations), with the amplitudes of the middle surface's"
-        " strains; c₁ is zero on a perfect bell"
-    )
-    printed = "m₀ = πρh W and b = πρh V (cos φ + sin φ) have no integral and the first power of the pattern; read so, k would be"
+    ours = "Coefficients per unit of φ from Lagrange's equations (Galerkin), with the strain amplitudes of the middle surface; c₁ is zero on a perfect bell"
+    printed = "m₀ = πρh W and b = πρh V (cos φ + sin φ) lack the integral and the square of the pattern; taken literally, k would be"
     return [
-        ("20", "Two patterns on a turning bell", bell.equations_of_motion(), 0),
+        ("20", "Two patterns on a rotating bell", bell.equations_of_motion(), 0),
         ("", ours, "m_0 b c_0", (model.m_0, model.b, energy)),
         ("20 as printed", printed, "k", bell.printed_precession_factor()),
         ("21", "Precession factor", "k", coupling / (n * mass)),
         ("22", "Frequency", omega**2, stiffness / mass),
-        ("", "On the hemisphere, over ρh", "M B", pattern_coefficients()),
+        ("", "On the hemisphere, divided by ρh", "M B", pattern_coefficients()),
     ]
 
 

@@ -70,12 +70,12 @@ def _elasticity() -> list[Row]:
     surface = strains.corrected_deformation(displacements.general_displacement())
     defect = strains.printed_twist_defect(), strains.printed_deformation(strains.rigid_motions()["shift along z"]).tau
     in_plane = ((one.e_phi, one.e_theta, one.gamma_phitheta) for one in (strain, layer))
-    twist = "has ∂w/∂φ for ∂w/∂θ in the twist: its error, and the twist it finds in a shell only shifted along its axis"
+    twist = "∂w/∂φ instead of ∂w/∂θ in the twist: the error, and the false twist of a rigid shift along the axis"
     return [
         ("1", "Displacements of harmonic n", "u v w", shape),
         ("2", "Kinetic energy", "K", displacements.kinetic_energy(shape)),
         ("3", "Strain energy per volume", "S_V", energies.full_energy_density()),
-        ("4", "the same of a thin shell, normals staying normal", "S_V", energies.thin_energy_density()),
+        ("4", "Strain energy of a thin shell whose normals stay normal", "S_V", energies.thin_energy_density()),
         ("5", "Hooke's law", energies.hooke().keys(), energies.hooke().values()),
         ("6", "Strains at height z, much smaller than r", next(in_plane), next(in_plane)),
         ("7", "Strain energy per area", "S_A", energies.surface_energy_density()),
@@ -94,16 +94,21 @@ def _mode() -> list[Row]:
     bending = [part.subs(t, 0) for part in inextensional.mode_deformation()[3:]]
     at_pole = "Powers of φ at the pole: M is infinite there for n > 1, so M = 0 and U = V"
     return [
-        ("9", "No stretching, for harmonic n", inextensional.inextensional_conditions(), 0),
+        ("9", "Conditions of no stretching, for harmonic n", inextensional.inextensional_conditions(), 0),
         ("", "The first condition removes W", inextensional.eliminate_normal_displacement(), 0),
-        ("", "Their sum, in P = U + V, and their difference, in M = U - V", inextensional.decoupled_equations(), 0),
-        ("", "Variables separated", "(lnP)′ (lnM)′", inextensional.separated_rates()),
-        ("", "Integrated in T = tan(φ/2)", "lnP lnM", inextensional.integrate_separated()),
-        ("", "General solution, each with a factor of its own", "P M", inextensional.general_solution()),
+        (
+            "",
+            "Sum and difference of the conditions, with P = U + V and M = U - V",
+            inextensional.decoupled_equations(),
+            0,
+        ),
+        ("", "Separation of variables", "(lnP)′ (lnM)′", inextensional.separated_rates()),
+        ("", "Integration with T = tan(φ/2)", "lnP lnM", inextensional.integrate_separated()),
+        ("", "General solution, each with a free factor", "P M", inextensional.general_solution()),
         ("", at_pole, "p_P p_M", inextensional.pole_exponents()),
-        ("10", "The mode that does not stretch", unknown, inextensional.inextensional_mode()),
-        ("11", "Its displacements", "u v w", inextensional.inextensional_displacement()),
-        ("", "Its curvature changes and twist", energies.DEFORMATION[3:], bending),
+        ("10", "The inextensional mode", unknown, inextensional.inextensional_mode()),
+        ("11", "Displacements of the inextensional mode", "u v w", inextensional.inextensional_displacement()),
+        ("", "Curvature changes and twist of the inextensional mode", energies.DEFORMATION[3:], bending),
     ]
 
 
@@ -111,17 +116,16 @@ def _frequency() -> list[Row]:
     greatest = frequency.maximum_kinetic_energy(), frequency.maximum_potential_energy()
     by_logarithm = "∂lnf/∂lnE ∂lnf/∂ν ∂lnf/∂lnρ ∂lnf/∂lnh ∂lnf/∂lnr ∂lnf/∂φ₂"
     turning = (
-        "Two patterns on a shell turning with Ω, per unit of φ and ρh: mass M and Coriolis coupling 2ΩB; "
-        "the standing wave lags by K of the angle turned"
+        "Two patterns on a shell rotating at Ω, per unit of φ and ρh: mass M, Coriolis coupling 2ΩB, Bryan factor K"
     )
     return [
         (
             "12",
-            "Greatest kinetic and potential energy, and their integrals",
+            "Maximum kinetic and potential energy, and their integrals",
             "K_max U_max I J",
             (*greatest, *frequency.integral_definitions()),
         ),
-        ("13", "Frequency, where both energies are equal", omega**2, frequency.omega_squared()),
+        ("13", "Frequency from equal maximum energies", omega**2, frequency.omega_squared()),
         ("", "Derivatives of ln f for design", by_logarithm, frequency.log_derivatives()),
         ("", turning, "M B K", (*coriolis.pattern_coefficients(), coriolis.precession_rate())),
     ]
@@ -130,19 +134,24 @@ def _frequency() -> list[Row]:
 def _temperature() -> list[Row]:
     parts = "TCF_E TCF_ν TCF_ρ TCF_h TCF_r"
     return [
-        ("15", "Frequency over temperature", "f", temperature.frequency_over_temperature()),
-        ("", "Its slope d ln f/dT by parts, from E, ν, ρ, h and r", parts, temperature.temperature_parts()),
-        ("", "their sum in free isotropic expansion α, E = 2 G (1 + ν)", "TCF", temperature.free_expansion()),
+        ("15", "Frequency as a function of temperature", "f", temperature.frequency_over_temperature()),
+        (
+            "",
+            "Temperature coefficient d ln f/dT and its parts from E, ν, ρ, h and r",
+            parts,
+            temperature.temperature_parts(),
+        ),
+        ("", "Sum of the parts for free isotropic expansion α, E = 2 G (1 + ν)", "TCF", temperature.free_expansion()),
     ]
 
 
 def _numbers(case: DerivedCase) -> list[Row]:
     number, names = "14" if case.harmonic == 2 else "", f"I_{case.harmonic} J_{case.harmonic} K_{case.harmonic}"
     values = (case.bending, case.mass, case.precession)
-    closed = [("", "Its integrals and Bryan factor in closed form", names, values)]
+    closed = [("", "Integrals and Bryan factor in closed form", names, values)]
     return [
         (number, f"Frequency in Hz for n = {case.harmonic}", "f", frequency.frequency(case.harmonic)),
         *([] if case.mass.has(sp.Float) else closed),
-        ("", "Its integrals and Bryan factor as numbers", names, [sp.N(value, 17) for value in values]),
-        ("", "Derivative of ln f by the rim angle (1/rad)", "∂lnf/∂φ₂", sp.N(case.rim_derivative, 17)),
+        ("", "Integrals and Bryan factor, numerical values", names, [sp.N(value, 17) for value in values]),
+        ("", "Derivative of ln f with respect to the rim angle (1/rad)", "∂lnf/∂φ₂", sp.N(case.rim_derivative, 17)),
     ]

@@ -22,6 +22,10 @@ WORSE = (
     "{} is worse than the record: the standard deviation of {:g} s averages goes from {:.4g} to {:.4g}. Use it only if the model"
     " is of this gyro and this sign of the output."
 )
+OPPOSITE = (
+    0.5  # of the record's deviation: what a correction of the opposite sign leaves where the output's sign is changed
+)
+SIGN = " With the opposite sign the correction would leave {:.4g}: check the sign of the output."
 OWN_THERMOMETER = (
     "{1} has no thermometer, so {0} has the resonator's temperature, found from the frequency, instead of a compensated frequency."
     " To compensate other outputs over this temperature, use hrg fit bias --over temperature."
@@ -126,8 +130,12 @@ def _show(record: Record, result: Record, columns: dict[str, dict[str, Any]]) ->
         if now is None:
             parts.append(Sentence(f"{name}: too few rows for {AVERAGE:g} s averages."))
         elif was is not None and now > was * (1 + NOISE):
-            say(f"warning: {WORSE.format(name, AVERAGE, was, now)}")
-            parts.append(Sentence(WORSE.format(name, AVERAGE, was, now), "warning", "page"))
+            words = WORSE.format(name, AVERAGE, was, now)
+            before = record[name.removeprefix(COMPENSATED)]
+            turned = _stability(record["time_s"], 2 * before - result[name])
+            words += SIGN.format(turned) if turned is not None and turned < OPPOSITE * was else ""
+            say(f"warning: {words}")
+            parts.append(Sentence(words, "warning", "page"))
         parts.append(Figure(lambda name=name: _draw(record, result, name), f"{name} over time."))  # type: ignore[misc]
     return parts
 

@@ -123,9 +123,9 @@ def derive(
         "d_ln_f_d_rim_angle_per_rad": float(case.rim_derivative.evalf(20)),
     }
     emitted = emit_code(case, code) if code else None
-    text = _write(payload, read_chain(steps(case)), HRG_TITLE, latex, code, emitted)
+    text = _write(payload, chain := read_chain(steps(case)), HRG_TITLE, latex, code, emitted)
     lead = f"HRG paper, equations (1) to (15), closed forms for n = {harmonic} from {pole_angle_deg:g}° to {rim_angle_deg:g}°."
-    return Result(payload, "Frequency of the inextensional shell", lead, _chapters(payload["equations"]), printed=text)
+    return Result(payload, "Frequency of the inextensional shell", lead, _chapters(chain), printed=text)
 
 
 def _into_file(out: str, result: Result) -> Result:
@@ -145,9 +145,9 @@ def _derive_dynamics(latex: bool, code: Literal["python", "c"] | None) -> Result
 
     payload: dict[str, Any] = {"schema": "hrg.derive-dynamics/1"}
     emitted = emit_code(code) if code else None
-    text = _write(payload, read_chain(steps()), DYNAMICS_TITLE, latex, code, emitted)
+    text = _write(payload, chain := read_chain(steps()), DYNAMICS_TITLE, latex, code, emitted)
     lead = "Averaged equations of amplitude, quadrature, precession and phase of the standing wave."
-    return Result(payload, "Dynamics of the standing wave", lead, _chapters(payload["equations"]), printed=text)
+    return Result(payload, "Dynamics of the standing wave", lead, _chapters(chain), printed=text)
 
 
 def _derive_bell(latex: bool) -> Result:
@@ -156,11 +156,11 @@ def _derive_bell(latex: bool) -> Result:
 
     say("deriving the bell's equations ...")
     payload: dict[str, Any] = {"schema": "hrg.derive-bell/1"}
-    text = _write(payload, read_chain(bell_steps(), shorten), BELL_TITLE, latex)
+    text = _write(payload, chain := read_chain(bell_steps(), shorten), BELL_TITLE, latex)
     payload["numbers"] = None
     title, lead = "Theory of the bell", "BVG paper, equations (1) to (22), beside what is printed."
     if latex:
-        return Result(payload, title, lead, _chapters(payload["equations"]), printed=text)
+        return Result(payload, title, lead, _chapters(chain), printed=text)
     theory = compare_bell_theory()
     numbers = [dataclasses.asdict(row) for row in (*theory.rows, theory.free, theory.solid)]
     columns = [
@@ -173,20 +173,16 @@ def _derive_bell(latex: bool) -> Result:
     parts: list[Chapter | Part] = [
         Sentence(text, "source", "terminal"),
         Chapter("Against the solver", [table]),
-        *_chapters(payload["equations"]),
+        *_chapters(chain),
     ]
     return Result(payload | {"numbers": dataclasses.asdict(theory)}, title, lead, parts)
 
 
-def _chapters(equations: list[dict[str, Any]]) -> list[Chapter]:
-    """The steps of a derivation, for a page."""
-    return [
-        Chapter(
-            f"({step['number']}) {step['title']}" if step["number"] else step["title"],
-            [Sentence("\n".join(step["plain"]), "source", "page")],
-        )
-        for step in equations
-    ]
+def _chapters(chain: "Sequence[Step]") -> list[Chapter]:
+    """The steps of a derivation, for a page: the equations as on a terminal."""
+    from studies.derivation import draw
+
+    return [Chapter(step.heading, [Sentence(draw(step), "source", "page")]) for step in chain]
 
 
 def _write(

@@ -77,6 +77,7 @@ def fit_bias(
         [
             parts.facts(study, method),
             Sentence(parts.verdict(study, method)),
+            *parts.doubts(study),
             Chapter("Before and after", [parts.runs_figure(study, method), parts.gain_table(study)]),
             Chapter(
                 "Selection of terms",
@@ -105,6 +106,7 @@ def _payload(study: BiasStudy, method: str, data: tuple[str, ...]) -> dict[str, 
         "play_half_width_degC": study.runs[0].memory.play,
         "method": method,
         "rows": [int(run.time.size) for run in study.runs],
+        "opposite_sign": study.opposite,
         "missing": sum(run.missing for run in study.runs),
         "spikes": sum(run.spikes for run in study.runs),
         "rate_lag_s": study.runs[0].lag,

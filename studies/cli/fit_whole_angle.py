@@ -44,7 +44,7 @@ def fit_whole_angle(
     card: str | None = None,
     bryan_factor: float | None = None,
     quadrature_volts_per_hertz: float | None = None,
-    confidence: Confidence = 0.95,
+    confidence: Confidence = 0.9,
     save: str | None = None,
 ) -> Result:
     """Find damping and frequency splits with their axes, gain ratio and phase error in a whole-angle run, with intervals.
@@ -68,7 +68,7 @@ def fit_whole_angle(
         Write the card with the estimates and their uncertainties.
     """
     if not 0 < confidence < 1:
-        raise InputError(f"--confidence {confidence:g}: a confidence level lies between 0 and 1, such as 0.95.")
+        raise InputError(f"--confidence {confidence:g}: a confidence level lies between 0 and 1, such as 0.9.")
     instrument = load_card(card) if card else None
     if save is not None and instrument is None:
         raise InputError("--save writes a card with the estimates: name the card to start from with --card.")

@@ -27,15 +27,11 @@ from studies.errors import InputError, naming
 from studies.instrument.card import Instrument, load_card
 from studies.law import law_of
 from studies.reports.digits import to_numerical_error
+from studies.reports.mode_picture import THEORIES
 from studies.reports.scenes import show_mode
 from studies.results import Blocks, Column, Result, Sentence, Table, Where
 from studies.results.page import Block
 
-THEORIES = {
-    "solid": "three-dimensional elasticity",
-    "shell": "Naghdi shell theory",
-    "rayleigh": "Rayleigh's closed form",
-}
 FAR = 0.1
 """Relative difference of the first order from all orders from which on a split is doubted."""
 COLUMNS = (
@@ -126,16 +122,20 @@ def modes(
             *effect_tables(entries, asked),
             *_all_orders(entries),
             *_detail_tables(entries if detailed else [], "everywhere" if sensitivities else "page"),
-            Blocks(lambda: _view(instrument, sorted(set(harmonic)), T)),
+            Blocks(lambda: _view(instrument, sorted(set(harmonic)), T, theory)),
         ],
     )
 
 
-def _view(instrument: Instrument, harmonics: list[int], T: float) -> Sequence[Block]:
+def _view(instrument: Instrument, harmonics: list[int], T: float, theory: str) -> Sequence[Block]:
     """The lowest modes, to be turned."""
     from studies.reports.mode_picture import view_blocks
 
-    return view_blocks([show_mode(instrument, n, temperature=T) for n in harmonics])
+    drawn: Literal["solid", "shell"] = "solid" if theory == "solid" else "shell"
+    remark = (
+        " Rayleigh's closed form gives the frequencies of the table, not these shapes." if theory == "rayleigh" else ""
+    )
+    return view_blocks([show_mode(instrument, n, temperature=T, theory=drawn) for n in harmonics], remark)
 
 
 def _to_error(row: dict[str, Any]) -> str:

@@ -1,7 +1,9 @@
 """`hrg study`: run, status, report and export of parametric studies."""
 
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
+
+from cyclopts import Parameter
 
 from studies.cli.arguments import Folder
 from studies.cli.output import answers, say
@@ -121,7 +123,7 @@ def status(folder: Folder) -> Result:
 
 
 @answers("hrg.study-report/1", page=False)
-def report(folder: Folder, *, out: str | None = None) -> Result:
+def report(folder: Folder, *, out: Annotated[str | None, Parameter(name=("--report", "--out"))] = None) -> Result:
     """Write a self-contained HTML page: definition, results, figures, sensitivities, yield and provenance.
 
     Parameters

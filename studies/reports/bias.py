@@ -6,6 +6,7 @@ from typing import Literal
 import numpy as np
 
 from compensation.bias import SELECTED_BY_THE_PAPER, TERMS, Variable
+from compensation.bias_selection import AVERAGING
 from compensation.memory import Memory
 from compensation.noise import FLAT
 from studies.bias import BiasStudy, Judged
@@ -26,6 +27,7 @@ SYMBOLS = {
 }  # fmt: skip
 ORDER = list(SYMBOLS)
 MOST_RUNS = 12  # that are drawn
+FEW = 40  # averages: four to each of nine terms and a constant
 METHOD = {"guarded": "guarded", "paper": "as in the paper"}
 Method = Literal["guarded", "paper"]
 PATH_NOTE = (
@@ -101,6 +103,25 @@ def verdict(study: BiasStudy, method: Method) -> str:
         if held.by_runs
         else f"{sentence} For a stronger test, record a second run, warming if this one cooled."
     )
+
+
+def doubts(study: BiasStudy) -> list[Sentence]:
+    """Warn where the runs are too short to select terms by, or where one has the opposite sign to the others."""
+    found, lasts = [], sum(float(np.ptp(run.time)) + run.width for run in study.runs)
+    averages = int(lasts / AVERAGING)
+    if averages < FEW:
+        spread = 100 / math.sqrt(2 * max(averages - 1, 1))
+        found.append(
+            f"The data are short: {averages} averages of {AVERAGING:g} s. A standard deviation of so few is uncertain by {spread:.0f} %,"
+            f" and the selection of terms is unreliable; record {FEW * AVERAGING / 3600:.1f} h or more, over the full temperature range."
+        )
+    if study.opposite is not None:
+        which = "One of the two runs" if len(study.runs) == 2 else study.opposite
+        found.append(
+            f"{which} has a bias of the opposite sign: with its sign changed, the terms fit all runs at least twice as well."
+            " Check the sign of the output in the files."
+        )
+    return [Sentence(text, "warning") for text in found]
 
 
 def how_rows_were_made(study: BiasStudy) -> str:

@@ -8,6 +8,12 @@ from shell.constants import zero_Celsius
 from studies.results import Sentence
 from studies.results.page import Block
 
+THEORIES = {
+    "solid": "three-dimensional elasticity",
+    "shell": "Naghdi shell theory",
+    "rayleigh": "Rayleigh's closed form",
+}
+
 if TYPE_CHECKING:
     from studies.instrument.card import Instrument
     from studies.reports.scenes import ModeScene
@@ -20,15 +26,15 @@ def mode_blocks(instrument: "Instrument", harmonics: Sequence[int] = (2, 3)) -> 
     return view_blocks([show_mode(instrument, n) for n in harmonics])
 
 
-def view_blocks(shown: "Sequence[ModeScene]") -> list[Block]:
+def view_blocks(shown: "Sequence[ModeScene]", remark: str = "") -> list[Block]:
     """Return the interactive view of modes of one instrument at one temperature."""
     from shell.render import NoOpenGL, render_png
     from studies.reports.webgl import Drawn, view_modes
 
     first = shown[0]
     caption = (
-        f"{first.instrument.name} at {first.temperature - zero_Celsius:g} °C: modes from the {first.mode.theory} solver, on the"
-        " solid of the card with its thickness, rim and stem. The displacement is exaggerated."
+        f"{first.instrument.name} at {first.temperature - zero_Celsius:g} °C: mode shapes of {THEORIES[first.mode.theory]}, on the solid"
+        f" of the card with its thickness, rim and stem. The displacement is exaggerated.{remark}"
     )
     for one in shown:
         if one.split is not None:

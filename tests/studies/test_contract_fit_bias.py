@@ -196,6 +196,7 @@ def test_a_short_run_is_fitted_without_an_allan_deviation(tmp_path, capsys):
     assert payload["allan"] is None
     assert payload["methods"]["guarded"]["coefficients"][1] == pytest.approx(5, abs=0.5)
     assert main(["fit", "bias", str(tmp_path / "r.csv"), "--report", str(tmp_path / "p.html")]) == 0
+    assert "The data are short: 2" in capsys.readouterr().out
 
 
 def test_json_is_one_object_with_both_methods(calibrated, capsys):
@@ -370,7 +371,20 @@ def test_a_compensation_that_does_harm_is_said(calibrated, tmp_path, capsys):
     record = read_record(run)
     write_record(record.with_columns({"bias_deg_per_h": -record["bias_deg_per_h"]}), flipped)
     assert main(["compensate", str(calibrated / "m.toml"), str(flipped), "--out", str(out)]) == 0
-    assert "is worse than the record" in capsys.readouterr().err
+    said = capsys.readouterr().err
+    assert "is worse than the record" in said
+    assert "With the opposite sign the correction would leave" in said
+
+
+@pytest.mark.parametrize("turned", [None, 1, 2])
+def test_a_run_with_the_opposite_sign_is_named(tmp_path, capsys, turned):
+    for k in range(3):
+        record = make_record(k, cooling=k != 1)
+        sign = -1.0 if k == turned else 1.0
+        write_record(record.with_columns({"bias_deg_per_h": sign * record["bias_deg_per_h"]}), tmp_path / f"{k}.csv")
+    assert main(["fit", "bias", *(str(tmp_path / f"{k}.csv") for k in range(3)), "--json"]) == 0
+    named = json.loads(capsys.readouterr().out)["opposite_sign"]
+    assert named == (None if turned is None else str(tmp_path / f"{turned}.csv"))
 
 
 def test_a_laboratory_file_is_sent_to_the_import(calibrated, tmp_path, capsys):
