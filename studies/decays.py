@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from studies.errors import InputError, naming
 from studies.files.columns import read_columns, read_header
 from studies.record import Record, check_plausible, write_record
-from studies.ringdown import Decay
+from studies.ringdown import POWERS, Decay
 
 if TYPE_CHECKING:
     from compensation.ringdown.laws import Law
@@ -46,7 +46,8 @@ def is_table(path: str | Path) -> bool:
     with open(path, "rb") as file:
         if file.read(1) == b"%":
             return False
-    return bool(set(read_header(path)) & set(RESPONSES))
+    header = set(read_header(path))
+    return bool(header & set(RESPONSES)) and not header & set(POWERS)
 
 
 def read_table(path: str | Path) -> Decays:
@@ -86,7 +87,7 @@ def table_of(decays: Sequence[Decay]) -> Decays:
     }
     sds = {
         "frequency_Hz": column(
-            [d.phased.estimates["frequency_Hz"].sd if d.phased and d.frequency else 0 for d in decays]
+            [d.estimates["frequency_Hz"].sd if "frequency_Hz" in d.estimates else 0 for d in decays]
         ),
         "inverse_q": column([0 if decay.inverse_q is None else decay.inverse_q.sd for decay in decays]),
     }

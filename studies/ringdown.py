@@ -6,7 +6,9 @@ A file is a table with the column `time_s` and one of these groups, for one pick
 - raw samples: `pickoff_cos_V`, `pickoff_sin_V`;
 - a lock-in's pairs: `amplitude_cos_V`, `phase_cos_deg` and the same with sin, or `in_phase_cos_V`, `out_of_phase_cos_V`; a
   comment `# reference_frequency_Hz: 7000.0` gives its reference;
-- a power without phase: `power_dBm` (or `power_dB`).
+- a power without phase: `power_dBm`, `power_dB` or `power_W` (linear, any unit).
+
+A spectrum analyser's trace has `frequency_Hz` in place of `time_s`, and a power.
 
 Comments `# pressure_Pa: …`, `# temperature_degC: …` and `# start: …` say where and when; a trace of a membrane or
 quartz laboratory with `%` comments and a last comment `time [s], power [dBm]` is read as it is.
@@ -21,7 +23,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from studies.errors import InputError, naming
-from studies.files.columns import Columns, read_columns
+from studies.files.columns import Columns, read_columns, read_header
 
 if TYPE_CHECKING:
     import numpy as np
@@ -29,6 +31,7 @@ if TYPE_CHECKING:
 
     from compensation.ringdown.analysis import Estimate, RingDown
     from compensation.ringdown.envelope import Envelope
+    from compensation.ringdown.spectrum import SpectrumFit
     from compensation.ringdown.trace import TraceDecay
     from studies.instrument.card import Instrument
 
@@ -36,8 +39,8 @@ PARTS = ("cos", "sin")
 RAW = tuple(f"pickoff_{part}_V" for part in PARTS)
 POLAR = tuple((f"amplitude_{part}_V", f"phase_{part}_deg") for part in PARTS)
 CARTESIAN = tuple((f"in_phase_{part}_V", f"out_of_phase_{part}_V") for part in PARTS)
-POWERS = ("power_dBm", "power_dB")
-KNOWN = ("time_s", *RAW, *(name for pair in (*POLAR, *CARTESIAN) for name in pair), *POWERS)
+POWERS = ("power_dBm", "power_dB", "power_W")
+KNOWN = ("time_s", "frequency_Hz", *RAW, *(name for pair in (*POLAR, *CARTESIAN) for name in pair), *POWERS)
 NOTES = ("reference_frequency_Hz", "pressure_Pa", "temperature_degC")
 NOTE = re.compile(r"^\W*(\w+):\s*([-+.\deE]+)\s*$")
 START = re.compile(r"^\W*(?:start|Date and time):\s*(\d{4}-\d\d-\d\d\S*(?: \d\d:\S+)?)\s*$")
@@ -50,41 +53,37 @@ FOREIGN = {
 
 @dataclass(frozen=True)
 class Decay:
-    """One decay: what was read and what it says, with its phase (`phased`) or without (`trace`, of `time` and `amplitude`)."""
+    """One decay: what was read and what it says, with its phase (`phased`), without (`trace`, of `time` and `amplitude`), or as a `spectrum`."""
 
     path: str
     notes: Mapping[str, float]
     phased: "RingDown | None" = None
     trace: "TraceDecay | None" = None
+    spectrum: "SpectrumFit | None" = None
     envelope: "Envelope | None" = field(default=None, repr=False)
     time: "NDArray[np.float64] | None" = field(default=None, repr=False)
     amplitude: "NDArray[np.float64] | None" = field(default=None, repr=False)
 
     @property
-    def _one(self) -> "RingDown | TraceDecay":
+    def window(self) -> tuple[float, float] | None:
+        """Seconds of the record that are free decay; a spectrum has none."""
         one = self.phased or self.trace
-        assert one is not None
-        return one
-
-    @property
-    def window(self) -> tuple[float, float]:
-        """Seconds of the record that are free decay."""
-        return self._one.window
+        return None if one is None else one.window
 
     @property
     def remarks(self) -> tuple[str, ...]:
         """What is not as it should be, a sentence each."""
-        return self._one.remarks
+        one = self.phased or self.trace or self.spectrum
+        return () if one is None else one.remarks
 
     @property
     def estimates(self) -> "Mapping[str, Estimate]":
         """Values by name; those of a trace are its rate and, where the frequency is known, 1/Q."""
         from compensation.ringdown.analysis import Estimate
 
-        if self.phased is not None:
-            return self.phased.estimates
-        assert self.trace is not None
-        t = self.trace
+        if (t := self.trace) is None:
+            one = self.phased or self.spectrum
+            return {} if one is None else one.estimates
         found = {"decay_per_s": Estimate(t.decay, t.sd, t.low, t.high)}
         if self.frequency is not None:
             unit = pi * self.frequency
@@ -94,9 +93,12 @@ class Decay:
     @property
     def frequency(self) -> float | None:
         """Mean frequency (Hz); a trace has that of its comments."""
-        if self.phased is not None:
-            return self.phased.estimates["frequency_Hz"].value if self.phased.fit.envelope.carrier else None
-        return self.notes.get("reference_frequency_Hz")
+        if self.trace is not None:
+            return self.notes.get("reference_frequency_Hz")
+        if self.phased is not None and not self.phased.fit.envelope.carrier:
+            return None
+        found = [e.value for name, e in self.estimates.items() if re.fullmatch(r"frequency(_[12])?_Hz", name)]
+        return self.estimates["frequency_Hz"].value if "frequency_Hz" in self.estimates else sum(found) / len(found)
 
     @property
     def inverse_q(self) -> "Estimate | None":
@@ -105,35 +107,34 @@ class Decay:
 
     @property
     def noise(self) -> list[float]:
-        """Standard deviation of the noise of a row, by channel, in the unit of the record."""
-        return self.phased.fit.noise.tolist() if self.phased is not None else [self.trace.noise] if self.trace else []
+        """Standard deviation of the noise of a row, by channel, in the unit of the record; of a spectrum the relative scatter."""
+        if self.phased is not None:
+            return [float(one) for one in self.phased.fit.noise]
+        return [self.trace.noise] if self.trace else [self.spectrum.scatter] if self.spectrum else []
 
     @property
     def widening(self) -> float:
-        """Standard deviations over the Cramér–Rao bound of white noise."""
-        return (
-            self.phased.fit.widening
-            if self.phased is not None
-            else self.trace.sd / self.trace.bound
-            if self.trace
-            else 1.0
-        )
+        """Standard deviations over the Cramér–Rao bound of white noise; of a spectrum its misfit."""
+        if self.trace is not None:
+            return self.trace.sd / self.trace.bound
+        return self.phased.fit.widening if self.phased else self.spectrum.widening if self.spectrum else 1.0
 
     @property
     def interference(self) -> list[float]:
         """Frequencies (Hz) of lines that are no decay."""
-        return (
-            [self.phased.fit.envelope.carrier + line for line in self.phased.lines] if self.phased is not None else []
-        )
+        return [self.phased.fit.envelope.carrier + line for line in self.phased.lines] if self.phased else []
 
     def curves(self) -> "Iterator[tuple[NDArray[Any], NDArray[Any], NDArray[Any], NDArray[Any]]]":
-        """Yield time, level (dB), fitted level and residual of each channel, within the window."""
+        """Yield time (of a spectrum: frequency), level (dB), fitted level and residual of each channel, within the window."""
         import numpy as np
 
         if self.phased is not None:
             fit = self.phased.fit
             for z, r in zip(fit.envelope.values, fit.residual, strict=True):
                 yield fit.envelope.time, 20 * np.log10(np.abs(z)), 20 * np.log10(np.abs(z - r)), r
+        elif (s := self.spectrum) is not None:
+            level, fitted = 10 * np.log10(s.power), 10 * np.log10(s.fitted)
+            yield s.frequency, level, fitted, level - fitted
         elif self.trace is not None and self.time is not None and self.amplitude is not None:
             level = 20 * np.log10(self.amplitude)
             start, end = self.trace.window
@@ -172,7 +173,18 @@ def read_decay(
     table, notes = _read(path)
     if frequency is not None:
         notes = {**notes, "reference_frequency_Hz": frequency}
-    columns, time = table.values, table.values["time_s"]
+    columns = table.values
+    power = next(
+        (columns[name] if name.endswith("W") else 10 ** (columns[name] / 10) for name in POWERS if name in columns),
+        None,
+    )
+    if "time_s" not in columns:
+        from compensation.ringdown.spectrum import fit_spectrum
+
+        assert power is not None
+        with naming(path):
+            return Decay(str(path), notes, spectrum=fit_spectrum(columns["frequency_Hz"], power))
+    time = columns["time_s"]
     if time.size > 1 and not np.all(np.diff(time) > 0):
         row = int(np.flatnonzero(np.diff(time) <= 0)[0]) + 1
         raise InputError(
@@ -180,9 +192,8 @@ def read_decay(
         )
     reference = notes.get("reference_frequency_Hz")
     with naming(path):
-        power = next((name for name in POWERS if name in columns), None)
         if power is not None:
-            amplitude = 10 ** (columns[power] / 20)
+            amplitude = np.sqrt(power)
             return Decay(str(path), notes, trace=analyse_trace(time, amplitude), time=time, amplitude=amplitude)
         raw = [columns[name] for name in RAW if name in columns]
         if raw:
@@ -196,6 +207,8 @@ def read_decay(
 
 def _read(path: str | Path) -> tuple[Columns, dict[str, float]]:
     """Return the table and the numbers of its comments; traces with % comments have two columns and no header."""
+    import numpy as np
+
     try:
         with open(path, encoding="utf-8", errors="replace") as file:
             foreign = file.read(1) == "%"
@@ -203,7 +216,13 @@ def _read(path: str | Path) -> tuple[Columns, dict[str, float]]:
         raise InputError(f"{path}: cannot be read ({error.strerror}).") from None
     if foreign:
         return _read_trace(path)
-    table = read_columns(path, KNOWN, ["time_s"])
+    header = set(read_header(path))
+    spectrum = "frequency_Hz" in header and bool(header & set(POWERS))
+    table = read_columns(path, KNOWN, ["frequency_Hz" if spectrum else "time_s"])
+    if spectrum and not (np.diff(table.values["frequency_Hz"]) > 0).all():
+        raise InputError(
+            f"{path}: frequency_Hz does not increase; a spectrum is one trace in order of frequency, without time_s."
+        )
     if len(table.values) < 2:
         raise InputError(
             f"{path}: only time_s; a decay needs {RAW[0]}, {POLAR[0][0]} with {POLAR[0][1]}, or {POWERS[0]} beside it."

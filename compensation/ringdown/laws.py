@@ -219,12 +219,12 @@ def _covariance(X: Real, residual: Real, weight: Real, rows: Rows) -> Real:
     began = np.full(decays.max() + 1, np.inf)
     np.minimum.at(began, decays, rows.time)
     order = np.argsort(np.argsort(began, kind="stable"))[decays]
-    middle, alone = _long_run(order, scores), _long_run(order, scores, neighbours=False)
+    middle, alone = long_run(order, scores), long_run(order, scores, neighbours=False)
     # what a value takes out of its session falls from the sum of neighbours: it must not count as noise that cancels
     short = np.sqrt(np.maximum(np.diag(alone) / np.maximum(np.diag(middle), 1e-300), 1.0))
     middle = middle * np.outer(short, short) if np.all(np.isfinite(short)) else alone
     if place.max() > 0:
-        middle = middle + _long_run(place, scores) - scores.T @ scores
+        middle = middle + long_run(place, scores) - scores.T @ scores
     bread = inverse / scale[:, None]
     least = np.diag(np.diag(inverse) / scale**2) * 1e-12
     return np.asarray(bread @ middle @ bread.T + least)
@@ -239,7 +239,7 @@ def _places(rows: Rows) -> Whole:
     return place
 
 
-def _long_run(group: Whole, scores: Real, neighbours: bool = True) -> Real:
+def long_run(group: Whole, scores: Real, neighbours: bool = True) -> Real:
     """Return Σ S_i S_jᵀ over sums of scores by group, those of neighbours with a weight that falls to 0 at √N."""
     sums: Real = np.stack([np.bincount(group, column) for column in scores.T], axis=1)
     found: Real = sums.T @ sums

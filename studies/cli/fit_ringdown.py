@@ -67,7 +67,8 @@ def fit_ringdown(
     """Fit frequencies, Q and the axes of elasticity and damping to ring-downs, with 90 % intervals.
 
     A file holds one decay: time_s and pickoff_cos_V (and pickoff_sin_V) as raw samples; from a lock-in amplifier
-    amplitude_cos_V with phase_cos_deg, or in_phase_cos_V with out_of_phase_cos_V (and the same with sin); or power_dB or power_dBm. The drive, the release transient and the noise floor are
+    amplitude_cos_V with phase_cos_deg, or in_phase_cos_V with out_of_phase_cos_V (and the same with sin); or power_dB, power_dBm or power_W. A spectrum analyser's trace has
+    frequency_Hz and a power: Lorentzian lines on a background give frequency and Q. The drive, the release transient and the noise floor are
     found and left out. Several files are several decays of one resonator: with comments such as '# pressure_Pa: 0.01',
     '# temperature_degC: 22.5' and '# start: 2026-03-01T10:00:00', frequency and 1/Q are fitted against pressure, temperature and
     time (ageing, or steps between sessions). A table of earlier results does the same: frequency_Hz or inverse_q beside
@@ -142,7 +143,7 @@ def _row(decay: Decay) -> dict[str, Any]:
     return {
         "data": decay.path,
         "file": Path(decay.path).name,
-        "window_s": list(decay.window),
+        "window_s": None if decay.window is None else list(decay.window),
         "frequency_Hz": decay.frequency,
         "q": None if q is None else 1 / q.value,
         "q_low": None if q is None else 1 / q.high,
@@ -164,7 +165,14 @@ def _figure(decay: Decay) -> Figure:
 
 
 def _draw(decay: Decay) -> Drawing:
-    with style.figure(2, 1, height=4.6, sharex=True, x="time (s)", y=("level (dB)", "residual")) as (
+    with style.figure(
+        2,
+        1,
+        height=4.6,
+        sharex=True,
+        x="frequency (Hz)" if decay.spectrum else "time (s)",
+        y=("level (dB)", "residual"),
+    ) as (
         drawn,
         (top, bottom),
     ):

@@ -6,6 +6,7 @@ import pytest
 from compensation.errors import CompensationError
 from compensation.ringdown.analysis import analyse_decay
 from compensation.ringdown.envelope import from_lock_in, mix_down
+from compensation.ringdown.spectrum import fit_spectrum
 from compensation.ringdown.trace import analyse_trace
 from tests.compensation.two_oscillators import Gyro, noisy
 
@@ -199,3 +200,29 @@ def test_a_trace_of_power_gives_the_decay_that_its_noise_allows(plateau):
         assert abs(found.decay - 1 / tau) < 4.5 * found.sd
         inside += found.low <= 1 / tau <= found.high
     assert inside >= 8
+
+
+def test_a_spectrum_gives_frequency_and_q_with_intervals_that_hold():
+    """Averaged periodograms of Lorentzian lines on a background: 24 spectra, two values of each."""
+    random, inside, scores = np.random.default_rng(12), [], []
+    for _ in range(24):
+        f0, q = 7000.0 + random.uniform(-1, 1), 10 ** random.uniform(3, 4.5)
+        f = np.linspace(7000 - 20 * 7000 / q, 7000 + 20 * 7000 / q, 401)
+        f0 = 7000 + random.uniform(-5, 5) * 7000 / q
+        clean = 1 + 10 ** random.uniform(1, 4) / (1 + (2 * (f - f0) * q / f0) ** 2)
+        found = fit_spectrum(f, clean * random.gamma(8, 1 / 8, f.size)).estimates
+        for name, value in (("frequency_Hz", f0), ("inverse_q", 1 / q)):
+            scores.append((found[name].value - value) / found[name].sd)
+            inside.append(found[name].low <= value <= found[name].high)
+    assert 0.77 <= np.mean(inside)
+    assert np.max(np.abs(scores)) < 4.5
+
+
+def test_a_spectrum_of_a_split_mode_gives_both_lines():
+    f = np.linspace(6990, 7010, 801)
+    clean = 1 + 100 / (1 + (2 * (f - 7000.6) / 0.5) ** 2) + 60 / (1 + (2 * (f - 6999.7) / 0.4) ** 2)
+    found = fit_spectrum(f, clean * np.random.default_rng(13).gamma(20, 1 / 20, f.size)).estimates
+    for name, value in (("split_Hz", 0.9), ("q_1", 7000.6 / 0.5), ("q_2", 6999.7 / 0.4)):
+        assert abs(found[name].value - value) < 4 * found[name].sd
+    with pytest.raises(CompensationError, match="no resonance"):
+        fit_spectrum(f, np.random.default_rng(14).gamma(20, 1 / 20, f.size))

@@ -67,6 +67,20 @@ def test_raw_samples_and_their_alias(tmp_path, capsys):
     assert "slow.csv" in said
 
 
+@pytest.mark.parametrize("name", ["power_dBm", "power_W"])
+def test_a_spectrum_analysers_trace(tmp_path, capsys, name):
+    f = np.linspace(4590, 4610, 501)
+    power = (0.01 + 1 / (1 + (2 * (f - 4599.7) / 0.8) ** 2)) * np.random.default_rng(5).gamma(30, 1 / 30, f.size)
+    path = write(
+        tmp_path / "trace.csv", {"frequency_Hz": f, name: 10 * np.log10(power) if name == "power_dBm" else power}
+    )
+    assert main(["fit", "ringdown", path, "--report", str(tmp_path / "page.html"), "--json"]) == 0
+    (line,) = json.loads(capsys.readouterr().out)["decays"]
+    assert line["frequency_Hz"] == pytest.approx(4599.7, abs=0.02)
+    assert line["q_low"] < 4599.7 / 0.8 < line["q_high"]
+    assert line["window_s"] is None
+
+
 @pytest.mark.parametrize(
     ("columns", "said"),
     [
@@ -76,6 +90,8 @@ def test_raw_samples_and_their_alias(tmp_path, capsys):
         ({"time_s": TIME, "power_dBm": 0 * TIME + np.sin(TIME)}, "nothing decays"),
         ({"time_s": TIME[:10], "power_dBm": -TIME[:10]}, "32 rows"),
         ({"time_s": TIME, "voltage": TIME}, "voltage"),
+        ({"frequency_Hz": TIME + 1, "power_dBm": 0 * TIME}, "no resonance"),
+        ({"frequency_Hz": TIME[::-1] + 1, "power_dBm": TIME}, "does not increase"),
     ],
 )
 def test_what_is_no_ring_down_is_refused_with_its_file(tmp_path, capsys, columns, said):
