@@ -56,6 +56,10 @@ COMMANDS: dict[str, tuple[str, str]] = {
         "studies.cli.diagnose:diagnose",
         "Find what the simulation gets wrong, its cause, and the gain from correcting it.",
     ),
+    "fleet": (
+        "studies.cli.fleet:fleet",
+        "Calibrate and diagnose a lot of devices: what it shares, who differs, charts.",
+    ),
     "acceptance": ("studies.cli.acceptance:acceptance", "Evaluate records against limits with the tests of IEEE 1431."),
     "derive": ("studies.cli.derive:derive", "Symbolic derivation as equations, LaTeX or code."),
     "render": ("studies.cli.render:render", "Mode shape as a picture, animation, page or mesh."),
@@ -222,7 +226,7 @@ CHAPTERS = {
     ),
     "Manufacture": ("scan", "trim", "electrodes"),
     "Simulate and import": ("simulate", "twin", "thermal", "import", "show", "export"),
-    "Calibrate, diagnose and accept": ("calibrate", "diagnose", "effects", "acceptance"),
+    "Calibrate, diagnose and accept": ("calibrate", "diagnose", "fleet", "effects", "acceptance"),
     "Compensate": ("fit", "compensate", "temperature"),
     "Library and setup": ("cards", "card", "keys", "materials", "reproduce", "doctor"),
 }

@@ -18,7 +18,7 @@ PLANNED = "hrg-30mm"
 """Card of a plan without --card."""
 
 
-@answers("hrg.diagnosis/1, with --plan hrg.plan/2, with --device hrg.fleet/1")
+@answers("hrg.diagnosis/1, with --plan hrg.plan/2, with --device hrg.fleet/2")
 def diagnose(
     *runs: str,
     card: str | None = None,
@@ -118,11 +118,13 @@ def _campaign(runs: tuple[str, ...], card: str | None, limits: Chamber | None, s
 
 def _fleet(devices: list[str], manifest: str | None, card: str | None) -> Result:
     """Diagnose devices of one design together."""
-    from studies.diagnosis.fleet.investigation import diagnose_fleet
-    from studies.diagnosis.fleet.records import read_fleet
+    from studies.fleet.folder import read_devices
+    from studies.fleet.run import run_lot
     from studies.reports import fleet as parts
 
     with Told("fleet") as told:
-        design = None if card is None else load_card(card)
-        whole = diagnose_fleet(read_fleet(devices, manifest), design, progress=told)
-    return Result(whole.as_dict(), "Diagnosis of a fleet", parts.headline(whole), parts.fleet_parts(whole))
+        lot = run_lot(read_devices(devices, manifest, card), progress=told)
+    for why in lot.failed.values():
+        say(f"hrg: {why}")
+    status = 4 if lot.failed else 0
+    return Result(lot.as_dict(), "Diagnosis of a fleet", parts.headline(lot), parts.fleet_parts(lot), status)

@@ -1,128 +1,178 @@
-"""Parts of a fleet's diagnosis: what devices of one design have in common, and which of them differs."""
+"""Parts of a lot: what devices of one design have in common, which differ, and control charts of their values."""
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from studies.diagnosis.fleet.outcome import Fleet, Share, Value
-from studies.reports.diagnosis import NAMES, cause_table, remarks, response_table
+import numpy as np
+
+from studies.fleet.comparison import Share
+from studies.fleet.lot import Lot
+from studies.fleet.population import Quantity
+from studies.reports.diagnosis import NAMES, spell_parameter
 from studies.reports.digits import plain
-from studies.reports.style import BLUE, VERMILION, figure
-from studies.results import Chapter, Column, Drawing, Figure, Part, Sentence, Table
+from studies.reports.style import BLUE, ORANGE, VERMILION, figure
+from studies.results import Chapter, Column, Drawing, Facts, Figure, Part, Sentence, Table
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-ACROSS, MOST = 3, 6
-KINDS = {"all": "all devices", "all but": "all but {0}", "alone": "{0} alone", "own": "each device its own"}
+ACROSS, MOST, DATED, NAMED = 2, 8, 4, 25
+"""Charts side by side, in all, and over the date; devices whose names stand below a chart."""
 METHOD = (
-    "Each device is diagnosed alone. For each cause that any of them shows, the evidence for every alternative effect is summed over"
-    " the devices. A cause of the design pays its prior once; a device that differs pays an extra prior. A value is flagged if it"
-    " lies more than three standard deviations from the prediction of the other devices, including their scatter. With two devices,"
-    " values alone cannot show which one differs."
+    "Each device is calibrated and diagnosed by itself. A value of the lot has a mean and a scatter over the devices (normal, restricted"
+    " likelihood), beside the error of each device. A device is odd where the others predict its value with a chance below 1 %, every device"
+    " and value that was looked at counted; a batch likewise, and all but its farthest device too. The evidence for each cause is summed over"
+    " the devices that show it; a device lacks a cause only where its records could show it."
 )
 
 
-def headline(fleet: Fleet) -> str:
-    """Return what the fleet has in common and which device differs, in a few sentences."""
-    common = [f"{_names(one)} ({NAMES[one.response]})" for one in fleet.shares if one.kind in ("all", "all but")]
-    first = f"Common to the design: {', '.join(common)}." if common else "The devices have no cause in common."
-    if fleet.odd is not None:
-        return f"{first} Device {fleet.odd} differs from the others: {'; '.join(fleet.reasons[fleet.odd])}."
-    several = any(fleet.reasons.values())
-    return f"{first} {'Several devices differ' if several else 'No device differs'} from the others."
+def headline(lot: Lot) -> str:
+    """Return what the lot has in common and who differs, in a few sentences."""
+    common = [_spell(one) for one in lot.shares if one.kind in ("all", "all but")]
+    text = f"Common to the lot: {', '.join(common)}." if common else "The devices have no cause in common."
+    for name, why in lot.bad_batches.items():
+        text += f" Batch {name} differs: {'; '.join(why)}."
+    if len(lot.odd) == 1:
+        text += f" Device {lot.odd[0]} differs from the others: {'; '.join(lot.reasons[lot.odd[0]])}."
+    elif lot.odd:
+        text += f" Devices that differ from the others: {', '.join(lot.odd)}."
+    else:
+        text += " No device differs from the others."
+    return text + (f" No answer: {', '.join(sorted(lot.failed))}." if lot.failed else "")
 
 
-def _names(share: Share) -> str:
-    return " or ".join([share.effect, *share.equivalent])
+def _spell(one: Share) -> str:
+    return f"{' or '.join(one.names)} ({NAMES[one.response]})"
+
+
+def _devices(one: Share) -> str:
+    able = len(one.having) + len(one.lacking)
+    words = f"{len(one.having)} of {able} that could show it"
+    if one.kind == "batch":
+        return f"batch {one.batch}"
+    return f"{words}; not {', '.join(one.lacking)}" if one.kind == "all but" else words
 
 
 SHARES = (
-    Column(_names, "cause"),
+    Column(lambda one: " or ".join(one.names), "cause"),
     Column(lambda one: NAMES[one.response], "response"),
-    Column(lambda one: KINDS[one.kind].format(one.odd), "devices"),
-    Column("probability", "probability", form=".2f"),
+    Column(_devices, "devices"),
+    Column(lambda one: ", ".join(one.odd), "odd"),
     Column("evidence", "evidence", digits=3),
-    Column(lambda one: ", ".join(f"{name} {plain(size.value)}" for name, size in one.sizes.items()), "size in each device"),
-    Column("coefficient", "coefficient"),
-)  # fmt: skip
+    Column(lambda one: _sizes(one), "sizes"),
+)
+VALUES = (
+    Column(lambda one: _name(one), "value"),
+    Column("population.mean", "mean", error="population.mean_sd"),
+    Column("population.scatter", "scatter", digits=2),
+    Column(lambda one: len(one.of), "devices"),
+    Column(lambda one: ", ".join(f"{s} {plain(one.of[s].value)}" for s in one.odd), "odd"),
+    Column(lambda one: ", ".join(one.bad_batches), "odd batches"),
+)
 
 
-def share_table(fleet: Fleet) -> Table:
-    """Return the causes over the fleet."""
-    return Table("Causes", fleet.shares, SHARES, "Size: value of the coefficient named in the last column.")
+def _sizes(one: Share) -> str:
+    values = [size.first for size in one.sizes.values()]
+    name = next(iter(one.sizes.values())).coefficient
+    return (
+        f"{name} {plain(min(values), 2)} … {plain(max(values), 2)}" if len(values) > 1 else f"{name} {plain(values[0])}"
+    )
 
 
-def device_table(fleet: Fleet) -> Table:
+def device_table(lot: Lot, page: Callable[[str], str] | None = None) -> Table:
     """Return one row a device: its verdict, its causes, and how it differs."""
-    columns = (
-        Column("0", "device"),
-        Column("1.verdict.verdict", "verdict"),
-        Column(lambda row: ", ".join(" or ".join(cause.names) for cause in row[1].verdict.causes), "causes"),
-        Column(lambda row: "; ".join(fleet.reasons[row[0]]), "differs from the others"),
-    )
-    return Table("Devices", list(fleet.devices.items()), columns)
+    rows: list[dict[str, Any]] = [
+        {
+            "serial": serial,
+            "made": str(lot.made.get(serial, "")),
+            "batch": lot.batches.get(serial, ""),
+            "verdict": one.verdict["verdict"],
+            "causes": ", ".join(" or ".join([c["effect"], *c["equivalent"]]) for c in one.verdict["causes"]),
+            "odd": "; ".join(lot.reasons[serial]),
+            "page": page(serial) if page else "",
+        }
+        for serial, one in lot.answers.items()
+    ]
+    heads = {
+        "serial": "device",
+        "made": "date",
+        "batch": "batch",
+        "verdict": "verdict",
+        "causes": "causes",
+        "odd": "differs from the others",
+        "page": "page",
+    }
+    return Table("Devices", rows, [Column(key, head) for key, head in heads.items()], sortable=True)
 
 
-def _ordered(fleet: Fleet) -> list[Value]:
-    return sorted(fleet.values, key=lambda value: -max(map(abs, value.odd.values()), default=0.0))
-
-
-def value_table(fleet: Fleet) -> Table:
-    """Return the values of every device, those first in which a device differs."""
-    columns = (
-        Column("name", "value"),
-        *(Column(_of(device), device) for device in fleet.devices),
-        Column("common", "mean", digits=3),
-        Column("scatter", "scatter", digits=3),
-    )
-    note = "!: far from the prediction of the other devices; left out of mean and scatter."
-    return Table("Values of the devices", _ordered(fleet), columns, note)
-
-
-def _of(device: str) -> Callable[[Value], str]:
-    def write(value: Value) -> str:
-        return plain(value.of[device].value) + " !" * (device in value.odd) if device in value.of else ""
-
-    return write
-
-
-def fleet_parts(fleet: Fleet) -> list[Chapter]:
-    """Return what people read of a fleet."""
-    caption = "Values of the devices with 90 % intervals; the line is the mean of those that agree."
-    values: list[Part] = [Figure(lambda: _draw_values(fleet), caption)] if fleet.values else []
+def fleet_parts(lot: Lot, page: Callable[[str], str] | None = None) -> list[Chapter]:
+    """Return what people read of a lot; `page` gives the page of a device, where it has one."""
+    facts = [
+        ("Devices", str(len(lot.answers)), f"{len(lot.failed)} without an answer" if lot.failed else "all diagnosed"),
+        ("Odd devices", str(len(lot.odd)), ", ".join(lot.odd[:6])),
+        ("Odd batches", str(len(lot.bad_batches)), ", ".join(lot.bad_batches)),
+    ]
+    ordered = _ordered(lot)
+    charts: list[Part] = []
+    if ordered:
+        caption = "Values with 90 % intervals in the order of the serial numbers; band: mean ± 3 scatter."
+        charts.append(Figure(lambda: _draw(lot, ordered[:MOST]), caption))
+    dated = [one for one in ordered[:DATED] if sum(s in lot.made for s in one.of) > 2]
+    if dated:
+        charts.append(Figure(lambda: _draw(lot, dated, by_date=True), "The same over the date."))
+    failed = [{"serial": serial, "why": why} for serial, why in lot.failed.items()]
     return [
-        Chapter("The answer", [Sentence(headline(fleet), where="terminal"), share_table(fleet), device_table(fleet)]),
-        Chapter("Values", [*values, value_table(fleet)]),
-        *(Chapter(f"Device {name}", [
-            *_on_page(cause_table(one.verdict), response_table(one.verdict)),
-            *(Sentence(said.text, said.kind, "page") for said in remarks(one.verdict)),
-        ]) for name, one in fleet.devices.items()),
+        Chapter("The lot", [
+            Sentence(headline(lot), where="terminal"), Facts(facts, "page"),
+            Table("Causes", lot.shares, SHARES, "Sizes: smallest and largest of the coefficient."),
+            Table("Values", ordered, VALUES, "Mean and scatter of the devices that are like each other."),
+            Table("Devices without an answer", failed, (Column("serial", "device"), Column("why", "why"))),
+        ]),
+        Chapter("Control charts", charts),
+        Chapter("Devices", [device_table(lot, page)]),
         Chapter("Method", [Sentence(METHOD, where="page")]),
     ]  # fmt: skip
 
 
-def _on_page(*tables: Table) -> list[Table]:
-    return [Table(one.title, one.rows, one.columns, one.note, "page") for one in tables]
+def _name(one: Quantity) -> str:
+    """Return a settled reading by its name, a value of the card by what people call it."""
+    return one.name if " " in one.name else spell_parameter(one.name)[0]
 
 
-def _draw_values(fleet: Fleet) -> Drawing:
-    drawn, devices = _ordered(fleet)[:MOST], list(fleet.devices)
-    rows = -(-len(drawn) // ACROSS)
-    with figure(rows, ACROSS, height=2.4 * rows, squeeze=False) as (canvas, axes):
-        for axis in axes.flat[len(drawn) :]:
+def _ordered(lot: Lot) -> list[Quantity]:
+    """Those first in which a device or a batch differs."""
+    return sorted(lot.quantities, key=lambda one: min([*one.odd.values(), *one.bad_batches.values()], default=1.0))
+
+
+def _draw(lot: Lot, quantities: list[Quantity], by_date: bool = False) -> Drawing:
+    rows = -(-len(quantities) // ACROSS)
+    with figure(rows, ACROSS, height=2.3 * rows, squeeze=False) as (canvas, axes):
+        for axis in axes.flat[len(quantities) :]:
             axis.set_visible(False)
-        for axis, value in zip(axes.flat, drawn, strict=False):
-            _draw_value(axis, value, devices)
+        for axis, one in zip(axes.flat, quantities, strict=False):
+            _draw_chart(axis, lot, one, by_date)
         return canvas
 
 
-def _draw_value(axis: "Axes", value: Value, devices: list[str]) -> None:
-    for k, device in enumerate(devices):
-        if device in value.of:
-            own, colour = value.of[device], VERMILION if device in value.odd else BLUE
-            span = [[own.value - own.low], [own.high - own.value]]
-            axis.errorbar([k], [own.value], yerr=span, fmt="o", color=colour, capsize=3)
-    axis.axhline(value.common, color="0.5", linewidth=0.8)
-    axis.set_xticks(range(len(devices)), devices)
-    axis.set_xlim(-0.5, len(devices) - 0.5)
-    axis.set_title(value.name.rpartition(".")[2].replace(": ", "\n"), fontsize=7)
+def _draw_chart(axis: "Axes", lot: Lot, one: Quantity, by_date: bool) -> None:
+    serials = [s for s in lot.answers if s in one.of and (not by_date or s in lot.made)]
+    first = min(lot.made.values(), default=None)
+    at = [(lot.made[s] - first).days if by_date and first else k for k, s in enumerate(serials)]
+    bad = {s for s in serials if one.batches.get(s, "") in one.bad_batches}
+    for x, serial in zip(at, serials, strict=True):
+        own = one.of[serial]
+        colour = VERMILION if serial in one.odd else ORANGE if serial in bad else BLUE
+        axis.errorbar([x], [own.value], yerr=[1.645 * own.sd], fmt="o", markersize=3, color=colour, elinewidth=0.8)
+    lot_mean, scatter = (
+        one.population.mean,
+        float(np.hypot(one.population.scatter, np.median([m.sd for m in one.of.values()]))),
+    )
+    axis.axhline(lot_mean, color="0.5", linewidth=0.8)
+    axis.axhspan(lot_mean - 3 * scatter, lot_mean + 3 * scatter, color="0.5", alpha=0.12)
+    if by_date:
+        axis.set_xlabel(f"days since {first}", fontsize=7)
+    elif len(serials) <= NAMED:
+        axis.set_xticks(range(len(serials)), serials, rotation=60, fontsize=6)
+    axis.tick_params(axis="x", labelrotation=60, labelsize=6)
+    axis.ticklabel_format(axis="y", useOffset=False)
+    axis.set_title(_name(one), fontsize=7)

@@ -1,0 +1,57 @@
+"""`hrg fleet`: a folder a device, all calibrated and diagnosed, with the lot as prior."""
+
+from pathlib import Path
+
+from studies.cli.output import answers, say
+from studies.cli.telling import Told
+from studies.errors import InputError
+from studies.files.writing import write_text
+from studies.results import Result
+
+
+@answers("hrg.fleet/2", page=False)
+def fleet(folder: str, *, out: str, card: str | None = None, workers: int = 1) -> Result:
+    """Calibrate and diagnose all devices of a lot: what it shares, which devices and batches differ, control charts.
+
+    Run it again to go on, or after adding devices: only what is missing or has changed is worked out.
+
+    Parameters
+    ----------
+    folder : str
+        Folder of the lot: a folder for each device, named by its serial number, with the device's records (CSV) and, if it has its own,
+        its card (TOML). A file lot.csv with the columns serial, date, batch may stand beside them.
+    out : str
+        Folder for the answers: lot.html, lot.json, and a page and an answer for each device in devices/.
+    card : str
+        The card of the design. Without it each device gets a polynomial card from its records.
+    workers : int
+        Devices that are worked out at the same time.
+    """
+    from studies.cli.output import dump_json
+    from studies.fleet.folder import read_lot
+    from studies.fleet.run import run_lot
+    from studies.reports import fleet as parts
+    from studies.results.page import render_result
+
+    if workers < 1:
+        raise InputError(f"--workers {workers}: give at least 1.")
+    if Path(out).resolve() == Path(folder).resolve():
+        raise InputError(f"--out {out}: give another folder than that of the records.")
+    if card is not None:
+        from studies.instrument.card import load_card
+
+        load_card(card)
+    with Told("fleet") as told:
+        lot = run_lot(read_lot(folder, card), out, workers, told)
+    for why in lot.failed.values():
+        say(f"hrg: {why}")
+    result = Result(
+        lot.as_dict(),
+        f"Lot {Path(folder).resolve().name}",
+        parts.headline(lot),
+        parts.fleet_parts(lot, lambda s: f"devices/{s}.html"),
+    )
+    write_text(Path(out) / "lot.json", dump_json(result.payload))
+    write_text(Path(out) / "lot.html", render_result(result))
+    say(f"report: {Path(out) / 'lot.html'}")
+    return Result(result.payload, result.title, result.lead, result.parts, 4 if lot.failed else 0)

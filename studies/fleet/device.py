@@ -1,0 +1,217 @@
+"""The answer of one device: its diagnosis, its values with their errors, and how every effect stands in it."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shell.constants import zero_Celsius
+from studies.diagnosis.verdict import NINETY
+from studies.effects.effect import UNITS
+from studies.errors import InputError
+from studies.fleet.folder import Device
+from studies.inference.inferred import Inferred
+from studies.inference.model import PRICE, Background, Term
+from studies.instrument.card import load_card
+from studies.record import read_record
+from studies.simulation.drive import Drive
+from studies.simulation.heat_path import slowest_lag
+from studies.simulation.prediction import HEATED, Variations, predict
+from thermal.profile import Profile
+
+if TYPE_CHECKING:
+    from studies.inference.diagnosis import Inference
+
+Array = NDArray[np.float64]
+SCHEMA = "hrg.fleet-device/1"
+USUAL, APART = 20.0, 5.0
+"""Temperature (°C) at which devices are compared without a common card, and kelvin to either side for slopes."""
+KNOWN, LITTLE = 0.5, 0.9
+"""Standard deviation of a value, over that of its prior, below which its records tell it, and above which they say nothing."""
+
+
+@dataclass(frozen=True)
+class Measured:
+    """A value of a device as its records alone tell it, the prior of the card taken out; `told` where they tell much more than that."""
+
+    value: float
+    sd: float
+    told: bool = True
+
+
+@dataclass(frozen=True)
+class Standing:
+    """An effect in one device.
+
+    Attributes
+    ----------
+    score : log posterior over nothing being there
+    size, sd : rms of what it makes of the response in the records, and how well that is known
+    first, first_sd : its first coefficient; of a family its size
+    coefficient : name of that
+    """
+
+    score: float
+    size: float
+    sd: float
+    first: float
+    first_sd: float
+    coefficient: str
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What is kept of a device.
+
+    Attributes
+    ----------
+    verdict : the object of `hrg diagnose --json`
+    level : its frequency (Hz), where it was measured
+    measured : name with unit -> Measured
+    standings : response -> effect -> Standing
+    """
+
+    serial: str
+    key: str
+    verdict: Mapping[str, Any]
+    level: float | None
+    measured: Mapping[str, Measured]
+    standings: Mapping[str, Mapping[str, Standing]]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the object of its file."""
+        return {"schema": SCHEMA, **asdict(self)}
+
+    @classmethod
+    def read(cls, found: Mapping[str, Any]) -> "Answer":
+        """Return the answer of a file."""
+        measured = {name: Measured(**own) for name, own in found["measured"].items()}
+        standings = {r: {name: Standing(**own) for name, own in of.items()} for r, of in found["standings"].items()}
+        return cls(found["serial"], found["key"], found["verdict"], found["level"], measured, standings)
+
+
+def diagnose_device(
+    device: Device, key: str, progress: Callable[[str], None] = lambda words: None
+) -> "tuple[Answer, Inference]":
+    """Calibrate and diagnose one device.
+
+    Raises
+    ------
+    InputError, ThermalError, ShellError
+        Records or a card that cannot be used.
+    """
+    from studies.inference.diagnosis import infer
+    from studies.inference.polynomial_card import polynomial_card
+    from studies.inference.records import make_ready
+    from studies.workbench import diagnose_records
+
+    if not device.records:
+        raise InputError(f"device {device.serial}: its folder has no records (*.csv).")
+    records = [read_record(path) for path in device.records]
+    if device.card is None:
+        ready = make_ready(records)
+        found = infer(polynomial_card(ready.records), ready.records, progress, ready.notes)
+    else:
+        found = diagnose_records(records, load_card(device.card), progress=progress)  # type: ignore[assignment]
+    at = USUAL + zero_Celsius if device.card is None else found.card.reference_temperature
+    levels = [float(np.nanmedian(record["frequency_Hz"])) for record in records if "frequency_Hz" in record]
+    level = float(np.median(levels)) if levels else None
+    answer = Answer(device.serial, key, found.verdict.as_dict(), level, measure(found, at), standings_of(found))
+    return answer, found
+
+
+def measure(found: Inferred, temperature: float) -> dict[str, Measured]:
+    """Return settled readings about a temperature (K), and the values of the card that the records tell."""
+    problem, (_, C) = found.search.linear.problem, found.background.posterior
+    priors, count = problem.priors, len(problem.priors.values)
+    u, C = found.numbers.point[:count], C[:count, :count]
+    card = problem.instrument_at(found.numbers.point)
+    law, slopes, at = problem.law_at(card), priors.slopes(u), priors.at(u)
+    rows: dict[str, tuple[float, Array]] = {
+        value.name: (at[value.name], row) for value, row in zip(priors.values, slopes, strict=True)
+    }
+    varied = Variations(card, law, priors.names)
+    settled = {
+        T: _settled(varied, card, law, T, slopes) for T in (temperature - APART, temperature, temperature + APART)
+    }
+    (low, here, high), spot = settled.values(), f"at {temperature - zero_Celsius:g} °C"
+    for name, words in (("frequency_Hz", "frequency"), ("bias_deg_per_h", "bias"), ("inverse_q", "1/Q")):
+        if name not in problem.responses:
+            continue
+        value, J = here[name]
+        rows[f"{words} {spot} ({UNITS[name]})"] = value, J
+        relative, unit = (1e6 / value, "ppm/K") if name == "frequency_Hz" else (1.0, f"{UNITS[name]}/K")
+        per = relative / (2.0 * APART)
+        rows[f"slope of {words} {spot} ({unit})"] = (
+            per * (high[name][0] - low[name][0]),
+            per * (high[name][1] - low[name][1]),
+        )
+    rows["slowest time constant (s)"] = _slowest(varied, temperature, slopes)
+    out = {}
+    for name, (value, J) in rows.items():
+        before, after = float(J @ J), float(J @ C @ J)
+        if 0.0 < after < LITTLE**2 * before:  # the prior has its mean where u is 0
+            variance = 1.0 / (1.0 / after - 1.0 / before)
+            mean = value + float(J @ u) * variance / before
+            out[name] = Measured(mean, float(np.sqrt(variance)), after < KNOWN**2 * before)
+    return out
+
+
+def _settled(varied: Variations, card: Any, law: Any, T: float, slopes: Array) -> dict[str, tuple[float, Array]]:
+    """Return every response of the settled gyro and its derivatives by the independent coordinates."""
+    time = np.array([0.0, 60.0, 120.0])
+    found = predict(card, Drive(time, "housing", Profile(time, np.full(3, T))), varied, law)
+    return {
+        name: (float(own[-1]), np.array([found.derivatives[v][name][-1] for v in varied.names]) @ slopes)
+        for name, own in found.columns.items()
+        if name in UNITS
+    }
+
+
+def _slowest(varied: Variations, T: float, slopes: Array) -> tuple[float, Array]:
+    """Return the slowest time constant of the resonator behind its housing, and its derivatives: differences."""
+    by_value = []
+    for name in varied.names:
+        below, above = varied.sides(name) if name.startswith(HEATED) else (None, None)
+        moved = [slowest_lag(side.network("housing"), T) for side in (below, above) if side is not None]
+        by_value.append((moved[1] - moved[0]) / (above.distance - below.distance) if above and below else 0.0)
+    return slowest_lag(varied.network("housing"), T), np.array(by_value) @ slopes
+
+
+def standings_of(found: Inferred) -> dict[str, dict[str, Standing]]:
+    """Return what every effect would stand at, its own rivals left out: response -> effect -> Standing."""
+    linear, outcome = found.search.linear, found.outcome
+    out: dict[str, dict[str, Standing]] = {}
+
+    def note(background: Background, score: float) -> None:
+        term = background.terms[-1]
+        known = out.setdefault(term.response, {})
+        if term.effect.name not in known or score > known[term.effect.name].score:
+            known[term.effect.name] = _standing(background, term, score)
+
+    for rivals, base in zip(outcome.rivals, outcome.without, strict=True):
+        for rival in rivals:
+            note(Background(linear, rival.terms, rival.noise), rival.score - base.score)
+    beside = found.background
+    for seen in found.search.scan(outcome.final, less=()):
+        term, _ = beside.with_term(seen.term)
+        note(Background(linear, (*beside.terms, term), beside.noise), seen.gain + PRICE)
+    return out
+
+
+def _standing(background: Background, term: Term, score: float) -> Standing:
+    mean, C = background.coefficients(len(background.terms) - 1)
+    own = term.columns.get(term.response, next(iter(term.columns.values())))
+    size = float(np.sqrt(np.mean((own @ mean) ** 2)))
+    times = float(np.sqrt(max(float(mean @ np.linalg.solve(C + 1e-12 * np.diag(np.diag(C)), mean)), 1e-12)))
+    if len(term.unit) == 1:
+        name = term.effect.coefficient_names(term.response)[term.members[0]]
+        return Standing(score, size, size / times, float(mean[0]), float(np.sqrt(C[0, 0])), name)
+    return Standing(score, size, size / times, size, size / times, f"rms_{UNITS[term.response]}")
+
+
+def interval(value: float, sd: float) -> dict[str, float]:
+    """Return a value with its 90 % interval."""
+    return {"value": value, "low": value - NINETY * sd, "high": value + NINETY * sd}

@@ -1,0 +1,176 @@
+"""What a lot is: values with mean, scatter, batches and outliers, causes that devices share, and why which device differs."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from datetime import date
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from studies.fleet.comparison import Share, compare
+from studies.fleet.device import Answer, Standing, interval
+from studies.fleet.folder import Device
+from studies.fleet.population import FEWEST, Quantity
+
+DESIGN = 0.05
+"""Relative distance of a frequency from the lot's, beyond which a device is of another design."""
+TOLD = 0.6
+"""Part of the devices whose records must tell a value for it to be one of the lot."""
+
+
+@dataclass(frozen=True)
+class Lot:
+    """Answers of all devices, with those that could not be had, and what they say together.
+
+    Attributes
+    ----------
+    answers : serial -> Answer
+    failed : serial -> why there is none
+    made, batches : serial -> date, and batch, where they are known
+    quantities : values over the lot
+    shares : causes over the lot
+    """
+
+    answers: Mapping[str, Answer]
+    failed: Mapping[str, str]
+    made: Mapping[str, date]
+    batches: Mapping[str, str]
+    quantities: tuple[Quantity, ...]
+    shares: tuple[Share, ...]
+
+    @cached_property
+    def reasons(self) -> dict[str, list[str]]:
+        """Why a device is not like the others; nothing for those that are."""
+        out: dict[str, list[str]] = {serial: [] for serial in self.answers}
+        for share in self.shares:
+            words = "lacks" if share.kind == "all but" else "alone has" if len(share.odd) == 1 else "has"
+            for serial in share.odd:
+                out[serial].append(f"{words} {' or '.join(share.names)} in {share.response}")
+        for one in self.quantities:
+            for serial, chance in one.odd.items():
+                own = one.of[serial].value
+                out[serial].append(
+                    f"{one.name} is {own:.5g}, in the lot {one.population.mean:.5g}; chance {chance:.1g}"
+                )
+        return out
+
+    @property
+    def odd(self) -> list[str]:
+        """Devices that differ, those with the most reasons first."""
+        return sorted((s for s, why in self.reasons.items() if why), key=lambda s: (-len(self.reasons[s]), s))
+
+    @cached_property
+    def bad_batches(self) -> dict[str, list[str]]:
+        """Batches that differ, with the reasons."""
+        out: dict[str, list[str]] = {}
+        for one in self.quantities:
+            for name, chance in one.bad_batches.items():
+                inside = one.among([s for s in one.of if one.batches.get(s) == name])
+                words = f"{one.name} is {inside.mean:.5g}, in the lot {one.population.mean:.5g}; chance {chance:.1g}"
+                out.setdefault(name, []).append(words)
+        for share in self.shares:
+            if share.kind == "batch":
+                out.setdefault(share.batch, []).append(f"has {' or '.join(share.names)} in {share.response}")
+        return out
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the object of `hrg fleet --json`."""
+        return {
+            "schema": "hrg.fleet/2",
+            "odd": self.odd,
+            "bad_batches": self.bad_batches,
+            "common_causes": [_cause(one) for one in self.shares],
+            "values": [_value(one) for one in self.quantities],
+            "devices": {
+                serial: {
+                    **one.verdict,
+                    "odd": self.reasons[serial],
+                    "date": str(self.made[serial]) if serial in self.made else None,
+                    "batch": self.batches.get(serial) or None,
+                }
+                for serial, one in self.answers.items()
+            },
+            "failed": dict(self.failed),
+        }
+
+
+def _cause(one: Share) -> dict[str, Any]:
+    return {
+        "effect": one.effect,
+        "response": one.response,
+        "equivalent": list(one.equivalent),
+        "kind": one.kind,
+        "batch": one.batch or None,
+        "having": list(one.having),
+        "lacking": list(one.lacking),
+        "odd": list(one.odd),
+        "evidence": one.evidence,
+        "coefficient": next(iter(one.sizes.values())).coefficient,
+        "sizes": {serial: interval(size.first, size.first_sd) for serial, size in one.sizes.items()},
+    }
+
+
+def _value(one: Quantity) -> dict[str, Any]:
+    lot = one.population
+    return {
+        "name": one.name,
+        "mean": lot.mean,
+        "mean_sd": lot.mean_sd,
+        "scatter": lot.scatter,
+        "devices": {serial: interval(own.value, own.sd) for serial, own in one.of.items()},
+        "with_lot": {s: interval(own.value, own.sd) for s in one.of for own in [one.with_lot(s)]},
+        "odd": dict(one.odd),
+        "bad_batches": dict(one.bad_batches),
+    }
+
+
+def gather(devices: Sequence[Device], answers: Mapping[str, Answer], failed: Mapping[str, str]) -> Lot:
+    """Hold the answers of devices of one design against each other; those of another design are put aside."""
+    levels = {serial: own.level for serial, own in answers.items() if own.level}
+    usual = float(np.median(list(levels.values()))) if levels else 0.0
+    other = {s: f for s, f in levels.items() if abs(np.log(f / usual)) > DESIGN}
+    failed = dict(failed) | {
+        s: f"device {s}: its frequency is near {f:.5g} Hz, that of the lot near {usual:.5g} Hz; it is of another design: give it a lot of its own."
+        for s, f in other.items()
+    }
+    alike = {s: own for s, own in answers.items() if s not in other}
+    made = {one.serial: one.made for one in devices if one.made is not None}
+    batches = {one.serial: one.batch for one in devices if one.batch}
+    return Lot(alike, failed, made, batches, _quantities(alike, batches), _shares(alike, batches))
+
+
+def _quantities(answers: Mapping[str, Answer], batches: Mapping[str, str]) -> tuple[Quantity, ...]:
+    names = dict.fromkeys(name for own in answers.values() for name in own.measured)
+    of = {name: {s: own.measured[name] for s, own in answers.items() if name in own.measured} for name in names}
+    told = {n: own for n, own in of.items() if sum(one.told for one in own.values()) >= max(2.0, TOLD * len(answers))}
+    looks = sum(len(own) for own in told.values() if len(own) > FEWEST)
+    return tuple(Quantity(name, own, max(looks, 1), batches) for name, own in told.items())
+
+
+def _shares(answers: Mapping[str, Answer], batches: Mapping[str, str]) -> tuple[Share, ...]:
+    shares = []
+    for response, names in _places(answers):
+        scores: dict[str, dict[str, Standing]] = {
+            serial: {name: own for name, own in one.standings.get(response, {}).items() if name in names}
+            for serial, one in answers.items()
+        }
+        share = compare(response, {s: of for s, of in scores.items() if of}, batches)
+        if share is not None:
+            shares.append(share)
+    return tuple(sorted(shares, key=lambda one: -one.evidence))
+
+
+def _places(answers: Mapping[str, Answer]) -> list[tuple[str, set[str]]]:
+    """Return the responses and the effects that contend for one place, over all devices: sets that meet are one."""
+    groups: list[tuple[str, set[str]]] = []
+    for own in answers.values():
+        for cause in own.verdict["causes"]:
+            if cause["kind"] != "physics":
+                continue
+            response, names = cause["response"], {cause["effect"], *cause["equivalent"]}
+            for other in [g for g in groups if g[0] == response and g[1] & names]:
+                names |= other[1]
+                groups.remove(other)
+            groups.append((response, names))
+    return groups

@@ -1,0 +1,197 @@
+"""Devices of one design: an odd device and a bad batch are found and nobody else is named; a set that one leaves open is closed by another."""
+
+import json
+
+import numpy as np
+import pytest
+
+from studies.cli import main
+from studies.errors import InputError
+from studies.fleet.comparison import compare
+from studies.fleet.device import Answer, Measured, Standing
+from studies.fleet.folder import Device, read_devices, read_lot
+from studies.fleet.lot import gather
+from studies.fleet.population import Population, Quantity
+from studies.fleet.run import run_lot
+from tests.studies.fleet.lots import make_lot
+
+QUICK = ("time_s", "housing_temperature_degC", "frequency_Hz")
+
+
+def stand(score, size=1.0, sd=0.05):
+    return Standing(score, size, sd, size, sd, "size")
+
+
+def test_a_set_of_one_device_is_closed_by_another():
+    open_set = {"second-lag": stand(20.0), "mounting-stress": stand(19.5)}
+    closed = {"second-lag": stand(40.0), "mounting-stress": stand(5.0)}
+    alone = compare("frequency_Hz", {"A": open_set, "B": open_set})
+    assert set(alone.names) == {"second-lag", "mounting-stress"}
+    share = compare("frequency_Hz", {"A": open_set, "B": open_set, "C": closed})
+    assert (share.kind, share.names) == ("all", ("second-lag",))
+
+
+def test_weak_evidence_of_every_device_adds_up():
+    """None alone would be believed beyond doubt; a cause of the design pays its prior once."""
+    share = compare("bias_deg_per_h", {name: {"rate-bias": stand(3.0, 1.0, 0.3)} for name in "ABCD"})
+    assert share.kind == "all"
+    assert share.evidence == pytest.approx(2 * (4 * 3.0 + 3 * 4.0))
+
+
+def test_a_device_that_lacks_a_cause_is_odd_and_one_that_cannot_show_it_is_not():
+    having = {name: {"rate-bias": stand(50.0)} for name in "ABD"}
+    lacking = compare("bias_deg_per_h", having | {"C": {"rate-bias": stand(-4.0, 0.005, 0.01)}})
+    assert (lacking.kind, lacking.odd) == ("all but", ("C",))
+    blind = compare("bias_deg_per_h", having | {"C": {"rate-bias": stand(-4.0, 0.5, 5.0)}})
+    assert (blind.kind, blind.odd) == ("all", ())
+
+
+def test_a_device_that_has_a_cause_alone_is_odd_and_three_of_eight_are_no_lot():
+    none = {"hysteresis": stand(-4.0, 0.005, 0.01)}
+    one = compare("frequency_Hz", {"A": none, "B": {"hysteresis": stand(60.0)}, "C": none})
+    assert (one.kind, one.odd) == ("few", ("B",))
+    devices = {f"G{k}": {"hysteresis": stand(60.0)} if k < 3 else none for k in range(8)}
+    several = compare("frequency_Hz", devices)
+    assert (several.kind, several.odd) == ("some", ())
+    batch = compare("frequency_Hz", devices, {f"G{k}": "b1" if k < 3 else "b2" for k in range(8)})
+    assert (batch.kind, batch.batch) == ("batch", "b1")
+    assert compare("frequency_Hz", {"A": none, "B": none}) is None
+
+
+def test_one_weak_exception_in_many_devices_is_what_a_wide_search_finds():
+    none = {"hysteresis": stand(-4.0, 0.005, 0.01)}
+    lots = {f"G{k:03d}": none for k in range(199)}
+    assert compare("frequency_Hz", lots | {"X": {"hysteresis": stand(8.0)}}).odd == ()
+    assert compare("frequency_Hz", lots | {"X": {"hysteresis": stand(20.0)}}).odd == ("X",)
+
+
+@pytest.mark.parametrize(("count", "scatter"), [(8, 10.0), (30, 1.0), (8, 0.0)])
+def test_limits_a_chance_is_one(count, scatter):
+    """Of devices that are like the others 10 % have a chance below 0.1; fewer where all that scatters is the error of each."""
+    rng, below = np.random.default_rng(1), 0
+    for _ in range(400):
+        sd = np.exp(0.3 * rng.standard_normal(count))
+        value = scatter * rng.standard_normal(count) + sd * rng.standard_normal(count)
+        below += Population.of(value[1:], sd[1:]).surprise(value[:1], sd[:1]) < 0.1
+    assert below <= 400 * 0.1 + 3 * (400 * 0.09) ** 0.5
+    if scatter > 1.0:
+        assert below >= 400 * 0.1 - 3 * (400 * 0.09) ** 0.5
+
+
+def test_recovery_of_mean_and_scatter():
+    rng = np.random.default_rng(2)
+    sd = rng.uniform(0.5, 2.0, 400)
+    found = Population.of(5.0 + 1.5 * rng.standard_normal(400) + sd * rng.standard_normal(400), sd)
+    assert found.mean == pytest.approx(5.0, abs=4 * found.mean_sd)
+    assert found.scatter == pytest.approx(1.5, rel=0.15)
+
+
+def lot_of(values, batches=()):
+    rng = np.random.default_rng(4)
+    of = {f"G{k:02d}": Measured(float(v + 0.01 * rng.standard_normal()), 0.02) for k, v in enumerate(values)}
+    return Quantity("value", of, 5 * len(of), dict(zip(of, batches, strict=False)))
+
+
+def test_odd_devices_and_a_bad_batch_are_named_and_left_out_of_mean_and_scatter():
+    rng = np.random.default_rng(3)
+    values = 1.0 + 0.1 * rng.standard_normal(40)
+    assert not lot_of(values).odd
+    values[[4, 9]] += 1.5
+    assert set(lot_of(values).odd) == {"G04", "G09"}
+    values[30:36] += 1.0
+    batches = ["bad" if 30 <= k < 36 else f"b{k // 10}" for k in range(40)]
+    both = lot_of(values, batches)
+    assert set(both.bad_batches) == {"bad"}
+    assert set(both.odd) == {"G04", "G09"}
+    assert both.population.mean == pytest.approx(1.0, abs=0.08)
+    assert both.population.scatter == pytest.approx(0.1, rel=0.35)
+    shrunk = both.with_lot("G00")
+    assert abs(shrunk.value - both.population.mean) <= abs(both.of["G00"].value - both.population.mean)
+
+
+def test_a_device_of_another_design_is_put_aside():
+    plain = {"causes": [], "verdict": "adequate"}
+    answers = {
+        s: Answer(s, "", plain, f, {}, {}) for s, f in (("A", 4432.0), ("B", 4440.0), ("C", 4429.0), ("D", 8100.0))
+    }
+    lot = gather([Device(s, ()) for s in answers], answers, {})
+    assert set(lot.failed) == {"D"}
+    assert "another design" in lot.failed["D"]
+    assert set(lot.answers) == {"A", "B", "C"}
+
+
+@pytest.mark.slow
+def test_the_odd_device_and_the_bad_batch_of_a_small_lot(tmp_path):
+    planted = make_lot(tmp_path, 8, [1], [5, 6, 7], seed=2, batch_size=5, columns=(*QUICK, "inverse_q"))
+    lot = run_lot(read_lot(str(tmp_path), "hrg-30mm"))
+    assert tuple(lot.odd) == planted.odd
+    assert set(lot.bad_batches) == {planted.batch}
+    assert not lot.shares
+    assert not lot.failed
+
+
+@pytest.mark.slow
+def test_a_lot_goes_on_where_it_was_and_past_what_it_cannot_read(tmp_path, capsys, monkeypatch):
+    folder, out = tmp_path / "lot", tmp_path / "out"
+    make_lot(folder, 2, [], [], seed=2, batch_size=5, columns=QUICK, row=120.0)
+    (folder / "lot.csv").unlink()
+    (folder / "empty").mkdir()
+    (folder / "torn").mkdir()
+    (folder / "torn" / "run.csv").write_text("time_s,frequency_Hz\n0,1\n0,2\n")
+    words = ["fleet", str(folder), "--out", str(out), "--card", "hrg-30mm", "--json"]
+    assert main(words) == 4
+    told = capsys.readouterr()
+    first = json.loads(told.out)
+    assert set(first["failed"]) == {"empty", "torn"}
+    assert "device empty: its folder has no records" in told.err
+    assert "time_s does not increase" in told.err
+    assert set(first["devices"]) == {"G001", "G002"}
+    assert {path.name for path in (out / "devices").iterdir()} == {"G001.json", "G001.html", "G002.json", "G002.html"}
+    assert "Control charts" in (out / "lot.html").read_text(encoding="utf-8")
+    monkeypatch.setattr("studies.fleet.device.infer", None, raising=False)
+    monkeypatch.setattr("studies.workbench.diagnose_records", None)
+    for path in (folder / "empty", folder / "torn"):
+        for one in path.iterdir():
+            one.unlink()
+        path.rmdir()
+    assert main(words) == 0  # nothing is worked out anew
+    assert json.loads(capsys.readouterr().out)["devices"] == first["devices"]
+    (out / "devices" / "G001.json").write_text("torn")
+    with pytest.raises(TypeError):  # what is torn would be worked out again
+        run_lot(read_lot(str(folder), "hrg-30mm"), str(out))
+
+
+def test_a_manifest_names_devices_beside_it(tmp_path):
+    (tmp_path / "a.csv").write_text("time_s\n")
+    manifest = tmp_path / "fleet.toml"
+    manifest.write_text('[devices]\nA = ["a.csv"]\nB = ["a.csv", "a.csv"]\n')
+    assert {one.serial: len(one.records) for one in read_devices([], str(manifest))} == {"A": 1, "B": 2}
+    manifest.write_text('[devices]\nA = "a.csv"\n')
+    with pytest.raises(InputError, match="A must be a list of 1 or more texts"):
+        read_devices([], str(manifest))
+    with pytest.raises(InputError, match="give a unique name"):
+        read_devices(["a.csv"])
+
+
+@pytest.mark.parametrize(
+    ("table", "said"),
+    [
+        ("serial,bach\nA,1\n", "unknown column 'bach'; did you mean 'batch'"),
+        ("date\n2024-01-01\n", "the column serial is missing"),
+        ("serial,date\nA,yesterday\n", "line 2: date 'yesterday' is not of the form 2024-05-31"),
+        ("serial,date\nZ,2024-01-01\n", "line 2: there is no folder of device 'Z'"),
+        ("serial\nA\nA\n", "line 3: device 'A' stands there twice"),
+    ],
+)
+def test_a_wrong_table_of_the_lot_is_told_with_its_line(tmp_path, table, said):
+    (tmp_path / "A").mkdir()
+    (tmp_path / "lot.csv").write_text(table)
+    with pytest.raises(InputError, match=said):
+        read_lot(str(tmp_path))
+
+
+def test_a_folder_without_devices_and_a_lot_of_one_are_refused(tmp_path, capsys):
+    assert main(["fleet", str(tmp_path), "--out", str(tmp_path / "out")]) == 2
+    assert "no folders of devices" in capsys.readouterr().err
+    assert main(["diagnose", "--device", f"A={tmp_path / 'a.csv'}"]) == 2
+    assert "needs at least two devices" in capsys.readouterr().err
