@@ -102,19 +102,14 @@ def diagnose_device(
     InputError, ThermalError, ShellError
         Records or a card that cannot be used.
     """
-    from studies.inference.diagnosis import infer
-    from studies.inference.polynomial_card import polynomial_card
-    from studies.inference.records import make_ready
     from studies.workbench import diagnose_records
 
     if not device.records:
         raise InputError(f"device {device.serial}: its folder has no records (*.csv).")
     records = [read_record(path) for path in device.records]
-    if device.card is None:
-        ready = make_ready(records)
-        found = infer(polynomial_card(ready.records), ready.records, progress, ready.notes)
-    else:
-        found = diagnose_records(records, load_card(device.card), progress=progress)  # type: ignore[assignment]
+    found = diagnose_records(records, None if device.card is None else load_card(device.card), progress=progress)
+    if not isinstance(found, Inferred):
+        raise InputError(f"device {device.serial}: its records say too little to be judged.")
     at = USUAL + zero_Celsius if device.card is None else found.card.reference_temperature
     levels = [float(np.nanmedian(record["frequency_Hz"])) for record in records if "frequency_Hz" in record]
     level = float(np.median(levels)) if levels else None

@@ -6,7 +6,6 @@ import numpy as np
 
 from studies.diagnosis.response import RESPONSES
 from studies.diagnosis.verdict import ResponseResult
-from studies.planning.programme import NextRun
 from studies.reports.digits import plain
 from studies.reports.style import BLACK, BLUE, ORANGE, VERMILION, figure
 from studies.results import Drawing
@@ -14,6 +13,7 @@ from studies.results import Drawing
 if TYPE_CHECKING:
     from studies.inference.diagnosis import Inference
     from studies.inference.unjudged import Unjudged
+    from studies.planning.programme import NextRun
 
 
 def ladder(diagnosis: "Inference | Unjudged") -> Drawing:
@@ -128,7 +128,7 @@ def residual_views(diagnosis: "Inference | Unjudged", response: str) -> Drawing:
         return canvas
 
 
-def next_run_picture(run: NextRun) -> Drawing:
+def next_run_picture(run: "NextRun") -> Drawing:
     """Draw the suggested run: the chamber's temperature, and the drives that step."""
     rows = 1 + len(run.drives)
     heights = [2.0] + [0.7] * len(run.drives)

@@ -20,6 +20,7 @@ import numpy as np
 from studies.calibration.priors import gather_priors
 from studies.effects import find_effect
 from studies.inference.diagnosis import Inference, infer
+from studies.inference.records import make_ready
 from studies.instrument.card import Instrument, load_card
 from studies.planning.chamber import Chamber
 from studies.planning.next_run import suggest
@@ -103,7 +104,7 @@ def run_case(card: Instrument, number: int, size: float, seed: int) -> dict[str,
     gyro = gyro.with_table("effect", [table])
     fixed = [measure(gyro, words, 100 * number + k, k + 1) for k, words in enumerate(FIXED)]
     hours = sum(float(np.ptp(one["time_s"])) for one in fixed) / 3600.0
-    whole = infer(card, fixed)
+    whole = infer(card, make_ready(fixed))
     out: dict[str, Any] = {
         "case": number,
         "seed": seed,
@@ -113,7 +114,7 @@ def run_case(card: Instrument, number: int, size: float, seed: int) -> dict[str,
     records, spent = fixed[:1], float(np.ptp(fixed[0]["time_s"])) / 3600.0
     steps: list[Mapping[str, Any]] = []
     while True:
-        found = infer(card, records)
+        found = infer(card, make_ready(records))
         done = settled(found, effect, response)
         steps.append({"hours": spent, "said": str(found.verdict), "settled": done})
         if done or spent >= hours:
