@@ -18,7 +18,7 @@ import datetime
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
-from math import pi
+from math import inf, pi
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -84,7 +84,10 @@ class Decay:
         if (t := self.trace) is None:
             one = self.phased or self.spectrum
             return {} if one is None else one.estimates
-        found = {"decay_per_s": Estimate(t.decay, t.sd, t.low, t.high)}
+        found = {
+            "decay_per_s": Estimate(t.decay, t.sd, t.low, t.high),
+            "decay_time_s": Estimate(1 / t.decay, t.sd / t.decay**2, 1 / t.high, 1 / t.low if t.low > 0 else inf),
+        }
         if self.frequency is not None:
             unit = pi * self.frequency
             found["inverse_q"] = Estimate(t.decay / unit, t.sd / unit, t.low / unit, t.high / unit)
@@ -205,6 +208,14 @@ def read_decay(
         return Decay(str(path), notes, phased=analyse_decay(envelope, harmonic=harmonic), envelope=envelope)
 
 
+def is_decay(path: str | Path) -> bool:
+    """Return whether a file is a decay or a spectrum by its columns, and not a record."""
+    with open(path, "rb") as file:
+        if file.read(1) == b"%":
+            return True
+    return bool(set(read_header(path)) & (set(KNOWN) - {"time_s", "frequency_Hz"}))
+
+
 def _read(path: str | Path) -> tuple[Columns, dict[str, float]]:
     """Return the table and the numbers of its comments; traces with % comments have two columns and no header."""
     import numpy as np
@@ -314,7 +325,7 @@ def with_decay(instrument: "Instrument", decay: Decay, harmonic: int = 2) -> "In
     """
     if decay.phased is None or "frequency_axis_deg" not in decay.phased.estimates:
         raise InputError(
-            f"{decay.path}: a card takes a split with its axis, and for that both pick-offs; this decay has one channel."
+            f"{decay.path}: a card takes a split with its axis; this decay shows none: record both pick-offs, with both modes excited, for longer."
         )
     e = decay.phased.estimates
     imperfection = dict(instrument.content.get("imperfection", {}))

@@ -8,6 +8,7 @@ from studies.acceptance.limits import Limits
 from studies.acceptance.measure import (
     Found,
     Measured,
+    measure_decays,
     measure_drift,
     measure_run_down,
     measure_scale,
@@ -22,6 +23,7 @@ from studies.acceptance.service import measure_life, measure_storage, measure_tr
 if TYPE_CHECKING:
     from compensation.stability import AllanDeviation, NoiseCoefficients
     from studies.record import Record
+    from studies.ringdown import Decay
 
 Verdict = Literal["pass", "fail", "undecided", "no limit", "missing"]
 
@@ -80,8 +82,13 @@ class Acceptance:
         return "incomplete" if kinds & {"undecided", "missing"} or not kinds else "pass"
 
 
-def judge(records: "Sequence[Record]", limits: Limits | None = None, output: str = "bias_deg_per_h") -> Acceptance:
-    """Measure what the records give and set it against the limits.
+def judge(
+    records: "Sequence[Record]",
+    limits: Limits | None = None,
+    output: str = "bias_deg_per_h",
+    decays: "Sequence[Decay]" = (),
+) -> Acceptance:
+    """Measure what the records and the free decays give and set it against the limits.
 
     Raises
     ------
@@ -105,6 +112,7 @@ def judge(records: "Sequence[Record]", limits: Limits | None = None, output: str
         found |= more
     for record in sorted_runs.get("run-down", [])[:1]:
         found |= measure_run_down(record)
+    found |= measure_decays(decays)
     for record in sorted_runs.get("transfer", [])[:1]:
         found |= measure_transfer(record)
     for record in sorted_runs.get("angle-storage", [])[:1]:
@@ -115,5 +123,6 @@ def judge(records: "Sequence[Record]", limits: Limits | None = None, output: str
     for test in ("warm-up", "scale-factor", "run-down", "transfer", "angle-storage"):
         for record in sorted_runs.get(test, [])[1:]:
             used[record.path] = f"{test}, not used: only the first record of this test counts"
+    used |= {decay.path: "run-down" for decay in decays}
     used |= {record.path: "no test: its columns fit none" for record in left}
     return Acceptance(lines, ELSEWHERE, used, band, allan, noise)

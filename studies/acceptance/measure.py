@@ -22,6 +22,7 @@ from studies.stability import read_stability
 
 if TYPE_CHECKING:
     from studies.record import Record
+    from studies.ringdown import Decay
 
 Real = NDArray[np.float64]
 BLOCK = 100.0
@@ -250,6 +251,26 @@ def measure_run_down(record: "Record") -> Found:
         scale = math.pi * float(np.nanmean(record["frequency_Hz"]))
         found["quality_factor"] = Measured(fit.tau * scale, fit.low * scale, fit.high * scale, (record.path,))
     return found
+
+
+def measure_decays(decays: "Sequence[Decay]") -> Found:
+    """The same of free decays as they were recorded (12.14), of the one that runs down fastest."""
+    found: Found = {}
+    for decay in decays:
+        tau = decay.estimates.get("decay_time_s")
+        if tau is None:
+            raise InputError(f"{decay.path}: two lines in a spectrum are no run-down; give a decay over time.")
+        if "run_down_time_s" in found and tau.value > found["run_down_time_s"].value:
+            continue
+        found = {"run_down_time_s": _around(tau.value, tau.sd, decay.path)}
+        if (loss := decay.inverse_q) is not None:
+            found["quality_factor"] = _around(1 / loss.value, loss.sd / loss.value**2, decay.path)
+    return found
+
+
+def _around(value: float, sd: float, path: str) -> Measured:
+    reach = float(scipy.special.ndtri(0.5 + CONFIDENCE / 2)) * sd
+    return Measured(value, value - reach, value + reach, (path,))
 
 
 def measure_seal(records: "Sequence[Record]") -> Found:

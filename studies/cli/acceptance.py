@@ -20,6 +20,7 @@ from studies.record import read_record
 from studies.reports import style
 from studies.reports.digits import plain
 from studies.results import Chapter, Column, Drawing, Facts, Figure, Part, Result, Sentence, Table
+from studies.ringdown import is_decay, read_decay
 from studies.schema.reader import read_file
 
 VERDICTS = {"pass": "all limits met", "fail": "a limit is not met", "incomplete": "not all limits could be judged"}
@@ -47,7 +48,7 @@ def acceptance(card: str, *runs: str, limits: str | None = None, output: str = "
     """Judge a gyro by its records: warm-up, temperature, scale factor, drift with Allan deviation, run-down, transfer function.
 
     Each record serves the test that its columns show: rest over temperature, rest for an hour or more, several applied rates, a swept
-    rate, or a free decay of vibration_amplitude_V. A line '# test: warm-up' (or temperature, scale-factor, drift, run-down, transfer,
+    rate, or a free decay: vibration_amplitude_V, or raw samples, lock-in pairs or a power as hrg fit ringdown reads them. A line '# test: warm-up' (or temperature, scale-factor, drift, run-down, transfer,
     angle-storage) above the header overrides this; warm-up and angle storage need it. Every value has a 95 % interval; a limit is
     judged only if the whole interval lies on one side of it.
 
@@ -65,9 +66,11 @@ def acceptance(card: str, *runs: str, limits: str | None = None, output: str = "
     instrument = load_card(card)
     if not runs:
         raise InputError("no record given; name at least one record (CSV) of the gyro.")
-    records = [read_record(path) for path in runs]
+    free = [path for path in runs if is_decay(path)]
+    records = [read_record(path) for path in runs if path not in free]
+    decays = [read_decay(path) for path in free]
     allowed = None if limits is None else read_file(limits, Limits, SCHEMA)
-    found = judge(records, allowed, output)
+    found = judge(records, allowed, output, decays)
     lines = [_line(line) for line in found.lines]
     for record in records:
         if record.instrument and record.instrument != instrument.name:
@@ -114,10 +117,14 @@ def acceptance(card: str, *runs: str, limits: str | None = None, output: str = "
         Chapter("Quantities", [Table("Measured, in the order of IEEE Std 1431", [row for row in rows if not row["needs"]], MEASURED, note)]),
         Chapter("Drift (12.11)", _drift(found)),
         Chapter("Not judged", [Table("Missing quantities and tests", missing, MISSING)]),
-        Chapter("Records", [Table("Files read", records, (RECORDS[0], used, *RECORDS[1:]), where="page")]),
+        Chapter("Records", [
+            Table("Files read", records, (RECORDS[0], used, *RECORDS[1:]), where="page"),
+            Table("Free decays read", decays, (RECORDS[0], Column("window", "free decay", "s", interval=("window.0", "window.1"))), where="page"),
+            *(Sentence(f"{decay.path}: {' '.join(decay.remarks)}", "warning") for decay in decays if decay.remarks),
+        ]),
     ]  # fmt: skip
     lead = (
-        f"{len(records)} record{'s' * (len(records) != 1)} of {instrument.name}, judged in the order of section 12 of IEEE"
+        f"{len(runs)} record{'s' * (len(runs) != 1)} of {instrument.name}, judged in the order of section 12 of IEEE"
         f" Std 1431-2004. Intervals are 95 %; the zero-rate output is {output}."
     )
     return Result(payload, f"Acceptance of {instrument.name}: {found.verdict}", lead, parts)

@@ -7,15 +7,22 @@ from math import radians
 
 from studies.errors import InputError
 from studies.files.reading import read_bytes
+from studies.instrument.card import Instrument
 from studies.schema.reader import read_keys
 
 
 def pair_splits(
-    split: tuple[float, ...], axis: tuple[float, ...], harmonic: tuple[int, ...], error: float
+    split: tuple[float, ...], axis: tuple[float, ...], harmonic: tuple[int, ...], error: float, card: Instrument
 ) -> list[tuple[int, float, float, float]]:
-    """Return (harmonic, split in Hz, azimuth in rad, reading error in Hz) of the splits given as options."""
+    """Return (harmonic, split in Hz, azimuth in rad, reading error in Hz) of the splits given as options, or of the card."""
+    if not split and not axis:
+        own = card.content.get("imperfection", {}).get("split")
+        if own is not None:
+            return [(int(own["harmonic"]), float(own["split_Hz"]), radians(own["slow_axis_deg"]), error)]
     if not split:
-        raise InputError("--split is missing: give the measured splits (Hz), each with its --axis (degrees).")
+        raise InputError(
+            "--split is missing: give the measured splits (Hz), each with its --axis (degrees), or a card with a measured split ('hrg fit ringdown --save')."
+        )
     for option, given in (("--axis", axis), ("--harmonic", harmonic)):
         if len(given) != len(split):
             found = "is missing" if not given else f"has {len(given)} values"

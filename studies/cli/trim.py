@@ -84,7 +84,7 @@ def trim(
     Parameters
     ----------
     split : tuple[float, ...]
-        Measured splits in Hz, one for each --harmonic.
+        Measured splits in Hz, one for each --harmonic; by default that of the card, as hrg fit ringdown --save writes it.
     axis : tuple[float, ...]
         Azimuth in degrees of an antinode of the slower mode, one for each split.
     harmonic : tuple[int, ...]
@@ -122,8 +122,10 @@ def trim(
     out : str
         Write the cuts as CSV, for the machine.
     """
-    measured = read_scan(scan, harmonic) if scan is not None else pair_splits(split, axis, harmonic, reading_error)
     instrument = load_card(card)
+    measured = (
+        read_scan(scan, harmonic) if scan is not None else pair_splits(split, axis, harmonic, reading_error, instrument)
+    )
     T = instrument.reference_temperature if temperature is None else temperature + zero_Celsius
     tool = Tool(1e-3 * width_mm, 1e-3 * length_mm, depth_limit)
     with naming(instrument.path):

@@ -50,6 +50,38 @@ def test_a_lock_in_file_gives_split_axes_and_q_and_a_card_that_has_them(lock_in,
     assert "Axis of the upper mode".lower() in page.read_text().lower()
 
 
+def test_from_a_raw_decay_to_acceptance_in_five_commands(lock_in, tmp_path, capsys):
+    """Decay, split, trim plan, decay of the trimmed shell (2 mHz left), acceptance of its run-down."""
+    measured, trimmed = str(tmp_path / "measured.toml"), str(tmp_path / "trimmed.toml")
+    after = Gyro(4599.702, 4599.700, 1.0e6, 1.04e6, 0.3, 1.0)
+    z = noisy(after.envelope(TIME, 4599.7, [1.0, 0.8j]), 0.001, np.random.default_rng(4))
+    columns = {"time_s": TIME}
+    for part, channel in zip(("cos", "sin"), z, strict=True):
+        columns |= {f"in_phase_{part}_V": channel.real, f"out_of_phase_{part}_V": channel.imag}
+    again = write(tmp_path / "after.csv", columns, ["reference_frequency_Hz: 4599.7"])
+    limits = tmp_path / "limits.toml"
+    limits.write_text('schema = "hrg.limits/1"\n[limits]\nrun_down_time_s = 60.0\nquality_factor = 1.1e6\n')
+    assert main(["fit", "ringdown", lock_in, "--card", "free-dome", "--save", measured]) == 0
+    capsys.readouterr()
+    assert main(["trim", measured, "--json"]) == 0
+    plan = json.loads(capsys.readouterr().out)
+    assert plan["before"][0]["split_Hz"] == pytest.approx(0.12, abs=1e-3)
+    cuts = plan["rounds"][0]["cuts"]
+    pull = sum(cut["mass_ug"] * np.exp(4j * np.radians(cut["azimuth_deg"])) for cut in cuts)
+    assert np.degrees(np.angle(pull)) / 4 % 90 == pytest.approx(76.0, abs=0.5)  # mass off where the slow mode moves
+    assert main(["fit", "ringdown", again, "--card", measured, "--save", trimmed]) == 0
+    assert load_card(trimmed).content["imperfection"]["split"]["split_Hz"] == pytest.approx(0.002, abs=2e-4)
+    assert main(["modes", trimmed]) == 0
+    capsys.readouterr()
+    assert main(["acceptance", trimmed, again, "--limits", str(limits), "--json"]) == 0
+    found = {row["key"]: row for row in json.loads(capsys.readouterr().out)["quantities"]}
+    q = 2 / (1 / 1.0e6 + 1 / 1.04e6)
+    assert found["quality_factor"]["low"] < q < found["quality_factor"]["high"]
+    assert found["quality_factor"]["verdict"] == "fail"
+    assert found["run_down_time_s"]["value"] == pytest.approx(q / (np.pi * 4599.7), rel=0.01)
+    assert found["run_down_time_s"]["verdict"] == "pass"
+
+
 def test_raw_samples_and_their_alias(tmp_path, capsys):
     time = np.arange(40_000) / 16_000
     gyro = Gyro(4600.0, 4598.0, 8e3, 8e3, 0.2, 0.2)
