@@ -6,7 +6,7 @@ extrapolation, and a property that no source states is refused by name.
 
 import difflib
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from pathlib import Path
@@ -260,9 +260,35 @@ def constant_material(name: str, youngs_modulus: float, poisson_ratio: float, de
     return Material(name, "given values", 0.0, 5000.0, properties, "given in the card", constant=open_ones)
 
 
+class Materials(Mapping[str, Mapping[str, Material]]):
+    """The materials of a file, each checked when it is first taken."""
+
+    def __init__(self, path: str, content: Mapping[str, Any]) -> None:
+        self._path, self._content = path, content
+        self._read: dict[str, Mapping[str, Material]] = {}
+
+    def __getitem__(self, name: str) -> Mapping[str, Material]:
+        """Return the laws of one material."""
+        if name not in self._read:
+            self._read[name] = _read_material(f"{self._path} [{name}]", name, self._content[name])
+        return self._read[name]
+
+    def __contains__(self, name: object) -> bool:
+        """Tell whether the file has a material, without reading it."""
+        return name in self._content
+
+    def __iter__(self) -> Iterator[str]:
+        """Yield the names."""
+        return iter(self._content)
+
+    def __len__(self) -> int:
+        """Return how many there are."""
+        return len(self._content)
+
+
 @lru_cache(maxsize=8)
 def read_materials(path: str | Path = _SHIPPED) -> Mapping[str, Mapping[str, Material]]:
-    """Read a table of materials: name -> law -> Material; the default law stands first.
+    """Read a table of materials: name -> law -> Material; the default law stands first. Those that ship are read when asked for.
 
     Raises
     ------
@@ -279,7 +305,8 @@ def read_materials(path: str | Path = _SHIPPED) -> Mapping[str, Mapping[str, Mat
         raise ShellError(f'{path}: the line schema = "hrg.materials/1" is missing; add it at the top.')
     if not content:
         raise ShellError(f"{path}: no material in it; add a table [name] with [name.laws.law].")
-    return {name: _read_material(f"{path} [{name}]", name, entry) for name, entry in content.items()}
+    found = Materials(str(path), content)
+    return found if path == _SHIPPED else dict(found)  # a file of one's own is checked as a whole
 
 
 def find_material(name: str, law: str = "default", path: str | Path | None = None) -> Material:

@@ -260,10 +260,12 @@ def _rayleigh(resonator: Resonator, elastic: Elastic | VaryingElastic, n: int, c
         raise ShellError(
             "Rayleigh's closed form holds for a hemisphere of constant thickness: use theory solid or shell."
         )
-    if resonator.support != "free" or n < 2 or count != 1 or not isinstance(elastic, Elastic):
+    if resonator.support != "free" or not isinstance(elastic, Elastic):
         raise ShellError(
-            "Rayleigh's closed form is one mode for each n >= 2 of a free shell of one material: use --harmonic 2 or more with --count 1, or --theory solid or shell."
+            "Rayleigh's closed form holds for a free shell of one material, without a stem, films or gradients: use --theory solid or shell."
         )
+    if n < 2 or count != 1:
+        raise ShellError("Rayleigh's closed form is one mode for each n >= 2: use --harmonic 2 or more with --count 1.")
     h = thicknesses.pop()
     f = float(
         rayleigh_frequency(n, elastic.E, elastic.nu, elastic.rho, h, dome.radius, dome.first_angle, dome.last_angle)

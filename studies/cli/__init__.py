@@ -18,7 +18,7 @@ from studies.threads import ONE_THREAD
 
 TYPE_CHECKING = False  # `typing` takes as long to load as all the rest here, and until `run` nobody heeds Ctrl-C
 if TYPE_CHECKING:
-    from cyclopts import App, Group
+    from cyclopts import App, Argument, Group
 
 for _name, _count in ONE_THREAD.items():  # read by the libraries when numpy is first imported
     os.environ.setdefault(_name, _count)
@@ -174,7 +174,7 @@ def _command_line(words: Sequence[str]) -> "App":
 
 def _judge(error: Exception, words: Sequence[str]) -> tuple[str, int]:
     """Return the sentence that a user reads of an error, and the exit status."""
-    from cyclopts import CycloptsError, UnknownCommandError, UnusedCliTokensError
+    from cyclopts import CoercionError, CycloptsError, MissingArgumentError, UnknownCommandError, UnusedCliTokensError
 
     from studies.errors import UNUSABLE_INPUT, MissingEnvironment, nearest
     from studies.files.lines import point_out
@@ -185,9 +185,18 @@ def _judge(error: Exception, words: Sequence[str]) -> tuple[str, int]:
         case UnknownCommandError():  # its own words would load every command
             word = " ".join([*words[:1], *(error.unused_tokens or [])[:1]] if words[0] in GROUPS else words[:1])
             return f"unknown command '{word}'{nearest(word, (*COMMANDS, *GROUPS))}", 2
+        case MissingArgumentError() if error.argument is not None and not error.tokens_so_far:
+            return (
+                f"{f'{error.keyword}: its value' if error.keyword else _spell(error.argument)} is missing. {_see(words)}",
+                2,
+            )
+        case CoercionError() if error.token is not None and error.target_type in KINDS:
+            return (
+                f"{error.token.keyword or _spell(error.argument)} {error.token.value}: give {KINDS[error.target_type]}. {_see(words)}",
+                2,
+            )
         case CycloptsError():
-            asked = " ".join(["hrg", *_command_words(words), "--help"])
-            return f"{' '.join(str(error).split())} See '{asked}'.", 2
+            return f"{' '.join(str(error).split())} {_see(words)}", 2
         case _ if isinstance(error, UNUSABLE_INPUT):
             return point_out(str(error)), 2
         case MissingEnvironment():
@@ -204,10 +213,22 @@ def _say_unused(unused: Sequence[str], words: Sequence[str]) -> str:
     if before and before[-1] in PROFILE_WORDS:
         whole = " ".join([before[-1], *takewhile(lambda word: not word.startswith("-") or word[1:2].isdigit(), unused)])
         return f'put a profile of several words in quotes: "{whole}".'
-    asked = " ".join(["hrg", *_command_words(words), "--help"])
-    return f"{named}: too many arguments; put text with spaces in quotes. See '{asked}'."
+    return f"{named}: too many arguments; put text with spaces in quotes. {_see(words)}"
 
 
+def _see(words: Sequence[str]) -> str:
+    return f"See '{' '.join(['hrg', *_command_words(words), '--help'])}'."
+
+
+def _spell(argument: "Argument | None") -> str:
+    """Return the name of an argument as its help has it: --out, or CARD for one that stands by its place."""
+    if argument is None:
+        return "an argument"
+    positional = argument.field_info.is_positional and not argument.field_info.is_keyword_only
+    return argument.name.lstrip("-").upper() if positional else argument.name
+
+
+KINDS: dict[object, str] = {int: "a whole number", float: "a number", bool: "yes or no"}
 PROFILE_WORDS = ("soak", "step", "ramp", "staircase", "cycle")
 CHAPTERS = {
     # of the list of commands

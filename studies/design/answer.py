@@ -4,9 +4,8 @@ from dataclasses import dataclass, field
 from itertools import product
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.optimize import nnls
-from scipy.stats import norm
 
 from studies.design.goals import EXACT, Scalar
 from studies.design.search import BOXES, Search
@@ -251,7 +250,7 @@ def _prices(search: Search, scalar: Scalar, best: int) -> list[float | None]:
     heavy = 1e3
     rows = np.vstack([slope[top], slope[held], ends]).T
     ones = np.concatenate([np.ones(top.sum()), np.zeros(held.sum() + len(ends))])
-    found = nnls(np.vstack([rows, heavy * ones]), np.append(np.zeros(len(x)), heavy))[0]
+    found = scipy.optimize.nnls(np.vstack([rows, heavy * ones]), np.append(np.zeros(len(x)), heavy))[0]
     prices: list[float | None] = [None] * len(goals.limits)
     for k, multiplier in zip(np.flatnonzero(held), found[top.sum() : top.sum() + held.sum()], strict=True):
         if multiplier < 1e-6:
@@ -302,7 +301,9 @@ def _spread(search: Search, best: int) -> tuple[Spread, ...]:
         one = float(np.sum(np.abs(move) * most)), float(np.linalg.norm(move * sd))
         value = _shown(name, values[c])
         passed = [
-            norm.cdf(sign * (limit - value) / max(one[1], 1e-300)) for n, sign, limit, _ in goals.limits if n == name
+            scipy.stats.norm.cdf(sign * (limit - value) / max(one[1], 1e-300))
+            for n, sign, limit, _ in goals.limits
+            if n == name
         ]
         share = float(max(0.0, sum(passed) - (len(passed) - 1))) if passed else None
         found.append(Spread(name, value, *one, float(column.min()), float(column.max()), share))

@@ -14,9 +14,8 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.optimize import minimize
-from scipy.stats import norm
 
 from studies.design.interpolant import Interpolant
 from studies.design.task import Task, is_magnitude
@@ -172,7 +171,7 @@ def reach(task: Task, moves: Array) -> float:
     if worst:
         return float(sum(total))
     assert margin is not None
-    return float(norm.ppf(margin.share) * np.linalg.norm(total))
+    return float(scipy.stats.norm.ppf(margin.share) * np.linalg.norm(total))
 
 
 def lay_goals(task: Task, values: Array, nominal: Array) -> Goals:
@@ -217,7 +216,7 @@ def step(
             "jac": lambda y: np.column_stack([-at(y[:-1])[1][used], t]),
         }
         box: Any = [*zip(low, high, strict=True), (None, None)]
-        solver: Any = minimize  # its types know no array of any length
+        solver: Any = scipy.optimize.minimize  # its types know no array of any length
         found = solver(
             lambda y: y[-1], y, jac=lambda y: unit, method="SLSQP", bounds=box, constraints=held, options=SLSQP
         )

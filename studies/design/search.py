@@ -9,8 +9,8 @@ over what is there.
 from collections.abc import Sequence
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.stats import qmc
 
 from studies.design.goals import Goals, Scalar, lay_goals, step
 from studies.design.interpolant import Interpolant, interpolate
@@ -211,7 +211,7 @@ class Search:
         if self.failures:
             raise InputError(f"the first design cannot be computed: {self.failures[0][1]}")
         free = self.task.free
-        drawn = qmc.LatinHypercube(free, rng=self.rng).random(max(2 * free + 4, 8))
+        drawn = scipy.stats.qmc.LatinHypercube(free, rng=self.rng).random(max(2 * free + 4, 8))
         self.look([np.append(x, self.start[free:]) for x in drawn])
         if len(self.failures) > len(drawn) / 2:
             raise InputError(

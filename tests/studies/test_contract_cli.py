@@ -94,7 +94,7 @@ def test_an_error_of_a_real_process_is_status_2_without_traceback():
     ("words", "part"),
     [
         (["nonsense"], "nonsense"),
-        (["tcf"], "card"),
+        (["tcf"], "CARD is missing"),
         (["tcf", "hrg-30m"], "hrg-30mm"),
         (["tcf", "none.toml"], "no such file"),
         (["tcf", "hrg-30mm", "--from", "-300", "--theory", "shell"], "outside the range"),
