@@ -10,6 +10,7 @@ from functools import cache
 from typing import NamedTuple
 
 import sympy as sp
+from sympy.simplify.fu import TR8
 
 from compensation.derivation.oscillator import Omega, k, n, omega, small_forces
 
@@ -95,12 +96,10 @@ def ellipse_rates() -> Rates:
     """
     turn = sp.Matrix([[sp.cos(psi), -sp.sin(psi)], [sp.sin(psi), sp.cos(psi)]])
     orbit = sp.Matrix([a, -sp.I * q])
-    r = turn.T * amplitude_matrix() * turn * orbit + sp.Matrix([u_a + sp.I * u_phi, u_r - sp.I * u_q])
-    real = [sp.expand(entry).as_real_imag()[0] for entry in r]
-    imaginary = [sp.expand(entry).as_real_imag()[1] for entry in r]
-    size = a**2 - q**2
-    angle = (a * real[1] - q * imaginary[0]) / size
-    phase = (a * imaginary[0] - q * real[1]) / size
-    coriolis = n * k * Omega
-    gathered = [sp.simplify(sp.expand(rate)) for rate in (real[0], -imaginary[1], angle - coriolis, phase)]
-    return Rates(gathered[0], gathered[1], coriolis + gathered[2], gathered[3])
+    turned = (turn.T * amplitude_matrix() * turn).applyfunc(lambda entry: sp.expand(TR8(sp.expand(entry))))
+    r = turned * orbit + sp.Matrix([u_a + sp.I * u_phi, u_r - sp.I * u_q])
+    (along, across), (along_i, across_i) = zip(*(sp.expand(entry).as_real_imag() for entry in r), strict=True)
+    size, coriolis = a**2 - q**2, n * k * Omega
+    angle = sp.expand(a * across - q * along_i - coriolis * size) / size
+    phase = sp.expand(a * along_i - q * across) / size
+    return Rates(along, sp.expand(-across_i), coriolis + angle, phase)
