@@ -7,7 +7,6 @@ from math import pi
 
 import numpy as np
 import pytest
-import trimesh
 
 from shell.elastic import Elastic
 from shell.errors import ShellError
@@ -82,6 +81,8 @@ def swinging():
 
 @pytest.mark.parametrize("kind", ["stl", "ply"])
 def test_files_read_back_as_the_same_solid_in_mm(swinging, kind):
+    import trimesh
+
     mesh = trimesh.load(io.BytesIO(encode_mesh(swinging, kind)), file_type=kind)
     assert mesh.is_watertight
     assert mesh.volume == pytest.approx(build_mesh(swinging).volume * 1e9, rel=1e-5)
@@ -145,6 +146,8 @@ def test_the_animated_glb_swings_by_one_morph_target(swinging):
 
 
 def test_another_library_reads_the_still_glb(swinging):
+    import trimesh
+
     scene = trimesh.load(io.BytesIO(encode_mesh(swinging, "glb", 1e-3)), file_type="glb")
     (mesh,) = scene.geometry.values()
     assert mesh.volume == pytest.approx(build_mesh(swinging, 1e-3).volume, rel=1e-4)

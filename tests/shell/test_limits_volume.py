@@ -6,8 +6,6 @@ from math import pi
 
 import numpy as np
 import pytest
-import pyvista
-from vtkmodules import vtkCommonDataModel
 
 from shell.elastic import Elastic
 from shell.errors import ShellError
@@ -30,23 +28,20 @@ SHAPES = {
     "cup": cylinder(12.5e-3, 0.7e-3, 18e-3, bottom_thickness=2e-3, clamp_radius=4e-3),
     "bell": bell(12.5e-3, 0.8e-3, 10e-3, 6e-3, 15e-3),
 }
-CELLS = {
-    25: vtkCommonDataModel.vtkQuadraticHexahedron,
-    29: vtkCommonDataModel.vtkTriQuadraticHexahedron,
-    26: vtkCommonDataModel.vtkQuadraticWedge,
-    32: vtkCommonDataModel.vtkBiQuadraticQuadraticWedge,
-}
+CELLS = {25: "QuadraticHexahedron", 29: "TriQuadraticHexahedron", 26: "QuadraticWedge", 32: "BiQuadraticQuadraticWedge"}
 
 
 def determinants(nodes, cells, kind):
     """det of the Jacobian at Gauss points (points, cells) with their weights, by VTK's shape functions."""
+    from vtkmodules import vtkCommonDataModel
+
     x, w = np.polynomial.legendre.leggauss(4)
     x, w = (x + 1) / 2, w / 2
     a, b, c = (axis.ravel() for axis in np.meshgrid(x, x, x, indexing="ij"))
     weights = (w[:, None, None] * w[:, None] * w).ravel()
     if kind in (26, 32):  # the square folded onto the triangle
         b, weights = b * (1 - a), weights * (1 - a)
-    found, cell = [], CELLS[kind]()
+    found, cell = [], getattr(vtkCommonDataModel, f"vtk{CELLS[kind]}")()
     for place in zip(a, b, c, strict=True):
         slopes = [0.0] * (3 * cells.shape[1])
         cell.InterpolateDerivs(list(place), slopes)
@@ -55,6 +50,8 @@ def determinants(nodes, cells, kind):
 
 
 def read_vtu(data, folder):
+    import pyvista
+
     (folder / "mesh.vtu").write_bytes(data)
     grid = pyvista.read(folder / "mesh.vtu")
     return np.asarray(grid.points), grid.cells_dict, np.asarray(grid.point_data["held"])

@@ -4,8 +4,6 @@ import ctypes
 import importlib.util
 import json
 import re
-import shutil
-import subprocess
 from math import pi, radians
 
 import numpy as np
@@ -13,6 +11,7 @@ import pytest
 from scipy.integrate import quad
 
 from studies.cli import main
+from tests.compiled import compile_c
 
 CASES = [(2, 0.0, 90.0), (3, 12.5, 77.0), (7, 0.0, 20.0)]
 
@@ -56,7 +55,8 @@ def random_shells(seed, count=20):
 
 
 @pytest.mark.parametrize("case", CASES, ids=str)
-def test_emitted_python_agrees_with_quadrature(case, tmp_path, capsys):
+def test_emitted_code_agrees_with_quadrature(case, tmp_path, capsys):
+    """Python, and C where there is a compiler: one derivation for both."""
     status, said = speak(capsys, "--code", "python", *options(*case))
     assert status == 0
     file = tmp_path / "rayleigh_design.py"
@@ -69,18 +69,9 @@ def test_emitted_python_agrees_with_quadrature(case, tmp_path, capsys):
     check_derivatives(case, module.rayleigh_log_derivatives(0.2))
     check_temperature(case, *module.rayleigh_temperature_coefficient(0.2, *SLOPES))
     check_bryan_factor(case, module.rayleigh_bryan_factor())
-
-
-@pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler 'cc' on this machine")
-@pytest.mark.parametrize("case", CASES, ids=str)
-def test_emitted_c_compiles_and_agrees_with_quadrature(case, tmp_path, capsys):
     status, said = speak(capsys, "--code", "c", *options(*case))
     assert status == 0
-    source, library = tmp_path / "rayleigh.c", tmp_path / "rayleigh.so"
-    source.write_text(said.out)
-    strict = ["-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic"]
-    subprocess.run(["cc", *strict, "-shared", "-fPIC", str(source), "-o", str(library), "-lm"], check=True)
-    compiled = ctypes.CDLL(str(library))
+    compiled = compile_c(said.out, tmp_path)
     for function in (compiled.rayleigh_frequency, compiled.rayleigh_bryan_factor):
         function.restype = ctypes.c_double
     for shell in random_shells(seed=5):

@@ -1,13 +1,12 @@
 """`hrg derive --dynamics` speaks as promised, and the C that it prints computes what the Python does."""
 
 import ctypes
-import shutil
-import subprocess
 
 import numpy as np
 import pytest
 
 from studies.cli import main
+from tests.compiled import compile_c
 
 
 def speak(capsys, *words):
@@ -21,14 +20,10 @@ def test_options_of_the_shell_are_refused(capsys):
     assert "--dynamics holds for any harmonic" in said.err
 
 
-@pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
 def test_both_languages_agree(tmp_path, capsys):
     space = {}
     exec(speak(capsys, "--code", "python")[1].out, space)
-    source, library = tmp_path / "averaged.c", tmp_path / "averaged.so"
-    source.write_text(speak(capsys, "--code", "c")[1].out)
-    subprocess.run(["cc", "-Wall", "-Werror", "-O1", "-shared", "-fPIC", "-o", library, source, "-lm"], check=True)
-    compiled = ctypes.CDLL(str(library)).averaged_rates
+    compiled = compile_c(speak(capsys, "--code", "c")[1].out, tmp_path).averaged_rates
     rng = np.random.default_rng(5)
     for _ in range(20):
         values = rng.uniform(0.2, 2.0, 15)

@@ -82,8 +82,8 @@ def test_a_hundred_thousand_columns_are_refused_quickly(tmp_path, capsys):
     ("shell", "status", "said"),
     [
         ("hrg cards --json >&-", 3, "standard output is closed"),
-        ("hrg derive --latex > /dev/full", 3, "No space left on device"),
-        ("PYTHONIOENCODING=ascii hrg tcf free-dome > {folder}/out.txt", 0, ""),
+        ("hrg effects > /dev/full", 3, "No space left on device"),
+        ("PYTHONIOENCODING=ascii hrg cards hrg-30mm > {folder}/out.txt", 0, ""),
         ("cd {folder}/gone && rmdir {folder}/gone && hrg modes free-dome --theory rayleigh > /dev/null", 0, ""),
     ],
 )

@@ -4,7 +4,6 @@ import ctypes
 import json
 import re
 import shutil
-import subprocess
 
 import numpy as np
 import pytest
@@ -12,6 +11,7 @@ import pytest
 from studies.cli import main
 from studies.models import compensate, emit_c, read_model
 from studies.record import Record, read_record, write_record
+from tests.compiled import compile_c
 
 TIME = np.arange(0.0, 18000.0, 5.0)
 
@@ -70,19 +70,9 @@ def test_a_compensated_record_is_flat_and_complete(calibrated, tmp_path, capsys)
     assert again["bias_deg_per_h"] == pytest.approx(read_record(calibrated / "run1.csv")["bias_deg_per_h"], abs=1e-12)
 
 
-FLAGS = ["-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic"]
-
-
-def compile_c(source, folder):
+def compiled(source, folder):
     """Return the emitted source as a library, after its own test has passed."""
-    compiler = shutil.which("cc") or shutil.which("gcc")
-    if compiler is None:
-        pytest.skip("no C compiler on this machine")
-    (folder / "m.c").write_text(source, encoding="utf-8")
-    subprocess.run([compiler, *FLAGS, "-DHRG_SELF_TEST", "m.c", "-o", "self", "-lm"], cwd=folder, check=True)
-    assert " 0 differ" in subprocess.run(["./self"], cwd=folder, check=True, capture_output=True, text=True).stdout
-    subprocess.run([compiler, *FLAGS, "-shared", "-fPIC", "m.c", "-o", "m.so", "-lm"], cwd=folder, check=True)
-    library = ctypes.CDLL(str(folder / "m.so"))
+    library = compile_c(source, folder, " 0 differ")
     library.hrg_compensate.restype = library.hrg_bias.restype = ctypes.c_double
     return library
 
@@ -112,7 +102,7 @@ def test_the_c_code_computes_what_the_causal_model_computes(calibrated, tmp_path
         time = time + np.random.default_rng(1).uniform(-2, 2, time.size)
         f[40:60], f[1000:1200] = np.nan, np.nan
     expected = compensate(model, Record({"time_s": time, "frequency_Hz": f, "bias_deg_per_h": output}))
-    found = run_c(compile_c(emit_c(model), tmp_path), time, output, f)
+    found = run_c(compiled(emit_c(model), tmp_path), time, output, f)
     assert np.array_equal(np.isnan(found), np.isnan(expected["compensated_bias_deg_per_h"]))
     assert np.mean(np.isfinite(found)) > 0.9
     np.testing.assert_allclose(found, expected["compensated_bias_deg_per_h"], atol=1e-9, rtol=0)
@@ -175,7 +165,7 @@ def test_a_gyro_without_a_frequency_is_fitted_over_its_temperature(tmp_path, cap
     fitted = read_model(model)
     record = read_record(names[3])
     found = run_c(
-        compile_c(emit_c(fitted), tmp_path),
+        compiled(emit_c(fitted), tmp_path),
         record["time_s"],
         record["bias_deg_per_h"],
         record["housing_temperature_degC"],

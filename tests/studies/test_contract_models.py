@@ -2,8 +2,6 @@
 
 import ctypes
 import json
-import shutil
-import subprocess
 import tomllib
 
 import numpy as np
@@ -16,6 +14,7 @@ from studies.errors import InputError
 from studies.models import ModelSource, compensate, emit_c, format_model, model_kinds, read_model, write_model
 from studies.models.kinds.frequency import evaluate, find_temperature, save_frequency
 from studies.record import Record, read_record, write_record
+from tests.compiled import compile_c
 
 T = np.linspace(-20, 40, 7)
 F = 4424.9 + 0.3716 * T - 9.7e-4 * T**2 + 1.5e-5 * T**3 + 0.01 * np.cos(5 * T)
@@ -24,16 +23,6 @@ F = 4424.9 + 0.3716 * T - 9.7e-4 * T**2 + 1.5e-5 * T**3 + 0.01 * np.cos(5 * T)
 @pytest.fixture
 def model():
     return save_frequency(fit_frequency(T, F), (ModelSource('a "b" */ ü.csv', "ab12", 7),), "test")
-
-
-def compile_c(source, folder):
-    compiler = shutil.which("cc") or shutil.which("gcc")
-    if compiler is None:
-        pytest.skip("no C compiler on this machine")
-    (folder / "model.c").write_text(source, encoding="utf-8")
-    flags = ["-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic", "-O2", "-shared", "-fPIC"]
-    subprocess.run([compiler, *flags, "model.c", "-o", "model.so", "-lm"], cwd=folder, check=True)
-    return ctypes.CDLL(str(folder / "model.so"))
 
 
 def test_a_saved_model_is_read_back_to_the_last_bit(model, tmp_path):

@@ -5,13 +5,14 @@ import re
 import warnings
 from importlib.resources import files
 
-import nbformat
 import pytest
-from nbclient import NotebookClient
 
 
 def run_notebook(name, folder):
     """Return everything that the cells of a notebook print, in a kernel of its own that starts in `folder`."""
+    import nbformat
+    from nbclient import NotebookClient
+
     text = (files("studies.examples") / f"{name}.ipynb").read_text(encoding="utf-8")
     notebook = nbformat.reads(text, as_version=4)
     assert any(cell.get("outputs") for cell in notebook.cells), "a reader sees results without running anything"

@@ -6,7 +6,6 @@ import sys
 
 import numpy as np
 import pytest
-import trimesh
 
 from studies.cli import main
 from studies.errors import InputError
@@ -70,6 +69,8 @@ def test_without_opengl_the_page_is_interactive_still_and_says_what_is_missing(t
 
 
 def test_a_mesh_for_slicers_is_the_undeformed_solid_in_mm(tmp_path, capsys):
+    import trimesh
+
     out = tmp_path / "dome.stl"
     assert hrg_render("free-dome", "--theory", "shell", "--out", out, "--json") == 0
     told = json.loads(capsys.readouterr().out)
@@ -83,6 +84,8 @@ def test_a_mesh_for_slicers_is_the_undeformed_solid_in_mm(tmp_path, capsys):
 
 
 def test_the_deformed_mesh_reaches_out_by_the_swing(tmp_path):
+    import trimesh
+
     still, moved = tmp_path / "still.ply", tmp_path / "moved.ply"
     assert hrg_render("free-dome", "--theory", "shell", "--out", still) == 0
     assert hrg_render("free-dome", "--theory", "shell", "--swing-mm", "0.8", "--out", moved) == 0

@@ -102,7 +102,7 @@ def test_notes_of_a_record_are_read(tmp_path):
     assert record.comments == ("free words",)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60, deadline=None, derandomize=True)
 @given(
     values=st.lists(st.one_of(st.none(), st.floats(-1e10, 1e10, width=64)), min_size=1, max_size=30),
     note=st.text(

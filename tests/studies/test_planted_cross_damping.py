@@ -2,8 +2,6 @@
 
 import ctypes
 import json
-import shutil
-import subprocess
 
 import numpy as np
 import pytest
@@ -26,6 +24,7 @@ from studies.papers.cvg_cross_damping import (
 from studies.record import read_record
 from studies.reports.cross_damping import twin_chapters
 from studies.results.page import make_blocks
+from tests.compiled import compile_c
 
 GIVEN = ["--frequency", str(FREQUENCY), "--quality", str(QUALITY)]
 
@@ -73,18 +72,10 @@ def test_saved_model_compensates_a_record(record, tmp_path):
 
 
 def test_emitted_c_agrees_with_python(record, tmp_path):
-    compiler = shutil.which("cc")
-    if compiler is None:
-        pytest.skip("no C compiler on this machine")
     model_file = tmp_path / "model.toml"
     assert main(["fit", "cross-damping", record, *GIVEN, "--save", str(model_file)]) == 0
     model = read_model(model_file)
-    (tmp_path / "m.c").write_text(emit_c(model), encoding="utf-8")
-    flags = ["-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic", "-shared", "-fPIC"]
-    subprocess.run([compiler, *flags, "m.c", "-o", "m.so", "-lm"], cwd=tmp_path, check=True)
-    subprocess.run([compiler, *flags[:-2], "-DHRG_SELF_TEST", "m.c", "-o", "self", "-lm"], cwd=tmp_path, check=True)
-    subprocess.run(["./self"], cwd=tmp_path, check=True)
-    library = ctypes.CDLL(str(tmp_path / "m.so"))
+    library = compile_c(emit_c(model), tmp_path, " ")
     step, state = library.hrg_cross_damping_step, (ctypes.c_double * 2)()
     settle = library.hrg_cross_damping_settle
     step.restype = settle.restype = ctypes.c_double

@@ -1,9 +1,9 @@
 """`hrg fit scale` from files: planted chain recovered, model applied and emitted, bad files named; printed claims."""
 
+import contextlib
 import ctypes
+import io
 import json
-import shutil
-import subprocess
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +20,7 @@ from studies.record import read_record
 from studies.reports.bell import bell_chapters
 from studies.results.page import make_blocks
 from studies.scale import settled_rows
+from tests.compiled import compile_c
 
 STRIDE = 20
 
@@ -34,15 +35,23 @@ def write(path, run, missing=()):
     return str(path)
 
 
-@pytest.fixture
-def records(tmp_path):
-    runs = simulate_runs(np.random.default_rng(2))
-    return [write(tmp_path / f"{name}.csv", run) for name, run in zip(("rates", "rest", "turning"), runs, strict=True)]
+@pytest.fixture(scope="module")
+def records(tmp_path_factory):
+    folder, runs = tmp_path_factory.mktemp("scale"), simulate_runs(np.random.default_rng(2))
+    return [write(folder / f"{name}.csv", run) for name, run in zip(("rates", "rest", "turning"), runs, strict=True)]
 
 
-def test_planted_chain_is_recovered_in_any_order_of_files(records, capsys):
-    assert main(["fit", "scale", *records[::-1], "--json"]) == 0
-    found = json.loads(capsys.readouterr().out)
+@pytest.fixture(scope="module")
+def fitted(records, tmp_path_factory):
+    """What `hrg fit scale` answers and leaves behind: JSON, model, page."""
+    model, page = (tmp_path_factory.mktemp("fit") / name for name in ("model.toml", "page.html"))
+    with contextlib.redirect_stdout(io.StringIO()) as told:
+        assert main(["fit", "scale", *records[::-1], "--save", str(model), "--report", str(page), "--json"]) == 0
+    return json.loads(told.getvalue()), model, page
+
+
+def test_planted_chain_is_recovered_in_any_order_of_files(fitted):
+    found = fitted[0]
     assert found["schema"] == "hrg.fit-scale/1"
     assert set(found["parts"]) == {"rough", "bias", "scale_over_rate", "scale_over_temperature"}
     gyro, parts = read_printed_chain(), found["parts"]
@@ -59,11 +68,9 @@ def test_planted_chain_is_recovered_in_any_order_of_files(records, capsys):
     assert found["error_held_out_deg_per_s"] < 0.5 * found["error_before_deg_per_s"]
 
 
-def test_saved_model_is_the_fitted_chain_and_compensates(records, tmp_path):
-    model_file, page = tmp_path / "model.toml", tmp_path / "page.html"
-    assert main(["fit", "scale", *records, "--save", str(model_file), "--report", str(page)]) == 0
-    assert page.stat().st_size > 10_000
-    model = read_model(model_file)
+def test_saved_model_is_the_fitted_chain_and_compensates(records, fitted):
+    assert fitted[2].stat().st_size > 10_000
+    model = read_model(fitted[1])
     data = read_record(records[2])
     column = compensate(model, data)["compensated_measured_rate_deg_per_s"]
     assert np.mean(column[100:]) == pytest.approx(300, abs=0.1)
@@ -102,10 +109,9 @@ def test_the_records_of_the_fit_are_compensated(tmp_path, capsys):
         compensate(read_model(model), hot)
 
 
-def test_gaps(records, tmp_path):
+def test_gaps(records, fitted, tmp_path):
     """With the filter a gap is refused; without it the row stays empty."""
-    models = [tmp_path / "with.toml", tmp_path / "without.toml"]
-    assert main(["fit", "scale", *records, "--save", str(models[0])]) == 0
+    models = [fitted[1], tmp_path / "without.toml"]
     assert main(["fit", "scale", *records, "--no-filter", "--save", str(models[1])]) == 0
     holed = read_record(write(tmp_path / "holed.csv", simulate_runs(np.random.default_rng(3))[1], missing=(7,)))
     with pytest.raises(InputError, match="row 8"):
@@ -114,9 +120,8 @@ def test_gaps(records, tmp_path):
     assert np.flatnonzero(np.isnan(column)).tolist() == [7]
 
 
-def test_outliers_and_gaps_in_the_calibration_are_left_out(records, tmp_path, capsys):
-    assert main(["fit", "scale", *records, "--json"]) == 0
-    clean = json.loads(capsys.readouterr().out)
+def test_outliers_and_gaps_in_the_calibration_are_left_out(records, fitted, tmp_path, capsys):
+    clean = fitted[0]
     lines = Path(records[1]).read_text().splitlines()
     for row in (50, 700, 2000):
         cells = lines[row].split(",")
@@ -134,16 +139,9 @@ def test_outliers_and_gaps_in_the_calibration_are_left_out(records, tmp_path, ca
         assert abs(coefficient["value"] - before["value"]) < 0.5 * before["standard_error"]
 
 
-def test_emitted_c_agrees_with_python(records, tmp_path):
-    compiler = shutil.which("cc")
-    if compiler is None:
-        pytest.skip("no C compiler on this machine")
-    assert main(["fit", "scale", *records, "--save", str(tmp_path / "m.toml")]) == 0
-    model = read_model(tmp_path / "m.toml")
-    (tmp_path / "m.c").write_text(emit_c(model), encoding="utf-8")
-    flags = ["-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic", "-shared", "-fPIC"]
-    subprocess.run([compiler, *flags, "m.c", "-o", "m.so", "-lm"], cwd=tmp_path, check=True)
-    library = ctypes.CDLL(str(tmp_path / "m.so"))
+def test_emitted_c_agrees_with_python(records, fitted, tmp_path):
+    model = read_model(fitted[1])
+    library = compile_c(emit_c(model), tmp_path)
     library.hrg_rate.restype = library.hrg_smooth.restype = ctypes.c_double
     library.hrg_rate.argtypes = [ctypes.c_double] * 2
     library.hrg_smooth.argtypes = [ctypes.c_void_p, ctypes.c_double]
@@ -245,12 +243,10 @@ def test_impossible_cut_off_is_refused(records, capsys):
     assert "200 Hz is impossible" in capsys.readouterr().err
 
 
-def test_the_command_compensates_a_record_of_raw_counts(records, tmp_path, capsys):
+def test_the_command_compensates_a_record_of_raw_counts(records, fitted, tmp_path, capsys):
     """The rate is made from counts, so there is no uncompensated column to compare with."""
-    model, out = tmp_path / "model.toml", tmp_path / "out.csv"
-    assert main(["fit", "scale", *records, "--save", str(model)]) == 0
-    capsys.readouterr()
-    assert main(["compensate", str(model), records[2], "--out", str(out), "--json"]) == 0
+    out = tmp_path / "out.csv"
+    assert main(["compensate", str(fitted[1]), records[2], "--out", str(out), "--json"]) == 0
     column = json.loads(capsys.readouterr().out)["columns"]["compensated_measured_rate_deg_per_s"]
     assert column["stability_before"] is None
     assert column["rows_not_compensated"] == 0
