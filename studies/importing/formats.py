@@ -164,7 +164,7 @@ def read_hdf5(path: str, files: ExitStack) -> Iterator[Channel]:
 
     file.visititems(visit)
     for group, items in found.items():
-        about = {**dict(file.attrs), **dict(file[group or "/"].attrs)}
+        about = {**_attributes(file), **_attributes(file[group or "/"])}
         yield from from_arrays(group, items, about)
 
 
@@ -200,7 +200,7 @@ def from_arrays(group: str, items: Mapping[str, Any], about: Mapping[str, Any]) 
         if a.dtype.kind in NUMBERS and np.prod(a.shape) == 1
     }
     for name, array in items.items():
-        own = dict(getattr(array, "attrs", {}))
+        own = _attributes(array)
         if array.dtype.kind in "OV" and not array.dtype.names:
             yield Channel(group, name, "", 0, _nothing, refused=MATLAB if "MATLAB_class" in own else OBJECT)
             continue
@@ -228,6 +228,13 @@ def from_arrays(group: str, items: Mapping[str, Any], about: Mapping[str, Any]) 
                     _slice(array, along, k),
                     clock,
                 )
+
+
+def _attributes(item: Any) -> dict[str, Any]:
+    """Return the attributes that say something here; others may be anything, or damaged."""
+    found = getattr(item, "attrs", {})
+    said = (*STEPS, *RATES, *STARTS, *UNITS, "matlab_class", "matlab_object_decode")
+    return {name: found[name] for name in found if name.lower() in said}
 
 
 def _slice(array: Any, along: int | None = None, place: int = 0, field: str = "") -> Callable[[int], Array]:
