@@ -16,7 +16,8 @@ from studies.calibration.fit import CardFit, fit, whitened
 from studies.calibration.ladder import Rung, build_ladder, noise_rms, spread_of, usual_mean
 from studies.calibration.misreading import check_readings
 from studies.calibration.observed import HOUSING, QUADRATURE, RESPONSES, SETTLED, ObservedRun, SettledTable, observe
-from studies.calibration.priors import Priors, gather_priors
+from studies.calibration.posterior import posterior_card
+from studies.calibration.priors import Priors, check_exact, gather_priors
 from studies.calibration.problem import JUMP, SHIFT, CardProblem, State, wide_law
 from studies.calibration.remarks import warn
 from studies.calibration.settled import SettledComparison, compare_settled
@@ -36,7 +37,6 @@ Array = NDArray[np.float64]
 Progress = Callable[[str], None]
 START_STEPS = 3
 EXCLUDED = 6.0  # prior standard deviations that no value of a right card is away
-DIGITS = 12  # of a correlation: the frequency knows two values together a thousand times better than each, and 1 − ρ² is the square
 
 
 @dataclass(frozen=True)
@@ -254,38 +254,17 @@ def _driving(record: Record) -> Array:
 def _pose(
     instrument: "Instrument", runs: tuple[ObservedRun, ...], tables: tuple[SettledTable, ...], exact: Sequence[str]
 ) -> CardProblem:
+    check_exact(instrument, exact)
     priors = gather_priors(instrument, exact)
-    known = {value.name for value in instrument.uncertain}
-    for name in exact:
-        if name not in known:
-            from studies.errors import nearest
-
-            raise InputError(
-                f"{instrument.path}: '{name}' is not an uncertain value of the card{nearest(name, sorted(known))}"
-            )
     return CardProblem(instrument, priors, runs, wide_law(instrument, runs, tables), tables)
 
 
 def _calibrated(instrument: "Instrument", found: CardFit, estimates: Sequence[Estimate]) -> "Instrument":
-    """The card with posterior values, widths, correlations and intervals."""
     priors: Priors = found.problem.priors
     count = len(priors.values)
-    moves = priors.slopes(found.point[:count])
-    C = moves @ found.covariance[:count, :count] @ moves.T
-    sd = np.sqrt(np.diag(C))
-    R = np.clip(C / np.outer(sd, sd), -1.0, 1.0)
-    np.fill_diagonal(R, 1.0)
-    values = {}
-    for one, prior in zip(estimates, priors.values, strict=True):
-        ends = {"low": prior.low if prior.low != 0.0 else -np.inf, "high": prior.high}
-        hard = {name: end for name, end in ends.items() if np.isfinite(end)}
-        values[one.parameter] = {"value": one.value, "sd": one.sd, **hard}
-    posterior = {
-        "names": [one.parameter for one in estimates],
-        "correlation": R.round(DIGITS).tolist(),
-        "interval": [[one.low, one.high] for one in estimates],
-    }
-    return instrument.with_values(values | _turn_on(found)).with_table("posterior", posterior)
+    return posterior_card(
+        instrument, priors, found.point[:count], found.covariance[:count, :count], estimates, _turn_on(found)
+    )
 
 
 def _turn_on(found: CardFit) -> dict[str, float]:

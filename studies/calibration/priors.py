@@ -124,6 +124,16 @@ def gather_priors(instrument: "Instrument", exact: Sequence[str] = ()) -> Priors
     return Priors(values, np.linalg.cholesky(R), wave)
 
 
+def check_exact(instrument: "Instrument", exact: Sequence[str]) -> None:
+    """Refuse names that are no uncertain values of the card."""
+    from studies.errors import InputError, nearest
+
+    known = sorted(value.name for value in instrument.uncertain)
+    for name in exact:
+        if name not in known:
+            raise InputError(f"{instrument.path}: '{name}' is not an uncertain value of the card{nearest(name, known)}")
+
+
 def idle_values(instrument: "Instrument") -> set[str]:
     """Return the values that say nothing in this card: the parts of a loss budget that it does not use, or what stands for them."""
     parts = instrument.part("loss", "loss_parts")

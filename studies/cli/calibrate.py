@@ -10,6 +10,7 @@ parameters that the data ties together but cannot tell apart; `responses`: by na
 (rms standard deviation that the calibrated values, the run's start and its turn-on leave from the chamber, or null);
 `settled`: for each steady-state table `temperature_degC`, `level_Hz` and `slope_ppm_per_degC` (or null), each `measured`, `predicted` by the
 card as given, `sd` and `away_sd`; `converged`; `warnings`; `calibrated_card`: path of the saved card, or null where it was not asked for or is refused.
+A table of modes is answered with hrg.mode-calibration/1 (`studies.cli.calibrate_modes`).
 """
 
 from typing import Any
@@ -18,16 +19,18 @@ from studies import workbench
 from studies.calibration.calibrate import Calibration
 from studies.calibration.observed import UNITS
 from studies.cli.arguments import Card
+from studies.cli.calibrate_modes import calibrate_modes
 from studies.cli.output import answers, say
 from studies.errors import InputError
 from studies.instrument.card import load_card, save_card
+from studies.inversion.readings import is_mode_table
 from studies.reports import calibration as parts
 from studies.results import Result
 
 VALUE = ("parameter", "unit", "card", "value", "low", "high", "shift_sd", "width", "told_by", "bound", "interval")
 
 
-@answers("hrg.calibration/1")
+@answers("hrg.calibration/1; hrg.mode-calibration/1 for a table of modes")
 def calibrate(
     card: Card, *data: str, save: str | None = None, hold_out: int = 0, exact: tuple[str, ...] = ()
 ) -> Result:
@@ -41,7 +44,8 @@ def calibrate(
     Parameters
     ----------
     data : str
-        Records (CSV) of one device, and steady-state tables (temperature_degC,frequency_Hz).
+        Records (CSV) of one device, and steady-state tables (temperature_degC,frequency_Hz); or one table of modes
+        (harmonic,frequency_Hz, and if known index, sd_Hz, temperature_degC; harmonic may be empty): then elastic values and dimensions.
     save : str
         Write the calibrated card: most probable values with their posterior widths. Not saved, with exit status 2, if the fit
         did not converge, determined no value, or moved one by more than 6 of the card's standard deviations.
@@ -53,6 +57,12 @@ def calibrate(
     if not data:
         raise InputError("no data given; name at least one record (CSV) or steady-state table.")
     instrument = load_card(card)
+    if tables := [path for path in data if is_mode_table(path)]:
+        if len(data) > 1 or hold_out:
+            raise InputError(
+                f"{tables[0]}: a table of modes is calibrated alone and without --hold-out; save that card, then calibrate it with the records."
+            )
+        return calibrate_modes(instrument, tables[0], save, exact)
     records = sum(not workbench.is_table(path) for path in data)
     if not 0 <= hold_out <= records:
         there = "is 1 record" if records == 1 else f"are {records} records"

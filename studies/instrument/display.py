@@ -73,6 +73,8 @@ def display_name(key: str) -> str:
         return f"{WORDS.get(side, side)} {ERRORS[error]}"
     parts = [WORDS.get(word, word) for word in plain.split("_")]
     places = [str(int(word) + 1) for word in key.split(".") if word.isdigit()]
+    if places and words == ["resonator", "thickness_mm"]:
+        return f"wall thickness at point {places[0]}"
     of = [" ".join([words[-2].replace("_", " "), *places])] if places else []
     return " ".join(of + parts)
 

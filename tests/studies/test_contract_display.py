@@ -17,5 +17,6 @@ def test_every_uncertain_value_has_a_name_of_its_own(card: str) -> None:
 def test_names_say_what_the_key_means() -> None:
     assert display_name("material.deviation.shear_modulus.log_slope_per_K") == "temperature slope of the shear modulus"
     assert display_name("loop.pickoff_phase_deg") == "pick-off phase error"
+    assert display_name("resonator.thickness_mm.1.1") == "wall thickness at point 2"
     assert display_name("loss.film.1.thickness_nm") == "film 2 thickness"
     assert name_constant("conductance housing-base") == "conductance housing to base"

@@ -1,0 +1,142 @@
+"""`hrg calibrate CARD modes.csv`: elastic values, wall and stem from the frequencies of many modes.
+
+The table has the columns `harmonic` (empty: n is not known), `frequency_Hz` and, if wanted, `index` (0 for the lowest of its n),
+`sd_Hz`, `temperature_degC`. Schema hrg.mode-calibration/1: `card`, `table`; `values` as in hrg.calibration/1; `modes`: `[{line,
+harmonic, index, frequency_Hz, predicted_Hz, residual_ppm, sd_ppm, chance, rivals}]`, `chance` the probability of the assignment,
+`rivals` other modes that the reading may be, `[{harmonic, index, chance}]`; `decided`: whether every chance is above 95 %;
+`next_modes`: by value the mode to measure next, `[{parameter, harmonic, index, frequency_Hz, sd, sd_then}]`; `misfit`: squared
+residuals and shifts over what is expected; `warnings`; `calibrated_card`.
+"""
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from studies.cli.output import say
+from studies.instrument.card import Instrument, save_card
+from studies.instrument.display import display_name
+from studies.inversion.invert import EXCLUDED, ModeCalibration, decided, invert
+from studies.inversion.readings import read_modes
+from studies.reports.calibration import KEY, TOLD, VALUES
+from studies.results import Column, Result, Sentence, Table
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+MODES = (
+    Column("line", "line"),
+    Column("harmonic", "n"),
+    Column("index", "index"),
+    Column("frequency_Hz", "measured", "Hz", digits=9),
+    Column("predicted_Hz", "calibrated", "Hz", digits=9),
+    Column("residual_ppm", "residual", "ppm", "+.2g"),
+    Column("sd_ppm", "noise", "ppm", ".2g"),
+    Column("chance", "chance", "%", ".3g", scale=100.0),
+    Column("others", "or n, index (%)"),
+)
+NEXT = (
+    Column("parameter", "quantity", spell=display_name),
+    Column("harmonic", "n"),
+    Column("index", "index"),
+    Column("frequency_Hz", "near", "Hz", digits=6),
+    Column("sd", "± now", form=".2g"),
+    Column("sd_then", "± then", form=".2g"),
+)
+VALUE = ("parameter", "unit", "card", "value", "low", "high", "shift_sd", "width", "told_by", "bound", "interval")
+WIDTHS = "Shift: change in prior standard deviations. Width: posterior over prior standard deviation; the modes determine a value up to 0.5."
+READ = (
+    "Noise: of the reading and of the solver. Chance: probability that the reading is of this mode. The modes are those of the bare"
+    " resonator, of a pair the mean: electrodes, films and the mount are not in them."
+)
+MEASURE = "The mode not yet measured that would lower the variance of each value most, read as well as the others; ± one standard deviation."
+
+
+def calibrate_modes(instrument: Instrument, path: str, save: str | None, exact: "Sequence[str]") -> Result:
+    """Calibrate a card by a table of modes, and save it."""
+    found = invert(instrument, read_modes(path), exact, say)
+    refused = save is not None and unsaved(found)
+    if refused:
+        say(f"{save} not saved: {refused}.")
+    elif save is not None:
+        save_card(found.instrument, save)
+        say(f"card: {save}")
+    payload = _payload(found, None if refused else save)
+    values = [
+        {**one, "unit": one["unit"] if one["unit"] != "1" else "", "told": TOLD[one["told_by"]]}
+        for one in sorted(payload["values"], key=lambda one: float(one["width"]))
+    ]
+    modes = [
+        {**one, "others": ", ".join(f"{r['harmonic']}, {r['index']} ({100 * r['chance']:.0f})" for r in one["rivals"])}
+        for one in payload["modes"]
+    ]
+    return Result(
+        payload,
+        f"Calibration of {instrument.name} by its modes",
+        f"Elastic values and dimensions of {instrument.name} from {len(modes)} frequencies in {path}.",
+        [
+            *(Sentence(one, "warning") for one in payload["warnings"]),
+            Table("Values, best known first", values, (*VALUES, KEY), WIDTHS, "page"),
+            Table("Values, best known first", values, VALUES, WIDTHS, "terminal"),
+            Table("Modes", modes, MODES, READ),
+            Table("Measure next", payload["next_modes"], NEXT, MEASURE),
+        ],
+        2 if refused else 0,
+    )
+
+
+def unsaved(found: ModeCalibration) -> str:
+    """Why no card is saved; empty where it is."""
+    if not found.fit.converged:
+        return "the fit did not converge"
+    if not decided(found):
+        return "the assignment of a reading is not decided. Give its harmonic, or measure more modes"
+    far = [
+        f"{display_name(one.parameter)} ({one.parameter})" for one in found.estimates if abs(one.shift_sd) > EXCLUDED
+    ]
+    if far:
+        return f"{', '.join(far)} would have to move by more than {EXCLUDED:g} of the card's standard deviations"
+    return ""
+
+
+def _payload(found: ModeCalibration, save: str | None) -> dict[str, Any]:
+    readings, fit = found.readings, found.fit
+    rows = zip(
+        readings.lines, fit.modes, readings.frequency, fit.residual, fit.noise, found.chance, found.rivals, strict=True
+    )
+    undecided = [line for line, chance in zip(readings.lines, found.chance, strict=True) if chance < 0.95]
+    said = [f"{readings.path}, line {line}: the readings do not decide which mode this is." for line in undecided]
+    return {
+        "schema": "hrg.mode-calibration/1",
+        "card": found.card.name,
+        "table": readings.path,
+        "values": [{key: getattr(one, key) for key in VALUE} for one in found.estimates],
+        "modes": [
+            {
+                "line": line,
+                "harmonic": mode.harmonic,
+                "index": mode.index,
+                "frequency_Hz": float(f),
+                "predicted_Hz": float(f * np.exp(-left)),
+                "residual_ppm": 1e6 * float(left),
+                "sd_ppm": 1e6 * float(noise),
+                "chance": chance,
+                "rivals": [{"harmonic": n, "index": k, "chance": p} for n, k, p in rivals],
+            }
+            for line, mode, f, left, noise, chance, rivals in rows
+        ],
+        "decided": decided(found),
+        "next_modes": [
+            {
+                "parameter": one.parameter,
+                "harmonic": one.harmonic,
+                "index": one.index,
+                "frequency_Hz": one.frequency,
+                "sd": one.sd,
+                "sd_then": one.sd_then,
+            }
+            for one in found.next_modes
+        ],
+        "misfit": found.misfit,
+        "warnings": [*found.warnings, *said],
+        "calibrated_card": save,
+    }

@@ -1,0 +1,309 @@
+r"""Values of a card from measured modes: the most probable ones, how well they are known, and which mode to measure next.
+
+    y_i = ln f_{m(i)}(u) + ε_i,   u ~ N(0, 1),   ε_i ~ N(0, σ_i²), σ² the reading's and the solver's,
+
+is minimised in u by Gauss-Newton steps for each likely assignment m; exp(-½ cost), cost = |r|² + |u|² + ln det(1 + JᵀJ),
+weighs the assignments (Laplace). A further mode with derivative j would lower the variance s C sᵀ of a value by
+(s C j)²/(j C jᵀ + σ²).
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+from studies.calibration.estimates import NINETY, Estimate
+from studies.calibration.posterior import posterior_card
+from studies.calibration.priors import Priors, check_exact, from_standard, gather_priors
+from studies.errors import InputError
+from studies.inversion.assignment import assign
+from studies.inversion.model import ModeModel, Which
+from studies.inversion.readings import USUAL, ModeReadings
+
+if TYPE_CHECKING:
+    from studies.instrument.card import Instrument
+
+Array = NDArray[np.float64]
+Progress = Callable[[str], None]
+ACTING = ("resonator.", "material.")
+IDLE = ("conductivity", "heat_capacity")
+CURVED = 1.5  # of the squared prior width of ln f: what a straight line leaves at that distance
+ABOVE = 1.15  # frequency of the highest candidate over the highest reading
+NEAR, FAR, MOST_STEPS = 0.02, 0.02, 12  # posterior and prior standard deviations, Gauss-Newton steps
+RIVALS, UNLIKELY = 4, 20.0  # assignments that are fitted, and their cost above the best's
+EXCLUDED = 6.0  # prior standard deviations that no value of a right card is away
+UNDECIDED = 0.05  # probability of other assignments from which a reading's is not decided
+DOUBTED = 1e-3  # probability of so large a misfit, below which the intervals are widened by it
+
+
+@dataclass(frozen=True, eq=False)
+class ModeFit:
+    """The most probable point for one assignment; `residual` is measured minus predicted ln f, `noise` its deviation."""
+
+    modes: tuple[Which, ...]
+    point: Array
+    covariance: Array
+    residual: Array
+    noise: Array
+    cost: float
+    converged: bool
+
+
+@dataclass(frozen=True)
+class NextMode:
+    """A mode that would tell most of a value: its deviation now and then, in the card's unit."""
+
+    parameter: str
+    harmonic: int
+    index: int
+    frequency: float
+    sd: float
+    sd_then: float
+
+
+@dataclass(frozen=True, eq=False)
+class ModeCalibration:
+    """A card and what its modes say of it.
+
+    Attributes
+    ----------
+    card, instrument : as given; with the values found.
+    fit : of the likeliest assignment.
+    chance : of each reading's assignment; `rivals` are the other modes that it may be, (harmonic, index, chance).
+    misfit : squared, over what is expected.
+    """
+
+    card: "Instrument"
+    instrument: "Instrument"
+    readings: ModeReadings
+    fit: ModeFit
+    estimates: tuple[Estimate, ...]
+    chance: tuple[float, ...]
+    rivals: tuple[tuple[tuple[int, int, float], ...], ...]
+    next_modes: tuple[NextMode, ...]
+    misfit: float
+    warnings: tuple[str, ...]
+
+
+def invert(
+    instrument: "Instrument", readings: ModeReadings, exact: Sequence[str] = (), progress: Progress = lambda _: None
+) -> ModeCalibration:
+    """Find the card's uncertain dimensions and elastic values from the frequencies of its modes.
+
+    Raises
+    ------
+    InputError
+        Nothing in the card is uncertain, or no assignment explains the readings within the card's tolerances.
+    """
+    priors = _priors(instrument, exact)
+    T = np.where(np.isnan(readings.temperature), instrument.reference_temperature, readings.temperature)
+    relative = readings.sd / readings.frequency
+    model = ModeModel(instrument, priors, float(np.clip(0.1 * relative.min(), 1e-8, 1e-6)))
+    progress("modes of the card")
+    fits = _fit_likely(model, readings, T, relative, progress)
+    best = fits[0]
+    weights = np.exp(-0.5 * np.array([one.cost - best.cost for one in fits]))
+    weights /= weights.sum()
+    chances: list[dict[Which, float]] = [{} for _ in range(len(readings))]
+    for one, weight in zip(fits, weights, strict=True):
+        for row, mode in enumerate(one.modes):
+            chances[row][mode] = chances[row].get(mode, 0.0) + float(weight)
+    squares = float(np.sum((best.residual / best.noise) ** 2) + best.point @ best.point)
+    misfit = squares / len(readings)
+    doubted = scipy.stats.chi2.sf(squares, len(readings)) < DOUBTED
+    covariance = best.covariance * (misfit if doubted else 1.0)
+    estimates = _estimates(priors, best.point, covariance)
+    progress("the mode to measure next")
+    return ModeCalibration(
+        instrument,
+        posterior_card(instrument, priors, best.point, covariance, estimates),
+        readings,
+        best,
+        estimates,
+        tuple(found[mode] for found, mode in zip(chances, best.modes, strict=True)),
+        tuple(
+            tuple((m.harmonic, m.index, p) for m, p in found.items() if m != mode and p > UNDECIDED)
+            for found, mode in zip(chances, best.modes, strict=True)
+        ),
+        _next_modes(model, best, covariance, readings),
+        misfit,
+        tuple(_warnings(model, best, readings, misfit, bool(doubted), relative)),
+    )
+
+
+def _priors(instrument: "Instrument", exact: Sequence[str]) -> Priors:
+    check_exact(instrument, exact)
+    if instrument.polynomial is not None:
+        raise InputError(
+            f"{instrument.path}: a card with a polynomial [law] has no modes; give it [resonator] and [material]."
+        )
+    idle = [
+        one.name
+        for one in instrument.uncertain
+        if not one.name.startswith(ACTING) or any(word in one.name for word in IDLE)
+    ]
+    priors = gather_priors(instrument, (*exact, *idle))
+    if not priors.values:
+        raise InputError(
+            f"{instrument.path}: no dimension and no elastic value is uncertain; give one, such as [resonator] thickness_mm ="
+            " { value = …, sd = … }."
+        )
+    return priors
+
+
+def _fit_likely(
+    model: ModeModel, readings: ModeReadings, T: Array, relative: Array, progress: Progress
+) -> list[ModeFit]:
+    """Fits of the likeliest assignments, best first."""
+    y, start = np.log(readings.frequency), np.zeros(len(model.priors.values))
+    n, k = readings.harmonic, readings.index
+    if not (np.isnan(n) | np.isnan(k)).any():
+        modes = [Which(int(a), int(b), float(t)) for a, b, t in zip(n, k, T, strict=True)]
+        return [_fit(model, modes, y, relative, model.derivatives(modes, start))]
+    most = int(max(12, np.nan_to_num(n).max()))
+    highest = ABOVE * float(readings.frequency.max())
+    every = [mode for t in sorted(set(map(float, T))) for mode in model.ladder(start, highest, most, t)]
+    allowed = [
+        [
+            place
+            for place, mode in enumerate(every)
+            if mode.temperature == t and (np.isnan(a) or mode.harmonic == a) and (np.isnan(b) or mode.index == b)
+        ]
+        for a, b, t in zip(n, k, T, strict=True)
+    ]
+    g, _ = model.predict(every, start)
+    progress(f"{len(every)} modes up to {highest:.4g} Hz may be those of the readings")
+    J = model.derivatives(every, start)
+    bent = CURVED * np.einsum("ij,ij->i", J, J)
+    noise = np.array([np.hypot(s, bent[a].max() if a else 0.0) for s, a in zip(relative, allowed, strict=True)])
+    likely = assign(y, noise, allowed, g, J)
+    if not likely:
+        raise InputError(_unexplained(readings, y, allowed, g, J, every))
+    fits: dict[tuple[int, ...], ModeFit] = {}
+    for one in likely[:RIVALS]:
+        if one.cost - likely[0].cost < UNLIKELY:
+            places = list(one.places)
+            progress(f"assignment {len(fits) + 1}")
+            fits[one.places] = _fit(model, [every[m] for m in places], y, relative, J[places])
+    return sorted(fits.values(), key=lambda one: one.cost)
+
+
+def _fit(model: ModeModel, modes: Sequence[Which], y: Array, relative: Array, J: Array) -> ModeFit:
+    u, converged = np.zeros(J.shape[1]), False
+    size, unit = np.inf, np.eye(len(u))
+    for _ in range(MOST_STEPS):
+        g, error = model.predict(modes, u)
+        noise = np.hypot(relative, error)
+        both = np.vstack([J / noise[:, None], unit])
+        step = np.linalg.lstsq(both, np.concatenate([(y - g) / noise, -u]), rcond=None)[0]
+        size = float(np.linalg.norm(both @ step))
+        if size < NEAR:
+            converged = True
+            break
+        u = model.priors.inside(u + step * min(1.0, 3.0 / float(np.linalg.norm(step))))
+        if np.linalg.norm(step) > FAR:
+            J = model.derivatives(modes, u)
+    g, error = model.predict(modes, u)
+    noise = np.hypot(relative, error)
+    precision = (J / noise[:, None]).T @ (J / noise[:, None]) + unit
+    r = (y - g) / noise
+    cost = float(r @ r + u @ u + np.linalg.slogdet(precision)[1] + 2 * np.log(noise).sum())
+    return ModeFit(tuple(modes), u, np.asarray(np.linalg.inv(precision), dtype=float), y - g, noise, cost, converged)
+
+
+def _estimates(priors: Priors, u: Array, covariance: Array) -> tuple[Estimate, ...]:
+    z, at, bounds = priors.standard(u), priors.at(u), priors.bound(u)
+    widths = np.sqrt(np.diag(priors.root @ covariance @ priors.root.T))
+    found = []
+    for k, value in enumerate(priors.values):
+        number, width = at[value.name], float(widths[k])
+        low, high = (
+            float(np.clip(from_standard(value, z[k] + side * NINETY * width), value.low, value.high))
+            for side in (-1.0, 1.0)
+        )
+        sd = width * value.sd * (number / value.value if value.logarithmic else 1.0)
+        found.append(
+            Estimate(
+                value.name, value.unit, value.value, number, low, high, sd, float(z[k]), width, bounds[k], "normal"
+            )
+        )
+    return tuple(found)
+
+
+def _next_modes(model: ModeModel, fit: ModeFit, covariance: Array, readings: ModeReadings) -> tuple[NextMode, ...]:
+    """For every value that the modes tell, the unmeasured mode that would lower its variance most."""
+    T = model.instrument.reference_temperature
+    measured = {(one.harmonic, one.index) for one in fit.modes}
+    most = max(one.harmonic for one in fit.modes) + 2
+    highest = 2.0 * float(readings.frequency.max())
+    ladder = model.ladder(fit.point, highest, most, T)
+    modes = [one for one in ladder if (one.harmonic, one.index) not in measured and one.index < 2]
+    if not modes:
+        return ()
+    J, g = model.derivatives(modes, fit.point), model.predict(modes, fit.point)[0]
+    away = J @ covariance
+    variance = np.einsum("ij,ij->i", away, J) + float(np.median(readings.sd / readings.frequency)) ** 2
+    found = []
+    for value, s in zip(model.priors.values, model.priors.slopes(fit.point), strict=True):
+        now = float(s @ covariance @ s)
+        falls = (away @ s) ** 2 / variance
+        best = int(np.argmax(falls))
+        if falls[best] > 1e-3 * now:
+            left = float(np.sqrt(max(now - falls[best], 0.0)))
+            mode = modes[best]
+            found.append(
+                NextMode(value.name, mode.harmonic, mode.index, float(np.exp(g[best])), float(np.sqrt(now)), left)
+            )
+    return tuple(found)
+
+
+def _warnings(
+    model: ModeModel, fit: ModeFit, readings: ModeReadings, misfit: float, doubted: bool, relative: Array
+) -> list[str]:
+    found = []
+    if not fit.converged:
+        found.append("the fit did not converge; keep more values fixed (--exact), or check the assignment.")
+    if readings.assumed:
+        found.append(f"{readings.path}: where sd_Hz is empty, {USUAL:g} of the frequency was taken.")
+    if doubted:
+        worst = int(np.argmax(np.abs(fit.residual / fit.noise)))
+        found.append(
+            f"the readings lie {np.sqrt(misfit):.2g} times as far from the card as they should; the largest residual is"
+            f" {1e6 * fit.residual[worst]:+.2g} ppm in line {readings.lines[worst]}. The intervals are widened by that; a wrong assignment,"
+            " an exact value that is wrong, charged electrodes, films or a wall that is not as the card says can be the cause."
+        )
+    solver = np.sqrt(np.maximum(fit.noise**2 - relative**2, 0.0))
+    if (solver > relative).any():
+        found.append(
+            f"the solver's own error, up to {1e6 * solver.max():.2g} ppm, is larger than the readings' and counts as noise; a stem with a"
+            " fillet is solved more closely."
+        )
+    return found
+
+
+def _unexplained(
+    readings: ModeReadings, y: Array, allowed: Sequence[Sequence[int]], g: Array, J: Array, every: Sequence[Which]
+) -> str:
+    """Say which reading is farthest from every mode that it may be."""
+    away = [
+        min((abs(y[i] - g[m]) / float(np.linalg.norm(J[m])), m) for m in found) if found else (np.inf, -1)
+        for i, found in enumerate(allowed)
+    ]
+    worst = max(range(len(away)), key=lambda i: away[i][0])
+    distance, place = away[worst]
+    if place < 0:
+        return f"{readings.path}, line {readings.lines[worst]}: the card has no such mode below {ABOVE:g} times the highest frequency."
+    mode = every[place]
+    return (
+        f"{readings.path}: no assignment explains all readings within the card's tolerances; line {readings.lines[worst]}"
+        f" ({readings.frequency[worst]:.6g} Hz) is {distance:.2g} standard deviations from its nearest mode, n = {mode.harmonic}, index"
+        f" {mode.index} at {np.exp(g[place]):.6g} Hz. Leave it out, or give the dimensions wider tolerances."
+    )
+
+
+def decided(found: ModeCalibration) -> bool:
+    """Whether every reading's mode is certain enough."""
+    return all(p > 1 - UNDECIDED for p in found.chance)

@@ -1,0 +1,79 @@
+"""A table of measured modes: `harmonic` (empty where n is not known), `index`, `frequency_Hz`, `sd_Hz`, `temperature_degC`."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shell.constants import zero_Celsius
+from studies.errors import InputError
+from studies.files.columns import Columns, read_columns, read_header
+
+Array = NDArray[np.float64]
+COLUMNS = ("harmonic", "index", "frequency_Hz", "sd_Hz", "temperature_degC")
+USUAL = 1e-6
+"""Relative standard deviation of a frequency where the table states none."""
+HIGHEST = 20
+
+
+@dataclass(frozen=True, eq=False)
+class ModeReadings:
+    """Measured frequencies of modes of one resonator: the mean of a pair counts as one.
+
+    Attributes
+    ----------
+    harmonic, index : NaN where not known.
+    frequency, sd : Hz
+    temperature : K, NaN for the card's reference temperature.
+    lines : of the file.
+    assumed : whether the standard deviations are `USUAL`.
+    """
+
+    path: str
+    harmonic: Array
+    index: Array
+    frequency: Array
+    sd: Array
+    temperature: Array
+    lines: tuple[int, ...]
+    assumed: bool
+
+    def __len__(self) -> int:
+        return len(self.frequency)
+
+
+def is_mode_table(path: str) -> bool:
+    """Return whether a file is a table of modes."""
+    names = read_header(path)
+    return "time_s" not in names and {"harmonic", "frequency_Hz"} <= set(names)
+
+
+def read_modes(path: str) -> ModeReadings:
+    """Read a table of modes.
+
+    Raises
+    ------
+    InputError
+        A frequency is missing, a harmonic is no whole number from 0, a mode stands there twice.
+    """
+    table = read_columns(path, COLUMNS, required=("harmonic", "frequency_Hz"))
+    count = len(table.values["frequency_Hz"])
+    n, k, f, sd, T = (table.values.get(name, np.full(count, np.nan)) for name in COLUMNS)
+    if not count:
+        raise InputError(f"{path}: no mode in it; give one row a mode.")
+    for column, name, most in ((n, "harmonic", HIGHEST), (k, "index", HIGHEST)):
+        wrong = ~np.isnan(column) & ((column < 0) | (column != np.round(column)) | (column > most))
+        _refuse(table, wrong, f"{name} must be a whole number from 0 to {most}, or empty where it is not known")
+    _refuse(table, ~(f > 0), "frequency_Hz must be a positive number")
+    _refuse(table, ~np.isnan(sd) & ~(sd > 0), "sd_Hz must be positive, or empty")
+    named = [(a, b, c) for a, b, c in zip(n, k, T, strict=True) if not np.isnan(a) and not np.isnan(b)]
+    if len({tuple(map(repr, one)) for one in named}) < len(named):
+        raise InputError(f"{path}: a mode stands there twice; give the mean of its readings, and of a split pair.")
+    stated = np.where(np.isnan(sd), USUAL * f, sd)
+    lines = tuple(table.line(row) for row in range(count))
+    return ModeReadings(path, n, k, f, stated, T + zero_Celsius, lines, bool(np.isnan(sd).any()))
+
+
+def _refuse(table: Columns, wrong: NDArray[np.bool_], rule: str) -> None:
+    if wrong.any():
+        raise InputError(f"{table.path}, line {table.line(int(np.flatnonzero(wrong)[0]))}: {rule}.")

@@ -1,0 +1,109 @@
+"""Blind devices for `hrg calibrate CARD modes.csv`: does the 90 % interval hold in nine of ten, and how close are E and wall?
+
+    python -m tests.benchmarks.mode_inversion [DEVICES] [HARMONIC.INDEX ...]
+
+Devices are drawn from the card's priors, solved one by one to 1e-9, and read with errors of 1e-6. The inversion sees them through
+an interpolant over Poisson's ratio and wall that was built from other solves (to 1e-8), so that 200 devices take minutes.
+"""
+
+import sys
+
+import numpy as np
+
+from shell.interpolation import Exploration
+from shell.modes import solve_modes
+from studies.instrument.card import build_instrument
+from studies.inversion.invert import _estimates, _fit, _priors
+from studies.inversion.model import ModeModel, Which
+
+CARD = {
+    "schema": "hrg.card/1",
+    "name": "glass-dome",
+    "resonator": {
+        "shape": "hemisphere",
+        "radius_mm": 15.0,
+        "thickness_mm": [[0.0, {"value": 0.9, "sd": 0.009}], [1.0, {"value": 0.9, "sd": 0.009}]],
+        "support": "free",
+    },
+    "material": {
+        "name": "glass",
+        "youngs_modulus_GPa": {"value": 72.6, "relative_sd": 0.01},
+        "poisson_ratio": {"value": 0.17, "sd": 0.005},
+        "density_kg_m3": 2203.0,
+    },
+}
+NOISE = 1e-6
+WIDTH = 4.0
+MODULUS = "material.youngs_modulus_GPa"
+
+
+class Interpolated(ModeModel):
+    """The model of a card by a sparse polynomial in all coordinates but the modulus, which scales f exactly."""
+
+    def build(self, modes: list[Which]) -> "Interpolated":
+        """Solve the nodes: values between ±4 prior standard deviations."""
+        free = [k for k, value in enumerate(self.priors.values) if "youngs" not in value.name]
+
+        def spread(x: np.ndarray) -> np.ndarray:
+            u = np.zeros(len(self.priors.values))
+            u[free] = WIDTH * x
+            return u
+
+        self.__dict__["free"], self.__dict__["polynomials"] = free, {}
+        for mode in modes:
+            nodes = Exploration(lambda x, m=mode: self.solve([m], spread(x)), len(free))
+            nodes.refine(3e-9, 150)
+            print(f"n = {mode.harmonic}, index {mode.index}: {len(nodes.surpluses)} solves", flush=True)
+            self.__dict__["polynomials"][mode] = nodes.polynomial()
+        return self
+
+    def solve(self, modes, u):
+        """Return ln f by the solver."""
+        return super().predict(modes, u)[0]
+
+    def predict(self, modes, u):
+        """See `ModeModel`."""
+        x = (u[self.free] / WIDTH)[None]
+        stiff = np.log(self.priors.at(u)[MODULUS] / self.priors.at(0 * u)[MODULUS]) / 2
+        return np.array([self.polynomials[m](x)[0, 0] + stiff for m in modes]), np.full(len(modes), 1e-8)
+
+    def derivatives(self, modes, u):
+        """See `ModeModel`."""
+        x = (u[self.free] / WIDTH)[None]
+        J = np.zeros((len(modes), len(u)))
+        for axis, k in enumerate(self.free):
+            J[:, k] = [self.polynomials[m](x, axis)[0, 0] / WIDTH for m in modes]
+        J[:, self.priors.names.index(MODULUS)] = 0.5 * self.priors.slopes(u)[0, 0] / self.priors.at(u)[MODULUS]
+        return J
+
+
+def main(devices: int, named: list[str]) -> None:
+    """Print how often the intervals hold, and how far the values are off, at the median and the 90th percentile."""
+    card = build_instrument(CARD)
+    T = card.reference_temperature
+    modes = [Which(int(n), int(k), T) for n, k in (name.split(".") for name in named)]
+    priors = _priors(card, ())
+    rng = np.random.default_rng(20)
+    model = Interpolated(card, priors, 1e-8).build(modes)
+    start = model.derivatives(modes, np.zeros(len(priors.values)))
+    held, off = [], []
+    for device in range(devices):
+        true = {value.name: value.draw(rng) for value in priors.values}
+        body, elastic = card.with_values(true).at(T)
+        f = [solve_modes(body, elastic, m.harmonic, m.index + 1, tolerance=1e-9)[m.index].frequency for m in modes]
+        y = np.log(f) + NOISE * rng.standard_normal(len(modes))
+        fit = _fit(model, modes, y, np.full(len(modes), NOISE), start)
+        found = _estimates(priors, fit.point, fit.covariance)
+        held.append([one.low <= true[one.parameter] <= one.high for one in found])
+        off.append([abs(one.value - true[one.parameter]) for one in found])
+        if device % 10 == 9:
+            share = 100 * np.mean(held, axis=0)
+            print(
+                f"{device + 1} devices: intervals hold in {np.mean(held):.1%}; by value {np.round(share)} %", flush=True
+            )
+    for name, middle, most in zip(priors.names, np.median(off, axis=0), np.percentile(off, 90, axis=0), strict=True):
+        print(f"{name}: off by {middle:.2g} at the median, {most:.2g} at the 90th percentile")
+
+
+if __name__ == "__main__":
+    main(int(sys.argv[1]) if len(sys.argv) > 1 else 200, sys.argv[2:] or ["2.0", "3.0", "4.0", "5.0", "0.0", "1.0"])
