@@ -421,8 +421,11 @@ def _read_property(where: str, name: str, entry: Any, span: list[float]) -> Prop
 
 
 def _check_sign(where: str, name: str, found: Property, span: list[float]) -> None:
-    with np.errstate(over="ignore", invalid="ignore"):  # what overflows is refused below
-        values = found(np.linspace(span[0], span[1], 101) + zero_Celsius)
+    if found.form == "table" and not any(found.deviation):  # shape-preserving: its extremes are among its points
+        values = found.numbers.get("value", 1.0) * np.asarray(found.numbers["values"], dtype=float)
+    else:
+        with np.errstate(over="ignore", invalid="ignore"):  # what overflows is refused below
+            values = found(np.linspace(span[0], span[1], 101) + zero_Celsius)
     if name == "poisson_ratio" and not ((values > -1) & (values < 0.5)).all():
         raise ShellError(f"{where}: leaves the range -1 to 0.5 within range_degC.")
     if name == "expansion" and not (np.abs(values) < 0.01).all():
