@@ -3,7 +3,6 @@
 Nothing is changed and nothing is left out of the record: spikes and missing values are left out of spectra and Allan deviations only.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 from math import ceil
@@ -21,7 +20,7 @@ from compensation.spikes import find_dropouts, find_spikes, find_step, find_stuc
 from studies.record import COMMANDED, Record
 from studies.reports.columns import find_gaps
 from studies.rest import LEAST_SPIKE
-from studies.settled import find_holds, find_soaks
+from studies.settled import LEAST, TEMPERATURES, Soak, find_holds, find_soaks
 from studies.stability import Stability, read_stability, unbroken
 
 Array = NDArray[np.float64]
@@ -39,11 +38,10 @@ CHANGES = 200  # means of a record, between which changes are correlated
 
 @dataclass(frozen=True)
 class Step:
-    """A column that moves at once: when (s), by how much, and one standard deviation of that."""
+    """A column that moves at once: when (s), and by how much."""
 
     time: float
     size: float
-    sd: float
 
 
 @dataclass(frozen=True)
@@ -105,36 +103,19 @@ class ColumnSurvey:
 
 
 @dataclass(frozen=True)
-class Settled:
-    """A part in which the temperature is held: settled where what is left (K) is known and small, else only held."""
-
-    start: float
-    end: float
-    temperature_degC: float
-    frequency_Hz: float | None = None
-    left_K: float | None = None
-
-
-@dataclass(frozen=True)
-class Correlation:
-    """Two columns: correlation of their values, and of their changes from one two-hundredth of the record to the next."""
-
-    one: str
-    two: str
-    values: float
-    changes: float | None
-
-
-@dataclass(frozen=True)
 class Survey:
-    """What one record shows."""
+    """What one record shows.
+
+    `settled`: soaks, or parts in which the temperature is held where there is no frequency (NaN) to judge them by. `correlations`: rows
+    `one`, `two`, and of their `values` and of their `changes` from one two-hundredth of the record to the next.
+    """
 
     record: Record
     step: float
     even: bool
     columns: tuple[ColumnSurvey, ...]
-    settled: tuple[Settled, ...]
-    correlations: tuple[Correlation, ...]
+    settled: tuple[Soak, ...]
+    correlations: tuple[dict[str, str | float | None], ...]
 
 
 def survey_record(record: Record) -> Survey:
@@ -243,7 +224,7 @@ def find_steps(time: Array, values: Array) -> tuple[Step, ...]:
             y = values[k : k + 2 * n] - values[k : k + 2 * n].mean()
             if _left(two_lines[None], y) < 0.5 * _left(bends, y):
                 found.append(k)
-    return tuple(Step(float(time[k + n - 1 : k + n + 1].mean()), float(D[k]), spread) for k in sorted(found))
+    return tuple(Step(float(time[k + n - 1 : k + n + 1].mean()), float(D[k])) for k in sorted(found))
 
 
 def _left(designs: Array, y: Array) -> float:
@@ -274,23 +255,26 @@ def _thin_out(frequency: Array, density: Array, even: bool) -> Density:
     return Density(average_groups(frequency, part), average_groups(density, part), even)
 
 
-def _find_settled(record: Record) -> tuple[Settled, ...]:
-    """Return the settled parts of a record with a frequency, or the parts of one without in which the temperature is held."""
-    column = next((name for name in ("housing_temperature_degC", "chamber_temperature_degC") if name in record), None)
+def _find_settled(record: Record) -> tuple[Soak, ...]:
+    column = next((name for name in TEMPERATURES if name in record), None)
     if column is None or not np.isfinite(record[column]).any():
         return ()
     if "frequency_Hz" in record and np.isfinite(record["frequency_Hz"]).any():
-        return tuple(Settled(s.start, s.end, s.temperature_degC, s.frequency_Hz, s.left_K) for s in find_soaks([record]) if not s.extrapolated_K)  # fmt: skip
+        return tuple(soak for soak in find_soaks([record]) if not soak.extrapolated_K)
     t, T, _ = average_evenly(record["time_s"], record[column])
-    whole = [rows for rows in find_holds(T) if t[rows[-1]] - t[rows[0]] >= max(600.0, 0.02 * (t[-1] - t[0]))]
-    return tuple(Settled(float(t[rows[0]]), float(t[rows[-1]]), float(T[rows].mean())) for rows in whole)
+    whole = [rows for rows in find_holds(T) if t[rows[-1]] - t[rows[0]] >= max(LEAST, 0.02 * (t[-1] - t[0]))]
+    return tuple(
+        Soak(record.path, float(t[rows[0]]), float(t[rows[-1]]), float(T[rows].mean()), np.nan, np.nan, np.nan, np.nan)
+        for rows in whole
+    )
 
 
-def _correlate(time: Array, one: str, x: Array, two: str, y: Array) -> Correlation:
+def _correlate(time: Array, one: str, x: Array, two: str, y: Array) -> dict[str, str | float | None]:
     both = np.isfinite(x) & np.isfinite(y)
-    t = time[both]
-    columns: Sequence[Array] = [average_evenly(t, values[both], CHANGES)[1] for values in (x, y)]
-    return Correlation(one, two, _correlation(*columns) or 0.0, _correlation(*map(np.diff, columns)))
+    columns = [average_evenly(time[both], values[both], CHANGES)[1] for values in (x, y)]
+    return {
+        "one": one, "two": two, "values": _correlation(*columns), "changes": _correlation(*map(np.diff, columns)),
+    }  # fmt: skip
 
 
 def _correlation(x: Array, y: Array) -> float | None:

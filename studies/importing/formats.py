@@ -6,6 +6,7 @@ import logging
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -37,34 +38,23 @@ MATLAB = "is of a class that only MATLAB reads (datetime, table, object): save i
 
 @dataclass(frozen=True)
 class Clock:
-    """The clock of channels: `step` (s) of even rows or what reads the seconds of the first so many (−1: all), when it started.
-
-    Channels whose clocks have one `key` have the same times.
-    """
+    """The clock of channels: `seconds` of so many rows, and when it started; channels whose clocks have one `key` have the same times."""
 
     key: str
+    seconds: Callable[[int], Array] = field(repr=False)
     step: float | None = None
-    read: Callable[[int], Array] | None = None
     start: datetime.datetime | None = None
-
-    def seconds(self, rows: int, first: int = -1) -> Array:
-        """Return the seconds of all rows, or of the first."""
-        count = rows if first < 0 else min(rows, first)
-        if self.step is not None:
-            return np.asarray(self.step * np.arange(count))
-        assert self.read is not None
-        return self.read(-1 if first < 0 else count)
 
 
 @dataclass(frozen=True)
 class Channel:
-    """One channel: group, name, unit, rows, what reads the first so many values (−1: all), its clock, or why it cannot be read."""
+    """One channel: what reads its first so many values (−1: all), its clock, or why it cannot be read."""
 
     group: str
     name: str
-    unit: str
-    rows: int
-    read: Callable[[int], Array] = field(repr=False)
+    unit: str = ""
+    rows: int = 0
+    read: Callable[[int], Array] = field(default=lambda _: np.empty(0), repr=False)
     clock: Clock | None = None
     refused: str = ""
 
@@ -87,32 +77,28 @@ def read_tdms(path: str, files: ExitStack) -> Iterator[Channel]:
             f"{path}: is cut off within its last block; copy it again, or stop the recording before copying."
         )
     for group in file.groups():
-        stamps = next((c for c in group.channels() if c.dtype is not None and c.dtype.kind == "M"), None)
-        for channel in group.channels():
-            if channel.dtype is not None and channel.dtype.kind in NUMBERS and len(channel):
-                clock = even_clock(channel.properties) or (
-                    _stamp_clock(group.name, stamps) if stamps is not None else None
-                )
-                yield Channel(
-                    group.name, channel.name, find_unit(channel.properties), len(channel), _tdms_values(channel), clock
-                )
+        numbers = [c for c in group.channels() if c.dtype is not None and c.dtype.kind in NUMBERS and len(c)]
+        stamps = next((c for c in group.channels() if c.dtype is not None and c.dtype.kind == "M" and len(c)), None)
+        common = None if stamps is None else stamp_clock(group.name, partial(_tdms_values, stamps), utc=True)
+        for channel in numbers:
+            about = channel.properties
+            read, clock = partial(_tdms_values, channel), even_clock(about) or common
+            yield Channel(group.name, channel.name, find_unit(about), len(channel), read, clock)
 
 
-def _tdms_values(channel: Any) -> Callable[[int], Array]:
-    return lambda n: np.asarray(channel.read_data(0, None if n < 0 else n), dtype=float)
+def _tdms_values(channel: Any, count: int) -> Any:
+    return channel.read_data(0, None if count < 0 else count)
 
 
-def _stamp_clock(key: str, stamps: Any) -> Clock | None:
-    first = stamps.read_data(0, 1)[:1]
-    if not len(first) or np.isnat(first[0]):
+def stamp_clock(key: str, read: Callable[[int], Any], utc: bool) -> Clock | None:
+    """Return the clock of a channel of time stamps; None where the first is missing."""
+    first = read(1)[0]
+    if np.isnat(first):
         return None
-
-    def read(n: int) -> Array:
-        return np.asarray(
-            (stamps.read_data(0, None if n < 0 else n) - first[0]) / np.timedelta64(1, "ns") * 1e-9, dtype=float
-        )
-
-    return Clock(f"stamps of {key}", read=read, start=_moment(first[0]))
+    nanosecond = np.timedelta64(1, "ns")
+    return Clock(
+        key, lambda _: np.asarray((read(-1) - first) / nanosecond * 1e-9, dtype=float), start=_moment(first, utc)
+    )
 
 
 def read_mdf(path: str, files: ExitStack) -> Iterator[Channel]:
@@ -124,31 +110,27 @@ def read_mdf(path: str, files: ExitStack) -> Iterator[Channel]:
         name = getattr(group.channel_group, "acq_name", "") or f"group {place + 1}"
         names[name] = names.get(name, 0) + 1
         name = f"{name} #{names[name]}" if names[name] > 1 else name
-        clock = None if master is None else Clock(name, read=_mdf_times(file, place), start=file.header.start_time)
+        times = partial(_mdf_times, file, place)
+        clock = None if master is None else Clock(name, times, start=file.header.start_time)
         for index, channel in enumerate(group.channels):
             if index == master or not rows:
                 continue
-            read = _mdf_values(file, place, index)
+            read = partial(_mdf_values, file, place, index)
             if file.get(group=place, index=index, record_count=1).samples.dtype.kind in NUMBERS:
                 yield Channel(name, channel.name, str(channel.unit or ""), rows, read, clock)
 
 
-def _mdf_times(file: Any, place: int) -> Callable[[int], Array]:
-    return lambda n: np.asarray(file.get_master(place, record_count=None if n < 0 else n), dtype=float)
+def _mdf_times(file: Any, place: int, _: int) -> Array:
+    return np.asarray(file.get_master(place), dtype=float)
 
 
-def _mdf_values(file: Any, place: int, index: int) -> Callable[[int], Array]:
-    def read(n: int) -> Array:
-        signal = file.get(
-            group=place, index=index, record_count=None if n < 0 else n,
-            ignore_invalidation_bits=True,
-        )  # fmt: skip
-        values = np.array(signal.samples, dtype=float)
-        if (invalid := getattr(signal, "invalidation_bits", None)) is not None:
-            values[np.asarray(invalid, dtype=bool)] = np.nan
-        return values
-
-    return read
+def _mdf_values(file: Any, place: int, index: int, count: int) -> Array:
+    some = None if count < 0 else count
+    signal = file.get(group=place, index=index, record_count=some, ignore_invalidation_bits=True)
+    values = np.array(signal.samples, dtype=float)
+    if (invalid := getattr(signal, "invalidation_bits", None)) is not None:
+        values[np.asarray(invalid, dtype=bool)] = np.nan
+    return values
 
 
 def read_hdf5(path: str, files: ExitStack) -> Iterator[Channel]:
@@ -187,7 +169,7 @@ def _from_structure(group: str, items: Mapping[str, Any]) -> Iterator[Channel]:
             continue
         inside = f"{group}/{name}" if group else name
         if type(value).__name__ == "MatlabOpaque" or value.size != 1:
-            yield Channel(group, name, "", 0, _nothing, refused=MATLAB)
+            yield Channel(group, name, refused=MATLAB)
         else:
             yield from _from_structure(inside, {field: value.flat[0][field] for field in value.dtype.names})
 
@@ -200,34 +182,22 @@ def from_arrays(group: str, items: Mapping[str, Any], about: Mapping[str, Any]) 
         if a.dtype.kind in NUMBERS and np.prod(a.shape) == 1
     }
     for name, array in items.items():
-        own = _attributes(array)
-        if array.dtype.kind in "OV" and not array.dtype.names:
-            yield Channel(group, name, "", 0, _nothing, refused=MATLAB if "MATLAB_class" in own else OBJECT)
-            continue
-        if "MATLAB_object_decode" in own:
-            yield Channel(group, name, "", 0, _nothing, refused=MATLAB)
-            continue
-        if own.get("MATLAB_class") == b"char" or array.ndim not in (1, 2):
-            continue
+        own, kind, shape = _attributes(array), array.dtype.kind, array.shape
         clock, unit = even_clock({**about, **single, **own}), find_unit(own)
-        if array.dtype.names:
-            for field in array.dtype.names:
-                if array.dtype[field].kind in NUMBERS and array.ndim == 1:
-                    yield Channel(group, f"{name}.{field}", "", array.shape[0], _slice(array, field=field), clock)
-        elif array.dtype.kind in NUMBERS and array.ndim == 1:
-            yield Channel(group, name, unit, array.shape[0], _slice(array), clock)
-        elif array.dtype.kind in NUMBERS and min(array.shape) <= MOST_WIDE:
-            along = int(np.argmax(array.shape))
-            wide = array.shape[1 - along]
+        if "MATLAB_object_decode" in own or (kind in "OV" and not array.dtype.names):
+            yield Channel(group, name, refused=MATLAB if "MATLAB_class" in own else OBJECT)
+        elif own.get("MATLAB_class") == b"char" or len(shape) not in (1, 2):
+            continue
+        elif array.dtype.names:
+            for part in array.dtype.names:
+                if array.dtype[part].kind in NUMBERS and len(shape) == 1:
+                    yield Channel(group, f"{name}.{part}", "", shape[0], partial(_field, array, part), clock)
+        elif kind in NUMBERS and (len(shape) == 1 or min(shape) <= MOST_WIDE):
+            along = int(np.argmax(shape))
+            wide = 1 if len(shape) == 1 else shape[1 - along]
             for k in range(wide):
-                yield Channel(
-                    group,
-                    f"{name}[{k + 1}]" if wide > 1 else name,
-                    unit,
-                    array.shape[along],
-                    _slice(array, along, k),
-                    clock,
-                )
+                own_name = f"{name}[{k + 1}]" if wide > 1 else name
+                yield Channel(group, own_name, unit, shape[along], partial(_row, array, along, k), clock)
 
 
 def _attributes(item: Any) -> dict[str, Any]:
@@ -237,46 +207,34 @@ def _attributes(item: Any) -> dict[str, Any]:
     return {name: found[name] for name in found if name.lower() in said}
 
 
-def _slice(array: Any, along: int | None = None, place: int = 0, field: str = "") -> Callable[[int], Array]:
-    def read(n: int) -> Array:
-        part = slice(None if n < 0 else n)
-        if field:
-            return np.asarray(array[part][field], dtype=float)
-        if along is None:
-            return np.asarray(array[part], dtype=float)
-        return np.asarray(array[part, place] if along == 0 else array[place, part], dtype=float)
+def _field(array: Any, part: str, count: int) -> Array:
+    return np.asarray(array[slice(None if count < 0 else count)][part], dtype=float)
 
-    return read
+
+def _row(array: Any, along: int, place: int, count: int) -> Array:
+    some = slice(None if count < 0 else count)
+    where = some if len(array.shape) == 1 else (some, place) if along == 0 else (place, some)
+    return np.asarray(array[where], dtype=float)
 
 
 def read_parquet(path: str, files: ExitStack) -> Iterator[Channel]:
     """Columns of a Parquet file; the first one of time stamps is the clock of the others."""
     file = files.enter_context(load_library("pyarrow.parquet", path, "Parquet").ParquetFile(path))
     rows, schema = file.metadata.num_rows, file.schema_arrow
-    kinds = [str(one.type) for one in schema]
-    stamps = next((one.name for one, kind in zip(schema, kinds, strict=True) if kind.startswith("timestamp")), None)
     clock = None
-    if stamps is not None and rows:
-        first = _parquet_column(file, stamps, 1)[0]
-        clock = Clock(
-            stamps,
-            read=lambda n: (_parquet_column(file, stamps, n) - first) / np.timedelta64(1, "ns") * 1e-9,
-            start=_moment(first),
-        )
-    for one, kind in zip(schema, kinds, strict=True):
-        if kind.startswith(("double", "float", "int", "uint", "bool", "halffloat")):
+    for one in schema:
+        if str(one.type).startswith("timestamp") and rows and clock is None:
+            clock = stamp_clock(one.name, partial(_parquet_values, file, one.name), utc="tz=" in str(one.type))
+    for one in schema:
+        if str(one.type).startswith(("double", "float", "int", "uint", "bool", "halffloat")):
             about = {key.decode(): value.decode(errors="replace") for key, value in (one.metadata or {}).items()}
-            yield Channel("", one.name, find_unit(about), rows, _parquet_values(file, one.name), clock)
+            yield Channel("", one.name, find_unit(about), rows, partial(_parquet_values, file, one.name), clock)
 
 
-def _parquet_values(file: Any, name: str) -> Callable[[int], Array]:
-    return lambda n: np.asarray(_parquet_column(file, name, n), dtype=float)
-
-
-def _parquet_column(file: Any, name: str, rows: int) -> Any:
-    if rows < 0:
+def _parquet_values(file: Any, name: str, count: int) -> Any:
+    if count < 0:
         return file.read(columns=[name]).column(0).to_numpy()
-    return next(file.iter_batches(batch_size=max(rows, 1), columns=[name])).column(0).to_numpy(zero_copy_only=False)
+    return next(file.iter_batches(batch_size=max(count, 1), columns=[name])).column(0).to_numpy(zero_copy_only=False)
 
 
 def even_clock(about: Mapping[str, Any]) -> Clock | None:
@@ -288,7 +246,13 @@ def even_clock(about: Mapping[str, Any]) -> Clock | None:
     if step is None or not 0 < step < np.inf:
         return None
     start = next((moment for name in STARTS if name in known and (moment := _moment(known[name])) is not None), None)
-    return Clock(f"{step!r} s from {start}", step=step, start=start)
+    offset = _number(known.get("wf_start_offset")) or 0.0
+    return Clock(
+        f"{step!r} s from {start} + {offset!r}",
+        lambda rows: np.asarray(offset + step * np.arange(float(rows))),
+        step,
+        start,
+    )
 
 
 def find_unit(about: Mapping[str, Any]) -> str:
@@ -305,22 +269,17 @@ def _number(value: Any) -> float | None:
         return None
 
 
-def _moment(value: Any) -> datetime.datetime | None:
-    """Return a moment (UTC) of a stamp; None where it is none, or the zero of a clock that was never set."""
+def _moment(value: Any, utc: bool = True) -> datetime.datetime | None:
+    """Return the moment of a stamp (numpy's are in UTC or without a zone); None where it is none, or the zero of a clock never set."""
     try:
         if isinstance(value, np.datetime64):
             found = value.astype("datetime64[us]").item()
+            found = found.replace(tzinfo=datetime.UTC) if utc else found
         else:
             found = datetime.datetime.fromisoformat(value.decode() if isinstance(value, bytes) else str(value))
-    except (ValueError, UnicodeDecodeError):
+    except (ValueError, UnicodeDecodeError, AttributeError, TypeError):
         return None
-    if not isinstance(found, datetime.datetime) or found.year < 1970:
-        return None
-    return found if found.tzinfo is not None else found.replace(tzinfo=datetime.UTC)
-
-
-def _nothing(_: int) -> Array:
-    return np.empty(0)
+    return found if found.year >= 1970 else None
 
 
 READERS: Mapping[str, Callable[[str, ExitStack], Iterator[Channel]]] = {

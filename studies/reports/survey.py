@@ -171,28 +171,24 @@ def _draw_over_temperature(survey: Survey, temperature: str, others: Sequence[st
 
 
 def _draw_stability(survey: Survey) -> Drawing:
-    shown = [column for column in survey.columns if column.stability is not None]
+    shown = [(column.name, column.stability) for column in survey.columns if column.stability is not None]
     with _grid(len(shown), "averaging time τ (s)") as (made, axes):
-        for axis, column in zip(axes.flat, shown, strict=False):
-            assert column.stability is not None
-            allan, noise = column.stability.allan, column.stability.noise
-            axis.fill_between(allan.tau, allan.low, allan.high, color=style.SKY, alpha=0.35)
-            axis.loglog(allan.tau, allan.deviation, color=style.BLUE, label="Allan deviation")
-            axis.loglog(
-                allan.tau, noise.deviation(allan.tau), "--", color=style.ORANGE, linewidth=1, label="fitted noise"
-            )
-            _title(axis, column.name)
+        for axis, (name, found) in zip(axes.flat, shown, strict=False):
+            tau = found.allan.tau
+            axis.fill_between(tau, found.allan.low, found.allan.high, color=style.SKY, alpha=0.35)
+            axis.loglog(tau, found.allan.deviation, color=style.BLUE, label="Allan deviation")
+            axis.loglog(tau, found.noise.deviation(tau), "--", color=style.ORANGE, linewidth=1, label="fitted noise")
+            _title(axis, name)
         _blank(axes, len(shown))
         return made
 
 
 def _draw_spectra(survey: Survey) -> Drawing:
-    shown = [column for column in survey.columns if column.density is not None]
+    shown = [(column.name, column.density) for column in survey.columns if column.density is not None]
     with _grid(len(shown), "frequency (Hz)") as (made, axes):
-        for axis, column in zip(axes.flat, shown, strict=False):
-            assert column.density is not None
-            axis.loglog(column.density.frequency, np.sqrt(column.density.density), color=style.BLUE, linewidth=1)
-            _title(axis, column.name, "/√Hz")
+        for axis, (name, found) in zip(axes.flat, shown, strict=False):
+            axis.loglog(found.frequency, np.sqrt(found.density), color=style.BLUE, linewidth=1)
+            _title(axis, name, "/√Hz")
         _blank(axes, len(shown))
         return made
 
@@ -217,6 +213,10 @@ def _spectrum_words(survey: Survey) -> str:
 
 def tell(survey: Survey) -> dict[str, Any]:
     """Return the payload of one record."""
+
+    def known(value: float) -> float | None:
+        return value if np.isfinite(value) else None
+
     record = survey.record
     columns = []
     for column in survey.columns:
@@ -237,15 +237,15 @@ def tell(survey: Survey) -> dict[str, Any]:
             row["line"] = {"period_s": column.line.period, "rms": column.line.rms}
         columns.append(row)
     steps = [
-        {"column": column.name, "time_s": step.time, "size": step.size, "sd": step.sd}
+        {"column": column.name, "time_s": step.time, "size": step.size}
         for column in survey.columns
         for step in column.steps
     ]
     settled = [
-        {"start_s": s.start, "end_s": s.end, "temperature_degC": s.temperature_degC, "frequency_Hz": s.frequency_Hz, "left_K": s.left_K}
+        {"start_s": s.start, "end_s": s.end, "temperature_degC": s.temperature_degC, "frequency_Hz": known(s.frequency_Hz), "left_K": known(s.left_K)}
         for s in survey.settled
     ]  # fmt: skip
-    correlations = sorted((vars(one) for one in survey.correlations), key=lambda row: -abs(row["changes"] or 0.0))
+    correlations = sorted(survey.correlations, key=lambda row: -abs(float(row["changes"] or 0.0)))
     return {
         "path": record.path, "instrument": record.instrument, "start": record.start.isoformat() if record.start else None,
         "rows": len(record), "span_s": float(np.ptp(record["time_s"])), "step_s": survey.step, "even": survey.even,

@@ -91,6 +91,35 @@ def test_contract_channels_of_two_rates_are_averaged_onto_the_slow_clock(tmp_pat
     assert any("resampled: mean" in note for note in run.comments)
 
 
+def test_contract_time_stamps_are_the_clock_of_their_group(tmp_path, monkeypatch):
+    arrow, parquet = pytest.importorskip("pyarrow"), pytest.importorskip("pyarrow.parquet")
+    monkeypatch.chdir(tmp_path)
+    stamps = np.datetime64("2026-03-01T12:00:00.5", "us") + np.arange(0, 5_000_000, 500_000).astype("timedelta64[us]")
+    housing = np.linspace(20, 21, 10)
+    tdms("a.tdms", G=[("when", stamps), ("T housing", housing, {"unit_string": "degC"})])
+    parquet.write_table(arrow.table({"when": arrow.array(stamps), "T housing": housing}), "a.parquet")
+    zoned = arrow.array(stamps).cast(arrow.timestamp("us", tz="UTC"))
+    parquet.write_table(arrow.table({"when": zoned, "T housing": housing}), "b.parquet")
+    tdms(
+        "b.tdms",
+        G=[
+            (
+                "T housing",
+                housing,
+                {"wf_increment": 0.5, "wf_start_offset": 0.5, "wf_start_time": stamps[0] - np.timedelta64(500, "ms")},
+            )
+        ],
+    )
+    for name, start in (("a.tdms", "+00:00"), ("a.parquet", ""), ("b.parquet", "+00:00"), ("b.tdms", "+00:00")):
+        Path("map.toml").unlink(missing_ok=True)
+        assert main(["import", name, "--draft", "map.toml"]) == 0
+        assert 'time_format = "own"' in Path("map.toml").read_text()
+        assert main(["import", name, "--map", "map.toml", "--out", "run.csv"]) == 0
+        run = read_record("run.csv")
+        assert run["time_s"] == pytest.approx(np.arange(10) / 2, abs=1e-9)
+        assert run.start.isoformat() == f"2026-03-01T12:00:00.500000{start}"
+
+
 def test_contract_a_channel_without_a_clock_asks_for_one(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     tdms("run.tdms", G=[("f", 4000 + np.cos(np.arange(50.0)), {"unit_string": "Hz"})])

@@ -80,10 +80,10 @@ def test_planted_correlation_of_changes_tells_a_cause_from_a_drift():
         "drive_amplitude_V": drift + rng.standard_normal(200).repeat(20),
     }
     columns["bias_deg_per_h"] = 2 * driver + 0.1 * rng.standard_normal(T.size)
-    pairs = {frozenset((one.one, one.two)): one for one in survey_record(Record(columns)).correlations}
-    assert pairs[frozenset(("quadrature_V", "drive_amplitude_V"))].values > 0.7
-    assert abs(pairs[frozenset(("quadrature_V", "drive_amplitude_V"))].changes) < 0.3
-    assert pairs[frozenset(("quadrature_V", "bias_deg_per_h"))].changes > 0.9
+    pairs = {frozenset((one["one"], one["two"])): one for one in survey_record(Record(columns)).correlations}
+    assert pairs[frozenset(("quadrature_V", "drive_amplitude_V"))]["values"] > 0.7
+    assert abs(pairs[frozenset(("quadrature_V", "drive_amplitude_V"))]["changes"]) < 0.3
+    assert pairs[frozenset(("quadrature_V", "bias_deg_per_h"))]["changes"] > 0.9
 
 
 def test_contract_what_is_named_possible_runs_and_what_is_missing_is_said(tmp_path, capsys, monkeypatch):
