@@ -29,7 +29,7 @@ from studies.law import law_of
 from studies.reports.digits import to_numerical_error
 from studies.reports.mode_picture import THEORIES
 from studies.reports.scenes import show_mode
-from studies.results import Blocks, Column, Result, Sentence, Table, Where
+from studies.results import Blocks, Chapter, Column, Result, Sentence, Table, Where
 from studies.results.page import Block
 
 FAR = 0.1
@@ -123,6 +123,11 @@ def modes(
             *_all_orders(entries),
             *_detail_tables(entries if detailed else [], "everywhere" if sensitivities else "page"),
             Blocks(lambda: _view(instrument, sorted(set(harmonic)), T, theory)),
+            *(
+                [Chapter("Over dimensions and temperature", [Blocks(lambda: _live(instrument, harmonic[0], theory))])]
+                if detailed
+                else []
+            ),
         ],
     )
 
@@ -136,6 +141,13 @@ def _view(instrument: Instrument, harmonics: list[int], T: float, theory: str) -
         " Rayleigh's closed form gives the frequencies of the table, not these shapes." if theory == "rayleigh" else ""
     )
     return view_blocks([show_mode(instrument, n, temperature=T, theory=drawn) for n in harmonics], remark)
+
+
+def _live(instrument: Instrument, harmonic: int, theory: Literal["solid", "shell", "rayleigh"]) -> Sequence[Block]:
+    """Sliders that move the lowest mode and its neighbour."""
+    from studies.reports.live import live_blocks
+
+    return live_blocks(instrument, harmonic, theory)
 
 
 def _to_error(row: dict[str, Any]) -> str:

@@ -9,6 +9,7 @@ columns; `tolerances`: rows of `column`, `value`, `worst_case` (±, first order)
 """
 
 from collections import Counter
+from collections.abc import Sequence
 from math import isfinite
 from operator import itemgetter
 from pathlib import Path
@@ -21,7 +22,8 @@ from studies.design.run import optimise as find_best
 from studies.errors import InputError
 from studies.reports import design as pictures
 from studies.reports.digits import plain
-from studies.results import Chapter, Column, Facts, Figure, Result, Sentence, Table
+from studies.results import Blocks, Chapter, Column, Facts, Figure, Result, Sentence, Table
+from studies.results.page import Block
 
 
 @answers("hrg.optimise/1")
@@ -191,6 +193,7 @@ def _parts(found: Answer, payload: dict[str, Any]) -> list[Any]:
                " A separation counts by its magnitude; its sign says on which side the nearest mode is."),
             Figure(lambda: pictures.section(best_instrument(found)), "Section of the best design, at rest and at full swing."),
         ]),
+        Chapter("About the best design", [Blocks(lambda: _live(found))]),
         Chapter("Constraints", [
             Table("Limits and what they cost", payload["constraints"], [
                 Column(lambda row: named(row["column"]), "quantity"), Column("kind", "limit is"), Column("limit", "limit", digits=7), Column("value", "value", digits=7),
@@ -216,6 +219,15 @@ def _parts(found: Answer, payload: dict[str, Any]) -> list[Any]:
             ], where="page"),
         ]),
     ]  # fmt: skip
+
+
+def _live(found: Answer) -> Sequence[Block]:
+    """Sliders of the free dimensions about the best design."""
+    from studies.reports.live import live_blocks
+
+    study = found.task.study
+    names = [name for name in study.names[: found.task.free] if name.startswith("resonator.")]
+    return live_blocks(best_instrument(found), names=names, derived=study.derived)
 
 
 def _number(count: int, what: str) -> str:

@@ -1,5 +1,6 @@
 """`hrg tcf`: frequency against temperature and its parts."""
 
+from collections.abc import Sequence
 from typing import Any, Literal
 
 import numpy as np
@@ -10,13 +11,14 @@ from shell.law import FrequencyLaw
 from studies.cli.arguments import Card, FromDegC, Harmonic, Step, ToDegC, lay_temperatures
 from studies.cli.output import answers
 from studies.errors import InputError
-from studies.instrument.card import load_card
+from studies.instrument.card import Instrument, load_card
 from studies.instrument.display import display_name
 from studies.law import check_slope_known, law_of
 from studies.papers import hrg
 from studies.record import read_frequency_table
 from studies.reports import style
-from studies.results import Column, Drawing, Figure, Result, Table, rows_of
+from studies.results import Blocks, Chapter, Column, Drawing, Figure, Result, Table, rows_of
+from studies.results.page import Block
 
 MOST_HARMONIC = 50  # a law of a higher one takes minutes
 PARTS = {"E": "E", "nu": "ν", "rho": "ρ", "h": "h", "r": "r", "base": "base"}
@@ -104,8 +106,20 @@ def tcf(
                 local,
                 [Column("temperature_degC", "T", "°C", ".1f"), Column("slope_ppm_per_degC", "slope", "ppm/°C", ".2f")],
             ),
+            *(
+                []
+                if theory == "rayleigh"
+                else [Chapter("Over dimensions and temperature", [Blocks(lambda: _live(instrument, harmonic, theory))])]
+            ),
         ],
     )
+
+
+def _live(instrument: Instrument, harmonic: int, theory: Literal["solid", "shell", "rayleigh"]) -> Sequence[Block]:
+    """Sliders that move frequency and TCF."""
+    from studies.reports.live import live_blocks
+
+    return live_blocks(instrument, harmonic, theory)
 
 
 def _curves(points: list[dict[str, Any]], parts: list[str], local: list[dict[str, float]]) -> Drawing:
