@@ -107,10 +107,10 @@ def between(found: Inferred, rivals: Sequence[Hypothesis], runs: Sequence[Candid
     return scored
 
 
-def _worth(scored: Scored) -> tuple[bool, float]:
-    """Runs that tell enough come first, the shortest of them before the others; else the most telling."""
+def _worth(scored: Scored, power: float = 1.0) -> tuple[bool, float]:
+    """Runs that tell enough come first, those that tell most per hour before the others; else the most telling."""
     evidence, _, programme = scored
-    return evidence >= ENOUGH, evidence / programme.hours if evidence >= ENOUGH else evidence
+    return evidence >= ENOUGH, evidence / programme.hours**power if evidence >= ENOUGH else evidence
 
 
 def _told(best: Programme, evidence: float, scored: Sequence[Scored], size: str = "") -> str:
@@ -162,7 +162,7 @@ def _detect(found: Inferred, chamber: Chamber) -> Advice:
     score = weights @ np.log((energy + least[:, None]) / (today + least)[:, None]) / weights.sum()
     pair = (seen[int(np.argmax(weights))].term.effect.name, "nothing")
     scored = [(UNIT * float(np.exp(v)), pair, run.programme) for v, run in zip(score, runs, strict=True)]
-    evidence, _, best = max(scored, key=lambda one: one[0] / np.sqrt(one[2].hours))
+    evidence, _, best = max(scored, key=lambda one: _worth(one, power=0.5))
     told = _told(best, evidence, scored, " for an effect whose evidence is 10 now")
     repeat = max((e for e, _, p in scored if p.repeats), default=None)
     proposed = NextRun.of(best, expected_evidence=evidence, repeat_evidence=repeat, separates=pair)

@@ -18,7 +18,7 @@ NARROW, WIDENED = 5.0, 15.0
 """A campaign that covers less than this, K, is widened by so much on both sides."""
 SHORTEST, LONGEST = 3600.0, 16 * 3600.0
 DURATIONS = (1.0, 0.5, 0.25)
-"""Lengths of the runs that are considered, in parts of the recorded runs'."""
+"""Lengths of the runs that are considered, in parts of the longest recorded one."""
 LEVELS = (0.5, 1.0, 0.0, 0.75, 0.25, 0.9)
 """Order of the levels of a stepped drive, from the lowest (0) to the highest (1)."""
 HOLDS = {"voltage_squared": 5, "amplitude_squared": 7, "quadrature": 6, "pattern_angle": 4}
@@ -172,13 +172,13 @@ def _short(value: float, digits: int = 0) -> float | int:
 def candidates(runs: Sequence[ObservedRun], chamber: Chamber, stepped: Sequence[str] = ()) -> list[Programme]:
     """Return the runs that could follow recorded ones: their repeats first; of `stepped` drives those that records have are stepped."""
     spans = [float(np.ptp(run.inner.time)) for run in runs]
-    duration = float(np.clip(600.0 * round(float(np.median(spans)) / 600.0), SHORTEST, LONGEST))
+    duration = float(np.clip(600.0 * round(max(spans) / 600.0), SHORTEST, LONGEST))
     housing = np.concatenate([run.inner.profile.value for run in runs]) - zero_Celsius
     low, high = float(np.ceil(housing.min())), float(np.floor(housing.max()))
     if high - low < NARROW:
         low, high = low - WIDENED, high + WIDENED
     low, high = chamber.within(low, high)
-    out = [_repeat(run) for run, span in zip(runs, spans, strict=True) if span >= 0.5 * np.median(spans)]
+    out = [_repeat(run) for run, span in zip(runs, spans, strict=True) if span >= 0.5 * max(spans)]
     for part in DURATIONS:
         if part * duration < SHORTEST and part < 1.0:
             continue
