@@ -4,7 +4,7 @@ import json
 import multiprocessing
 import time
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from functools import partial
 from pathlib import Path
 
@@ -70,6 +70,7 @@ def _all(devices: Sequence[Device], out: str | None, workers: int, progress: Pro
         return
     context = multiprocessing.get_context("spawn")
     executor = ProcessPoolExecutor(workers, mp_context=context)
+    waiting: set[Future[Answer | str]] = set()
     try:
         work = {executor.submit(_answer, device, out): device for device in devices}
         waiting = set(work)
@@ -78,7 +79,7 @@ def _all(devices: Sequence[Device], out: str | None, workers: int, progress: Pro
             for one in done:
                 yield work[one], one.result()
     finally:
-        executor.shutdown(wait=False, cancel_futures=True)
+        executor.shutdown(wait=not waiting, cancel_futures=True)
 
 
 def _answer(device: Device, out: str | None, progress: Progress = lambda words: None) -> Answer | str:
