@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from compensation.bell import apply_chain
-from compensation.bell_calibration import fit_chain
+from compensation.bell_calibration import BellRun, fit_chain
 from studies.cli import main
 from studies.errors import InputError
 from studies.models import compensate, emit_c, read_model
@@ -207,7 +207,10 @@ def test_long_runs_are_averaged_for_the_fit(monkeypatch):
     """Block averages give the same chain as the rows, and no block mixes two applied rates."""
     from studies import scale
 
-    rates, rest, turning = simulate_runs(np.random.default_rng(5))
+    rates, rest, turning = (
+        BellRun(run.time[::4], run.output[::4], run.temperature[::4], run.rate[::4])
+        for run in simulate_runs(np.random.default_rng(5))
+    )
     whole = fit_chain(rates, rest, turning, cutoff=None)
     monkeypatch.setattr(scale, "MOST_ROWS", 2000)
     thin = [scale._thin(run) for run in (rates, rest, turning)]
