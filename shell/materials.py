@@ -83,6 +83,13 @@ class Material:
         known = not self.constant or "expansion" in self.constant  # else given in the card, which says so itself
         return (() if known else (flat,)) + ((f"{self.name}: {self.crystal.note}",) if self.crystal else ())
 
+    @property
+    def lacks(self) -> list[str]:
+        """Properties that no source states, and that do not follow from those stated."""
+        stated = [p for p in ELASTIC if p in self.properties]
+        elastic = [] if len(stated) > 1 else ["poisson_ratio" if "poisson_ratio" not in stated else "youngs_modulus"]
+        return elastic + [p for p in PROPERTIES if p not in ELASTIC and p not in self.properties]
+
     def cubic(self, temperature: float) -> "Cubic | None":
         """The crystal at a temperature (K), where its modes can be solved as one: cubic, [001] along the axis."""
         if self.crystal is None or self.crystal.axis != "[001]":

@@ -8,7 +8,9 @@ harmonic, index, frequency_Hz, predicted_Hz, residual_ppm, sd_ppm, chance, rival
 residuals and shifts over what is expected; `warnings`; `calibrated_card`.
 """
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from dataclasses import asdict
+from typing import Any
 
 import numpy as np
 
@@ -19,9 +21,6 @@ from studies.inversion.invert import EXCLUDED, ModeCalibration, decided, invert
 from studies.inversion.readings import read_modes
 from studies.reports.calibration import KEY, TOLD, VALUES
 from studies.results import Column, Result, Sentence, Table
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
 
 MODES = (
     Column("line", "line"),
@@ -51,7 +50,7 @@ READ = (
 MEASURE = "The mode not yet measured that would lower the variance of each value most, read as well as the others; ± one standard deviation."
 
 
-def calibrate_modes(instrument: Instrument, path: str, save: str | None, exact: "Sequence[str]") -> Result:
+def calibrate_modes(instrument: Instrument, path: str, save: str | None, exact: Sequence[str]) -> Result:
     """Calibrate a card by a table of modes, and save it."""
     found = invert(instrument, read_modes(path), exact, say)
     refused = save is not None and unsaved(found)
@@ -125,17 +124,7 @@ def _payload(found: ModeCalibration, save: str | None) -> dict[str, Any]:
             for line, mode, f, left, noise, chance, rivals in rows
         ],
         "decided": decided(found),
-        "next_modes": [
-            {
-                "parameter": one.parameter,
-                "harmonic": one.harmonic,
-                "index": one.index,
-                "frequency_Hz": one.frequency,
-                "sd": one.sd,
-                "sd_then": one.sd_then,
-            }
-            for one in found.next_modes
-        ],
+        "next_modes": [asdict(one) for one in found.next_modes],
         "misfit": found.misfit,
         "warnings": [*found.warnings, *said],
         "calibrated_card": save,

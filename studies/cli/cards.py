@@ -3,7 +3,7 @@
 from typing import TYPE_CHECKING, Any
 
 from studies.cli.arguments import Card, Harmonic
-from studies.cli.output import answers, say
+from studies.cli.output import answers
 from studies.results import Column, Facts, Result, Table
 
 if TYPE_CHECKING:
@@ -188,23 +188,8 @@ def _compare(card: str, harmonic: int) -> Result:
     instrument = load_card(card)
     T = instrument.reference_temperature
     with naming(instrument.path):
-        found = compare_materials(instrument.resonator, T, harmonic, say)
-    rows = [
-        {
-            "material": one.material,
-            "law": one.law,
-            "frequency_Hz": one.frequency,
-            "frequency_sd_Hz": one.frequency_sd,
-            "slope_ppm_per_degC": 1e6 * one.slope,
-            "slope_sd_ppm_per_degC": 1e6 * one.slope_sd,
-            "thermoelastic_q": one.thermoelastic_q,
-            "surface_q": one.surface_q,
-            "surface_layer_pm": 1e12 * one.layer,
-            "remarks": list(one.remarks),
-        }
-        for one in found
-    ]
-    remarks = [{"material": one.material, "law": one.law, "remark": text} for one in found for text in one.remarks]
+        rows = compare_materials(instrument.resonator, T, harmonic)
+    remarks = [{**row, "remark": text} for row in rows for text in row["remarks"]]
     head = {"card": instrument.name, "harmonic": harmonic, "temperature_degC": T - zero_Celsius}
     return Result(
         {"schema": "hrg.materials-compared/1", **head, "materials": rows},
@@ -281,7 +266,7 @@ def _describe(law: "Material") -> "dict[str, Any]":
         "source": law.source,
         "note": law.note,
         "caveats": list(law.caveats),
-        "lacks": _lacking(law),
+        "lacks": law.lacks,
         "prior": {
             "coefficients": list(law.prior.names),
             "sd": law.prior.sd.tolist(),
@@ -292,12 +277,3 @@ def _describe(law: "Material") -> "dict[str, Any]":
             for key, p in law.properties.items()
         },
     }
-
-
-def _lacking(law: "Material") -> "list[str]":
-    from shell.materials import ELASTIC
-    from shell.property import PROPERTIES
-
-    stated = [p for p in ELASTIC if p in law.properties]
-    elastic = [] if len(stated) > 1 else ["poisson_ratio" if "poisson_ratio" not in stated else "youngs_modulus"]
-    return elastic + [p for p in PROPERTIES if p not in ELASTIC and p not in law.properties]

@@ -20,8 +20,9 @@ from studies.calibration.posterior import posterior_card
 from studies.calibration.priors import Priors, check_exact, from_standard, gather_priors
 from studies.errors import InputError
 from studies.inversion.assignment import assign
-from studies.inversion.model import ModeModel, Which
-from studies.inversion.readings import USUAL, ModeReadings
+from studies.inversion.model import ModeFit, ModeModel, Which
+from studies.inversion.readings import ModeReadings
+from studies.inversion.remarks import unexplained, warn
 
 if TYPE_CHECKING:
     from studies.instrument.card import Instrument
@@ -39,19 +40,6 @@ UNDECIDED = 0.05  # probability of other assignments from which a reading's is n
 DOUBTED = 1e-3  # probability of so large a misfit, below which the intervals are widened by it
 
 
-@dataclass(frozen=True, eq=False)
-class ModeFit:
-    """The most probable point for one assignment; `residual` is measured minus predicted ln f, `noise` its deviation."""
-
-    modes: tuple[Which, ...]
-    point: Array
-    covariance: Array
-    residual: Array
-    noise: Array
-    cost: float
-    converged: bool
-
-
 @dataclass(frozen=True)
 class NextMode:
     """A mode that would tell most of a value: its deviation now and then, in the card's unit."""
@@ -59,7 +47,7 @@ class NextMode:
     parameter: str
     harmonic: int
     index: int
-    frequency: float
+    frequency_Hz: float
     sd: float
     sd_then: float
 
@@ -130,7 +118,7 @@ def invert(
         ),
         _next_modes(model, best, covariance, readings),
         misfit,
-        tuple(_warnings(model, best, readings, misfit, bool(doubted), relative)),
+        tuple(warn(best, readings, misfit, bool(doubted), relative)),
     )
 
 
@@ -181,7 +169,7 @@ def _fit_likely(
     noise = np.array([np.hypot(s, bent[a].max() if a else 0.0) for s, a in zip(relative, allowed, strict=True)])
     likely = assign(y, noise, allowed, g, J)
     if not likely:
-        raise InputError(_unexplained(readings, y, allowed, g, J, every))
+        raise InputError(unexplained(readings, y, allowed, g, J, every))
     fits: dict[tuple[int, ...], ModeFit] = {}
     for one in likely[:RIVALS]:
         if one.cost - likely[0].cost < UNLIKELY:
@@ -258,50 +246,6 @@ def _next_modes(model: ModeModel, fit: ModeFit, covariance: Array, readings: Mod
                 NextMode(value.name, mode.harmonic, mode.index, float(np.exp(g[best])), float(np.sqrt(now)), left)
             )
     return tuple(found)
-
-
-def _warnings(
-    model: ModeModel, fit: ModeFit, readings: ModeReadings, misfit: float, doubted: bool, relative: Array
-) -> list[str]:
-    found = []
-    if not fit.converged:
-        found.append("the fit did not converge; keep more values fixed (--exact), or check the assignment.")
-    if readings.assumed:
-        found.append(f"{readings.path}: where sd_Hz is empty, {USUAL:g} of the frequency was taken.")
-    if doubted:
-        worst = int(np.argmax(np.abs(fit.residual / fit.noise)))
-        found.append(
-            f"the readings lie {np.sqrt(misfit):.2g} times as far from the card as they should; the largest residual is"
-            f" {1e6 * fit.residual[worst]:+.2g} ppm in line {readings.lines[worst]}. The intervals are widened by that; a wrong assignment,"
-            " an exact value that is wrong, charged electrodes, films or a wall that is not as the card says can be the cause."
-        )
-    solver = np.sqrt(np.maximum(fit.noise**2 - relative**2, 0.0))
-    if (solver > relative).any():
-        found.append(
-            f"the solver's own error, up to {1e6 * solver.max():.2g} ppm, is larger than the readings' and counts as noise; a stem with a"
-            " fillet is solved more closely."
-        )
-    return found
-
-
-def _unexplained(
-    readings: ModeReadings, y: Array, allowed: Sequence[Sequence[int]], g: Array, J: Array, every: Sequence[Which]
-) -> str:
-    """Say which reading is farthest from every mode that it may be."""
-    away = [
-        min((abs(y[i] - g[m]) / float(np.linalg.norm(J[m])), m) for m in found) if found else (np.inf, -1)
-        for i, found in enumerate(allowed)
-    ]
-    worst = max(range(len(away)), key=lambda i: away[i][0])
-    distance, place = away[worst]
-    if place < 0:
-        return f"{readings.path}, line {readings.lines[worst]}: the card has no such mode below {ABOVE:g} times the highest frequency."
-    mode = every[place]
-    return (
-        f"{readings.path}: no assignment explains all readings within the card's tolerances; line {readings.lines[worst]}"
-        f" ({readings.frequency[worst]:.6g} Hz) is {distance:.2g} standard deviations from its nearest mode, n = {mode.harmonic}, index"
-        f" {mode.index} at {np.exp(g[place]):.6g} Hz. Leave it out, or give the dimensions wider tolerances."
-    )
 
 
 def decided(found: ModeCalibration) -> bool:

@@ -103,3 +103,16 @@ class ModeModel:
                 warnings.simplefilter("ignore", TheoryRangeWarning)  # the error that is left counts as noise
                 self._solved[key] = solve_modes(body, elastic, n, count, tolerance=self.tolerance)
         return self._solved[key]
+
+
+@dataclass(frozen=True, eq=False)
+class ModeFit:
+    """The most probable point for one assignment; `residual` is measured minus predicted ln f, `noise` its deviation."""
+
+    modes: tuple[Which, ...]
+    point: Array
+    covariance: Array
+    residual: Array
+    noise: Array
+    cost: float
+    converged: bool
