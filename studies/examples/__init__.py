@@ -1,1 +1,1 @@
-"""Short scripts to start from; each one runs as it is: `python -m studies.examples.design_code`."""
+"""Short scripts to start from, with `import hrg` only; each one runs as it is: `python -m studies.examples.design_code`."""

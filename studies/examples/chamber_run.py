@@ -2,20 +2,17 @@
 
 import numpy as np
 
-from studies.instrument.card import load_card
-from studies.record import Record
-from studies.simulation.chamber import load_profile
-from studies.simulation.virtual_gyro import simulate_run
+import hrg
 
 CHAMBER = "step 20 -10 5h"
 
 
-def run_chamber() -> Record:
+def run_chamber() -> hrg.Record:
     """Simulate the record of the step, without noise, one row in ten seconds; `write_record` saves it."""
-    return simulate_run(load_card("hrg-30mm"), load_profile(CHAMBER), 0.1, noise=False, theory="shell").record
+    return hrg.simulate("hrg-30mm", CHAMBER, row=10, noise=False)
 
 
-def settling_time(record: Record, share: float) -> float:
+def settling_time(record: hrg.Record, share: float) -> float:
     """Return the time (s) from which the frequency stays within a share of its whole change."""
     f = record["frequency_Hz"]
     outside = abs(f - f[-1]) > share * abs(f[0] - f[-1])

@@ -5,12 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from compensation.frequency import fit_frequency
-from studies.instrument.card import load_card
-from studies.models import ModelSource, compensate, emit_c
-from studies.models.kinds.frequency import save_frequency
-from studies.simulation.chamber import load_profile
-from studies.simulation.virtual_gyro import simulate_run
+import hrg
 
 STEP = 6 * 3600.0  # s on each step of the staircase
 
@@ -25,16 +20,13 @@ class Outcome(NamedTuple):
 
 def calibrate_and_apply() -> Outcome:
     """Fit the cubic to the settled end of every step and apply it to the ramp."""
-    gyro = load_card("hrg-30mm")
-    staircase = simulate_run(gyro, load_profile("staircase -20 40 10 6h"), 0.01, noise=False, theory="shell")
-    slowly, known = load_profile("ramp -20 40 0.05"), staircase.law
-    ramp = simulate_run(gyro, slowly, 0.01, noise=False, law=known).record
-    record = staircase.record
+    record = hrg.simulate("hrg-30mm", "staircase -20 40 10 6h", row=100, noise=False)
+    ramp = hrg.simulate("hrg-30mm", "ramp -20 40 0.05", row=100, noise=False)
     settled = np.searchsorted(record["time_s"], STEP * np.arange(1, 8)) - 1
     T, f = record["housing_temperature_degC"][settled], record["frequency_Hz"][settled]
-    model = save_frequency(fit_frequency(T, f), (ModelSource("staircase", "", len(T)),), "example")
-    result = compensate(model, ramp, extrapolate=True)
-    return Outcome(_spread(ramp["frequency_Hz"]), _spread(result["compensated_frequency_Hz"]), emit_c(model))
+    model = hrg.save_frequency(hrg.fit_frequency(T, f), (hrg.ModelSource("staircase", "", len(T)),), "example")
+    result = hrg.compensate(model, ramp, extrapolate=True)
+    return Outcome(_spread(ramp["frequency_Hz"]), _spread(result["compensated_frequency_Hz"]), hrg.emit_c(model))
 
 
 def _spread(values: NDArray[np.float64]) -> float:

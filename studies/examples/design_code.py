@@ -1,6 +1,6 @@
 """The symbolic derivation inside design code: which wall gives a wanted frequency, and how sharply it must be held.
 
-HRG paper, eq. (14), is taken from the derivation, turned into a fast function and solved for the thickness; the solver
+HRG paper, eq. (13), is taken from the derivation, turned into a fast function and solved for the thickness; the solver
 then says how far Rayleigh's mode, which ignores the free edge, was off.
 """
 
@@ -9,12 +9,9 @@ from typing import NamedTuple
 import sympy as sp
 from scipy.optimize import brentq
 
-from shell.derivation.frequency import bending_integral, frequency, mass_integral
-from shell.elastic import Elastic
-from shell.meridian import hemisphere
-from shell.modes import solve_modes
+import hrg
 
-SILICA = Elastic(E=72.7e9, nu=0.17, rho=2203.0)
+SILICA = hrg.Elastic(E=72.7e9, nu=0.17, rho=2203.0)
 RADIUS = 15e-3
 WANTED = 5000.0  # Hz
 
@@ -29,18 +26,16 @@ class DesignedWall(NamedTuple):
 
 def choose_thickness() -> DesignedWall:
     """Solve f(h) = 5 kHz for a free hemisphere, n = 2."""
-    formula = frequency(sp.Integer(2))
-    print("HRG paper, eq. (14):  f =", formula)
-    integrals = {
-        sp.Symbol(name, positive=True): value(2) for name, value in (("I", bending_integral), ("J", mass_integral))
-    }
+    formula = sp.sqrt(hrg.derivation.omega_squared()) / (2 * sp.pi)
+    print("HRG paper, eq. (13):  f =", formula)
+    known = {"n": 2, "E": SILICA.E, "nu": SILICA.nu, "rho": SILICA.rho, "r": RADIUS}
+    known |= {"I": hrg.derivation.bending_integral(2), "J": hrg.derivation.mass_integral(2)}
     symbols = {str(symbol): symbol for symbol in formula.free_symbols}
-    numbers = {symbols["E"]: SILICA.E, symbols["nu"]: SILICA.nu, symbols["rho"]: SILICA.rho, symbols["r"]: RADIUS}
-    formula = formula.subs({symbols[str(name)]: value for name, value in integrals.items()}).subs(numbers)
+    formula = formula.subs({symbols[name]: value for name, value in known.items()})
     in_hertz = sp.lambdify(symbols["h"], formula)  # numbers in, numbers out: no SymPy in the loop
 
     def solved(h: float) -> float:
-        return solve_modes(hemisphere(RADIUS, h), SILICA, harmonic=2)[0].frequency
+        return hrg.solve_modes(hrg.hemisphere(RADIUS, h), SILICA, harmonic=2)[0].frequency
 
     by_formula = brentq(lambda h: float(in_hertz(h)) - WANTED, 0.2e-3, 3e-3)
     by_solver = brentq(lambda h: solved(h) - WANTED, by_formula, 1.5 * by_formula, xtol=1e-9)

@@ -1,8 +1,8 @@
 """A tolerance study: how far thickness and radius of a production run spread its frequency, and the share within limits."""
 
-from studies.sweeps.results import Results
-from studies.sweeps.run import run_study
-from studies.sweeps.tolerance import Yield, find_yield
+from typing import Any
+
+import hrg
 
 SPEC = {
     "name": "a production run of domes",
@@ -17,10 +17,10 @@ SPEC = {
 }
 
 
-def study_tolerances() -> tuple[Results, Yield]:
+def study_tolerances() -> tuple[Any, Any]:
     """Run the study in memory, on one process, and judge it; give `out=` a folder to keep and resume it."""
-    results = run_study(SPEC, workers=1)
-    return results, find_yield(results, results.study.requirements)
+    results = hrg.run_study(SPEC, workers=1)
+    return results, hrg.find_yield(results, results.study.requirements)
 
 
 if __name__ == "__main__":
