@@ -24,8 +24,6 @@ GRID = np.geomspace(1e-3, 3.0, 60)
 """Scatters that are tried, in parts of the range of the values."""
 CHANCE = 0.01
 """Chance, with all looks counted, below which a device or a batch is odd."""
-SUSPECT = 2.5
-"""Standard deviations of the whole lot, beyond which a device is held against the others."""
 FEWEST = 4
 """Devices from which on values tell who is odd."""
 CLEAR = 2.0
@@ -125,18 +123,11 @@ class Quantity:
         """Devices that are far from the others, with the counted chance: the farthest first, each against what then remains."""
         found: dict[str, float] = {}
         while len(rest := self._usual(found)) > FEWEST:
-            whole = self.among(rest)
-            suspects = [
-                s
-                for s in rest
-                if abs(self.of[s].value - whole.mean)
-                > SUSPECT * np.hypot(whole.scatter, self.of[s].sd) * _room(len(rest))
-            ]
             chances = {
-                s: self.among([o for o in rest if o != s]).surprise(*self._arrays([s])) * self.looks for s in suspects
+                s: self.among([o for o in rest if o != s]).surprise(*self._arrays([s])) * self.looks for s in rest
             }
-            worst = min(suspects, key=lambda s: chances[s], default=None)
-            if worst is None or chances[worst] >= CHANCE:
+            worst = min(rest, key=lambda s: chances[s])
+            if chances[worst] >= CHANCE:
                 break
             found[worst] = chances[worst]
         return found
@@ -158,8 +149,3 @@ class Quantity:
         lot = self.among(others)
         w, v = own.sd**-2, 1.0 / float(lot.weights @ (lot.scatters**2 + 1.0 / lot.known))
         return Measured((w * own.value + v * lot.mean) / (w + v), float((w + v) ** -0.5))
-
-
-def _room(count: int) -> float:
-    """One of few devices cannot be far from a mean that it has a part in: (n − 1)/√n is the most."""
-    return min(1.0, 0.6 * (count - 1) / float(np.sqrt(count)) / SUSPECT)
