@@ -45,11 +45,11 @@ def unknown_slope(instrument: "Instrument") -> str:
     from shell.materials import read_materials
 
     missing = () if instrument.polynomial is not None else instrument.material.constant
+    if not missing:
+        return ""
     named = {"youngs_modulus": "Young's modulus", "shear_modulus": "shear modulus", "expansion": "expansion"}
     said = "no source states" if instrument.material.name in read_materials() else "the card does not say"
     keys = {name: f"[material.deviation.{name}] {key} (1/K)" for name, key in SLOPE_KEYS.items()}
-    if not missing:
-        return ""
     return (
         f"{said} how the {' and the '.join(named[name] for name in missing)} of"
         f" '{instrument.material.name}' change{'s' if len(missing) == 1 else ''} with temperature, so the slope of the"

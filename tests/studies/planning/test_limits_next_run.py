@@ -10,6 +10,7 @@ import pytest
 from studies.cli import main
 from studies.inference.diagnosis import build_problem
 from studies.inference.model import Linear
+from studies.inference.polynomial_card import polynomial_card
 from studies.inference.search import Hypothesis, Search
 from studies.inference.signatures import Signatures
 from studies.instrument.card import load_card
@@ -64,6 +65,14 @@ def found():
     linear, noise = Linear(problem, problem.rows, state.residual, state.slope), stated_noises(card, records)
     search = Search(linear, Signatures.at(problem, state.point), noise, bank=[])
     return SimpleNamespace(search=search, final=Hypothesis((), noise, 0.0), numbers=SimpleNamespace(point=state.point))
+
+
+def test_a_card_made_from_records_simulates_what_could_come_next(found):
+    """Without a card the runs go through the polynomial card of the records."""
+    card = polynomial_card([run.record for run in found.search.linear.problem.runs])
+    (record,) = simulate_plan(card, [WORDS])
+    rise = np.ptp(record["frequency_Hz"]) / np.ptp(found.search.linear.problem.runs[0].record["frequency_Hz"])
+    assert rise == pytest.approx(1.0, abs=0.1)
 
 
 def rival(found, name, size):
