@@ -68,11 +68,11 @@ def found():
 
 
 def test_a_card_made_from_records_simulates_what_could_come_next(found):
-    """Without a card the runs go through the polynomial card of the records."""
+    """Without a card the runs go through the polynomial card of the records; how the housing follows its chamber is assumed (600 s)."""
     card = polynomial_card([run.record for run in found.search.linear.problem.runs])
     (record,) = simulate_plan(card, [WORDS])
     rise = np.ptp(record["frequency_Hz"]) / np.ptp(found.search.linear.problem.runs[0].record["frequency_Hz"])
-    assert rise == pytest.approx(1.0, abs=0.1)
+    assert 0.7 < rise < 1.4
 
 
 def rival(found, name, size):
