@@ -28,7 +28,9 @@ CONFIDENCE = 0.9
 FEWEST = 64  # values of a column that has a spectrum and an Allan deviation
 MOST = 20_000  # means that steps, lines and correlations are found in
 SIDE = 25  # means on either side of a step, through which straight lines go
+SCALES = (1, 8, 64)  # rows whose means are looked at for steps
 STANDS_OUT = 8.0  # robust standard deviations of what two such lines differ by elsewhere
+EVIDENCE = 35.0  # twice the logarithm of the likelihood by which a step exceeds a bend
 AT_ONCE = 0.6  # of a step, within two rows of it
 SEGMENTS = 8  # of a series, whose periodograms are averaged
 MOST_FREQUENCIES = 4096
@@ -196,41 +198,67 @@ def average_evenly(time: Array, values: Array, most: int = MOST) -> tuple[Array,
 
 
 def find_steps(time: Array, values: Array) -> tuple[Step, ...]:
-    """Return where a series moves at once: straight lines through the rows before and after differ there by D.
+    """Return where a series moves at once, seen in its rows and, for what noise hides there, in means of 8 and of 64 rows.
 
-    A step stands out by 8 robust standard deviations of D over the series, is the largest within `SIDE` rows, is there within two
-    rows, and a line with a bend in it leaves twice the squares. Steps nearer than `SIDE` rows to an end are not seen.
+    Straight lines through the 25 means before and after differ by D, which stands out by 8 robust standard deviations over the series;
+    the change is there within two means; and about it a parabola with a step follows the rows better than one with a bend.
     """
+    found: list[Step] = []
+    for rows in SCALES:
+        y = values[: len(values) // rows * rows].reshape(-1, rows).mean(axis=1)
+        for place, size in _candidates(y):
+            at = (place + SIDE) * rows
+            if abs(size) < LEAST_SPIKE * np.ptp(values) or (edge := _find_edge(values, at, rows)) is None:
+                continue
+            when, reach = float(time[edge - 1 : edge + 1].mean()), abs(time[at] - time[at - SIDE * rows])
+            if all(abs(when - old.time) > reach for old in found):
+                found.append(Step(when, size))
+    return tuple(sorted(found, key=lambda step: step.time))
+
+
+def _candidates(values: Array) -> list[tuple[int, float]]:
+    """Return places (rows before the last one of the left line) and sizes D where a series may step, the likeliest first."""
     n = SIDE
     if len(values) < 4 * n:
-        return ()
+        return []
     place = np.arange(n) - 0.5 * (n - 1)
     ahead = 1 / n - place * 0.5 * n / float(
         place @ place
     )  # weights of n rows for the value half a row before the first
-    after = np.correlate(values, ahead, mode="valid")[n:]
-    before = np.correlate(values, ahead[::-1], mode="valid")[:-n]
-    D = after - before  # between rows k + n − 1 and k + n
+    D = np.correlate(values, ahead, mode="valid")[n:] - np.correlate(values, ahead[::-1], mode="valid")[:-n]
     near = np.correlate(values, np.r_[-np.ones(3), np.ones(3)] / 3, mode="valid")[n - 3 : n - 3 + len(D)]
     spread = max(1.4826 * float(np.median(np.abs(D))), 1e-9 * float(np.ptp(values)))
-    x = np.arange(2.0 * n)
-    two_lines = np.column_stack([x < n, x >= n, np.minimum(x - n, 0), np.maximum(x - n, 0)]).astype(float)
-    bends = np.stack([np.column_stack([np.ones(2 * n), x, np.maximum(x - h, 0)]) for h in x[1:-1]])
     found: list[int] = []
     for k in map(int, np.argsort(-np.abs(D))[:CANDIDATES]):
         if abs(D[k]) <= STANDS_OUT * spread:
             break
         if near[k] / D[k] > AT_ONCE and all(abs(k - other) > n for other in found):
-            y = values[k : k + 2 * n] - values[k : k + 2 * n].mean()
-            if _left(two_lines[None], y) < 0.5 * _left(bends, y):
-                found.append(k)
-    return tuple(Step(float(time[k + n - 1 : k + n + 1].mean()), float(D[k])) for k in sorted(found))
+            found.append(k)
+    return [(k, float(D[k])) for k in found]
 
 
-def _left(designs: Array, y: Array) -> float:
-    """Return the least sum of squares that one of several designs (d, m, p) leaves of readings (m,)."""
-    explained = np.einsum("dmp,m->dp", np.linalg.qr(designs)[0], y)
-    return float(y @ y - np.max(np.sum(explained**2, axis=1)))
+def _find_edge(values: Array, at: int, rows: int) -> int | None:
+    """Return the first row after a step near a row; None where a bend explains the rows as well."""
+    begin, end = max(at - SIDE * rows, 0), min(at + SIDE * rows, len(values))
+    y, x = values[begin:end], np.linspace(-1, 1, end - begin)
+    Q = np.linalg.qr(np.stack([np.ones_like(x), x, x**2], axis=1))[0]
+    rest = y - Q @ (Q.T @ y)
+
+    def explained(columns: Array) -> Array:
+        columns = columns - Q @ (Q.T @ columns)
+        return np.asarray((rest @ columns) ** 2 / np.maximum(np.sum(columns**2, axis=0), 1e-12))
+
+    edges = np.arange(max(at - 2 * rows, begin + 3), min(at + 2 * rows + 1, end - 3))
+    of_steps = explained(np.asarray(np.arange(begin, end)[:, None] >= edges, dtype=float))
+    low, high, bend = -1.0, 1.0, 0.0
+    for _ in range(3):
+        places = np.linspace(low, high, 60)
+        of_bends = explained(np.maximum(x[:, None] - places, 0))
+        best, width = float(places[np.argmax(of_bends)]), (high - low) / 59
+        low, high, bend = best - width, best + width, max(bend, float(of_bends.max()))
+    least = len(y) * (1e-9 * float(np.ptp(values))) ** 2
+    left = [max(float(rest @ rest) - one, least) for one in (bend, float(of_steps.max()))]
+    return int(edges[np.argmax(of_steps)]) if len(y) * np.log(left[0] / left[1]) > EVIDENCE else None
 
 
 def find_density(time: Array, values: Array) -> Density | None:

@@ -116,7 +116,7 @@ def run_chapters(survey: Survey, told: dict[str, Any], several: bool) -> list[Ch
             Figure(lambda: draw_columns(survey.record.columns), f"All columns. Shaded: no values.{drawn}"),
         ],
         "steps and settled parts": [
-            Table("Steps", told["steps"], STEPS, "A step is there within two rows; its time is that between them."),
+            Table("Steps", told["steps"], STEPS, "Small steps are found in means of 8 or 64 rows; the time is that between the two rows of the best fit."),
             Table("Settled parts", told["settled"], SETTLED),
         ],
         "over temperature": _temperature_parts(survey),

@@ -65,7 +65,7 @@ def read_curves(figure: Drawing, left: float, bottom: float, width: float, heigh
         )
     if not plots or sum(len(one["x"]) for plot in plots for one in plot["series"]) > MOST:
         return ""
-    return json.dumps(plots, separators=(",", ":"), ensure_ascii=False).replace("<", "\\u003c")
+    return json.dumps(plots, separators=(",", ":"), ensure_ascii=False, allow_nan=False).replace("<", "\\u003c")
 
 
 def _is_surface(collection: Any) -> bool:
@@ -91,7 +91,12 @@ class _Axis:
         given = np.asarray(values, dtype=float)
         if self.log:
             return [float(f"{v:.6g}") if np.isfinite(v) else None for v in given.tolist()]
-        return [v if np.isfinite(v) else None for v in np.round(given, self.decimals).tolist()]
+        return _plain(np.round(given, self.decimals))
+
+
+def _plain(values: ArrayLike) -> list[float | None]:
+    """Return numbers as JSON has them: what is missing is null."""
+    return [v if np.isfinite(v) else None for v in np.asarray(values, dtype=float).tolist()]
 
 
 def _series(axes: Any, x: _Axis, y: _Axis) -> Iterator[dict[str, Any]]:
@@ -102,7 +107,7 @@ def _series(axes: Any, x: _Axis, y: _Axis) -> Iterator[dict[str, Any]]:
         inside = transform.contains_branch_seperately(axes.transData)
         if not any(inside):
             return
-        scaled = [axis.values(v) if of_data else np.asarray(v, dtype=float).tolist() for axis, v, of_data in zip((x, y), points.T, inside, strict=True)]  # fmt: skip
+        scaled = [axis.values(v) if of_data else _plain(v) for axis, v, of_data in zip((x, y), points.T, inside, strict=True)]  # fmt: skip
         name = str(of.get_label())
         named = "" if name.startswith("_") else " ".join(name.replace("$", "").split())
         across = "" if all(inside) else "y" if inside[0] else "x"

@@ -41,6 +41,22 @@ def test_planted_steps_are_found_and_bends_are_not(noise):
     assert not find_steps(T, np.where(T < 1000, 0, 40 * (1 - np.exp(-(T - 1000) / 300))))
 
 
+def test_planted_small_steps_are_found_in_means_of_rows():
+    time = np.arange(20_000.0)
+    noise = np.random.default_rng(8).standard_normal(time.size)
+    (found,) = find_steps(time, noise + np.where(time < 12_345, 0, 0.9))
+    assert found.time == pytest.approx(12_345, abs=130)
+    assert found.size == pytest.approx(0.9, abs=0.4)
+    for shape in (
+        0 * time,
+        30 * np.sin(time / 1500),
+        40 * np.exp(-time / 3000),
+        np.interp(time, [5000, 9000], [0, 40]),
+    ):
+        assert not find_steps(time, noise + shape)
+        assert not find_steps(time, 0.01 * noise + shape)
+
+
 def test_planted_faults_of_readings_are_counted(noise):
     y = 4432 + noise
     y[100:140] = y[100]
@@ -139,6 +155,26 @@ def test_contract_numbers_of_a_figure_lie_where_the_picture_has_them():
     told_y = (top + high * (1 - (np.log10(y) - low) / (up - low))) * height
     assert drawn[:, 0] == pytest.approx(told_x, abs=0.5)
     assert drawn[:, 1] == pytest.approx(told_y, abs=0.5)
+
+
+def test_contract_shaded_gaps_and_lines_across_are_numbers_that_a_browser_reads():
+    with style.figure() as (made, axes):
+        axes.plot([0, 1, 2], [1.0, np.nan, 3.0])
+        axes.axvline(1.0)
+        axes.broken_barh([(0.5, 1.0)], (0, 1), transform=axes.get_xaxis_transform())
+        axes.fill_between([0, 1], [0, 1], [1, 2])
+
+    def refuse(word):
+        raise AssertionError(word)
+
+    (plot,) = json.loads(draw(made, "caption", "alt").curves, parse_constant=refuse)
+    assert [(one["kind"], one["across"]) for one in plot["series"]] == [
+        ("line", ""),
+        ("line", "y"),
+        ("area", "y"),
+        ("area", ""),
+    ]
+    assert plot["series"][0]["y"] == [1.0, None, 3.0]
 
 
 def test_limits_what_is_drawn_of_many_rows_has_every_extreme():
