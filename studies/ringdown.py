@@ -205,6 +205,8 @@ def read_decay(
                 _refuse_alias(path, envelope.carrier, 1 / even_rows(time)[0], expected)
         else:
             envelope = from_lock_in(time, np.array(_pairs(path, columns)), reference or 0.0)
+        if expected is not None and envelope.carrier:
+            _refuse_other(path, envelope.carrier, expected)
         return Decay(str(path), notes, phased=analyse_decay(envelope, harmonic=harmonic), envelope=envelope)
 
 
@@ -312,6 +314,15 @@ def _refuse_alias(path: str | Path, found: float, rate: float, expected: float) 
         raise InputError(
             f"{path}: the card's {expected:.6g} Hz cannot be in samples at {rate:.6g} Hz; the line at {found:.6g} Hz is its alias. "
             f"Sample above {2 * expected:.4g} Hz, or give --frequency {expected:.6g} to a lock-in's record."
+        )
+
+
+def _refuse_other(path: str | Path, found: float, expected: float) -> None:
+    """Refuse a decay that is far from what the card predicts."""
+    if not 0.8 < found / expected < 1.25:
+        raise InputError(
+            f"{path}: the decay is at {found:.6g} Hz, the card predicts {expected:.6g} Hz, {expected / found:.4g} times as much. Correct the sampling rate"
+            " (time_s) or the reference, or leave out --card for another mode."
         )
 
 

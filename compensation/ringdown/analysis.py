@@ -12,7 +12,7 @@ from compensation.ringdown.fit import DecayFit
 from compensation.ringdown.model import Decay
 from compensation.ringdown.terms import fit_terms
 from compensation.ringdown.whiteness import Leftover, examine
-from compensation.ringdown.window import find_end, find_start
+from compensation.ringdown.window import find_end, find_jump, find_start
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -81,6 +81,10 @@ def analyse_decay(envelope: Envelope, *, harmonic: int = 2, confidence: float = 
         A record without a decay, or two channels that are one.
     """
     _check(envelope)
+    jump = find_jump(envelope)
+    given = envelope
+    if jump is not None:
+        envelope = _after_jump(envelope, jump)
     end = find_end(envelope)
     whole = envelope.within(envelope.time[0], end)
     start = find_start(whole)
@@ -90,7 +94,7 @@ def analyse_decay(envelope: Envelope, *, harmonic: int = 2, confidence: float = 
     _check_decays(fit)
     fit = replace(fit, covariance=fit.covariance * left.widening**2, widening=left.widening)
     estimates = _estimate(fit, harmonic, confidence)
-    remarks = (*_remark(envelope, fit, left, beyond, lines, start), *_undetermined(fit, estimates))
+    remarks = (*_remark(given, fit, left, beyond, lines, start, jump), *_undetermined(fit, estimates))
     return RingDown(estimates, fit, (float(free.time[0]), float(free.time[-1])), remarks, tuple(lines))
 
 
@@ -103,12 +107,32 @@ def _check(envelope: Envelope) -> None:
             raise CompensationError("the two channels are one and the same signal; give each pick-off its own column.")
 
 
+def _after_jump(envelope: Envelope, jump: float) -> Envelope:
+    """Return what follows a jump of the phase.
+
+    Raises
+    ------
+    CompensationError
+        Where less than half of the record follows it.
+    """
+    first, last = float(envelope.time[0]), float(envelope.time[-1])
+    if jump > (first + last) / 2:
+        raise CompensationError(
+            f"the phase jumps at {jump:.6g} s: the reference was lost, or samples are missing without a gap in time_s. Cut the file there and fit the longer part."
+        )
+    return envelope.within(jump, last)
+
+
 def _check_decays(fit: DecayFit) -> None:
     rate, sd = fit.decay.decay, fit.sd("decay")
     if not rate > 2 * sd:
+        if fit.envelope.clipped:
+            raise CompensationError(
+                f"{100 * fit.envelope.clipped:.2g} % of the samples are clipped and nothing decays: the amplifier is overloaded to the end; lower the gain."
+            )
         span = fit.envelope.time[-1] - fit.envelope.time[0]
         raise CompensationError(
-            f"nothing decays in the {span:.3g} s of this record (1/τ = {rate:.3g} ± {sd:.2g} 1/s); record a free ring-down, longer."
+            f"nothing decays in the {span:.3g} s of this record (1/τ = {rate:.3g} ± {sd:.2g} 1/s); switch the drive off, or record longer."
         )
 
 
@@ -170,10 +194,20 @@ def _estimate(fit: DecayFit, harmonic: int, confidence: float) -> dict[str, Esti
 
 
 def _remark(
-    envelope: Envelope, fit: DecayFit, left: Leftover, beyond: tuple[str, ...], lines: list[float], start: float
+    envelope: Envelope,
+    fit: DecayFit,
+    left: Leftover,
+    beyond: tuple[str, ...],
+    lines: list[float],
+    start: float,
+    jump: float | None,
 ) -> list[str]:
     said = []
     first = float(envelope.time[0])
+    if jump is not None:
+        said.append(
+            f"The phase jumps at {jump:.4g} s (reference or samples lost, or a drive switched): only what follows is used."
+        )
     if start > first:
         said.append(
             f"The first {start - first:.4g} s are no free decay (drive, transient or release) and are left out."

@@ -176,15 +176,18 @@ def estimate_noise(values: Complex) -> float:
 
 
 def thin(envelope: Envelope, rows: int) -> Envelope:
-    """Average neighbouring rows down to `rows`, as far as that costs no more than 0.2 % of the signal's power."""
-    z, noise = envelope.values, estimate_noise(envelope.values)
+    """Average neighbouring rows down to `rows`, as far as that costs no more than 0.2 % of the signal's power; never across a gap."""
+    t, z, noise = envelope.time, envelope.values, estimate_noise(envelope.values)
     signal = max(float(np.sum(np.mean(np.abs(z) ** 2, axis=1))) - noise, 1e-300)
     size = z.shape[1] // rows
     while size > 1:
-        count = z.shape[1] // size
-        means = z[:, : count * size].reshape(len(z), count, size).mean(axis=2)
-        if float(np.sum(np.mean(np.abs(means) ** 2, axis=1))) - noise / size > 0.998 * signal:
-            time = envelope.time[: count * size].reshape(count, size).mean(axis=1)
+        block = even_rows(t)[1] // size
+        _, first, count = np.unique(block, return_index=True, return_counts=True)
+        full = count > size / 2
+        means = np.add.reduceat(z, first, axis=1)[:, full] / count[full]
+        whole = float(np.sum(np.abs(means) ** 2 @ count[full])) / float(np.sum(count[full]))
+        if whole - noise * full.sum() / float(np.sum(count[full])) > 0.998 * signal:
+            time = (np.add.reduceat(t, first) / count)[full]
             return replace(envelope, time=time, values=means, width=envelope.width * size)
         size //= 2
     return envelope

@@ -10,6 +10,9 @@ LATER = (0.35, 0.6, 0.15)
 HALVINGS = 4
 LEAST_ROWS = 64
 SEARCH_ROWS = 300
+JUMP = 0.5
+"""Radians from which a turn of the phase between rows is no drift."""
+NEAR = 41
 
 
 def find_end(envelope: Envelope) -> float:
@@ -22,6 +25,31 @@ def find_end(envelope: Envelope) -> float:
     above = np.flatnonzero(energy > 0.25 * noise)
     last = int(above[-1]) + 1 if above.size else count
     return float(envelope.time[min(last * size, envelope.time.size) - 1])
+
+
+def find_jump(envelope: Envelope) -> float | None:
+    """Return the time after the last jump of the phase, common to the channels, that leaves the amplitude as it was; None without one.
+
+    The turn over two rows is compared with that of the rows around: a jump turns two such pairs alike, a single bad row none.
+    """
+    t, z = envelope.time, envelope.values
+    size = np.sqrt(np.sum(np.abs(z) ** 2, axis=0))
+    usual = max(float(np.sqrt(estimate_noise(z))), 1e-12 * float(size.max()))
+    turn = np.angle(np.sum(z[:, 2:] * z[:, :-2].conj(), axis=0))
+    near = np.lib.stride_tricks.sliding_window_view(np.exp(1j * turn), NEAR)
+    around = np.median(near.real, axis=1) + 1j * np.median(near.imag, axis=1)
+    half = NEAR // 2
+    away = np.angle(np.exp(1j * turn[half:-half]) * around.conj())
+    pairs = np.arange(half, half + away.size)
+    loud = np.minimum(size[pairs], size[pairs + 2])
+    steady = np.abs(np.log(np.maximum(size[pairs + 2], 1e-300) / np.maximum(size[pairs], 1e-300))) < 0.3
+    steady &= t[pairs + 2] - t[pairs] < 2.5 * float(np.median(np.diff(t)))
+    level = np.median(np.lib.stride_tricks.sliding_window_view(size, NEAR), axis=1)[: loud.size]
+    steady &= loud > 0.5 * level  # the phase of a beat turns by itself where it is low
+    limit = np.maximum(JUMP, 8 * np.maximum(1.4826 * float(np.median(np.abs(away))), usual / np.maximum(loud, 1e-300)))
+    jumps = steady & (np.abs(away) > limit)
+    both = np.flatnonzero(jumps[1:] & jumps[:-1] & (np.abs(away[1:] - away[:-1]) < 0.2))
+    return float(t[pairs[both[-1]] + 2]) if both.size else None
 
 
 def find_start(whole: Envelope) -> float:

@@ -93,7 +93,7 @@ def fit_ringdown(
         raise InputError("--save writes the card with the values found; name the card by --card.")
     instrument = load_card(card) if card else None
     expected = None
-    if instrument is not None:
+    if instrument is not None and harmonic == 2:
         T = instrument.reference_temperature
         expected = float(law_of(instrument, T - 5, T + 5).frequency(T))
     tables = [path for path in data if is_table(path)]

@@ -134,6 +134,44 @@ def test_what_is_no_ring_down_is_refused_with_its_file(tmp_path, capsys, columns
     assert "x.csv" in err
 
 
+FINE = np.arange(16_000) / 16_000
+TONE = np.exp(-FINE / 0.4) * np.cos(2 * np.pi * 4600 * FINE)
+LOCK = 0.3 * np.exp(-TIME / 40 + 0.2j * TIME)
+
+
+def lock(z):
+    return {"time_s": TIME, "in_phase_cos_V": z.real, "out_of_phase_cos_V": z.imag}
+
+
+@pytest.mark.parametrize(
+    ("columns", "said"),
+    [
+        ({"time_s": FINE, "pickoff_cos_V": np.cos(2 * np.pi * 4600 * FINE)}, "drive off"),
+        ({"time_s": FINE, "pickoff_cos_V": np.clip(9 * np.cos(2 * np.pi * 4600 * FINE), -1, 1)}, "lower the gain"),
+        ({"time_s": FINE, "pickoff_cos_V": TONE, "pickoff_sin_V": 0.5 * TONE}, "own column"),
+        ({"time_s": 2 * FINE, "pickoff_cos_V": TONE}, "sampling rate"),
+        ({"time_s": FINE[::4], "pickoff_cos_V": TONE[::4]}, "alias"),
+        ({"pickoff_cos_V": TONE}, "time_s"),
+        ({"time_s": 0 * FINE, "pickoff_cos_V": TONE}, "does not increase"),
+        (lock(LOCK * np.where(TIME > 80, np.exp(1.6j), 1)), "phase jumps at 80"),
+        (lock(0 * LOCK + 0.2), "drive off"),
+        (lock(np.conj(LOCK) / np.abs(LOCK) ** 2), "drive off"),
+    ],
+)
+def test_a_bad_decay_ends_in_one_sentence_with_cause_and_mend(tmp_path, capsys, columns, said):
+    random = np.random.default_rng(9)
+    for name in columns:
+        if name.endswith("_V") and said not in ("own column", "lower the gain"):
+            columns = columns | {name: columns[name] + 1e-3 * random.standard_normal(len(columns[name]))}
+    path = write(
+        tmp_path / "bad.csv", columns, ["reference_frequency_Hz: 4599.7"] if "in_phase_cos_V" in columns else []
+    )
+    assert main(["fit", "ringdown", path, "--card", "free-dome"]) == 2
+    err = capsys.readouterr().err
+    assert said in err
+    assert "bad.csv" in err
+
+
 def test_decays_over_pressure_give_the_gas_law(tmp_path, capsys):
     """1/Q = 1e-7 + 5e-5 p planted in ten traces of power."""
     random = np.random.default_rng(3)
