@@ -237,7 +237,7 @@ def calibrate(
         _calibrated(instrument, found, estimates),
         found,
         estimates,
-        find_groups(found),
+        find_groups(problem.priors, found.covariance),
         ladder,
         held_out,
         (*repeated, *warn(found, estimates, ladder)),

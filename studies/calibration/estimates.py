@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studies.calibration.fit import CardFit, whitened
-from studies.calibration.priors import from_standard, to_standard
+from studies.calibration.priors import Priors, from_standard, to_standard
 from studies.calibration.valley import find_bend, follow
 from studies.calibration.wave import Polar
 
@@ -169,11 +169,10 @@ def _profiled(fit: CardFit, k: int, J: Array, ends: tuple[float, float]) -> tupl
     return (found[0], found[1]), kind
 
 
-def find_groups(fit: CardFit) -> tuple[tuple[str, ...], ...]:
+def find_groups(priors: Priors, covariance: Array) -> tuple[tuple[str, ...], ...]:
     """Return groups of values that the data ties together but cannot tell apart: |correlation| above 0.9."""
-    priors = fit.problem.priors
     count = len(priors.values)
-    C = priors.root @ fit.covariance[:count, :count] @ priors.root.T
+    C = priors.root @ covariance[:count, :count] @ priors.root.T
     sd = np.sqrt(np.diag(C))
     tied = np.abs(C / np.outer(sd, sd)) > INSEPARABLE
     groups, left = [], set(range(count))

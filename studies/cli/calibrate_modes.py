@@ -4,8 +4,8 @@ The table has the columns `harmonic` (empty: n is not known), `frequency_Hz` and
 `sd_Hz`, `temperature_degC`. Schema hrg.mode-calibration/1: `card`, `table`; `values` as in hrg.calibration/1; `modes`: `[{line,
 harmonic, index, frequency_Hz, predicted_Hz, residual_ppm, sd_ppm, chance, rivals}]`, `chance` the probability of the assignment,
 `rivals` other modes that the reading may be, `[{harmonic, index, chance}]`; `decided`: whether every chance is above 95 %;
-`next_modes`: by value the mode to measure next, `[{parameter, harmonic, index, frequency_Hz, sd, sd_then}]`; `misfit`: squared
-residuals and shifts over what is expected; `warnings`; `calibrated_card`.
+`next_modes`: by value the mode to measure next, `[{parameter, harmonic, index, frequency_Hz, sd, sd_then}]`; `inseparable`: groups of values that
+are known no better than one of them that the modes do not tell; `misfit`: squared residuals and shifts over what is expected; `warnings`; `calibrated_card`.
 """
 
 from collections.abc import Sequence
@@ -42,10 +42,14 @@ NEXT = (
     Column("sd_then", "± then", form=".2g"),
 )
 VALUE = ("parameter", "unit", "card", "value", "low", "high", "shift_sd", "width", "told_by", "bound", "interval")
+UNTOUCHED = 0.9995
 WIDTHS = "Shift: change in prior standard deviations. Width: posterior over prior standard deviation; the modes determine a value up to 0.5."
 READ = (
     "Noise: of the reading and of the solver. Chance: probability that the reading is of this mode. The modes are those of the bare"
     " resonator, of a pair the mean: electrodes, films and the mount are not in them."
+)
+TIED = (
+    "Known only together: {}. The modes do not tell all of them; weigh the resonator, or measure what they leave open."
 )
 MEASURE = "The mode not yet measured that would lower the variance of each value most, read as well as the others; ± one standard deviation."
 
@@ -63,6 +67,7 @@ def calibrate_modes(instrument: Instrument, path: str, save: str | None, exact: 
     values = [
         {**one, "unit": one["unit"] if one["unit"] != "1" else "", "told": TOLD[one["told_by"]]}
         for one in sorted(payload["values"], key=lambda one: float(one["width"]))
+        if one["width"] < UNTOUCHED
     ]
     modes = [
         {**one, "others": ", ".join(f"{r['harmonic']}, {r['index']} ({100 * r['chance']:.0f})" for r in one["rivals"])}
@@ -76,6 +81,7 @@ def calibrate_modes(instrument: Instrument, path: str, save: str | None, exact: 
             *(Sentence(one, "warning") for one in payload["warnings"]),
             Table("Values, best known first", values, (*VALUES, KEY), WIDTHS, "page"),
             Table("Values, best known first", values, VALUES, WIDTHS, "terminal"),
+            *(Sentence(TIED.format(", ".join(map(display_name, group)))) for group in found.groups),
             Table("Modes", modes, MODES, READ),
             Table("Measure next", payload["next_modes"], NEXT, MEASURE),
         ],
@@ -125,6 +131,7 @@ def _payload(found: ModeCalibration, save: str | None) -> dict[str, Any]:
         ],
         "decided": decided(found),
         "next_modes": [asdict(one) for one in found.next_modes],
+        "inseparable": [list(group) for group in found.groups],
         "misfit": found.misfit,
         "warnings": [*found.warnings, *said],
         "calibrated_card": save,

@@ -15,7 +15,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from studies.calibration.estimates import NINETY, Estimate
+from studies.calibration.estimates import NINETY, Estimate, find_groups
 from studies.calibration.posterior import posterior_card
 from studies.calibration.priors import Priors, check_exact, from_standard, gather_priors
 from studies.errors import InputError
@@ -60,6 +60,7 @@ class ModeCalibration:
     ----------
     card, instrument : as given; with the values found.
     fit : of the likeliest assignment.
+    groups : names of values that share what is known of one that the modes do not tell, as the modulus does of the density.
     chance : of each reading's assignment; `rivals` are the other modes that it may be, (harmonic, index, chance).
     misfit : squared, over what is expected.
     """
@@ -69,6 +70,7 @@ class ModeCalibration:
     readings: ModeReadings
     fit: ModeFit
     estimates: tuple[Estimate, ...]
+    groups: tuple[tuple[str, ...], ...]
     chance: tuple[float, ...]
     rivals: tuple[tuple[tuple[int, int, float], ...], ...]
     next_modes: tuple[NextMode, ...]
@@ -104,6 +106,7 @@ def invert(
     doubted = scipy.stats.chi2.sf(squares, len(readings)) < DOUBTED
     covariance = best.covariance * (misfit if doubted else 1.0)
     estimates = _estimates(priors, best.point, covariance)
+    told = {one.parameter: one.told_by for one in estimates}
     progress("the mode to measure next")
     return ModeCalibration(
         instrument,
@@ -111,6 +114,9 @@ def invert(
         readings,
         best,
         estimates,
+        tuple(
+            group for group in find_groups(priors, covariance) if {"data", "prior"} <= {told[name] for name in group}
+        ),
         tuple(found[mode] for found, mode in zip(chances, best.modes, strict=True)),
         tuple(
             tuple((m.harmonic, m.index, p) for m, p in found.items() if m != mode and p > UNDECIDED)
