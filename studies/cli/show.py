@@ -85,7 +85,7 @@ def _facts(survey: Survey) -> list[tuple[str, str, str]]:
 def _warnings(surveys: list[Survey]) -> list[Sentence | Chapter]:
     """Say which readings look wrong, and how to leave them out."""
     found = [
-        f"{survey.record.path}, {column.name}: {count} {words}"
+        f"{survey.record.path}, {column.name}: {words} {count}"
         for survey in surveys
         for column in survey.columns
         for count, words in (

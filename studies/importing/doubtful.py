@@ -39,11 +39,11 @@ def drop_doubtful(column: ColumnMap, values: "Array") -> "tuple[Array, list[str]
         found = find(values if taken else values[:LOOKED_AT])
         count, where = int(found.sum()), "" if len(found) == len(values) else f" in the first {LOOKED_AT:,} rows"
         if taken:
-            notes.append(f"{column.target}: {count} {words} made missing")
+            notes.append(f"{column.target}: {words}: {count}, made missing")
             kept = np.where(found, np.nan, kept)
         elif count:
             notes.append(
-                f"{column.target}: {count} {words}{where} left as they are (drop = ['{kind}'] makes them missing)"
+                f"{column.target}: {words}{where}: {count}, left as they are (drop = ['{kind}'] makes them missing)"
             )
     return kept, notes
 

@@ -264,11 +264,11 @@ def test_contract_doubtful_readings_are_offered_as_missing_and_never_changed(tmp
     Path("map.toml").write_text(MAP)
     assert main(["import", "one.csv", "--map", "map.toml", "--out", "run.csv"]) == 0
     said = capsys.readouterr().out
-    assert "1 spikes left as they are (drop = ['spikes'] makes them missing)" in said
-    assert "30 readings of a sensor that is stuck left as they are" in said
+    assert "spikes: 1, left as they are (drop = ['spikes'] makes them missing)" in said
+    assert "readings of a sensor that is stuck: 30, left as they are" in said
     assert np.array_equal(read_record("run.csv")["frequency_Hz"], f)
     Path("map.toml").write_text(MAP + 'drop = ["spikes", "stuck"]\n')
     assert main(["import", "one.csv", "--map", "map.toml", "--out", "run.csv"]) == 0
     kept = read_record("run.csv")["frequency_Hz"]
     assert np.isnan(kept).sum() == 31
-    assert "1 spikes made missing" in capsys.readouterr().out
+    assert "spikes: 1, made missing" in capsys.readouterr().out
