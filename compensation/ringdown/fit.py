@@ -126,7 +126,7 @@ def _fit_from(envelope: Envelope, time: Real, names: tuple[str, ...], guess: Dec
     channels = 2 if summed else z.shape[0]
     fixed = {name: 0.0 for name in NAMES if name not in names}
     size = float(np.sqrt(np.mean(np.abs(z) ** 2))) or 1.0
-    span = float(time[-1]) or 1.0
+    span, most = float(time[-1]) or 1.0, 1e9 * size  # a trial point's growth ends there
     scale = np.array(
         [
             1 / (span * size**2 if name in ("hardening", "thickening") else span**2 if name == "chirp" else span)
@@ -143,7 +143,8 @@ def _fit_from(envelope: Envelope, time: Real, names: tuple[str, ...], guess: Dec
         with np.errstate(over="ignore", invalid="ignore"):
             found = propagate(of(point)[0], time, of(point)[1])
         found = found.sum(axis=0, keepdims=True) if summed else found
-        return np.asarray(np.nan_to_num(found, nan=1e9, posinf=1e9, neginf=-1e9))
+        real, imaginary = (np.clip(np.nan_to_num(part, nan=most), -most, most) for part in (found.real, found.imag))
+        return np.asarray(real + 1j * imaginary)
 
     first = _amplitudes(time, z, guess, summed)
     point = np.concatenate([guess.vector(names) / scale, first.real / size, first.imag / size])
