@@ -122,6 +122,7 @@ def derive(
         "bryan_factor": {"closed_form": str(case.precession), "value": float(case.precession.evalf(20))},
         "d_ln_f_d_rim_angle_per_rad": float(case.rim_derivative.evalf(20)),
     }
+    say("deriving the equations ...")
     emitted = emit_code(case, code) if code else None
     text = _write(payload, chain := read_chain(steps(case)), HRG_TITLE, latex, code, emitted)
     lead = f"HRG paper, equations (1) to (15), closed forms for n = {harmonic} from {pole_angle_deg:g}° to {rim_angle_deg:g}°."

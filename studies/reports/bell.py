@@ -63,7 +63,10 @@ TWIN = (
 def steps_table(steps: Sequence[Payload], title: str) -> Table:
     """Return the figures of merit after every step; a column is left out where the records are too short for it."""
     rows = [{**step, "name": NAMES[step["step"]]} for step in steps]
-    note = "σ: standard deviation over the temperature run."
+    note = (
+        "σ: standard deviation over the temperature run. At a constant rate the temperature errors of bias and scale may partly cancel:"
+        " σ can then grow when only the bias is compensated, until the scale over temperature is, too."
+    )
     if any(step["bias_instability"] is not None for step in steps):
         note += " Bias instability: minimum of the Allan deviation over 0.664. A filter lowers the random walk at 1 s, not at 100 s."
     return Table(title, rows, STEP_COLUMNS, note)
