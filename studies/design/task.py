@@ -123,6 +123,11 @@ def is_magnitude(column: str) -> bool:
     return "separation_n" in column and column.endswith("_Hz") and "_of_n" not in column
 
 
+def shown(column: str, value: float) -> float:
+    """Return a value as it counts: distances by their magnitude."""
+    return abs(float(value)) if is_magnitude(column) else float(value)
+
+
 def _goals(keys: DesignKeys) -> list[Objective | Requirement]:
     """Return all that is wanted of columns."""
     return [*keys.objective, *keys.constraint]

@@ -11,8 +11,8 @@ from types import SimpleNamespace
 import numpy as np
 
 from studies.design import answer as module
+from studies.design.goals import lay_goals
 from studies.design.keys import DesignKeys
-from studies.design.search import Search
 from studies.design.task import Task, read_task
 from studies.schema.reader import read_keys
 from studies.sweeps.block import Batch
@@ -78,10 +78,6 @@ def shells(path: str, draws: int) -> None:
     plan = WorkPlan.of(task.study)
     (cases,) = evaluate_task(plan, [Batch(np.full(draws, -1), low + x * width)])
     good = cases.values[np.isfinite(cases.values).all(axis=1)]
-    goals = Search.__new__(Search)
-    del goals
-    from studies.design.goals import lay_goals
-
     laid = lay_goals(task, found.values, found.values[0])
     none = np.zeros(len(task.columns))
     held = [v for v in good if laid.violation(v, none) == 0]
