@@ -12,6 +12,7 @@ from studies.fleet.comparison import Share, compare
 from studies.fleet.device import Answer, Standing, interval
 from studies.fleet.folder import Device
 from studies.fleet.population import FEWEST, Quantity
+from studies.instrument.display import display_name
 
 DESIGN = 0.05
 """Relative distance of a frequency from the lot's, beyond which a device is of another design."""
@@ -67,8 +68,7 @@ class Lot:
         for one in self.quantities:
             for name, chance in one.bad_batches.items():
                 inside = one.among([s for s in one.of if one.batches.get(s) == name])
-                words = f"{one.name} is {inside.mean:.5g}, in the lot {one.population.mean:.5g}; chance {chance:.1g}"
-                out.setdefault(name, []).append(words)
+                out.setdefault(name, []).append(_far(one, inside.mean, chance))
         for share in self.shares:
             if share.kind == "batch":
                 out.setdefault(share.batch, []).append(f"has {' or '.join(share.names)} in {share.response}")
@@ -93,6 +93,11 @@ class Lot:
             },
             "failed": dict(self.failed),
         }
+
+
+def _far(one: Quantity, value: float, chance: float) -> str:
+    name = one.name if " " in one.name else display_name(one.name)
+    return f"{name} is {value:.5g}, in the lot {one.population.mean:.5g} (chance {chance:.1g})"
 
 
 def _cause(one: Share) -> dict[str, Any]:

@@ -31,14 +31,18 @@ def headline(lot: Lot) -> str:
     common = [_spell(one) for one in lot.shares if one.kind in ("all", "all but")]
     text = f"Common to the lot: {', '.join(common)}." if common else "The devices have no cause in common."
     for name, why in lot.bad_batches.items():
-        text += f" Batch {name} differs: {'; '.join(why)}."
+        text += f" Batch {name} differs: {_first(why)}."
     if len(lot.odd) == 1:
-        text += f" Device {lot.odd[0]} differs from the others: {'; '.join(lot.reasons[lot.odd[0]])}."
+        text += f" Device {lot.odd[0]} differs from the others: {_first(lot.reasons[lot.odd[0]])}."
     elif lot.odd:
         text += f" Devices that differ from the others: {', '.join(lot.odd)}."
     else:
         text += " No device differs from the others."
     return text + (f" No answer: {', '.join(sorted(lot.failed))}." if lot.failed else "")
+
+
+def _first(reasons: list[str]) -> str:
+    return reasons[0] + (f", and {len(reasons) - 1} more" if len(reasons) > 1 else "")
 
 
 def _spell(one: Share) -> str:
