@@ -11,6 +11,7 @@ from compensation.bell import BellChain, apply_chain
 from compensation.bell_calibration import BellRun, fit_chain
 from compensation.decimation import average_blocks
 from compensation.linearity import measure_linearity, same_rate
+from compensation.rate_law import RateLaw, fit_rate_law
 from compensation.samples import is_regular
 from compensation.stability import allan_deviation
 from shell.constants import zero_Celsius
@@ -68,6 +69,7 @@ class ScaleStudy:
     error_held_out: float
     averaged: bool
     rough_run: bool = False
+    law: RateLaw | None = None
 
 
 def judge_steps(chain: BellChain, rates: BellRun, rest: BellRun, turning: BellRun) -> list[StepFigures]:
@@ -139,7 +141,9 @@ def study_scale(records: "Sequence[Record]", cutoff: float | None, order: int) -
         before, after = _hold_out(thin, rough)
         figures = judge_steps(chain, rates, rest, turning)
     averaged = any(len(less.time) < len(run.time) for less, run in zip(thin, runs, strict=True))
-    return ScaleStudy(chain, runs, output, column, left_out, figures, before, after, averaged, rough is not None)
+    return ScaleStudy(
+        chain, runs, output, column, left_out, figures, before, after, averaged, rough is not None, read_law(rates)
+    )
 
 
 ROUGH = "at rest and then at one rate"
@@ -151,6 +155,19 @@ KINDS = {
     "at rest over temperature": "equation (34)",
     "at one rate over temperature": "equation (36)",
 }
+
+
+def read_law(run: BellRun) -> RateLaw | None:
+    """Return the law of the raw output over the held rates (°/s), each by its mean with the error that its fifths show."""
+    level = same_rate(run.rate)
+    held = [rows for one in np.unique(level) if len(rows := np.flatnonzero(level == one)) >= 4 * BLOCKS]
+    fifths = np.array([[run.output[part].mean() for part in np.array_split(rows, BLOCKS)] for rows in held])
+    if not held:
+        return None
+    error = np.sqrt(np.mean(fifths.var(axis=1, ddof=1)) / BLOCKS) * np.ones(
+        len(held)
+    )  # one error of all, of many fifths
+    return fit_rate_law(np.array([level[rows[0]] for rows in held]) / DEG, fifths.mean(axis=1), error)
 
 
 def _classify(run: BellRun, path: str) -> str:

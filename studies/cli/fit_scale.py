@@ -4,6 +4,7 @@ import dataclasses
 import re
 from typing import Any
 
+from compensation.rate_law import SURE, RateLaw
 from studies.cli.arguments import SaveModel
 from studies.cli.output import answers, say
 from studies.errors import InputError
@@ -21,6 +22,16 @@ STEPS = {
     "scale_over_rate": "scale over rate (35)",
     "scale_over_temperature": "scale over temperature (36)",
 }
+FORMS = (
+    Column("form", "Form"),
+    Column("gain", "Evidence over the line", digits=3),
+    Column("held_out_deg_per_s", "Error on rates left out", "°/s", digits=2),
+    Column("chosen", ""),
+)
+FORM_NOTE = (
+    "Evidence: fall of N ln(mean square) + p ln N; above 6 is 20:1. Directions: different scales for positive and negative rates. The"
+    " coefficients below follow the paper's quadratic form."
+)
 COEFFICIENTS = (
     Column("step", "Step"),
     Column("name", "Coefficient"),
@@ -79,7 +90,7 @@ def fit_scale(
         for part in model.parts
     }
     steps = [dataclasses.asdict(figures) for figures in study.figures]
-    payload = {
+    payload: dict[str, Any] = {
         "schema": "hrg.fit-scale/1",
         "records": list(data),
         "output": study.output,
@@ -88,6 +99,7 @@ def fit_scale(
         "steps": steps,
         "error_before_deg_per_s": study.error_before,
         "error_held_out_deg_per_s": study.error_held_out,
+        "rate_law": _law_row(study.law),
         "filter_delay_s": study.chain.delay,
         "rows_left_out": study.left_out,
     }
@@ -112,10 +124,50 @@ def fit_scale(
                     Figure(lambda: draw_steps(study.chain, study.runs), caption),
                 ],
             ),
+            Chapter(
+                "Law over rate",
+                [
+                    Table(
+                        "Forms of the raw output over rate",
+                        payload["rate_law"]["forms"] if payload["rate_law"] else [],
+                        FORMS,
+                        FORM_NOTE,
+                    ),
+                    *([Sentence(_law_words(study.law))] if study.law else []),
+                ],
+            ),
             Chapter("Coefficients", [Table("Coefficients", rows, COEFFICIENTS, NOTE)]),
         ],
         sources=SOURCES,
     )
+
+
+def _law_row(law: RateLaw | None) -> dict[str, Any] | None:
+    """The forms for --json; values per °/s of the applied rate, in the unit of the output; A and d in °/s."""
+    if law is None:
+        return None
+    return {
+        "chosen": law.chosen.name,
+        "left_over": "structure" if law.structure else "none",
+        "forms": [
+            {"form": f.name, "gain": f.gain, "held_out_deg_per_s": f.held_out, "values": f.values,
+             "chosen": "←" if f.name == law.chosen.name else ""}
+            for f in law.forms
+        ],
+    }  # fmt: skip
+
+
+def _law_words(law: RateLaw) -> str:
+    alike = [
+        form.name
+        for form in law.forms
+        if form.name not in (law.chosen.name, "line") and abs(form.gain - law.chosen.gain) < SURE
+    ]
+    words = f"The output over rate follows this form: {law.chosen.name}."
+    if alike and law.chosen.name != "line":
+        words += f" These rates do not separate it from: {', '.join(alike)}."
+    left = "It leaves structure beyond the errors of the means: more rates, or another form, are needed."
+    return f"{words} {left if law.structure else 'What it leaves is within the errors of the means.'}"
 
 
 def _facts(study: ScaleStudy) -> Facts:

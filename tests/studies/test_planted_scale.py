@@ -11,6 +11,7 @@ import pytest
 
 from compensation.bell import apply_chain
 from compensation.bell_calibration import BellRun, fit_chain
+from compensation.rate_law import fit_rate_law
 from studies.cli import main
 from studies.errors import InputError
 from studies.models import compensate, emit_c, read_model
@@ -66,6 +67,25 @@ def test_planted_chain_is_recovered_in_any_order_of_files(fitted):
     for name, planted in (("c1", -0.0056), ("c2", 2.52e-5)):
         assert abs(bias[name]["value"] - planted * share) < 4 * bias[name]["standard_error"]
     assert found["error_held_out_deg_per_s"] < 0.5 * found["error_before_deg_per_s"]
+    assert found["rate_law"]["chosen"] == "quadratic"
+
+
+def test_the_form_over_rate_is_chosen_by_evidence_and_rates_left_out():
+    """A line, two scales, a square, a dead band are told apart; a shallow sine and a cubic may stand for one another."""
+    x = np.array([-300.0, -200, -100, -50, -20, -5, -2, 2, 5, 20, 50, 100, 200, 300])
+    for name, y in {
+        "line": x,
+        "directions": x + 2e-3 * np.maximum(x, 0),
+        "quadratic": x + 5e-6 * x**2,
+        "dead band": np.sign(x) * np.maximum(np.abs(x) - 0.8, 0),
+        "sine": 400 * np.sin(x / 400),
+    }.items():
+        noise = 0.8 * np.random.default_rng(1).standard_normal(x.size)
+        law = fit_rate_law(x, -690 + 40 * y + noise, np.full(x.size, 0.8))
+        assert law.chosen.name == name
+        assert not law.structure
+    wavy = fit_rate_law(x, x + 0.5 * np.sin(x / 30), np.full(x.size, 0.02))
+    assert wavy.structure
 
 
 def test_saved_model_is_the_fitted_chain_and_compensates(records, fitted):
