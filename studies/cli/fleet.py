@@ -35,8 +35,8 @@ def fleet(folder: str, *, out: str, card: str | None = None, workers: int = 1) -
 
     if workers < 1:
         raise InputError(f"--workers {workers}: give at least 1.")
-    if Path(out).resolve() == Path(folder).resolve():
-        raise InputError(f"--out {out}: give another folder than that of the records.")
+    if Path(out).resolve().is_relative_to(Path(folder).resolve()):
+        raise InputError(f"--out {out}: give a folder outside {folder}, where every folder is a device.")
     if card is not None:
         from studies.instrument.card import load_card
 
