@@ -101,9 +101,9 @@ def _whole_angle(records: Sequence[Record]) -> None:
 
 
 def _campaign(records: Sequence[Record]) -> None:
-    from studies.diagnosis.campaign import load_campaign
+    from studies.inference.records import make_ready
 
-    load_campaign(records)
+    make_ready(records)
 
 
 def _acceptance(records: Sequence[Record]) -> None:

@@ -135,6 +135,7 @@ def diagnose_records(
     from studies.inference.records import driving, make_ready
     from studies.inference.unjudged import Unjudged
     from studies.planning.next_run import suggest
+    from studies.plausible import check_card_frequency
 
     campaign = make_ready(records)
     if not campaign.records:
@@ -142,9 +143,12 @@ def diagnose_records(
     if card is None:
         card = polynomial_card(campaign.records)
     else:
-        check_readings(card, campaign.records)
         if card.polynomial is None:
             card.material.check(np.concatenate([driving(record) for record in campaign.records]) + zero_Celsius)
+        for record in campaign.records:
+            if "frequency_Hz" in record:
+                check_card_frequency(card, record["frequency_Hz"], record.path)
+        check_readings(card, campaign.records)
         turned = [bias_of_opposite_sign(card, record) for record in campaign.records]
         campaign = campaign.noting(said for said in turned if said is not None)
     tell = progress or (lambda words: None)

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from compensation.noise import white_rms
 from shell.constants import zero_Celsius
 from studies.calibration.fit import CardFit, fit, residual_noise
 from studies.calibration.observed import RESPONSES, observe
@@ -26,6 +27,7 @@ from studies.inference.model import Background, Linear
 from studies.inference.records import Campaign
 from studies.inference.relinearise import relinearise
 from studies.inference.search import Hypothesis, Outcome, Search
+from studies.inference.sharp import RESOLVED, fast_line, longest_resolved
 from studies.inference.signatures import Signatures
 from studies.inference.verdict import judge
 from studies.record import Record
@@ -143,9 +145,22 @@ def build_problem(card: "Instrument", records: Sequence[Record]) -> CardProblem:
     """Return the problem of a card's values and the starts of runs, driven by the measured temperature."""
     runs = tuple(
         replace(run, outer=None, responses={name: own for name, own in run.responses.items() if name in RESPONSES})
-        for run in observe(records, blocks=int(np.clip(BLOCKS / len(records), *BLOCKS_OF_RUN)))
+        for run in observe(records, blocks=blocks_of(records))
     )
     return CardProblem(card, gather_priors(card), runs, wide_law(card, runs))
+
+
+def blocks_of(records: Sequence[Record]) -> int:
+    """Return how many block averages a run has: more where a line is faster than the usual ones and finer ones resolve it."""
+    count = int(np.clip(BLOCKS / len(records), *BLOCKS_OF_RUN))
+    longest = max(float(np.ptp(record["time_s"])) for record in records)
+    sampling = max(float(np.median(np.diff(record["time_s"]))) for record in records)
+    for name in RESPONSES:
+        series = [(record["time_s"] - record["time_s"][0], record[name]) for record in records if name in record]
+        line = fast_line(series, sampling, longest / count, white_rms(*(own for _, own in series))) if series else None
+        if line is not None and longest <= longest_resolved(line.period):
+            count = max(count, int(np.ceil(RESOLVED * longest / line.period)))
+    return count
 
 
 def infer(card: "Instrument", campaign: Campaign, progress: Report = lambda _: None) -> Inference:
@@ -231,10 +246,10 @@ def _confirmed(
         weak = [
             k
             for k, name in enumerate(term.response for term in final.terms)
-            if _worse(before[name], after[name]) or rows[name].rms > alone[name].rms
+            if _worse(*before[name].beside(after[name])) or rows[name].rms > alone[name].rms
         ]
         if not weak:
-            return outcome, {name: (before[name], after[name]) for name in before}, rows
+            return outcome, {name: before[name].beside(after[name]) for name in before}, rows
         gone = min(weak, key=lambda k: final.score - outcome.without[k].score)
         outcome = _left_out(search, outcome, gone)
 

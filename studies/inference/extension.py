@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from studies.diagnosis.extension import SURE, WIDER, shortest, spread_of_shape
+from studies.diagnosis.verdict import Interval
+from studies.effects import Parameter
 from studies.inference.diagnosis import Inference
 from studies.inference.model import Background, Term
 from studies.inference.verdict import parameters_of
@@ -17,6 +18,10 @@ if TYPE_CHECKING:
     from studies.calibration.calibrate import Calibration
 
 Array = NDArray[np.float64]
+WIDER = 3.0
+"""Of what a diagnosis knows of an effect, the prior with which a calibration finds it anew beside all other values."""
+SURE = 3.0
+"""Log evidence, twenty to one, by which fewer members of a family must be likelier than all of them."""
 
 
 def extend(found: Inference, progress: Callable[[str], None] = lambda words: None) -> "Calibration":
@@ -66,6 +71,22 @@ def entry_of(found: Inference, background: Background, k: int) -> dict[str, Any]
         if sd > 0 and isinstance(numbers.get(key), float):
             numbers[key] = {"value": numbers[key], "sd": float(sd)}
     return {"name": effect.name, "response": term.response, **numbers}
+
+
+def spread_of_shape(parameter: Parameter, known: Interval) -> float:
+    """Return the prior's standard deviation of a shape parameter: at most that of a value which is even between its bounds."""
+    interval, bounds, scale = np.array([known.low, known.high]), np.array([parameter.low, parameter.high]), 1.0
+    if parameter.logarithmic and parameter.low > 0:
+        interval, bounds, scale = np.log(interval), np.log(bounds), known.value
+    return scale * min(WIDER * Interval(known.value, *interval).sd, float(np.ptp(bounds)) / float(np.sqrt(12.0)))
+
+
+def shortest(value: float | list[float]) -> float | list[float]:
+    """Return a list without the zeros at its end, and a number for one alone: that can be uncertain."""
+    if isinstance(value, float):
+        return value
+    members = value[: int(np.flatnonzero(value)[-1]) + 1]
+    return members if len(members) > 1 else members[0]
 
 
 def without_events(found: Inference) -> list[Record]:

@@ -22,7 +22,7 @@ OWN_OFFSET = "bias_deg_per_h"
 BLOCKS = 5
 FREE = 1e3
 """Prior standard deviation of the offset of a run that is held out, in parts of the noise of its mean."""
-KNOWN = 1.5
+KNOWN = 1.0
 """Standard deviation of a prediction, in parts of the noise, up to which the rest of the records predict a row."""
 FEWEST = 0.5
 """Part of the rows from which on they speak for the records."""
@@ -39,6 +39,28 @@ class Rows:
     def rms(self) -> float:
         """Root mean square."""
         return float(np.sqrt(np.mean(np.concatenate(self.residual) ** 2)))
+
+
+@dataclass(frozen=True)
+class Unseen:
+    """What a model leaves of rows that it has not seen, and which of them the other rows tell it."""
+
+    residual: Array
+    known: Mask
+
+    @classmethod
+    def of(cls, parts: Sequence[tuple[Array, Mask]]) -> "Unseen":
+        """Join parts."""
+        residuals, masks = zip(*parts, strict=True) if parts else ((np.empty(0),), (np.empty(0, dtype=bool),))
+        return cls(np.concatenate(residuals), np.concatenate(masks))
+
+    def beside(self, other: "Unseen") -> tuple[float | None, float | None]:
+        """Return the rms of both on the rows that both can predict; None where these are too few."""
+        both = self.known & other.known
+        if both.sum() < max(FEWEST * len(both), 1):
+            return None, None
+        first, second = (float(np.sqrt(np.mean(one.residual[both] ** 2))) for one in (self, other))
+        return first, second
 
 
 @dataclass(frozen=True)
@@ -104,8 +126,8 @@ class Model:
         X, r, _ = self.linear.whitened(self.terms, self.noise)
         return solve_posterior(np.vstack(list(X.values())), np.concatenate(list(r.values())))[0]
 
-    def held_out(self, by_record: bool) -> dict[str, float | None]:
-        """Return the rms of what is left of rows that were held out; None where too few of them can be predicted."""
+    def held_out(self, by_record: bool) -> "dict[str, Unseen]":
+        """Return what is left of rows that were held out."""
         whole = self.mean()
         rows = self.residuals(self.kept(whole))
         return self._by_record(whole, rows) if by_record else self._by_block(whole, rows)
@@ -119,8 +141,8 @@ class Model:
             found.append(left - left.mean() if name == OWN_OFFSET else left)
         return found
 
-    def _by_record(self, whole: Array, rows: Mapping[str, Rows]) -> dict[str, float | None]:
-        squares: dict[str, list[Array]] = {name: [] for name in rows}
+    def _by_record(self, whole: Array, rows: Mapping[str, Rows]) -> "dict[str, Unseen]":
+        parts: dict[str, list[tuple[Array, Mask]]] = {name: [] for name in rows}
         for run in range(len(self.problem.runs)):
             keep = {
                 name: [
@@ -129,12 +151,37 @@ class Model:
                 ]
                 for name in self.problem.responses
             }
-            mean, _ = self._trained(keep)
+            mean, C = self._trained(keep)
             step = self._restarted(mean, run, keep) - whole
+            others = np.setdiff1d(np.arange(len(mean)), self._own(run))
             for name in rows:
-                parts = zip(self.problem.members(name), self._moved(rows, name, step), strict=True)
-                squares[name] += [rest**2 for part, rest in parts if part.run == run]
-        return {name: float(np.sqrt(np.mean(np.concatenate(own)))) if own else None for name, own in squares.items()}
+                known = self._known(name, C[np.ix_(others, others)], others)
+                moved = self._moved(rows, name, step)
+                for k, part in enumerate(self.problem.members(name)):
+                    if part.run == run:
+                        parts[name].append((moved[k], self._near(name, k, rows[name].time[k], known)))
+        return {name: Unseen.of(own) for name, own in parts.items()}
+
+    def _known(self, name: str, C: Array, others: NDArray[np.intp]) -> Mask:
+        """Blocks that a trained model predicts to `KNOWN` times the noise; the level of a run of its own is refitted."""
+        X, level = self.linear.columns(self.terms, name)[:, others], self.linear.rows[name]
+        if name == OWN_OFFSET:
+            X = np.concatenate([X[own] - X[own].mean(axis=0) for own in level.slices])
+        spread = np.sqrt(np.einsum("ij,jk,ik->i", X, C, X))
+        quiet = replace(self.noise[name], offset=0.0)
+        noise = np.sqrt(np.concatenate([np.diag(level.covariance(k, quiet)) for k in range(len(level.times))]))
+        return np.asarray(spread < KNOWN * noise)
+
+    def _near(self, name: str, k: int, time: Array, known: Mask) -> Mask:
+        """Rows of a part whose blocks are known."""
+        level = self.linear.rows[name]
+        at = level.times[k]
+        return np.asarray(known[level.slices[k]][np.clip(np.searchsorted(at - at[0], time), 0, len(at) - 1)])
+
+    def _own(self, run: int) -> list[int]:
+        """Coordinates of a run of its own: how it began."""
+        first = len(self.problem.priors.values)
+        return [first + i for i, (k, _, _) in enumerate(self.problem.starts) if self.problem.parts[k].run == run]
 
     def _trained(self, keep: Mapping[str, Sequence[Mask]]) -> tuple[Array, Array]:
         seen = {name: own for name, own in keep.items() if any(mask.any() for mask in own)}
@@ -143,10 +190,7 @@ class Model:
 
     def _restarted(self, mean: Array, run: int, keep: Mapping[str, Sequence[Mask]]) -> Array:
         """Refit start and offset of a run that was held out."""
-        problem = self.problem
-        first = len(problem.priors.values)
-        own = [first + i for i, (k, _, _) in enumerate(problem.starts) if problem.parts[k].run == run]
-        mean = mean.copy()
+        own, mean = self._own(run), mean.copy()
         if not own:
             return mean
         mean[own] = 0.0
@@ -161,38 +205,23 @@ class Model:
         mean[own] = solve_posterior(columns[:, own], rest - columns @ mean)[0]
         return mean
 
-    def _by_block(self, whole: Array, rows: Mapping[str, Rows]) -> dict[str, float | None]:
-        tau = self.signatures.span.tau
-        squares: dict[str, list[Array]] = {name: [] for name in self.problem.responses}
-        asked = dict.fromkeys(self.problem.responses, 0)
+    def _by_block(self, whole: Array, rows: Mapping[str, Rows]) -> "dict[str, Unseen]":
+        tau, every = self.signatures.span.tau, np.arange(len(whole))
+        parts: dict[str, list[tuple[Array, Mask]]] = {name: [] for name in rows}
         for block in range(BLOCKS):
             keep = {
                 name: [_outside(self.problem.runs[part.run].responses[name].time, block, tau) for part in self.problem.members(name)]
                 for name in self.problem.responses
             }  # fmt: skip
-            if not all(any(mask.any() for mask in masks) for masks in keep.values()):
-                continue
-            mean, C = self._trained(keep)
+            trained = all(any(mask.any() for mask in masks) for masks in keep.values())
+            mean, C = self._trained(keep) if trained else (whole, np.zeros((0, 0)))
             for name in rows:
-                X = self.linear.columns(self.terms, name)
-                spread = np.sqrt(np.einsum("ij,jk,ik->i", X, C, X))
-                level = self.linear.rows[name]
-                noise = np.sqrt(
-                    np.concatenate([np.diag(level.covariance(k, replace(self.noise[name], offset=0.0))) for k in range(len(level.times))])
-                )  # fmt: skip
-                known = spread < KNOWN * noise
-                moved = self._moved(rows, name, mean - whole)
-                for t, rest, at, place in zip(rows[name].time, moved, level.times, level.slices, strict=True):
+                blocks = np.zeros(self.linear.rows[name].count, dtype=bool)
+                known = self._known(name, C, every) if trained else blocks
+                for k, (t, rest) in enumerate(zip(rows[name].time, self._moved(rows, name, mean - whole), strict=True)):
                     inside = ~_outside(t, block, 0.0)
-                    near = known[place][np.clip(np.searchsorted(at - at[0], t), 0, len(at) - 1)]
-                    asked[name] += int(inside.sum())
-                    squares[name].append(rest[inside & near] ** 2)
-        found: dict[str, float | None] = {}
-        for name, parts in squares.items():
-            seen = np.concatenate(parts) if parts else np.empty(0)
-            enough = seen.size >= FEWEST * max(asked[name], 1)
-            found[name] = float(np.sqrt(np.mean(seen))) if enough and seen.size else None
-        return found
+                    parts[name].append((rest[inside], self._near(name, k, t, known)[inside]))
+        return {name: Unseen.of(own) for name, own in parts.items()}
 
 
 def _outside(time: Array, block: int, gap: float) -> Mask:

@@ -6,6 +6,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 from studies.calibration.fit import CardFit
+from studies.inference.clock import clock_drifts
 from studies.inference.held_out import Kept, Model, Rows
 from studies.inference.lack_of_fit import Leftover
 from studies.inference.model import Background
@@ -46,6 +47,11 @@ class Inferred:
     def final(self) -> Hypothesis:
         """The model with the named effects."""
         return self.outcome.final
+
+    @cached_property
+    def clock_drifts(self) -> bool | None:
+        """Whether the gyro's clock drifts against a reference; None without one."""
+        return clock_drifts(self.campaign.records)
 
     @cached_property
     def background(self) -> Background:

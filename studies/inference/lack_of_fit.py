@@ -7,13 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from compensation.lines import Line
-from studies.diagnosis.campaign import fast_line
 from studies.diagnosis.constants import CONSTANTS
-from studies.diagnosis.lack_of_fit import BUMP, STEP, brief_events, generic_forms, intermittent
-from studies.diagnosis.noise import tails_of
+from studies.inference.generic_forms import BUMP, STEP, generic_forms
 from studies.inference.held_out import Rows
 from studies.inference.model import Background, Term
 from studies.inference.search import Hypothesis, Search, Shapes
+from studies.inference.sharp import brief_events, fast_line, intermittent, tails_of
 
 Array = NDArray[np.float64]
 ENOUGH = CONSTANTS["margin"] - CONSTANTS["log_prior_unknown"]
@@ -38,6 +37,12 @@ class Leftover:
     def doubtful(self) -> bool:
         """Whether it is more than noise leaves, though perhaps too little to be called structure."""
         return self.evidence > CONSTANTS["margin"]
+
+
+def doubt_of(input_: str, evidence: float) -> str:
+    """Return the sentence on structure that is more than noise leaves and less than it takes to name it."""
+    needed = 2.0 * (CONSTANTS["margin"] - CONSTANTS["log_prior_unknown"])
+    return f"something may be left ({input_}): evidence {2.0 * evidence:.3g}, more than noise leaves, but structure needs {needed:g}"
 
 
 def generic_bank(search: Search) -> list[Shapes]:

@@ -7,13 +7,13 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from compensation.lines import Line
 from compensation.noise import Noise, white_rms
 from studies.calibration.estimates import SILENT
 from studies.calibration.fit import stated_noise
 from studies.calibration.ladder import noise_rms
 from studies.calibration.priors import from_standard
 from studies.diagnosis.constants import CONSTANTS
-from studies.diagnosis.lack_of_fit import doubt_of
 from studies.diagnosis.response import RESPONSES
 from studies.diagnosis.verdict import (
     NINETY,
@@ -27,10 +27,13 @@ from studies.diagnosis.verdict import (
     same_cause,
     weigh,
 )
-from studies.effects import find_effect
+from studies.effects import find_effect, library
+from studies.inference.clock import settle
 from studies.inference.inferred import Inferred
+from studies.inference.lack_of_fit import doubt_of
 from studies.inference.model import Background, Term
-from studies.inference.records import Campaign
+from studies.inference.records import REFERENCE, Campaign
+from studies.inference.sharp import longest_resolved
 from studies.inference.signatures import Signatures
 
 Array = NDArray[np.float64]
@@ -38,9 +41,12 @@ FAR = 2.0
 """Prior standard deviations beyond which a value of the card is wrong."""
 FEWEST_LAGS = 3.0
 """Time constants that the records must cover before they confirm a law whose lag is free."""
-MINUTES = 5.0
-"""Times the change within minutes up to which slow noise is usual where no card states it: a random walk of a day."""
+BRIEF, MINUTES = 300.0, 5.0
+"""Seconds, and times the change within them up to which slow noise is usual where no card states it: a random walk of a day."""
 SLOW_THAN = {True: "what the card states of its noise", False: "what noise usually makes of its changes within minutes"}
+DELAY = "law.delay_s"
+SURE_DELAY, LEAST_DELAY = 3.0, 0.5
+"""Standard deviations, and part of what is expected of it beforehand, from which on a delay is said."""
 NARROW_RANGE = 1.0
 """Kelvin below which a temperature does not vary."""
 STEP, WORTH = 0.03, 0.5
@@ -56,7 +62,14 @@ def judge(found: Inferred) -> Verdict:
     results |= skipped_results(found.campaign)
     verdict = overall([result.verdict for result in results.values()])
     named = tuple(cause for cause in doubted(causes) if cause.probability >= CONSTANTS["member"])
-    return Verdict(verdict, named, results, next_step(named, results), found.campaign.notes, calibration=tuple(shifts))
+    return Verdict(
+        verdict,
+        named,
+        results,
+        next_step(named, results, {name: left.line for name, left in found.left.items()}),
+        found.campaign.notes,
+        calibration=tuple(shifts),
+    )
 
 
 def skipped_results(campaign: Campaign) -> dict[str, ResponseResult]:
@@ -119,12 +132,14 @@ def _cause(found: Inferred, k: int) -> Cause:
         probability *= left.share  # whatever made the larger rest may have made this too
     exact = term.effect.equivalents.get(term.response, ())
     names = list(dict.fromkeys([term.effect.name, *members, *exact]))
+    for judge in (one for one in library().values() if one.judge == REFERENCE and term.response in one.sizes):
+        names = settle(names, judge.name, judge.equivalents.get(term.response, ()), found.clock_drifts)
     numbers = parameters_of(found.background, found.search.signatures, k)
     own = next(iter([columns for name, columns in term.columns.items() if name == term.response]))
     change = own @ found.background.coefficients(k)[0]
     shapes = {rival.terms[-1].effect.name: _shape_of(rival.terms[-1]) for rival in reversed(outcome.rivals[k])}
     return Cause(
-        term.effect.name,
+        names[0],
         term.response,
         probability,
         tuple(sorted(names[1:])),
@@ -200,6 +215,7 @@ def _result(found: Inferred, name: str, causes: Sequence[Cause]) -> ResponseResu
     share = (left.share if left.significant else 1.0) if terms else None
     slow = _slow(found, name)
     verdict, remark = _judge(found, name, bool(terms), mine, values, slow, share)
+    remark = "; ".join(word for word in (remark, _delayed(found, name), _turned_on(found, name, verdict)) if word)
     noise = min(value for value in (rows.rms, after if terms else before) if value is not None)
     white = white_rms(*rows.residual)
     return ResponseResult(
@@ -257,6 +273,38 @@ def _judge(
     return ("not-identifiable", doubt_of(left.input, left.evidence)) if left.doubtful else ("adequate", "")
 
 
+def _delayed(found: Inferred, name: str) -> str:
+    """Return the sentence on a delay that a polynomial law has taken: it tolerates what sensors and clocks may have."""
+    priors = found.search.linear.problem.priors
+    if DELAY not in priors.names or name != found.search.linear.responses[0]:
+        return ""
+    k = priors.names.index(DELAY)
+    mean, C = found.background.posterior
+    delay, sd = priors.values[k].sd * float(mean[k]), priors.values[k].sd * float(np.sqrt(C[k, k]))
+    if abs(delay) < max(SURE_DELAY * sd, LEAST_DELAY * priors.values[k].sd):
+        return ""
+    return (
+        f"it follows the temperature {abs(delay):.2g} s {'later' if delay > 0.0 else 'earlier'} than one lag predicts, as sensors and"
+        " clocks may; a thermometer lag or a rate effect of this size looks the same"
+    )
+
+
+def _turned_on(found: Inferred, name: str, verdict: str) -> str:
+    """Return the sentence on offsets of runs far beyond what is left within them."""
+    rows = found.rows[name].residual
+    if name != "bias_deg_per_h" or verdict != "adequate" or found.card.polynomial is None:
+        return ""
+    apart = float(np.sqrt(np.mean(np.square(_run_shifts(found, name)))))
+    within = float(np.sqrt(np.mean(np.concatenate([own - own.mean() for own in rows]) ** 2)))
+    if apart <= CONSTANTS["wander_usual"] * within:
+        return ""
+    response = RESPONSES[name]
+    return (
+        f"the runs lie {apart * response.scale:.3g} {response.shown} (rms) apart, which is treated as a turn-on offset; ageing or a jump"
+        " between runs would look the same. A saved model states it as turn-on; a card with bias_turn_on_deg_per_h distinguishes them"
+    )
+
+
 def _apart(found: Inferred, name: str) -> str:
     """Return the sentence on runs of a response without turn-on that lie farther apart than what is left within them."""
     if name == "bias_deg_per_h" or found.card.polynomial is None:
@@ -279,7 +327,9 @@ def _slow(found: Inferred, name: str) -> float:
     if found.card.polynomial is not None:  # nothing is stated: over the changes within minutes
         level = found.search.linear.rows[name]
         rest = found.background.residual(name)
-        brief = float(np.hypot(white_rms(*rows.residual), white_rms(*(rest[own] for own in level.slices))))
+        apart = max(1, round(BRIEF / level.span))
+        changes = np.concatenate([rest[own][apart:] - rest[own][:-apart] for own in level.slices])
+        brief = float(np.hypot(white_rms(*rows.residual), np.sqrt(np.mean(changes**2) / 2.0)))
         return rows.rms / max(MINUTES * brief, 1e-300)
     stated = stated_noise(found.card.noise, name) or Noise(0.0)
     slow = noise_rms(found.fit, name, replace(stated, white=0.0, offset=0.0))
@@ -294,7 +344,9 @@ def _run_shifts(found: Inferred, name: str) -> tuple[float, ...]:
     return tuple(float(value) for value in means - means.mean())
 
 
-def next_step(causes: Sequence[Cause], results: Mapping[str, ResponseResult]) -> str | None:
+def next_step(
+    causes: Sequence[Cause], results: Mapping[str, ResponseResult], lines: Mapping[str, Line | None]
+) -> str | None:
     """Return what to measure next: what would separate a set, or see again what nobody explains."""
     for cause in causes:
         if cause.equivalent:
@@ -304,7 +356,12 @@ def next_step(causes: Sequence[Cause], results: Mapping[str, ResponseResult]) ->
             return f"To distinguish {cause.effect} from {others}: {find_effect(cause.effect).isolate}.{more}"
     for name, result in results.items():
         if result.verdict == "unexplained":
-            word = RESPONSES[name].word
+            word, line = RESPONSES[name].word, lines.get(name)
+            if line is not None:
+                return (
+                    f"The {word} has a line of {line.period:.3g} s: diagnose a part of at most {longest_resolved(line.period) / 3600:.2g} h,"
+                    " where it is resolved, or record its spectrum."
+                )
             return (
                 f"The {word} has structure in {result.left_over_input} that no known effect explains: repeat a run unchanged to see"
                 " whether it recurs, then vary that input alone."

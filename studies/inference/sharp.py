@@ -1,0 +1,110 @@
+"""What is sharp in time and in no smooth form: brief events, oscillations that come and go, lines faster than the blocks."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import scipy
+
+from compensation.lines import Line, find_line
+from studies.effects.states import FloatArray
+
+RESOLVED = 2.5
+"""Blocks to a period of a line that they resolve."""
+MOST_RESOLVED = 700
+"""Blocks of a run up to which they may be finer for such a line: their noise costs their third power."""
+LEAST_LINE = 0.1
+"""Size of a line over the noise from which on it counts: without it the noise is less by 0.5 %."""
+
+
+def longest_resolved(period: float) -> float:
+    """Return the length of a record, s, whose blocks resolve a line."""
+    return MOST_RESOLVED * period / RESOLVED
+
+
+def fast_line(
+    series: Sequence[tuple[FloatArray, FloatArray]], sampling: float, step: float, noise: float
+) -> Line | None:
+    """Return the largest line that is too fast for steps of a grid, of readings or of what a model leaves of them."""
+    line = find_line(series, sampling, RESOLVED * step)
+    return line if line is not None and line.rms > LEAST_LINE * noise else None
+
+
+def intermittent(runs: Sequence[FloatArray]) -> float:
+    """Return the log evidence of oscillations that come, go or wander: noise has the same spectrum all the time.
+
+    Short periodograms of the innovations over their mean in each run are of one exponential law in noise, with about one
+    mean at all frequencies; against it a mixture of two, a small part of the cells with more power.
+    """
+    best = 0.0
+    for length in CELLS:
+        cells = []
+        for rows in runs:
+            blocks = rows[: rows.size // length * length].reshape(-1, length)
+            power = np.abs(np.fft.rfft(blocks, axis=1)[:, 1:-1]) ** 2
+            cells.append(power / max(float(power.mean()), 1e-300) if power.size else power)
+        table = np.concatenate(cells)
+        if table.shape[0] < FEWEST_CELLS:
+            continue
+        power = table / np.clip(table.mean(axis=0), 1.0 / UNEVEN, UNEVEN)
+        for part in (0.01, 0.03, 0.1):
+            for strong in (3.0, 6.0, 12.0):
+                weak = max((1.0 - part * strong) / (1.0 - part), 0.3)
+                mixed = (1 - part) / weak * np.exp(-power / weak) + part / strong * np.exp(-power / strong)
+                best = max(best, float(np.sum(np.log(mixed + 1e-300) + power)))
+    return best - 3.0
+
+
+CELLS = (8, 16, 32, 64, 128)
+"""Rows to a short periodogram."""
+FEWEST_CELLS = 6
+"""Of each length at least so many: of fewer the mean is no measure."""
+UNEVEN = 2.5
+"""Factor by which the spectrum of noise may differ from that of the kinds of wander."""
+
+
+def brief_events(rows: FloatArray, heaviest: float) -> float:
+    """Return the log evidence of brief events: a few innovations that are too large for noise of tails no heavier than Student's t.
+
+    A mixture of two normal laws about 0, by expectation and maximisation, against the likeliest of Student's laws, for the
+    tails of noise may be heavy; as many numbers more as the BIC counts.
+    """
+    square = rows**2 / max(float(np.mean(rows**2)), 1e-300)
+    best = -np.inf
+    for part in (0.02, 0.1, 0.3):
+        narrow, wide = 0.5, 4.0
+        for _ in range(40):
+            laws = [(1.0 - part) * _normal(square, narrow), part * _normal(square, wide)]
+            total = laws[0] + laws[1] + 1e-300
+            belongs = laws[1] / total
+            part = float(np.clip(belongs.mean(), 0.5 / rows.size, 0.5))
+            narrow = max(float((1.0 - belongs) @ square / max(np.sum(1.0 - belongs), 1e-9)), 1e-3)
+            wide = max(float(belongs @ square / max(belongs.sum(), 1e-9)), narrow)
+        best = max(best, float(np.sum(np.log(total))))
+    best -= max(student_log(square, freedom) for freedom in (heaviest, 2.0 * heaviest, 1e3))
+    return best - float(np.log(rows.size))
+
+
+def _normal(square: FloatArray, variance: float) -> FloatArray:
+    return np.asarray(np.exp(-0.5 * square / variance) / np.sqrt(2.0 * np.pi * variance))
+
+
+def student_log(square: FloatArray, freedom: float) -> float:
+    """Return the log likelihood of Student's law at its likeliest scale, from squares."""
+    scale = max(float(np.mean(square)), 1e-300)
+    for _ in range(30):
+        scale = float(np.mean((freedom + 1.0) * square / (freedom + square / scale)))
+    norm = (
+        scipy.special.gammaln((freedom + 1.0) / 2.0)
+        - scipy.special.gammaln(freedom / 2.0)
+        - 0.5 * np.log(np.pi * freedom * scale)
+    )
+    return float(square.size * norm - (freedom + 1.0) / 2.0 * np.log1p(square / (freedom * scale)).sum())
+
+
+def tails_of(values: FloatArray) -> float:
+    """Return the likeliest degrees of freedom of Student's law for a sample about 0."""
+    square = values[values != 0.0] ** 2
+    return max(TAILS, key=lambda freedom: student_log(square, freedom)) if square.size else TAILS[-1]
+
+
+TAILS = (3.0, 4.0, 6.0, 9.0, 15.0, 30.0, 1e3)
