@@ -5,7 +5,7 @@ import pytest
 
 from compensation.errors import CompensationError
 from compensation.ringdown.analysis import analyse_decay
-from compensation.ringdown.envelope import from_lock_in, mix_down
+from compensation.ringdown.envelope import even_rows, from_lock_in, mix_down
 from compensation.ringdown.spectrum import fit_spectrum
 from compensation.ringdown.trace import analyse_trace
 from tests.compensation.two_oscillators import Gyro, noisy
@@ -107,6 +107,12 @@ def test_times_written_with_few_digits_lose_no_samples():
     for name, true in (("frequency_Hz", f), ("decay_time_s", tau)):
         one = found.estimates[name]
         assert abs(one.value - true) < 4 * one.sd + 1e-7 * true
+
+
+def test_times_of_seven_digits_are_still_an_even_grid():
+    """Beyond 10 s they stand in steps of 10 µs, half a row at 48 kHz."""
+    time = np.arange(960_000) / 48e3
+    assert even_rows(np.round(time, 5)) == (pytest.approx(1 / 48e3, rel=1e-6), pytest.approx(np.arange(960_000)))
 
 
 def test_one_channel_tells_two_modes_but_no_axes():
