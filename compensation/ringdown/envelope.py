@@ -136,8 +136,11 @@ def even_rows(time: Real) -> "tuple[float, NDArray[np.int64]]":
     """Return the step of evenly sampled rows (s), however few digits their times are written with, and the place of each row."""
     step = float(time[-1] - time[0]) / (time.size - 1)
     whole = np.arange(time.size)
-    if np.max(np.abs(time - time[0] - step * whole)) < 0.5 * step:  # no row is lost
-        return step, whole
+    if (
+        np.max(np.abs(time - time[0] - step * whole)) < 0.5 * step
+    ):  # no row is lost: the line of all times, free of their digits
+        middle = whole - whole.mean()
+        return float(middle @ (time - time[0]) / (middle @ middle)), whole
     between = np.diff(time)
     rows = np.concatenate([[0.0], np.cumsum(np.rint(between / np.median(between)))])
     step = float((time[-1] - time[0]) / rows[-1])
