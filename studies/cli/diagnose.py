@@ -40,7 +40,7 @@ def diagnose(
     card : str
         The gyro's card. The records are compared with its simulation, calibrated within the card's uncertainties.
     save : str
-        Save the extended model as a card (TOML): the card with what was found, or without --card a polynomial law ([law]). Not saved, with exit status 2, if its calibration does not converge.
+        Save the extended model as a card (TOML): the card with what was found. Without --card it is a polynomial law ([law]) beside which the records are diagnosed anew, so that causes may differ from those without --save. Not saved, with exit status 2, if its calibration does not converge.
     plan : list[str]
         Chamber profiles of a planned campaign, as text or as files, one for each run: predict which effects the campaign can
         identify with the gyro of --card, and how small they may be. Further profiles may follow without --plan.
@@ -102,7 +102,8 @@ def _campaign(runs: tuple[str, ...], card: str | None, limits: Chamber | None, s
 
     instrument, records = None if card is None else load_card(card), workbench.open_records(runs)
     with Told("diagnosis") as told:
-        found = workbench.diagnose_records(records, instrument, limits, told)
+        ask = workbench.diagnose_records if save is None else workbench.infer_records
+        found = ask(records, instrument, limits, told)
         extended = extend(found, told) if save is not None and isinstance(found, Inference) else None
     refused = extended is not None and not extended.fit.converged
     if refused:

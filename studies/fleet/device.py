@@ -102,12 +102,12 @@ def diagnose_device(
     InputError, ThermalError, ShellError
         Records or a card that cannot be used.
     """
-    from studies.workbench import diagnose_records
+    from studies.workbench import infer_records
 
     if not device.records:
         raise InputError(f"device {device.serial}: its folder has no records (*.csv).")
     records = [read_record(path) for path in device.records]
-    found = diagnose_records(records, None if device.card is None else load_card(device.card), progress=progress)
+    found = infer_records(records, None if device.card is None else load_card(device.card), progress=progress)
     if not isinstance(found, Inferred):
         raise InputError(f"device {device.serial}: its records say too little to be judged.")
     at = USUAL + zero_Celsius if device.card is None else found.card.reference_temperature
