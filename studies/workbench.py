@@ -138,7 +138,7 @@ def diagnose_records(
     from studies.diagnosis.investigate import investigate
 
     if card is None:
-        return investigate(load_campaign(records), progress=progress, advise=chamber is not None, chamber=chamber)
+        return investigate(load_campaign(records), progress=progress, chamber=chamber)
     return infer_records(records, card, chamber, progress)
 
 

@@ -63,6 +63,7 @@ COMMANDS = {
     "scan": ["scan", "CARD", "RUN"],
     "trim": ["trim", "CARD", "--split", "0.1", "--axis", "10"],
     "twin": ["twin", "CARD", "--c", "OUT"],
+    "fleet": ["fleet", "LOT", "--out", "OUT", "--card", "CARD"],
 }
 
 
@@ -75,6 +76,9 @@ def places(tmp_path_factory):
     (folder / "study.toml").write_text(tomli_w.dumps(spec), encoding="utf-8")
     rows = "".join(f"{t},20.0,{4432 + 0.01 * math.sin(t):.4f}\n" for t in range(0, 4000, 100))
     (folder / "run.csv").write_text("time_s,housing_temperature_degC,frequency_Hz\n" + rows, encoding="utf-8")
+    for serial in ("a", "b"):
+        (folder / "lot" / serial).mkdir(parents=True)
+        (folder / "lot" / serial / "run.csv").write_text((folder / "run.csv").read_text())
     return folder
 
 
@@ -86,7 +90,7 @@ def test_a_typo_is_named_by_every_command_that_loads_the_card(places, capsys, co
     card = places / "card.toml"
     card.write_text(tomli_w.dumps(HRG | content), encoding="utf-8")
     files = {"CARD": card, "OUT": places / "out", "OUT.ply": places / "out.ply"}
-    files |= {"STUDY": places / "study.toml", "RUN": places / "run.csv"}
+    files |= {"STUDY": places / "study.toml", "RUN": places / "run.csv", "LOT": places / "lot"}
     status = main([str(files.get(word, word)) for word in COMMANDS[command]])
     told = capsys.readouterr()
     assert (status, told.out) == (2, "")

@@ -21,6 +21,8 @@ WITHOUT_REPORT = {
     "export": "computes nothing",
     "card new": "computes nothing",
     "study new": "computes nothing",
+    "design new": "computes nothing",
+    "fleet": "writes a page of each device and of the lot",
 }
 ROW = {"a": 1.23456789, "sd": 0.0234, "low": 1e-7, "high": 3.0e6, "in": {"list": [1.0, -0.0004]}, "n": 2, "name": "x"}
 

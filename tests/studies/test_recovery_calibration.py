@@ -125,11 +125,16 @@ def test_the_saved_card_predicts_the_runs_and_an_unseen_one_from_their_chambers(
     save_card(found.instrument, tmp_path / "calibrated.toml")
     saved = load_card(tmp_path / "calibrated.toml")
     for words, run in zip((*PROFILES, UNSEEN), (*records, measure(device, UNSEEN, 9)), strict=True):
+        profile = load_profile(words)
+        stated = spread_of_prediction(saved, drive_by_profile(profile, rows_of(profile, 1 / 60)))
         true, again = measure(device, words, 0, noise=False), measure(saved, words, 0, noise=False)
         usual = [measure(device, words, seed) for seed in range(20, 28)]  # one run's wander says little of the next's
         for name in ("frequency_Hz", "bias_deg_per_h", "inverse_q"):
             noise = np.sqrt(np.mean([(one[name] - true[name]) ** 2 for one in usual]))
-            assert np.sqrt(np.mean((again[name] - run[name]) ** 2)) < 2 * noise, (words, name)
+            # two runs do not tell all of the heat path that a third needs: the card says how much
+            wide = np.sqrt(np.mean(stated[name] ** 2)) if name == "frequency_Hz" else 0.0
+            assert wide < 3 * noise, (words, name)
+            assert np.sqrt(np.mean((again[name] - run[name]) ** 2)) < 2 * np.hypot(noise, wide), (words, name)
     widths = {value.name: value.sd for value in saved.uncertain}
     assert all(widths[one.parameter] == pytest.approx(one.sd, rel=1e-6) for one in found.estimates)
 
