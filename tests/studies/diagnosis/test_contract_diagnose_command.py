@@ -198,7 +198,7 @@ def test_a_plan_of_one_step_names_what_cannot_show(capsys):
     assert status == 0
     plan = json.loads(out)
     assert plan["schema"] == "hrg.plan/2"
-    assert "electrostatic-softening" in plan["invisible"]
+    assert "electrostatic-softening" in plan["not_testable"]
     (bias,) = [one for one in plan["effects"] if (one["effect"], one["response"]) == ("rate-bias", "bias_deg_per_h")]
     assert all(0.0 <= chance <= 1.0 for chance in bias["identified"].values())
 
