@@ -6,7 +6,6 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from compensation.lines import Line, find_line
 from compensation.noise import white_rms
 from compensation.spikes import find_spike_groups, find_spikes, find_step
 from shell.constants import zero_Celsius
@@ -16,6 +15,7 @@ from studies.diagnosis.response import RESPONSES
 from studies.diagnosis.steps import Steps
 from studies.effects.states import FloatArray, States, average
 from studies.errors import InputError
+from studies.inference.sharp import RESOLVED, fast_line
 from studies.record import Record, drop_repeats, place_in_time
 from studies.rest import LEAST_SPIKE
 
@@ -23,12 +23,8 @@ TEMPERATURES = ("housing_temperature_degC", "chamber_temperature_degC", "resonat
 COMMANDS = ("drive_amplitude_V", "electrode_bias_V", "quadrature_V", "pattern_angle_deg")
 MOST_BINS = 800
 FINEST = 40
-RESOLVED = 2.5
-"""Steps of the grid to a period of a fast line that it resolves."""
 MOST_RESOLVED, LONGEST_RUN = 3 * MOST_BINS, 1200
 """Bins for which a grid may be finer for such a line: of all runs, and of one, whose noise costs their third power."""
-LEAST_LINE = 0.1
-"""Size of a line over the noise from which on it counts: without it the noise is less by 0.5 %."""
 
 
 @dataclass(frozen=True)
@@ -229,14 +225,6 @@ def load_campaign(records: Sequence[Record], reference_degC: float | None = None
 def longest_resolved(period: float) -> float:
     """Return the length of a record, s, whose grid resolves a line."""
     return LONGEST_RUN * period / RESOLVED
-
-
-def fast_line(
-    series: Sequence[tuple[FloatArray, FloatArray]], sampling: float, step: float, noise: float
-) -> Line | None:
-    """Return the largest line that is too fast for steps of a grid, of readings or of what a model leaves of them."""
-    line = find_line(series, sampling, RESOLVED * step)
-    return line if line is not None and line.rms > LEAST_LINE * noise else None
 
 
 def _reading_noise(temperature: FloatArray) -> float:

@@ -15,13 +15,13 @@ from studies.diagnosis.constants import CONSTANTS
 from studies.diagnosis.held_out import Score, is_worse, score_both
 from studies.diagnosis.lack_of_fit import Leftover, left_over, look
 from studies.diagnosis.model import Fit, fit, settle
-from studies.diagnosis.noise import tails_of
 from studies.diagnosis.problem import Problem, pose
 from studies.diagnosis.response import RESPONSES, Response
 from studies.diagnosis.scan import applicable, build_bank
 from studies.diagnosis.search import Hypothesis, Place, Selection, drop, needed, search
 from studies.effects import Effect
 from studies.effects.states import FloatArray, States
+from studies.inference.sharp import tails_of
 
 MOST_TRIED = 3
 """Rivals that are asked when the winner of a place foretells nothing."""

@@ -4,26 +4,22 @@ A generic form is a family like any effect, with many columns and no physics: sm
 in history, in a drive, in time. It is weighed by the same marginal likelihood; its name is where structure is left.
 """
 
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy
 
 from compensation.lines import Line
-from studies.diagnosis.campaign import Campaign, fast_line
+from studies.diagnosis.campaign import Campaign
 from studies.diagnosis.constants import CONSTANTS
 from studies.diagnosis.held_out import residuals, rms
 from studies.diagnosis.model import Fit, fit
-from studies.diagnosis.noise import SHARES, student_log
+from studies.diagnosis.noise import SHARES
 from studies.diagnosis.scan import applicable, build_bank, scan
 from studies.diagnosis.terms import Term
-from studies.effects import Coefficient, Effect, Parameter, Span
-from studies.effects.states import FloatArray, States, lag, play
-
-TEMPERATURE_ORDERS, TIME_ORDERS = 24, 24
-STRONG = {"frequency_Hz": 1e-4, "bias_deg_per_h": 10.0, "inverse_q": 0.3}
-
+from studies.effects.states import FloatArray
+from studies.inference.generic_forms import BUMP, STEP, generic_forms
+from studies.inference.sharp import brief_events, fast_line, intermittent
 
 WANDER = "time: slow drift far beyond its white noise"
 
@@ -58,142 +54,6 @@ def doubt_of(input_: str, evidence: float) -> str:
     """Return the sentence on structure that is more than noise leaves and less than it takes to name it."""
     needed = 2.0 * (CONSTANTS["margin"] - CONSTANTS["log_prior_unknown"])
     return f"something may be left ({input_}): evidence {2.0 * evidence:.3g}, more than noise leaves, but structure needs {needed:g}"
-
-
-def _ends(states: States) -> FloatArray:
-    """Temperature over the range of the campaign, about −1 … 1."""
-    return np.asarray(states.excess / 30.0)
-
-
-def _powers(x: FloatArray, orders: int) -> FloatArray:
-    return np.stack([np.cos(k * np.arccos(np.clip(x, -1.0, 1.0))) for k in range(orders)], axis=1)
-
-
-def _generic(
-    name: str,
-    columns: Callable[[States, Sequence[float], str], FloatArray],
-    spread: Sequence[float] | FloatArray,
-    needs: tuple[str, ...] = (),
-) -> Effect:
-    return Effect(
-        name=name,
-        summary="",
-        source="",
-        isolate="",
-        coefficients=(Coefficient("size_{unit}", tuple(float(v) for v in spread)),),
-        columns=columns,
-        grid=lambda span, response: [()],
-        sizes=STRONG,
-        needs=needs,
-    )
-
-
-def generic_forms(span: Span, runs: Sequence[States]) -> list[Effect]:
-    """Return the generic forms of a campaign: of a drive, what it does where it leaves its mean, and no curve of the temperature."""
-    low, high = span.temperature_low, span.temperature_high
-
-    def place(states: States) -> FloatArray:
-        return np.asarray(np.clip((states.resonator - low) / max(high - low, 1e-9), 0.0, 1.0))
-
-    def temperature(states: States, shape: Sequence[float], response: str) -> FloatArray:
-        return np.cos(np.pi * place(states)[:, None] * np.arange(2, TEMPERATURE_ORDERS))
-
-    def rate(states: States, shape: Sequence[float], response: str) -> FloatArray:
-        fast = states.rate / max((high - low) / 3600.0, 1e-12)
-        x = 2.0 * place(states) - 1.0
-        curve = _powers(x, 4)
-        return np.concatenate(
-            [curve * fast[:, None], curve * (fast**2)[:, None], curve * np.abs(fast)[:, None]], axis=1
-        )
-
-    def history(states: States, shape: Sequence[float], response: str) -> FloatArray:
-        wide = high - low
-        loops = play(states.resonator, [wide * part for part in (0.01, 0.03, 0.1, 0.25)])
-        slow = [lag(states.resonator, states.step, span.longest_run * part) for part in (0.01, 0.04, 0.15, 0.6)]
-        return np.asarray((np.concatenate([loops, np.stack(slow, 1)], axis=1) - states.resonator[:, None]) / wide)
-
-    def time(states: States, shape: Sequence[float], response: str) -> FloatArray:
-        t = (states.time - states.time[0]) / max(float(np.ptp(states.time)), 1e-9)
-        waves = np.cos(np.pi * t[:, None] * np.arange(TIME_ORDERS))
-        out = np.zeros((t.size, len(runs) * TIME_ORDERS))
-        out[:, states.run * TIME_ORDERS : (states.run + 1) * TIME_ORDERS] = waves
-        return out
-
-    def drive(field: str) -> Callable[[States, Sequence[float], str], FloatArray]:
-        every = [own for run in runs if (own := getattr(run, field)) is not None]
-        largest = max((float(np.abs(own).max()) for own in every), default=0.0) or 1e-12
-
-        def powers(states: States) -> FloatArray:
-            values = np.asarray(getattr(states, field), dtype=float)
-            if field == "pattern_angle":
-                return np.stack([np.sin(4 * values), np.cos(4 * values)], axis=1)
-            unit = values / largest
-            return np.stack([unit, unit**2, unit**3, lag(unit, states.step, states.tau)], axis=1)
-
-        # a drive that a run lacks has no form
-        means = np.mean(np.concatenate([powers(run) for run in runs]), axis=0) if len(every) == len(runs) else 0.0
-
-        def columns(states: States, shape: Sequence[float], response: str) -> FloatArray:
-            curve = _powers(2.0 * place(states) - 1.0, 4)
-            return np.concatenate([curve * power[:, None] for power in (powers(states) - means).T], axis=1)
-
-        return columns
-
-    orders = np.arange(2, TEMPERATURE_ORDERS)
-    forms = [
-        _generic("temperature", temperature, 2.0 / orders),
-        _generic("rate and temperature", rate, [1.0] * 12),
-        _generic("history of the temperature", history, [1.0] * 8),
-        _generic("time", time, np.tile(1.0 / (1.0 + np.arange(TIME_ORDERS)), len(runs))),
-    ]
-    for field, word in (
-        ("voltage_squared", "voltage"),
-        ("amplitude_squared", "amplitude"),
-        ("quadrature", "quadrature"),
-        ("pattern_angle", "azimuth"),
-    ):
-        count = 16 if field != "pattern_angle" else 8
-        forms.append(_generic(word, drive(field), [1.0] * count, (field,)))
-    return forms
-
-
-def _step(states: States, shape: Sequence[float], response: str) -> FloatArray:
-    """One step at one moment of one run."""
-    run, moment = shape
-    return np.asarray(np.clip((states.time - moment) / states.step + 0.5, 0.0, 1.0)[:, None] * (states.run == int(run)))
-
-
-STEP = replace(
-    _generic("step", _step, [1.0]),
-    shape=(Parameter("run", 0.0, 1e4, "run", False, True), Parameter("time_s", 0.0, 1e9, "moment", False, True)),
-    grid=lambda span, response: [
-        (float(k), float(t) + span.step / 2) for k, times in enumerate(span.bins) for t in times
-    ],
-)
-
-
-def _bump(states: States, shape: Sequence[float], response: str) -> FloatArray:
-    """A bump at one temperature, what shifts it and what widens it: Hermite's functions of order 0, 1 and 2."""
-    centre, width = shape
-    z = (states.resonator - centre) / width
-    return np.asarray(np.stack([np.ones_like(z), z, z * z - 1.0], axis=1) * np.exp(-0.5 * z * z)[:, None])
-
-
-def _bumps(span: Span, response: str) -> list[tuple[float, ...]]:
-    """Centres a width apart; wider ones are curves, which the other forms have."""
-    low, high = span.temperature_low, span.temperature_high
-    widths = [(high - low) * part for part in BUMPS]
-    return [(float(centre), width) for width in widths for centre in np.arange(low, high, max(width, 1e-3))]
-
-
-BUMPS = tuple(2.0 ** (-0.5 * k) for k in range(8, 14))
-"""Widths of bumps in parts of the covered range: a sixteenth to a ninetieth."""
-BUMP = replace(
-    _generic("temperature: a bump", _bump, [1.0, 0.5, 0.5]),
-    shape=(Parameter("centre", 0.0, 1e4, "centre", False, True), Parameter("width", 0.0, 1e4, "width", True, True)),
-    grid=_bumps,
-    fine=True,
-)
 
 
 def look(plain: Fit, model: Fit) -> Leftover:
@@ -273,39 +133,6 @@ def fitful(model: Fit) -> tuple[str, float]:
     return "time: an intermittent oscillation", intermittent(innovations(model))
 
 
-def intermittent(runs: Sequence[FloatArray]) -> float:
-    """Return the log evidence of oscillations that come, go or wander: noise has the same spectrum all the time.
-
-    Short periodograms of the innovations over their mean in each run are of one exponential law in noise, with about one
-    mean at all frequencies; against it a mixture of two, a small part of the cells with more power.
-    """
-    best = 0.0
-    for length in CELLS:
-        cells = []
-        for rows in runs:
-            blocks = rows[: rows.size // length * length].reshape(-1, length)
-            power = np.abs(np.fft.rfft(blocks, axis=1)[:, 1:-1]) ** 2
-            cells.append(power / max(float(power.mean()), 1e-300) if power.size else power)
-        table = np.concatenate(cells)
-        if table.shape[0] < FEWEST_CELLS:
-            continue
-        power = table / np.clip(table.mean(axis=0), 1.0 / UNEVEN, UNEVEN)
-        for part in (0.01, 0.03, 0.1):
-            for strong in (3.0, 6.0, 12.0):
-                weak = max((1.0 - part * strong) / (1.0 - part), 0.3)
-                mixed = (1 - part) / weak * np.exp(-power / weak) + part / strong * np.exp(-power / strong)
-                best = max(best, float(np.sum(np.log(mixed + 1e-300) + power)))
-    return best - 3.0
-
-
-CELLS = (8, 16, 32, 64, 128)
-"""Rows to a short periodogram."""
-FEWEST_CELLS = 6
-"""Of each length at least so many: of fewer the mean is no measure."""
-UNEVEN = 2.5
-"""Factor by which the spectrum of noise may differ from that of the kinds of wander."""
-
-
 def innovations(model: Fit) -> list[FloatArray]:
     """Return what each row of a model's residual brings that the rows before do not foretell, in units of σ, run by run."""
     solved, problem = model.solved, model.problem
@@ -326,29 +153,3 @@ def sharp(model: Fit) -> tuple[str, float]:
     # the tails of a mean over rows are lighter than theirs
     heaviest = min(model.problem.noise.tails + 0.5 * (model.problem.noise.rows - 1.0), 1e3)
     return "time: brief events", brief_events(np.concatenate(innovations(model)), heaviest)
-
-
-def brief_events(rows: FloatArray, heaviest: float) -> float:
-    """Return the log evidence of brief events: a few innovations that are too large for noise of tails no heavier than Student's t.
-
-    A mixture of two normal laws about 0, by expectation and maximisation, against the likeliest of Student's laws, for the
-    tails of noise may be heavy; as many numbers more as the BIC counts.
-    """
-    square = rows**2 / max(float(np.mean(rows**2)), 1e-300)
-    best = -np.inf
-    for part in (0.02, 0.1, 0.3):
-        narrow, wide = 0.5, 4.0
-        for _ in range(40):
-            laws = [(1.0 - part) * _normal(square, narrow), part * _normal(square, wide)]
-            total = laws[0] + laws[1] + 1e-300
-            belongs = laws[1] / total
-            part = float(np.clip(belongs.mean(), 0.5 / rows.size, 0.5))
-            narrow = max(float((1.0 - belongs) @ square / max(np.sum(1.0 - belongs), 1e-9)), 1e-3)
-            wide = max(float(belongs @ square / max(belongs.sum(), 1e-9)), narrow)
-        best = max(best, float(np.sum(np.log(total))))
-    best -= max(student_log(square, freedom) for freedom in (heaviest, 2.0 * heaviest, 1e3))
-    return best - float(np.log(rows.size))
-
-
-def _normal(square: FloatArray, variance: float) -> FloatArray:
-    return np.asarray(np.exp(-0.5 * square / variance) / np.sqrt(2.0 * np.pi * variance))

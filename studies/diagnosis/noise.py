@@ -13,7 +13,6 @@ from threading import Lock
 from typing import NamedTuple
 
 import numpy as np
-import scipy
 
 from compensation.noise import SLOW_TIMES, Noise, gauss_markov
 from studies.diagnosis.constants import CONSTANTS
@@ -39,28 +38,6 @@ KERNELS: Mapping[str, Covariance] = {
 """Kinds of wander."""
 BRIEF = 300.0
 """What changes within so many seconds is noise of a row as much as white noise is: loops and filters have a memory."""
-
-
-def student_log(square: FloatArray, freedom: float) -> float:
-    """Return the log likelihood of Student's law at its likeliest scale, from squares."""
-    scale = max(float(np.mean(square)), 1e-300)
-    for _ in range(30):
-        scale = float(np.mean((freedom + 1.0) * square / (freedom + square / scale)))
-    norm = (
-        scipy.special.gammaln((freedom + 1.0) / 2.0)
-        - scipy.special.gammaln(freedom / 2.0)
-        - 0.5 * np.log(np.pi * freedom * scale)
-    )
-    return float(square.size * norm - (freedom + 1.0) / 2.0 * np.log1p(square / (freedom * scale)).sum())
-
-
-def tails_of(values: FloatArray) -> float:
-    """Return the likeliest degrees of freedom of Student's law for a sample about 0."""
-    square = values[values != 0.0] ** 2
-    return max(TAILS, key=lambda freedom: student_log(square, freedom)) if square.size else TAILS[-1]
-
-
-TAILS = (3.0, 4.0, 6.0, 9.0, 15.0, 30.0, 1e3)
 
 
 @dataclass(frozen=True)
