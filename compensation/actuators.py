@@ -15,8 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from compensation.errors import CompensationError
 
 Real = NDArray[np.float64]
-NEAR = 0.9
-"""Part of a limit from which a row of the record is followed sample by sample."""
+NEAR = 0.9  # part of a limit from which a row of the record is followed sample by sample
 
 
 @dataclass(frozen=True)
@@ -45,14 +44,10 @@ class Actuators:
 
     Attributes
     ----------
-    force : float
-        Of the force across the wave.
-    drive : float
-        Of the force along it, which holds the amplitude.
-    stiffness : float
-        Of the stiffness that nulls quadrature, κ = ½ Δω.
-    quadrature : "force" or "stiffness"
-        What the quadrature loop commands.
+    force : of the force across the wave.
+    drive : of the force along it, which holds the amplitude.
+    stiffness : of the stiffness that nulls quadrature, κ = ½ Δω.
+    quadrature : "force" or "stiffness", what the quadrature loop commands.
     """
 
     force: float = np.inf
@@ -100,8 +95,7 @@ class Actuators:
         return any(self.use(c[2], c[3], c[0]).worst > NEAR for c in commands)
 
 
-UNLIMITED = Actuators()
-"""Forces without limits, for quadrature too."""
+UNLIMITED = Actuators()  # forces without limits, for quadrature too
 
 
 def require_range(use: RangeUse, context: str) -> None:

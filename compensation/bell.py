@@ -20,8 +20,7 @@ from compensation.fir import smooth
 from compensation.samples import read_columns, require_regular
 
 Real = NDArray[np.float64]
-MARGIN = 0.01
-"""Part of a fitted range by which noise may lead out of it before that counts as extrapolation."""
+MARGIN = 0.01  # part of a fitted range by which noise may lead out of it before that counts as extrapolation
 
 
 @dataclass(frozen=True)
@@ -56,22 +55,14 @@ class BellChain:
 
     Attributes
     ----------
-    null : float
-        N₁ (counts).
-    scale : float
-        S₁ (rad/s per count).
-    rough_covariance : array (2, 2)
-        Covariance of null and scale.
-    bias : PolynomialCurve
-        N(T), rad/s over kelvin: eq. (34).
-    scale_over_rate : PolynomialCurve
-        Rate (rad/s) over rate (rad/s): eq. (35).
-    scale_over_temperature : PolynomialCurve
-        Factor (1) over kelvin: eq. (36).
-    taps : array
-        FIR coefficients, empty for none.
-    sampling : float
-        Step (s) that the taps were designed for.
+    null : N₁ (counts).
+    scale : S₁ (rad/s per count).
+    rough_covariance : array (2, 2), covariance of null and scale.
+    bias : N(T), rad/s over kelvin: eq. (34).
+    scale_over_rate : rate (rad/s) over rate (rad/s): eq. (35).
+    scale_over_temperature : factor (1) over kelvin: eq. (36).
+    taps : array, FIR coefficients, empty for none.
+    sampling : step (s) that the taps were designed for.
     """
 
     null: float
@@ -107,17 +98,9 @@ def apply_chain(
 
     Parameters
     ----------
-    chain : BellChain
-        The fitted steps.
-    time, output, temperature : array (N,)
-        Times (s), raw output (counts) and temperature (K).
-    extrapolate : bool
-        Allow temperatures and rates outside the fitted ranges.
-
-    Raises
-    ------
-    CompensationError
-        On values that are not finite or out of range, or a sampling that is not the filter's.
+    chain : the fitted steps.
+    time, output, temperature : array (N,), times (s), raw output (counts) and temperature (K).
+    extrapolate : allow temperatures and rates outside the fitted ranges.
     """
     t, A, T = read_columns(time=time, output=output, temperature=temperature)
     rough = chain.scale * (A - chain.null)

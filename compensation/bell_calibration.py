@@ -45,8 +45,7 @@ def fit_rough(run: BellRun) -> tuple[float, float, Real]:
 
     Returns
     -------
-    null, scale, covariance : float, float, array (2, 2)
-        Of null and scale in this order.
+    null, scale, covariance : float, array (2, 2), of null and scale in this order.
     """
     line = fit_polynomial(run.rate, run.output, 1, "rate")
     (null, slope), _ = line.about(0.0)
@@ -96,25 +95,13 @@ def fit_chain(
 
     Parameters
     ----------
-    rates : BellRun
-        Several applied rates at one temperature: eq. (35).
-    rest : BellRun
-        The gyro at rest over temperature: eq. (34).
-    turning : BellRun
-        One rate over temperature: eq. (36).
-    rough : BellRun, optional
-        A run at rest and turning for (33); `rates` when left out.
-    cutoff : float or None
-        Cut-off (Hz) of the FIR filter; None for no filter.
-    order : int
-        Its order.
-    sampling : float, optional
-        Step (s) of the output that it will filter; that of `rest` when left out.
-
-    Raises
-    ------
-    CompensationError
-        When a run does not vary what its step needs, names the step.
+    rates : several applied rates at one temperature: eq. (35).
+    rest : the gyro at rest over temperature: eq. (34).
+    turning : one rate over temperature: eq. (36).
+    rough : a run at rest and turning for (33); `rates` when left out.
+    cutoff : cut-off (Hz) of the FIR filter; None for no filter.
+    order : its order.
+    sampling : step (s) of the output that it will filter; that of `rest` when left out.
     """
     null, scale, covariance = _step("rough null and scale (33)", fit_rough, rates if rough is None else rough)
     bias = _step("bias over temperature (34)", fit_bias, rest.temperature, scale * (rest.output - null))

@@ -134,21 +134,11 @@ def prepare_run(
     ----------
     time, state, bias : array, shape (m,)
         Time (s), frequency (Hz) or temperature (°C), and zero-rate output; NaN where missing.
-    width : float
-        Length of the blocks that are averaged, s; never less than the sampling interval.
-    window : float
-        Length of the window over which the rate is taken, s.
-    causal : bool
-        The rate uses past samples only, as firmware must, and lags by window/2.
-    variable : Variable
-        FREQUENCY or TEMPERATURE.
-    memory : Memory
-        Lag and play behind which the temperature acts.
-
-    Raises
-    ------
-    CompensationError
-        Too little data, values that cannot be, a constant bias, time that does not increase, a window that is too short.
+    width : length of the blocks that are averaged, s; never less than the sampling interval.
+    window : length of the window over which the rate is taken, s.
+    causal : the rate uses past samples only, as firmware must, and lags by window/2.
+    variable : FREQUENCY or TEMPERATURE.
+    memory : lag and play behind which the temperature acts.
     """
     blocks = average_run(time, state, bias, width, variable)
     lagged = follow_lag(blocks.time, blocks.columns[variable.name], memory.lag)

@@ -74,17 +74,9 @@ def fit_bias(runs: Sequence[BiasRun], method: Method = "guarded", reference: flo
 
     Parameters
     ----------
-    runs : sequence of BiasRun
-        Every run has its own constant (turn-on bias); B₀ is their mean.
-    method : "paper" or "guarded"
-        See the head of this module.
-    reference : float, optional
-        The frequency or temperature from which changes are counted; the first of the first run unless given.
-
-    Raises
-    ------
-    CompensationError
-        Fewer rows than terms, or a frequency that does not change.
+    runs : sequence of BiasRun, every run has its own constant (turn-on bias); B₀ is their mean.
+    method : "paper" or "guarded", see the head of this module.
+    reference : the frequency or temperature from which changes are counted; the first of the first run unless given.
     """
     return _select(runs, method, reference, by_runs=len(runs) > 1)
 
@@ -96,8 +88,7 @@ def choose_memory(prepare: Callable[[Memory], Sequence[BiasRun]]) -> Memory:
 
     Parameters
     ----------
-    prepare : callable
-        Memory to runs that were prepared with it.
+    prepare : memory to runs that were prepared with it.
     """
     plain = prepare(NO_MEMORY)
     span = float(np.ptp(np.concatenate([run.state for run in plain])))
@@ -219,11 +210,6 @@ def score_path(runs: Sequence[BiasRun], selection: StepwiseSelection) -> tuple[f
     """Return the held-out standard deviation of each model on a selection's path, over that of the constant alone.
 
     Whole runs are held out, or blocks of a single one, as in `score_held_out`, but the terms stay those of the path.
-
-    Raises
-    ------
-    CompensationError
-        Nothing can be held out, or what is left carries no fit.
     """
     by_runs = len(runs) > 1
     folds = _folds(runs, by_runs)

@@ -36,15 +36,11 @@ class ClosedLoop:
 
     Attributes
     ----------
-    A : complex (2, 2), 1/s
-        Averaged dynamics in the frame of the wave.
-    pickoff, drive : complex (2, 2)
-        Channels in the frame of the wave.
+    A : complex (2, 2), 1/s, averaged dynamics in the frame of the wave.
+    pickoff, drive : complex (2, 2), channels in the frame of the wave.
     loops : Loops
-    electronics : Electronics
-        For the noise; its channels are those above.
-    turning : bool
-        The wave turns freely (whole angle): the frame follows it, there is no rate loop.
+    electronics : for the noise; its channels are those above.
+    turning : the wave turns freely (whole angle): the frame follows it, there is no rate loop.
     """
 
     A: Complex

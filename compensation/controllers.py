@@ -18,8 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from compensation.errors import CompensationError
 
 Real = NDArray[np.float64]
-CORNER = 0.25
-"""Corner of the integral part over the bandwidth: 14° of phase margin for it."""
+CORNER = 0.25  # corner of the integral part over the bandwidth: 14° of phase margin for it
 LEAST_BANDWIDTH = 1e-3
 
 

@@ -61,12 +61,9 @@ def relate_cross_damping_to_rate_when_tuned(k: float, zeta: float, g2: float = 2
 
     Parameters
     ----------
-    k : float
-        Natural frequency (rad/s).
-    zeta : float
-        Relative damping (1).
-    g2 : float
-        Coriolis coefficient (1); 2 for a cylinder.
+    k : natural frequency (rad/s).
+    zeta : relative damping (1).
+    g2 : Coriolis coefficient (1); 2 for a cylinder.
     """
     if not (0 < k < 1e12 and 0 < zeta < 1 and g2 != 0):
         raise CompensationError(
@@ -87,18 +84,12 @@ class CrossDampingModel:
 
     Attributes
     ----------
-    coefficients : array (n + 1,)
-        ζᵢ (K⁻ⁱ), constant first.
-    covariance : array (n + 1, n + 1)
-        Covariance of the coefficients.
-    calibration_temperature : float
-        Temperature (K) from which T is counted.
-    k, zeta, g2 : float
-        Natural frequency (rad/s), relative damping (1) and Coriolis coefficient (1) of eq. (9).
-    lowest, highest : float
-        Temperatures (K) between which it was fitted.
-    noise : float
-        Standard deviation (rad/s) of what the fit left.
+    coefficients : array (n + 1,), ζᵢ (K⁻ⁱ), constant first.
+    covariance : array (n + 1, n + 1), covariance of the coefficients.
+    calibration_temperature : temperature (K) from which T is counted.
+    k, zeta, g2 : natural frequency (rad/s), relative damping (1) and Coriolis coefficient (1) of eq. (9).
+    lowest, highest : temperatures (K) between which it was fitted.
+    noise : standard deviation (rad/s) of what the fit left.
     """
 
     coefficients: Real
@@ -120,15 +111,8 @@ class CrossDampingModel:
 
         Parameters
         ----------
-        time, temperature : array (N,)
-            Times (s) and temperature (K), linear in between.
-        extrapolate : bool
-            Allow temperatures outside the fitted range.
-
-        Raises
-        ------
-        CompensationError
-            On values that are not finite, times that do not increase, or temperatures outside the fitted range.
+        time, temperature : array (N,), times (s) and temperature (K), linear in between.
+        extrapolate : allow temperatures outside the fitted range.
         """
         t, T = read_columns(time=time, temperature=temperature)
         _check_range(T, self.lowest, self.highest, extrapolate)
@@ -188,19 +172,10 @@ def fit_cross_damping(
 
     Parameters
     ----------
-    runs : sequence of RestRun
-        One or more runs.
-    k, zeta, g2 : float
-        Constants of eq. (9): natural frequency (rad/s), relative damping and Coriolis coefficient (1).
-    calibration_temperature : float
-        Temperature (K) from which T is counted.
-    order : int
-        Highest power of T, 1 or more; 3 in the paper.
-
-    Raises
-    ------
-    CompensationError
-        When there is no run, the temperature is constant or takes too few values for the order, or rows are too few.
+    runs : sequence of RestRun, one or more runs.
+    k, zeta, g2 : constants of eq. (9): natural frequency (rad/s), relative damping and Coriolis coefficient (1).
+    calibration_temperature : temperature (K) from which T is counted.
+    order : highest power of T, 1 or more; 3 in the paper.
     """
     if order < 1:
         raise CompensationError(f"the polynomial of eq. (10) needs an order of 1 or more, not {order}.")

@@ -51,17 +51,10 @@ def average_blocks(time: ArrayLike, columns: Mapping[str, ArrayLike], width: flo
 
     Parameters
     ----------
-    time : array, shape (m,)
-        Strictly increasing, s; any sampling.
+    time : array (m,), strictly increasing, s; any sampling.
     columns : mapping of name to array, shape (m,)
         NaN marks a missing value; a row that lacks one column is left out of all.
-    width : float
-        Length of a block, s.
-
-    Raises
-    ------
-    CompensationError
-        Time that does not increase, lengths that disagree, a width that is not positive, or no usable row.
+    width : length of a block, s.
     """
     t = np.asarray(time, dtype=np.float64)
     arrays = {name: np.asarray(column, dtype=np.float64) for name, column in columns.items()}

@@ -81,10 +81,8 @@ def respond_to_oscillating_rate(element: SensitiveElement, frequency: ArrayLike)
 
     Parameters
     ----------
-    element : SensitiveElement
-        The oscillators.
-    frequency : array
-        Angular frequency λ of the rate (rad/s), of either sign: the response is not symmetric.
+    element : the oscillators.
+    frequency : array, angular frequency λ of the rate (rad/s), of either sign: the response is not symmetric.
     """
     e, frequency = element, np.asarray(frequency, dtype=float)
     shifted = frequency + e.omega
@@ -149,10 +147,8 @@ class ErrorMap:
 
     Attributes
     ----------
-    frequency_ratio, damping_ratio : arrays (N,), (M,)
-        δk = k₂/k₁ and δζ = ζ₂/ζ₁ (1).
-    error : array (M, N)
-        J of eq. (26) over the integral of the realistic amplitude squared (1).
+    frequency_ratio, damping_ratio : arrays (N,), (M,), δk = k₂/k₁ and δζ = ζ₂/ζ₁ (1).
+    error : array (M, N), J of eq. (26) over the integral of the realistic amplitude squared (1).
     """
 
     frequency_ratio: Real
@@ -177,14 +173,10 @@ def map_integral_error(
 
     Parameters
     ----------
-    frequency_ratio, damping_ratio : array (N,), array (M,)
-        δk and δζ (1).
-    k, zeta : float
-        Natural frequency (rad/s) and relative damping (1) of the primary, driven at its resonance.
-    rate : float
-        Height of the step (rad/s).
-    settling_times : float
-        Length of the transient in time constants.
+    frequency_ratio, damping_ratio : array (N,), array (M,), δk and δζ (1).
+    k, zeta : natural frequency (rad/s) and relative damping (1) of the primary, driven at its resonance.
+    rate : height of the step (rad/s).
+    settling_times : length of the transient in time constants.
     """
     ratios, dampings = np.array(frequency_ratio, float, ndmin=1), np.array(damping_ratio, float, ndmin=1)
     if np.any(ratios <= 0) or np.any(dampings <= 0):
@@ -211,10 +203,8 @@ def measure_rate(element: SensitiveElement, time: ArrayLike, rate: ArrayLike) ->
 
     Parameters
     ----------
-    element : SensitiveElement
-        The oscillators.
-    time, rate : array (N,)
-        Times (s) and true angular rate (rad/s), linear in between.
+    element : the oscillators.
+    time, rate : array (N,), times (s) and true angular rate (rad/s), linear in between.
     """
     read_columns(time=time, rate=rate)
     secondary = propagate_envelope(element, time, rate).secondary

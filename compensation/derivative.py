@@ -32,18 +32,10 @@ def differentiate(time: ArrayLike, values: ArrayLike, window: float, *, causal: 
 
     Parameters
     ----------
-    time, values : array, shape (m,)
-        Time (s), strictly increasing, and the variable.
-    window : float
-        Length of the window, s.
-    causal : bool
-        The window ends at the present sample, as firmware has it, and the lag is window/2; else it is centred
-        and the lag is zero.
-
-    Raises
-    ------
-    CompensationError
-        A window too short for three samples, or values that are not finite.
+    time, values : array (m,), time (s), strictly increasing, and the variable.
+    window : length of the window, s.
+    causal : the window ends at the present sample, as firmware has it, and the lag is window/2; else it is centred and
+        the lag is zero.
     """
     t, x = np.asarray(time, dtype=np.float64), np.asarray(values, dtype=np.float64)
     check_time(t)

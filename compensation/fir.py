@@ -13,17 +13,9 @@ def design_smoother(sampling: float, cutoff: float, order: int = 50) -> Real:
 
     Parameters
     ----------
-    sampling : float
-        Step (s) of the output; 0.1 s in the paper.
-    cutoff : float
-        Nominal cut-off (Hz): half the amplitude there, as long as it is above about two over the filter's length.
-    order : int
-        Number of taps less one; 50 in the paper.
-
-    Raises
-    ------
-    CompensationError
-        When the cut-off is not below half the sampling rate, as with the paper's 200 Hz at 10 Hz output.
+    sampling : step (s) of the output; 0.1 s in the paper.
+    cutoff : nominal cut-off (Hz): half the amplitude there, as long as it is above about two over the filter's length.
+    order : number of taps less one; 50 in the paper.
     """
     from scipy.signal import firwin
 

@@ -104,11 +104,6 @@ class FrequencyFit:
 
         The root is bracketed, so it cannot leave the measured range by more than the fit's own errors
         (three residual standard deviations, or the largest residual where that is more).
-
-        Raises
-        ------
-        CompensationError
-            The curve is not monotonic, or a frequency lies outside the range of the readings.
         """
         frequency = np.asarray(frequency, dtype=np.float64)
         if not np.all(np.isfinite(frequency)):
@@ -162,16 +157,9 @@ def invert(curve: Callable[[Array], Array], span: tuple[float, float], frequency
 
     Parameters
     ----------
-    curve : callable
-        f(T).
-    span : (low, high), °C
-        The root is bracketed by it.
+    curve : f(T).
+    span : (low, high), °C, the root is bracketed by it.
     frequency : array
-
-    Raises
-    ------
-    CompensationError
-        A curve that turns round within the span, or frequencies outside it.
     """
     turn = find_turn(curve, span)
     if turn is not None:
@@ -211,20 +199,10 @@ def fit_frequency(
 
     Parameters
     ----------
-    temperature_degC, frequency : array, shape (m,)
-        Settled temperatures (°C) and the resonator's frequency there (Hz).
-    order : int
-        Highest power; the paper takes 3.
-    reference_temperature_degC : float
-        T₀, about which the coefficients are stated.
-    resolution : float, optional
-        Step of the frequency readings (Hz): rounding to it has the variance resolution²/12.
-
-    Raises
-    ------
-    CompensationError
-        Frequencies that are not positive, a constant column, values that are not finite, or too few
-        different temperatures for the order.
+    temperature_degC, frequency : array (m,), settled temperatures (°C) and the resonator's frequency there (Hz).
+    order : highest power; the paper takes 3.
+    reference_temperature_degC : T₀, about which the coefficients are stated.
+    resolution : step of the frequency readings (Hz): rounding to it has the variance resolution²/12.
     """
     T, f = np.asarray(temperature_degC, dtype=np.float64), np.asarray(frequency, dtype=np.float64)
     if resolution is not None and not (np.isfinite(resolution) and resolution > 0):

@@ -15,8 +15,7 @@ from compensation.errors import CompensationError
 
 Run = TypeVar("Run")
 Real = NDArray[np.float64]
-AVERAGING = 100.0
-"""Seconds of the averages."""
+AVERAGING = 100.0  # seconds of the averages
 
 
 @dataclass(frozen=True)
@@ -45,8 +44,7 @@ def compare_outputs(times: Sequence[Real], before: Sequence[Real], after: Sequen
 
     Parameters
     ----------
-    times, before, after : sequences of arrays, one of each per run
-        Times (s) and outputs.
+    times, before, after : sequences of arrays, one of each per run, times (s) and outputs.
     """
     means = [[_average(t, y) for t, y in zip(times, outputs, strict=True)] for outputs in (before, after)]
     return Improvement(
@@ -59,15 +57,8 @@ def hold_out(runs: Sequence[Run], compensate: Callable[[Sequence[Run], Run], Rea
 
     Parameters
     ----------
-    runs : sequence
-        Two runs or more.
-    compensate : callable
-        (Runs to fit, run to compensate) to the compensated output of the latter.
-
-    Raises
-    ------
-    CompensationError
-        With fewer than two runs: nothing would be left to fit.
+    runs : sequence, two runs or more.
+    compensate : (Runs to fit, run to compensate) to the compensated output of the latter.
     """
     if len(runs) < 2:
         raise CompensationError("a held-out improvement needs two runs or more.")

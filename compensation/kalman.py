@@ -12,8 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from compensation.errors import CompensationError
 
 Real = NDArray[np.float64]
-SETTLED = 1e-13
-"""Relative change of the covariance in one step below which it has settled."""
+SETTLED = 1e-13  # relative change of the covariance in one step below which it has settled
 _NOT_STEADY = "this model has no steady filter: a lasting state is not observed, or no process noise reaches it."
 
 
@@ -23,19 +22,10 @@ class LinearModel:
 
     Parameters
     ----------
-    transition : array (n, n)
-        F.
-    measurement : array (m, n)
-        C.
-    process_noise : array (n, n)
-        Q, covariance of w over one step.
-    measurement_noise : array (m, m)
-        R, covariance of v.
-
-    Raises
-    ------
-    CompensationError
-        When shapes disagree, Q or R is not symmetric and non-negative, or R is singular.
+    transition : array (n, n), F.
+    measurement : array (m, n), C.
+    process_noise : array (n, n), Q, covariance of w over one step.
+    measurement_noise : array (m, m), R, covariance of v.
     """
 
     transition: Real
@@ -64,14 +54,10 @@ def model_gyro(k: float, zeta: float, step: float, process_noise: ArrayLike, mea
 
     Parameters
     ----------
-    k, zeta : float
-        Natural frequency (rad/s) and relative damping (1).
-    step : float
-        Sampling step t (s); the paper does not give its own.
-    process_noise : array (2, 2)
-        Q, rad²/s² per step.
-    measurement_noise : float
-        R, rad²/s².
+    k, zeta : natural frequency (rad/s) and relative damping (1).
+    step : sampling step t (s); the paper does not give its own.
+    process_noise : array (2, 2), Q, rad²/s² per step.
+    measurement_noise : R, rad²/s².
     """
     if not (k > 0 and zeta > 0 and step > 0):
         raise CompensationError("the gyro model needs a positive natural frequency, damping and sampling step.")
@@ -138,17 +124,9 @@ def run_filter(model: LinearModel, measurements: ArrayLike, start: ArrayLike, co
 
     Parameters
     ----------
-    model : LinearModel
-        The system.
-    measurements : array (N,) or (N, m)
-        z, one row a step; the first is one step after `start`.
-    start, covariance : array (n,), array (n, n)
-        State and its covariance before the first step.
-
-    Raises
-    ------
-    CompensationError
-        When a measurement is not finite (leave a gap out by calling `predict` over it) or shapes disagree.
+    model : the system.
+    measurements : array (N,) or (N, m), z, one row a step; the first is one step after `start`.
+    start, covariance : array (n,), array (n, n), state and its covariance before the first step.
     """
     z = np.asarray(measurements, dtype=float)
     z = z[:, None] if z.ndim == 1 else z
@@ -205,11 +183,6 @@ def noise_of_estimate(model: LinearModel) -> Real:
     """Return the covariance of what the settled filter leaves of the measurement noise, the truth being still.
 
     With the settled gain K the error of the estimate obeys e⁺ = (1 − K C) F e + K v, so N = A N Aᵀ + K R Kᵀ, A = (1 − K C) F.
-
-    Raises
-    ------
-    CompensationError
-        When the filter has no settled gain.
     """
     from scipy.linalg import solve_discrete_lyapunov
 

@@ -9,8 +9,7 @@ from compensation.errors import CompensationError
 from compensation.samples import read_columns
 
 Real = NDArray[np.float64]
-PLATEAU = 1e-3
-"""Part of the largest applied rate within which two rates are the same."""
+PLATEAU = 1e-3  # part of the largest applied rate within which two rates are the same
 
 
 def same_rate(rate: ArrayLike) -> Real:
@@ -26,10 +25,8 @@ class Linearity:
 
     Attributes
     ----------
-    slope, intercept : float
-        Of the line (1, rad/s).
-    nonlinearity : float
-        Largest deviation from the line over full scale (1), full scale being the largest applied rate.
+    slope, intercept : of the line (1, rad/s).
+    nonlinearity : largest deviation from the line over full scale (1), full scale being the largest applied rate.
     """
 
     slope: float
@@ -38,13 +35,7 @@ class Linearity:
 
 
 def measure_linearity(applied: ArrayLike, measured: ArrayLike) -> Linearity:
-    """Judge measured against applied rate (rad/s) by the means of each applied rate, as the BVG paper does.
-
-    Raises
-    ------
-    CompensationError
-        With fewer than three different applied rates.
-    """
+    """Judge measured against applied rate (rad/s) by the means of each applied rate, as the BVG paper does."""
     x, y = read_columns(applied=applied, measured=measured)
     _, kind = np.unique(same_rate(x), return_inverse=True)
     rates = np.bincount(kind, x) / np.bincount(kind)

@@ -15,14 +15,11 @@ AROUND = 101
 """Frequencies about each whose median power is the level of the noise there; a series with fewer rows has no spectrum."""
 LEVEL = 24.0
 """Degrees of freedom of that median: every other frequency is independent, and a median knows (ln 2)² of what a mean would."""
-CYCLES = 8.0
-"""Periods in the longest series that make a line."""
-TALLEST = 4.0
-"""Distance from the mean, in robust standard deviations, beyond which a reading belongs to no line."""
+CYCLES = 8.0  # periods in the longest series that make a line
+TALLEST = 4.0  # distance from the mean, in robust standard deviations, beyond which a reading belongs to no line
 FAR = 200.0
 """Beyond this and three times its order a gamma law counts by its leading term: it leaves the range of numbers."""
-FASTEST = 2.5
-"""Rows to a period: what is faster may be folded, and the law of a power is another one at two rows."""
+FASTEST = 2.5  # rows to a period: what is faster may be folded, and the law of a power is another one at two rows
 
 
 @dataclass(frozen=True)
@@ -31,12 +28,9 @@ class Line:
 
     Attributes
     ----------
-    period : float
-        In s.
-    evidence : float
-        Minus the log of the probability that noise has one as strong among all that were looked at.
-    rms : float
-        Its size in the series where it is the largest.
+    period : in s.
+    evidence : minus the log of the probability that noise has one as strong among all that were looked at.
+    rms : its size in the series where it is the largest.
     """
 
     period: float

@@ -55,21 +55,12 @@ def read_rate_from_loop(
 
     Parameters
     ----------
-    resonator : BellResonator
-        Constants of the two axes.
-    omega : float
-        Carrier frequency (rad/s) of the amplitudes.
-    time : array (N,)
-        Times (s).
-    p, q : complex array (N,)
-        Amplitudes P, Q (m), as `motion.demodulate` gives them.
+    resonator : constants of the two axes.
+    omega : carrier frequency (rad/s) of the amplitudes.
+    time : array (N,), times (s).
+    p, q : complex array (N,), amplitudes P, Q (m), as `motion.demodulate` gives them.
     force : complex array (N,), optional
         Amplitude F of f_q (N): force rebalance, eq. (26). Without it the loop is open, eq. (25).
-
-    Raises
-    ------
-    CompensationError
-        When a column is not finite or the driven axis does not vibrate.
     """
     P, Q = np.asarray(p, dtype=complex), np.asarray(q, dtype=complex)
     F = np.zeros_like(P) if force is None else np.asarray(force, dtype=complex)
@@ -95,13 +86,7 @@ def read_rate_from_drive(
     ----------
     resonator, omega, time, p, q
         As for `read_rate_from_loop`.
-    force : complex array (N,)
-        Amplitude F of f_p (N).
-
-    Raises
-    ------
-    CompensationError
-        When a column is not finite or the axis q does not vibrate.
+    force : complex array (N,), amplitude F of f_p (N).
     """
     r = resonator
     if np.any(np.asarray(q) == 0):
@@ -117,11 +102,8 @@ def scale_of_rebalance(resonator: BellResonator, omega: float, amplitude: float)
 
     Parameters
     ----------
-    resonator : BellResonator
-        Constants of the two axes.
-    omega : float
-        Frequency of vibration (rad/s).
-    amplitude : float
-        Amplitude of the driven axis (m), held constant by the loop.
+    resonator : constants of the two axes.
+    omega : frequency of vibration (rad/s).
+    amplitude : amplitude of the driven axis (m), held constant by the loop.
     """
     return 1 / (4 * resonator.precession_factor * resonator.m0 * omega * amplitude)

@@ -34,12 +34,9 @@ def write_dynamics(
 
     Parameters
     ----------
-    element : SensitiveElement
-        The oscillators.
-    rate, rate_slope : array (...,)
-        Ω (rad/s) and its time derivative (rad/s²).
-    zeta12, zeta21 : array (...,)
-        Relative cross-damping (1); with both zero these are equations (1).
+    element : the oscillators.
+    rate, rate_slope : array (...,), Ω (rad/s) and its time derivative (rad/s²).
+    zeta12, zeta21 : array (...,), relative cross-damping (1); with both zero these are equations (1).
 
     Returns
     -------
@@ -125,20 +122,12 @@ def demodulate(time: ArrayLike, displacement: ArrayLike, omega: float) -> tuple[
 
     Parameters
     ----------
-    time, displacement : array (N,)
-        Even times (s), a whole number per period, and x (m).
-    omega : float
-        Carrier frequency (rad/s).
+    time, displacement : array (N,), even times (s), a whole number per period, and x (m).
+    omega : carrier frequency (rad/s).
 
     Returns
     -------
-    time, amplitude : arrays
-        Shorter than the input by one period at either end.
-
-    Raises
-    ------
-    CompensationError
-        On uneven times, or when a period is not a whole number of samples (four or more).
+    time, amplitude : arrays, shorter than the input by one period at either end.
     """
     t, x = read_columns(time=time, displacement=displacement)
     step = require_regular(t, "synchronous demodulation")

@@ -33,16 +33,11 @@ class PiezoRing:
 
     Attributes
     ----------
-    stress : float
-        Σ = σ_θθ + σ_φφ of the wall under the elements per displacement of the pattern (Pa/m), at its antinode.
-    d31 : float
-        Piezoelectric constant (C/N).
-    area : float
-        Area S of one element (m²).
-    arc : float
-        Angle that one element covers (rad); its charge is the mean over it.
-    capacitance : float
-        Feedback of the charge amplifiers (F): they give V = −F/C.
+    stress : Σ = σ_θθ + σ_φφ of the wall under the elements per displacement of the pattern (Pa/m), at its antinode.
+    d31 : piezoelectric constant (C/N).
+    area : area S of one element (m²).
+    arc : angle that one element covers (rad); its charge is the mean over it.
+    capacitance : feedback of the charge amplifiers (F): they give V = −F/C.
     harmonic : int
     """
 

@@ -96,17 +96,9 @@ def fit_polynomial(
     Parameters
     ----------
     x, y : array, shape (m,)
-    order : int
-        Highest power, 1 or more.
-    name : str
-        What errors call x.
-    least_variance : float
-        Variance that every observation has at least, such as that of its rounding.
-
-    Raises
-    ------
-    CompensationError
-        Order below 1, values not finite, x constant, or too few distinct x for the order.
+    order : highest power, 1 or more.
+    name : what errors call x.
+    least_variance : variance that every observation has at least, such as that of its rounding.
     """
     if order < 1:
         raise CompensationError(f"a polynomial fit needs an order of 1 or more, not {order}.")

@@ -18,8 +18,7 @@ import scipy
 from numpy.typing import NDArray
 
 Real = NDArray[np.float64]
-SURE = 6.0
-"""Fall of N ln(mean square) + p ln N below the line's for which another form is taken (20:1)."""
+SURE = 6.0  # fall of N ln(mean square) + p ln N below the line's for which another form is taken (20:1)
 LEAST = 6
 
 
@@ -49,8 +48,7 @@ def fit_rate_law(rate: Real, output: Real, error: Real) -> RateLaw | None:
 
     Parameters
     ----------
-    rate, output, error : array (levels,)
-        Applied rate, mean output in any unit, and the standard error of the mean.
+    rate, output, error : array (levels,), applied rate, mean output in any unit, and the standard error of the mean.
     """
     if len(rate) < LEAST or not rate.min() < 0 < rate.max():
         return None

@@ -26,8 +26,7 @@ from compensation.wave import StandingWave, turn
 
 Real = NDArray[np.float64]
 PHYSICAL = ("omega", "tau", "damping_split", "damping_axis", "frequency_split", "frequency_axis")
-LOST = 0.3
-"""Node over antinode at which a wave that its force cannot hold has left its azimuth."""
+LOST = 0.3  # node over antinode at which a wave that its force cannot hold has left its azimuth
 ALIKE = 0.01
 """Part of 1/τ, and of n k per rad/s, within which rows share one matrix; what drives the wave is exact in every row."""
 
@@ -64,17 +63,12 @@ def simulate_rebalance(
 
     Parameters
     ----------
-    wave : StandingWave
-        Its values numbers, or arrays (N,).
+    wave : its values numbers, or arrays (N,).
     electronics, loops
-    time : array (N,)
-        Even times (s), a whole number of samples apart.
-    rate : float or array (N,)
-        Rate (rad/s), linear between rows.
-    angle : float or array (N,)
-        Commanded azimuth (rad); where it changes, the loops are settled anew.
-    generator : numpy Generator, optional
-        Of the noise; without it there is none.
+    time : array (N,), even times (s), a whole number of samples apart.
+    rate : float or array (N,), rate (rad/s), linear between rows.
+    angle : float or array (N,), commanded azimuth (rad); where it changes, the loops are settled anew.
+    generator : of the noise; without it there is none.
 
     Raises
     ------
@@ -146,12 +140,9 @@ def settle_rebalance(
 
     Parameters
     ----------
-    wave : StandingWave
-        Its values numbers, or arrays (N,).
-    rate, angle : float or array (N,)
-        Rate (rad/s) and azimuth of the wave (rad).
-    turn : float or array (N,)
-        θ̇ (rad/s) at which the rate's command turns the wave, as the pick-offs show it.
+    wave : its values numbers, or arrays (N,).
+    rate, angle : float or array (N,), rate (rad/s) and azimuth of the wave (rad).
+    turn : float or array (N,), θ̇ (rad/s) at which the rate's command turns the wave, as the pick-offs show it.
 
     Returns
     -------

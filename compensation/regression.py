@@ -123,26 +123,11 @@ def fit_linear(
 
     Parameters
     ----------
-    X : array, shape (m, k)
-        One column per variable.
-    y : array, shape (m,)
-        Observations.
-    names : sequence of k names
-        Names of the columns; errors speak of them.
-    constant : bool
-        Fit b₀ too; it comes first in the result under the name "constant".
-    least_variance : float
-        Variance that every observation has at least, such as that of its rounding.
-
-    Returns
-    -------
-    LinearFit
-
-    Raises
-    ------
-    CompensationError
-        Values that are not finite, shapes that disagree, fewer than p + 1 rows, a column that is constant or
-        a combination of others.
+    X : array (m, k), one column per variable.
+    y : array (m,), observations.
+    names : sequence of k names, names of the columns; errors speak of them.
+    constant : fit b₀ too; it comes first in the result under the name "constant".
+    least_variance : variance that every observation has at least, such as that of its rounding.
     """
     X, y = _check(X, y, names)
     m, k = X.shape

@@ -5,18 +5,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from compensation.errors import CompensationError
 
-REGULAR = 1e-3
-"""Largest departure from an even grid, as a part of the mean step, that still counts as even sampling."""
+REGULAR = 1e-3  # largest departure from an even grid, as a part of the mean step, that still counts as even sampling
 
 
 def read_columns(**columns: ArrayLike) -> list[NDArray[np.float64]]:
-    """Return the named columns as arrays of floats, all finite and of one length.
-
-    Raises
-    ------
-    CompensationError
-        When a column is not one-dimensional, differs in length from the first, or has a value that is not finite.
-    """
+    """Return the named columns as arrays of floats, all finite and of one length."""
     arrays = [np.asarray(values, dtype=float) for values in columns.values()]
     for name, values in zip(columns, arrays, strict=True):
         if values.ndim != 1 or len(values) != len(arrays[0]):

@@ -17,21 +17,11 @@ class SensitiveElement:
 
     Parameters
     ----------
-    k1, k2 : float
-        Natural frequencies of the primary and secondary motion (rad/s).
-    zeta1, zeta2 : float
-        Relative damping (1), 1/(2 Q).
-    omega : float
-        Excitation frequency (rad/s).
-    q10 : float
-        Amplitude of the excitation (m/s²).
-    d1, d2, d3, g1, g2 : float
-        Coefficients of the design (1); the defaults are those of a vibrating cylinder.
-
-    Raises
-    ------
-    CompensationError
-        When a frequency is not positive or a damping lies outside 0 < ζ < 1/√2, where no resonance exists.
+    k1, k2 : natural frequencies of the primary and secondary motion (rad/s).
+    zeta1, zeta2 : relative damping (1), 1/(2 Q).
+    omega : excitation frequency (rad/s).
+    q10 : amplitude of the excitation (m/s²).
+    d1, d2, d3, g1, g2 : coefficients of the design (1); the defaults are those of a vibrating cylinder.
     """
 
     k1: float
@@ -69,12 +59,9 @@ def tune(k: float, zeta: float, *, q10: float = 1.0) -> SensitiveElement:
 
     Parameters
     ----------
-    k : float
-        Natural frequency (rad/s).
-    zeta : float
-        Relative damping (1).
-    q10 : float
-        Amplitude of the excitation (m/s²).
+    k : natural frequency (rad/s).
+    zeta : relative damping (1).
+    q10 : amplitude of the excitation (m/s²).
     """
     if not 0 < zeta < math.sqrt(0.5):
         raise CompensationError(f"zeta = {zeta:g} must lie between 0 and 0.707.")
@@ -97,17 +84,9 @@ def translate(
 
     Parameters
     ----------
-    frame, proof_mass : float
-        m₁ of the frame and m₂ within it (kg).
-    k, zeta : (float, float)
-        Natural frequencies (rad/s) and relative damping (1) of the primary and secondary motion.
-    omega, q10 : float
-        Excitation frequency (rad/s) and amplitude (m/s²).
-
-    Raises
-    ------
-    CompensationError
-        A mass that is not positive (the frame may weigh nothing), or what `SensitiveElement` refuses.
+    frame, proof_mass : m₁ of the frame and m₂ within it (kg).
+    k, zeta : (float, float), natural frequencies (rad/s) and relative damping (1) of the primary and secondary motion.
+    omega, q10 : excitation frequency (rad/s) and amplitude (m/s²).
     """
     if not (frame >= 0 and proof_mass > 0):
         raise CompensationError(

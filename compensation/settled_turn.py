@@ -23,12 +23,9 @@ from compensation.wave import StandingWave
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
-TURN = 0.3
-"""Largest turn of 2 n θ (rad) in one step."""
-AZIMUTHS, HARMONICS = 16, 5
-"""Azimuths at which B, g and c are taken, and terms of e^{2 i n θ} that are kept of them."""
-TIMES = 200
-"""Times at which B is taken; it is linear between them."""
+TURN = 0.3  # largest turn of 2 n θ (rad) in one step
+AZIMUTHS, HARMONICS = 16, 5  # azimuths at which B, g and c are taken, and terms of e^{2 i n θ} that are kept of them
+TIMES = 200  # times at which B is taken; it is linear between them
 
 
 def turn_settled(
@@ -44,14 +41,11 @@ def turn_settled(
 
     Parameters
     ----------
-    wave : StandingWave
-        Its values numbers, or arrays (N,).
-    time : array (N,)
-        Increasing times (s), any sampling.
+    wave : its values numbers, or arrays (N,).
+    time : array (N,), increasing times (s), any sampling.
     rate, precession : float or array (N,)
         Rate and commanded turn of the azimuth against the shell (rad/s), linear between rows.
-    angle : float
-        True azimuth at the start (rad).
+    angle : true azimuth at the start (rad).
 
     Returns
     -------

@@ -15,13 +15,7 @@ Real = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Spectrum:
-    """An even rational spectral density S(s) = numerator(s) / denominator(s), highest power of s first.
-
-    Raises
-    ------
-    CompensationError
-        When a polynomial has an odd power of s, or S(jω) is negative somewhere.
-    """
+    """An even rational spectral density S(s) = numerator(s) / denominator(s), highest power of s first."""
 
     numerator: tuple[float, ...]
     denominator: tuple[float, ...]
@@ -84,13 +78,7 @@ def reflect(polynomial: ArrayLike) -> Real:
 
 
 def factorise(even: ArrayLike) -> Real:
-    """Return the polynomial d with d(s) d(−s) = ± even(s) and all roots to the left, found from the roots in s².
-
-    Raises
-    ------
-    CompensationError
-        When a root lies on the imaginary axis, where no stable factor exists.
-    """
+    """Return the polynomial d with d(s) d(−s) = ± even(s) and all roots to the left, found from the roots in s²."""
     p = np.trim_zeros(np.asarray(even, dtype=float), "f")
     squares = np.roots(p[::2])
     # A double root on the axis comes out of the root finder as a pair that is 1e-8 apart.
@@ -143,13 +131,7 @@ class CrossSpectrum:
     denominator: tuple[float, ...]
 
     def split_poles(self) -> tuple[Real, Real]:
-        """Return the factors of the denominator with roots to the left (with its leading factor) and to the right.
-
-        Raises
-        ------
-        CompensationError
-            When a pole lies on the imaginary axis.
-        """
+        """Return the factors of the denominator with roots to the left (with its leading factor) and to the right."""
         p = np.trim_zeros(np.asarray(self.denominator, dtype=float), "f")
         roots = np.roots(p)
         if np.any(np.abs(roots.real) <= 1e-9 * np.abs(roots)):

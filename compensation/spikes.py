@@ -9,8 +9,7 @@ REACH = 3
 NEIGHBOURS = 2 * REACH + 1
 SPIKE, ALONE = 6.0, 4.0
 FEW, LEVEL = 3, 25
-STUCK = 20
-"""Readings in a row that are alike, where those beside them mostly differ, make a sensor that is stuck."""
+STUCK = 20  # readings in a row that are alike, where those beside them mostly differ, make a sensor that is stuck
 
 
 def find_spikes(values: Array, least: float = 0.0, step: float = 0.0) -> NDArray[np.bool_]:
@@ -25,11 +24,9 @@ def find_spikes(values: Array, least: float = 0.0, step: float = 0.0) -> NDArray
 
     Parameters
     ----------
-    least : float
-        Part of the series' span, spikes left out of it, by which a spike must stand out too: a smooth column has no noise
-        to measure a spike by.
-    step : float
-        What the readings were rounded to, where the values do not show it any more: half of it is the least spread.
+    least : part of the series' span, spikes left out of it, by which a spike must stand out too: a smooth column has no
+        noise to measure a spike by.
+    step : what the readings were rounded to, where the values do not show it any more: half of it is the least spread.
     """
     marked, rows = np.zeros(len(values), dtype=bool), np.flatnonzero(np.isfinite(values))
     if len(rows) < NEIGHBOURS:

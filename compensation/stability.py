@@ -18,8 +18,7 @@ from compensation.errors import CompensationError
 from compensation.noise import FLAT, Noise
 
 Array = NDArray[np.float64]
-UNITS = (Noise(white=1.0), Noise(flicker=FLAT), Noise(walk=1.0))
-"""N, B and K of 1."""
+UNITS = (Noise(white=1.0), Noise(flicker=FLAT), Noise(walk=1.0))  # N, B and K of 1
 NoiseKind = Literal["phase", "white", "flicker", "random walk"]
 # Slope of log σ against log τ: quantisation, angle random walk, bias instability, rate random walk.
 SLOPES: dict[NoiseKind, float] = {"phase": -1.0, "white": -0.5, "flicker": 0.0, "random walk": 0.5}
@@ -87,21 +86,11 @@ def allan_deviation(
 
     Parameters
     ----------
-    rate : array, shape (n,)
-        Rate or bias, each the mean over one step.
-    step : float
-        τ₀, s.
-    points_per_octave : int
-        How densely τ is chosen; the longest is a third of the record.
-    confidence : float
-        Of the band between `low` and `high`, from χ² with the equivalent degrees of freedom.
-    factors : sequence of int, optional
-        The averaging factors m themselves, where particular ones are wanted.
-
-    Raises
-    ------
-    CompensationError
-        Fewer than 9 samples, missing values, a constant record or a step that is not positive.
+    rate : array (n,), rate or bias, each the mean over one step.
+    step : τ₀, s.
+    points_per_octave : how densely τ is chosen; the longest is a third of the record.
+    confidence : of the band between `low` and `high`, from χ² with the equivalent degrees of freedom.
+    factors : sequence of int, the averaging factors m themselves, where particular ones are wanted.
     """
     y = np.asarray(rate, dtype=np.float64)
     if y.ndim != 1 or y.size < 9:
@@ -153,11 +142,6 @@ def fit_noise(allan: AllanDeviation) -> NoiseCoefficients:
 
     Least squares on σ²/σ²_fit with weights EDF/2, non-negative and reweighted until it settles. The uncertainties know
     that points of the curve share their samples, and grow with the misfit where three kinds of noise do not suffice.
-
-    Raises
-    ------
-    CompensationError
-        Fewer than five values of τ.
     """
     if allan.tau.size < 5:
         raise CompensationError(

@@ -50,22 +50,12 @@ def start_up(
 
     Parameters
     ----------
-    tau : float
-        Decay time (s).
+    tau : decay time (s).
     loops : Loops
-    headroom : float
-        Largest drive over 1/τ.
-    offset : float
-        Of the resonance from where the oscillator starts (rad/s).
-    amplitude : float
-        At the start, over the command: what noise and a kick leave.
-    seconds : float, optional
-        Length; what a full drive needs three times over, unless given.
-
-    Raises
-    ------
-    CompensationError
-        A loop is unstable, or a drive that does not reach the amplitude.
+    headroom : largest drive over 1/τ.
+    offset : of the resonance from where the oscillator starts (rad/s).
+    amplitude : at the start, over the command: what noise and a kick leave.
+    seconds : length; what a full drive needs three times over, unless given.
     """
     if not headroom > 1:
         raise CompensationError(
@@ -134,11 +124,6 @@ def fit_run_down(time: ArrayLike, amplitude: ArrayLike, confidence: float = 0.95
     """Fit a = a₀ e^{−t/τ} by least squares on ln a with weights a², the noise being that of the amplitude.
 
     Neighbouring rows are averaged so that their noise is independent; the interval is Student's.
-
-    Raises
-    ------
-    CompensationError
-        The amplitude is not positive, or does not decay.
     """
     from scipy import special
 

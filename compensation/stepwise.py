@@ -62,24 +62,14 @@ def select_stepwise(
 
     Parameters
     ----------
-    forced : array, shape (m, q)
-        Columns that are always in the model: the constant, or one per run.
-    candidates : array, shape (m, k)
-        Columns that may enter.
+    forced : array (m, q), columns that are always in the model: the constant, or one per run.
+    candidates : array (m, k), columns that may enter.
     y : array, shape (m,)
     names : sequence of k names
-    parents : mapping of name to names
-        Terms that must be in the model before this one enters, and while it stays.
-    enter, remove : float
-        Levels of the p-values.
-    shared : bool
-        The entry level is divided by the number of candidates that compete at the step, so that the chance of any
+    parents : mapping of name to names, terms that must be in the model before this one enters, and while it stays.
+    enter, remove : levels of the p-values.
+    shared : the entry level is divided by the number of candidates that compete at the step, so that the chance of any
         term entering where there is nothing is at most `enter`.
-
-    Raises
-    ------
-    CompensationError
-        Levels that could cycle, or fewer rows than all candidates together need.
     """
     if not 0 < enter <= remove < 1:
         raise CompensationError(f"levels must satisfy 0 < entry ≤ removal < 1, not {enter:g} and {remove:g}.")

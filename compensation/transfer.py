@@ -16,8 +16,7 @@ from compensation.recursion import recur
 from compensation.samples import check_time, is_regular
 
 Complex = NDArray[np.complex128]
-SAME_STEP = 1e-9
-"""Part of the usual step by which two steps may differ and still share one matrix exponential."""
+SAME_STEP = 1e-9  # part of the usual step by which two steps may differ and still share one matrix exponential
 
 
 @dataclass(frozen=True)
@@ -26,13 +25,7 @@ class TransferFunction:
 
     Parameters
     ----------
-    numerator, denominator : tuple of complex
-        Coefficients, highest power of s (1/s) first.
-
-    Raises
-    ------
-    CompensationError
-        When a coefficient is not finite or the denominator is zero.
+    numerator, denominator : tuple of complex, coefficients, highest power of s (1/s) first.
     """
 
     numerator: tuple[complex, ...]
@@ -135,22 +128,14 @@ class TransferFunction:
 
         Parameters
         ----------
-        time : array (N,)
-            Strictly increasing times (s). An even grid is fast; any other is followed step by step.
-        values : array (N,)
-            The input at these times, real or complex.
-        settled : bool
-            Start from the steady state under the first value instead of from rest.
+        time : array (N,), strictly increasing times (s). An even grid is fast; any other is followed step by step.
+        values : array (N,), the input at these times, real or complex.
+        settled : start from the steady state under the first value instead of from rest.
 
         Returns
         -------
         array (N,)
             The output, real when the input and all coefficients are.
-
-        Raises
-        ------
-        CompensationError
-            On times that do not increase, on values that are not finite, or on a numerator of too high a degree.
         """
         t, u = np.asarray(time, dtype=float), np.asarray(values)
         check_time(t)

@@ -25,14 +25,10 @@ class StandingWave:
 
     Attributes
     ----------
-    omega : float or array, rad/s
-        Mean angular frequency of the two patterns.
-    tau : float or array, s
-        Decay time of the amplitude, 2 Q/ω.
-    damping_split : float or array, 1/s
-        Δ(1/τ) = 1/τ₁ − 1/τ₂, of the axis `damping_axis` (rad) that is damped most.
-    frequency_split : float or array, rad/s
-        Δω = ω₁ − ω₂, of the axis `frequency_axis` (rad) of the higher frequency.
+    omega : rad/s, mean angular frequency of the two patterns.
+    tau : s, decay time of the amplitude, 2 Q/ω.
+    damping_split : 1/s, Δ(1/τ) = 1/τ₁ − 1/τ₂, of the axis `damping_axis` (rad) that is damped most.
+    frequency_split : rad/s, Δω = ω₁ − ω₂, of the axis `frequency_axis` (rad) of the higher frequency.
     harmonic, bryan_factor
         n and k: a rate Ω turns the wave with k Ω against the shell.
     """
@@ -153,10 +149,8 @@ def from_quality(
     Parameters
     ----------
     frequency, frequency_split : float, Hz
-    quality : float
-        Q; 1/τ = π f/Q.
-    damping_anisotropy : float
-        Δ(1/τ) over 1/τ (1).
+    quality : Q; 1/τ = π f/Q.
+    damping_anisotropy : Δ(1/τ) over 1/τ (1).
     damping_axis, frequency_axis : float, rad
     """
     if not (frequency > 0 and quality > 0):

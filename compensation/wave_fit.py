@@ -26,11 +26,9 @@ from compensation.noise_regression import fit_coloured
 from compensation.samples import read_columns, require_regular
 
 Real = NDArray[np.float64]
-LEAST_TURN = 2 * np.pi
-"""Least span of x (rad): one period of what is looked for."""
+LEAST_TURN = 2 * np.pi  # least span of x (rad): one period of what is looked for
 LEAKS = ("leak", "leak cos", "leak sin")
-LEAST_CONTRAST = 0.05
-"""Least spread of the turn rate over its largest: below it, turning both ways is missing."""
+LEAST_CONTRAST = 0.05  # least spread of the turn rate over its largest: below it, turning both ways is missing
 
 
 @dataclass(frozen=True)
@@ -75,25 +73,15 @@ def fit_whole_angle(
 
     Parameters
     ----------
-    time : array (N,)
-        Even times (s).
-    angle : array (N,)
-        Measured azimuth (rad), unwrapped.
+    time : array (N,), even times (s).
+    angle : array (N,), measured azimuth (rad), unwrapped.
     rate : array (N,)
         Indicated rate (rad/s), each the mean to the next row; what is commanded of the turn is not in it.
-    coupling : float
-        n k.
-    applied : float or array (N,)
-        Applied rate (rad/s), if known.
+    coupling : n k.
+    applied : float or array (N,), applied rate (rad/s), if known.
     decay, frequency, quadrature : arrays (N,), optional
         Drive of the amplitude (1/s), angular frequency (rad/s), quadrature control ½ Δω sin (1/s).
-    drive_gain_ratio, drive_skew : float
-        δ_d and κ_d of the drives, taken as known.
-
-    Raises
-    ------
-    CompensationError
-        Uneven rows, or a wave that turned by less than one period of 2nθ.
+    drive_gain_ratio, drive_skew : δ_d and κ_d of the drives, taken as known.
     """
     t, theta, indicated = read_columns(time=time, angle=angle, rate=rate)
     step = require_regular(t, "the fit of a whole-angle run")

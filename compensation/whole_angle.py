@@ -23,8 +23,7 @@ from compensation.rebalance import LoopRun, at_row, samples_in_row, spread_over_
 from compensation.wave import StandingWave
 
 Real = NDArray[np.float64]
-TURN = 0.1
-"""Largest turn of 2ψ (rad) in one step."""
+TURN = 0.1  # largest turn of 2ψ (rad) in one step
 Means = tuple[float, float, float, float, float]
 """Means over a step: commands of amplitude and quadrature, the quadrature left, the amplitude, its phase (rad)."""
 WITHOUT_RATE = ("amplitude", "phase", "quadrature")
@@ -45,31 +44,20 @@ def simulate_whole_angle(
 
     Parameters
     ----------
-    wave : StandingWave
-        Its values numbers, or arrays (N,).
+    wave : its values numbers, or arrays (N,).
     electronics, loops
         The rate loop is not used.
-    time : array (N,)
-        Even times (s), a whole number of samples apart.
-    rate : float or array (N,)
-        Rate (rad/s), linear between rows.
-    precession : float or array (N,)
-        Commanded turn of the azimuth against the shell (rad/s), linear between rows.
-    angle : float
-        Azimuth at the start (rad).
-    generator : numpy Generator, optional
-        Of the noise.
+    time : array (N,), even times (s), a whole number of samples apart.
+    rate : float or array (N,), rate (rad/s), linear between rows.
+    precession : float or array (N,), commanded turn of the azimuth against the shell (rad/s), linear between rows.
+    angle : azimuth at the start (rad).
+    generator : of the noise.
 
     Returns
     -------
     LoopRun
         `angle` is the measured azimuth at the row, unwrapped; `rate` the indicated rate to the next row, what is not
         commanded of the turn over k; the other values are means from the row to the next.
-
-    Raises
-    ------
-    CompensationError
-        A loop is unstable, the rows are uneven, or commanded turn and quadrature need more than the actuators give.
     """
     t = np.asarray(time, dtype=float)
     samples = samples_in_row(t, loops)

@@ -27,8 +27,7 @@ class WienerFilter:
 
     Attributes
     ----------
-    filter : TransferFunction
-        G(s).
+    filter : G(s).
     distortion, noise, joint : float
         Variance (rad²/s²) of (G W − H) Ω and of G φ, and twice their covariance; their sum is E ε² of eq. (30).
     """
@@ -59,16 +58,12 @@ def design_wiener_filter(
 
     Parameters
     ----------
-    gyro : TransferFunction
-        W(s) from rate to output, stable with real coefficients, such as eq. (25).
-    rate, noise : Spectrum
-        S_Ω of the rate (rad²/s) and S_φ of the sensor noise at the output; any even rational densities.
+    gyro : W(s) from rate to output, stable with real coefficients, such as eq. (25).
+    rate, noise : S_Ω of the rate (rad²/s) and S_φ of the sensor noise at the output; any even rational densities.
     wanted : TransferFunction
         H(s), what the filtered output is to be of the rate: 1, or a stable filter, or s for the angular acceleration.
-    weight : Spectrum, optional
-        R(s), the weight of the error over frequency; 1 unless given. A number moves nothing.
-    cross : CrossSpectrum, optional
-        S_φΩ(s) of noise and rate; 0 unless given.
+    weight : R(s), the weight of the error over frequency; 1 unless given. A number moves nothing.
+    cross : S_φΩ(s) of noise and rate; 0 unless given.
 
     Raises
     ------
@@ -119,13 +114,7 @@ def judge_filter(
     wanted: TransferFunction = UNITY,
     cross: CrossSpectrum | None = None,
 ) -> WienerFilter:
-    """Return any filter behind the gyro with its error variances: eqs. (30), (31), without weight.
-
-    Raises
-    ------
-    CompensationError
-        The coherence of rate and noise is above 1.
-    """
+    """Return any filter behind the gyro with its error variances: eqs. (30), (31), without weight."""
     require_possible(rate, noise, cross)
     n, d = np.real(candidate.numerator), np.real(candidate.denominator)
     n_w, d_w = np.real(gyro.numerator), np.real(gyro.denominator)

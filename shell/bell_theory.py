@@ -99,22 +99,14 @@ def two_pattern_model(resonator: Resonator, elastic: Elastic, pattern: Pattern) 
 
     Parameters
     ----------
-    resonator : Resonator
-        Meridian and thickness; it must start at a pole.
-    elastic : Elastic
-        E (Pa), ν and ρ (kg/m³).
-    pattern : callable
-        `rayleigh_functions`, `rayleigh_functions_without_factor` or `inextensional_functions`.
+    resonator : meridian and thickness; it must start at a pole.
+    elastic : E (Pa), ν and ρ (kg/m³).
+    pattern : `rayleigh_functions`, `rayleigh_functions_without_factor` or `inextensional_functions`.
 
     Returns
     -------
     TwoPatternModel
         The coefficients with frequency, precession factor and membrane share.
-
-    Raises
-    ------
-    ShellError
-        When the meridian does not start at a pole.
     """
     if not resonator.starts_on_axis:
         raise ShellError("the bell's theory needs a meridian that starts at the pole; close the opening.")

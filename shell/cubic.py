@@ -93,11 +93,6 @@ def solve_cubic(resonator: Resonator, crystal: Cubic, harmonic: int = 2, toleran
     crystal : its axis [001] along that of the resonator.
     harmonic : n >= 2, not a multiple of 4.
     tolerance : relative error of the frequency.
-
-    Raises
-    ------
-    ShellError
-        For other resonators and harmonics.
     """
     if harmonic < 2 or harmonic % 4 == 0:
         raise ShellError(f"in a cubic crystal pairs n >= 2 are solved that do not meet n = 0: not n = {harmonic}.")

@@ -56,11 +56,6 @@ def amplitude_shift(mode: Mode) -> AmplitudeShift:
     ----------
     mode : of a harmonic n >= 2, in the solid theory.
 
-    Raises
-    ------
-    ShellError
-        For other modes.
-
     Warns
     -----
     TheoryRangeWarning

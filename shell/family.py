@@ -111,11 +111,6 @@ class Family:
         values : (m, axes) array
         nu, E, rho : Poisson's ratio, Young's modulus (Pa), density (kg/m³): numbers or arrays (m,).
         growth : factor of all lengths, as by free thermal expansion.
-
-        Raises
-        ------
-        ShellError
-            A design lies outside the ranges of the family.
         """
         x, poisson = self._unit(values, nu)
         found = np.full((len(x), 4), np.nan)

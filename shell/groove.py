@@ -84,13 +84,7 @@ class _Grid:
 
 
 def solve_groove(pair: Pair, groove: Groove) -> GrooveSplit:
-    """The change of the split by one cut.
-
-    Raises
-    ------
-    ShellError
-        The cut goes through the wall, or does not lie on the shell.
-    """
+    """The change of the split by one cut."""
     resonator = pair.resonator
     grid = _lay_grid(resonator, groove, pair.mode.harmonic)
     nodes = _Nodes(resonator, grid)

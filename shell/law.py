@@ -71,10 +71,8 @@ def slope_parts(
     ----------
     material : Material
     temperature : array_like, K
-    by_nu, by_thickness : arrays
-        ∂ ln f/∂ν and ∂ ln f/∂ ln h there.
-    base : array_like, 1/K
-        By the stress of a base that expands otherwise.
+    by_nu, by_thickness : arrays, ∂ ln f/∂ν and ∂ ln f/∂ ln h there.
+    base : array_like, 1/K, by the stress of a base that expands otherwise.
     """
     alpha = material.value("expansion", temperature)
     return SlopeParts(
@@ -93,20 +91,14 @@ class FrequencyLaw:
 
     Attributes
     ----------
-    material : Material
-        Its laws give E, ν, ρ and the growth of lengths.
-    reference_temperature : float, K
-        Dimensions hold here.
-    lowest, highest : float, K
-        Where the law holds.
+    material : its laws give E, ν, ρ and the growth of lengths.
+    reference_temperature : K, dimensions hold here.
+    lowest, highest : K, where the law holds.
     theory, harmonic : of the shell solver; n.
     shape : ShapeFactor
-    mode : Mode
-        The mode at the reference temperature: Bryan factor, energies, shape.
-    prestress : Prestress
-        What expansion does to it through stress.
-    mount : Mount, optional
-        A base that expands otherwise than the resonator.
+    mode : the mode at the reference temperature: Bryan factor, energies, shape.
+    prestress : what expansion does to it through stress.
+    mount : a base that expands otherwise than the resonator.
     """
 
     material: Material
@@ -126,13 +118,7 @@ class FrequencyLaw:
         Parameters
         ----------
         temperature : array_like, K
-        extrapolate : bool
-            Continue a little beyond the range, as the trial states of a fit do, instead of raising.
-
-        Raises
-        ------
-        ShellError
-            A temperature outside the range of the law.
+        extrapolate : continue a little beyond the range, as the trial states of a fit do, instead of raising.
         """
         return np.asarray(np.exp(self.logarithm(temperature, extrapolate=extrapolate)))
 
@@ -237,13 +223,7 @@ class FrequencyLaw:
         )
 
     def with_material(self, material: Material) -> "FrequencyLaw":
-        """Return the law of the same resonator with another material; nothing is solved again.
-
-        Raises
-        ------
-        ShellError
-            The material's Poisson's ratio leaves the range for which the mode was solved.
-        """
+        """Return the law of the same resonator with another material; nothing is solved again."""
         nu = material.value("poisson_ratio", np.linspace(self.lowest, self.highest, 41))
         low, high = self.shape.lowest, self.shape.highest
         if not (nu.min() >= low - 1e-9 and nu.max() <= high + 1e-9):
@@ -336,21 +316,14 @@ def build_law(
 
     Parameters
     ----------
-    resonator : Resonator
-        With its dimensions at the reference temperature.
+    resonator : with its dimensions at the reference temperature.
     material : Material
     reference_temperature : float, K
-    lowest, highest : float, K
-        Wanted range; it ends where the material's does. Where both are one temperature, there is a single solve, and
-        the law does not follow changes of Poisson's ratio.
+    lowest, highest : K, wanted range; it ends where the material's does. Where both are one temperature, there is a
+        single solve, and the law does not follow changes of Poisson's ratio.
     theory : "solid", "shell" or "rayleigh".
     harmonic : n.
     mount : what the support holds on to, if it expands otherwise; for the solid theory and n >= 1.
-
-    Raises
-    ------
-    ShellError
-        The range lies outside that of the material, the material lacks a property, or a mount has nothing to act on.
     """
     if mount is not None:
         check_mount(resonator, theory, harmonic)

@@ -56,10 +56,8 @@ class Material:
 
     Attributes
     ----------
-    lowest, highest : float, K
-        Range of the law.
-    reference : float, K
-        Temperature about which the deviations of the law and their prior count.
+    lowest, highest : K, range of the law.
+    reference : K, temperature about which the deviations of the law and their prior count.
     constant : properties given at one temperature only: nobody says how they change with it.
     crystal : whose mean over all directions the elastic properties are.
     """
@@ -100,13 +98,7 @@ class Material:
         return Cubic(float(C[0, 0]), float(C[0, 1]), float(C[3, 3]), float(self.value("density", temperature)))
 
     def value(self, name: str, temperature: ArrayLike) -> NDArray[np.float64]:
-        """Return a property at temperatures in kelvin; E, G and nu are derived from the two that are stated.
-
-        Raises
-        ------
-        ShellError
-            The sources state no such property, or a temperature lies outside the law's range.
-        """
+        """Return a property at temperatures in kelvin; E, G and nu are derived from the two that are stated."""
         T = self.check(temperature)
         if name in self.properties:
             if name == "density":
@@ -175,13 +167,7 @@ class Material:
         return Prior(tuple(names[k] for k in open_ones), sd, correlation)
 
     def with_coefficients(self, values: Mapping[str, float]) -> "Material":
-        """Return the same material with coefficients of its deviation set, for example `expansion.value` in 1/K.
-
-        Raises
-        ------
-        ShellError
-            An unknown coefficient; a value that leads to an impossible property within the range.
-        """
+        """Return the same material with coefficients of its deviation set, for example `expansion.value` in 1/K."""
         changed: dict[str, list[float]] = {}
         for key, value in values.items():
             name, _, coefficient = key.partition(".")
@@ -217,10 +203,8 @@ class Material:
 
         Parameters
         ----------
-        reference : float, K
-            Temperature at which the given values hold.
-        **given : float
-            Any of `youngs_modulus`, `poisson_ratio`, `density`; what the law does not state becomes a constant.
+        reference : K, temperature at which the given values hold.
+        **given : any of `youngs_modulus`, `poisson_ratio`, `density`; what the law does not state becomes a constant.
         """
         target = dict(given)
         properties = dict(self.properties)
@@ -295,13 +279,7 @@ class Materials(Mapping[str, Mapping[str, Material]]):
 
 @lru_cache(maxsize=8)
 def read_materials(path: str | Path = _SHIPPED) -> Mapping[str, Mapping[str, Material]]:
-    """Read a table of materials: name -> law -> Material; the default law stands first. Those that ship are read when asked for.
-
-    Raises
-    ------
-    ShellError
-        The file cannot be read or a key is wrong: the message names file, key and mend.
-    """
+    """Read a table of materials: name -> law -> Material; the default law stands first. Those that ship are read when asked for."""
     try:
         content = tomllib.loads(Path(path).read_bytes().decode("utf-8-sig"))
     except OSError as error:

@@ -32,11 +32,6 @@ def hemisphere(
     pole_angle : polar angle where it starts, rad; above 0 the pole is open.
     support : "free", "clamped-pole", "clamped-rim" or "stem".
     stem : the solid stem of support "stem".
-
-    Raises
-    ------
-    ShellError
-        When the dimensions are impossible.
     """
     _require_positive(radius=radius)
     if not 0 <= pole_angle < rim_angle <= pi + 1e-12:

@@ -28,13 +28,7 @@ MeshKind = Literal["stl", "ply", "glb"]
 
 
 def build_mesh(surface: Surface, swing: float = 0.0) -> "trimesh.Trimesh":
-    """Return the watertight mesh of a surface in metres, displaced by `swing` (m, at the largest displacement).
-
-    Raises
-    ------
-    ShellError
-        The triangles do not close, or the swing is so large that the solid turns inside out.
-    """
+    """Return the watertight mesh of a surface in metres, displaced by `swing` (m, at the largest displacement)."""
     import trimesh
 
     mesh = trimesh.Trimesh(surface.points + swing * surface.displacement, surface.triangles, process=False)

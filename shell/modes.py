@@ -97,13 +97,7 @@ class Mode:
         return sample_shape(self.resonator, solution, points)
 
     def plot(self) -> "Figure":
-        """Draw the cross-section through an antinode, undeformed and at full swing to both sides (matplotlib).
-
-        Raises
-        ------
-        ShellError
-            Rayleigh's closed form has no shape.
-        """
+        """Draw the cross-section through an antinode, undeformed and at full swing to both sides (matplotlib)."""
         return draw_section(self.shape(33), self.harmonic, f"n = {self.harmonic}, {self.frequency:.3f} Hz")
 
     def __repr__(self) -> str:
@@ -159,11 +153,6 @@ def solve_modes(
     -------
     tuple[Mode, ...]
         Sorted by frequency.
-
-    Raises
-    ------
-    ShellError
-        On arguments that make no sense.
 
     Warns
     -----

@@ -37,15 +37,12 @@ class Outline:
 
     Attributes
     ----------
-    r, z : (k,) array, m
-        Points; the last is joined to the first unless both lie on the axis.
-    position : (k,) array
-        Place on the meridian, 0 ... 1.
+    r, z : (k,) array, m, points; the last is joined to the first unless both lie on the axis.
+    position : (k,) array, place on the meridian, 0 ... 1.
     displacement : (3, k) array
         Amplitudes u_r, u_θ, u_z of the mode; u_r and u_z go as cos nθ, u_θ as sin nθ. Zero without a mode.
-    energy : (2, k) array, J/m³
-        Strain-energy density, at its largest in time, for these amplitudes taken in metres: the parts that go as cos² nθ
-        and sin² nθ.
+    energy : (2, k) array, J/m³, strain-energy density, at its largest in time, for these amplitudes taken in metres:
+        the parts that go as cos² nθ and sin² nθ.
     """
 
     r: Array
@@ -80,11 +77,6 @@ def trace_outlines(resonator: Resonator, spacing: float, mode: "Mode | None" = N
     resonator : the one that the mode was solved for.
     spacing : wanted distance of the points, m; sides shorter than this still get their middle.
     mode : what to carry along the outline; the amplitudes are scaled so that the largest displacement is 1.
-
-    Raises
-    ------
-    ShellError
-        The mode has no shape (Rayleigh's closed form) or belongs to another resonator.
     """
     if mode is not None and mode.solution is None:
         raise ShellError(f"theory '{mode.theory}' gives no shape through the thickness: use theory solid or shell.")

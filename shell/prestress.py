@@ -85,11 +85,6 @@ def expansion_shares(mode: Mode) -> Array:
     -------
     array
         At the stations of `mode.along`, in their order.
-
-    Raises
-    ------
-    ShellError
-        For other modes.
     """
     solution = solved_as_solid(mode)
     if mode.harmonic < 1:

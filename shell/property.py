@@ -29,8 +29,7 @@ PROPERTIES = {
     "conductivity": "W/(m K)",
     "heat_capacity": "J/(kg K)",
 }
-SIGNED = ("poisson_ratio", "expansion")
-"""Properties whose deviation is a difference, not a factor."""
+SIGNED = ("poisson_ratio", "expansion")  # properties whose deviation is a difference, not a factor
 STEP = 5.0  # K, of the differences that give slope and curvature of a form
 
 
@@ -65,8 +64,7 @@ FORMS: dict[str, tuple[Callable[[Array, Mapping[str, Any]], Array], tuple[str, .
 }
 
 
-LISTS = ("temperature_degC", "values")
-"""Numbers of a form that are lists."""
+LISTS = ("temperature_degC", "values")  # numbers of a form that are lists
 
 
 def coefficient_names(name: str) -> tuple[str, str, str]:
@@ -93,8 +91,7 @@ class Property:
     relative : whether the deviation is a factor.
     unsettled : standard deviations of a, b, c beyond what `uncertainty` makes of them.
     deviation : a, b, c.
-    reference : float, K
-        Temperature about which the deviation counts.
+    reference : K, temperature about which the deviation counts.
     """
 
     form: str

@@ -56,24 +56,15 @@ def rayleigh_frequency(
 
     Parameters
     ----------
-    n : int
-        Circumferential harmonic, at least 2.
-    E, nu, rho : array_like
-        Young's modulus (Pa), Poisson ratio (1), density (kg/m³).
-    h, R : array_like
-        Thickness and radius of the middle surface (m). All five broadcast together.
-    phi_1, phi_2 : float
-        Polar angles (rad) where the shell starts and ends, 0 ≤ phi_1 < phi_2 < π.
+    n : circumferential harmonic, at least 2.
+    E, nu, rho : array_like, Young's modulus (Pa), Poisson ratio (1), density (kg/m³).
+    h, R : array_like, thickness and radius of the middle surface (m). All five broadcast together.
+    phi_1, phi_2 : polar angles (rad) where the shell starts and ends, 0 ≤ phi_1 < phi_2 < π.
 
     Returns
     -------
     ndarray
         Frequency (Hz), shape of the broadcast arguments.
-
-    Raises
-    ------
-    ShellError
-        For n below 2, an impossible angle, or values outside their physical range.
     """
     E, nu, rho, h, R = (np.asarray(value, dtype=float) for value in (E, nu, rho, h, R))
     _require_physical(E, nu, rho, h, R)
@@ -90,20 +81,13 @@ def rayleigh_bryan_factor(n: int, phi_1: float = 0.0, phi_2: float = pi / 2) -> 
 
     Parameters
     ----------
-    n : int
-        Circumferential harmonic, at least 2.
-    phi_1, phi_2 : float
-        Polar angles (rad) where the shell starts and ends.
+    n : circumferential harmonic, at least 2.
+    phi_1, phi_2 : polar angles (rad) where the shell starts and ends.
 
     Returns
     -------
     float
         Bryan factor, without unit.
-
-    Raises
-    ------
-    ShellError
-        For n below 2 or an impossible angle.
     """
     shape = rayleigh_integrals(n, phi_1, phi_2)
     return shape.N / shape.J
@@ -117,22 +101,14 @@ def rayleigh_log_derivatives(n: int, nu: float, phi_1: float = 0.0, phi_2: float
 
     Parameters
     ----------
-    n : int
-        Circumferential harmonic, at least 2.
-    nu : float
-        Poisson ratio (1).
-    phi_1, phi_2 : float
-        Polar angles (rad) where the shell starts and ends.
+    n : circumferential harmonic, at least 2.
+    nu : Poisson ratio (1).
+    phi_1, phi_2 : polar angles (rad) where the shell starts and ends.
 
     Returns
     -------
     RayleighLogDerivatives
         By ln E, ν, ln ρ, ln h, ln R (no unit) and φ₂ (1/rad).
-
-    Raises
-    ------
-    ShellError
-        For n below 2, an impossible angle or Poisson ratio.
     """
     if not -1 < nu < 0.5:
         raise ShellError(f"Poisson's ratio must lie between -1 and 0.5 (exclusive), not {nu:g}.")
@@ -150,20 +126,13 @@ def rayleigh_integrals(n: int, phi_1: float = 0.0, phi_2: float = pi / 2) -> Ray
 
     Parameters
     ----------
-    n : int
-        Circumferential harmonic, at least 2.
-    phi_1, phi_2 : float
-        Polar angles (rad) where the shell starts and ends.
+    n : circumferential harmonic, at least 2.
+    phi_1, phi_2 : polar angles (rad) where the shell starts and ends.
 
     Returns
     -------
     RayleighIntegrals
         I, J and N.
-
-    Raises
-    ------
-    ShellError
-        For n below 2, angles that are not 0 ≤ phi_1 < phi_2 < π, or a cap too small for double precision.
     """
     from scipy.integrate import quad
 

@@ -20,18 +20,12 @@ class Scene:
     points, displacement : (N, 3) arrays, m
         Vertices and what is added to them at the largest swing, already exaggerated.
     triangles : (F, 3) array
-    values : (N,) array
-        What the colour shows.
-    legend : str
-        Quantity and unit of the values.
-    title : str
-        A line above the resonator; a second line stands below it as a remark.
-    nodes : (L, k) array
-        Vertex numbers along each nodal line, -1 after its end.
-    antinodes : (A,) array
-        Vertex numbers.
-    opens_up : bool
-        Whether the open end is at the larger z, from where it is then seen.
+    values : (N,) array, what the colour shows.
+    legend : quantity and unit of the values.
+    title : a line above the resonator; a second line stands below it as a remark.
+    nodes : (L, k) array, vertex numbers along each nodal line, -1 after its end.
+    antinodes : (A,) array, vertex numbers.
+    opens_up : whether the open end is at the larger z, from where it is then seen.
     axes : (A, 2, 3) array, m
         Lines across the rim: the axes of the slower mode of a split pair, then as many of the faster one.
     """

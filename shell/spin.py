@@ -51,11 +51,6 @@ def spin_shift(mode: Mode, elastic: Elastic) -> SpinShift:
     ----------
     mode : the lowest of a harmonic n >= 2 in the solid theory.
     elastic : the material it was solved with.
-
-    Raises
-    ------
-    ShellError
-        For other modes.
     """
     solution = solved_as_solid(mode)
     if mode.harmonic < 2 or mode.index:

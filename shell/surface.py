@@ -24,20 +24,14 @@ class Surface:
 
     Attributes
     ----------
-    points : (N, 3) array, m
-        Undeformed vertices; the axis of the resonator is z.
-    displacement : (N, 3) array
-        Shape of the mode, its largest displacement 1; zero without a mode.
-    energy : (N,) array, J/m³
-        Largest strain-energy density in a period per square metre of amplitude.
-    position : (N,) array
-        Place on the meridian, 0 ... 1.
-    triangles : (F, 3) array
-        Vertex numbers.
+    points : (N, 3) array, m, undeformed vertices; the axis of the resonator is z.
+    displacement : (N, 3) array, shape of the mode, its largest displacement 1; zero without a mode.
+    energy : (N,) array, J/m³, largest strain-energy density in a period per square metre of amplitude.
+    position : (N,) array, place on the meridian, 0 ... 1.
+    triangles : (F, 3) array, vertex numbers.
     grids : tuple of (k, count) arrays
         Vertex numbers of every outline, point by point (rows) and around (columns); on the axis a number repeats.
-    harmonic : int
-        n; column j lies at θ = 2 π j / count, and cos nθ = 0 falls on columns.
+    harmonic : n; column j lies at θ = 2 π j / count, and cos nθ = 0 falls on columns.
     """
 
     points: Array

@@ -40,13 +40,7 @@ class SplitWave:
 
     @classmethod
     def of(cls, harmonic: int, frequency: float, split: float, slow_axis: float, error: float) -> "SplitWave":
-        """From a split and its standard error in Hz and the azimuth of the slower mode's antinode, rad.
-
-        Raises
-        ------
-        ShellError
-            The split is smaller than twice its error: there is nothing that could be cut safely.
-        """
+        """From a split and its standard error in Hz and the azimuth of the slower mode's antinode, rad."""
         if not split > 0 or not error > 0:
             raise ShellError(
                 f"a split of {split:g} Hz with a reading error of {error:g} Hz: both must be positive (--split, --reading-error)."

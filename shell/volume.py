@@ -40,12 +40,9 @@ class Volume:
 
     Attributes
     ----------
-    nodes : (N, 3) array, m
-        Places; the axis of the resonator is z.
-    hexahedra : (H, 27 or 20) array
-        Node numbers in VTK's order: corners, edges, then faces and middle.
-    wedges : (W, 18 or 15) array
-        The same for the elements on the axis.
+    nodes : (N, 3) array, m, places; the axis of the resonator is z.
+    hexahedra : (H, 27 or 20) array, node numbers in VTK's order: corners, edges, then faces and middle.
+    wedges : (W, 18 or 15) array, the same for the elements on the axis.
     held_quadrilaterals, held_triangles : (Q, 9 or 8), (T, 6) arrays
         Faces that the support holds: corners, edges, middle.
     """
@@ -99,11 +96,6 @@ def build_volume(resonator: Resonator, layers: int = 2, around: int = 48, spacin
     layers : elements through the thickness; more where two solid parts need a multiple.
     around : elements around the axis.
     spacing : longest element along the meridian, m; a sixth of the radius unless given.
-
-    Raises
-    ------
-    ShellError
-        The numbers are out of range, or the section cannot be cut that way.
     """
     if not (1 <= layers <= 16 and 8 <= around <= 720):
         raise ShellError("a mesh has 1 to 16 elements through the thickness and 8 to 720 around.")

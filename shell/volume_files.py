@@ -25,13 +25,7 @@ ABAQUS_LINE = 16  # entries of a line at most
 
 
 def encode_volume(mesh: Volume, kind: VolumeKind) -> bytes:
-    """Return the bytes of a mesh file.
-
-    Raises
-    ------
-    ShellError
-        Complete elements (27 and 18 nodes) in an .inp file, which knows none.
-    """
+    """Return the bytes of a mesh file."""
     return {"vtu": _encode_vtu, "msh": _encode_msh, "inp": _encode_inp}[kind](mesh)
 
 

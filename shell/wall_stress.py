@@ -27,16 +27,9 @@ def find_wall_stress(mode: Mode, first: float, last: float, face: Literal["inner
 
     Parameters
     ----------
-    mode : Mode
-        A solved one, theory solid or shell.
-    first, last : float
-        Arc length over that of the shell (0 … 1); means are by area.
+    mode : a solved one, theory solid or shell.
+    first, last : arc length over that of the shell (0 … 1); means are by area.
     face : "inner" or "outer"
-
-    Raises
-    ------
-    ShellError
-        Nothing of the shell lies between the positions, or the mode has no solution.
     """
     from shell.damping.faces import shell_faces
 

@@ -15,8 +15,7 @@ def lag(time: ArrayLike, temperature: ArrayLike, time_constant: float, initial: 
     ----------
     time, temperature : arrays (N,), s and K
     time_constant : float, s
-    initial : float, K, optional
-        T_r at the first row; the first temperature when absent.
+    initial : K, T_r at the first row; the first temperature when absent.
 
     Returns
     -------

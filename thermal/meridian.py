@@ -112,18 +112,12 @@ def describe_meridian(
 
     Parameters
     ----------
-    root : str
-        Node or boundary to which the inner end of the meridian is joined.
-    volumetric_capacity : float or callable of temperature (K)
-        ρ c in J/(m³ K).
-    conductivity : float
-        k in W/(m K).
-    root_resistance : float
-        Resistance (K/W) between `root` and the inner end of the meridian.
-    exchange : float
-        Exchange area per area of the middle surface: the effective emissivities of both faces added.
-    surroundings : str
-        Node or boundary with which the faces exchange radiation.
+    root : node or boundary to which the inner end of the meridian is joined.
+    volumetric_capacity : float or callable of temperature (K), ρ c in J/(m³ K).
+    conductivity : k in W/(m K).
+    root_resistance : resistance (K/W) between `root` and the inner end of the meridian.
+    exchange : exchange area per area of the middle surface: the effective emissivities of both faces added.
+    surroundings : node or boundary with which the faces exchange radiation.
     """
     names = cell_names(cells.count)
     parts: list[Part] = [

@@ -173,14 +173,7 @@ class Network:
 
 
 def assemble(parts: Iterable[Part]) -> Network:
-    """Put nodes, boundaries, links and sources, in any order, together into a network and check it.
-
-    Raises
-    ------
-    ThermalError
-        For a name that is unknown or used twice, a capacity, conductance or exchange area that is not positive,
-        an isolated node, or nodes from which no path leads to a boundary.
-    """
+    """Put nodes, boundaries, links and sources, in any order, together into a network and check it."""
     parts = tuple(parts)
     network = Network(
         nodes=tuple(part for part in parts if isinstance(part, Node)),

@@ -33,11 +33,9 @@ class Profile:
 
     Parameters
     ----------
-    time : array (N,)
-        Seconds, not decreasing; a time given twice is a jump. The value before a jump at the start is the one at
-        which the network has settled.
-    value : array (N,)
-        Temperature in kelvin, or power in watt.
+    time : array (N,), seconds, not decreasing; a time given twice is a jump. The value before a jump at the start is
+        the one at which the network has settled.
+    value : array (N,), temperature in kelvin, or power in watt.
     """
 
     time: NDArray[np.float64]
@@ -114,13 +112,7 @@ def constant(value: float, duration: float) -> Profile:
 
 
 def parse_profile(words: str) -> Profile:
-    """Read a chamber profile from words (see the module); temperatures are °C in the words, K in the result.
-
-    Raises
-    ------
-    ThermalError
-        For an unknown or incomplete form; the message shows the form that was expected.
-    """
+    """Read a chamber profile from words (see the module); temperatures are °C in the words, K in the result."""
     sentences = [sentence.split() for sentence in re.split(r"\bthen\b", words)]
     points: Points = []
     for sentence in sentences:

@@ -41,8 +41,7 @@ def integrate(
     Parameters
     ----------
     network, boundaries, initial : as for `propagate`
-    relative_tolerance : float
-        Error of one step over the temperature (K).
+    relative_tolerance : error of one step over the temperature (K).
     """
     knots = find_corners(network, boundaries)
     jumps = np.concatenate([boundaries[b.name].jumps for b in network.boundaries])

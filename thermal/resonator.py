@@ -21,27 +21,17 @@ class HeatPath:
 
     Attributes
     ----------
-    cells : MeridianCells
-        The shell's meridian from the stem to the rim; `meridian.lump` makes them one.
-    volumetric_capacity : float or callable of temperature (K)
-        ρ c of shell and stem, J/(m³ K).
-    conductivity : float
-        k of shell and stem, W/(m K).
-    stem_radius, stem_length : float
-        m.
-    emissivity : float
-        Effective emissivity between each face of the shell and what it faces, 1/(1/ε₁ + 1/ε₂ − 1) of parallel faces;
-        decided by the metal film.
-    base_capacity, housing_capacity : float
-        J/K.
-    mount_conductance : float
-        Base to housing, W/K.
-    mount_exchange : float
-        Base to housing, exchange area in m².
-    chamber_conductance : float
-        Housing to chamber, W/K.
-    drive_power : float
-        Heat of the vibration, W, spread evenly over the shell's volume.
+    cells : the shell's meridian from the stem to the rim; `meridian.lump` makes them one.
+    volumetric_capacity : float or callable of temperature (K), ρ c of shell and stem, J/(m³ K).
+    conductivity : k of shell and stem, W/(m K).
+    stem_radius, stem_length : m.
+    emissivity : effective emissivity between each face of the shell and what it faces, 1/(1/ε₁ + 1/ε₂ − 1) of parallel
+        faces; decided by the metal film.
+    base_capacity, housing_capacity : J/K.
+    mount_conductance : base to housing, W/K.
+    mount_exchange : base to housing, exchange area in m².
+    chamber_conductance : housing to chamber, W/K.
+    drive_power : heat of the vibration, W, spread evenly over the shell's volume.
     """
 
     cells: MeridianCells

@@ -105,15 +105,8 @@ def respond(
     network, boundaries : as for `thermal.sweeping.sweep`
     time : array (M,), s
     weights : array (sums, n), of the nodes
-    departure : array (n,), K, optional
-        Of the initial state from the steady state before the profiles begin.
-    longest : float, s, optional
-        As for `run_sweeps`.
-
-    Raises
-    ------
-    ThermalError
-        As `run_sweeps`.
+    departure : array (n,), K, of the initial state from the steady state before the profiles begin.
+    longest : s, as for `run_sweeps`.
     """
     rows = np.asarray(time, dtype=float)
     first = {name: float(profile.value[0]) for name, profile in boundaries.items()}

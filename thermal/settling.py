@@ -19,8 +19,7 @@ def step_remaining(network: Network, before: float, after: float, weights: Array
 
     Parameters
     ----------
-    weights : array (nodes,)
-        Row of weights of sum one, which makes the mean.
+    weights : array (nodes,), row of weights of sum one, which makes the mean.
     time : array (N,), s after the step
     """
     time = np.asarray(time, dtype=float)
@@ -31,13 +30,7 @@ def step_remaining(network: Network, before: float, after: float, weights: Array
 
 
 def identify_conductance(remaining: Callable[[float], float], observed: float) -> float:
-    """Find the conductance (W/K) with which `remaining(conductance)`, a share of a step, is the observed one.
-
-    Raises
-    ------
-    ThermalError
-        When no conductance from 1e-6 to 1e3 W/K does it: then the rest of the network is too slow or too fast.
-    """
+    """Find the conductance (W/K) with which `remaining(conductance)`, a share of a step, is the observed one."""
 
     def excess(decade: float) -> float:
         return float(remaining(10**decade)) - observed

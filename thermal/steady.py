@@ -17,10 +17,8 @@ def find_steady_state(network: Network, boundaries: Mapping[str, float], time: f
     Parameters
     ----------
     network : Network
-    boundaries : mapping
-        Temperature (K) of every boundary.
-    time : float
-        Moment (s) at which sources that vary are read.
+    boundaries : mapping, temperature (K) of every boundary.
+    time : moment (s) at which sources that vary are read.
 
     Returns
     -------

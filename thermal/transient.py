@@ -77,12 +77,9 @@ def propagate(network: Network, boundaries: Mapping[str, Profile], initial: Arra
 
     Parameters
     ----------
-    network : Network
-        Without radiation and with constant capacities; see `thermal.network.linearise`.
-    boundaries : mapping
-        Profile (K) of every boundary; all cover the same time.
-    initial : array (nodes,), K, optional
-        Temperatures at the start; the steady state before the profiles begin when absent.
+    network : without radiation and with constant capacities; see `thermal.network.linearise`.
+    boundaries : mapping, profile (K) of every boundary; all cover the same time.
+    initial : array (nodes,), K, temperatures at the start; the steady state before the profiles begin when absent.
     """
     if not network.is_linear:
         raise ThermalError(

@@ -14,8 +14,7 @@ from sympy.simplify.fu import TR8
 
 from compensation.derivation.oscillator import Omega, k, n, omega, small_forces
 
-a, q = sp.symbols("a q", real=True)
-"""Half axes of the orbit (m): amplitude of the antinode, and quadrature."""
+a, q = sp.symbols("a q", real=True)  # half axes of the orbit (m): amplitude of the antinode, and quadrature
 psi, phi = sp.symbols("psi phi", real=True)
 """Angle of the orbit in the plane, n θ, and phase of the vibration against ωt (rad)."""
 u_a, u_phi, u_r, u_q = sp.symbols("u_a u_phi u_r u_q", real=True)

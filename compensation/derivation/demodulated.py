@@ -12,20 +12,13 @@ import sympy as sp
 from compensation.derivation.averaging import amplitude_rates, amplitudes
 from compensation.derivation.oscillator import Omega, delta_omega, delta_tau, k, n, omega, psi_omega, psi_tau, t, tau
 
-A1, A2 = sp.symbols("A_1 A_2", cls=sp.Function)
-"""Complex amplitudes of primary and secondary (m), functions of time."""
-rate = sp.Function("Omega")(t)
-"""Angular rate that varies (rad/s)."""
-k_1, k_2 = sp.symbols("k_1 k_2", positive=True)
-"""Natural frequencies of primary and secondary (rad/s)."""
-zeta_1, zeta_2 = sp.symbols("zeta_1 zeta_2", positive=True)
-"""Relative damping."""
-g_2 = sp.Symbol("g_2", real=True)
-"""Coefficient of the Coriolis force, 2 n k of a shell."""
-q_10 = sp.Symbol("q_10", real=True)
-"""Amplitude of the excitation (m/s²)."""
-s = sp.Symbol("s")
-"""Laplace's variable (1/s)."""
+A1, A2 = sp.symbols("A_1 A_2", cls=sp.Function)  # complex amplitudes of primary and secondary (m), functions of time
+rate = sp.Function("Omega")(t)  # angular rate that varies (rad/s)
+k_1, k_2 = sp.symbols("k_1 k_2", positive=True)  # natural frequencies of primary and secondary (rad/s)
+zeta_1, zeta_2 = sp.symbols("zeta_1 zeta_2", positive=True)  # relative damping
+g_2 = sp.Symbol("g_2", real=True)  # coefficient of the Coriolis force, 2 n k of a shell
+q_10 = sp.Symbol("q_10", real=True)  # amplitude of the excitation (m/s²)
+s = sp.Symbol("s")  # Laplace's variable (1/s)
 
 
 @cache

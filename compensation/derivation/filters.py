@@ -10,8 +10,7 @@ from compensation.derivation.demodulated import s
 
 k, zeta, gamma, B = sp.symbols("k zeta gamma B", positive=True)
 """Natural frequency (rad/s) and damping of both modes; noise over signal, and the band B (rad/s) of the rate."""
-g_2 = sp.Symbol("g_2", positive=True)
-"""Coefficient of the Coriolis force."""
+g_2 = sp.Symbol("g_2", positive=True)  # coefficient of the Coriolis force
 
 
 @dataclass(frozen=True)

@@ -12,20 +12,14 @@ from functools import cache
 
 import sympy as sp
 
-t = sp.Symbol("t", real=True)
-"""Time (s)."""
+t = sp.Symbol("t", real=True)  # time (s)
 omega, tau = sp.symbols("omega tau", positive=True)
 """Mean angular frequency (rad/s) and decay time of the amplitude (s)."""
-delta_tau, delta_omega = sp.symbols("Delta_tau Delta_omega", real=True)
-"""Δ(1/τ) (1/s) and Δω (rad/s)."""
-psi_tau, psi_omega = sp.symbols("psi_tau psi_omega", real=True)
-"""n times the azimuths of the two axes (rad)."""
-n, k = sp.symbols("n k", positive=True)
-"""Circumferential harmonic and Bryan factor."""
-Omega = sp.Symbol("Omega", real=True)
-"""Angular rate (rad/s)."""
-J = sp.Matrix([[0, -1], [1, 0]])
-"""The quarter turn of the plane."""
+delta_tau, delta_omega = sp.symbols("Delta_tau Delta_omega", real=True)  # Δ(1/τ) (1/s) and Δω (rad/s)
+psi_tau, psi_omega = sp.symbols("psi_tau psi_omega", real=True)  # n times the azimuths of the two axes (rad)
+n, k = sp.symbols("n k", positive=True)  # circumferential harmonic and Bryan factor
+Omega = sp.Symbol("Omega", real=True)  # angular rate (rad/s)
+J = sp.Matrix([[0, -1], [1, 0]])  # the quarter turn of the plane
 
 
 def split(axis: sp.Expr) -> sp.Matrix:

@@ -24,12 +24,9 @@ from compensation.derivation.demodulated import (
 )
 from compensation.derivation.oscillator import omega, t
 
-A_1, A_1R, A_1I = sp.symbols("A_1 A_1R A_1I")
-"""Settled amplitude of the primary (m), and its real and imaginary part."""
-lam = sp.Symbol("lambda", real=True)
-"""Angular frequency of a rate that oscillates (rad/s)."""
-k, zeta = sp.symbols("k zeta", positive=True)
-"""Natural frequency (rad/s) and damping of two equal modes."""
+A_1, A_1R, A_1I = sp.symbols("A_1 A_1R A_1I")  # settled amplitude of the primary (m), and its real and imaginary part
+lam = sp.Symbol("lambda", real=True)  # angular frequency of a rate that oscillates (rad/s)
+k, zeta = sp.symbols("k zeta", positive=True)  # natural frequency (rad/s) and damping of two equal modes
 
 
 class RealParts(NamedTuple):

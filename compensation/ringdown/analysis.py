@@ -16,8 +16,7 @@ from compensation.ringdown.window import find_end, find_jump, find_start
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
-RESOLVED = 3.0
-"""Standard deviations above zero from which a split has an axis."""
+RESOLVED = 3.0  # standard deviations above zero from which a split has an axis
 LENGTHS = ("split_Hz", "damping_split_per_s")
 ROWS = 1024
 DRAWS = 2000
@@ -44,16 +43,12 @@ class RingDown:
 
     Attributes
     ----------
-    estimates : mapping
-        `frequency_1_Hz` (the higher), `frequency_2_Hz`, `q_1`, `q_2`, `frequency_Hz`, `inverse_q`, `decay_time_s`;
-        of two channels `split_Hz`, `frequency_axis_deg`, `damping_split_per_s`, `damping_axis_deg`; where they are seen
-        `hardening_Hz`, `thickening_per_s`, at the first amplitude, and `drift_Hz_per_s`.
-    fit : DecayFit
-        The decay within `window`.
-    window : (float, float)
-        Seconds of the record that are free decay above the noise.
-    remarks : tuple of str
-        What is not as it should be, a sentence each.
+    estimates : mapping, `frequency_1_Hz` (the higher), `frequency_2_Hz`, `q_1`, `q_2`, `frequency_Hz`, `inverse_q`,
+        `decay_time_s`; of two channels `split_Hz`, `frequency_axis_deg`, `damping_split_per_s`, `damping_axis_deg`;
+        where they are seen `hardening_Hz`, `thickening_per_s`, at the first amplitude, and `drift_Hz_per_s`.
+    fit : the decay within `window`.
+    window : (float, float), seconds of the record that are free decay above the noise.
+    remarks : tuple of str, what is not as it should be, a sentence each.
     """
 
     estimates: Mapping[str, Estimate]
@@ -68,17 +63,9 @@ def analyse_decay(envelope: Envelope, *, harmonic: int = 2, confidence: float = 
 
     Parameters
     ----------
-    envelope : Envelope
-        Of the whole record.
-    harmonic : int
-        n: a pattern at the azimuth θ has the amplitudes cos nθ and sin nθ in the two channels.
-    confidence : float
-        Of the intervals.
-
-    Raises
-    ------
-    CompensationError
-        A record without a decay, or two channels that are one.
+    envelope : of the whole record.
+    harmonic : n: a pattern at the azimuth θ has the amplitudes cos nθ and sin nθ in the two channels.
+    confidence : of the intervals.
     """
     _check(envelope)
     jump = find_jump(envelope)
@@ -108,13 +95,7 @@ def _check(envelope: Envelope) -> None:
 
 
 def _after_jump(envelope: Envelope, jump: float) -> Envelope:
-    """Return what follows a jump of the phase.
-
-    Raises
-    ------
-    CompensationError
-        Where less than half of the record follows it.
-    """
+    """Return what follows a jump of the phase."""
     first, last = float(envelope.time[0]), float(envelope.time[-1])
     if jump > (first + last) / 2:
         raise CompensationError(

@@ -16,8 +16,7 @@ Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 MOST_BLOCKS = 4096
 CHUNK = 1 << 18
-WRITTEN = 0.5
-"""Part of a step by which the times of an even grid may be off for their few digits."""
+WRITTEN = 0.5  # part of a step by which the times of an even grid may be off for their few digits
 
 
 @dataclass(frozen=True)
@@ -26,18 +25,13 @@ class Envelope:
 
     Attributes
     ----------
-    time : array (rows,), s
-        Middle of each block, from the first sample of the record.
+    time : array (rows,), s, middle of each block, from the first sample of the record.
     values : array (channels, rows)
         z of each channel, in the unit of the record, by rows; NaN where a block has no samples.
-    carrier : float, Hz
-        The frequency that turns e^{2πi f t}: f_c of raw samples, the reference of a lock-in.
-    width : float, s
-        Length of a block.
-    clipped : float
-        Part of the raw samples at the ends of their range where the record is flat there; 0 of a lock-in.
-    lost : float
-        Part of the time without samples.
+    carrier : Hz, the frequency that turns e^{2πi f t}: f_c of raw samples, the reference of a lock-in.
+    width : s, length of a block.
+    clipped : part of the raw samples at the ends of their range where the record is flat there; 0 of a lock-in.
+    lost : part of the time without samples.
     """
 
     time: Real
@@ -76,12 +70,9 @@ def mix_down(time: ArrayLike, channels: ArrayLike, carrier: float | None = None)
 
     Parameters
     ----------
-    time : array (N,)
-        Seconds, evenly spaced but for lost rows.
-    channels : array (channels, N)
-        Raw samples of one or two pick-offs; NaN is a lost sample.
-    carrier : float, optional
-        Hz; the largest line where it is not given.
+    time : array (N,), seconds, evenly spaced but for lost rows.
+    channels : array (channels, N), raw samples of one or two pick-offs; NaN is a lost sample.
+    carrier : Hz; the largest line where it is not given.
     """
     t = np.asarray(time, dtype=np.float64)
     x = np.atleast_2d(np.asarray(channels, dtype=np.float64))
@@ -158,10 +149,8 @@ def from_lock_in(time: ArrayLike, amplitudes: ArrayLike, carrier: float = 0.0) -
 
     Parameters
     ----------
-    time : array (N,)
-        Seconds.
-    amplitudes : array (channels, N)
-        X + iY, or R e^{iφ}, about the reference frequency `carrier` (Hz).
+    time : array (N,), seconds.
+    amplitudes : array (channels, N), X + iY, or R e^{iφ}, about the reference frequency `carrier` (Hz).
     """
     t = np.asarray(time, dtype=np.float64)
     z = np.atleast_2d(np.asarray(amplitudes, dtype=np.complex128))

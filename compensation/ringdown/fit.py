@@ -18,8 +18,7 @@ from compensation.ringdown.model import NAMES, ONE_MODE, TWO_MODES, Decay, propa
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
-COARSE = 256
-"""Rows of the averaged envelope on which starting points are looked for."""
+COARSE = 256  # rows of the averaged envelope on which starting points are looked for
 
 
 @dataclass(frozen=True)
@@ -28,22 +27,15 @@ class DecayFit:
 
     Attributes
     ----------
-    decay, start : Decay, array (channels,)
-        Rates, and the complex amplitudes at the first row.
+    decay, start : Decay, array (channels,), rates, and the complex amplitudes at the first row.
     names : tuple of str
         The rates that were fitted; the real and imaginary parts of `start` follow them in `covariance`.
-    covariance : array
-        Cramér–Rao bound of rates and start at the noise found (times `widening`²).
-    noise : array (channels,)
-        Standard deviation of a complex row, √⟨|n|²⟩.
-    residual : array (channels, rows)
-        Data minus model.
-    cost : float
-        Σ |residual|²/noise², twice the negative logarithm of the likelihood but for a constant.
-    widening : float
-        Factor on the bound where the residual is not white.
-    summed : bool
-        Whether one channel sees the sum of the two modes.
+    covariance : array, Cramér–Rao bound of rates and start at the noise found (times `widening`²).
+    noise : array (channels,), standard deviation of a complex row, √⟨|n|²⟩.
+    residual : array (channels, rows), data minus model.
+    cost : Σ |residual|²/noise², twice the negative logarithm of the likelihood but for a constant.
+    widening : factor on the bound where the residual is not white.
+    summed : whether one channel sees the sum of the two modes.
     """
 
     envelope: Envelope
@@ -87,14 +79,10 @@ def fit_decay(
 
     Parameters
     ----------
-    envelope : Envelope
-        Of the free decay alone.
-    extra : sequence of str
-        Rates beyond the linear ones to fit: `hardening`, `thickening`, `chirp`.
-    modes : int
-        1 or 2. Two channels of an isotropic resonator are one mode too.
-    starts : sequence of Decay
-        Starting points; looked for where there is none.
+    envelope : of the free decay alone.
+    extra : sequence of str, rates beyond the linear ones to fit: `hardening`, `thickening`, `chirp`.
+    modes : 1 or 2. Two channels of an isotropic resonator are one mode too.
+    starts : sequence of Decay, starting points; looked for where there is none.
     """
     z = envelope.values
     summed = z.shape[0] == 1 and modes == 2

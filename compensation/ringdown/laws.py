@@ -22,20 +22,16 @@ from compensation.errors import CompensationError
 
 Real = NDArray[np.float64]
 Whole = NDArray[np.int64]
-PAYS = 12.0
-"""Least fall of −2 ln L, over the widening², for which time or a bend comes in, beside ln N for each value."""
+PAYS = 12.0  # least fall of −2 ln L, over the widening², for which time or a bend comes in, beside ln N for each value
 NEIGHBOURS = 32
 """Sums from which the correlation between neighbours is taken over √N of them; fewer are taken for independent."""
 DAY = 86400.0
 SESSION = 6 * 3600.0
-VISCOUS = 10.0
-"""Pa from which viscous gas is tried."""
-ROBUST = 2.0
-"""Standard deviations beyond which a row counts less."""
+VISCOUS = 10.0  # Pa from which viscous gas is tried
+ROBUST = 2.0  # standard deviations beyond which a row counts less
 UNLIKE = 2.5
 """Standard deviations of the difference from which the effect of the amplitude is another one at the beginning of the decays."""
-BEND = 20.0
-"""Span of temperature (K) from which a bend of 1/Q is tried."""
+BEND = 20.0  # span of temperature (K) from which a bend of 1/Q is tried
 
 
 @dataclass(frozen=True)
@@ -84,11 +80,6 @@ def fit_law(rows: Rows, *, loss: bool) -> Law:
 
     The first twentieth of the rows of every decay is left out where it stands out of the later rows, or where without it the
     effect of the amplitude is another one: the variance of the difference is that of the variances (Hausman 1978).
-
-    Raises
-    ------
-    CompensationError
-        Fewer readings than the law needs.
     """
     law = _fit(rows, loss)
     place = _places(rows)

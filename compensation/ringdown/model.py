@@ -24,14 +24,11 @@ class Decay:
 
     Attributes
     ----------
-    detuning, decay : float
-        δ and 1/τ.
+    detuning, decay : δ and 1/τ.
     damping_cos, damping_sin, stiffness_cos, stiffness_sin : float
         C₁, C₂ and W₁, W₂; the stiffness pair alone is used of a single channel with two modes.
-    hardening, thickening : float
-        κ and γ per squared amplitude.
-    chirp : float
-        β (rad/s²).
+    hardening, thickening : κ and γ per squared amplitude.
+    chirp : β (rad/s²).
     """
 
     detuning: float

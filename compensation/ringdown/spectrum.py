@@ -19,10 +19,8 @@ from compensation.ringdown.laws import long_run
 
 Real = NDArray[np.float64]
 PAYS = 20.0
-REACH = 1.6449
-"""Standard deviations of the ends of a 90 % interval."""
-NARROW = 3.0
-"""Points within the width below which the analyser, not the resonator, makes it."""
+REACH = 1.6449  # standard deviations of the ends of a 90 % interval
+NARROW = 3.0  # points within the width below which the analyser, not the resonator, makes it
 
 
 @dataclass(frozen=True)
@@ -42,13 +40,7 @@ class SpectrumFit:
 
 
 def fit_spectrum(frequency: ArrayLike, power: ArrayLike) -> SpectrumFit:
-    """Fit one line, or two where the second pays.
-
-    Raises
-    ------
-    CompensationError
-        Fewer than 16 points, or no line above the background.
-    """
+    """Fit one line, or two where the second pays."""
     f, y = np.asarray(frequency, dtype=np.float64), np.asarray(power, dtype=np.float64)
     keep = np.isfinite(f) & np.isfinite(y) & (y > 0)
     f, y = f[keep], y[keep]

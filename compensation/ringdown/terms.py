@@ -8,8 +8,7 @@ from compensation.ringdown.envelope import Envelope
 from compensation.ringdown.fit import DecayFit, fit_decay
 from compensation.ringdown.whiteness import Leftover, examine
 
-PAYS = 20.0
-"""Least fall of −2 ln L, over the widening², for a second mode, beside 2 ln N."""
+PAYS = 20.0  # least fall of −2 ln L, over the widening², for a second mode, beside 2 ln N
 NAMED = 10.0
 """The same for a rate beyond the linear ones: noise passes it once in 200 records, and left out it shifts what is stated by up to √10 of its errors, and more."""
 WHITE = 1.3

@@ -27,16 +27,11 @@ class TraceDecay:
 
     Attributes
     ----------
-    decay, sd : float, 1/s
-        1/τ of the amplitude, and its standard deviation with the correlation of the scatter counted.
-    low, high : float
-        90 % interval of 1/τ.
-    amplitude, noise : float
-        a at the start of the window and σ, in the unit of the record.
-    window : (float, float)
-        Seconds that were used.
-    bound : float
-        Standard deviation that the Cramér–Rao bound of uncorrelated scatter allows.
+    decay, sd : 1/s, 1/τ of the amplitude, and its standard deviation with the correlation of the scatter counted.
+    low, high : 90 % interval of 1/τ.
+    amplitude, noise : a at the start of the window and σ, in the unit of the record.
+    window : (float, float), seconds that were used.
+    bound : standard deviation that the Cramér–Rao bound of uncorrelated scatter allows.
     remarks : tuple of str
     """
 
@@ -56,15 +51,8 @@ def analyse_trace(time: ArrayLike, amplitude: ArrayLike, *, confidence: float = 
 
     Parameters
     ----------
-    time : array (N,)
-        Seconds.
-    amplitude : array (N,)
-        Positive; the root of a power.
-
-    Raises
-    ------
-    CompensationError
-        A trace that does not decay, or of fewer than 32 rows.
+    time : array (N,), seconds.
+    amplitude : array (N,), positive; the root of a power.
     """
     t, a = np.asarray(time, dtype=np.float64), np.asarray(amplitude, dtype=np.float64)
     keep = np.isfinite(t) & np.isfinite(a) & (a > 0)

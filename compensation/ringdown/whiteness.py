@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 BLOCKS = 64
-RARE = 1e-3
-"""Probability below which noise is not held for the reason."""
+RARE = 1e-3  # probability below which noise is not held for the reason
 
 
 @dataclass(frozen=True)
@@ -19,14 +18,10 @@ class Leftover:
 
     Attributes
     ----------
-    widening : float
-        √ of the largest ratio between the variance of block means and what white noise leaves of it, at least 1.
-    early : bool
-        Whether the first rows miss by more than the rest: a transient, or a drive that still acts.
-    line : float or None
-        Frequency (Hz, from the carrier) of a line in the residual, None where there is none.
-    amplitude : float
-        Of that line, in the unit of the record.
+    widening : √ of the largest ratio between the variance of block means and what white noise leaves of it, at least 1.
+    early : whether the first rows miss by more than the rest: a transient, or a drive that still acts.
+    line : frequency (Hz, from the carrier) of a line in the residual, None where there is none.
+    amplitude : of that line, in the unit of the record.
     """
 
     widening: float

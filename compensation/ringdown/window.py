@@ -5,13 +5,11 @@ import numpy as np
 from compensation.ringdown.envelope import Envelope, estimate_noise, thin
 from compensation.ringdown.terms import examine_without_lines, extend, fit_modes, is_plain
 
-LATER = (0.35, 0.6, 0.15)
-"""Parts of the record at whose end a free decay is looked for, where the whole is none."""
+LATER = (0.35, 0.6, 0.15)  # parts of the record at whose end a free decay is looked for, where the whole is none
 HALVINGS = 4
 LEAST_ROWS = 64
 SEARCH_ROWS = 300
-JUMP = 0.5
-"""Radians from which a turn of the phase between rows is no drift."""
+JUMP = 0.5  # radians from which a turn of the phase between rows is no drift
 NEAR = 41
 
 

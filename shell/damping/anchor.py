@@ -38,11 +38,6 @@ def anchor_loss(mode: Mode, elastic: Elastic | VaryingElastic, base: Elastic | N
     -------
     Radiating
         Frequency, 1/Q, and the resonator's share of the motion.
-
-    Raises
-    ------
-    ShellError
-        A resonator without a stem or with two, or with properties that vary.
     """
     _, waves = _stand(mode, elastic, base, _solved(mode).system.n)
     return radiating_mode(waves, mode.frequency)
@@ -83,11 +78,6 @@ def unbalance_loss(mode: Mode, elastic: Elastic | VaryingElastic, base: Elastic 
     ----------
     mode : with n = 2, of a resonator on one stem, its rim free.
     elastic, base : as for `anchor_loss`.
-
-    Raises
-    ------
-    ShellError
-        Another harmonic, no stem, no free rim.
     """
     solution = _solved(mode)
     if solution.system.n != 2:

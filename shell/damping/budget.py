@@ -102,13 +102,7 @@ class Budget:
 
 
 def loss_budget(vibration: Vibration, causes: Sequence[LossCause], temperatures: ArrayLike) -> Budget:
-    """Sum the causes over temperatures (K).
-
-    Raises
-    ------
-    ShellError
-        No cause, or a temperature outside the material's range.
-    """
+    """Sum the causes over temperatures (K)."""
     T = vibration.material.check(np.atleast_1d(np.asarray(temperatures, dtype=float)))
     if not causes:
         raise ShellError("a loss budget needs at least one cause of loss.")

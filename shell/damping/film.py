@@ -96,13 +96,7 @@ def film_energy(film: Film, face: FreeFaces) -> Array:
 
 
 def film_shift(mode: Mode, film: Film) -> float:
-    """Relative change of a mode's frequency by a film's stiffness and mass; stem and root stay bare.
-
-    Raises
-    ------
-    ShellError
-        A film that is too thick for the first order, or a mode without a shape.
-    """
+    """Relative change of a mode's frequency by a film's stiffness and mass; stem and root stay bare."""
     if mode.solution is None or mode.resonator is None:
         raise ShellError("Rayleigh's closed form carries no energies: use theory solid or shell.")
     check_film(film, min(value for _, value in mode.resonator.thickness))

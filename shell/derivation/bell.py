@@ -18,10 +18,8 @@ from shell.derivation.symbols import E, h, n, nu, phi, r, rho, t, theta, z
 
 R, L, S, R_b = sp.symbols("R L S R_b", positive=True)
 """Radius of hemisphere and cylinder, heights of cylinder and hyperbola, radius of the mouth (m)."""
-x, axial = sp.symbols("x z_a", real=True)
-"""Distance from the axis and height above the centre of the hemisphere (m)."""
-phi_b = sp.Symbol("phi_b", positive=True)
-"""Angle between normal and axis at the mouth (rad)."""
+x, axial = sp.symbols("x z_a", real=True)  # distance from the axis and height above the centre of the hemisphere (m)
+phi_b = sp.Symbol("phi_b", positive=True)  # angle between normal and axis at the mouth (rad)
 rho_1, rho_2 = sp.symbols("rho_1 rho_2", cls=sp.Function)
 """Principal radii of curvature along the meridian and around, functions of φ (m)."""
 

@@ -13,12 +13,9 @@ from shell.derivation.symbols import Omega, h, phi, rho, t, theta, z
 
 AXES = ("phi", "upsilon", "theta")
 COORDINATES = (phi, z, theta)
-rho_z = sp.Function("rho_z")(phi, z)
-"""Length per unit of φ, ρ₁ + υ (m)."""
-r_z = sp.Function("r_z")(phi, z)
-"""Distance from the axis, (ρ₂ + υ) sin φ (m)."""
-Omega_t = sp.Function("Omega")(t)
-"""Rate about the axis (rad/s), a function of time."""
+rho_z = sp.Function("rho_z")(phi, z)  # length per unit of φ, ρ₁ + υ (m)
+r_z = sp.Function("r_z")(phi, z)  # distance from the axis, (ρ₂ + υ) sin φ (m)
+Omega_t = sp.Function("Omega")(t)  # rate about the axis (rad/s), a function of time
 
 
 def stress(i: int, j: int) -> sp.Expr:

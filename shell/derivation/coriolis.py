@@ -15,8 +15,7 @@ from shell.derivation.inextensional import inextensional_mode
 from shell.derivation.strains import frame
 from shell.derivation.symbols import Omega, n, phi, r, t, theta
 
-p, q = sp.symbols("p q", cls=sp.Function)
-"""Amplitudes of the two patterns, functions of time."""
+p, q = sp.symbols("p q", cls=sp.Function)  # amplitudes of the two patterns, functions of time
 
 
 class PatternCoefficients(NamedTuple):

@@ -25,8 +25,7 @@ from shell.derivation.symbols import (
     tan_half,
 )
 
-I, J = sp.symbols("I J", real=True)
-"""The shape integrals of bending and of mass."""
+I, J = sp.symbols("I J", real=True)  # the shape integrals of bending and of mass
 
 
 class LogDerivatives(NamedTuple):

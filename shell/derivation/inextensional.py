@@ -12,8 +12,7 @@ from shell.derivation.displacements import Displacement, U, V, W
 from shell.derivation.strains import Deformation, corrected_deformation
 from shell.derivation.symbols import C, in_half_angle, n, omega, phi, r, t, tan_half, theta
 
-P, M = sp.symbols("P M", cls=sp.Function)
-"""P = U + V and M = U − V."""
+P, M = sp.symbols("P M", cls=sp.Function)  # P = U + V and M = U − V
 
 
 @cache

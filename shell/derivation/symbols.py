@@ -2,26 +2,17 @@
 
 import sympy as sp
 
-phi, theta = sp.symbols("phi theta", real=True)
-"""Polar angle from the pole and angle around the axis (rad)."""
-z, t = sp.symbols("z t", real=True)
-"""Height above the middle surface along its outward normal (m), and time (s)."""
-n = sp.Symbol("n", integer=True, positive=True)
-"""Circumferential harmonic."""
-r, h = sp.symbols("r h", positive=True)
-"""Radius of the middle surface and thickness (m)."""
-E, rho = sp.symbols("E rho", real=True)
-"""Young's modulus (Pa) and density (kg/m³)."""
-nu = sp.Symbol("nu", real=True)
-"""Poisson ratio, the HRG paper's μ."""
+phi, theta = sp.symbols("phi theta", real=True)  # polar angle from the pole and angle around the axis (rad)
+z, t = sp.symbols("z t", real=True)  # height above the middle surface along its outward normal (m), and time (s)
+n = sp.Symbol("n", integer=True, positive=True)  # circumferential harmonic
+r, h = sp.symbols("r h", positive=True)  # radius of the middle surface and thickness (m)
+E, rho = sp.symbols("E rho", real=True)  # Young's modulus (Pa) and density (kg/m³)
+nu = sp.Symbol("nu", real=True)  # Poisson ratio, the HRG paper's μ
 omega, Omega = sp.symbols("omega Omega", positive=True)
 """Angular frequency of the mode and turning rate about the axis (rad/s)."""
-C = sp.Symbol("C", positive=True)
-"""Amplitude of the mode (m)."""
-phi_1, phi_2 = sp.symbols("phi_1 phi_2", positive=True)
-"""Polar angles where the shell starts and ends (rad)."""
-tan_half = sp.Symbol("T", positive=True)
-"""tan(φ/2), in which every function of φ of this problem is rational."""
+C = sp.Symbol("C", positive=True)  # amplitude of the mode (m)
+phi_1, phi_2 = sp.symbols("phi_1 phi_2", positive=True)  # polar angles where the shell starts and ends (rad)
+tan_half = sp.Symbol("T", positive=True)  # tan(φ/2), in which every function of φ of this problem is rational
 
 
 def in_half_angle(expression: sp.Expr) -> sp.Expr:

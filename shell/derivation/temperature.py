@@ -12,12 +12,9 @@ import sympy as sp
 from shell.derivation.frequency import frequency, log_derivatives
 from shell.derivation.symbols import E, h, nu, r, rho
 
-temperature = sp.Symbol("T", real=True)
-"""Temperature of the resonator (K)."""
-alpha = sp.Symbol("alpha", real=True)
-"""Coefficient of free isotropic expansion (1/K): h'/h = r'/r = α, ρ'/ρ = −3 α."""
-G = sp.Function("G")
-"""Shear modulus over temperature (Pa), E = 2 G (1 + ν)."""
+temperature = sp.Symbol("T", real=True)  # temperature of the resonator (K)
+alpha = sp.Symbol("alpha", real=True)  # coefficient of free isotropic expansion (1/K): h'/h = r'/r = α, ρ'/ρ = −3 α
+G = sp.Function("G")  # shear modulus over temperature (Pa), E = 2 G (1 + ν)
 OVER_TEMPERATURE = {symbol: sp.Function(symbol.name)(temperature) for symbol in (E, nu, rho, h, r)}
 """Each property as a function of temperature."""
 

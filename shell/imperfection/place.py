@@ -77,13 +77,7 @@ def fade(resonator: Resonator, system: System) -> Callable[[Array], Array] | Non
 
 
 def cut(resonator: Resonator, system: System, position: float, heights: Array) -> CrossSection:
-    """The cross-section at a position of the meridian, at heights η (-1 inner face, 1 outer face).
-
-    Raises
-    ------
-    ShellError
-        The position lies outside 0 ... 1, or in a solid root or corner.
-    """
+    """The cross-section at a position of the meridian, at heights η (-1 inner face, 1 outer face)."""
     if not 0 <= position <= 1:
         raise ShellError(f"a position on the meridian lies in 0 (start) ... 1 (rim), not at {position:g}.")
     s, margin = position * resonator.length, 1e-9 * resonator.length

@@ -75,13 +75,7 @@ class Projector:
 
 
 def check_unit(points: Array, resonator: Resonator, name: str) -> None:
-    """Refuse points whose size is not that of the resonator.
-
-    Raises
-    ------
-    ShellError
-        The largest extent differs by more than a factor of two from the resonator's; the message guesses the unit.
-    """
+    """Refuse points whose size is not that of the resonator."""
     line = resonator.sample(401)
     nominal = max(2 * float(line.r.max()), float(np.ptp(line.z)))
     low, high = np.percentile(points[:: max(1, len(points) // 20000)], [0.5, 99.5], axis=0)

@@ -27,8 +27,7 @@ ROWS, COLUMNS = 72, 288  # cells along the meridian and around
 SAMPLE = 25_000  # points of the first fit
 RIGID = 1e-6  # of the largest: a motion that moves the face along itself shows nothing
 HOLE = 25.0  # growth of a variance by gaps from which on the waves are not told
-Points: TypeAlias = tuple[Array, Array, Array]
-"""Position, azimuth and how far points stand out of the material."""
+Points: TypeAlias = tuple[Array, Array, Array]  # position, azimuth and how far points stand out of the material
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,13 +171,7 @@ class _Profile:
 def survey(
     points: Array, side: int, motion: RigidMotion, projector: Projector, name: str, highest: int = 12, degree: int = 7
 ) -> Face:
-    """The waves of a face from its points (count, 3), m, in their own frame.
-
-    Raises
-    ------
-    ShellError
-        Too few points, or gaps larger than the waves allow.
-    """
+    """The waves of a face from its points (count, 3), m, in their own frame."""
 
     def place(some: Array) -> Points:
         at = projector.place(motion.apply(some))

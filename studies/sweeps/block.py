@@ -24,10 +24,8 @@ class Batch:
 
     Attributes
     ----------
-    places : array (m,) of int
-        Among the unique designs of the study, ascending; -1 for a design of a search.
-    designs : array (m, parameters)
-        Texts as their place in the parameter's values, -1 for the nominal one.
+    places : array (m,) of int, among the unique designs of the study, ascending; -1 for a design of a search.
+    designs : array (m, parameters), texts as their place in the parameter's values, -1 for the nominal one.
     """
 
     places: NDArray[np.int64]

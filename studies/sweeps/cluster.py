@@ -125,13 +125,7 @@ def is_encrypted(address: str) -> bool:
 
 
 def check_private(address: str) -> None:
-    """Refuse a public address without encryption: who reaches or imitates the scheduler there could run code here.
-
-    Raises
-    ------
-    InputError
-        The host is public and the protocol not encrypted.
-    """
+    """Refuse a public address without encryption: who reaches or imitates the scheduler there could run code here."""
     host = address.rpartition("://")[2].rpartition(":")[0].strip("[]")
     try:
         found = socket.getaddrinfo(host, None) if host and not is_encrypted(address) else []

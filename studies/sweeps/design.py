@@ -23,12 +23,9 @@ class Design:
 
     Attributes
     ----------
-    values : array (cases, parameters)
-        In the unit of each name; texts as their place in the parameter's `values`.
-    unique : array of int
-        Places of the designs that differ from all before them: only these are computed.
-    inverse : array (cases,) of int
-        For every design its place in `unique`.
+    values : array (cases, parameters), in the unit of each name; texts as their place in the parameter's `values`.
+    unique : array of int, places of the designs that differ from all before them: only these are computed.
+    inverse : array (cases,) of int, for every design its place in `unique`.
     """
 
     values: Array
@@ -42,13 +39,7 @@ class Design:
 
 
 def draw(study: "Study") -> Design:
-    """Return the designs that a study asks for; the same for the same spec and seed.
-
-    Raises
-    ------
-    InputError
-        More designs than a study can hold.
-    """
+    """Return the designs that a study asks for; the same for the same spec and seed."""
     if not study.parameters:
         return _unique(np.empty((1, 0)))
     values = SAMPLERS[study.sampling.method](study)

@@ -43,13 +43,7 @@ class Derived(Keys, frozen=True, kw_only=True):
         return tuple(dict.fromkeys(_names(parse(self.expression))))
 
     def value(self, known: Mapping[str, Any]) -> float:
-        """Return the value for known names.
-
-        Raises
-        ------
-        InputError
-            The arithmetic fails or its result is no finite number.
-        """
+        """Return the value for known names."""
         where = f"{self.name} = '{self.expression}'"
         try:
             found = _evaluate(parse(self.expression), known)

@@ -49,13 +49,7 @@ class Families:
     members: Mapping[tuple[int, int, str], Family]
 
     def evaluate(self, designs: Designs, count: int) -> tuple[Array, Array]:
-        """Evaluate designs together: values and errors, arrays (designs, columns).
-
-        Raises
-        ------
-        ShellError, InputError
-            One of the designs cannot be computed.
-        """
+        """Evaluate designs together: values and errors, arrays (designs, columns)."""
         found = [FAST[one.name](self, one, designs, count) for one in self.asked]
         values, errors = (np.concatenate([one[part] for one in found], axis=1) for part in (0, 1))
         return values, errors
@@ -144,13 +138,7 @@ def build_families(study: "Study", design: "Design", most: int = MOST_SOLVES) ->
 
 
 def choose_solver(study: "Study", design: "Design") -> "Families | None":
-    """Return the families where the spec asks for them or lets them be, None where every design is solved in full.
-
-    Raises
-    ------
-    InputError
-        The spec asks for families and the study cannot be computed with them.
-    """
+    """Return the families where the spec asks for them or lets them be, None where every design is solved in full."""
     wanted, count = study.sampling.solver, len(design.unique)
     if wanted == "full" or (wanted == "auto" and count < FEWEST):
         return None

@@ -20,13 +20,7 @@ LOCK = "lock"
 
 
 def open_store(folder: str | Path) -> Store:
-    """Open the store of a study for reading, also while it is being written.
-
-    Raises
-    ------
-    InputError
-        There is no study in the folder, or its store is damaged.
-    """
+    """Open the store of a study for reading, also while it is being written."""
     path = Path(folder) / FILE
     _refuse_former(folder)
     if not os.path.isfile(path):

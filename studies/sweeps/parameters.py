@@ -25,13 +25,7 @@ TEMPERATURE = "temperature_degC"
 
 
 def find_nominal(instrument: Instrument, name: str, where: str) -> float | str | None:
-    """Return a parameter's value in the card, None where the card leaves it open.
-
-    Raises
-    ------
-    InputError
-        The card cannot have such a key; the nearest is named.
-    """
+    """Return a parameter's value in the card, None where the card leaves it open."""
     if name.startswith("user.") and len(name) > len("user."):
         return None
     if name == TEMPERATURE:

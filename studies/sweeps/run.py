@@ -52,23 +52,17 @@ def run_study(
 
     Parameters
     ----------
-    source : path, name or mapping
-        The spec (`studies.sweeps.spec`).
-    out : path, optional
-        Folder of the store; without it the results live in memory only.
-    card : str, optional
-        Another card than the spec's.
-    workers : int, optional
-        Processes on this machine; one for every core unless given. With 1 everything is computed in this process. In a
-        script, more than one need the guard `if __name__ == "__main__":`.
+    source : path, name or mapping, the spec (`studies.sweeps.spec`).
+    out : folder of the store; without it the results live in memory only.
+    card : another card than the spec's.
+    workers : processes on this machine; one for every core unless given. With 1 everything is computed in this process.
+        In a script, more than one need the guard `if __name__ == "__main__":`.
     scheduler : str, optional
         Address of a Dask scheduler, instead of processes here; it and its workers can run code here (`studies.sweeps.cluster`).
-    allow_python : bool
-        Run the user functions that the spec names.
+    allow_python : run the user functions that the spec names.
     retry_failed : bool
         Compute the cases again that failed in an earlier run. Those whose worker was lost are always tried again.
-    show_progress : bool
-        Show progress on standard error.
+    show_progress : show progress on standard error.
 
     Raises
     ------

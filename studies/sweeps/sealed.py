@@ -32,10 +32,8 @@ class SealedFile:
 
     Attributes
     ----------
-    end : int
-        Where the next block goes.
-    damaged : list of (int, int)
-        Stretches that `scan` could not read, from and to.
+    end : where the next block goes.
+    damaged : list of (int, int), stretches that `scan` could not read, from and to.
     """
 
     def __init__(self, file: IO[bytes]) -> None:

@@ -68,13 +68,7 @@ class LinearShares:
 
 
 def sobol_indices(results: "Results", column: str) -> SobolIndices:
-    """Return the Sobol indices of a column from a study with method = "sensitivity" (Saltelli 2010, table 2 b and f).
-
-    Raises
-    ------
-    InputError
-        The study has another design, or cases without a value: they are listed.
-    """
+    """Return the Sobol indices of a column from a study with method = "sensitivity" (Saltelli 2010, table 2 b and f)."""
     study = results.study
     if study.sampling.method != "sensitivity":
         raise InputError(
@@ -110,11 +104,6 @@ def local_slopes(results: "Results", column: str) -> list[LocalSlope]:
 
     The slope is that of the polynomial through a parameter's levels; its uncertainty is the distance to the
     polynomial through the inner levels, plus the numerical error of the values over the distance of the inner levels.
-
-    Raises
-    ------
-    InputError
-        The study has another design, or cases without a value: they are listed.
     """
     study = results.study
     if study.sampling.method != "one-at-a-time":

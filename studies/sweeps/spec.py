@@ -24,11 +24,6 @@ def read_study(source: str | Path | Mapping[str, Any], card: str | None = None) 
     ----------
     source : path, name or mapping.
     card : another card than the one that the spec names.
-
-    Raises
-    ------
-    InputError
-        An unknown key, parameter or quantity (the nearest is named), a value of the wrong type or out of range.
     """
     if isinstance(source, Mapping):
         content, where, folder, text = {"schema": SCHEMA, **source}, "study", Path(), ""

@@ -17,13 +17,7 @@ SAMPLES = ("latin-hypercube", "sobol")
 
 
 def check_nominal(study: "Study", where: str) -> None:
-    """Build the nominal design, and hold its thickness against the theory; temperatures must lie in the law's range.
-
-    Raises
-    ------
-    InputError
-        A nominal design or a temperature that the card, the material's law or the chosen theory does not allow.
-    """
+    """Build the nominal design, and hold its thickness against the theory; temperatures must lie in the law's range."""
     problem = _problem(study, nominal_design(study))
     if problem:
         raise InputError(f"{where}: {problem}")
