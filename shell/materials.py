@@ -6,7 +6,7 @@ extrapolation, and a property that no source states is refused by name.
 
 import difflib
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from pathlib import Path
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from shell.cubic import Cubic
 
 ELASTIC = ("shear_modulus", "youngs_modulus", "poisson_ratio")
+CHECKABLE = (*PROPERTIES, "elastic_constants", "temperature_coefficients")
 _SHIPPED = Path(__file__).with_name("materials.toml")
 
 
@@ -60,6 +61,7 @@ class Material:
     reference : K, temperature about which the deviations of the law and their prior count.
     constant : properties given at one temperature only: nobody says how they change with it.
     crystal : whose mean over all directions the elastic properties are.
+    unchecked : what could not be compared with an open source, of `CHECKABLE`.
     """
 
     name: str
@@ -72,14 +74,18 @@ class Material:
     reference: float = ROOM
     constant: tuple[str, ...] = ()
     crystal: Crystal | None = None
+    unchecked: tuple[str, ...] = ()
 
     @property
     def caveats(self) -> tuple[str, ...]:
-        """What every answer with this material must say: a modulus taken as constant, a crystal."""
-        moduli = " and ".join(name.replace("youngs", "Young's").replace("_", " ") for name in self.constant)
-        flat = f"No source states how the {moduli} of {self.name} changes with temperature: taken as constant."
+        """What every answer with this material must say: a modulus taken as constant, a crystal, values not checked."""
+        flat = (
+            f"No source states how {spell(self.constant)} of {self.name} changes with temperature: taken as constant."
+        )
         known = not self.constant or "expansion" in self.constant  # else given in the card, which says so itself
-        return (() if known else (flat,)) + ((f"{self.name}: {self.crystal.note}",) if self.crystal else ())
+        caveats = (() if known else (flat,)) + ((f"{self.name}: {self.crystal.note}",) if self.crystal else ())
+        doubt = f"{self.name}: {spell(self.unchecked)} not checked against a source; the uncertainty is wide."
+        return (*caveats, doubt) if self.unchecked else caveats
 
     @property
     def lacks(self) -> list[str]:
@@ -320,7 +326,7 @@ def _read_material(where: str, name: str, entry: Any) -> Mapping[str, Material]:
 
 
 def _read_law(where: str, name: str, law: str, entry: Any) -> Material:
-    known = ("source", "note", "range_degC", "crystal", *PROPERTIES)
+    known = ("source", "note", "range_degC", "crystal", "unchecked", *PROPERTIES)
     _check_keys(where, entry, known, required=("source", "range_degC"))
     span = entry["range_degC"]
     if not (isinstance(span, list) and len(span) == 2 and all(_is_number(x) for x in span) and span[0] < span[1]):
@@ -338,9 +344,13 @@ def _read_law(where: str, name: str, law: str, entry: Any) -> Material:
             _check_sign(f"{where}: {p} of the crystal", p, found[p], span)
     if all(p in found for p in ELASTIC):
         raise ShellError(f"{where}: give two of {', '.join(ELASTIC)}; the third follows.")
+    unchecked = entry.get("unchecked", [])
+    if not isinstance(unchecked, list) or not all(one in CHECKABLE for one in unchecked):
+        raise ShellError(f"{where}: unchecked must be a list of some of {', '.join(CHECKABLE)}.")
     flat = tuple(p for p in ELASTIC[:2] if p in found and found[p].form == "constant" and not found[p].unsettled[1])
+    source, note = str(entry["source"]), str(entry.get("note", ""))
     return Material(
-        name, law, low, high, found, str(entry["source"]), str(entry.get("note", "")), constant=flat, crystal=crystal
+        name, law, low, high, found, source, note, constant=flat, crystal=crystal, unchecked=tuple(unchecked)
     )
 
 
@@ -430,6 +440,12 @@ def _check_keys(where: str, entry: Any, known: tuple[str, ...] | None, required:
     for key in required:
         if key not in entry:
             raise ShellError(f"{where}: the key '{key}' is missing; add it.")
+
+
+def spell(names: Sequence[str]) -> str:
+    """Names of properties as a list in words."""
+    words = [name.replace("youngs", "Young's").replace("poisson", "Poisson's").replace("_", " ") for name in names]
+    return " and ".join([", ".join(words[:-1]), words[-1]] if words[1:] else words)
 
 
 def _is_number(value: Any) -> bool:

@@ -130,7 +130,7 @@ def materials(name: str = "", *, compare: bool = False, card: Card = "", harmoni
     compare : bool
         Compare all laws in the geometry of --card (free-dome unless given): frequency, its slope, thermoelastic Q and what the surface must be.
     """
-    from shell.materials import read_materials
+    from shell.materials import read_materials, spell
     from studies.errors import InputError, nearest
 
     if card and not compare:
@@ -144,12 +144,13 @@ def materials(name: str = "", *, compare: bool = False, card: Card = "", harmoni
         raise InputError(f"unknown material '{name}'{nearest(name, table)}")
     laws = [law for key, laws in table.items() if name in ("", key) for law in laws.values()]
     entries = [_describe(law) for law in laws]
-    rows = [row | {"lacks": ", ".join(one.replace("_", " ") for one in row["lacks"]) or "—"} for row in entries]
+    rows = [row | {key: spell(row[key]) or "—" for key in ("lacks", "unchecked")} for row in entries]
     columns = [
         Column("name", "name"),
         Column("law", "law"),
         Column("range_degC", "range", "°C", "g", interval=("range_degC.0", "range_degC.1")),
         Column("lacks", "not stated"),
+        Column("unchecked", "not checked"),
         Column("source", "source"),
     ]
     return Result(
@@ -213,7 +214,7 @@ def _law_tables(law: "Material") -> list[Table]:
             "numbers": ", ".join(
                 _with_error(k, v, prop.uncertainty.get(k, 0.0), PROPERTIES[key]) for k, v in prop.numbers.items()
             ),
-            "source": prop.source,
+            "source": "not checked against a source" if key in law.unchecked else prop.source or "source of the law",
         }
         for key, prop in law.properties.items()
     ]
@@ -236,7 +237,7 @@ def _law_tables(law: "Material") -> list[Table]:
         Column("correlation", "correlation"),
     ]
     return [
-        Table(f"{law.name}, law '{law.law}'", properties, columns, law.note),
+        Table(f"{law.name}, law '{law.law}'", properties, columns, " ".join([*law.caveats, law.note])),
         Table(f"Uncertainty of law '{law.law}'", coefficients, open_ones, note),
     ]
 
@@ -267,6 +268,7 @@ def _describe(law: "Material") -> "dict[str, Any]":
         "note": law.note,
         "caveats": list(law.caveats),
         "lacks": law.lacks,
+        "unchecked": list(law.unchecked),
         "prior": {
             "coefficients": list(law.prior.names),
             "sd": law.prior.sd.tolist(),

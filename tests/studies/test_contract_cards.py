@@ -1,9 +1,13 @@
 """Contract: every shipped card loads and says what is illustrative; a wrong card is refused by key with the mend."""
 
+import json
+import re
 import tomllib
 
 import pytest
 
+from shell.materials import read_materials
+from studies.cli import main
 from studies.errors import InputError
 from studies.instrument.card import load_card, save_card, shipped_cards
 
@@ -152,3 +156,28 @@ def test_lengths_a_thousand_times_too_large_are_named(tmp_path):
     )
     with pytest.raises(InputError, match="in mm, not in µm"):
         load_card(card)
+
+
+def _printed(value, text):
+    """Whether a text prints a number, as such or in GPa."""
+    numbers = [float(found) for found in re.findall(r"-?\d+(?:\.\d+)?(?:e-?\d+)?", text)]
+    return any(abs(value * scale - one) <= 1e-3 * abs(one) for one in numbers for scale in (1.0, 1e-9)) or value == 0
+
+
+@pytest.mark.parametrize("name", read_materials())
+def test_contract_every_value_of_a_material_has_a_source_or_says_that_it_was_not_checked(name, capsys):
+    """Without a source of its own a value stands in the source of its law; what is not checked is told in every answer."""
+    assert main(["materials", name, "--json"]) == 0
+    shown = json.loads(capsys.readouterr().out)["materials"]
+    laws = read_materials()[name]
+    for row, law in zip(shown, laws.values(), strict=True):
+        source = next(iter(laws.values())).source if law.source.startswith("as law") else law.source
+        for key, found in law.properties.items():
+            if key not in law.unchecked and not found.source:
+                value = found.numbers["value"]
+                assert _printed(value, source) or (round(6 * value, 3) == 1 and "1/6" in source), (key, source)
+        if law.crystal is not None:
+            assert all(_printed(value, source) for value in law.crystal.constants.values()), source
+            assert not law.crystal.slope or "temperature_coefficients" in law.unchecked
+        assert row["unchecked"] == list(law.unchecked)
+        assert bool(law.unchecked) == any("not checked against a source" in text for text in row["caveats"])
