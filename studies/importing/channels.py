@@ -73,7 +73,7 @@ def plainly(path: str | Path) -> Iterator[None]:
         while one is not None:
             traceback.clear_frames(one.__traceback__)
             one.__traceback__, one = None, one.__context__
-        gc.collect()
+        gc.collect(1)  # what is half-made is young
         kind = KINDS.get(Path(path).suffix.lower(), "channel")
         raise InputError(
             f"{path}: cannot be read as {kind}: damaged, cut off, or of another format ({shorten(said)}); export it again."

@@ -61,11 +61,13 @@ class Channel:
 
 def load_library(name: str, path: str | Path, kind: str) -> Any:
     """Return a library of the extra `formats`."""
-    logging.getLogger(name.split(".")[0]).setLevel(logging.CRITICAL)  # what is wrong is told once, in a sentence
     try:
-        return importlib.import_module(name)
+        library = importlib.import_module(name)
     except ImportError:
         raise MissingEnvironment(f"{path}: {kind} needs {name}: pip install 'hrg-workbench[formats]'.") from None
+    for logger in [own for own in logging.root.manager.loggerDict if own.partition(".")[0] == name.partition(".")[0]]:
+        logging.getLogger(logger).setLevel(logging.CRITICAL)  # what is wrong is told once, in a sentence
+    return library
 
 
 def read_tdms(path: str, files: ExitStack) -> Iterator[Channel]:

@@ -22,8 +22,6 @@ from shell.surface import build_surface
 
 RESONATOR = hemisphere(15e-3, 0.9e-3, support="stem", stem=Stem(2.5e-3, -5e-3, 0.5e-3))
 SILICA = Elastic(72.7e9, 0.17, 2203.0)
-DRAWS, REMEDY = can_draw()
-needs_opengl = pytest.mark.skipif(not DRAWS, reason=REMEDY)
 
 
 @lru_cache
@@ -59,7 +57,14 @@ def count_clusters(angles, gap=0.15):
 
 
 @pytest.fixture(scope="module")
-def drawn():
+def opengl():
+    draws, remedy = can_draw()
+    if not draws:
+        pytest.skip(remedy)
+
+
+@pytest.fixture(scope="module")
+def drawn(opengl):
     """The axial view of n = 2 and 3, each swinging and at rest, side by side in one picture."""
     scenes = []
     for n in (2, 3):
@@ -71,7 +76,6 @@ def drawn():
 
 
 @pytest.mark.slow
-@needs_opengl
 @pytest.mark.parametrize("n", [2, 3])
 def test_nodal_lines_in_the_picture_are_2n(drawn, n):
     swinging, rest = drawn[n]
@@ -83,7 +87,7 @@ def test_nodal_lines_in_the_picture_are_2n(drawn, n):
     assert count_clusters(angle[ring]) == 2 * n
 
 
-@needs_opengl
+@pytest.mark.slow
 @pytest.mark.parametrize("n", [2, 3])
 def test_the_drawn_rim_crosses_the_circle_at_rest_2n_times(drawn, n):
     swinging, rest = drawn[n]
@@ -98,7 +102,7 @@ def test_the_drawn_rim_crosses_the_circle_at_rest_2n_times(drawn, n):
     assert int((told != np.roll(told, 1)).sum()) == 2 * n
 
 
-@needs_opengl
+@pytest.mark.slow
 def test_the_rim_shows_the_thickness_and_the_stem(drawn):
     _, rest = drawn[2]
     rows, columns = np.nonzero(is_body(rest))
@@ -115,7 +119,7 @@ def test_the_rim_shows_the_thickness_and_the_stem(drawn):
 
 
 @pytest.mark.slow
-@needs_opengl
+@pytest.mark.usefixtures("opengl")
 def test_animations_loop_and_move(monkeypatch):
     scene = scene_of(2)
     pictures = shell.render._draw(scene, "oblique", (160, 140), [1.0, 0.0, -1.0, 0.0])

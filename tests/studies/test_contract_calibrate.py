@@ -14,9 +14,6 @@ from studies.reports.calibration import NAMES, SHOWN
 from studies.simulation.chamber import load_profile
 from studies.simulation.virtual_gyro import simulate_run
 
-VALUE = ["parameter", "unit", "card", "value", "low", "high", "shift_sd", "width", "told_by", "bound", "interval"]
-RESPONSE = ["unit", "as_shipped", "calibrated", "noise", "run_offset", "outliers"]
-
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory):
@@ -24,37 +21,6 @@ def run(tmp_path_factory):
     true = load_card("hrg-30mm").with_values({"loss.inverse_q": 2e-7, "thermal.chamber_conductance_W_per_K": 0.2})
     write_record(simulate_run(true, load_profile("ramp 20 0 0.5 then soak 0 1h"), 1 / 60).record, path)
     return path
-
-
-@pytest.mark.slow
-def test_the_object_the_card_and_the_page(run, tmp_path, capsys):
-    card, page = tmp_path / "calibrated.toml", tmp_path / "page.html"
-    thermal = [v.name for v in load_card("hrg-30mm").uncertain if v.name.startswith(("material.", "bias."))]
-    exact = [word for name in thermal for word in ("--exact", name)]
-    words = ["calibrate", "hrg-30mm", str(run), "--save", str(card), "--report", str(page), "--json", *exact]
-    assert main(words) == 0
-    answer = json.loads(capsys.readouterr().out)
-    assert list(answer) == [
-        "schema", "card", "records", "values", "inseparable", "responses", "held_out", "settled", "converged", "warnings",
-        "calibrated_card",
-    ]  # fmt: skip
-    assert answer["schema"] == "hrg.calibration/1"
-    assert answer["card"] == "hrg-30mm"
-    assert answer["held_out"] is None
-    assert answer["calibrated_card"] == str(card)
-    assert all(list(one) == VALUE for one in answer["values"])
-    assert all(list(one) == RESPONSE for one in answer["responses"].values())
-    assert list(answer["responses"]) == ["frequency_Hz", "bias_deg_per_h", "inverse_q", "housing_temperature_degC"]
-    told = {one["parameter"]: one for one in answer["values"]}
-    assert not any(name in told for name in thermal)
-    q = told["loss.inverse_q"]
-    assert q["low"] < q["value"] < q["high"]
-    assert q["value"] == pytest.approx(2e-7, abs=3 * (q["high"] - q["low"]))
-    assert q["told_by"] == "data"
-    assert load_card(card).loss.inverse_q == pytest.approx(q["value"])
-    text = page.read_text(encoding="utf-8")
-    assert "run<1>" not in text
-    assert "run&lt;1&gt;" in text
 
 
 def test_what_has_not_converged_is_no_card(tmp_path, monkeypatch, capsys):

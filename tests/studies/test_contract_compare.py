@@ -45,12 +45,6 @@ def test_hertz_per_micrometre_is_a_difference_of_two_solves(tmp_path, capsys):
     assert mode["frequency_per_thickness_Hz_per_um"] == pytest.approx(frequencies[1] - frequencies[0], rel=1e-3)
 
 
-def test_one_card_cannot_be_compared(capsys):
-    assert main(["compare", "free-dome"]) == 2
-    assert "two cards or more" in capsys.readouterr().err
-    assert main(["compare", "free-dome", "no-such"]) == 2
-
-
 def test_nearest_mode_is_any_mode_and_not_the_lowest_of_its_harmonic(capsys):
     """The card's second n = 1 mode is nearer to the drive mode than the first, as the list of modes shows."""
     modes = ask(capsys, "modes", "hrg-30mm", "--harmonic", "0", "1", "2", "3", "4", "--count", "3")["modes"]

@@ -184,27 +184,6 @@ def test_json_carries_the_published_integrals(capsys):
     assert payload["bryan_factor"]["value"] == pytest.approx(0.27699, abs=5e-6)
 
 
-@pytest.mark.parametrize(
-    "words",
-    [
-        ["--harmonic", "1"],
-        ["--rim-angle-deg", "180"],
-        ["--rim-angle-deg", "179.99999"],
-        ["--rim-angle-deg", "1e-9"],
-        ["--harmonic", "12", "--rim-angle-deg", "0.001"],
-        ["--pole-angle-deg", "95"],
-        ["--code", "fortran"],
-        ["--latex", "--code", "c"],
-    ],
-    ids=" ".join,
-)
-def test_unusable_arguments_end_with_one_sentence(words, capsys):
-    status, said = speak(capsys, *words)
-    assert status == 2
-    assert said.out == ""
-    assert said.err.startswith("hrg: ")
-
-
 @pytest.mark.slow
 def test_the_bell_is_derived_beside_its_numbers(capsys):
     status, said = speak(capsys, "--bell", "--json")
@@ -224,10 +203,6 @@ def test_the_bell_is_derived_beside_its_numbers(capsys):
     solid = payload["numbers"]["solid"]["frequency"]
     assert rows["(19) as printed"] > 100 * solid
     assert 1 < rows["solved from (17), (18)"] / solid < 1.4
-    for words, mend in ((["--bell", "--dynamics"], "choose one"), (["--bell", "--code", "c"], "leave out --code")):
-        status, said = speak(capsys, *words)
-        assert status == 2
-        assert mend in said.err
 
 
 @pytest.mark.parametrize(("n", "solid"), [(2, 4596.3915), (3, 11921.2280)], ids=["n = 2", "n = 3"])

@@ -14,12 +14,6 @@ def speak(capsys, *words):
     return status, capsys.readouterr()
 
 
-def test_options_of_the_shell_are_refused(capsys):
-    status, said = speak(capsys, "--harmonic", "3")
-    assert status == 2
-    assert "--dynamics holds for any harmonic" in said.err
-
-
 def test_both_languages_agree(tmp_path, capsys):
     space = {}
     exec(speak(capsys, "--code", "python")[1].out, space)

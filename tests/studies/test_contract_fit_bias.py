@@ -189,19 +189,6 @@ def test_a_short_run_is_fitted_without_an_allan_deviation(tmp_path, capsys):
     assert "The data are short: 2" in capsys.readouterr().out
 
 
-def test_json_is_one_object_with_both_methods(calibrated, capsys):
-    assert main(["fit", "bias", *(str(calibrated / f"run{k}.csv") for k in range(3)), "--json"]) == 0
-    payload = json.loads(capsys.readouterr().out)
-    assert payload["schema"] == "hrg.fit-bias/1"
-    assert set(payload["methods"]) == {"guarded", "paper"}
-    guarded = payload["methods"]["guarded"]
-    assert guarded["terms"] == ["constant", "f", "fdot"]
-    assert [step["term"] for step in guarded["path"]]
-    assert guarded["held_out"]["of"] == "runs"
-    assert guarded["held_out"]["gain"] > 5
-    assert payload["allan"]["before"]["N"] == pytest.approx(0.4 * np.sqrt(5.0), rel=0.05)
-
-
 def test_a_rate_output_is_fitted_in_its_own_unit(tmp_path, capsys):
     def spoil(columns):
         columns["measured_rate_deg_per_s"] = columns.pop("bias_deg_per_h") / 3600
@@ -233,14 +220,6 @@ def test_the_page_says_where_its_coefficients_are_read_and_the_range_that_is_enf
     assert [float(end) for end in said.groups()] == pytest.approx(
         read_model(calibrated / "m.toml").range_of("frequency_Hz"), rel=1e-6
     )
-
-
-def test_the_page_is_whole_and_escapes_names(calibrated, tmp_path):
-    page = (calibrated / "page.html").read_text(encoding="utf-8")
-    assert page.count("<svg") + page.count("data:image") >= 2
-    shutil.copy(calibrated / "run0.csv", tmp_path / "<b>run.csv")
-    assert main(["fit", "bias", str(tmp_path / "<b>run.csv"), "--report", str(tmp_path / "p.html")]) == 0
-    assert "<b>run" not in (tmp_path / "p.html").read_text(encoding="utf-8")
 
 
 def test_one_cooling_run_is_not_applied_to_a_warming_one(calibrated, tmp_path, capsys):

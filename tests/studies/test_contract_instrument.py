@@ -3,7 +3,6 @@
 import importlib
 import inspect
 import itertools
-import json
 import math
 import pickle
 import tomllib
@@ -307,34 +306,3 @@ def test_priors_are_drawn_as_they_are_stated():
 )
 def test_a_key_carries_its_unit(key, unit):
     assert unit_of(key) == unit
-
-
-def test_the_uncertain_values_of_a_card_are_listed(capsys):
-    assert main(["cards", "cvg-25mm", "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
-    assert told["schema"] == "hrg.card-values/1"
-    found = {one["name"]: one for one in told["values"]}
-    assert found["material.youngs_modulus_GPa"] | {"low": None} == {
-        "name": "material.youngs_modulus_GPa", "value": 190.0, "sd": 5.0, "low": None, "high": None,
-        "logarithmic": True, "unit": "GPa", "stated": True,
-    }  # fmt: skip
-    assert not found["thermal.mount_exchange_cm2"]["stated"]
-    assert all({one, other} <= set(found) for one, other, _ in told["correlations"])
-    assert main(["cards", "hrg-30mm"]) == 0
-    assert max(map(len, capsys.readouterr().out.splitlines())) <= 82
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", sorted(shipped_cards()))
-def test_every_shipped_card_works_with_every_command(tmp_path, capsys, name):
-    commands = (
-        ["modes", name, "--theory", "shell"],
-        ["tcf", name, "--theory", "shell"],
-        ["thermal", name, "step 20 10 1h"],
-        ["simulate", name, "step 20 10 1h", "--row", "10", "--theory", "shell", "--out", str(tmp_path / "run.csv")],
-    )
-    for command in commands:
-        status = main([*command, "--json"])
-        told = capsys.readouterr()
-        assert status == 0, told.err
-        assert json.loads(told.out)["schema"] == f"hrg.{command[0]}/1"

@@ -131,13 +131,6 @@ def test_the_reference_has_every_key_with_its_unit_and_default(kind, capsys):
         assert found["[[loss.film]]", "thickness_nm"]["required"]
 
 
-def test_an_unknown_file_or_table_is_refused(capsys):
-    assert main(["keys", "crad"]) == 2
-    assert "did you mean 'card'" in capsys.readouterr().err
-    assert main(["keys", "card", "--table", "los"]) == 2
-    assert "did you mean 'loss'" in capsys.readouterr().err
-
-
 def all_tables(node):
     """Every class of keys in a declaration."""
     for struct in structs(node):

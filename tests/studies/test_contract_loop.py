@@ -58,11 +58,6 @@ def test_unstable_loop_is_said_with_its_margin_before_anything_is_simulated(card
     assert rate["phase_margin_deg"] > 44
 
 
-def test_card_without_loops_is_refused(capsys):
-    assert main(["loop", "free-dome"]) == 2
-    assert "add a table [loop]" in capsys.readouterr().err
-
-
 def test_uncertainties_of_the_loops_hold_only_where_the_card_has_them(card):
     names = {value.name for value in load_card(card("")).uncertain}
     assert "loop.pickoff_phase_deg" in names
@@ -98,22 +93,6 @@ def test_a_profile_drives_the_resonator_not_its_reading(card, tmp_path):
 def test_a_reversal_of_what_does_not_precess_is_refused(card, capsys, lines):
     assert main(["loop", card(lines), "--both-ways"]) == 2
     assert "--both-ways reverses the self-precession of a whole-angle wave" in capsys.readouterr().err
-
-
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (["--hours", "2"], "--hours: only for a simulated run; add --out"),
-        (["--row", "10", "--noiseless"], "--row, --noiseless: only for a simulated run"),
-        (["--profile", "soak 20 1h"], "--profile: only for a simulated run"),
-        (["--hours", "2", "--profile", "soak 20 1h", "--out", "run.csv"], "leave out --hours or --profile"),
-        (["--hours", "-1", "--out", "run.csv"], "--hours -1: must be positive"),
-        (["--hours", "1e9", "--out", "run.csv"], "more than"),
-    ],
-)
-def test_options_of_a_run_are_never_ignored(card, capsys, words, said):
-    assert main(["loop", card(""), *words]) == 2
-    assert said in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -128,13 +128,6 @@ def test_an_unusable_part_is_named_with_its_mend(capsys, tmp_path, loss, words):
     assert str(path) in err
 
 
-def test_a_range_outside_the_material_is_refused(capsys):
-    status, _, err = _run(capsys, "free-dome", "--from", "-100", "--to", "20")
-    assert status == 2
-    assert "outside the range" in err
-    assert _run(capsys, "free-dome", "--from", "30", "--to", "20")[0] == 2
-
-
 def test_anchor_of_a_stem(capsys):
     status, out, _ = _run(capsys, "hrg-30mm", "--anchor", "--from", "20", "--to", "20", "--json")
     assert status == 0

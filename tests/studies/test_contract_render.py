@@ -26,31 +26,6 @@ def no_opengl(monkeypatch):
     monkeypatch.setattr("shell.render._run_child", lambda *_: None)
 
 
-@pytest.mark.parametrize(
-    ("words", "part"),
-    [
-        (["free-dome", "--out", "mode.bmp"], "the ending must be one of .png"),
-        (["free-dome", "--out", "mode"], "the ending"),
-        (["--out", "mode.png"], "a card is missing"),
-        (["free-dom", "--out", "mode.png"], "did you mean 'free-dome'"),
-        (["free-dome", "--harmonic", "2", "3", "--out", "mode.png"], "only in an .html page"),
-        (["free-dome", "--index", "-1", "--out", "mode.stl"], "counted from 0"),
-        (["free-dome", "--colour", "temperature", "--out", "mode.ply"], "--field"),
-        (["free-dome", "--colour", "rainbow", "--out", "mode.ply"], "rainbow"),
-        (["free-dome", "cvg-25mm", "--out", "mode.stl"], "1 at most"),
-        (["free-dome", "--temperature", "1", "2", "3", "4", "5", "--out", "mode.png"], "4 at most"),
-        (["free-dome", "--temperature", "900", "--theory", "shell", "--out", "mode.stl"], "outside the range"),
-    ],
-)
-def test_unusable_arguments_name_the_mend(tmp_path, monkeypatch, capsys, words, part):
-    monkeypatch.chdir(tmp_path)
-    assert hrg_render(*words) == 2
-    told = capsys.readouterr()
-    assert part in told.err
-    assert told.out == ""
-    assert list(tmp_path.iterdir()) == []
-
-
 @pytest.mark.parametrize("ending", ["png", "webp", "gif"])
 def test_without_opengl_a_picture_is_status_3_and_nothing_is_left(tmp_path, capsys, no_opengl, ending):
     assert hrg_render("free-dome", "--theory", "shell", "--out", tmp_path / f"mode.{ending}") == 3
@@ -145,10 +120,3 @@ def test_a_mesh_for_another_program_says_what_it_holds(tmp_path, capsys):
     text = (tmp_path / "solid.msh").read_text()
     assert text.split("$Nodes\n")[1].splitlines()[0] == str(found["nodes"])
     assert found["held_nodes"] > 0
-    for words, part in (
-        (["--out", "solid.stl"], ".msh"),
-        (["--out", "solid.inp", "--complete"], "--complete"),
-        (["--out", "solid.msh", "--layers", "99"], "16 elements"),
-    ):
-        assert main(["mesh", "hrg-30mm", *words]) == 2
-        assert part in capsys.readouterr().err

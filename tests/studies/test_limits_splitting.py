@@ -116,18 +116,6 @@ def test_a_plain_card_is_perfect_and_uncertain_numbers_are_listed(tmp_path):
     assert names["electrodes.gap_um"] == 5.0
 
 
-def test_modes_tell_the_split_only_where_there_is_one(tmp_path, capsys):
-    loaded(tmp_path, WALL, MASS)
-    assert main(["modes", str(tmp_path / "card.toml"), "--harmonic", "0", "2", "--json"]) == 0
-    breathing, two = json.loads(capsys.readouterr().out)["modes"]
-    assert "split" not in breathing
-    found = two["split"]
-    assert found["fast_Hz"] - found["slow_Hz"] == pytest.approx(found["split_Hz"], rel=1e-9)
-    assert set(found["parts"]) == {"imperfection", "measured", "electrodes"}
-    assert main(["modes", "free-dome", "--json"]) == 0
-    assert "split" not in json.loads(capsys.readouterr().out)["modes"][0]
-
-
 def test_studies_vary_a_wave_and_ask_for_the_split(tmp_path):
     instrument = loaded(tmp_path, WALL)
     quantity = Split(theory="shell")

@@ -30,10 +30,6 @@ def test_one_lag_without_radiation_is_found_with_its_interval(tmp_path, capsys):
     assert main(["fit", "thermal", str(path), "--lags", "1", "--json"]) == 0
     answer = json.loads(capsys.readouterr().out)
     assert answer["schema"] == "hrg.fit-thermal/1"
-    assert list(answer) == [
-        "schema", "data", "confidence", "estimates", "undetermined", "initial_departure_K", "residual_rms_Hz", "row_step_s",
-        "warnings",
-    ]  # fmt: skip
     tau, share = answer["estimates"]["time_constant_1"], answer["estimates"]["radiated_share"]
     assert tau["low"] < 1800.0 < tau["high"]
     assert tau["value"] == pytest.approx(1800.0, rel=0.01)
@@ -62,10 +58,6 @@ def test_unusable_records_are_refused(tmp_path, capsys):
     answer = capsys.readouterr()
     assert "still.csv: nothing can be identified" in answer.err
     assert answer.out == ""
-    assert main(["fit", "thermal"]) == 2
-    assert "name at least one record" in capsys.readouterr().err
-    assert main(["fit", "thermal", str(path), "--confidence", "90"]) == 2
-    assert "--confidence 90" in capsys.readouterr().err
     with pytest.raises(InputError, match=r"run.csv: thermal constants need frequency_Hz and housing_temperature_degC"):
         fit_thermal_constants([Record({"time_s": np.arange(9.0), "frequency_Hz": np.ones(9)}, path="run.csv")])
     with pytest.raises(InputError, match="--lags 9"):

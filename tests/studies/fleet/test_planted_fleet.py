@@ -195,5 +195,3 @@ def test_a_folder_without_devices_and_a_lot_of_one_are_refused(tmp_path, capsys)
     (tmp_path / "lot").mkdir()
     assert main(["fleet", str(tmp_path / "lot"), "--out", str(tmp_path / "out")]) == 2
     assert "no folders of devices" in capsys.readouterr().err
-    assert main(["diagnose", "--device", f"A={tmp_path / 'a.csv'}"]) == 2
-    assert "needs at least two devices" in capsys.readouterr().err

@@ -140,24 +140,24 @@ def cluster():
         yield address, *processes
 
 
+def started_slowly(folder, address, cases):
+    """A study of many slow cases on a cluster, as a process of its own, when its first results are in the store."""
+    spec, slow = folder / "study.toml", f'method = "latin-hypercube"\ncases = {cases}\nbatch = 4'
+    spec.write_text(spec_of("slow", slow, 'name = "user.x"\nlow = 0\nhigh = 1'))
+    words = words_of("study", "run", str(spec), "--out", str(folder / "out"), "--scheduler", address, "--allow-python")
+    run = subprocess.Popen(words, stderr=subprocess.PIPE, text=True, env=environment(HRG_TEST_LOG=str(folder / "log")))
+    until = time.monotonic() + 600
+    while run.poll() is None and time.monotonic() < until and not rows_of(folder / "out"):
+        time.sleep(0.1)
+    return run
+
+
 @pytest.mark.slow
 def test_two_dask_workers_give_the_same_bits_and_a_lost_scheduler_is_resumable(cluster, results, tmp_path, functions):
     address, scheduler, _ = cluster
-    spec = tmp_path / "study.toml"
-    spec.write_text(
-        spec_of("slow", 'method = "latin-hypercube"\ncases = 3000\nbatch = 4', 'name = "user.x"\nlow = 0\nhigh = 1')
-    )
     again = run_study(SPEC, scheduler=address)
     assert again.values.tobytes() == results.values.tobytes()
-    words = words_of(
-        "study", "run", str(spec), "--out", str(tmp_path / "out"), "--scheduler", address, "--allow-python"
-    )
-    run = subprocess.Popen(
-        words, stderr=subprocess.PIPE, text=True, env=environment(HRG_TEST_LOG=str(tmp_path / "log"))
-    )
-    until = time.monotonic() + 600
-    while run.poll() is None and time.monotonic() < until and not rows_of(tmp_path / "out"):
-        time.sleep(0.1)
+    run = started_slowly(tmp_path, address, 3000)
     scheduler.kill()
     _, said = run.communicate(timeout=600)
     assert run.returncode == 3, said
@@ -184,19 +184,7 @@ def test_a_public_scheduler_needs_encryption(address, public):
 @pytest.mark.slow
 def test_the_end_of_the_last_worker_is_said_and_the_study_is_resumable(cluster, tmp_path, functions):
     address, _, worker = cluster
-    spec = tmp_path / "study.toml"
-    spec.write_text(
-        spec_of("slow", 'method = "latin-hypercube"\ncases = 30000\nbatch = 4', 'name = "user.x"\nlow = 0\nhigh = 1')
-    )
-    words = words_of(
-        "study", "run", str(spec), "--out", str(tmp_path / "out"), "--scheduler", address, "--allow-python"
-    )
-    run = subprocess.Popen(
-        words, stderr=subprocess.PIPE, text=True, env=environment(HRG_TEST_LOG=str(tmp_path / "log"))
-    )
-    until = time.monotonic() + 240
-    while run.poll() is None and time.monotonic() < until and not rows_of(tmp_path / "out"):
-        time.sleep(0.1)
+    run = started_slowly(tmp_path, address, 30000)
     worker.terminate()
     _, said = run.communicate(timeout=120)
     assert run.returncode == 3, said

@@ -1,0 +1,121 @@
+"""Command lines that cannot be worked: one plain message that names the mend, status 2, nothing on stdout and no file."""
+
+import shlex
+
+import pytest
+
+from studies.cli import main
+
+REFUSED = {
+    "nonsense": "nonsense",
+    "cards none.toml --debug": "Traceback",  # only where it is asked for
+    "compare free-dome": "two cards or more",
+    "compare free-dome no-such": "no-such",
+    "derive --bell --code c": "leave out --code",
+    "derive --bell --dynamics": "choose one",
+    "derive --code fortran": "fortran",
+    "derive --dynamics --harmonic 3": "--dynamics holds for any harmonic",
+    "derive --harmonic 1": "harmonic",
+    "derive --harmonic 12 --rim-angle-deg 0.001": "hrg: ",
+    "derive --latex --code c": "--code",
+    "derive --pole-angle-deg 95": "hrg: ",
+    "derive --rim-angle-deg 179.99999": "hrg: ",
+    "derive --rim-angle-deg 180": "hrg: ",
+    "derive --rim-angle-deg 1e-9": "hrg: ",
+    "diagnose --plan 'soak 20 2h' --card nobody": "nobody",
+    "diagnose --device A=a.csv": "needs at least two devices",
+    "effects histeresis": "hysteresis",
+    "fit frequency HRG --order 7": "order",
+    "fit frequency none.csv": "no such file",
+    "fit thermal": "name at least one record",
+    "fit thermal HRG --confidence 90": "--confidence 90",
+    "keys card --table los": "did you mean 'loss'",
+    "keys crad": "did you mean 'card'",
+    "loop free-dome": "add a table [loop]",
+    "loop hrg-30mm-loops --hours -1 --out run.csv": "--hours -1: must be positive",
+    "loop hrg-30mm-loops --hours 1e9 --out run.csv": "more than",
+    "loop hrg-30mm-loops --hours 2": "--hours: only for a simulated run; add --out",
+    "loop hrg-30mm-loops --hours 2 --profile 'soak 20 1h' --out run.csv": "leave out --hours or --profile",
+    "loop hrg-30mm-loops --hours inf --out run.csv": "--hours",
+    "loop hrg-30mm-loops --profile 'soak 20 1h'": "--profile: only for a simulated run",
+    "loop hrg-30mm-loops --row 10 --noiseless": "--row, --noiseless: only for a simulated run",
+    "loop hrg-30mm-loops --seed -1 --out run.csv": "--seed",
+    "loss free-dome --from -100 --to 20": "outside the range",
+    "loss free-dome --from 30 --to 20": "hrg: ",
+    "materials fused-silca": "fused-silica",
+    "mesh hrg-30mm --out solid.inp --complete": "--complete",
+    "mesh hrg-30mm --out solid.msh --layers 99": "16 elements",
+    "mesh hrg-30mm --out solid.stl": ".msh",
+    "modes free-dome --amplitude -1": "--amplitude",
+    "modes free-dome --amplitude 1 --harmonic 1": "--amplitude",
+    "modes free-dome --spin 100 --theory shell": "--spin",
+    "modes free-dome --spin nan": "--spin",
+    "modes free-dome 3": "too many arguments",
+    "modes hrg-30mm --count 0": "count",
+    "render --out mode.png": "a card is missing",
+    "render free-dom --out mode.png": "did you mean 'free-dome'",
+    "render free-dome --colour rainbow --out mode.ply": "rainbow",
+    "render free-dome --colour temperature --out mode.ply": "--field",
+    "render free-dome --harmonic 2 3 --out mode.png": "only in an .html page",
+    "render free-dome --index -1 --out mode.stl": "counted from 0",
+    "render free-dome --out mode": "the ending",
+    "render free-dome --out mode.bmp": "the ending must be one of .png",
+    "render free-dome --temperature 1 2 3 4 5 --out mode.png": "4 at most",
+    "render free-dome --temperature 900 --theory shell --out mode.stl": "outside the range",
+    "render free-dome cvg-25mm --out mode.stl": "1 at most",
+    "reproduce --out file/sub": "cannot be written",
+    "scan free-dome none": "no face given",
+    "scan free-dome none none.asc": "there is no such file",
+    "simulate hrg-30 'soak 20 1h' --out x.csv": "did you mean 'hrg-30mm'",
+    "simulate hrg-30mm 'soak 20 1h' --out x.csv --row -1": "time between rows must be positive",
+    "simulate hrg-30mm 'soak 20 1h' --out x.csv --seed -1": "--seed",
+    "simulate hrg-30mm 'step 20 -90 5h' --out x.csv": "reaches -90 °C",
+    "simulate hrg-30mm 'stepp 20 -10 5h' --out x.csv": "'stepp' is not a kind of profile",
+    "tcf": "CARD is missing",
+    "tcf hrg-30m": "hrg-30mm",
+    "tcf hrg-30mm --from -300 --theory shell": "outside the range",
+    "tcf hrg-30mm --step 0": "step",
+    "tcf none.toml": "no such file",
+    "thermal hrg-30mm 'soak 20 1h' --rows 1": "--rows 1",
+    "thermal hrg-30mm nothere.csv": "there is no such file",
+    "thermal hrg-30mm step 20 -10 5h": '"step 20 -10 5h"',
+    "trim free-dome --split 0.05 --axis 10 --goal inf": "--goal",
+    "trim free-dome --split 0.05 --axis 10 --teeth 1000000000": "hrg: ",
+    f"trim free-dome --split 0.05 --axis 10 --unbalance 1:{'9' * 400}@35": "hrg: ",
+    "trim free-dome --split 0.05 --axis 10 --width-mm 1e-308": "hrg: ",
+    "trim free-dome --split 0.05 --axis 10 --width-mm 1e308": "hrg: ",
+    "trim free-dome --split 0.05 --axis nan": "--axis",
+    "trim free-dome --split 0.1": "--axis is missing: give one for each --split",
+    "trim free-dome --split 0.1 --axis 3 --cut edge --position 0.9": "lies at position 1",
+    "trim free-dome --split 0.1 --axis 3 --unbalance 4:3@2": "write k:µg@degrees",
+    "trim free-dome --split 0.5 --axis 3 --cut edge": "no depth of these cuts",  # it relieves what its mass does
+    "trim free-dome --split 1e-4 --axis 3": "measure more accurately before cutting",
+    "trim free-dome --split 500 --axis 3": "beyond the wall",
+    "twin free-dome": "--fmu",
+    **{
+        f"{words} {number}": "must be a finite number"
+        for number in ("inf", "nan", "-1e308", "1e16")
+        for words in (
+            "modes free-dome --amplitude",
+            "tcf free-dome --step",
+            "loop hrg-30mm-loops --rate",
+            "simulate free-dome 'step 20 -10 5h' --out run.csv --row",
+        )
+    },
+}
+
+
+SLOW = "trim free-dome --split 0.5 --axis 3 --cut edge"
+
+
+@pytest.mark.parametrize("words", [pytest.param(w, marks=[pytest.mark.slow] * (w == SLOW)) for w in REFUSED])
+def test_it_is_refused_in_one_message(words, tmp_path, monkeypatch, capsys, request):
+    table = request.config.rootpath / "studies/papers/hrg_table1.csv"
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "file").write_text("")
+    assert main(shlex.split(words.replace("HRG", str(table)))) == 2
+    out, err = capsys.readouterr()
+    assert REFUSED[words] in err
+    assert ("Traceback" in err) == ("--debug" in words)
+    assert out == ""
+    assert [path.name for path in tmp_path.iterdir()] == ["file"]
