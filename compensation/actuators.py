@@ -40,20 +40,12 @@ class RangeUse:
 
 @dataclass(frozen=True)
 class Actuators:
-    """Limits of the actuators, 1/s.
+    """Limits of the actuators, 1/s."""
 
-    Attributes
-    ----------
-    force : of the force across the wave.
-    drive : of the force along it, which holds the amplitude.
-    stiffness : of the stiffness that nulls quadrature, κ = ½ Δω.
-    quadrature : "force" or "stiffness", what the quadrature loop commands.
-    """
-
-    force: float = np.inf
-    drive: float = np.inf
-    stiffness: float = np.inf
-    quadrature: Literal["force", "stiffness"] = "force"
+    force: float = np.inf  # of the force across the wave
+    drive: float = np.inf  # of the force along it, which holds the amplitude
+    stiffness: float = np.inf  # of the stiffness that nulls quadrature, κ = ½ Δω
+    quadrature: Literal["force", "stiffness"] = "force"  # "force" or "stiffness", what the quadrature loop commands
 
     def __post_init__(self) -> None:
         for name in ("force", "drive", "stiffness"):

@@ -51,28 +51,16 @@ class PolynomialCurve:
 
 @dataclass(frozen=True)
 class BellChain:
-    """The fitted steps (33)–(36) and the filter.
+    """The fitted steps (33)–(36) and the filter."""
 
-    Attributes
-    ----------
-    null : N₁ (counts).
-    scale : S₁ (rad/s per count).
-    rough_covariance : array (2, 2), covariance of null and scale.
-    bias : N(T), rad/s over kelvin: eq. (34).
-    scale_over_rate : rate (rad/s) over rate (rad/s): eq. (35).
-    scale_over_temperature : factor (1) over kelvin: eq. (36).
-    taps : array, FIR coefficients, empty for none.
-    sampling : step (s) that the taps were designed for.
-    """
-
-    null: float
-    scale: float
-    rough_covariance: Real
-    bias: PolynomialCurve
-    scale_over_rate: PolynomialCurve
-    scale_over_temperature: PolynomialCurve
-    taps: Real
-    sampling: float
+    null: float  # N₁ (counts)
+    scale: float  # S₁ (rad/s per count)
+    rough_covariance: Real  # array (2, 2), covariance of null and scale
+    bias: PolynomialCurve  # N(T), rad/s over kelvin: eq. (34)
+    scale_over_rate: PolynomialCurve  # rate (rad/s) over rate (rad/s): eq. (35)
+    scale_over_temperature: PolynomialCurve  # factor (1) over kelvin: eq. (36)
+    taps: Real  # array, FIR coefficients, empty for none
+    sampling: float  # step (s) that the taps were designed for
 
     @property
     def delay(self) -> float:
@@ -94,14 +82,7 @@ class ChainOutput:
 def apply_chain(
     chain: BellChain, time: ArrayLike, output: ArrayLike, temperature: ArrayLike, *, extrapolate: bool = False
 ) -> ChainOutput:
-    """Return the rate after each step of eq. (32), and after the filter.
-
-    Parameters
-    ----------
-    chain : the fitted steps.
-    time, output, temperature : array (N,), times (s), raw output (counts) and temperature (K).
-    extrapolate : allow temperatures and rates outside the fitted ranges.
-    """
+    """Return the rate after each step of eq. (32), and after the filter."""
     t, A, T = read_columns(time=time, output=output, temperature=temperature)
     rough = chain.scale * (A - chain.null)
     straight = rough - chain.bias.value(T)

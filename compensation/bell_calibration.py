@@ -38,14 +38,10 @@ class BellRun:
 
 
 def fit_rough(run: BellRun) -> tuple[float, float, Real]:
-    """Fit null N₁ (counts) and scale S₁ (rad/s per count) to a run at rest and turning: eq. (33).
+    """Fit null N₁ (counts) and scale S₁ (rad/s per count), with covariance, to a run at rest and turning: eq. (33).
 
     The output is regressed on the rate, whose values are exact; with the paper's two plateaus the line passes through
     both means.
-
-    Returns
-    -------
-    null, scale, covariance : float, array (2, 2), of null and scale in this order.
     """
     line = fit_polynomial(run.rate, run.output, 1, "rate")
     (null, slope), _ = line.about(0.0)

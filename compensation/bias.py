@@ -132,8 +132,6 @@ def prepare_run(
 
     Parameters
     ----------
-    time, state, bias : array, shape (m,)
-        Time (s), frequency (Hz) or temperature (°C), and zero-rate output; NaN where missing.
     width : length of the blocks that are averaged, s; never less than the sampling interval.
     window : length of the window over which the rate is taken, s.
     causal : the rate uses past samples only, as firmware must, and lags by window/2.

@@ -70,13 +70,9 @@ class _Fold:
 
 
 def fit_bias(runs: Sequence[BiasRun], method: Method = "guarded", reference: float | None = None) -> BiasFit:
-    """Select and fit the bias model on one run or several, HRG paper eqs. (21), (22).
+    """Select and fit the bias model, HRG paper eqs. (21), (22); every run has its own constant, B₀ is their mean.
 
-    Parameters
-    ----------
-    runs : sequence of BiasRun, every run has its own constant (turn-on bias); B₀ is their mean.
-    method : "paper" or "guarded", see the head of this module.
-    reference : the frequency or temperature from which changes are counted; the first of the first run unless given.
+    `reference`: the frequency or temperature from which changes are counted; the first of the first run unless given.
     """
     return _select(runs, method, reference, by_runs=len(runs) > 1)
 
@@ -85,10 +81,6 @@ def choose_memory(prepare: Callable[[Memory], Sequence[BiasRun]]) -> Memory:
     """Return the lag and play of highest likelihood behind which all candidate terms together act.
 
     Each must gain `WORTH` in deviance, m ln(SSE/m) of the whitened rows, to be taken.
-
-    Parameters
-    ----------
-    prepare : memory to runs that were prepared with it.
     """
     plain = prepare(NO_MEMORY)
     span = float(np.ptp(np.concatenate([run.state for run in plain])))
@@ -138,11 +130,6 @@ def score_held_out(runs: Sequence[BiasRun], method: Method = "guarded") -> HeldO
     The blocks of a single run are held out with a gap of one thermal constant, std(f) / rms(ḟ), on either side. The
     held-out piece's own constant is refitted, nothing else; rows outside the range that the rest has seen are not
     predicted, as the model refuses to be used there, and `coverage` tells how many were left.
-
-    Raises
-    ------
-    NoHeldOut
-        The run is too short, or nothing of any held-out piece lies inside the range of the rest.
     """
     by_runs = len(runs) > 1
     folds, fits = [], []
@@ -225,11 +212,6 @@ def score_runs(fit: BiasFit, runs: Sequence[BiasRun], *, extrapolate: bool = Fal
     """Apply a fitted model to runs that it has not seen; each run's own mean is taken out, nothing else.
 
     Rows outside the range that the fit has seen are left out, unless `extrapolate`.
-
-    Raises
-    ------
-    NoHeldOut
-        Nothing of the runs lies inside the range of frequency and rate that the fit has seen.
     """
     return _pool([_Fold(run, []) for run in runs], [fit] * len(runs), by_runs=True, everywhere=extrapolate)
 

@@ -32,23 +32,14 @@ FOUR = 4
 
 @dataclass(frozen=True)
 class ClosedLoop:
-    """One sample of wave and loops as a linear map of the state, and its powers.
+    """One sample of wave and loops as a linear map of the state, and its powers."""
 
-    Attributes
-    ----------
-    A : complex (2, 2), 1/s, averaged dynamics in the frame of the wave.
-    pickoff, drive : complex (2, 2), channels in the frame of the wave.
-    loops : Loops
-    electronics : for the noise; its channels are those above.
-    turning : the wave turns freely (whole angle): the frame follows it, there is no rate loop.
-    """
-
-    A: Complex
-    pickoff: Complex
+    A: Complex  # complex (2, 2), 1/s, averaged dynamics in the frame of the wave
+    pickoff: Complex  # pickoff, drive: complex (2, 2), channels in the frame of the wave
     drive: Complex
     loops: Loops
-    electronics: Electronics
-    turning: bool = False
+    electronics: Electronics  # for the noise; its channels are those above
+    turning: bool = False  # the wave turns freely (whole angle): the frame follows it, there is no rate loop
 
     @cached_property
     def places(self) -> dict[str, slice]:

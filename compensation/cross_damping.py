@@ -30,11 +30,7 @@ Real = NDArray[np.float64]
 
 
 def relate_cross_damping_to_secondary(element: SensitiveElement) -> TransferFunction:
-    """W₂ᶻ(s) = 2 A₁ j ω k₂ / ((s + jω)² + 2 ζ₂ k₂ (s + jω) + k₂²), in m per unit ζ₁₂: second of eqs. (6).
-
-    Its companion, rate to secondary, is `relate_rate_to_secondary`; both with the denominator of (4)
-    instead are the slow forms.
-    """
+    """W₂ᶻ(s) = 2 A₁ j ω k₂ / ((s + jω)² + 2 ζ₂ k₂ (s + jω) + k₂²), in m per unit ζ₁₂: second of eqs. (6)."""
     return TransferFunction((_drive_by_damping(element),), expand_secondary(element))
 
 
@@ -57,14 +53,7 @@ def _drive_by_damping(element: SensitiveElement) -> complex:
 
 
 def relate_cross_damping_to_rate_when_tuned(k: float, zeta: float, g2: float = 2.0) -> TransferFunction:
-    """W(s) = 2 k² ζ / (g₂ (s + k ζ)), rad/s per unit ζ₁₂, for equal modes driven at resonance: eq. (9).
-
-    Parameters
-    ----------
-    k : natural frequency (rad/s).
-    zeta : relative damping (1).
-    g2 : Coriolis coefficient (1); 2 for a cylinder.
-    """
+    """W(s) = 2 k² ζ / (g₂ (s + k ζ)), rad/s per unit ζ₁₂, for equal modes driven at resonance: eq. (9)."""
     if not (0 < k < 1e12 and 0 < zeta < 1 and g2 != 0):
         raise CompensationError(
             "eq. (9) needs a positive natural frequency that a resonator can have, damping between 0 and 1, and g2 not zero."
@@ -80,40 +69,24 @@ def evaluate_cross_damping(coefficients: ArrayLike, shift: ArrayLike) -> Real:
 
 @dataclass(frozen=True)
 class CrossDampingModel:
-    """ζ₁₂(T) of one gyro and what turns it into rate: eqs. (9), (10).
+    """ζ₁₂(T) of one gyro and what turns it into rate: eqs. (9), (10)."""
 
-    Attributes
-    ----------
-    coefficients : array (n + 1,), ζᵢ (K⁻ⁱ), constant first.
-    covariance : array (n + 1, n + 1), covariance of the coefficients.
-    calibration_temperature : temperature (K) from which T is counted.
-    k, zeta, g2 : natural frequency (rad/s), relative damping (1) and Coriolis coefficient (1) of eq. (9).
-    lowest, highest : temperatures (K) between which it was fitted.
-    noise : standard deviation (rad/s) of what the fit left.
-    """
-
-    coefficients: Real
-    covariance: Real
-    calibration_temperature: float
-    k: float
+    coefficients: Real  # array (n + 1,), ζᵢ (K⁻ⁱ), constant first
+    covariance: Real  # array (n + 1, n + 1), covariance of the coefficients
+    calibration_temperature: float  # temperature (K) from which T is counted
+    k: float  # k, zeta, g2: natural frequency (rad/s), relative damping (1) and Coriolis coefficient (1) of eq. (9)
     zeta: float
     g2: float
-    lowest: float
+    lowest: float  # lowest, highest: temperatures (K) between which it was fitted
     highest: float
-    noise: float
+    noise: float  # standard deviation (rad/s) of what the fit left
 
     def cross_damping(self, temperature: ArrayLike) -> Real:
         """Return ζ₁₂ (1) at a temperature (K): eq. (10)."""
         return evaluate_cross_damping(self.coefficients, np.asarray(temperature) - self.calibration_temperature)
 
     def predict(self, time: ArrayLike, temperature: ArrayLike, *, extrapolate: bool = False) -> Real:
-        """Return the erroneous rate (rad/s) over time: ζ₁₂(T(t)) through the filter (9), settled at the start.
-
-        Parameters
-        ----------
-        time, temperature : array (N,), times (s) and temperature (K), linear in between.
-        extrapolate : allow temperatures outside the fitted range.
-        """
+        """Return the erroneous rate (rad/s) over time: ζ₁₂(T(t)) through the filter (9), settled at the start."""
         t, T = read_columns(time=time, temperature=temperature)
         _check_range(T, self.lowest, self.highest, extrapolate)
         return simulate_bias(t, self.cross_damping(T), self.k, self.zeta, self.g2)
@@ -169,13 +142,6 @@ def fit_cross_damping(
 
     The model is linear in ζᵢ: each column of the regression is Tⁱ after the filter (9), so the fit is dynamic too.
     The covariance allows for errors that wander (see `correlated`).
-
-    Parameters
-    ----------
-    runs : sequence of RestRun, one or more runs.
-    k, zeta, g2 : constants of eq. (9): natural frequency (rad/s), relative damping and Coriolis coefficient (1).
-    calibration_temperature : temperature (K) from which T is counted.
-    order : highest power of T, 1 or more; 3 in the paper.
     """
     if order < 1:
         raise CompensationError(f"the polynomial of eq. (10) needs an order of 1 or more, not {order}.")

@@ -47,15 +47,7 @@ def average_groups(values: Array, group: NDArray[np.intp], count: int = 0) -> Ar
 
 
 def average_blocks(time: ArrayLike, columns: Mapping[str, ArrayLike], width: float) -> Blocks:
-    """Average every column over consecutive blocks of `width` seconds.
-
-    Parameters
-    ----------
-    time : array (m,), strictly increasing, s; any sampling.
-    columns : mapping of name to array, shape (m,)
-        NaN marks a missing value; a row that lacks one column is left out of all.
-    width : length of a block, s.
-    """
+    """Average columns over blocks of `width` (s), any sampling; a row that lacks one of them (NaN) is left out of all."""
     t = np.asarray(time, dtype=np.float64)
     arrays = {name: np.asarray(column, dtype=np.float64) for name, column in columns.items()}
     check_time(t)

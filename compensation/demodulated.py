@@ -78,11 +78,6 @@ def respond_to_oscillating_rate(element: SensitiveElement, frequency: ArrayLike)
     """Return amplitude A(λ) (m per rad/s) and phase φ(λ) (rad) of the secondary for the rate e^{jλt}: eq. (14).
 
     The phase is taken with the sign of numerator and denominator of (14), so it is right in all four quadrants.
-
-    Parameters
-    ----------
-    element : the oscillators.
-    frequency : array, angular frequency λ of the rate (rad/s), of either sign: the response is not symmetric.
     """
     e, frequency = element, np.asarray(frequency, dtype=float)
     shifted = frequency + e.omega
@@ -143,17 +138,11 @@ def relate_rate_to_measured_rate(k: float, zeta: float) -> TransferFunction:
 
 @dataclass(frozen=True)
 class ErrorMap:
-    """Figure 3: the integral error of the simplified dynamics over the mismatch of the two modes.
+    """Figure 3: the integral error of the simplified dynamics over the mismatch of the two modes."""
 
-    Attributes
-    ----------
-    frequency_ratio, damping_ratio : arrays (N,), (M,), δk = k₂/k₁ and δζ = ζ₂/ζ₁ (1).
-    error : array (M, N), J of eq. (26) over the integral of the realistic amplitude squared (1).
-    """
-
-    frequency_ratio: Real
+    frequency_ratio: Real  # frequency_ratio, damping_ratio: arrays (N,), (M,), δk = k₂/k₁ and δζ = ζ₂/ζ₁ (1)
     damping_ratio: Real
-    error: Real
+    error: Real  # array (M, N), J of eq. (26) over the integral of the realistic amplitude squared (1)
 
 
 def map_integral_error(
@@ -170,13 +159,6 @@ def map_integral_error(
     J(δk, δζ) = ∫₀ᵀ [A₂₀ − A₂₀*]² dt after a step of the rate, A₂₀ from (24) and A₂₀* from the full equations (1)
     for k₂ = δk k, ζ₂ = δζ ζ. The paper gives neither T nor the rate; here T = `settling_times` / (k ζ), and J is
     divided by ∫ A₂₀*² dt of the tuned gyro, so that 0.01 means a tenth of the amplitude, rms.
-
-    Parameters
-    ----------
-    frequency_ratio, damping_ratio : array (N,), array (M,), δk and δζ (1).
-    k, zeta : natural frequency (rad/s) and relative damping (1) of the primary, driven at its resonance.
-    rate : height of the step (rad/s).
-    settling_times : length of the transient in time constants.
     """
     ratios, dampings = np.array(frequency_ratio, float, ndmin=1), np.array(damping_ratio, float, ndmin=1)
     if np.any(ratios <= 0) or np.any(dampings <= 0):
@@ -200,11 +182,6 @@ def measure_rate(element: SensitiveElement, time: ArrayLike, rate: ArrayLike) ->
 
     The secondary amplitude is detected in the phase that a constant rate gives it, W₂(0), which keeps the sign of the
     rate; this is the 'realistic' gyro of figures 5–7.
-
-    Parameters
-    ----------
-    element : the oscillators.
-    time, rate : array (N,), times (s) and true angular rate (rad/s), linear in between.
     """
     read_columns(time=time, rate=rate)
     secondary = propagate_envelope(element, time, rate).secondary

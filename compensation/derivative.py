@@ -30,12 +30,7 @@ def differentiate(time: ArrayLike, values: ArrayLike, window: float, *, causal: 
     dx/dt ≈ Σ (tᵢ − t̄)(xᵢ − x̄) / Σ (tᵢ − t̄)², the slope of a first-order Savitzky–Golay filter, for any sampling.
     White noise of standard deviation σ on m samples in the window w makes an error of about √12 σ / (w √m).
 
-    Parameters
-    ----------
-    time, values : array (m,), time (s), strictly increasing, and the variable.
-    window : length of the window, s.
-    causal : the window ends at the present sample, as firmware has it, and the lag is window/2; else it is centred and
-        the lag is zero.
+    `causal`: the window (s) ends at the present sample, as firmware has it, and lags by window/2; else it is centred.
     """
     t, x = np.asarray(time, dtype=np.float64), np.asarray(values, dtype=np.float64)
     check_time(t)

@@ -79,10 +79,6 @@ def thermal_noise(wave: StandingWave, temperature: float, modal_mass: float, amp
 
     A quadrature X obeys dX = −X/τ dt + σ dW; equipartition, ⟨X²⟩ = k_B T/(m ω²) = σ² τ/2, gives σ. As angle random walk
     of the rate it is σ/(a n k) (rad/√s).
-
-    Parameters
-    ----------
-    temperature, modal_mass, amplitude : float, K, kg, m
     """
     if not (temperature > 0 and modal_mass > 0 and amplitude > 0):
         raise CompensationError("thermal noise needs a positive temperature, modal mass and amplitude.")

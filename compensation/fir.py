@@ -11,11 +11,8 @@ Real = NDArray[np.float64]
 def design_smoother(sampling: float, cutoff: float, order: int = 50) -> Real:
     """Return the taps of a low-pass FIR filter (Hamming window) with unit gain at rest.
 
-    Parameters
-    ----------
-    sampling : step (s) of the output; 0.1 s in the paper.
-    cutoff : nominal cut-off (Hz): half the amplitude there, as long as it is above about two over the filter's length.
-    order : number of taps less one; 50 in the paper.
+    Half the amplitude is left at the `cutoff` (Hz), as long as that is above about two over the filter's length; the
+    paper has 50 taps less one and a `sampling` step of 0.1 s.
     """
     from scipy.signal import firwin
 

@@ -153,14 +153,7 @@ def find_turn(curve: Callable[[Array], Array], span: tuple[float, float]) -> flo
 
 
 def invert(curve: Callable[[Array], Array], span: tuple[float, float], frequency: Array) -> Array:
-    """Return the temperatures (°C) within a span whose frequencies (Hz) these are; NaN where there is no frequency.
-
-    Parameters
-    ----------
-    curve : f(T).
-    span : (low, high), °C, the root is bracketed by it.
-    frequency : array
-    """
+    """Return the temperatures (°C) within a span whose frequencies (Hz) these are; NaN where there is no frequency."""
     turn = find_turn(curve, span)
     if turn is not None:
         raise CompensationError(
@@ -197,12 +190,7 @@ def fit_frequency(
 ) -> FrequencyFit:
     """Fit f(T) by least squares, HRG paper eqs. (16)–(18).
 
-    Parameters
-    ----------
-    temperature_degC, frequency : array (m,), settled temperatures (°C) and the resonator's frequency there (Hz).
-    order : highest power; the paper takes 3.
-    reference_temperature_degC : T₀, about which the coefficients are stated.
-    resolution : step of the frequency readings (Hz): rounding to it has the variance resolution²/12.
+    `resolution`: step of the readings (Hz); rounding to it has the variance resolution²/12.
     """
     T, f = np.asarray(temperature_degC, dtype=np.float64), np.asarray(frequency, dtype=np.float64)
     if resolution is not None and not (np.isfinite(resolution) and resolution > 0):

@@ -40,12 +40,7 @@ class Improvement:
 
 
 def compare_outputs(times: Sequence[Real], before: Sequence[Real], after: Sequence[Real]) -> Improvement:
-    """Return the improvement of an output that should be zero; its mean before counts as removed by calibration.
-
-    Parameters
-    ----------
-    times, before, after : sequences of arrays, one of each per run, times (s) and outputs.
-    """
+    """Return the improvement of an output that should be zero; its mean before counts as removed by calibration."""
     means = [[_average(t, y) for t, y in zip(times, outputs, strict=True)] for outputs in (before, after)]
     return Improvement(
         _compare(np.concatenate(before), np.concatenate(after)), _compare(*(np.concatenate(one) for one in means))
@@ -53,13 +48,7 @@ def compare_outputs(times: Sequence[Real], before: Sequence[Real], after: Sequen
 
 
 def hold_out(runs: Sequence[Run], compensate: Callable[[Sequence[Run], Run], Real]) -> list[Real]:
-    """Return the compensated output of each run, which the compensation has not seen.
-
-    Parameters
-    ----------
-    runs : sequence, two runs or more.
-    compensate : (Runs to fit, run to compensate) to the compensated output of the latter.
-    """
+    """Return the compensated output of each run, which the compensation has not seen."""
     if len(runs) < 2:
         raise CompensationError("a held-out improvement needs two runs or more.")
     return [compensate([*runs[:i], *runs[i + 1 :]], run) for i, run in enumerate(runs)]

@@ -18,20 +18,12 @@ _NOT_STEADY = "this model has no steady filter: a lasting state is not observed,
 
 @dataclass(frozen=True)
 class LinearModel:
-    """x⁺ = F x + w, z = C x + v: eq. (37).
+    """x⁺ = F x + w, z = C x + v: eq. (37)."""
 
-    Parameters
-    ----------
-    transition : array (n, n), F.
-    measurement : array (m, n), C.
-    process_noise : array (n, n), Q, covariance of w over one step.
-    measurement_noise : array (m, m), R, covariance of v.
-    """
-
-    transition: Real
-    measurement: Real
-    process_noise: Real
-    measurement_noise: Real
+    transition: Real  # array (n, n), F
+    measurement: Real  # array (m, n), C
+    process_noise: Real  # array (n, n), Q, covariance of w over one step
+    measurement_noise: Real  # array (m, m), R, covariance of v
 
     def __post_init__(self) -> None:
         for name in ("transition", "measurement", "process_noise", "measurement_noise"):
@@ -51,13 +43,6 @@ def model_gyro(k: float, zeta: float, step: float, process_noise: ArrayLike, mea
     """Return the model of a tuned gyro with the states (Ω measured, Ω₀ true), Ω₀ a random walk: eqs. (37)–(40).
 
     A = ((−kζ, kζ), (0, 0)) and C = (1, 0); F = exp(A t), that is e^{−kζt}, 1 − e^{−kζt} in the first row.
-
-    Parameters
-    ----------
-    k, zeta : natural frequency (rad/s) and relative damping (1).
-    step : sampling step t (s); the paper does not give its own.
-    process_noise : array (2, 2), Q, rad²/s² per step.
-    measurement_noise : R, rad²/s².
     """
     if not (k > 0 and zeta > 0 and step > 0):
         raise CompensationError("the gyro model needs a positive natural frequency, damping and sampling step.")
@@ -120,14 +105,7 @@ class KalmanRun:
 
 
 def run_filter(model: LinearModel, measurements: ArrayLike, start: ArrayLike, covariance: ArrayLike) -> KalmanRun:
-    """Filter a series of evenly sampled measurements.
-
-    Parameters
-    ----------
-    model : the system.
-    measurements : array (N,) or (N, m), z, one row a step; the first is one step after `start`.
-    start, covariance : array (n,), array (n, n), state and its covariance before the first step.
-    """
+    """Filter evenly sampled measurements z, (N,) or (N, m), the first one step after `start`; leave gaps to `predict`."""
     z = np.asarray(measurements, dtype=float)
     z = z[:, None] if z.ndim == 1 else z
     m, n = model.measurement.shape
@@ -160,11 +138,6 @@ def settle(model: LinearModel) -> tuple[Real, Real, Real]:
     """Return gain K, and covariance before and after a measurement, that the filter tends to.
 
     The covariance before solves P = F P Fᵀ − F P Cᵀ (C P Cᵀ + R)⁻¹ C P Fᵀ + Q.
-
-    Raises
-    ------
-    CompensationError
-        When there is none: the state cannot be observed, or is never stirred by noise.
     """
     from scipy.linalg import LinAlgError, solve_discrete_are
 

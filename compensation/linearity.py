@@ -21,16 +21,11 @@ def same_rate(rate: ArrayLike) -> Real:
 
 @dataclass(frozen=True)
 class Linearity:
-    """The line through measured over applied rate, and the largest departure from it.
+    """The line through measured over applied rate, and the largest departure from it."""
 
-    Attributes
-    ----------
-    slope, intercept : of the line (1, rad/s).
-    nonlinearity : largest deviation from the line over full scale (1), full scale being the largest applied rate.
-    """
-
-    slope: float
+    slope: float  # slope, intercept: of the line (1, rad/s)
     intercept: float
+    # largest deviation from the line over full scale (1), full scale being the largest applied rate
     nonlinearity: float
 
 

@@ -53,14 +53,7 @@ def read_rate_from_loop(
 
     Ω = Re{ [F/m₀ − (c₁/m₀) P − (ω_n² − ω²) Q − 2jω Q̇] / (4 k jω P) }; Q̈ is neglected against ω Q̇.
 
-    Parameters
-    ----------
-    resonator : constants of the two axes.
-    omega : carrier frequency (rad/s) of the amplitudes.
-    time : array (N,), times (s).
-    p, q : complex array (N,), amplitudes P, Q (m), as `motion.demodulate` gives them.
-    force : complex array (N,), optional
-        Amplitude F of f_q (N): force rebalance, eq. (26). Without it the loop is open, eq. (25).
+    Without `force` (N,), the amplitude F of f_q (N), the loop is open: eq. (25).
     """
     P, Q = np.asarray(p, dtype=complex), np.asarray(q, dtype=complex)
     F = np.zeros_like(P) if force is None else np.asarray(force, dtype=complex)
@@ -81,12 +74,6 @@ def read_rate_from_drive(
 
     The first of (23) gives Ω = [p̈ + ω_n² p + (c₁/m₀) q − f_p/m₀] / (4 k q̇); for amplitudes
     Ω = Re{ [(ω_n² − ω²) P + 2jω Ṗ + (c₁/m₀) Q − F/m₀] / (4 k jω Q) }. It needs an axis q that moves: open loop.
-
-    Parameters
-    ----------
-    resonator, omega, time, p, q
-        As for `read_rate_from_loop`.
-    force : complex array (N,), amplitude F of f_p (N).
     """
     r = resonator
     if np.any(np.asarray(q) == 0):
@@ -98,12 +85,5 @@ def read_rate_from_drive(
 
 
 def scale_of_rebalance(resonator: BellResonator, omega: float, amplitude: float) -> float:
-    """K of Ω = K A_q, rad/s per newton of rebalance amplitude: 1 / (4 k m₀ ω P), BVG paper eq. (30).
-
-    Parameters
-    ----------
-    resonator : constants of the two axes.
-    omega : frequency of vibration (rad/s).
-    amplitude : amplitude of the driven axis (m), held constant by the loop.
-    """
+    """K of Ω = K A_q, rad/s per newton of rebalance amplitude: 1 / (4 k m₀ ω P), BVG paper eq. (30)."""
     return 1 / (4 * resonator.precession_factor * resonator.m0 * omega * amplitude)

@@ -32,16 +32,7 @@ def write_dynamics(
 ) -> Real:
     """Return the matrices M of ẏ = M y + (0, 0, q₁, 0, 0), y = (x₁, x₂, ẋ₁, ẋ₂, 1): CVG cross-damping eq. (2).
 
-    Parameters
-    ----------
-    element : the oscillators.
-    rate, rate_slope : array (...,), Ω (rad/s) and its time derivative (rad/s²).
-    zeta12, zeta21 : array (...,), relative cross-damping (1); with both zero these are equations (1).
-
-    Returns
-    -------
-    array (..., 5, 5)
-        The last state is the constant 1 and carries no force here; the caller adds the excitation in its column.
+    The last state is the constant 1 and carries no force here; the caller adds the excitation in its column.
     """
     e = element
     Omega, slope, cross12, cross21 = np.broadcast_arrays(
@@ -75,16 +66,6 @@ def propagate_envelope(
     exact where the rate is constant. Where it changes, a step that resolves the carrier (h ω < 1) uses the
     fourth-order Magnus expansion h M(mid) + h³/12 [M′, M(mid)], a longer one M(mid) alone: second order in h, and
     slow amplitudes do not feel the carrier that it steps over.
-
-    Parameters
-    ----------
-    element, time, rate, zeta12, zeta21, from_rest
-        As for `integrate_motion`.
-
-    Returns
-    -------
-    Motion
-        Complex amplitudes A₁, A₂ at `time`.
     """
     from scipy.linalg import expm
 
@@ -119,15 +100,7 @@ def demodulate(time: ArrayLike, displacement: ArrayLike, omega: float) -> tuple[
 
     2 j x e^{−jωt} = A − A* e^{−2jωt}; a moving mean over one period, taken twice, removes the second term as long
     as A changes linearly over the window, and does not shift A in time.
-
-    Parameters
-    ----------
-    time, displacement : array (N,), even times (s), a whole number per period, and x (m).
-    omega : carrier frequency (rad/s).
-
-    Returns
-    -------
-    time, amplitude : arrays, shorter than the input by one period at either end.
+    The result lacks one period at either end.
     """
     t, x = read_columns(time=time, displacement=displacement)
     step = require_regular(t, "synchronous demodulation")

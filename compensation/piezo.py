@@ -29,23 +29,14 @@ DRIVE_P, SENSE_P, DRIVE_Q, SENSE_Q = (1, 5), (3, 7), (2, 6), (4, 8)
 
 @dataclass(frozen=True)
 class PiezoRing:
-    """Eight equal elements on the wall.
+    """Eight equal elements on the wall."""
 
-    Attributes
-    ----------
-    stress : Σ = σ_θθ + σ_φφ of the wall under the elements per displacement of the pattern (Pa/m), at its antinode.
-    d31 : piezoelectric constant (C/N).
-    area : area S of one element (m²).
-    arc : angle that one element covers (rad); its charge is the mean over it.
-    capacitance : feedback of the charge amplifiers (F): they give V = −F/C.
-    harmonic : int
-    """
-
+    # Σ = σ_θθ + σ_φφ of the wall under the elements per displacement of the pattern (Pa/m), at its antinode
     stress: float
-    d31: float
-    area: float
-    arc: float
-    capacitance: float
+    d31: float  # piezoelectric constant (C/N)
+    area: float  # area S of one element (m²)
+    arc: float  # angle that one element covers (rad); its charge is the mean over it
+    capacitance: float  # feedback of the charge amplifiers (F): they give V = −F/C
     harmonic: int = 2
 
     def __post_init__(self) -> None:

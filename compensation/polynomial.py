@@ -91,15 +91,7 @@ def count_apart(x: ArrayLike) -> int:
 def fit_polynomial(
     x: ArrayLike, y: ArrayLike, order: int, name: str = "x", least_variance: float = 0.0
 ) -> PolynomialFit:
-    """Fit a polynomial of the given order by least squares.
-
-    Parameters
-    ----------
-    x, y : array, shape (m,)
-    order : highest power, 1 or more.
-    name : what errors call x.
-    least_variance : variance that every observation has at least, such as that of its rounding.
-    """
+    """Fit a polynomial of the given order by least squares."""
     if order < 1:
         raise CompensationError(f"a polynomial fit needs an order of 1 or more, not {order}.")
     x, y = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)

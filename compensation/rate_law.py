@@ -44,12 +44,7 @@ class RateLaw:
 
 
 def fit_rate_law(rate: Real, output: Real, error: Real) -> RateLaw | None:
-    """Choose the form of means of held rates; None of fewer than six rates, or of one direction.
-
-    Parameters
-    ----------
-    rate, output, error : array (levels,), applied rate, mean output in any unit, and the standard error of the mean.
-    """
+    """Choose the form of mean outputs at held rates, with standard errors; None below six rates or of one direction."""
     if len(rate) < LEAST or not rate.min() < 0 < rate.max():
         return None
     forms: list[RateForm] = []

@@ -61,20 +61,8 @@ def simulate_rebalance(
 ) -> LoopRun:
     """Run a gyro in force-to-rebalance mode, settled at the first row.
 
-    Parameters
-    ----------
-    wave : its values numbers, or arrays (N,).
-    electronics, loops
-    time : array (N,), even times (s), a whole number of samples apart.
-    rate : float or array (N,), rate (rad/s), linear between rows.
-    angle : float or array (N,), commanded azimuth (rad); where it changes, the loops are settled anew.
-    generator : of the noise; without it there is none.
-
-    Raises
-    ------
-    CompensationError
-        A loop is unstable (said with its margins, before anything is simulated), the rows are uneven, the loops need more
-        than the actuators give where they are settled, or the wave is lost while an actuator is at its limit.
+    `rate` (rad/s) is linear between the rows, which are a whole number of samples apart; where the commanded `angle`
+    (rad) changes, the loops are settled anew. CompensationError where the wave is lost, an actuator being at its limit.
     """
     t = np.asarray(time, dtype=float)
     samples = samples_in_row(t, loops)
@@ -137,17 +125,7 @@ def settle_rebalance(
         C_d (a, r + iq) − iν m = n θ̇ C_p⁻¹ (0, 1) − A m,
 
     two complex equations; a stiffness acts as iq (m₂, m₁) in the place of C_d (0, iq).
-
-    Parameters
-    ----------
-    wave : its values numbers, or arrays (N,).
-    rate, angle : float or array (N,), rate (rad/s) and azimuth of the wave (rad).
-    turn : float or array (N,), θ̇ (rad/s) at which the rate's command turns the wave, as the pick-offs show it.
-
-    Returns
-    -------
-    LoopRun
-        `time` counts the rows.
+    `turn` is the θ̇ (rad/s) at which the rate's command turns the wave, as the pick-offs show it.
     """
     values = [np.asarray(getattr(wave, name), dtype=float) for name in PHYSICAL]
     shape = np.broadcast_shapes(*(np.shape(x) for x in (*values, rate, angle)), (1,))
@@ -176,14 +154,7 @@ def use_of_range(run: LoopRun, electronics: Electronics, coupling: float) -> Ran
 
 
 def leak_quadrature(quadrature: ArrayLike, phase: ArrayLike, coupling: float = 1.0) -> Real:
-    """Rate (rad/s) that the quadrature's force shows in the rate's channel, ε q/(n k); the loop indicates its negative.
-
-    Parameters
-    ----------
-    quadrature : q, as `LoopRun` has it (1/s).
-    phase : ε, phase errors of pick-off and drive together (rad).
-    coupling : n k.
-    """
+    """Rate (rad/s) that the quadrature's force shows in the rate's channel, ε q/(n k); the loop indicates its negative."""
     return np.asarray(np.asarray(quadrature) * np.asarray(phase) / coupling)
 
 

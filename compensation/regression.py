@@ -119,16 +119,7 @@ def fit_linear(
     constant: bool = True,
     least_variance: float = 0.0,
 ) -> LinearFit:
-    """Fit y = b₀ + X b by least squares, HRG paper eqs. (19), (20).
-
-    Parameters
-    ----------
-    X : array (m, k), one column per variable.
-    y : array (m,), observations.
-    names : sequence of k names, names of the columns; errors speak of them.
-    constant : fit b₀ too; it comes first in the result under the name "constant".
-    least_variance : variance that every observation has at least, such as that of its rounding.
-    """
+    """Fit y = b₀ + X b by least squares, HRG paper eqs. (19), (20)."""
     X, y = _check(X, y, names)
     m, k = X.shape
     if m < k + constant + 1:

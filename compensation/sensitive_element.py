@@ -13,23 +13,15 @@ from compensation.errors import CompensationError
 
 @dataclass(frozen=True)
 class SensitiveElement:
-    """Parameters of the motion equations (1) of both CVG papers.
+    """Parameters of the motion equations (1) of both CVG papers."""
 
-    Parameters
-    ----------
-    k1, k2 : natural frequencies of the primary and secondary motion (rad/s).
-    zeta1, zeta2 : relative damping (1), 1/(2 Q).
-    omega : excitation frequency (rad/s).
-    q10 : amplitude of the excitation (m/s²).
-    d1, d2, d3, g1, g2 : coefficients of the design (1); the defaults are those of a vibrating cylinder.
-    """
-
-    k1: float
+    k1: float  # k1, k2: natural frequencies of the primary and secondary motion (rad/s)
     k2: float
-    zeta1: float
+    zeta1: float  # zeta1, zeta2: relative damping (1), 1/(2 Q)
     zeta2: float
-    omega: float
-    q10: float = 1.0
+    omega: float  # excitation frequency (rad/s)
+    q10: float = 1.0  # amplitude of the excitation (m/s²)
+    # d1, d2, d3, g1, g2: coefficients of the design (1); the defaults are those of a vibrating cylinder
     d1: float = 1.0
     d2: float = 1.0
     d3: float = 1.0
@@ -56,12 +48,6 @@ def tune(k: float, zeta: float, *, q10: float = 1.0) -> SensitiveElement:
     """Return the tuned element k₁ = k₂ = k, ζ₁ = ζ₂ = ζ, driven at resonance, ω = k √(1 − 2ζ²).
 
     This is the case in which CVG cross-damping eq. (9) and demodulated-dynamics eqs. (23)–(25) hold.
-
-    Parameters
-    ----------
-    k : natural frequency (rad/s).
-    zeta : relative damping (1).
-    q10 : amplitude of the excitation (m/s²).
     """
     if not 0 < zeta < math.sqrt(0.5):
         raise CompensationError(f"zeta = {zeta:g} must lie between 0 and 0.707.")
@@ -81,12 +67,6 @@ def translate(
 
     d₁ = d₂ = 1, d₃ = m₂/(m₁ + m₂), g₁ = 2 m₂/(m₁ + m₂), g₂ = 2: along the primary axis frame and proof mass move together,
     along the secondary axis the proof mass alone.
-
-    Parameters
-    ----------
-    frame, proof_mass : m₁ of the frame and m₂ within it (kg).
-    k, zeta : (float, float), natural frequencies (rad/s) and relative damping (1) of the primary and secondary motion.
-    omega, q10 : excitation frequency (rad/s) and amplitude (m/s²).
     """
     if not (frame >= 0 and proof_mass > 0):
         raise CompensationError(

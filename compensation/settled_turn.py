@@ -39,18 +39,8 @@ def turn_settled(
 ) -> LoopRun:
     """Return what settled loops say of a wave that turns, without noise.
 
-    Parameters
-    ----------
-    wave : its values numbers, or arrays (N,).
-    time : array (N,), increasing times (s), any sampling.
-    rate, precession : float or array (N,)
-        Rate and commanded turn of the azimuth against the shell (rad/s), linear between rows.
-    angle : true azimuth at the start (rad).
-
-    Returns
-    -------
-    LoopRun
-        `angle` measured, unwrapped; `rate` the indicated rate, what is not commanded of the turn over k.
+    `rate` and `precession`, the commanded turn against the shell (rad/s), are linear between rows; `angle` is the true
+    one at the start. Of the run `angle` is measured, unwrapped, and `rate` what is not commanded of the turn over k.
     """
     t = np.asarray(time, dtype=float)
     if t.ndim != 1 or not (np.diff(t) > 0).all():

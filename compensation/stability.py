@@ -83,14 +83,8 @@ def allan_deviation(
     """Compute the overlapping Allan deviation of equally spaced rate samples.
 
     σ²(m τ₀) = Σ (x_{i+2m} − 2 x_{i+m} + x_i)² / (2 (m τ₀)² (n + 1 − 2m)), x the running integral of the rate.
-
-    Parameters
-    ----------
-    rate : array (n,), rate or bias, each the mean over one step.
-    step : τ₀, s.
-    points_per_octave : how densely τ is chosen; the longest is a third of the record.
-    confidence : of the band between `low` and `high`, from χ² with the equivalent degrees of freedom.
-    factors : sequence of int, the averaging factors m themselves, where particular ones are wanted.
+    The longest τ is a third of the record unless the `factors` m are given; `confidence` is that of the band `low` to
+    `high`.
     """
     y = np.asarray(rate, dtype=np.float64)
     if y.ndim != 1 or y.size < 9:

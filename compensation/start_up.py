@@ -47,15 +47,6 @@ def start_up(
     Ż = −Z/τ − i (ν − ω + ω_n) Z + u, Z the amplitude in the phase of the oscillator, u the drive in its phase, at most
     `headroom` times what holds the amplitude. The phase loop reads arg Z at any amplitude, its integral starts at 0, and what
     swings at the start is a quarter cycle off.
-
-    Parameters
-    ----------
-    tau : decay time (s).
-    loops : Loops
-    headroom : largest drive over 1/τ.
-    offset : of the resonance from where the oscillator starts (rad/s).
-    amplitude : at the start, over the command: what noise and a kick leave.
-    seconds : length; what a full drive needs three times over, unless given.
     """
     if not headroom > 1:
         raise CompensationError(

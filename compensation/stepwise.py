@@ -58,17 +58,9 @@ def select_stepwise(
     *,
     shared: bool = False,
 ) -> StepwiseSelection:
-    """Select among candidate columns by partial F-tests.
+    """Select among candidate columns by partial F-tests; `forced` ones are in, a term's `parents` before it.
 
-    Parameters
-    ----------
-    forced : array (m, q), columns that are always in the model: the constant, or one per run.
-    candidates : array (m, k), columns that may enter.
-    y : array, shape (m,)
-    names : sequence of k names
-    parents : mapping of name to names, terms that must be in the model before this one enters, and while it stays.
-    enter, remove : levels of the p-values.
-    shared : the entry level is divided by the number of candidates that compete at the step, so that the chance of any
+    `shared`: the entry level is divided by the number of candidates that compete at the step, so that the chance of any
         term entering where there is nothing is at most `enter`.
     """
     if not 0 < enter <= remove < 1:

@@ -21,13 +21,9 @@ SAME_STEP = 1e-9  # part of the usual step by which two steps may differ and sti
 
 @dataclass(frozen=True)
 class TransferFunction:
-    """A rational function W(s) = numerator(s) / denominator(s).
+    """A rational function W(s) = numerator(s) / denominator(s)."""
 
-    Parameters
-    ----------
-    numerator, denominator : tuple of complex, coefficients, highest power of s (1/s) first.
-    """
-
+    # numerator, denominator: tuple of complex, coefficients, highest power of s (1/s) first
     numerator: tuple[complex, ...]
     denominator: tuple[complex, ...]
 
@@ -126,16 +122,8 @@ class TransferFunction:
     def simulate(self, time: ArrayLike, values: ArrayLike, *, settled: bool = False) -> NDArray[Any]:
         """Return the output for an input that is linear between its samples, propagated exactly.
 
-        Parameters
-        ----------
-        time : array (N,), strictly increasing times (s). An even grid is fast; any other is followed step by step.
-        values : array (N,), the input at these times, real or complex.
-        settled : start from the steady state under the first value instead of from rest.
-
-        Returns
-        -------
-        array (N,)
-            The output, real when the input and all coefficients are.
+        An even grid is fast, any other is followed step by step; `settled`: from the steady state under the first
+        value.
         """
         t, u = np.asarray(time, dtype=float), np.asarray(values)
         check_time(t)

@@ -144,15 +144,7 @@ def from_quality(
     harmonic: int = 2,
     bryan_factor: float = 0.277,
 ) -> StandingWave:
-    """Return the wave of a resonator in the numbers of its data sheet.
-
-    Parameters
-    ----------
-    frequency, frequency_split : float, Hz
-    quality : Q; 1/τ = π f/Q.
-    damping_anisotropy : Δ(1/τ) over 1/τ (1).
-    damping_axis, frequency_axis : float, rad
-    """
+    """Return the wave of a data sheet: frequencies (Hz), Q (1/τ = π f/Q), Δ(1/τ) over 1/τ, axes (rad)."""
     if not (frequency > 0 and quality > 0):
         raise CompensationError("frequency and quality factor must be positive.")
     decay = np.pi * frequency / quality

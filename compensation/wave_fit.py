@@ -71,17 +71,8 @@ def fit_whole_angle(
 ) -> WaveFit:
     """Fit splits, axes, gain ratio, skew and phase error to a whole-angle run.
 
-    Parameters
-    ----------
-    time : array (N,), even times (s).
-    angle : array (N,), measured azimuth (rad), unwrapped.
-    rate : array (N,)
-        Indicated rate (rad/s), each the mean to the next row; what is commanded of the turn is not in it.
-    coupling : n k.
-    applied : float or array (N,), applied rate (rad/s), if known.
-    decay, frequency, quadrature : arrays (N,), optional
-        Drive of the amplitude (1/s), angular frequency (rad/s), quadrature control ½ Δω sin (1/s).
-    drive_gain_ratio, drive_skew : δ_d and κ_d of the drives, taken as known.
+    `angle` is measured and unwrapped (rad); `rate` indicated (rad/s), each the mean to the next row, without what is
+    commanded of the turn; `coupling` n k; decay (1/s), frequency (rad/s), quadrature (1/s) as in `LoopRun`.
     """
     t, theta, indicated = read_columns(time=time, angle=angle, rate=rate)
     step = require_regular(t, "the fit of a whole-angle run")

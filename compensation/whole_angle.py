@@ -42,20 +42,7 @@ def simulate_whole_angle(
 ) -> LoopRun:
     """Run a gyro in whole-angle mode, its loops settled at the first row.
 
-    Parameters
-    ----------
-    wave : its values numbers, or arrays (N,).
-    electronics, loops
-        The rate loop is not used.
-    time : array (N,), even times (s), a whole number of samples apart.
-    rate : float or array (N,), rate (rad/s), linear between rows.
-    precession : float or array (N,), commanded turn of the azimuth against the shell (rad/s), linear between rows.
-    angle : azimuth at the start (rad).
-    generator : of the noise.
-
-    Returns
-    -------
-    LoopRun
+    `precession` is the commanded turn against the shell (rad/s), linear between rows as `rate` is. Of the run
         `angle` is the measured azimuth at the row, unwrapped; `rate` the indicated rate to the next row, what is not
         commanded of the turn over k; the other values are means from the row to the next.
     """

@@ -23,16 +23,11 @@ UNITY = TransferFunction((1.0,), (1.0,))
 
 @dataclass(frozen=True)
 class WienerFilter:
-    """A filter behind a gyro, with the parts of its error variance.
+    """A filter behind a gyro, with the parts of its error variance."""
 
-    Attributes
-    ----------
-    filter : G(s).
-    distortion, noise, joint : float
-        Variance (rad²/s²) of (G W − H) Ω and of G φ, and twice their covariance; their sum is E ε² of eq. (30).
-    """
-
-    filter: TransferFunction
+    filter: TransferFunction  # G(s)
+    # distortion, noise, joint: variance (rad²/s²) of (G W − H) Ω and of G φ, and twice their covariance; their
+    # sum is E ε² of eq. (30)
     distortion: float
     noise: float
     joint: float = 0.0
@@ -55,20 +50,7 @@ def design_wiener_filter(
 
     With D D* = W S_Ω W* + W S_φΩ + S_Ωφ W* + S_φ, Γ Γ* = R and T = Γ H (S_Ω W* + S_φΩ)/D*, the optimum of
     E R|ε|², ε = (G W − H) Ω + G φ, is G = Γ⁻¹ (T₀ + T₊) D⁻¹.
-
-    Parameters
-    ----------
-    gyro : W(s) from rate to output, stable with real coefficients, such as eq. (25).
-    rate, noise : S_Ω of the rate (rad²/s) and S_φ of the sensor noise at the output; any even rational densities.
-    wanted : TransferFunction
-        H(s), what the filtered output is to be of the rate: 1, or a stable filter, or s for the angular acceleration.
-    weight : R(s), the weight of the error over frequency; 1 unless given. A number moves nothing.
-    cross : S_φΩ(s) of noise and rate; 0 unless given.
-
-    Raises
-    ------
-    CompensationError
-        When W or H is not stable or not real, the densities have no stable factors, or their coherence is above 1.
+    `wanted` is H(s): 1, a stable filter, or s for the angular acceleration; `weight` R(s), `cross` S_φΩ(s).
     """
     require_possible(rate, noise, cross)
     if not gyro.is_real or not gyro.is_stable:

@@ -62,22 +62,13 @@ Pattern: TypeAlias = Callable[[Resonator, Sequence[Piece]], list[Amplitudes]]
 
 @dataclass(frozen=True)
 class TwoPatternModel:
-    """BVG paper eq. (20): m₀ p̈ − 2Ωb q̇ + c₀ p = 0, m₀ q̈ + 2Ωb ṗ + c₀ q = 0 (c₁ = 0), for unit amplitude in m.
+    """BVG paper eq. (20): m₀ p̈ − 2Ωb q̇ + c₀ p = 0, m₀ q̈ + 2Ωb ṗ + c₀ q = 0 (c₁ = 0), for unit amplitude in m."""
 
-    Attributes
-    ----------
-    mass : m₀, kg.
-    coupling : b, kg.
-    stiffness : c₀, N/m.
-    membrane_share : part of the strain energy that goes into stretching the middle surface, 0 … 1.
-    membrane_strain : rms membrane strain over rms displacement/R, no unit; zero if (17) were true.
-    """
-
-    mass: float
-    coupling: float
-    stiffness: float
-    membrane_share: float
-    membrane_strain: float
+    mass: float  # m₀, kg
+    coupling: float  # b, kg
+    stiffness: float  # c₀, N/m
+    membrane_share: float  # part of the strain energy that goes into stretching the middle surface, 0 … 1
+    membrane_strain: float  # rms membrane strain over rms displacement/R, no unit; zero if (17) were true
 
     @property
     def frequency(self) -> float:
@@ -96,17 +87,6 @@ def two_pattern_model(resonator: Resonator, elastic: Elastic, pattern: Pattern) 
     m₀ = πρ ∫ h (u² + v² + w²) r ds,  b = −2πρ ∫ h v (u cos φ + w sin φ) r ds,
     c₀ = π ∫ E h/(1−ν²) [ε_s² + ε_θ² + 2ν ε_s ε_θ + (1−ν)/2 γ²] + E h³/(12(1−ν²)) [κ_s² + κ_θ² + 2ν κ_s κ_θ
     + 2(1−ν) τ²] r ds (HRG paper eq. (7)).
-
-    Parameters
-    ----------
-    resonator : meridian and thickness; it must start at a pole.
-    elastic : E (Pa), ν and ρ (kg/m³).
-    pattern : `rayleigh_functions`, `rayleigh_functions_without_factor` or `inextensional_functions`.
-
-    Returns
-    -------
-    TwoPatternModel
-        The coefficients with frequency, precession factor and membrane share.
     """
     if not resonator.starts_on_axis:
         raise ShellError("the bell's theory needs a meridian that starts at the pole; close the opening.")

@@ -23,20 +23,12 @@ R, Z, ZERO = range(3)  # the gradients φ_r, φ_z, φ_0
 
 @dataclass(frozen=True, eq=False)
 class CellTable:
-    """Gradients of the functions of solid cells at their quadrature points.
+    """Gradients of the functions of solid cells at their quadrature points."""
 
-    Attributes
-    ----------
-    gradients : φ_r, φ_z, φ/r, (cells, 3, points, functions).
-    radius : r of the points, m, (cells, points).
-    volume : dr dz times r and the quadrature weights, (cells, 1, points).
-    position : where on the meridian (0 ... 1) the material is to be taken, (cells, 1).
-    """
-
-    gradients: Array
-    radius: Array
-    volume: Array
-    position: Array
+    gradients: Array  # φ_r, φ_z, φ/r, (cells, 3, points, functions)
+    radius: Array  # r of the points, m, (cells, points)
+    volume: Array  # dr dz times r and the quadrature weights, (cells, 1, points)
+    position: Array  # where on the meridian (0 ... 1) the material is to be taken, (cells, 1)
     n: int
     transverse_shear: float = 1.0
     plane_stress: bool = False
@@ -142,19 +134,12 @@ def in_order(degree: int) -> tuple[Index, Index]:
 
 @dataclass(frozen=True, eq=False)
 class Reference:
-    """The functions of a cell and those of its sides at points (ξ_i, η_j) of the reference square.
+    """The functions of a cell and those of its sides at points (ξ_i, η_j) of the reference square."""
 
-    Attributes
-    ----------
-    weights : of the points, (points,).
-    along, across : functions of the sides.
-    value, by_xi, by_eta : of the functions of the cell, (points, functions).
-    """
-
-    weights: Array
-    along: Basis
+    weights: Array  # of the points, (points,)
+    along: Basis  # along, across: functions of the sides
     across: Basis
-    value: Array
+    value: Array  # value, by_xi, by_eta: of the functions of the cell, (points, functions)
     by_xi: Array
     by_eta: Array
 
@@ -190,13 +175,7 @@ def at_gauss_points(degree: int, sides: int, count: int) -> Reference:
 
 
 def tabulate_cells(grid: Array, place: Reference, n: int, position: float) -> CellTable:
-    """Gradients in cells whose sides are polynomials through `grid` (2, cells, Lobatto ξ, η).
-
-    Raises
-    ------
-    FoldedCells
-        Where a cell overlaps itself.
-    """
+    """Gradients in cells whose sides are polynomials through `grid` (2, cells, Lobatto ξ, η)."""
     along, across = place.along, place.across
     r = _interpolate(grid[0], along.values, across.values)
     r_xi, z_xi = (_interpolate(x, along.slopes, across.values) for x in grid)

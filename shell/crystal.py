@@ -23,23 +23,16 @@ AXES = {"cubic": ("[001]", "[111]"), "trigonal": ("c",)}
 
 @dataclass(frozen=True)
 class Crystal:
-    """Elastic constants of a crystal over temperature.
+    """Elastic constants of a crystal over temperature."""
 
-    Attributes
-    ----------
-    system, axis : of `SYSTEMS`, and what lies along the resonator's axis.
-    at : °C, where the constants hold.
-    constants : Pa, by name.
-    slope, curvature : s (1/K) and q (1/K²) of each; empty where no source states them.
-    uncertainty, slope_uncertainty : standard uncertainties of constants and slopes.
-    """
-
-    system: str
+    system: str  # system, axis: of `SYSTEMS`, and what lies along the resonator's axis
     axis: str
-    at: float
-    constants: Mapping[str, float]
+    at: float  # °C, where the constants hold
+    constants: Mapping[str, float]  # Pa, by name
+    # slope, curvature: s (1/K) and q (1/K²) of each; empty where no source states them
     slope: Mapping[str, float] = field(default_factory=dict)
     curvature: Mapping[str, float] = field(default_factory=dict)
+    # uncertainty, slope_uncertainty: standard uncertainties of constants and slopes
     uncertainty: Mapping[str, float] = field(default_factory=dict)
     slope_uncertainty: Mapping[str, float] = field(default_factory=dict)
 

@@ -64,19 +64,14 @@ class Cubic:
 
 @dataclass(frozen=True)
 class CubicPair:
-    """The two modes of a pair in the crystal.
-
-    Attributes
-    ----------
-    along_100, along_110 : Hz, of the mode with an antinode along [100] and of the one turned by a quarter wave: for n = 2 its
-        antinodes lie along [110].
-    relative_error_estimate : of both.
-    """
+    """The two modes of a pair in the crystal."""
 
     harmonic: int
+    # along_100, along_110: Hz, of the mode with an antinode along [100] and of the one turned by a quarter wave: for n
+    # = 2 its antinodes lie along [110]
     along_100: float
     along_110: float
-    relative_error_estimate: float
+    relative_error_estimate: float  # of both
 
     @property
     def relative_split(self) -> float:
@@ -85,15 +80,7 @@ class CubicPair:
 
 
 def solve_cubic(resonator: Resonator, crystal: Cubic, harmonic: int = 2, tolerance: float = 1e-5) -> CubicPair:
-    """The lowest pair of one harmonic n in three-dimensional elasticity.
-
-    Parameters
-    ----------
-    resonator : of shell alone, without stem, clamp or kink.
-    crystal : its axis [001] along that of the resonator.
-    harmonic : n >= 2, not a multiple of 4.
-    tolerance : relative error of the frequency.
-    """
+    """The lowest pair of a harmonic n >= 2, not a multiple of 4, of a shell without stem, clamp or kink."""
     if harmonic < 2 or harmonic % 4 == 0:
         raise ShellError(f"in a cubic crystal pairs n >= 2 are solved that do not meet n = 0: not n = {harmonic}.")
     mean = crystal.isotropic

@@ -32,16 +32,10 @@ SETTLED = 0.1  # share of the coefficient that this may change
 
 @dataclass(frozen=True)
 class AmplitudeShift:
-    """δf/f = (static + inertial) w² of a standing wave whose largest displacement is w, m: both in 1/m².
+    """δf/f = (static + inertial) w² of a standing wave whose largest displacement is w, m: both in 1/m²."""
 
-    Attributes
-    ----------
-    static : by the energy of the bent shape, its stretching relieved.
-    inertial : by the motion at 2ω that relieves it.
-    """
-
-    static: float
-    inertial: float
+    static: float  # by the energy of the bent shape, its stretching relieved
+    inertial: float  # by the motion at 2ω that relieves it
 
     @property
     def total(self) -> float:
@@ -50,17 +44,7 @@ class AmplitudeShift:
 
 
 def amplitude_shift(mode: Mode) -> AmplitudeShift:
-    """How the frequency of a standing wave follows the square of its amplitude.
-
-    Parameters
-    ----------
-    mode : of a harmonic n >= 2, in the solid theory.
-
-    Warns
-    -----
-    TheoryRangeWarning
-        Where a mode of the harmonic 0 or 2n lies near twice the frequency, so that it takes part by itself.
-    """
+    """How the frequency of a standing wave follows its amplitude squared; warns of a mode of 0 or 2n near twice it."""
     solution = solved_as_solid(mode)
     if mode.harmonic < 2:
         raise ShellError("the effect of the amplitude is computed for harmonics from 2 up.")

@@ -24,27 +24,18 @@ MOST = 300  # vectors in all, and four for each mode
 
 @dataclass(frozen=True, eq=False)
 class Pattern:
-    """Which unknowns each element has: first the ones of its own, then those it shares with others.
-
-    Attributes
-    ----------
-    order : how the unknowns of each element, as they were given, are rearranged to that end.
-    own : how many of them are its own.
-    skeleton : numbers of the shared ones in an order in which they couple in a narrow band.
-    entries : where the lower triangle of what each element leaves on its shared unknowns (flat) goes in the band (flat).
-    shared : global numbers of the shared unknowns, in that order.
-    is_whole : whether there is one element, with all unknowns in their order.
-    """
+    """Which unknowns each element has: first the ones of its own, then those it shares with others."""
 
     unknowns: tuple[Index, ...]
-    order: tuple[Index, ...]
-    own: tuple[int, ...]
-    skeleton: tuple[Index, ...]
+    order: tuple[Index, ...]  # how the unknowns of each element, as they were given, are rearranged to that end
+    own: tuple[int, ...]  # how many of them are its own
+    skeleton: tuple[Index, ...]  # numbers of the shared ones in an order in which they couple in a narrow band
+    # where the lower triangle of what each element leaves on its shared unknowns (flat) goes in the band (flat)
     entries: tuple[tuple[Index, Index], ...]
-    shared: Index
+    shared: Index  # global numbers of the shared unknowns, in that order
     size: int
     band: int
-    is_whole: bool
+    is_whole: bool  # whether there is one element, with all unknowns in their order
 
 
 def find_pattern(unknowns: list[Index], size: int, in_order: bool = False) -> Pattern:

@@ -50,13 +50,7 @@ def ring_of_electrodes(
     first: float = 0.0,
     last: float = 1.0,
 ) -> tuple[Electrode, ...]:
-    """Equal electrodes around, the first one centred at `azimuth`, which cover a share of the circle.
-
-    Parameters
-    ----------
-    count : number. coverage : 0 ... 1 of the circle. voltage : of all, or of each, V.
-    azimuth : rad. first, last : positions along the meridian.
-    """
+    """Equal electrodes around, the first one centred at `azimuth`, which cover a share of the circle."""
     if not (count >= 1 and 0 < coverage <= 1):
         raise ShellError(f"electrodes cover a share of the circle above 0 and up to 1, not {coverage:g}.")
     volts = np.broadcast_to(np.asarray(voltage, dtype=float), (count,))
@@ -66,22 +60,14 @@ def ring_of_electrodes(
 
 @dataclass(frozen=True, eq=False)
 class Electrodes:
-    """Electrodes with their gap.
+    """Electrodes with their gap."""
 
-    Attributes
-    ----------
-    pair : the mode that feels them.
-    electrodes : patches with their voltages.
-    gap : mean gap, m.
-    departure : relative departure of the gap over the shell, g = gap (1 + departure); its waves 1, 2, ... are the gap harmonics.
-    face : "inner" or "outer", the face that they look at.
-    """
-
-    pair: Pair
-    electrodes: tuple[Electrode, ...]
-    gap: float
+    pair: Pair  # the mode that feels them
+    electrodes: tuple[Electrode, ...]  # patches with their voltages
+    gap: float  # mean gap, m
+    # relative departure of the gap over the shell, g = gap (1 + departure); its waves 1, 2, ... are the gap harmonics
     departure: Field | None = None
-    face: Literal["inner", "outer"] = "inner"
+    face: Literal["inner", "outer"] = "inner"  # "inner" or "outer", the face that they look at
     _bands: dict[tuple[float, float], tuple[Array, Array, Array]] = field(default_factory=dict, repr=False)
 
     def __post_init__(self) -> None:
@@ -123,13 +109,7 @@ class Electrodes:
         return np.array(means) / 2, np.array(waves)
 
     def soften(self) -> Split:
-        """The pair under the voltages, to first order in V²/g³.
-
-        Raises
-        ------
-        ShellError
-            The voltage lies beyond pull-in.
-        """
+        """The pair under the voltages, to first order in V²/g³."""
         squares = self.voltages**2
         means, waves = self.per_square_volt
         split = Split(
@@ -174,13 +154,7 @@ class Electrodes:
         return float(2 * self.per_square_volt[0] @ self.voltages)
 
     def per_kelvin(self, gap_expansion: float, voltage_slope: float = 0.0) -> float:
-        """Relative change of f per kelvin by the electrodes alone, 1/K.
-
-        Parameters
-        ----------
-        gap_expansion : (1/g) dg/dT, 1/K: of a frame and a shell (a_frame r_frame - a_shell r_shell)/g.
-        voltage_slope : (1/V) dV/dT of the supply, 1/K.
-        """
+        """Relative change of f per kelvin by the electrodes alone, from (1/g) dg/dT and (1/V) dV/dT, 1/K."""
         return float(self.per_square_volt[0] @ self.voltages**2) * (2 * voltage_slope - 3 * gap_expansion)
 
     def _patch(self, one: Electrode) -> tuple[Array, Array, Array, Array, Array]:
@@ -238,19 +212,7 @@ class Trim:
 
 
 def trim_voltages(electrodes: Electrodes, wave: complex, limit: float) -> Trim:
-    """The voltages, of least Σ V², with which the electrodes null a split.
-
-    Parameters
-    ----------
-    electrodes : as they lie; their own voltages are not used.
-    wave : (f_fast - f_slow)/f exp(2 i n α) that is to be cancelled.
-    limit : largest voltage, V.
-
-    Raises
-    ------
-    ShellError
-        The split lies beyond what the electrodes reach within the limit.
-    """
+    """The voltages, of least Σ V² and none above `limit` (V), with which electrodes null the wave of a split."""
     from scipy.optimize import linprog
 
     means, waves = electrodes.per_square_volt
@@ -283,12 +245,5 @@ def reach(electrodes: Electrodes, limit: float) -> float:
 
 
 def soften_at_gap(per_square_volt: float, voltage_squared: ArrayLike, gap: ArrayLike = 1.0) -> Array:
-    """S V²/g³: relative change of f by a voltage on all electrodes together.
-
-    Parameters
-    ----------
-    per_square_volt : s, per V² at the gap for which it was found (the sum of `Electrodes.per_square_volt`).
-    voltage_squared : V², a number or an array.
-    gap : g over that gap.
-    """
+    """S V²/g³: relative change of f by a voltage on all electrodes, s per V² at the gap over which g is counted."""
     return np.asarray(per_square_volt * np.asarray(voltage_squared) / np.asarray(gap, dtype=float) ** 3)

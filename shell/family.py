@@ -50,17 +50,11 @@ class Axis:
 
 @dataclass(frozen=True, eq=False)
 class FamilyResult:
-    """One mode of m designs: arrays (m,).
+    """One mode of m designs: arrays (m,)."""
 
-    Attributes
-    ----------
-    frequency : Hz.
-    bryan_factor : precession of the standing wave per angle of rotation.
-    by_nu, by_thickness : ∂ ln f/∂ν and ∂ ln f/∂ ln h of the whole profile; NaN unless the family was built with slopes.
-    """
-
-    frequency: Array
-    bryan_factor: Array
+    frequency: Array  # Hz
+    bryan_factor: Array  # precession of the standing wave per angle of rotation
+    # by_nu, by_thickness: ∂ ln f/∂ν and ∂ ln f/∂ ln h of the whole profile; NaN unless the family was built with slopes
     by_nu: Array
     by_thickness: Array
 
@@ -77,41 +71,24 @@ class Errors:
 
 @dataclass(frozen=True, eq=False)
 class Family:
-    """One mode of all designs within ranges; see `build_family`.
+    """One mode of all designs within ranges; see `build_family`."""
 
-    Attributes
-    ----------
-    axes, nu : the ranges.
-    harmonic, index, theory : which mode.
-    polynomial : ln F, Bryan factor and slopes over the cube -1 ... 1 of the axes, and of ν where it varies.
-    error : Errors
-    theory_error : relative error of f of the full solves themselves against the exact solution of the theory.
-    solver_tolerance : what the full solves were asked for.
-    solves : how many of them it took, those that judge it included.
-    """
-
-    axes: tuple[Axis, ...]
+    axes: tuple[Axis, ...]  # axes, nu: the ranges
     nu: Range
-    harmonic: int
+    harmonic: int  # harmonic, index, theory: which mode
     index: int
     theory: Theory
+    # ln F, Bryan factor and slopes over the cube -1 ... 1 of the axes, and of ν where it varies
     polynomial: SparsePolynomial
     error: Errors
-    theory_error: float
-    solver_tolerance: float
-    solves: int
+    theory_error: float  # relative error of f of the full solves themselves against the exact solution of the theory
+    solver_tolerance: float  # what the full solves were asked for
+    solves: int  # how many of them it took, those that judge it included
 
     def evaluate(
         self, values: ArrayLike, *, nu: ArrayLike, E: ArrayLike, rho: ArrayLike, growth: ArrayLike = 1.0
     ) -> FamilyResult:
-        """Give the mode of m designs; what a design gives does not depend on the others.
-
-        Parameters
-        ----------
-        values : (m, axes) array
-        nu, E, rho : Poisson's ratio, Young's modulus (Pa), density (kg/m³): numbers or arrays (m,).
-        growth : factor of all lengths, as by free thermal expansion.
-        """
+        """Give the mode of m designs (m, axes), each for itself; `growth` is the factor of all lengths."""
         x, poisson = self._unit(values, nu)
         found = np.full((len(x), 4), np.nan)
         known = self.polynomial(x)
@@ -182,12 +159,6 @@ def build_family(
     slopes : whether ∂ ln f/∂ν and ∂ ln f/∂ ln h are wanted.
     tolerance : of the interpolated frequency, relative, against the full solve.
     most : full solves that may be spent, about; a finer one counts by the square of its unknowns.
-
-    Raises
-    ------
-    ShellError
-        Ranges or designs that make no sense, or a tolerance that so many solves do not reach: the designs must then be
-        solved one by one.
     """
     _check(axes, nu, tolerance, most)
     if theory == "rayleigh":

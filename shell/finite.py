@@ -76,15 +76,11 @@ class QuadraticForce:
     """The force g of u ~ cos nθ on the wave 0 or 2n with the same elements, on its free unknowns.
 
     Integrals are over the π of cos² 2nθ for the wave 2n and over 2π for the wave 0, as those of the matrices of each.
-
-    Attributes
-    ----------
-    stretch, turn : its two terms, ½ q : C : e(ψ) and σ_ij u_k,i ψ_k,j.
-    squares : q(u, u) of that wave at the points of every group, engineering strains (elements, stations, 6, points).
     """
 
-    stretch: Array
+    stretch: Array  # stretch, turn: its two terms, ½ q : C : e(ψ) and σ_ij u_k,i ψ_k,j
     turn: Array
+    # q(u, u) of that wave at the points of every group, engineering strains (elements, stations, 6, points)
     squares: list[Array]
 
     @classmethod

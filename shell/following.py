@@ -54,16 +54,8 @@ def follow(solve: Callable[[float, int], Sequence[Mode]], known: Mode) -> Mode:
     """The mode at the end of a way that has the shape of `known` at its start.
 
     Where no mode at the end is like it, the way is halved, so that a shape that changes slowly is followed step by step.
-
-    Parameters
-    ----------
-    solve : (place on the way 0 ... 1, count) -> the lowest modes there, in order of frequency.
-    known : the mode at 0.
-
-    Raises
-    ------
-    ShellError
-        No mode has its shape: it has vanished, or lies beyond the next few of its harmonic.
+    solve(place on the way 0 ... 1, count) gives the lowest modes there. ShellError where no mode has the shape any
+    more.
     """
     return _step(solve, known, 0.0, 1.0, DEEPEST)
 

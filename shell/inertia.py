@@ -15,29 +15,18 @@ from shell.system import Group, SolidPart
 
 @dataclass(frozen=True)
 class MassProperties:
-    """What a body of revolution weighs.
+    """What a body of revolution weighs."""
 
-    Attributes
-    ----------
-    volume : m³. mass : kg. center : height z of the centre of mass, m.
-    axial, transverse : moments of inertia about the axis and about a diameter through the centre of mass, kg m².
-    """
-
-    volume: float
-    mass: float
-    center: float
+    volume: float  # m³
+    mass: float  # kg
+    center: float  # height z of the centre of mass, m
+    # axial, transverse: moments of inertia about the axis and about a diameter through the centre of mass, kg m²
     axial: float
     transverse: float
 
 
 def weigh(resonator: Resonator, density: float) -> MassProperties:
-    """Integrate over the solver's elements: V = 2π ∫ r dr dz, I_axial = ∫ ρ r² dV, I_transverse = ∫ ρ (r²/2 + (z - z_c)²) dV.
-
-    Parameters
-    ----------
-    resonator : shell with roots, corners and stem.
-    density : kg/m³.
-    """
+    """Integrate over the solver's elements: V = 2π ∫ r dr dz, I_axial = ∫ ρ r² dV, I_transverse = ∫ ρ (r²/2 + (z - z_c)²) dV."""
     system = build_system(resonator, 2, "solid", LEVELS["solid"][0])
     places = [_gauss_points(resonator, group, system.level) for group in system.groups]
     r = np.concatenate([place[0].ravel() for place in places])

@@ -48,16 +48,10 @@ def tabulate(x: Array, count: int) -> tuple[Array, Array]:
 
 @dataclass(frozen=True, eq=False)
 class SparsePolynomial:
-    """The interpolant of a vector function.
+    """The interpolant of a vector function."""
 
-    Attributes
-    ----------
-    indices : in lexical order.
-    surpluses : (terms, outputs).
-    """
-
-    indices: tuple[Index, ...]
-    surpluses: Array
+    indices: tuple[Index, ...]  # in lexical order
+    surpluses: Array  # (terms, outputs)
 
     def __call__(self, x: Array, along: int | None = None) -> Array:
         """Values (m, outputs) at points (m, dimensions), or their derivatives by the coordinate `along`.
@@ -83,17 +77,11 @@ class SparsePolynomial:
 
 @dataclass
 class Exploration:
-    """A sparse grid that grows where the first output of a function needs it.
+    """A sparse grid that grows where the first output of a function needs it."""
 
-    Attributes
-    ----------
-    function : point (dimensions,) -> outputs (k,).
-    surpluses : of every index evaluated so far.
-    """
-
-    function: Callable[[Array], Array]
+    function: Callable[[Array], Array]  # point (dimensions,) -> outputs (k,)
     dimensions: int
-    surpluses: dict[Index, Array] = field(default_factory=dict)
+    surpluses: dict[Index, Array] = field(default_factory=dict)  # of every index evaluated so far
     _settled: set[Index] = field(default_factory=set)
 
     @property

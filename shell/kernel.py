@@ -23,22 +23,14 @@ Orders = tuple[int, int, int]
 
 @dataclass(frozen=True, eq=False)
 class StrainTable:
-    """Strains at the quadrature points of elements, per unit of their section amplitudes.
+    """Strains at the quadrature points of elements, per unit of their section amplitudes."""
 
-    Attributes
-    ----------
-    strain : (elements, stations, 6, points, 2, amplitudes); the axis of length 2 is value and ξ-derivative.
-    displacement : (elements, stations, 3, points, amplitudes).
-    volume : (elements, stations, points), dr dz times r and the quadrature weights (times π it is a volume in m³).
-    along : (2, stations, functions), the polynomials along ξ and their derivatives.
-    position : (elements, stations), where on the meridian (0 ... 1) the material is to be taken.
-    """
-
-    strain: Array
-    displacement: Array
+    strain: Array  # (elements, stations, 6, points, 2, amplitudes); the axis of length 2 is value and ξ-derivative
+    displacement: Array  # (elements, stations, 3, points, amplitudes)
+    # (elements, stations, points), dr dz times r and the quadrature weights (times π it is a volume in m³)
     volume: Array
-    along: Array
-    position: Array
+    along: Array  # (2, stations, functions), the polynomials along ξ and their derivatives
+    position: Array  # (elements, stations), where on the meridian (0 ... 1) the material is to be taken
     transverse_shear: float = 1.0
     plane_stress: bool = False
 

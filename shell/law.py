@@ -65,15 +65,7 @@ class SlopeParts:
 def slope_parts(
     material: Material, temperature: ArrayLike, by_nu: Array, by_thickness: Array, base: ArrayLike = 0.0
 ) -> SlopeParts:
-    """The parts of d ln f/dT (HRG paper eq. 15, and the base's) at temperatures (K).
-
-    Parameters
-    ----------
-    material : Material
-    temperature : array_like, K
-    by_nu, by_thickness : arrays, ∂ ln f/∂ν and ∂ ln f/∂ ln h there.
-    base : array_like, 1/K, by the stress of a base that expands otherwise.
-    """
+    """The parts of d ln f/dT (HRG paper eq. 15, and the base's) at temperatures (K)."""
     alpha = material.value("expansion", temperature)
     return SlopeParts(
         E=0.5 * material.log_slope("youngs_modulus", temperature),
@@ -115,10 +107,7 @@ class FrequencyLaw:
     def frequency(self, temperature: ArrayLike, *, extrapolate: bool = False) -> Array:
         """Frequency (Hz) at even temperatures of the resonator (K).
 
-        Parameters
-        ----------
-        temperature : array_like, K
-        extrapolate : continue a little beyond the range, as the trial states of a fit do, instead of raising.
+        `extrapolate` continues a little beyond the range, as the trial states of a fit do, instead of raising.
         """
         return np.asarray(np.exp(self.logarithm(temperature, extrapolate=extrapolate)))
 
@@ -144,13 +133,7 @@ class FrequencyLaw:
         return slope_parts(self.material, T, self.shape.by_nu(nu), self.shape.by_thickness(nu), base)
 
     def derivatives(self, temperature: ArrayLike) -> dict[str, Array]:
-        """Derivative of ln f(T) by every coefficient of the material's deviation that acts on it.
-
-        Returns
-        -------
-        dict
-            Coefficient, such as `shear_modulus.log_slope_per_K`, -> array like the temperatures.
-        """
+        """Derivative of ln f(T) by every coefficient of the material's deviation that acts on it, by its name."""
         return self._derivatives(self._check(temperature))
 
     def uncertainty(self, temperature: ArrayLike) -> Array:

@@ -32,18 +32,12 @@ _SHIPPED = Path(__file__).with_name("materials.toml")
 
 @dataclass(frozen=True, eq=False)
 class Prior:
-    """What a law leaves open: coefficients of its deviation, jointly Gaussian about zero.
+    """What a law leaves open: coefficients of its deviation, jointly Gaussian about zero."""
 
-    Attributes
-    ----------
-    names : (k,) such as `shear_modulus.log_slope_per_K`; x counts from the material's reference temperature.
-    sd : (k,) array
-    correlation : (k, k) array
-    """
-
+    # (k,) such as `shear_modulus.log_slope_per_K`; x counts from the material's reference temperature
     names: tuple[str, ...]
-    sd: Array
-    correlation: Array
+    sd: Array  # (k,) array
+    correlation: Array  # (k, k) array
 
     @property
     def covariance(self) -> Array:
@@ -207,10 +201,7 @@ class Material:
 
         Deviations and their prior count from that temperature.
 
-        Parameters
-        ----------
-        reference : K, temperature at which the given values hold.
-        **given : any of `youngs_modulus`, `poisson_ratio`, `density`; what the law does not state becomes a constant.
+        `given`: any of `youngs_modulus`, `poisson_ratio`, `density`; what the law does not state becomes a constant.
         """
         target = dict(given)
         properties = dict(self.properties)

@@ -40,15 +40,7 @@ def build_mesh(surface: Surface, swing: float = 0.0) -> "trimesh.Trimesh":
 def encode_mesh(
     surface: Surface, kind: MeshKind, swing: float = 0.0, colours: "NDArray[np.uint8] | None" = None
 ) -> bytes:
-    """Return the bytes of a mesh file.
-
-    Parameters
-    ----------
-    surface : with or without a mode.
-    kind : "stl" or "ply" in mm, "glb" in m.
-    swing : displacement (m) at the antinode; 0 for the undeformed solid.
-    colours : (N, 3) or (N, 4) bytes for the vertices; STL has none.
-    """
+    """Return the bytes of a mesh file: STL and PLY in mm, GLB in m; `swing` (m) at the antinode, `colours` in bytes."""
     mesh = build_mesh(surface, swing)
     if kind == "glb":
         return encode_animation(surface, swing, colours, animated=False)

@@ -149,11 +149,6 @@ def solve_modes(
     theory : "solid" (three-dimensional), "shell" (Naghdi) or "rayleigh" (inextensional hemisphere, closed form).
     tolerance : wanted relative error of the frequency.
 
-    Returns
-    -------
-    tuple[Mode, ...]
-        Sorted by frequency.
-
     Warns
     -----
     TheoryRangeWarning

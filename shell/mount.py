@@ -12,16 +12,10 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Mount:
-    """The body that the held face of the resonator is joined to, stiff beside it.
+    """The body that the held face of the resonator is joined to, stiff beside it."""
 
-    Attributes
-    ----------
-    expansion : 1/K, of the base.
-    joined_at : K, the temperature at which the joint is free of stress.
-    """
-
-    expansion: float
-    joined_at: float
+    expansion: float  # 1/K, of the base
+    joined_at: float  # K, the temperature at which the joint is free of stress
 
     def strain(self, material: Material, temperature: ArrayLike) -> Array:
         """Growth of the base beyond the resonator's own since they were joined: ε = ∫ (α_base - α) dT."""

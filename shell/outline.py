@@ -33,22 +33,15 @@ SHEARED = (3, 5)  # strains that go as sin nθ; the others go as cos nθ
 
 @dataclass(frozen=True, eq=False)
 class Outline:
-    """One line around the material, which lies to its left as seen with r to the right and z up.
+    """One line around the material, which lies to its left as seen with r to the right and z up."""
 
-    Attributes
-    ----------
-    r, z : (k,) array, m, points; the last is joined to the first unless both lie on the axis.
-    position : (k,) array, place on the meridian, 0 ... 1.
-    displacement : (3, k) array
-        Amplitudes u_r, u_θ, u_z of the mode; u_r and u_z go as cos nθ, u_θ as sin nθ. Zero without a mode.
-    energy : (2, k) array, J/m³, strain-energy density, at its largest in time, for these amplitudes taken in metres:
-        the parts that go as cos² nθ and sin² nθ.
-    """
-
-    r: Array
+    r: Array  # r, z: (k,) array, m, points; the last is joined to the first unless both lie on the axis
     z: Array
-    position: Array
+    position: Array  # (k,) array, place on the meridian, 0 ... 1
+    # (3, k) array, amplitudes u_r, u_θ, u_z of the mode; u_r and u_z go as cos nθ, u_θ as sin nθ. Zero without a mode
     displacement: Array
+    # (2, k) array, J/m³, strain-energy density, at its largest in time, for these amplitudes taken in metres: the parts
+    # that go as cos² nθ and sin² nθ
     energy: Array
 
     @property
@@ -72,11 +65,7 @@ class Outline:
 def trace_outlines(resonator: Resonator, spacing: float, mode: "Mode | None" = None) -> tuple[Outline, ...]:
     """The outlines of a resonator's section, the outer one first; a closed shell has a second one around its cavity.
 
-    Parameters
-    ----------
-    resonator : the one that the mode was solved for.
-    spacing : wanted distance of the points, m; sides shorter than this still get their middle.
-    mode : what to carry along the outline; the amplitudes are scaled so that the largest displacement is 1.
+    `spacing` (m) is the wanted distance of points; the amplitudes are scaled so that the largest displacement is 1.
     """
     if mode is not None and mode.solution is None:
         raise ShellError(f"theory '{mode.theory}' gives no shape through the thickness: use theory solid or shell.")

@@ -76,15 +76,6 @@ def expansion_shares(mode: Mode) -> Array:
     """What a growth β(s) of the material by warmth contributes to δ ln f = Σ share β, the base held as it was.
 
     E, ν and ρ of the warm material come besides. Free resonators: the shares add up to ½.
-
-    Parameters
-    ----------
-    mode : of a harmonic n >= 1, in the solid theory.
-
-    Returns
-    -------
-    array
-        At the stations of `mode.along`, in their order.
     """
     solution = solved_as_solid(mode)
     if mode.harmonic < 1:

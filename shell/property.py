@@ -81,27 +81,17 @@ def powers(x: Array) -> tuple[Array, Array, Array]:
 
 @dataclass(frozen=True)
 class Property:
-    """One property over temperature.
+    """One property over temperature."""
 
-    Attributes
-    ----------
-    form, numbers : the published form and its numbers, in the units of their names.
-    uncertainty : standard uncertainty of any of the numbers.
-    source : where they come from.
-    relative : whether the deviation is a factor.
-    unsettled : standard deviations of a, b, c beyond what `uncertainty` makes of them.
-    deviation : a, b, c.
-    reference : K, temperature about which the deviation counts.
-    """
-
-    form: str
+    form: str  # form, numbers: the published form and its numbers, in the units of their names
     numbers: Mapping[str, Any]
-    uncertainty: Mapping[str, float] = field(default_factory=dict)
-    source: str = ""
-    relative: bool = True
+    uncertainty: Mapping[str, float] = field(default_factory=dict)  # standard uncertainty of any of the numbers
+    source: str = ""  # where they come from
+    relative: bool = True  # whether the deviation is a factor
+    # standard deviations of a, b, c beyond what `uncertainty` makes of them
     unsettled: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    deviation: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    reference: float = ROOM
+    deviation: tuple[float, float, float] = (0.0, 0.0, 0.0)  # a, b, c
+    reference: float = ROOM  # K, temperature about which the deviation counts
 
     def __call__(self, temperature: ArrayLike) -> Array:
         """Evaluate the form with its deviation at temperatures in kelvin."""

@@ -60,11 +60,6 @@ def rayleigh_frequency(
     E, nu, rho : array_like, Young's modulus (Pa), Poisson ratio (1), density (kg/m³).
     h, R : array_like, thickness and radius of the middle surface (m). All five broadcast together.
     phi_1, phi_2 : polar angles (rad) where the shell starts and ends, 0 ≤ phi_1 < phi_2 < π.
-
-    Returns
-    -------
-    ndarray
-        Frequency (Hz), shape of the broadcast arguments.
     """
     E, nu, rho, h, R = (np.asarray(value, dtype=float) for value in (E, nu, rho, h, R))
     _require_physical(E, nu, rho, h, R)
@@ -78,16 +73,6 @@ def rayleigh_bryan_factor(n: int, phi_1: float = 0.0, phi_2: float = pi / 2) -> 
 
     The Coriolis energy of the mode over its kinetic energy: K = N / J = 2 ∫ sin³φ tan²ⁿ(φ/2) dφ / J
     (`shell.derivation.coriolis`); 0.27699 for n = 2 on the hemisphere.
-
-    Parameters
-    ----------
-    n : circumferential harmonic, at least 2.
-    phi_1, phi_2 : polar angles (rad) where the shell starts and ends.
-
-    Returns
-    -------
-    float
-        Bryan factor, without unit.
     """
     shape = rayleigh_integrals(n, phi_1, phi_2)
     return shape.N / shape.J
@@ -98,17 +83,6 @@ def rayleigh_log_derivatives(n: int, nu: float, phi_1: float = 0.0, phi_2: float
 
     d ln f = ½ d ln E − ½ d ln ρ − dν/(2(1+ν)) + d ln h − 2 d ln R + ½ [i(φ₂)/I − j(φ₂)/J] dφ₂, where i and j
     are the integrands of I and J.
-
-    Parameters
-    ----------
-    n : circumferential harmonic, at least 2.
-    nu : Poisson ratio (1).
-    phi_1, phi_2 : polar angles (rad) where the shell starts and ends.
-
-    Returns
-    -------
-    RayleighLogDerivatives
-        By ln E, ν, ln ρ, ln h, ln R (no unit) and φ₂ (1/rad).
     """
     if not -1 < nu < 0.5:
         raise ShellError(f"Poisson's ratio must lie between -1 and 0.5 (exclusive), not {nu:g}.")
@@ -123,16 +97,6 @@ def rayleigh_integrals(n: int, phi_1: float = 0.0, phi_2: float = pi / 2) -> Ray
 
     HRG paper eqs. (12)–(14): I = ∫ tan²ⁿ(φ/2) sin⁻³φ dφ, J = ∫ [(n + cos φ)² + 2 sin²φ] sin φ tan²ⁿ(φ/2) dφ,
     and N = 2 ∫ sin³φ tan²ⁿ(φ/2) dφ of the Coriolis energy.
-
-    Parameters
-    ----------
-    n : circumferential harmonic, at least 2.
-    phi_1, phi_2 : polar angles (rad) where the shell starts and ends.
-
-    Returns
-    -------
-    RayleighIntegrals
-        I, J and N.
     """
     from scipy.integrate import quad
 

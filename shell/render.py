@@ -44,11 +44,6 @@ def render_png(scenes: Scene | Sequence[Scene], view: View = "oblique", width: i
     scenes : what to draw; all share one colour scale and one length scale.
     view : "oblique" into the open end, "axis" straight into it, or "side".
     width, height : pixels of each scene.
-
-    Raises
-    ------
-    NoOpenGL
-        The machine cannot draw.
     """
     return _draw(scenes, view, (width, height), [1.0])[0]
 
@@ -62,13 +57,7 @@ def render_animation(
     frames: int = 24,
     period: float = 1.2,
 ) -> bytes:
-    """Return a looping WebP or GIF of one period of the swing, which lasts `period` seconds.
-
-    Raises
-    ------
-    NoOpenGL
-        The machine cannot draw.
-    """
+    """Return a looping WebP or GIF of one period of the swing, which lasts `period` seconds."""
     from PIL import Image
 
     swings = [float(np.cos(2 * pi * k / frames)) for k in range(frames)]

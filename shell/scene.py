@@ -13,32 +13,21 @@ EXAGGERATION = 0.12  # largest displacement in a picture over the size of the re
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """One resonator in a picture.
+    """One resonator in a picture."""
 
-    Attributes
-    ----------
-    points, displacement : (N, 3) arrays, m
-        Vertices and what is added to them at the largest swing, already exaggerated.
-    triangles : (F, 3) array
-    values : (N,) array, what the colour shows.
-    legend : quantity and unit of the values.
-    title : a line above the resonator; a second line stands below it as a remark.
-    nodes : (L, k) array, vertex numbers along each nodal line, -1 after its end.
-    antinodes : (A,) array, vertex numbers.
-    opens_up : whether the open end is at the larger z, from where it is then seen.
-    axes : (A, 2, 3) array, m
-        Lines across the rim: the axes of the slower mode of a split pair, then as many of the faster one.
-    """
-
+    # points, displacement: (N, 3) arrays, m Vertices and what is added to them at the largest swing, already
+    # exaggerated
     points: Array
     displacement: Array
-    triangles: NDArray[np.int64]
-    values: Array
-    legend: str
-    title: str
-    nodes: NDArray[np.int64]
-    antinodes: NDArray[np.int64]
-    opens_up: bool
+    triangles: NDArray[np.int64]  # (F, 3) array
+    values: Array  # (N,) array, what the colour shows
+    legend: str  # quantity and unit of the values
+    title: str  # a line above the resonator; a second line stands below it as a remark
+    nodes: NDArray[np.int64]  # (L, k) array, vertex numbers along each nodal line, -1 after its end
+    antinodes: NDArray[np.int64]  # (A,) array, vertex numbers
+    opens_up: bool  # whether the open end is at the larger z, from where it is then seen
+    # (A, 2, 3) array, m Lines across the rim: the axes of the slower mode of a split pair, then as many of the faster
+    # one
     axes: Array = field(default_factory=lambda: np.zeros((0, 2, 3)))
 
 

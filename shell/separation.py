@@ -15,13 +15,7 @@ def nearest_mode(
     """Return the mode nearest in frequency to `own` among some harmonics.
 
     Every harmonic is solved until a mode lies above `own`: the nearest below and above are then both known.
-
-    Parameters
-    ----------
-    solve : returns at least the `count` lowest modes of a harmonic, in order of frequency: solve(harmonic, count).
-    own : the mode whose neighbour is sought; both waves of its pair are this one mode.
-    harmonics : harmonics that are searched.
-    least : modes of each harmonic that are solved at least.
+    solve(harmonic, count) gives at least the `count` lowest modes of a harmonic, in order of frequency.
     """
     others: list[Mode] = []
     for n in harmonics:

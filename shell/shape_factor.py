@@ -22,27 +22,16 @@ CLOSE = 1e-9  # wanted error of ln Φ between them
 
 @dataclass(frozen=True, eq=False)
 class ShapeFactor:
-    """ln Φ(ν), Φ = f/√(E/ρ) at the reference geometry in 1/m, through full solves at a few Poisson's ratios.
+    """ln Φ(ν), Φ = f/√(E/ρ) at the reference geometry in 1/m, through full solves at a few Poisson's ratios."""
 
-    Attributes
-    ----------
-    resonator : of the solves.
-    lowest, highest : the Poisson's ratios between which it holds.
-    logarithm : polynomial of ln Φ in ν.
-    modes : the solves, at Chebyshev points.
-    ratios : (k,) array, their Poisson's ratios.
-    error : relative, of Φ between them.
-    solver_error : relative, the largest of the solves against the exact solution of their theory.
-    """
-
-    resonator: Resonator
-    lowest: float
+    resonator: Resonator  # of the solves
+    lowest: float  # lowest, highest: the Poisson's ratios between which it holds
     highest: float
-    logarithm: Chebyshev
-    modes: tuple[Mode, ...]
-    ratios: Array
-    error: float
-    solver_error: float
+    logarithm: Chebyshev  # polynomial of ln Φ in ν
+    modes: tuple[Mode, ...]  # the solves, at Chebyshev points
+    ratios: Array  # (k,) array, their Poisson's ratios
+    error: float  # relative, of Φ between them
+    solver_error: float  # relative, the largest of the solves against the exact solution of their theory
 
     @cached_property
     def by_nu(self) -> Chebyshev:

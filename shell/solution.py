@@ -51,22 +51,15 @@ def find_constants(position: Array, elastic: Elastic | VaryingElastic, plane_str
 
 @dataclass(frozen=True)
 class EnergyFractions:
-    """Shares of the strain energy; they add up to 1.
+    """Shares of the strain energy; they add up to 1."""
 
-    Attributes
-    ----------
-    bending, membrane, shear : of the shell: strains that vary through the thickness, their mean, transverse shear.
-    root : of the solid cap, root or corner.
-    stem : of the stem.
-    kinetic_stem : the stem's share of the kinetic energy (counted apart).
-    """
-
+    # bending, membrane, shear: of the shell: strains that vary through the thickness, their mean, transverse shear
     bending: float
     membrane: float
     shear: float
-    root: float
-    stem: float
-    kinetic_stem: float
+    root: float  # of the solid cap, root or corner
+    stem: float  # of the stem
+    kinetic_stem: float  # the stem's share of the kinetic energy (counted apart)
 
     @property
     def shell(self) -> float:

@@ -45,13 +45,7 @@ class SpinShift:
 
 
 def spin_shift(mode: Mode, elastic: Elastic) -> SpinShift:
-    """Second-order change of a mode's frequency by a constant spin about the axis, in the frame of the body.
-
-    Parameters
-    ----------
-    mode : the lowest of a harmonic n >= 2 in the solid theory.
-    elastic : the material it was solved with.
-    """
+    """Second-order change of a mode's frequency by a constant spin about the axis, in the frame of the body."""
     solution = solved_as_solid(mode)
     if mode.harmonic < 2 or mode.index:
         raise ShellError("the second-order effect of spin is computed for the lowest mode of a harmonic from 2 up.")

@@ -20,27 +20,17 @@ Triangles = NDArray[np.int64]
 
 @dataclass(frozen=True, eq=False)
 class Surface:
-    """Triangles around the material, counterclockwise as seen from outside.
+    """Triangles around the material, counterclockwise as seen from outside."""
 
-    Attributes
-    ----------
-    points : (N, 3) array, m, undeformed vertices; the axis of the resonator is z.
-    displacement : (N, 3) array, shape of the mode, its largest displacement 1; zero without a mode.
-    energy : (N,) array, J/m³, largest strain-energy density in a period per square metre of amplitude.
-    position : (N,) array, place on the meridian, 0 ... 1.
-    triangles : (F, 3) array, vertex numbers.
-    grids : tuple of (k, count) arrays
-        Vertex numbers of every outline, point by point (rows) and around (columns); on the axis a number repeats.
-    harmonic : n; column j lies at θ = 2 π j / count, and cos nθ = 0 falls on columns.
-    """
-
-    points: Array
-    displacement: Array
-    energy: Array
-    position: Array
-    triangles: Triangles
+    points: Array  # (N, 3) array, m, undeformed vertices; the axis of the resonator is z
+    displacement: Array  # (N, 3) array, shape of the mode, its largest displacement 1; zero without a mode
+    energy: Array  # (N,) array, J/m³, largest strain-energy density in a period per square metre of amplitude
+    position: Array  # (N,) array, place on the meridian, 0 ... 1
+    triangles: Triangles  # (F, 3) array, vertex numbers
+    # tuple of (k, count) arrays Vertex numbers of every outline, point by point (rows) and around (columns); on the
+    # axis a number repeats
     grids: tuple[Triangles, ...]
-    harmonic: int
+    harmonic: int  # n; column j lies at θ = 2 π j / count, and cos nθ = 0 falls on columns
 
     @property
     def size(self) -> float:
@@ -73,12 +63,8 @@ def build_surface(
 ) -> Surface:
     """Turn the section of a resonator into its surface.
 
-    Parameters
-    ----------
-    resonator : geometry.
-    mode : solved for this resonator; None for the geometry alone.
-    spacing : distance of points along the outline, m; one fiftieth of the radius unless given.
-    count : points around; rounded up to a multiple of 4n, and 160 unless given.
+    Points lie `spacing` (m) apart along the outline, R/50 unless given; `count` around, up to a multiple of 4n, 160
+    unless given.
     """
     n = mode.harmonic if mode else 0
     around = 4 * max(n, 1) * int(np.ceil((count or 160) / (4 * max(n, 1))))

@@ -85,29 +85,18 @@ Answer: TypeAlias = tuple[Array, Array, Array, Array]
 
 @dataclass(frozen=True, eq=False)
 class ShellExtension:
-    """More functions on the elements of a chain, hierarchic along the meridian: those of its two ends, then the others.
+    """More functions on the elements of a chain, hierarchic along the meridian: those of its two ends, then the others."""
 
-    Attributes
-    ----------
-    table : with more orders through the thickness and along the meridian.
-    is_old : which amplitudes the level has.
-    to_old : from the values at the level's nodes.
-    pattern : the functions that may answer: the new ones, and the old ones inside an element, with which these go
-        together in a thin shell.
-    places : where these are among the functions and amplitudes of every element.
-    is_deep : which of these have a new order through the thickness.
-    units : their stiffness per unit λ and G.
-    factor : error over surplus.
-    """
-
-    table: StrainTable
-    is_old: NDArray[np.bool_]
-    is_deep: NDArray[np.bool_]
-    to_old: Array
+    table: StrainTable  # with more orders through the thickness and along the meridian
+    is_old: NDArray[np.bool_]  # which amplitudes the level has
+    is_deep: NDArray[np.bool_]  # which of these have a new order through the thickness
+    to_old: Array  # from the values at the level's nodes
+    # the functions that may answer: the new ones, and the old ones inside an element, with which these go together in a
+    # thin shell
     pattern: Pattern
-    places: tuple[Index, ...]
-    units: tuple[tuple[Array, ...], ...]
-    factor: float
+    places: tuple[Index, ...]  # where these are among the functions and amplitudes of every element
+    units: tuple[tuple[Array, ...], ...]  # their stiffness per unit λ and G
+    factor: float  # error over surplus
 
     def answer(self, solutions: Sequence[Solution], part: int, elastic: Elastic | VaryingElastic) -> Answer:
         """See `Answer`; the chain is one part of the system."""
@@ -174,23 +163,15 @@ class ShellExtension:
 
 @dataclass(frozen=True, eq=False)
 class SolidExtension:
-    """Functions of one more degree on the cells of a solid part, at the points of the level.
+    """Functions of one more degree on the cells of a solid part, at the points of the level."""
 
-    Attributes
-    ----------
-    table : the new functions.
-    products : of the same.
-    edges, turned : the edge of the four first ones, and the sign that turns them the same way, (cells, 4).
-    are_open : whether an edge may move, (edges,).
-    factor : error over surplus.
-    """
-
-    table: CellTable
-    products: Array
+    table: CellTable  # the new functions
+    products: Array  # of the same
+    # edges, turned: the edge of the four first ones, and the sign that turns them the same way, (cells, 4)
     edges: Index
     turned: Array
-    are_open: NDArray[np.bool_]
-    factor: float
+    are_open: NDArray[np.bool_]  # whether an edge may move, (edges,)
+    factor: float  # error over surplus
 
     def answer(self, solutions: Sequence[Solution], part: int, elastic: Elastic | VaryingElastic) -> Answer:
         """See `Answer`; the cells are one part of the system."""

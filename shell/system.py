@@ -211,14 +211,7 @@ class System:
     def operators(
         self, lam: list[Array], G: list[Array], rho: list[Array], uniform: bool, shift: float = 0.0
     ) -> tuple[list[Array], "Inertia"]:
-        """Stiffness (plus shift times mass) of every element in the order of `pattern`, and the mass.
-
-        Parameters
-        ----------
-        lam, G, rho : λ, G, ρ at the stations of every group.
-        uniform : whether they are the same everywhere in a group.
-        shift : 1/s², added as shift M so that rigid motions can be factored.
-        """
+        """Stiffness, plus `shift` (1/s²) times mass, of every element in the order of `pattern`, and the mass."""
         K: list[Array] = []
         M: list[Array] = []
         maps = iter(self.maps)

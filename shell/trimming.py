@@ -77,18 +77,12 @@ class SplitWave:
 
 @dataclass(frozen=True, eq=False)
 class Sites:
-    """Where material can be taken off.
+    """Where material can be taken off."""
 
-    Attributes
-    ----------
-    azimuth : rad, (sites,). position : of the meridian, (sites,). capacity : most mass at each, kg, (sites,).
-    gain : w_n of each site per harmonic n, relative split per kg, of either sign, n -> (sites,).
-    """
-
-    azimuth: Array
-    position: Array
-    capacity: Array
-    gain: Mapping[int, Array]
+    azimuth: Array  # rad, (sites,)
+    position: Array  # of the meridian, (sites,)
+    capacity: Array  # most mass at each, kg, (sites,)
+    gain: Mapping[int, Array]  # w_n of each site per harmonic n, relative split per kg, of either sign, n -> (sites,)
 
 
 @dataclass(frozen=True)
@@ -148,11 +142,6 @@ def plan_trim(
     removal_error : relative standard error of the mass of each cut, independent.
     gain_error : relative standard error that all cuts share: of what a mass does, and of the removal rate.
     unbalance : k -> u_k = Σ m exp(i k θ) of the resonator, kg, for k of 1 ... 3 as far as known.
-
-    Raises
-    ------
-    ShellError
-        The sites cannot take off what is needed.
     """
     if not goal > 0:
         raise ShellError("the goal is a positive split in Hz.")

@@ -36,20 +36,13 @@ WEDGE = "000 202 200 020 222 220 102 201 100 122 221 120 010 212 210 112 211 110
 
 @dataclass(frozen=True, eq=False)
 class Volume:
-    """A mesh of quadratic elements.
+    """A mesh of quadratic elements."""
 
-    Attributes
-    ----------
-    nodes : (N, 3) array, m, places; the axis of the resonator is z.
-    hexahedra : (H, 27 or 20) array, node numbers in VTK's order: corners, edges, then faces and middle.
-    wedges : (W, 18 or 15) array, the same for the elements on the axis.
-    held_quadrilaterals, held_triangles : (Q, 9 or 8), (T, 6) arrays
-        Faces that the support holds: corners, edges, middle.
-    """
-
-    nodes: Array
-    hexahedra: Index
-    wedges: Index
+    nodes: Array  # (N, 3) array, m, places; the axis of the resonator is z
+    hexahedra: Index  # (H, 27 or 20) array, node numbers in VTK's order: corners, edges, then faces and middle
+    wedges: Index  # (W, 18 or 15) array, the same for the elements on the axis
+    # held_quadrilaterals, held_triangles: (Q, 9 or 8), (T, 6) arrays Faces that the support holds: corners, edges,
+    # middle
     held_quadrilaterals: Index
     held_triangles: Index
 
@@ -88,15 +81,7 @@ class Pieces:
 
 
 def build_volume(resonator: Resonator, layers: int = 2, around: int = 48, spacing: float | None = None) -> Volume:
-    """Mesh a resonator with complete quadratic elements.
-
-    Parameters
-    ----------
-    resonator : geometry.
-    layers : elements through the thickness; more where two solid parts need a multiple.
-    around : elements around the axis.
-    spacing : longest element along the meridian, m; a sixth of the radius unless given.
-    """
+    """Mesh a resonator with complete quadratic elements, at most `spacing` (m), or R/6, long along the meridian."""
     if not (1 <= layers <= 16 and 8 <= around <= 720):
         raise ShellError("a mesh has 1 to 16 elements through the thickness and 8 to 720 around.")
     spacing = resonator.size / 6 if spacing is None else spacing

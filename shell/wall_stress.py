@@ -25,11 +25,7 @@ class WallStress:
 def find_wall_stress(mode: Mode, first: float, last: float, face: Literal["inner", "outer"] = "outer") -> WallStress:
     """Return σ_φφ and σ_θθ of a free face between two positions of the meridian, E/(1 − ν²) (ε_φ + ν ε_θ) and its like.
 
-    Parameters
-    ----------
-    mode : a solved one, theory solid or shell.
-    first, last : arc length over that of the shell (0 … 1); means are by area.
-    face : "inner" or "outer"
+    Positions are 0 … 1 of the arc length of the shell; means are by area.
     """
     from shell.damping.faces import shell_faces
 

@@ -28,11 +28,7 @@ class EnergyBalance:
 
 
 def check_energy(network: Network, boundaries: Mapping[str, Profile], transient: Transient) -> EnergyBalance:
-    """Compare Σ ∫ C dT with ∫ (heat from the boundaries + sources) dt along a transient.
-
-    The temperatures alone enter, not the method that made them; the time integral is Gauss's, graded towards
-    the start of every smooth stretch, where a network changes fastest.
-    """
+    """Compare Σ ∫ C dT with ∫ (heat from the boundaries + sources) dt along a transient."""
     n = network.count
     received = turnover = 0.0
     for start, end in zip(transient.knots[:-1], transient.knots[1:], strict=True):

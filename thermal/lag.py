@@ -9,18 +9,7 @@ from thermal.network import Array
 
 
 def lag(time: ArrayLike, temperature: ArrayLike, time_constant: float, initial: float | None = None) -> Array:
-    """Follow a temperature, linear between its rows, with one lag: τ dT_r/dt = T − T_r, exactly.
-
-    Parameters
-    ----------
-    time, temperature : arrays (N,), s and K
-    time_constant : float, s
-    initial : K, T_r at the first row; the first temperature when absent.
-
-    Returns
-    -------
-    array (N,), K
-    """
+    """Follow a temperature (K) with one lag from `initial`, or its first value: τ dT_r/dt = T − T_r, exactly."""
     time, temperature = np.asarray(time, dtype=float), np.asarray(temperature, dtype=float)
     if not time_constant > 0:
         raise ThermalError(f"a time constant must be positive, not {time_constant:g} s.")

@@ -21,21 +21,13 @@ Capacity = float | Callable[[float], float]
 
 @dataclass(frozen=True)
 class MeridianCells:
-    """A meridian cut into cells, with plain numbers for each.
+    """A meridian cut into cells, with plain numbers for each."""
 
-    Attributes
-    ----------
-    edge : array (N + 1,), arc length, m, from the stem to the rim
-    middle : array (N,), arc length, m
-    area : array (N,), area of the middle surface, m²
-    volume : array (N,), m³
-    shape_resistance : array (N,), ∫ ds / (2π r h) from the middle before (the first: from the stem) to this one, 1/m
-    """
-
-    edge: Array
-    middle: Array
-    area: Array
-    volume: Array
+    edge: Array  # array (N + 1,), arc length, m, from the stem to the rim
+    middle: Array  # array (N,), arc length, m
+    area: Array  # array (N,), area of the middle surface, m²
+    volume: Array  # array (N,), m³
+    # array (N,), ∫ ds / (2π r h) from the middle before (the first: from the stem) to this one, 1/m
     shape_resistance: Array
 
     @property
@@ -45,12 +37,7 @@ class MeridianCells:
 
 
 def cut_meridian(length: float, radius: Along, thickness: Along, count: int) -> MeridianCells:
-    """Cut a meridian of arc length `length` (m) into `count` equal cells.
-
-    Parameters
-    ----------
-    radius, thickness : callables from arc length (array, m) to the distance from the axis and the thickness (m)
-    """
+    """Cut a meridian into `count` equal cells; radius and thickness (m) are functions of the arc length (m)."""
     if not (length > 0 and count >= 1):
         raise ThermalError("a meridian needs a positive length and at least one cell.")
     edge = np.linspace(0.0, length, count + 1)
@@ -144,11 +131,6 @@ def energy_weights(cells: MeridianCells, place: ArrayLike, share: ArrayLike) -> 
 
     The change of frequency of a temperature field is then Σ weights (T − T_ref) = δ ln f. Before the first middle and
     beyond the last the field is even.
-
-    Parameters
-    ----------
-    place : array (M,), arc length from the root, m
-    share : array (M,), 1/K
     """
     place = np.asarray(place, dtype=float)
     hats = np.array([np.interp(place, cells.middle, unit) for unit in np.eye(cells.count)])

@@ -29,17 +29,12 @@ UNITS = {"s": 1.0, "min": 60.0, "h": 3600.0}
 
 @dataclass(frozen=True)
 class Profile:
-    """A piecewise linear function of time: a boundary's temperature (K) or a source's power (W).
+    """A piecewise linear function of time: a boundary's temperature (K) or a source's power (W)."""
 
-    Parameters
-    ----------
-    time : array (N,), seconds, not decreasing; a time given twice is a jump. The value before a jump at the start is
-        the one at which the network has settled.
-    value : array (N,), temperature in kelvin, or power in watt.
-    """
-
+    # array (N,), seconds, not decreasing; a time given twice is a jump. The value before a jump at the start is the one
+    # at which the network has settled
     time: NDArray[np.float64]
-    value: NDArray[np.float64]
+    value: NDArray[np.float64]  # array (N,), temperature in kelvin, or power in watt
 
     def __post_init__(self) -> None:
         time, value = np.array(self.time, dtype=float), np.array(self.value, dtype=float)

@@ -37,11 +37,6 @@ def integrate(
     """Integrate a network with radiation and capacities that depend on temperature.
 
     Implicit Runge-Kutta of order 5 (Radau IIA) with the exact Jacobian, restarted at the corners of the profiles.
-
-    Parameters
-    ----------
-    network, boundaries, initial : as for `propagate`
-    relative_tolerance : error of one step over the temperature (K).
     """
     knots = find_corners(network, boundaries)
     jumps = np.concatenate([boundaries[b.name].jumps for b in network.boundaries])

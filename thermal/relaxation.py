@@ -10,26 +10,15 @@ from thermal.network import Array, Network, linearise
 
 @dataclass(frozen=True)
 class Relaxation:
-    """Modes of C dT/dt = −G T, slowest first.
+    """Modes of C dT/dt = −G T, slowest first."""
 
-    Attributes
-    ----------
-    nodes : names of the nodes
-    temperature : float, K, where the network was linearised
-    capacity : array (n,), J/K
-    conductance : array (n, n), W/K, the matrix G over the nodes
-    coupling : array (n, boundaries), W/K, heat into the nodes per kelvin of each boundary
-    time_constants : array (n,), s
-    shapes : array (n, n); column k is mode k, normalised to shapesᵀ C shapes = 1
-    """
-
-    nodes: tuple[str, ...]
-    temperature: float
-    capacity: Array
-    conductance: Array
-    coupling: Array
-    time_constants: Array
-    shapes: Array
+    nodes: tuple[str, ...]  # names of the nodes
+    temperature: float  # float, K, where the network was linearised
+    capacity: Array  # array (n,), J/K
+    conductance: Array  # array (n, n), W/K, the matrix G over the nodes
+    coupling: Array  # array (n, boundaries), W/K, heat into the nodes per kelvin of each boundary
+    time_constants: Array  # array (n,), s
+    shapes: Array  # array (n, n); column k is mode k, normalised to shapesᵀ C shapes = 1
 
 
 def find_relaxation(network: Network, temperature: float) -> Relaxation:
@@ -55,9 +44,6 @@ def time_constant_sensitivities(network: Network, temperature: float) -> dict[st
 
     d ln τ_k / d ln p = −(1/λ_k) v_kᵀ (∂G/∂ln p − λ_k ∂C/∂ln p) v_k, from the derivative of a simple eigenvalue.
 
-    Returns
-    -------
-    dict
         "capacity NODE", "conductance ONE-OTHER", "exchange ONE-OTHER" to an array (n,) in the order of
         `find_relaxation`. Capacities sum to 1 in every mode, conductances and exchange areas together to −1.
         Links that share both ends are counted together.

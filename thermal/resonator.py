@@ -17,35 +17,22 @@ from thermal.network import Array, Boundary, Conductor, Node, Part, Radiator, So
 
 @dataclass(frozen=True)
 class HeatPath:
-    """Plain numbers of the heat path.
+    """Plain numbers of the heat path."""
 
-    Attributes
-    ----------
-    cells : the shell's meridian from the stem to the rim; `meridian.lump` makes them one.
-    volumetric_capacity : float or callable of temperature (K), ρ c of shell and stem, J/(m³ K).
-    conductivity : k of shell and stem, W/(m K).
-    stem_radius, stem_length : m.
-    emissivity : effective emissivity between each face of the shell and what it faces, 1/(1/ε₁ + 1/ε₂ − 1) of parallel
-        faces; decided by the metal film.
-    base_capacity, housing_capacity : J/K.
-    mount_conductance : base to housing, W/K.
-    mount_exchange : base to housing, exchange area in m².
-    chamber_conductance : housing to chamber, W/K.
-    drive_power : heat of the vibration, W, spread evenly over the shell's volume.
-    """
-
-    cells: MeridianCells
-    volumetric_capacity: Capacity
-    conductivity: float
-    stem_radius: float
+    cells: MeridianCells  # the shell's meridian from the stem to the rim; `meridian.lump` makes them one
+    volumetric_capacity: Capacity  # float or callable of temperature (K), ρ c of shell and stem, J/(m³ K)
+    conductivity: float  # k of shell and stem, W/(m K)
+    stem_radius: float  # stem_radius, stem_length: m
     stem_length: float
+    # effective emissivity between each face of the shell and what it faces, 1/(1/ε₁ + 1/ε₂ − 1) of parallel faces;
+    # decided by the metal film
     emissivity: float
-    base_capacity: float
+    base_capacity: float  # base_capacity, housing_capacity: J/K
     housing_capacity: float
-    mount_conductance: float
-    mount_exchange: float
-    chamber_conductance: float
-    drive_power: float = 0.0
+    mount_conductance: float  # base to housing, W/K
+    mount_exchange: float  # base to housing, exchange area in m²
+    chamber_conductance: float  # housing to chamber, W/K
+    drive_power: float = 0.0  # heat of the vibration, W, spread evenly over the shell's volume
 
     def __post_init__(self) -> None:
         if not 0 <= self.emissivity <= 1:

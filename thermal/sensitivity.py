@@ -26,23 +26,15 @@ CAPACITY_STEP = 0.5  # K, half the central difference of a capacity over tempera
 
 @dataclass(frozen=True)
 class NetworkChange:
-    """How a network changes with one value: derivatives of its matrices; all zero unless given.
+    """How a network changes with one value: derivatives of its matrices; all zero unless given."""
 
-    Attributes
-    ----------
-    conduction, radiation : arrays (N, N), ∂L/∂p and ∂R/∂p over nodes and boundaries
-    capacity : array (n,), ∂ ln C/∂p of the nodes
-    power : array (n,), ∂q/∂p
-    boundaries : mapping of a boundary's name to the change of its profile, on rows as long as the run
-    initial : array (n,), ∂T(0)/∂p beyond what a settled start does (K)
-    """
-
-    conduction: Array
+    conduction: Array  # conduction, radiation: arrays (N, N), ∂L/∂p and ∂R/∂p over nodes and boundaries
     radiation: Array
-    capacity: Array
-    power: Array
+    capacity: Array  # array (n,), ∂ ln C/∂p of the nodes
+    power: Array  # array (n,), ∂q/∂p
+    # mapping of a boundary's name to the change of its profile, on rows as long as the run
     boundaries: Mapping[str, Profile] = field(default_factory=dict)
-    initial: Array | None = None
+    initial: Array | None = None  # array (n,), ∂T(0)/∂p beyond what a settled start does (K)
 
     @property
     def moves(self) -> bool:
@@ -75,17 +67,11 @@ def difference(
 
 @dataclass(frozen=True)
 class ObservedSums:
-    """Sums of node temperatures at the rows, and their derivatives.
+    """Sums of node temperatures at the rows, and their derivatives."""
 
-    Attributes
-    ----------
-    temperature, rate : arrays (M, sums), K and K/s
-    slope, rate_slope : arrays (changes, M, sums), the derivatives of both
-    """
-
-    temperature: Array
+    temperature: Array  # temperature, rate: arrays (M, sums), K and K/s
     rate: Array
-    slope: Array
+    slope: Array  # slope, rate_slope: arrays (changes, M, sums), the derivatives of both
     rate_slope: Array
 
 
@@ -100,13 +86,8 @@ def respond(
 ) -> ObservedSums:
     """Temperatures of a network at the rows, with derivatives by every change.
 
-    Parameters
-    ----------
-    network, boundaries : as for `thermal.sweeping.sweep`
-    time : array (M,), s
-    weights : array (sums, n), of the nodes
-    departure : array (n,), K, of the initial state from the steady state before the profiles begin.
-    longest : s, as for `run_sweeps`.
+    `weights` (sums, n) of the nodes; `departure` (n,) of the initial state from the steady one before the profiles
+    begin (K).
     """
     rows = np.asarray(time, dtype=float)
     first = {name: float(profile.value[0]) for name, profile in boundaries.items()}

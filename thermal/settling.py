@@ -15,13 +15,7 @@ DECADES = (-6.0, 3.0)  # search range of a conductance, log10 of W/K
 
 
 def step_remaining(network: Network, before: float, after: float, weights: Array, time: ArrayLike) -> Array:
-    """Share of a step of all boundaries from `before` to `after` (K) that a mean temperature still lacks.
-
-    Parameters
-    ----------
-    weights : array (nodes,), row of weights of sum one, which makes the mean.
-    time : array (N,), s after the step
-    """
+    """Share of a step of all boundaries from `before` to `after` (K) that a mean over nodes lacks, `time` (s) after it."""
     time = np.asarray(time, dtype=float)
     profile = Profile(np.array([0.0, 0.0, time.max()]), np.array([before, after, after]))
     transient = simulate(network, {boundary.name: profile for boundary in network.boundaries})

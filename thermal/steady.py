@@ -12,19 +12,7 @@ TOLERANCE = 1e-9  # relative size of the last Newton step; its error is the squa
 
 
 def find_steady_state(network: Network, boundaries: Mapping[str, float], time: float = 0.0) -> Array:
-    """Solve q = L T + σ R T⁴ by Newton's method.
-
-    Parameters
-    ----------
-    network : Network
-    boundaries : mapping, temperature (K) of every boundary.
-    time : moment (s) at which sources that vary are read.
-
-    Returns
-    -------
-    array (nodes + boundaries,)
-        Temperatures in kelvin, in the order of `network.names`.
-    """
+    """Solve q = L T + σ R T⁴ by Newton's method: temperatures (K) of nodes and boundaries, sources at `time` (s)."""
     n = network.count
     held = boundary_vector(network, boundaries)
     T = np.concatenate([np.full(n, held.mean()), held])

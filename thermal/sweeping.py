@@ -94,26 +94,17 @@ class Grid:
 
 @dataclass(frozen=True)
 class Sweep:
-    """A network's temperatures at all moments of its grid, and what they were found with.
-
-    Attributes
-    ----------
-    held : array (3, K, boundaries), K
-    power : array (3, K, n), W, of the sources
-    temperature : array (3, K, n), K
-    beyond, beyond_rate : arrays (3, K, n), δ and its rate (K, K/s)
-    first : Transient, the linear network's answer T₁
-    """
+    """A network's temperatures at all moments of its grid, and what they were found with."""
 
     network: Network
     linear: Network
     grid: Grid
-    held: Array
-    power: Array
-    temperature: Array
-    beyond: Array
+    held: Array  # array (3, K, boundaries), K
+    power: Array  # array (3, K, n), W, of the sources
+    temperature: Array  # array (3, K, n), K
+    beyond: Array  # beyond, beyond_rate: arrays (3, K, n), δ and its rate (K, K/s)
     beyond_rate: Array
-    first: Transient
+    first: Transient  # Transient, the linear network's answer T₁
 
     @cached_property
     def everything(self) -> Array:
@@ -142,13 +133,7 @@ def run_sweeps(
     initial: ArrayLike | None = None,
     longest: float | None = None,
 ) -> Sweep:
-    """Sweep until no temperature changes by more than 1e-7 K, with knots at most `longest` (s) apart, `LONGEST_ROW` when absent.
-
-    Raises
-    ------
-    ThermalError
-        Profiles that do not fit the network, or radiation so strong that the sweeps do not converge.
-    """
+    """Sweep until no temperature changes by more than 1e-7 K, with knots at most `longest` (s) apart, `LONGEST_ROW` when absent."""
     corners = find_corners(network, boundaries)
     knots = _choose_knots(corners, boundaries, longest or LONGEST_ROW)
     T0 = initial_state(network, boundaries, initial)

@@ -18,18 +18,11 @@ BLOCK = 1 << 16  # rows evaluated at a time; bounds the memory of long outputs
 
 @dataclass(frozen=True)
 class Transient:
-    """Temperatures (K) of the nodes as functions of time, from `start` to `end` (s).
+    """Temperatures (K) of the nodes as functions of time, from `start` to `end` (s)."""
 
-    Attributes
-    ----------
-    nodes : names of the nodes
-    knots : array, times (s) between which the temperatures are smooth
-    evaluate : callable from an array of times (N,) to the array of temperatures (N, nodes)
-    """
-
-    nodes: tuple[str, ...]
-    knots: Array
-    evaluate: Callable[[Array], Array]
+    nodes: tuple[str, ...]  # names of the nodes
+    knots: Array  # array, times (s) between which the temperatures are smooth
+    evaluate: Callable[[Array], Array]  # callable from an array of times (N,) to the array of temperatures (N, nodes)
 
     @property
     def start(self) -> float:
@@ -53,13 +46,7 @@ class Transient:
         return self.observe(time, weights)[:, 0]
 
     def observe(self, time: ArrayLike, weights: Array) -> Array:
-        """Sums of node temperatures, shape (N, rows of weights), in blocks, so that only the sums are stored.
-
-        Parameters
-        ----------
-        time : array (N,), s
-        weights : array (sums, nodes)
-        """
+        """Sums of node temperatures, shape (N, rows of weights), in blocks, so that only the sums are stored."""
         time = np.asarray(time, dtype=float)
         if time.size and not (time.min() >= self.start and time.max() <= self.end):
             raise ThermalError(f"the transient covers only {self.start:g} to {self.end:g} s.")
@@ -74,12 +61,7 @@ def propagate(network: Network, boundaries: Mapping[str, Profile], initial: Arra
 
     In modal coordinates x = shapesᵀ C T every mode obeys dx/dt = −λ x + u, u linear between the corners of the
     profiles, so that x = u₀/λ − u₁/λ² + (u₁/λ) s + c e^(−λ s) at the time s after a corner.
-
-    Parameters
-    ----------
-    network : without radiation and with constant capacities; see `thermal.network.linearise`.
-    boundaries : mapping, profile (K) of every boundary; all cover the same time.
-    initial : array (nodes,), K, temperatures at the start; the steady state before the profiles begin when absent.
+    `initial` temperatures of the nodes: the steady state before the profiles begin unless given.
     """
     if not network.is_linear:
         raise ThermalError(

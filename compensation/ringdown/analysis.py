@@ -39,34 +39,20 @@ class Estimate:
 
 @dataclass(frozen=True)
 class RingDown:
-    """What one decay says.
+    """What one decay says."""
 
-    Attributes
-    ----------
-    estimates : mapping, `frequency_1_Hz` (the higher), `frequency_2_Hz`, `q_1`, `q_2`, `frequency_Hz`, `inverse_q`,
-        `decay_time_s`; of two channels `split_Hz`, `frequency_axis_deg`, `damping_split_per_s`, `damping_axis_deg`;
-        where they are seen `hardening_Hz`, `thickening_per_s`, at the first amplitude, and `drift_Hz_per_s`.
-    fit : the decay within `window`.
-    window : (float, float), seconds of the record that are free decay above the noise.
-    remarks : tuple of str, what is not as it should be, a sentence each.
-    """
-
+    # mapping, `frequency_1_Hz` (the higher), `frequency_2_Hz`, `q_1`, `q_2`, `frequency_Hz`, `inverse_q`,
+    # `decay_time_s`; of two channels `split_Hz`, `frequency_axis_deg`, `damping_split_per_s`, `damping_axis_deg`; where
+    # they are seen `hardening_Hz`, `thickening_per_s`, at the first amplitude, and `drift_Hz_per_s`
     estimates: Mapping[str, Estimate]
-    fit: DecayFit
-    window: tuple[float, float]
-    remarks: tuple[str, ...]
+    fit: DecayFit  # the decay within `window`
+    window: tuple[float, float]  # (float, float), seconds of the record that are free decay above the noise
+    remarks: tuple[str, ...]  # tuple of str, what is not as it should be, a sentence each
     lines: tuple[float, ...] = ()
 
 
 def analyse_decay(envelope: Envelope, *, harmonic: int = 2, confidence: float = 0.9) -> RingDown:
-    """Find the free decay in an envelope and return its frequencies, Q and axes with intervals.
-
-    Parameters
-    ----------
-    envelope : of the whole record.
-    harmonic : n: a pattern at the azimuth θ has the amplitudes cos nθ and sin nθ in the two channels.
-    confidence : of the intervals.
-    """
+    """Find the free decay in an envelope and return its frequencies, Q and axes with intervals."""
     _check(envelope)
     jump = find_jump(envelope)
     given = envelope

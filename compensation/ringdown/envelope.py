@@ -21,25 +21,16 @@ WRITTEN = 0.5  # part of a step by which the times of an even grid may be off fo
 
 @dataclass(frozen=True)
 class Envelope:
-    """Complex amplitudes about a carrier.
+    """Complex amplitudes about a carrier."""
 
-    Attributes
-    ----------
-    time : array (rows,), s, middle of each block, from the first sample of the record.
-    values : array (channels, rows)
-        z of each channel, in the unit of the record, by rows; NaN where a block has no samples.
-    carrier : Hz, the frequency that turns e^{2πi f t}: f_c of raw samples, the reference of a lock-in.
-    width : s, length of a block.
-    clipped : part of the raw samples at the ends of their range where the record is flat there; 0 of a lock-in.
-    lost : part of the time without samples.
-    """
-
-    time: Real
+    time: Real  # array (rows,), s, middle of each block, from the first sample of the record
+    # array (channels, rows) z of each channel, in the unit of the record, by rows; NaN where a block has no samples
     values: Complex
-    carrier: float
-    width: float
+    carrier: float  # Hz, the frequency that turns e^{2πi f t}: f_c of raw samples, the reference of a lock-in
+    width: float  # s, length of a block
+    # part of the raw samples at the ends of their range where the record is flat there; 0 of a lock-in
     clipped: float = 0.0
-    lost: float = 0.0
+    lost: float = 0.0  # part of the time without samples
 
     def within(self, start: float, end: float) -> "Envelope":
         """The rows between two times (s)."""
@@ -66,14 +57,7 @@ def find_carrier(samples: ArrayLike, rate: float) -> float:
 
 
 def mix_down(time: ArrayLike, channels: ArrayLike, carrier: float | None = None) -> Envelope:
-    """Return the complex amplitudes of raw samples.
-
-    Parameters
-    ----------
-    time : array (N,), seconds, evenly spaced but for lost rows.
-    channels : array (channels, N), raw samples of one or two pick-offs; NaN is a lost sample.
-    carrier : Hz; the largest line where it is not given.
-    """
+    """Return the complex amplitudes of raw samples (channels, N); the carrier (Hz) is the largest line unless given."""
     t = np.asarray(time, dtype=np.float64)
     x = np.atleast_2d(np.asarray(channels, dtype=np.float64))
     if t.size < 64:
@@ -145,13 +129,7 @@ def _choose_block(least: float, period: float) -> int:
 
 
 def from_lock_in(time: ArrayLike, amplitudes: ArrayLike, carrier: float = 0.0) -> Envelope:
-    """Return the complex amplitudes of a lock-in's rows, averaged to a few thousand blocks where there are more.
-
-    Parameters
-    ----------
-    time : array (N,), seconds.
-    amplitudes : array (channels, N), X + iY, or R e^{iφ}, about the reference frequency `carrier` (Hz).
-    """
+    """Return the complex amplitudes of a lock-in's rows, averaged to a few thousand blocks where there are more."""
     t = np.asarray(time, dtype=np.float64)
     z = np.atleast_2d(np.asarray(amplitudes, dtype=np.complex128))
     keep = np.isfinite(t) & np.all(np.isfinite(z), axis=0)

@@ -23,30 +23,18 @@ COARSE = 256  # rows of the averaged envelope on which starting points are looke
 
 @dataclass(frozen=True)
 class DecayFit:
-    """A decay fitted to an envelope.
-
-    Attributes
-    ----------
-    decay, start : Decay, array (channels,), rates, and the complex amplitudes at the first row.
-    names : tuple of str
-        The rates that were fitted; the real and imaginary parts of `start` follow them in `covariance`.
-    covariance : array, Cramér–Rao bound of rates and start at the noise found (times `widening`²).
-    noise : array (channels,), standard deviation of a complex row, √⟨|n|²⟩.
-    residual : array (channels, rows), data minus model.
-    cost : Σ |residual|²/noise², twice the negative logarithm of the likelihood but for a constant.
-    widening : factor on the bound where the residual is not white.
-    summed : whether one channel sees the sum of the two modes.
-    """
+    """A decay fitted to an envelope."""
 
     envelope: Envelope
-    decay: Decay
+    decay: Decay  # decay, start: Decay, array (channels,), rates, and the complex amplitudes at the first row
     start: Complex
+    # the rates that were fitted; the real and imaginary parts of `start` follow them in `covariance`
     names: tuple[str, ...]
-    covariance: Real
-    noise: Real
-    residual: Complex
-    widening: float = 1.0
-    summed: bool = False
+    covariance: Real  # array, Cramér–Rao bound of rates and start at the noise found (times `widening`²)
+    noise: Real  # array (channels,), standard deviation of a complex row, √⟨|n|²⟩
+    residual: Complex  # array (channels, rows), data minus model
+    widening: float = 1.0  # factor on the bound where the residual is not white
+    summed: bool = False  # whether one channel sees the sum of the two modes
 
     @property
     def one_mode(self) -> bool:
@@ -75,15 +63,7 @@ class DecayFit:
 def fit_decay(
     envelope: Envelope, *, extra: Sequence[str] = (), modes: int = 2, starts: Sequence[Decay] = ()
 ) -> DecayFit:
-    """Fit the decay of one or two modes to one or two channels.
-
-    Parameters
-    ----------
-    envelope : of the free decay alone.
-    extra : sequence of str, rates beyond the linear ones to fit: `hardening`, `thickening`, `chirp`.
-    modes : 1 or 2. Two channels of an isotropic resonator are one mode too.
-    starts : sequence of Decay, starting points; looked for where there is none.
-    """
+    """Fit the decay of one or two modes, with `extra` rates beyond the linear ones, to one or two channels."""
     z = envelope.values
     summed = z.shape[0] == 1 and modes == 2
     linear = ONE_MODE if modes == 1 else TWO_MODES if not summed else (*ONE_MODE, "damping_cos", "stiffness_cos")

@@ -20,26 +20,19 @@ Complex = NDArray[np.complex128]
 
 @dataclass(frozen=True)
 class Decay:
-    """The rates of a free decay, all in 1/s (rad/s), about a carrier.
+    """The rates of a free decay, all in 1/s (rad/s), about a carrier."""
 
-    Attributes
-    ----------
-    detuning, decay : δ and 1/τ.
-    damping_cos, damping_sin, stiffness_cos, stiffness_sin : float
-        C₁, C₂ and W₁, W₂; the stiffness pair alone is used of a single channel with two modes.
-    hardening, thickening : κ and γ per squared amplitude.
-    chirp : β (rad/s²).
-    """
-
-    detuning: float
+    detuning: float  # detuning, decay: δ and 1/τ
     decay: float
+    # damping_cos, damping_sin, stiffness_cos, stiffness_sin: C₁, C₂ and W₁, W₂; the stiffness pair alone is used
+    # of a single channel with two modes
     damping_cos: float = 0.0
     damping_sin: float = 0.0
     stiffness_cos: float = 0.0
     stiffness_sin: float = 0.0
-    hardening: float = 0.0
+    hardening: float = 0.0  # hardening, thickening: κ and γ per squared amplitude
     thickening: float = 0.0
-    chirp: float = 0.0
+    chirp: float = 0.0  # β (rad/s²)
 
     @property
     def mean(self) -> complex:

@@ -23,37 +23,22 @@ FLOOR = 3.0
 
 @dataclass(frozen=True)
 class TraceDecay:
-    """Decay time of a trace without phase.
+    """Decay time of a trace without phase."""
 
-    Attributes
-    ----------
-    decay, sd : 1/s, 1/τ of the amplitude, and its standard deviation with the correlation of the scatter counted.
-    low, high : 90 % interval of 1/τ.
-    amplitude, noise : a at the start of the window and σ, in the unit of the record.
-    window : (float, float), seconds that were used.
-    bound : standard deviation that the Cramér–Rao bound of uncorrelated scatter allows.
-    remarks : tuple of str
-    """
-
+    # decay, sd: 1/s, 1/τ of the amplitude, and its standard deviation with the correlation of the scatter counted
     decay: float
     sd: float
-    low: float
+    low: float  # low, high: 90 % interval of 1/τ
     high: float
-    amplitude: float
+    amplitude: float  # amplitude, noise: a at the start of the window and σ, in the unit of the record
     noise: float
-    window: tuple[float, float]
-    bound: float
+    window: tuple[float, float]  # (float, float), seconds that were used
+    bound: float  # standard deviation that the Cramér–Rao bound of uncorrelated scatter allows
     remarks: tuple[str, ...]
 
 
 def analyse_trace(time: ArrayLike, amplitude: ArrayLike, *, confidence: float = 0.9) -> TraceDecay:
-    """Find the free part of a trace and return its decay.
-
-    Parameters
-    ----------
-    time : array (N,), seconds.
-    amplitude : array (N,), positive; the root of a power.
-    """
+    """Find the free part of a trace and return its decay."""
     t, a = np.asarray(time, dtype=np.float64), np.asarray(amplitude, dtype=np.float64)
     keep = np.isfinite(t) & np.isfinite(a) & (a > 0)
     t, L = t[keep], np.log(a[keep])

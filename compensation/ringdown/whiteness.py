@@ -14,20 +14,13 @@ RARE = 1e-3  # probability below which noise is not held for the reason
 
 @dataclass(frozen=True)
 class Leftover:
-    """What a residual (channels, rows) shows beside white noise.
+    """What a residual (channels, rows) shows beside white noise."""
 
-    Attributes
-    ----------
-    widening : √ of the largest ratio between the variance of block means and what white noise leaves of it, at least 1.
-    early : whether the first rows miss by more than the rest: a transient, or a drive that still acts.
-    line : frequency (Hz, from the carrier) of a line in the residual, None where there is none.
-    amplitude : of that line, in the unit of the record.
-    """
-
+    # √ of the largest ratio between the variance of block means and what white noise leaves of it, at least 1
     widening: float
-    early: bool
-    line: float | None
-    amplitude: float
+    early: bool  # whether the first rows miss by more than the rest: a transient, or a drive that still acts
+    line: float | None  # frequency (Hz, from the carrier) of a line in the residual, None where there is none
+    amplitude: float  # of that line, in the unit of the record
 
 
 def examine(time: Real, residual: Complex) -> Leftover:

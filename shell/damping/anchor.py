@@ -27,17 +27,7 @@ def anchor_loss(mode: Mode, elastic: Elastic | VaryingElastic, base: Elastic | N
 
     A mode with n >= 2 has neither force nor moment on the stem, and its motion dies out along it as exp(-1.8 z/a) or faster:
     what arrives is tiny. The harmonics 0 and 1 arrive as a force; an imperfect resonator has them too (`unbalance_loss`).
-
-    Parameters
-    ----------
-    mode : of a resonator on one stem.
-    elastic : of the resonator, the same everywhere.
-    base : of the half-space; that of the resonator unless given.
-
-    Returns
-    -------
-    Radiating
-        Frequency, 1/Q, and the resonator's share of the motion.
+    The half-space is of the resonator's material unless a `base` is given.
     """
     _, waves = _stand(mode, elastic, base, _solved(mode).system.n)
     return radiating_mode(waves, mode.frequency)
@@ -73,11 +63,6 @@ def unbalance_loss(mode: Mode, elastic: Elastic | VaryingElastic, base: Elastic 
     Masses that move with the mode push the motion of n = 1, which reaches the base: of a mass density with the wave k around,
     (K₁ - ω² M₁) v_k = ω² L_k with L_k = (1/2π)(w₂ w₁ ± v₂ v₁ + z₂ z₁) at the rim, + for k = 1 and - for k = 3, and
     α_kl = -Im(L_kᵀ v_l)/∫ ρ |u₂|² dV.
-
-    Parameters
-    ----------
-    mode : with n = 2, of a resonator on one stem, its rim free.
-    elastic, base : as for `anchor_loss`.
     """
     solution = _solved(mode)
     if solution.system.n != 2:
@@ -164,15 +149,7 @@ def _rim(resonator: Resonator, system: System) -> list[Array]:
 
 
 def lay_half_space(radii: list[float], surface: float, below: bool, wavelength: float) -> tuple[list[Patch], Layer]:
-    """Cells of a half-space whose surface carries a stem.
-
-    Parameters
-    ----------
-    radii : where the cells of the stem's end meet, from 0 to its radius, m.
-    surface : height of the surface, m.
-    below : whether the half-space fills z < surface.
-    wavelength : of shear waves in it at the mode's frequency, m.
-    """
+    """Cells of a half-space whose surface carries a stem."""
     radius, step = radii[-1], radii[-1] - radii[-2]
     start, width = max(4 * radius, 0.5 * wavelength), wavelength
     columns = [*radii, *_grow(radius, step, start, wavelength), *(start + width * np.arange(1, LAYER + 1) / LAYER)]

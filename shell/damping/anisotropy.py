@@ -39,14 +39,7 @@ class Ripple:
 
 
 def damping_wave(budget: Budget, ripples: Sequence[Ripple], harmonic: int) -> Complex:
-    """Δ(1/Q) exp(2 i n θ_τ) over the budget's temperatures.
-
-    Parameters
-    ----------
-    budget : its parts by name.
-    ripples : how some of them vary around.
-    harmonic : n.
-    """
+    """Δ(1/Q) exp(2 i n θ_τ) over the budget's temperatures."""
     parts = {part.name: part.inverse_q for part in budget.parts}
     total = np.zeros(len(budget.temperatures), dtype=complex)
     for ripple in ripples:

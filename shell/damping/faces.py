@@ -28,26 +28,16 @@ SIDES = ((None, -1.0), (None, 1.0), (-1.0, None), (1.0, None))  # (ξ, η) held 
 
 @dataclass(frozen=True, eq=False)
 class FreeFaces:
-    """A free surface of the body as a mode moves it: arrays over quadrature points.
+    """A free surface of the body as a mode moves it: arrays over quadrature points."""
 
-    Attributes
-    ----------
-    kind : inner or outer face of the shell, its free edges, the surface of roots, corners and stem.
-    position : of the meridian, 0 ... 1, (points,).
-    area : dA/π, m², (points,).
-    strain : ε_1, ε_2, ε_3, γ_12, γ_13, γ_23, (6, points); on faces 1, 2, 3 are meridian, circumference and normal.
-    energy : σ : ε, twice the strain energy density, J/m³, (points,).
-    moved : displacement along 1, 2, 3, m, (3, points).
-    E, nu : of the material there, Pa and 1, (points,).
-    """
-
-    kind: Kind
-    position: Array
-    area: Array
+    kind: Kind  # inner or outer face of the shell, its free edges, the surface of roots, corners and stem
+    position: Array  # of the meridian, 0 ... 1, (points,)
+    area: Array  # dA/π, m², (points,)
+    # ε_1, ε_2, ε_3, γ_12, γ_13, γ_23, (6, points); on faces 1, 2, 3 are meridian, circumference and normal
     strain: Array
-    energy: Array
-    moved: Array
-    E: Array
+    energy: Array  # σ : ε, twice the strain energy density, J/m³, (points,)
+    moved: Array  # displacement along 1, 2, 3, m, (3, points)
+    E: Array  # E, nu: of the material there, Pa and 1, (points,)
     nu: Array
 
     @property

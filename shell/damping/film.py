@@ -32,29 +32,17 @@ THICKEST = 0.05  # film over wall up to which it follows the face and leaves the
 
 @dataclass(frozen=True)
 class Film:
-    """A film on the faces of the shell.
+    """A film on the faces of the shell."""
 
-    Attributes
-    ----------
-    thickness : m.
-    E, nu : Young's modulus (Pa) and Poisson ratio.
-    loss : its own loss angle φ.
-    heat : what it does with heat; None leaves its thermoelastic loss out.
-    faces : the faces that carry it.
-    span : part of the meridian that carries it, 0 ... 1 of the arc length.
-    coverage : covered share of that part (a pattern finer than the mode's wavelength).
-    rho : density, kg/m³, for its effect on a frequency.
-    """
-
-    thickness: float
-    E: float
+    thickness: float  # m
+    E: float  # E, nu: Young's modulus (Pa) and Poisson ratio
     nu: float
-    loss: float = 0.0
-    heat: Heat | None = None
-    faces: tuple[str, ...] = ("inner", "outer")
-    span: tuple[float, float] = (0.0, 1.0)
-    coverage: float = 1.0
-    rho: float = 0.0
+    loss: float = 0.0  # its own loss angle φ
+    heat: Heat | None = None  # what it does with heat; None leaves its thermoelastic loss out
+    faces: tuple[str, ...] = ("inner", "outer")  # the faces that carry it
+    span: tuple[float, float] = (0.0, 1.0)  # part of the meridian that carries it, 0 ... 1 of the arc length
+    coverage: float = 1.0  # covered share of that part (a pattern finer than the mode's wavelength)
+    rho: float = 0.0  # density, kg/m³, for its effect on a frequency
 
     def __post_init__(self) -> None:
         if not (self.thickness >= 0 and self.loss >= 0):

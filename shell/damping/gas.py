@@ -84,12 +84,7 @@ def free_molecular_loss(
 
 
 def free_impedance(pressure: ArrayLike, molar_mass: float, temperature: ArrayLike) -> Array:
-    """P √(M/(R T)), kg/(m² s): what free molecules take from a face per velocity, up to a number of the wall.
-
-    Parameters
-    ----------
-    pressure : Pa. molar_mass : kg/mol. temperature : K; numbers or arrays.
-    """
+    """P √(M/(R T)), kg/(m² s): what free molecules take from a face per velocity, up to a number of the wall."""
     return np.asarray(np.asarray(pressure) * np.sqrt(molar_mass / (R * np.asarray(temperature, dtype=float))))
 
 

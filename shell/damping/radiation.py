@@ -33,19 +33,13 @@ ITERATIONS = 12  # at one shift
 
 @dataclass(frozen=True)
 class Layer:
-    """An absorbing layer around a half-space: beyond `start` from the axis and from the surface, `width` wide, m.
-
-    Attributes
-    ----------
-    surface : height of the half-space's surface; `below` whether it fills z < surface.
-    wavelength : of shear waves in it.
-    """
+    """An absorbing layer around a half-space: beyond `start` from the axis and from the surface, `width` wide, m."""
 
     start: float
     width: float
-    surface: float
+    surface: float  # height of the half-space's surface; `below` whether it fills z < surface
     below: bool
-    wavelength: float
+    wavelength: float  # of shear waves in it
 
     def stretch(self, distance: Array) -> tuple[Complex, Complex]:
         """1 - i b and -i ∫ b at distances from the axis or the surface; b grows as a square to the outer edge."""
@@ -87,13 +81,7 @@ class RadiatingBody:
 
 
 def radiating_mode(waves: RadiatingBody, frequency: float) -> Radiating:
-    """The mode nearest to a frequency (Hz) that moves the body.
-
-    Raises
-    ------
-    ShellError
-        No mode was found there: the iteration does not settle, or moves the base and not the body.
-    """
+    """The mode nearest to a frequency (Hz) that moves the body."""
     shift = complex((2 * np.pi * frequency) ** 2)
     start = np.random.default_rng(0).standard_normal(waves.body.shape[0])
     v: Complex = np.asarray(waves.body @ start, dtype=complex)
@@ -115,15 +103,7 @@ def radiating_mode(waves: RadiatingBody, frequency: float) -> Radiating:
 
 
 def assemble_waves(system: System, materials: Sequence[Elastic], bases: Sequence[Mask], layer: Layer) -> RadiatingBody:
-    """Stiffness and mass of body and base.
-
-    Parameters
-    ----------
-    system : all elements, those of the base among the cells.
-    materials : of the body and of the base.
-    bases : for every group, which of its cells belong to the base (empty for shells).
-    layer : where waves are absorbed.
-    """
+    """Stiffness and mass of body and base; `bases` says of every group which of its cells belong to the base."""
     P, size = system.constraint.astype(complex), system.constraint.shape[0]
     total: list[scipy.sparse.csc_matrix] = [scipy.sparse.csc_matrix((size, size), dtype=complex) for _ in range(3)]
     for group, base in zip(system.groups, bases, strict=True):

@@ -7,12 +7,7 @@ from shell.quadrature import Array
 
 
 class PairBasis:
-    """The pair, which the perfect body leaves without forces, and answers of the perfect body to loads.
-
-    Parameters
-    ----------
-    value : λ.
-    """
+    """The pair, of eigenvalue λ, which the perfect body leaves without forces, and its answers to loads."""
 
     def __init__(self, body: Body, value: float) -> None:
         self.body, self.value = body, value

@@ -22,27 +22,17 @@ from shell.system import ShellGroup, System
 
 @dataclass(frozen=True, eq=False)
 class Block:
-    """A harmonic k, prepared for any imperfection.
-
-    Attributes
-    ----------
-    shell : the free unknowns of the shell, (size,), which are the unknowns here.
-    shared : which of them the solid parts share, numbers among `shell`.
-    inside, lifted : free unknowns inside the solid parts, and W, (inside, shared).
-    elements : (unknowns, matrix) of K - λ M, the condensed solid parts as one element. around : ∫ cos² kθ dθ.
-    heavy : mass of the solid parts, (shared, shared).
-    kept : M times the pair's vector in the pair's own block.
-    """
+    """A harmonic k, prepared for any imperfection."""
 
     system: System
-    shell: Index
-    shared: Index
-    inside: Index
+    shell: Index  # the free unknowns of the shell, (size,), which are the unknowns here
+    shared: Index  # which of them the solid parts share, numbers among `shell`
+    inside: Index  # inside, lifted: free unknowns inside the solid parts, and W, (inside, shared)
     lifted: Array
-    elements: tuple[tuple[Index, Array], ...]
-    around: float
-    heavy: Array
-    kept: Array | None
+    elements: tuple[tuple[Index, Array], ...]  # (unknowns, matrix) of K - λ M, the condensed solid parts as one element
+    around: float  # ∫ cos² kθ dθ
+    heavy: Array  # mass of the solid parts, (shared, shared)
+    kept: Array | None  # M times the pair's vector in the pair's own block
 
     @property
     def size(self) -> int:

@@ -22,8 +22,6 @@ RUN = 4  # elements that are treated at once: fields that stay in the fast memor
 class Body:
     """Layers on faces, changes of the material, the edge of the rim, masses.
 
-    Parameters
-    ----------
     together : the harmonics. cores : the solid parts. flaw : what is there more, its fields cut down to `waves`.
     theta : azimuths of the quadrature, rad.
     """

@@ -25,12 +25,7 @@ Energies: TypeAlias = Callable[[Block, Block], tuple[Array, Array]]
 
 
 class Core:
-    """Energies of one solid part between any two harmonics, per unit of the unknowns that it shares with the shell.
-
-    Parameters
-    ----------
-    number : of its group. constants : its material.
-    """
+    """Energies of one solid part between any two harmonics, per unit of the unknowns that it shares with the shell."""
 
     def __init__(self, number: int, constants: Constants) -> None:
         self.number, self.constants = number, constants
@@ -38,12 +33,7 @@ class Core:
         self._products: dict[tuple[int, int], tuple[Array, ...]] = {}
 
     def respond(self, X: Array, energies: Energies, weight: Array, around: Around, together: Together) -> Array:
-        """What a change of its material does to vectors (unknowns, vectors, 2).
-
-        Parameters
-        ----------
-        energies : `stiffness` or `mass`. weight : the relative change at the azimuths, times dθ.
-        """
+        """What a change of its material does to vectors (unknowns, vectors, 2)."""
         found = np.zeros_like(X)
         cosine, sine = ((one * weight) @ one.T for one in (around.cosine, around.sine))
         least = 1e-14 * float(np.abs(weight).sum())

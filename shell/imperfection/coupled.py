@@ -47,14 +47,7 @@ KEPT = 8  # sets of harmonics that are kept side by side
 
 
 class CoupledHarmonics:
-    """Harmonics of one resonator, prepared once for any imperfection.
-
-    Parameters
-    ----------
-    mode : the solved pair; theory, level and index are its own.
-    elastic : the material that it was solved with.
-    highest : the highest harmonic k that may take part.
-    """
+    """Harmonics of one resonator, prepared once for any imperfection."""
 
     def __init__(self, mode: Mode, elastic: Elastic | VaryingElastic, highest: int | None = None) -> None:
         if mode.harmonic < 1 or mode.solution is None or mode.resonator is None:
@@ -117,8 +110,6 @@ class CoupledHarmonics:
     def solve(self, imperfection: Imperfection, tolerance: float = 1e-6, rounds: int = MOST) -> Split:
         """The split with every order of the imperfection.
 
-        Parameters
-        ----------
         imperfection : fields and masses. The edge of the rim counts to first order in its height.
         tolerance : of the split, relative to it: where a further round of answers is foretold to change less, there is none.
         rounds : most rounds of answers.

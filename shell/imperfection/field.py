@@ -64,15 +64,7 @@ class _Grown:
 def wave(
     order: int, amplitude: float, azimuth: float = 0.0, profile: Callable[[Array], ArrayLike] | None = None
 ) -> Waves:
-    """A single wave a(x) cos m(θ - θ_m).
-
-    Parameters
-    ----------
-    order : m >= 0.
-    amplitude : a.
-    azimuth : θ_m of a crest, rad.
-    profile : factor over the position; 1 everywhere unless given.
-    """
+    """A single wave a(x) cos m(θ - θ_m), θ_m (rad) the azimuth of a crest, `profile` a factor over the position."""
     if order != int(order) or order < 0:
         raise ShellError(f"the order of a wave around is a whole number from 0 up, not {order!r}.")
     c = complex(amplitude * np.exp(1j * order * azimuth))
@@ -108,18 +100,11 @@ class Function:
 
 @dataclass(frozen=True, eq=False)
 class Map:
-    """A field given by a table over positions and equally spaced azimuths; cubic between positions, constant beyond.
+    """A field given by a table over positions and equally spaced azimuths; cubic between positions, constant beyond."""
 
-    Parameters
-    ----------
-    position : rising, 0 ... 1, (rows,).
-    azimuth : of the columns, rad: equal steps that close the circle, (columns,).
-    values : (rows, columns), no gaps.
-    """
-
-    position: Array
-    azimuth: Array
-    values: Array
+    position: Array  # rising, 0 ... 1, (rows,)
+    azimuth: Array  # of the columns, rad: equal steps that close the circle, (columns,)
+    values: Array  # (rows, columns), no gaps
 
     def __post_init__(self) -> None:
         x, theta = np.asarray(self.position, dtype=float), np.asarray(self.azimuth, dtype=float)

@@ -35,26 +35,18 @@ class LineMass:
 
 @dataclass(frozen=True)
 class Imperfection:
-    """Small departures from the body of revolution; lengths in m, densities and moduli relative.
+    """Small departures from the body of revolution; lengths in m, densities and moduli relative."""
 
-    Attributes
-    ----------
-    thickness : change of the wall, the middle surface kept.
-    outer, inner : how far the outer and the inner face stand out of the material.
-    offset : how far the middle surface stands out along its normal, the wall kept (a radius that varies around).
-    density, modulus : of ρ, and of E at constant ν.
-    rim : how far the edge of the rim stands out along the meridian; its value at position 1 counts.
-    masses, lines : point and line masses.
-    """
-
-    thickness: Field | None = None
-    outer: Field | None = None
+    thickness: Field | None = None  # change of the wall, the middle surface kept
+    outer: Field | None = None  # outer, inner: how far the outer and the inner face stand out of the material
     inner: Field | None = None
+    # how far the middle surface stands out along its normal, the wall kept (a radius that varies around)
     offset: Field | None = None
-    density: Field | None = None
+    density: Field | None = None  # density, modulus: of ρ, and of E at constant ν
     modulus: Field | None = None
+    # how far the edge of the rim stands out along the meridian; its value at position 1 counts
     rim: Field | None = None
-    masses: tuple[PointMass, ...] = ()
+    masses: tuple[PointMass, ...] = ()  # masses, lines: point and line masses
     lines: tuple[LineMass, ...] = ()
 
     def __add__(self, other: "Imperfection") -> "Imperfection":
@@ -96,14 +88,6 @@ def teeth(count: int, width: float, height: float, azimuth: float = 0.0, errors:
         c_m = Σ_j h_j (2/(π m)) sin(m w/2) exp(i m θ_j),  c_0 = Σ_j h_j w/(2π).
 
     The strain in a tooth is taken as that of the edge, which is small, so it is mostly mass.
-
-    Parameters
-    ----------
-    count : number of teeth.
-    width : of each, rad.
-    height : m.
-    azimuth : of the middle of the first, rad.
-    errors : relative errors of their heights, (count,); none unless given.
     """
     if not (count >= 1 and 0 < width * count <= 2 * pi * (1 + 1e-12)):
         raise ShellError(f"{count} teeth of {np.rad2deg(width):g}° do not fit around the rim.")
@@ -121,15 +105,6 @@ def teeth(count: int, width: float, height: float, azimuth: float = 0.0, errors:
 def holes(
     count: int, radius: float, wall: float, density: float, position: float, azimuth: float = 0.0
 ) -> tuple[PointMass, ...]:
-    """Round holes through the wall as masses taken away, ρ π a² h each; what they take off the stiffness is left out.
-
-    Parameters
-    ----------
-    count : number of holes, equally spaced.
-    radius, wall : of each hole and of the wall there, m.
-    density : kg/m³.
-    position : 0 ... 1 of the meridian.
-    azimuth : of the first, rad.
-    """
+    """Round holes through the wall as masses taken away, ρ π a² h each; what they take off the stiffness is left out."""
     mass = -density * pi * radius**2 * wall
     return tuple(PointMass(mass, azimuth + 2 * pi * k / count, position) for k in range(count))

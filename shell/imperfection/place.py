@@ -15,21 +15,14 @@ from shell.system import ShellGroup, System
 
 @dataclass(frozen=True, eq=False)
 class CrossSection:
-    """Where a position of the meridian lies among the elements, and the table of strains there, one station.
+    """Where a position of the meridian lies among the elements, and the table of strains there, one station."""
 
-    Attributes
-    ----------
-    group, element : numbers of the group and of the element in it.
-    along : values and ξ-derivatives of the functions along the element, (2, functions).
-    place, section : the middle surface.
-    table : at the heights that were asked for; its volumes are those of a slice of unit arc length and unit η.
-    """
-
-    group: int
+    group: int  # group, element: numbers of the group and of the element in it
     element: int
-    along: Array
-    place: MeridianPoints
+    along: Array  # values and ξ-derivatives of the functions along the element, (2, functions)
+    place: MeridianPoints  # place, section: the middle surface
     section: Section
+    # at the heights that were asked for; its volumes are those of a slice of unit arc length and unit η
     table: StrainTable
 
     def strains(self, unknowns: list[Array]) -> Array:

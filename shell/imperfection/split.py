@@ -13,20 +13,12 @@ ROUNDING = 1e-14  # relative; below it a split has no axis
 
 @dataclass(frozen=True)
 class Split:
-    """Two modes where the perfect resonator has a pair.
+    """Two modes where the perfect resonator has a pair."""
 
-    Attributes
-    ----------
-    harmonic : n.
-    frequency : of the perfect pair, Hz.
-    shift : of the mean frequency, relative.
-    wave : (f_fast - f_slow)/f · exp(2 i n α), α the azimuth of an antinode of the faster mode.
-    """
-
-    harmonic: int
-    frequency: float
-    shift: float
-    wave: complex
+    harmonic: int  # n
+    frequency: float  # of the perfect pair, Hz
+    shift: float  # of the mean frequency, relative
+    wave: complex  # (f_fast - f_slow)/f · exp(2 i n α), α the azimuth of an antinode of the faster mode
 
     @property
     def relative(self) -> float:
@@ -63,13 +55,7 @@ class Split:
 
 
 def find_split(pair: Pair, imperfection: Imperfection) -> Split:
-    """The split to first order in the imperfection: only its waves 0 and 2n are felt.
-
-    Parameters
-    ----------
-    pair : a solved mode.
-    imperfection : fields and masses.
-    """
+    """The split to first order in the imperfection: only its waves 0 and 2n are felt."""
     mean, z = 0.0, 0j
     n = pair.mode.harmonic
     inner, outer = imperfection.faces(pair.fade)

@@ -18,13 +18,7 @@ from shell.sparse import Index
 
 
 class Substructures:
-    """A = Σ of element matrices on their unknowns, prepared for answers.
-
-    Parameters
-    ----------
-    elements : (unknowns, symmetric matrix) of each.
-    size : number of unknowns, each of which some element has.
-    """
+    """A = Σ of element matrices on their unknowns, prepared for answers."""
 
     def __init__(self, elements: Sequence[tuple[Index, Array]], size: int) -> None:
         pattern = find_pattern([unknowns for unknowns, _ in elements], size, in_order=True)

@@ -24,12 +24,7 @@ PLACES = 16  # of masses whose displacements are kept
 
 
 class Together:
-    """Harmonics that take part, one after the other.
-
-    Parameters
-    ----------
-    blocks : of the harmonics, rising. resonator, constants : of them all.
-    """
+    """Harmonics that take part, one after the other."""
 
     def __init__(self, blocks: Sequence[Block], resonator: Resonator, constants: tuple[Constants, ...]) -> None:
         self.blocks, self.resonator, self.constants = tuple(blocks), resonator, constants

@@ -31,17 +31,11 @@ HEIGHTS = 4  # of a layer: exact to the third power of the height
 
 @dataclass(frozen=True, eq=False)
 class Around:
-    """How harmonics go around: of each k the mode that starts as cos kθ and the one that starts as sin kθ, (2 harmonics, θ).
+    """How harmonics go around: of each k the mode that starts as cos kθ and the one that starts as sin kθ, (2 harmonics, θ)."""
 
-    Attributes
-    ----------
-    order : k of every row, (rows, 1).
-    cosine : of u and w, cos kθ or sin kθ. sine : of v, sin kθ or -cos kθ.
-    """
-
-    order: Array
-    cosine: Array
-    sine: Array
+    order: Array  # k of every row, (rows, 1)
+    cosine: Array  # of u and w, cos kθ or sin kθ
+    sine: Array  # of v, sin kθ or -cos kθ
 
 
 def go_around(harmonics: Sequence[int], theta: Array) -> Around:
@@ -55,43 +49,29 @@ def go_around(harmonics: Sequence[int], theta: Array) -> Around:
 
 @dataclass(frozen=True, eq=False)
 class Wall:
-    """Points of what is there more, (stations, heights), of a run of elements.
+    """Points of what is there more, (stations, heights), of a run of elements."""
 
-    Attributes
-    ----------
-    elements : which elements of the chain these are.
-    along : (2, stations of an element, functions) values and ξ-derivatives. ds : ds/dξ, (stations, 1, 1).
-    through : of u, v, w: Legendre modes at the heights and their ζ-derivatives, (2, stations, heights, modes).
-    drift : h'η/2 of the perfect wall: ∂_s at constant ζ is ∂_s - drift ∂_ζ, (stations, heights, 1, 1) like those that follow.
-    per_A, per_rho : 1/(1 + κ ζ) and 1/ρ. t_r, n_r, kappa : of the middle surface.
-    lam, G, rho : λ, G and ρ. weights : of the strains in the energy.
-    stiff, heavy : volumes that count for the stiffness and for the mass, (stations, heights, 1, θ).
-    """
-
-    elements: slice
-    along: Array
-    ds: Array
+    elements: slice  # which elements of the chain these are
+    along: Array  # (2, stations of an element, functions) values and ξ-derivatives
+    ds: Array  # ds/dξ, (stations, 1, 1)
+    # of u, v, w: Legendre modes at the heights and their ζ-derivatives, (2, stations, heights, modes)
     through: tuple[Array, ...]
+    # h'η/2 of the perfect wall: ∂_s at constant ζ is ∂_s - drift ∂_ζ, (stations, heights, 1, 1) like those that follow
     drift: Array
-    per_A: Array
+    per_A: Array  # per_A, per_rho: 1/(1 + κ ζ) and 1/ρ
     per_rho: Array
-    t_r: Array
+    t_r: Array  # t_r, n_r, kappa: of the middle surface
     n_r: Array
     kappa: Array
-    lam: Array
+    lam: Array  # lam, G, rho: λ, G and ρ
     G: Array
     rho: Array
-    weights: Array
-    stiff: Array
+    weights: Array  # of the strains in the energy
+    stiff: Array  # stiff, heavy: volumes that count for the stiffness and for the mass, (stations, heights, 1, θ)
     heavy: Array
 
     def respond(self, plain: Array, around: Around) -> tuple[Array, Array]:
-        """δK and δM times vectors that go around so.
-
-        Parameters
-        ----------
-        plain : unknowns of these elements, (amplitudes, elements, functions, vectors, harmonics, 2); so are the answers.
-        """
+        """δK and δM times unknowns of these elements in the layout of `Together.plain`, which go around so."""
         A, rho, kappa, t_r, n_r = self.per_A, self.per_rho, self.kappa, self.t_r, self.n_r
         k, cosine, sine = around.order[:, 0], around.cosine, around.sine
         (u, u_s, u_z), (v, v_s, v_z), (w, w_s, w_z) = self._jets(plain)

@@ -50,19 +50,7 @@ class RigidMotion:
 
 
 def align(clouds: Sequence[tuple[Array, int]], projector: Projector, names: Sequence[str]) -> RigidMotion:
-    """One motion for clouds of points that share a frame.
-
-    Parameters
-    ----------
-    clouds : (points (count, 3) in m, side) with side -1 for the inner and 1 for the outer face.
-    projector : of the resonator.
-    names : of the clouds, for the messages.
-
-    Raises
-    ------
-    ShellError
-        The points cannot be brought onto the faces; which says how far off they stay.
-    """
+    """One motion for clouds that share a frame: points (count, 3) in m with their side, -1 inner and 1 outer face."""
     resonator = projector.resonator
     samples = [(points[:: max(1, len(points) // SAMPLE)], side) for points, side in clouds]
     best: tuple[float, RigidMotion] | None = None

@@ -32,26 +32,18 @@ Points: TypeAlias = tuple[Array, Array, Array]  # position, azimuth and how far 
 
 @dataclass(frozen=True, eq=False)
 class Face:
-    """One face: how far it stands out of the material, as waves with their covariance.
+    """One face: how far it stands out of the material, as waves with their covariance."""
 
-    Attributes
-    ----------
-    side : -1 inner, 1 outer. waves : the basis, over the positions that the points cover.
-    coefficients : (waves, polynomials), complex a + i b. covariance : of all a and b, m².
-    noise : of one point, m. points, outliers : numbers. cells : mean position, azimuth, δ and count of every cell.
-    motion : that aligned it. span : polar angles of the ends of a dome whose tilt the shape does not tell.
-    """
-
-    side: int
-    waves: WaveBasis
-    coefficients: Complex
-    covariance: Array
-    noise: float
-    points: int
+    side: int  # -1 inner, 1 outer
+    waves: WaveBasis  # the basis, over the positions that the points cover
+    coefficients: Complex  # (waves, polynomials), complex a + i b
+    covariance: Array  # of all a and b, m²
+    noise: float  # of one point, m
+    points: int  # points, outliers: numbers
     outliers: int
-    cells: tuple[Array, Array, Array, Array]
-    motion: RigidMotion | None
-    span: tuple[float, float] | None = None
+    cells: tuple[Array, Array, Array, Array]  # mean position, azimuth, δ and count of every cell
+    motion: RigidMotion | None  # that aligned it
+    span: tuple[float, float] | None = None  # polar angles of the ends of a dome whose tilt the shape does not tell
 
     @property
     def turns(self) -> "Callable[[Array, int], list[Complex]] | None":
@@ -100,13 +92,7 @@ class Face:
         return Waves({m: _Profile(self, m) for m in range(self.highest + 1)})
 
     def project(self, density: Density, order: int) -> tuple[complex, Array]:
-        """Σ density c_order over the shell and the covariance of its real and imaginary part.
-
-        Parameters
-        ----------
-        density : what the wave does at stations (shell.imperfection.pair).
-        order : m > 0.
-        """
+        """Σ density c_order over the shell and the covariance of its real and imaginary part."""
         return self._weigh(density.position, density.wave, order)
 
     def at(self, position: float, order: int) -> tuple[complex, Array]:
@@ -124,10 +110,6 @@ class Face:
         """Return the face without what a rigid motion makes of its first wave: only the frame holds that.
 
         The motion was found from points that also show form, which pushes it aside where they are uneven or have gaps.
-
-        Parameters
-        ----------
-        rigid : (polynomials, k), coefficients of the normal displacement along the meridian by each motion.
         """
         count = len(rigid)
         u, size, _ = np.linalg.svd(rigid, full_matrices=False)

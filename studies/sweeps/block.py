@@ -20,16 +20,11 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Batch:
-    """Designs to be computed together.
+    """Designs to be computed together."""
 
-    Attributes
-    ----------
-    places : array (m,) of int, among the unique designs of the study, ascending; -1 for a design of a search.
-    designs : array (m, parameters), texts as their place in the parameter's values, -1 for the nominal one.
-    """
-
+    # array (m,) of int, among the unique designs of the study, ascending; -1 for a design of a search
     places: NDArray[np.int64]
-    designs: Array
+    designs: Array  # array (m, parameters), texts as their place in the parameter's values, -1 for the nominal one
 
     def __len__(self) -> int:
         return len(self.places)

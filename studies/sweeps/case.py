@@ -18,18 +18,12 @@ if TYPE_CHECKING:
 
 @dataclass
 class Case:
-    """A design to be evaluated.
+    """A design to be evaluated."""
 
-    Attributes
-    ----------
-    instrument : the card with this design's parameters.
-    parameters : every parameter of the study by name, in the unit of its name.
-    on_the_way : the instrument at a place 0 ... 1 of the way from the start of a search to this design, where modes keep
-        their names by their shapes; None where they have them by their order.
-    """
-
-    instrument: Instrument
-    parameters: Mapping[str, Any]
+    instrument: Instrument  # the card with this design's parameters
+    parameters: Mapping[str, Any]  # every parameter of the study by name, in the unit of its name
+    # the instrument at a place 0 ... 1 of the way from the start of a search to this design, where modes keep their
+    # names by their shapes; None where they have them by their order
     on_the_way: "Callable[[float], Instrument] | None" = None
     _solved: dict[tuple[int, str, float], "tuple[Mode, ...]"] = field(default_factory=dict, repr=False)
 

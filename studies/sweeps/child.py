@@ -137,15 +137,7 @@ def _end_children() -> None:
 
 
 def ask(function: str, limit: float, case: "Case") -> float:
-    """Return what a user's function says of a case.
-
-    Raises
-    ------
-    FunctionFailed
-        It raised, hung, crashed or returned no finite number.
-    FunctionLost
-        Its process was ended from outside, twice.
-    """
+    """Return what a user's function says of a case."""
     instrument = case.instrument
     request = {
         "content": instrument.content,

@@ -69,13 +69,7 @@ class Cluster:
         return False
 
     def check(self) -> None:
-        """Say when the last worker has ended; give up when no other comes.
-
-        Raises
-        ------
-        MissingEnvironment
-            No worker has come for `PATIENCE` seconds.
-        """
+        """Say when the last worker has ended; give up when no other comes."""
         try:
             there = self.client.sync(self.client.scheduler.ncores, callback_timeout=GLANCE)
         except (OSError, TimeoutError):  # a scheduler that is lost ends the tasks itself
@@ -139,13 +133,7 @@ def check_private(address: str) -> None:
 
 
 def call_if_same(code: str, function: Callable[..., Any], *arguments: Any) -> Any:
-    """Call a function on a worker; one that joined later with another version refuses.
-
-    Raises
-    ------
-    MissingEnvironment
-        The worker's versions differ from those of the study.
-    """
+    """Call a function on a worker; one that joined later with another version refuses."""
     here = describe_code()
     if here != code:
         raise MissingEnvironment(

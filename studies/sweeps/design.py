@@ -19,18 +19,13 @@ LEVELS = (-1.0, -0.5, 0.5, 1.0)  # of one parameter at a time, in half ranges ab
 
 @dataclass(frozen=True)
 class Design:
-    """The designs, in order.
+    """The designs, in order."""
 
-    Attributes
-    ----------
-    values : array (cases, parameters), in the unit of each name; texts as their place in the parameter's `values`.
-    unique : array of int, places of the designs that differ from all before them: only these are computed.
-    inverse : array (cases,) of int, for every design its place in `unique`.
-    """
-
+    # array (cases, parameters), in the unit of each name; texts as their place in the parameter's `values`
     values: Array
+    # array of int, places of the designs that differ from all before them: only these are computed
     unique: NDArray[np.intp]
-    inverse: NDArray[np.intp]
+    inverse: NDArray[np.intp]  # array (cases,) of int, for every design its place in `unique`
 
     @property
     def digest(self) -> str:

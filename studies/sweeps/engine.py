@@ -76,13 +76,7 @@ def batch_size(study: "Study", vectorised: bool) -> int:
 def compute(
     plan: WorkPlan, batches: "Batches | deque[Batch]", workers: "Workers", store: "Store", progress: "Progress"
 ) -> None:
-    """Evaluate all batches and keep their rows; returns when every case is in the store.
-
-    Raises
-    ------
-    MissingEnvironment
-        The store cannot be written, or all workers are gone for good; what was computed before is kept.
-    """
+    """Evaluate all batches and keep their rows; returns when every case is in the store."""
     suspects: deque[_Task] = deque()
     running: dict[Future[Any], _Task] = {}
     size, losses, computed = 1, 0, False

@@ -13,13 +13,7 @@ if TYPE_CHECKING:
 
 
 def export_results(results: "Results", path: str | Path) -> Path:
-    """Write the table as CSV and, beside it, `NAME.units.json`; floats keep every digit.
-
-    Returns
-    -------
-    Path
-        Of the file with the units.
-    """
+    """Write the table as CSV and, beside it, `NAME.units.json`, whose path is returned; floats keep every digit."""
     with written_whole(path) as file:
         text = io.TextIOWrapper(file, "utf-8", newline="")
         csv.writer(text, lineterminator="\n").writerow(map(_harmless, results.header))

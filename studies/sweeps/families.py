@@ -95,14 +95,7 @@ def why_not(study: "Study") -> str:
 
 
 def build_families(study: "Study", design: "Design", most: int = MOST_SOLVES) -> "Families | str":
-    """Build the families that a study asks for, or say why it must be computed design by design.
-
-    Parameters
-    ----------
-    study : the study.
-    design : its designs; with the ends of the parameters they decide the ranges.
-    most : full solves that each family may take.
-    """
+    """Build the families that a study asks for, or say why it must be computed design by design."""
     reason = why_not(study)
     if reason:
         return reason

@@ -40,15 +40,7 @@ def open_store(folder: str | Path) -> Store:
 
 
 def claim_store(folder: str | Path) -> Store:
-    """Open or make the store of a study for writing, lock its folder, and leave out what is damaged.
-
-    Raises
-    ------
-    InputError
-        Another run works in the folder, or the folder's folder does not exist.
-    MissingEnvironment
-        The folder cannot be written.
-    """
+    """Open or make the store of a study for writing, lock its folder, and leave out what is damaged."""
     path = Path(folder) / FILE
     _refuse_former(folder)
     if not path.parent.absolute().parent.exists():

@@ -18,13 +18,7 @@ from studies.sweeps.validity import check_nominal, check_sample
 
 
 def read_study(source: str | Path | Mapping[str, Any], card: str | None = None) -> Study:
-    """Read a study from a TOML file, by the name of a shipped one, or from its content as a mapping.
-
-    Parameters
-    ----------
-    source : path, name or mapping.
-    card : another card than the one that the spec names.
-    """
+    """Read a study from a TOML file, by a shipped one's name, or from a mapping; `card` stands in place of its own."""
     if isinstance(source, Mapping):
         content, where, folder, text = {"schema": SCHEMA, **source}, "study", Path(), ""
     else:

@@ -25,19 +25,14 @@ class RequirementLimits:
 
 @dataclass(frozen=True)
 class Yield:
-    """The share of designs that meet requirements.
-
-    Attributes
-    ----------
-    cases, passed, unknown : numbers of designs; `unknown` are those without a value.
-    low, high : a 95 % interval (Wilson) in which every unknown design counts once as failing and once as passing; None
-        where the designs are no sample, such as a grid.
-    """
+    """The share of designs that meet requirements."""
 
     limits: tuple[RequirementLimits, ...]
-    cases: int
+    cases: int  # cases, passed, unknown: numbers of designs; `unknown` are those without a value
     passed: int
     unknown: int
+    # low, high: a 95 % interval (Wilson) in which every unknown design counts once as failing and once as passing; None
+    # where the designs are no sample, such as a grid
     low: float | None
     high: float | None
 
