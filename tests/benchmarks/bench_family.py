@@ -132,21 +132,6 @@ def measure(build, axes, tolerance, checked):
     }
 
 
-def say(name, tolerance, figures):
-    """Print the figures of one box."""
-    if "refused" in figures:
-        print(f"{name}, {tolerance:g}: {figures['refused']} ({figures['seconds']:.1f} s)", flush=True)
-        return
-    print(
-        f"{name}, {tolerance:g}: {figures['solves']} solves ({figures['terms']} terms) in {figures['seconds']:.2f} s, one to"
-        f" {figures['solver_tolerance']:g} takes {figures['ms_of_a_full_solve']:.1f} ms; {DESIGNS} designs in"
-        f" {figures['ms_of_10000_designs']:.2f} ms; error stated {figures['stated']:.1e}, largest of {figures['checked']}"
-        f" {figures['largest']:.1e}, beyond {figures['beyond']}; Bryan factor stated {figures['bryan_stated']:.1e}, largest"
-        f" {figures['bryan_largest']:.1e}, beyond {figures['bryan_beyond']}; theory {figures['theory_error']:.1e}",
-        flush=True,
-    )
-
-
 def main():
     """Measure the boxes that are named, or all of them."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -161,7 +146,7 @@ def main():
     for name in given.names or known:
         build, axes, tolerance = known[name]
         figures = measure(build, axes, tolerance, given.checked)
-        say(name, tolerance, figures)
+        print(f"{name}, {tolerance:g}: {figures}", flush=True)
         record("families of designs", box=name, tolerance=tolerance, **figures)
 
 

@@ -19,12 +19,13 @@ import time
 from pathlib import Path
 
 import numpy as np
-from bench_modes import forget
 from history import record
 
+import shell.corner
+import shell.root
+import shell.surplus
 from shell.assembly import build_system
 from shell.elastic import Elastic
-from shell.levels import LEVELS
 from shell.meridian import hemisphere
 from shell.modes import solve_modes
 
@@ -32,6 +33,12 @@ R, H = 15e-3, 0.9e-3
 GLASS = Elastic(72.7e9, 0.17, 2203.0)
 EXACT = 4596.3915
 SHIFT = (2 * np.pi * 3500.0) ** 2  # between the rigid motions and the pair
+
+
+def forget():
+    """Empty every cache that depends on the geometry."""
+    for cached in (build_system, shell.surplus.extend, shell.root._find_frame, shell.corner._meet):
+        cached.cache_clear()
 
 
 def best_time(work, repeats):
@@ -69,36 +76,6 @@ def ours():
                 return solve()
 
             yield f"ours {name}, cold", best_time(cold, 3)[0], size, [mode.frequency]
-
-
-def stages():
-    """Print what one cached solve of one level spends its time on."""
-    from shell.eigen import Factor, Iteration
-    from shell.solution import Solution, find_constants
-    from shell.surplus import estimate_errors
-
-    print("\nOne level, operators cached (ms):")
-    dome = hemisphere(R, H)
-    for theory, number in (("shell", 0), ("solid", 0), ("solid", 1)):
-        system = build_system(dome, 2, theory, LEVELS[theory][number])
-        group, pattern = system.groups[0], system.pattern
-        constants = find_constants(group.table.position, GLASS, group.table.plane_stress)
-        fields = [[field] for field in (*constants.lame, constants.rho)]
-        t_matrices, (K, M) = best_time(lambda s=system, f=fields: s.operators(*f, uniform=True), 20)
-        t_factor, factor = best_time(lambda p=pattern, K=K: Factor(p, K), 20)
-        x = np.ones((pattern.size, 5))
-        t_step, _ = best_time(lambda f=factor, M=M, x=x: f.solve(M @ x), 20)
-        t_vectors, vector = best_time(
-            lambda p=pattern, K=K, M=M: Iteration(Factor(p, K), M).converge(1, 1e-11).vectors, 20
-        )
-        solution = Solution(system, (constants,), vector[:, 0])
-        t_quotient, _ = best_time(lambda s=solution: Solution(s.system, s.constants, s.vector).eigenvalue, 20)
-        t_error, _ = best_time(lambda s=solution: estimate_errors(dome, GLASS, [s]), 20)
-        print(
-            f"  {theory} level {number}, {pattern.size} unknowns: matrices {1e3 * t_matrices:.3f}, factor {1e3 * t_factor:.3f}, "
-            f"one step {1e3 * t_step:.3f}, vectors {1e3 * t_vectors:.3f}, Rayleigh quotient {1e3 * t_quotient:.3f}, "
-            f"error estimate {1e3 * t_error:.3f}"
-        )
 
 
 def dome_hexahedra(cells, layers=1):
@@ -312,7 +289,6 @@ def main():
             f"{name:42} {1e3 * seconds:8.2f} ms {seconds / unit:8.2f} {unknowns:9d} {mean:12.4f} {mean / EXACT - 1:9.1e} {split:>9}"
         )
     record("solvers side by side", milliseconds={name: round(1e3 * seconds, 3) for name, seconds, _, _ in rows})
-    stages()
     return 0
 
 

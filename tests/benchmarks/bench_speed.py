@@ -1,6 +1,6 @@
 """Processor time of single tasks beside their targets, the shortest of several runs: PYTHONPATH=. python tests/benchmarks/bench_speed.py [NAME …].
 
-Names: loops, loss, split, twin, run, record. Figures of the solver, of families and of studies have benchmarks of their own.
+Names: modes, study, loops, loss, split, twin, run, record. bench_solver.py has the solver beside others, bench_family.py families.
 """
 
 import resource
@@ -12,6 +12,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+from bench_solver import forget
 
 from compensation.controllers import Loops
 from compensation.electronics import Channels, Electronics, LoopNoise
@@ -29,6 +30,9 @@ from studies.loss.model import loss_model
 from studies.record import Record, write_record
 from studies.simulation.chamber import load_profile
 from studies.simulation.virtual_gyro import simulate_run
+from studies.sweeps.evaluate import WorkPlan, evaluate_case
+from studies.sweeps.run import run_study
+from studies.sweeps.spec import read_study
 from studies.twin.fmu import write_fmu
 from studies.twin.plan import plan_twin
 from tests.studies.twin.building import compile_twin, run_twin, write_profile
@@ -48,6 +52,44 @@ def best(work: Callable[[], object], times: int = 1) -> float:
 
 def tell(what: str, seconds: float, target: str = "") -> None:
     print(f"{what:64} {seconds:9.4f} s{f'  (target {target})' if target else ''}", flush=True)
+
+
+def modes() -> None:
+    """One mode with the operators of its geometry kept, several, to other tolerances; and from a card, with nothing kept."""
+    silica, dome = Elastic(72.7e9, 0.17, 2203.0), hemisphere(15e-3, H)
+    for n, count, tolerance in ((2, 1, 1e-5), (2, 16, 1e-5), (5, 8, 1e-5), (20, 1, 1e-5), (2, 1, 1e-3), (2, 1, 1e-7)):
+
+        def solve(n: int = n, count: int = count, tolerance: float = tolerance) -> object:
+            return solve_modes(dome, silica, n, count, tolerance=tolerance)
+
+        solve()
+        tell(f"{count} of n = {n} of the free dome to {tolerance:g}", best(solve, 10))
+
+    def from_card(name: str) -> None:
+        forget()
+        card = load_card(name)
+        solve_modes(card.resonator, card.material.elastic(card.reference_temperature))
+
+    for name in shipped_cards():
+        tell(f"from the card {name} to its frequency", best(lambda name=name: from_card(name), 20))
+
+
+def study() -> None:
+    """Designs of a free dome: a plain loop over the solver, studies on one and two processes, and through a family."""
+    ranges = [{"name": f"resonator.{key}", "low": low, "high": high} for key, low, high in (("thickness_mm", 0.8, 1), ("radius_mm", 14, 16))]  # fmt: skip
+
+    def spec(cases: int, solver: str) -> dict[str, object]:
+        sampling = {"method": "latin-hypercube", "cases": cases, "seed": 1, "solver": solver}
+        return {"card": "free-dome", "sampling": sampling, "parameter": ranges, "quantity": [{"name": "frequency"}]}
+
+    plan, rng = WorkPlan.of(read_study(spec(1, "full"))), np.random.default_rng(1)
+    designs = [{one["name"]: float(rng.uniform(one["low"], one["high"])) for one in ranges} for _ in range(200)]
+    tell("plain loop over 200 designs", best(lambda: [evaluate_case(plan, design) for design in designs]))
+    for cases, solver, workers in ((200, "full", 1), (200, "full", 2), (10_000, "family", 1), (1_000_000, "family", 1)):
+        with tempfile.TemporaryDirectory() as folder:
+            began = time.perf_counter()
+            run_study(spec(cases, solver), folder, workers=workers).close()
+            tell(f"study of {cases} designs, {solver}, {workers} process(es), its store included", time.perf_counter() - began)  # fmt: skip
 
 
 def loops() -> None:
@@ -148,7 +190,7 @@ def record() -> None:
         tell(f"hrg fit bias, {memory:.2f} GB at most", time.perf_counter() - began, "15 s, 2 GB")
 
 
-TASKS = {one.__name__: one for one in (loops, loss, split, twin, run, record)}
+TASKS = {one.__name__: one for one in (modes, study, loops, loss, split, twin, run, record)}
 
 
 if __name__ == "__main__":

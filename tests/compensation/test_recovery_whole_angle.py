@@ -41,12 +41,7 @@ def test_parameters_within_two_per_cent_and_covered(seed):
     gain, skew, phase = 0.01 * rng.choice([-1, 1]), rng.uniform(-4e-3, 4e-3), rng.uniform(0.008, 0.015)
     axis_tau, axis_omega = rng.uniform(-0.6, 0.6, 2)
     wave = from_quality(
-        4432.0,
-        1e6,
-        damping_anisotropy=0.03,
-        damping_axis=axis_tau,
-        frequency_split=0.01,
-        frequency_axis=axis_omega,
+        4432.0, 1e6, damping_anisotropy=0.03, damping_axis=axis_tau, frequency_split=0.01, frequency_axis=axis_omega
     )
     electronics = Electronics(Channels(gain, 0.0, skew), Channels(phase=phase), NOISE)
     fit = run_and_fit(wave, electronics, both_ways, seed)

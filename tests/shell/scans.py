@@ -7,17 +7,7 @@ from scipy.spatial.transform import Rotation
 
 
 def dome_points(
-    rng,
-    count,
-    waves,
-    side,
-    radius=15e-3,
-    wall=0.9e-3,
-    noise=100e-9,
-    gaps=0.02,
-    outliers=0.0,
-    tilt_deg=0.5,
-    shift=50e-6,
+    rng, count, waves, side, radius=15e-3, wall=0.9e-3, noise=100e-9, gaps=0.02, outliers=0.0, tilt_deg=0.5, shift=50e-6
 ):
     """Points (count, 3), m, evenly over the face `side` (-1 inner, 1 outer) of a dome with its pole at +z.
 

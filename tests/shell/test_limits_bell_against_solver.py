@@ -4,11 +4,7 @@ from math import sqrt
 
 import pytest
 
-from shell.bell_theory import (
-    inextensional_functions,
-    rayleigh_functions,
-    two_pattern_model,
-)
+from shell.bell_theory import inextensional_functions, rayleigh_functions, two_pattern_model
 from shell.elastic import Elastic
 from shell.meridian import bell
 from shell.modes import solve_modes

@@ -53,11 +53,7 @@ KINDS = {
         [Axis("h", 0.79, 0.81)],
         {},
     ),
-    "clamped rim": (
-        lambda v: hemisphere(15e-3, 1e-3 * v[0], support="clamped-rim"),
-        [Axis("h", 0.85, 0.95)],
-        {},
-    ),
+    "clamped rim": (lambda v: hemisphere(15e-3, 1e-3 * v[0], support="clamped-rim"), [Axis("h", 0.85, 0.95)], {}),
     "clamped pole, open by an angle": (
         lambda v: hemisphere(15e-3, 1e-3 * v[0], pole_angle=v[1], support="clamped-pole"),
         [Axis("h", 0.85, 0.95), Axis("pole", 0.18, 0.22)],

@@ -111,10 +111,7 @@ def test_nodes_of_the_dome_are_counted():
     assert len(mesh.nodes) == 5 + 5 * 2 * along * 48  # five nodes of the section on the axis
 
 
-GMSH_EDGES = {
-    17: "01 03 04 12 15 23 26 37 45 47 56 67",
-    18: "01 02 03 12 14 25 34 35 45",
-}
+GMSH_EDGES = {17: "01 03 04 12 15 23 26 37 45 47 56 67", 18: "01 02 03 12 14 25 34 35 45"}
 
 
 def test_gmsh_finds_the_nodes_of_edges_where_it_looks_for_them():

@@ -6,14 +6,7 @@ import numpy as np
 import pytest
 
 from shell.elastic import Elastic
-from shell.electrodes import (
-    VACUUM,
-    Electrode,
-    Electrodes,
-    reach,
-    ring_of_electrodes,
-    trim_voltages,
-)
+from shell.electrodes import VACUUM, Electrode, Electrodes, reach, ring_of_electrodes, trim_voltages
 from shell.errors import ShellError
 from shell.imperfection import Pair, Sum, wave
 from shell.meridian import hemisphere

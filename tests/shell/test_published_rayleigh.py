@@ -10,12 +10,7 @@ import sympy as sp
 
 from shell.derivation import coriolis, frequency
 from shell.errors import ShellError
-from shell.rayleigh import (
-    rayleigh_bryan_factor,
-    rayleigh_frequency,
-    rayleigh_integrals,
-    rayleigh_log_derivatives,
-)
+from shell.rayleigh import rayleigh_bryan_factor, rayleigh_frequency, rayleigh_integrals, rayleigh_log_derivatives
 
 REFERENCE = Path(__file__).parents[1] / "reference" / "rayleigh_integrals_exact.csv"
 ROWS = list(csv.DictReader(line for line in REFERENCE.read_text().splitlines() if not line.startswith("#")))

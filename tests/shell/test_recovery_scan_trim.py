@@ -125,10 +125,7 @@ def test_known_unbalance_is_used_and_never_raised(pair):
 def test_two_harmonics_and_teeth(pair):
     (three,) = solve_modes(DOME, SILICA, 3)
     pairs = {2: pair, 3: Pair(three)}
-    readings = [
-        SplitWave.of(2, pair.mode.frequency, 0.2, 0.4, 1e-4),
-        SplitWave.of(3, three.frequency, 0.5, 0.1, 1e-4),
-    ]
+    readings = [SplitWave.of(2, pair.mode.frequency, 0.2, 0.4, 1e-4), SplitWave.of(3, three.frequency, 0.5, 0.1, 1e-4)]
     plan = plan_trim(readings, tooth_sites(pairs, Teeth(36, 0.05, 200e-9)), goal=5e-4)
     first = plan.round
     flaw = Imperfection(masses=tuple(PointMass(-c.mass, c.azimuth) for c in first.cuts))

@@ -96,11 +96,7 @@ def test_what_cannot_be_calibrated_is_refused(run, tmp_path, capsys):
 
 def test_a_table_whose_level_is_not_the_cards_says_what_would_bridge_it_and_saves_nothing(tmp_path, capsys):
     """The level once went into 112 Hz of noise, with 0 of 27 values determined and the card saved as if it had succeeded."""
-    shipped, card, out = (
-        Path("studies/cards/hrg-30mm.toml"),
-        tmp_path / "thick.toml",
-        tmp_path / "out.toml",
-    )
+    shipped, card, out = (Path("studies/cards/hrg-30mm.toml"), tmp_path / "thick.toml", tmp_path / "out.toml")
     card.write_text(shipped.read_text(encoding="utf-8").replace("0.8558278", "0.88"), encoding="utf-8")
     assert main(["calibrate", str(card), "studies/papers/hrg_table1.csv", "--save", str(out), "--json"]) == 2
     said = capsys.readouterr()

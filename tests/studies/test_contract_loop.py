@@ -100,11 +100,7 @@ def test_a_reversal_of_what_does_not_precess_is_refused(card, capsys, lines):
     [
         ("", ["--rate", "300"], "the rate of 300 °/s (--rate) is beyond rate_range_deg_per_s = 100"),
         ("frequency_split_mHz = 5000.0\n", [], "nulls a split of 306"),
-        (
-            'quadrature_control = "stiffness"\nfrequency_split_mHz = 5000.0\n',
-            [],
-            "quadrature_range_Hz = 1",
-        ),
+        ('quadrature_control = "stiffness"\nfrequency_split_mHz = 5000.0\n', [], "quadrature_range_Hz = 1"),
         ('mode = "whole-angle"\nself_precession_deg_per_s = 60.0\n', [], "the self-precession of 60 °/s takes 217.7 %"),
     ],
     ids=["rate", "split, force", "split, stiffness", "self-precession"],

@@ -12,14 +12,7 @@ from hypothesis import strategies as st
 from studies.errors import InputError
 from studies.files import columns
 from studies.files.writing import written_whole
-from studies.record import (
-    Record,
-    read_frequency_table,
-    read_profile,
-    read_record,
-    reading_resolution,
-    write_record,
-)
+from studies.record import Record, read_frequency_table, read_profile, read_record, reading_resolution, write_record
 
 RECORD = "time_s,frequency_Hz\n"
 TABLE = "temperature_degC,frequency_Hz\n"

@@ -249,12 +249,7 @@ def test_settled_rows():
 
 
 @pytest.mark.parametrize(
-    ("files", "words"),
-    [
-        ([0, 1], "one rate over temperature"),
-        ([0, 1, 1], "both runs at rest"),
-        ([], "three records"),
-    ],
+    ("files", "words"), [([0, 1], "one rate over temperature"), ([0, 1, 1], "both runs at rest"), ([], "three records")]
 )
 def test_missing_runs_are_named(records, files, words, capsys):
     assert main(["fit", "scale", *(records[i] for i in files)]) == 2

@@ -7,14 +7,7 @@ from scipy.optimize import brentq
 from scipy.special import j0, j1, y0, y1
 
 from thermal.errors import ThermalError
-from thermal.meridian import (
-    cell_names,
-    cut_meridian,
-    cut_meridian_table,
-    describe_meridian,
-    energy_weights,
-    lump,
-)
+from thermal.meridian import cell_names, cut_meridian, cut_meridian_table, describe_meridian, energy_weights, lump
 from thermal.network import Boundary, assemble
 from thermal.profile import parse_profile
 from thermal.relaxation import find_relaxation

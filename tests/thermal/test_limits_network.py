@@ -8,16 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.constants import Stefan_Boltzmann
 
-from thermal.network import (
-    Boundary,
-    Conductor,
-    Network,
-    Node,
-    Radiator,
-    Source,
-    assemble,
-    linearise,
-)
+from thermal.network import Boundary, Conductor, Network, Node, Radiator, Source, assemble, linearise
 from thermal.relaxation import find_relaxation, time_constant_sensitivities
 from thermal.steady import find_steady_state
 

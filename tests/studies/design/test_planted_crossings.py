@@ -11,8 +11,7 @@ HEIGHT = "resonator.height_mm"
 
 
 @pytest.mark.parametrize(
-    ("heights", "other"),
-    [((8.0, 12.0), "separation_n2_of_n0_0_Hz"), ((8.0, 60.0), "separation_n3_of_n0_1_Hz")],
+    ("heights", "other"), [((8.0, 12.0), "separation_n2_of_n0_0_Hz"), ((8.0, 60.0), "separation_n3_of_n0_1_Hz")]
 )
 def test_a_mode_that_another_crosses_is_followed(heights, other):
     harmonic = int(other.split("_n")[1][0])
