@@ -1,7 +1,6 @@
 """What a user who misunderstands is told, and what stays whole: files of this test's own making."""
 
 import csv
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -29,26 +28,6 @@ def model(tmp_path):
     table = _write(tmp_path / "table.csv", temperature_degC=T, frequency_Hz=_frequency(T))
     assert main(["fit", "frequency", table, "--save", str(tmp_path / "model.toml")]) == 0
     return str(tmp_path / "model.toml")
-
-
-@pytest.mark.parametrize(
-    "words",
-    [
-        ["temperature", "MODEL", "RUN", "--out", "MODEL"],
-        ["temperature", "MODEL", "RUN", "--out", "RUN"],
-        ["compensate", "MODEL", "RUN", "--out", "RUN"],
-        ["compensate", "MODEL", "--emit", "MODEL"],
-        ["fit", "frequency", "RUN", "--save", "RUN"],
-    ],
-)
-def test_no_command_writes_over_what_it_reads(words, model, tmp_path, capsys):
-    time = np.arange(0.0, 3600.0, 30.0)
-    run = _write(tmp_path / "run.csv", time_s=time, frequency_Hz=_frequency(20.0 + time / 600))
-    names = {"MODEL": model, "RUN": run}
-    before = [Path(path).read_text() for path in (model, run)]
-    assert main([names.get(word, word) for word in words]) == 2
-    assert "the same command reads this file" in capsys.readouterr().err
-    assert [Path(path).read_text() for path in (model, run)] == before
 
 
 def test_a_glitch_costs_its_own_row_alone(model, tmp_path, capsys):

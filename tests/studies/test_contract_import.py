@@ -372,16 +372,6 @@ def test_a_span_of_a_lifetime_is_no_run(tmp_path):
         draft_and_import(tmp_path / "raw.csv", tmp_path, ('"us"', '"s"'))
 
 
-def test_stamps_of_a_time_zone(tmp_path):
-    rows = [f"2026-07-01 12:00:{k:02d},{20 + k / 10}" for k in range(30)]
-    (tmp_path / "raw.csv").write_text("time,temp\n" + "\n".join(rows) + "\n")
-    zone = ("# clock_offset_s", 'timezone = "Europe/Berlin"\n# clock_offset_s')
-    record = draft_and_import(tmp_path / "raw.csv", tmp_path, zone)
-    assert record.start.isoformat() == "2026-07-01T12:00:00+02:00"
-    with pytest.raises(InputError, match="timezone = 'Mars/Base' is unknown"):
-        draft_and_import(tmp_path / "raw.csv", tmp_path, (zone[0], zone[1].replace("Europe/Berlin", "Mars/Base")))
-
-
 def test_overloads_of_an_instrument_are_missing_values(tmp_path):
     rows = [f"{k},{9.9e37 if k in (3, 4) else 4432 + k / 10}" for k in range(40)]
     (tmp_path / "raw.csv").write_text("time_s,freq [Hz]\n" + "\n".join(rows) + "\n")

@@ -23,17 +23,12 @@ HRG = tomllib.loads(shipped_cards()["hrg-30mm"].read_text(encoding="utf-8"))
 LAG = {"name": "second-lag", "weight": 0.1, "second_time_constant_s": 2000.0}
 TYPOS = {
     # table: (content with a typo, what the message names)
-    "head": ({"nmae": "x"}, ["'nmae'", "'name'"]),
-    "resonator": ({"resonator": HRG["resonator"] | {"rim_angel_deg": 90}}, ["[resonator]", "'rim_angle_deg'"]),
     "stem": (
         {"resonator": HRG["resonator"] | {"stem": {"radius_m": 2.5, "end_mm": -5}}},
         ["[resonator.stem]", "'radius_mm'"],
     ),
     "material": ({"material": {"name": "fused-silica", "lwa": "default"}}, ["[material]", "'law'"]),
-    "thermal": ({"thermal": {"film_emisivity": 0.03}}, ["[thermal]", "'film_emissivity'"]),
-    "bias": ({"bias": {"ofset_deg_per_h": 1}}, ["[bias]", "'offset_deg_per_h'"]),
     "loss": ({"loss": {"invers_q": 1e-7}}, ["[loss]", "'inverse_q'"]),
-    "noise": ({"noise": {"frequency_white": 1e-3}}, ["[noise]", "'frequency_white_Hz'"]),
     "effect": ({"effect": [LAG | {"wieght": 0.1}]}, ["[[effect]] number 1", "'weight'"]),
     "effect name": ({"effect": [LAG, {"name": "second-leg"}]}, ["[[effect]] number 2", "'second-lag'"]),
     "uncertainty": ({"thermal": {"cells": {"value": 3, "relativ_sd": 1}}}, ["[thermal]: cells", "'relative_sd'"]),
@@ -112,11 +107,6 @@ def test_every_command_that_takes_a_card_is_tried_above():
     ("table", "words"),
     [
         ({"thermal": {"film_emissivity": 1.5}}, "[thermal]: film_emissivity must be at most 1, not 1.5."),
-        ({"thermal": {"film_emissivity": "0.3"}}, "film_emissivity must be a finite number, not '0.3'."),
-        ({"thermal": {"film_emissivity": float("inf")}}, "film_emissivity must be a finite number, not inf."),
-        ({"thermal": {"base_heat_capacity_J_per_K": 10**400}}, "base_heat_capacity_J_per_K must be a finite number"),
-        ({"thermal": {"radiation": 1}}, "radiation must be true or false, not 1."),
-        ({"thermal": {"cells": 2.5}}, "cells must be a whole number, not 2.5."),
         ({"thermal": 3}, "thermal must be a table ([thermal]), not 3."),
         ({"effect": {"name": "second-lag"}}, "effect must be an array of tables ([[effect]])"),
         ({"effect": [{"weight": 1}]}, '[[effect]] number 1: the line name = "..." is missing; add it.'),
@@ -126,9 +116,6 @@ def test_every_command_that_takes_a_card_is_tried_above():
         ({"resonator": HRG["resonator"] | {"thickness_mm": [[0, 1], [2, 1]]}}, "thickness_mm.1.0 must be at most 1"),
         ({"resonator": {"shape": "meridian", "thickness_mm": 1, "segment": [{"kind": "line", "from_mm": [1, 0]}]}},
          "[[resonator.segment]] number 1: the key 'to_mm' is missing; add it."),
-        ({"resonator": {"shape": 3}}, "[resonator]: shape must be text in quotes, not 3."),
-        ({"loss": {"film": 3}}, "[loss]: film must be a list of tables, not 3."),
-        ({"bias": {"note": {}}}, "[bias]: note must be text in quotes, not {}."),
         ({"resonator": {"radius_mm": 1}}, "[resonator]: the key 'shape' is missing; add it."),
         ({"thermal": {"cells": {"value": 3}}}, "cells: its uncertainty is missing; give sd, relative_sd, or low and high."),
         ({"thermal": {"cells": {"sd": 3}}}, "cells: the key 'value' is missing; add it."),

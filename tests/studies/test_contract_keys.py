@@ -13,6 +13,7 @@ from msgspec import inspect
 
 from studies.acceptance.limits import Limits
 from studies.cli import main
+from studies.design.keys import DesignKeys
 from studies.errors import InputError
 from studies.importing.mapping import ImportMap
 from studies.instrument.registry import card_tables
@@ -22,7 +23,7 @@ from studies.schema.reader import read_keys
 from studies.sweeps.keys import StudyKeys
 
 CARD = {f"{entry.table}.{entry.name}": entry.keys for es in card_tables().values() for entry in es if entry.keys}
-KINDS = {"limits": Limits, "study": StudyKeys, "map": ImportMap, "model": ModelKeys, **CARD}
+KINDS = {"limits": Limits, "study": StudyKeys, "design": DesignKeys, "map": ImportMap, "model": ModelKeys, **CARD}
 JUNK = st.one_of(
     st.none(), st.booleans(), st.integers(-(10**20), 10**20), st.floats(), st.text(max_size=5),
     st.lists(st.integers(), max_size=3), st.dictionaries(st.text(max_size=3), st.integers(), max_size=2),

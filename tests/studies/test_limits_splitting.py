@@ -175,12 +175,6 @@ def test_even_voltages_make_no_split_and_rounding_is_not_trimmed(tmp_path, capsy
     assert "Trim voltages" not in out
 
 
-def test_a_voltage_beyond_pull_in_names_its_table(tmp_path):
-    instrument = loaded(tmp_path, "[electrodes]\ngap_um = 10.0\nvoltage_V = 2000.0\n")
-    with pytest.raises(InputError, match=r"\[electrodes\].*pull in the shell"):
-        _ = split_of(instrument).split
-
-
 def test_commands_refuse_a_voltage_beyond_pull_in_and_a_map_with_holes(tmp_path, capsys):
     loaded(tmp_path, "[electrodes]\ngap_um = 10.0\nvoltage_V = 2000.0\n")
     for command in ("electrodes", "modes"):

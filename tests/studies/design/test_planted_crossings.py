@@ -10,6 +10,7 @@ from studies.sweeps.quantities import library
 HEIGHT = "resonator.height_mm"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("heights", "other"), [((8.0, 12.0), "separation_n2_of_n0_0_Hz"), ((8.0, 60.0), "separation_n3_of_n0_1_Hz")]
 )
