@@ -114,7 +114,7 @@ def invert_chain(chain: BellChain, rate: ArrayLike, temperature: ArrayLike) -> R
     straight = chain.scale_over_rate.reference - 2 * shift / (c1 + root)
     counts: Real = (straight + chain.bias.value(T)) / chain.scale + chain.null
     if not np.all(np.isfinite(counts)):
-        raise CompensationError("the scale over rate turns back within this range and cannot be inverted.")
+        raise CompensationError("the scale over rate has a turning point in this range and cannot be inverted.")
     return counts
 
 

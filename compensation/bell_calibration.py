@@ -73,7 +73,7 @@ def fit_scale_over_temperature(
     """Fit the factor that brings the output (rad/s) to the applied rate (rad/s), over temperature (K): eq. (36)."""
     T, measured, applied = read_columns(temperature=temperature, rate_compensated=rate_compensated, rate=rate)
     if np.any(applied == 0) or np.any(np.abs(measured) < 0.1 * np.abs(applied)):
-        raise CompensationError("the scale over temperature needs a gyro that turns in every row of the run.")
+        raise CompensationError("the scale over temperature needs an applied rate in every row of the run.")
     return _fit_curve(T, applied / measured, order, "temperature", zero_Celsius)
 
 

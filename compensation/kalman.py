@@ -13,7 +13,7 @@ from compensation.errors import CompensationError
 
 Real = NDArray[np.float64]
 SETTLED = 1e-13  # relative change of the covariance in one step below which it has settled
-_NOT_STEADY = "this model has no steady filter: a lasting state is not observed, or no process noise reaches it."
+_NOT_STEADY = "this model has no steady filter: a persistent state is not observed, or no process noise drives it."
 
 
 @dataclass(frozen=True)

@@ -102,7 +102,7 @@ def simulate_rebalance(
                 limited += at_limit
                 if at_limit and abs(state[at["wave"]][2]) > LOST:
                     raise CompensationError(
-                        f"at {t[n]:g} s the wave is lost: the force across it is at its limit and no longer holds a rate of"
+                        f"at {t[n]:g} s control of the wave is lost: the force is at its limit and cannot balance a rate of"
                         f" {np.degrees(turning[n]):.4g} °/s; lower the rate or its duration, or raise the range."
                     )
             commands[n] = state[at["sum"]] / samples

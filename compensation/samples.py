@@ -14,7 +14,7 @@ def read_columns(**columns: ArrayLike) -> list[NDArray[np.float64]]:
     for name, values in zip(columns, arrays, strict=True):
         if values.ndim != 1 or len(values) != len(arrays[0]):
             raise CompensationError(
-                f"'{name}' has shape {values.shape} where one value a row, {len(arrays[0])} in all, is needed."
+                f"'{name}' has shape {values.shape} where one value per row, {len(arrays[0])} in all, is needed."
             )
         holes = np.flatnonzero(~np.isfinite(values))
         if len(holes):

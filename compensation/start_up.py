@@ -49,9 +49,7 @@ def start_up(
     swings at the start is a quarter cycle off.
     """
     if not headroom > 1:
-        raise CompensationError(
-            f"the drive reaches {headroom:g} of the commanded amplitude and no more; it needs more than 1."
-        )
+        raise CompensationError(f"the drive reaches {headroom:g} of the commanded amplitude; it must exceed 1.")
     require_stable(loops, 1 / tau, ("amplitude", "phase"))
     least = tau * math.log(headroom / (headroom - 1))
     seconds = seconds if seconds is not None else 3 * least + 20 / loops.phase + 10 / loops.amplitude

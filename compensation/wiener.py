@@ -56,7 +56,7 @@ def design_wiener_filter(
     if not gyro.is_real or not gyro.is_stable:
         raise CompensationError("the Wiener filter needs a stable gyro with real coefficients, such as eq. (25).")
     if not wanted.is_real or not wanted.is_stable:
-        raise CompensationError("what the filter is to deliver, H(s), must be stable with real coefficients.")
+        raise CompensationError("the wanted output H(s) must be stable with real coefficients.")
     n_w, d_w = np.real(gyro.numerator), np.real(gyro.denominator)
     n_h, d_h = np.real(wanted.numerator), np.real(wanted.denominator)
     d_a, d_b = factorise(rate.denominator), factorise(noise.denominator)

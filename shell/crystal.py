@@ -65,7 +65,7 @@ class Crystal:
         )
         if self.axis == "[001]":
             return f"{mean}. Along [001] its pair n = 2 splits: only hrg modes computes that, for shells without stem or clamp."
-        return f"{mean}. Along its threefold axis the pair n = 2 does not split, n = 3 does, which is not modelled."
+        return f"{mean}. Along its threefold axis the pair n = 2 does not split; the split of n = 3 is not modelled."
 
     def properties(self) -> dict[str, Property]:
         """Hill's E and ν over temperature, uncertain by the bounds and by the constants."""

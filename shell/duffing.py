@@ -63,8 +63,8 @@ def amplitude_shift(mode: Mode) -> AmplitudeShift:
         moved += abs(2 * weight * eigenvalue * slope * 4 * eigenvalue * 2 * NEAR)
     if moved > SETTLED * (abs(static) + abs(inertial)):
         warnings.warn(
-            f"a mode of harmonic 0 or {2 * mode.harmonic} lies near twice the frequency of n = {mode.harmonic}: what the amplitude "
-            "does hangs on how far, and the two may exchange their energy.",
+            f"a mode of harmonic 0 or {2 * mode.harmonic} lies near twice the frequency of n = {mode.harmonic}: the effect of the "
+            "amplitude depends on their distance, and the two modes may exchange energy.",
             TheoryRangeWarning,
             stacklevel=2,
         )

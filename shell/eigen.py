@@ -17,7 +17,7 @@ from shell.errors import ShellError
 from shell.quadrature import Array
 from shell.sparse import Index
 
-TOO_THIN = "the stiffness lost its last digit in double precision: the shell is too thin (h/R far below 1e-6)."
+TOO_THIN = "double precision cannot resolve the stiffness: the shell is too thin (h/R far below 1e-6)."
 BLOCK = 3  # vectors a step; modes that coincide (torsion and axial, mirror images) need two
 MOST = 300  # vectors in all, and four for each mode
 

@@ -339,9 +339,9 @@ def build_law(
 def check_mount(resonator: Resonator, theory: Theory, harmonic: int) -> None:
     """Refuse what a base that expands otherwise is not computed for."""
     if resonator.support == "free":
-        raise ShellError("nothing of a free resonator is held by a base: give it a support, or leave the mount out.")
+        raise ShellError("a free resonator is not joined to a base: give it a support, or leave the mount out.")
     if theory != "solid" or harmonic < 1:
-        raise ShellError("the stress by a base is computed in the solid theory, for harmonics from 1 up.")
+        raise ShellError("the stress from a base is computed in the solid theory, for harmonics from 1 up.")
 
 
 def _ratio_spread(material: Material, T: Array) -> float:

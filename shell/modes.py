@@ -227,8 +227,8 @@ def _check_range(resonator: Resonator, theory: Theory) -> None:
     ratio = max(value for _, value in resonator.thickness) / resonator.size
     if theory != "solid" and ratio > THICKEST_SHELL:
         warnings.warn(
-            f"h/R = {ratio:.3g} is {ratio / THICKEST_SHELL:.2g} times the thickest ({THICKEST_SHELL:g}) for which the "
-            f"{theory} theory is meant: use the solid theory.",
+            f"h/R = {ratio:.3g} is {ratio / THICKEST_SHELL:.2g} times the limit ({THICKEST_SHELL:g}) of the "
+            f"{theory} theory: use the solid theory.",
             TheoryRangeWarning,
             stacklevel=3,
         )

@@ -138,7 +138,7 @@ def settle(system: System, mode: Mode, load: Array) -> Solution:
         u = u - motions @ (heavy.T @ u)
         if np.max(abs(u - before)) <= DONE * np.max(abs(u)):
             return Solution(system, constants, u[:, 0])
-    raise ShellError("the static field that a mode or a spin brings with it did not converge.")
+    raise ShellError("the static field caused by a mode or a spin did not converge.")
 
 
 def is_uniform(constants: tuple[Constants, ...]) -> bool:

@@ -56,8 +56,8 @@ def refine(
             break
         if system.memory > MEMORY:
             raise ShellError(
-                f"harmonic {n} of this resonator needs {system.memory / 1e9:.1f} GB: it waves too finely for elements of the whole "
-                "section. Ask for a lower harmonic or a shorter or thicker shell."
+                f"harmonic {n} of this resonator needs {system.memory / 1e9:.1f} GB: its wavelength is too short for elements of the "
+                "whole section. Ask for a lower harmonic or a shorter or thicker shell."
             )
         solutions, undone, factor = _solve(system, resonator.size, elastic, count, max(UNDONE * tolerance, 1e-13))
         if not before and (shorter := _cut(solutions[1:], level, tolerance)) < level.longest / 1.2:

@@ -219,8 +219,8 @@ def _least_mass(
     if found.x is None:
         room, need = 1e6 * float(capacity.sum()), 1e6 * size
         raise ShellError(
-            f"the cuts would go beyond the wall: about {need:.3g} mg must come off around the antinodes, but the {count} sites "
-            f"give {room:.3g} mg in all, at most {1e9 * float(capacity.max()):.3g} µg each, and the balance must be kept. "
+            f"the cuts would be deeper than allowed: about {need:.3g} mg must be removed near the antinodes, but the {count} sites "
+            f"give {room:.3g} mg in all, at most {1e9 * float(capacity.max()):.3g} µg each, with the balance preserved. "
             "Allow longer, wider or more cuts. Is the split in Hz?"
         )
     return np.asarray(np.maximum(found.x[:count], 0.0) * size)

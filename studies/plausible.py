@@ -49,7 +49,7 @@ def check_card_frequency(instrument: "Instrument", frequency: Array, path: str) 
         f" thickness_mm = {{ value = …, relative_sd = {np.ceil(50 * away) / 100:g} }}."
     )
     raise InputError(
-        f"{path}: frequency_Hz is near {read:.5g} Hz, but the card {instrument.name} rings at {own:.5g} Hz at {T:g} °C,"
+        f"{path}: frequency_Hz is near {read:.5g} Hz, but the card {instrument.name} resonates at {own:.5g} Hz at {T:g} °C,"
         f" known to {100 * spread:.2g} %: {ask if away < ANOTHER else 'this is not a record of that gyro; check the card and the file.'}"
     )
 

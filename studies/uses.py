@@ -110,7 +110,7 @@ def _acceptance(records: Sequence[Record]) -> None:
     served, left = sort_records(records, OUTPUT)
     if not served:
         needs = "; ".join(dict.fromkeys(quantity.needs for quantity in QUANTITIES))
-        raise InputError(f"{left[0].path}: serves none of the tests, which need {needs}.")
+        raise InputError(f"{left[0].path}: fits none of the tests, which need {needs}.")
 
 
 def _check_span(records: Sequence[Record], least: float, purpose: str) -> None:

@@ -151,7 +151,7 @@ def _step(before: float, after: float, duration: float) -> Points:
 
 def _ramp(before: float, after: float, rate: float) -> Points:
     if before == after:
-        raise ThermalError(f"a ramp from {before:g} to {after:g} °C goes nowhere; use 'soak'.")
+        raise ThermalError(f"a ramp from {before:g} to {after:g} °C changes nothing; use 'soak'.")
     return [(0.0, before), (60 * abs(after - before) / rate, after)]
 
 

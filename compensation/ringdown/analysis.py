@@ -77,7 +77,7 @@ def _check(envelope: Envelope) -> None:
         x, y = z
         gain = np.vdot(x, y) / np.vdot(x, x)
         if np.linalg.norm(y - gain * x) < 1e-9 * np.linalg.norm(y):
-            raise CompensationError("the two channels are one and the same signal; give each pick-off its own column.")
+            raise CompensationError("the two channels carry the same signal; give each pick-off its own column.")
 
 
 def _after_jump(envelope: Envelope, jump: float) -> Envelope:
@@ -173,15 +173,15 @@ def _remark(
     first = float(envelope.time[0])
     if jump is not None:
         said.append(
-            f"The phase jumps at {jump:.4g} s (reference or samples lost, or a drive switched): only what follows is used."
+            f"The phase jumps at {jump:.4g} s (reference or samples lost, or a drive switched): only the part after it is used."
         )
     if start > first:
         said.append(
-            f"The first {start - first:.4g} s are no free decay (drive, transient or release) and are left out."
+            f"The first {start - first:.4g} s are not a free decay (drive, transient or release) and are left out."
         )
     said += [f"{SAID_OF[name]}." for name in beyond]
     for line in lines:
-        said.append(f"Interference at {envelope.carrier + line:.6g} Hz is taken out; find its source.")
+        said.append(f"Interference at {envelope.carrier + line:.6g} Hz is removed; find its source.")
     if envelope.clipped:
         said.append(
             f"{100 * envelope.clipped:.2g} % of the first samples are clipped: the early decay is distorted; lower the gain."
@@ -190,10 +190,12 @@ def _remark(
         said.append(f"{100 * envelope.lost:.2g} % of the samples are lost.")
     if left.widening > 1:
         said.append(
-            f"What the fit leaves is not white noise: intervals are {left.widening:.3g} times as wide as the Cramér–Rao bound of white noise."
+            f"The residual is not white noise: intervals are {left.widening:.3g} times as wide as the Cramér–Rao bound of white noise."
         )
     if left.early:
-        said.append("The first rows of the window still miss the fit: no part of this record is a plain free decay.")
+        said.append(
+            "The first rows of the window still deviate from the fit: no part of this record is a plain free decay."
+        )
     if left.widening > 3:
         said.append("Poor fit: take the values as indications.")
     return said
@@ -202,7 +204,9 @@ def _remark(
 def _undetermined(fit: DecayFit, estimates: Mapping[str, Estimate]) -> list[str]:
     said = []
     if fit.one_mode:
-        said.append("One mode is seen: a second one is not excited, or its split is not resolved; there are no axes.")
+        said.append(
+            "Only one mode is seen: the second one is not excited, or the split is not resolved. No axes can be given."
+        )
     if "split_Hz" in estimates:
         split = estimates["split_Hz"]
         width = 1 / (np.pi * estimates["decay_time_s"].value)

@@ -152,14 +152,14 @@ def _remark(f: Real, point: Real, split: bool, widening: float) -> list[str]:
     step = float(np.median(np.diff(f)))
     if exp(min(point[3::3])) < NARROW * step:
         said.append(
-            f"The line is narrower than {NARROW:g} points of {step:.3g} Hz: the analyser makes its width, and Q is at least what is stated."
+            f"The line is narrower than {NARROW:g} points of {step:.3g} Hz: the analyser sets its width, and the stated Q is a lower limit."
         )
     if widening > 2:
         said.append(
-            "The line is no Lorentzian (amplitude too large, drift during the sweep, or a coarse resolution bandwidth): take Q as an indication."
+            "The line is not a Lorentzian (amplitude too large, drift during the sweep, or a coarse resolution bandwidth): take Q as an indication."
         )
     if not all(f[0] < f0 < f[-1] for f0 in point[2::3]):
         said.append("The line lies at the edge of the span: centre the span on it.")
     if split:
-        said.append("Two lines are seen: a spectrum without phase gives no axes.")
+        said.append("Two lines are seen: without phase, a spectrum cannot give axes.")
     return said

@@ -84,15 +84,17 @@ def analyse_trace(time: ArrayLike, amplitude: ArrayLike, *, confidence: float = 
     reach = float(scipy.stats.norm.isf((1 - confidence) / 2)) * sd
     said = []
     if first:
-        said.append(f"The first {t[first] - t[0]:.4g} s are no free decay (drive or release) and are left out.")
+        said.append(f"The first {t[first] - t[0]:.4g} s are not a free decay (drive or release) and are left out.")
     if bent:
         said.append(
-            f"After {t[last - 1]:.4g} s the decay bends (interference, a second mode, or the amplitude matters): only what is straight is used."
+            f"After {t[last - 1]:.4g} s the decay is not exponential (interference, a second mode, or amplitude dependence): only the part before is used."
         )
     elif last < t.size:
         said.append(f"The last {t[-1] - t[last - 1]:.4g} s are below {FLOOR:g} times the noise and are left out.")
     if x[-1] * -slope < 0.5:
-        said.append("The amplitude falls by less than 40 % in the window: a bend would not be seen; record longer.")
+        said.append(
+            "The amplitude falls by less than 40 % in the window: a deviation from an exponential would not be seen; record longer."
+        )
     return TraceDecay(
         -slope,
         sd,

@@ -66,9 +66,7 @@ def unbalance_loss(mode: Mode, elastic: Elastic | VaryingElastic, base: Elastic 
     """
     solution = _solved(mode)
     if solution.system.n != 2:
-        raise ShellError(
-            "the first and third harmonic of the rim's mass couple a mode with n = 2 to the stem, no other."
-        )
+        raise ShellError("only the first and third harmonics of the rim's mass couple a mode with n = 2 to the stem.")
     system, waves = _stand(mode, elastic, base, 1)
     assert mode.resonator is not None
     raw = solution.system.constraint @ solution.vector
@@ -132,7 +130,7 @@ def _rim(resonator: Resonator, system: System) -> list[Array]:
     """Radial, circumferential and axial motion of the middle surface at the free rim, as rows over the raw unknowns."""
     group = [one for one in system.groups if isinstance(one, ShellGroup)][-1]
     if group.place.chain.ends[1] != "free":
-        raise ShellError("an unbalanced rim is a free rim.")
+        raise ShellError("an imbalance of the rim needs a free rim.")
     orders, element = system.level.through, len(group.unknowns) - 1
     width = sum(orders) + 3
     ends = [group.unknowns[element, -width:]]

@@ -44,7 +44,7 @@ def damping_wave(budget: Budget, ripples: Sequence[Ripple], harmonic: int) -> Co
     total = np.zeros(len(budget.temperatures), dtype=complex)
     for ripple in ripples:
         if ripple.part not in parts:
-            raise ShellError(f"the budget has no part '{ripple.part}' that could vary around.")
+            raise ShellError(f"the budget has no loss '{ripple.part}' that could vary around the circumference.")
         total += parts[ripple.part] * ripple.weight * ripple.amplitude * np.exp(2j * harmonic * ripple.angle)
     return total
 

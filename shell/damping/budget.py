@@ -138,7 +138,7 @@ def thermoelastic_cause(
             found.append(now.expansion**2 * temperature / now.capacity * flow / vibration.strain_energy)
         return np.array(found)
 
-    advice = "a wall thinner or thicker than the heat's path, or a material that expands less"
+    advice = "a wall thinner or thicker than the thermal diffusion length, or a material with less expansion"
     return LossCause("thermoelastic", inverse_q, float(np.hypot(sd, 0.02)), source, advice)
 
 
@@ -189,7 +189,7 @@ def film_causes(
             internal,
             float(np.hypot(*relative)),
             source,
-            "a thinner film, none where the mode bends, or a metal with less loss",
+            "a thinner film, no film where the mode bends, or a metal with less loss",
         )
     ]
     if film.heat is not None and heat is not None:
@@ -200,7 +200,7 @@ def film_causes(
 
         sd = float(np.hypot(relative[0], 0.2))  # films differ from the bulk whose constants they are given
         found.append(
-            LossCause(f"film {name}, heat", thermoelastic, sd, source, "a thinner film, or a metal that expands less")
+            LossCause(f"film {name}, heat", thermoelastic, sd, source, "a thinner film, or a metal with less expansion")
         )
     return found
 

@@ -61,7 +61,7 @@ def gas_loss(vibration: Vibration, gas: Gas, pressure: float, temperature: float
     if not pressure >= 0:
         raise ShellError(f"the gas pressure must be 0 or positive, not {pressure:g} Pa.")
     if not 0 <= accommodation <= 1:
-        raise ShellError(f"the accommodation is a share 0 ... 1, not {accommodation:g}.")
+        raise ShellError(f"the accommodation coefficient lies between 0 and 1, not {accommodation:g}.")
     if pressure == 0:
         return 0.0
     free = free_molecular_loss(vibration, gas, pressure, temperature, accommodation)

@@ -66,7 +66,7 @@ def wave(
 ) -> Waves:
     """A single wave a(x) cos m(θ - θ_m), θ_m (rad) the azimuth of a crest, `profile` a factor over the position."""
     if order != int(order) or order < 0:
-        raise ShellError(f"the order of a wave around is a whole number from 0 up, not {order!r}.")
+        raise ShellError(f"the circumferential order of a wave is a whole number from 0 up, not {order!r}.")
     c = complex(amplitude * np.exp(1j * order * azimuth))
     return Waves({order: c if profile is None else _Grown(c, profile)})
 
@@ -110,7 +110,7 @@ class Map:
         x, theta = np.asarray(self.position, dtype=float), np.asarray(self.azimuth, dtype=float)
         if np.shape(self.values) != (x.size, theta.size):
             raise ShellError(
-                f"a map of {x.size} positions and {theta.size} azimuths has so many rows and columns, "
+                f"a map of {x.size} positions and {theta.size} azimuths needs as many rows and columns, "
                 f"not {' x '.join(str(k) for k in np.shape(self.values))}."
             )
         if x.size < 1 or np.any(np.diff(x) <= 0) or x.min() < -1e-9 or x.max() > 1 + 1e-9:
@@ -118,13 +118,13 @@ class Map:
         step = 2 * pi / max(theta.size, 1)
         if theta.size < 4 or np.any(abs(np.diff(theta) - step) > 1e-3 * step):
             raise ShellError(
-                f"the azimuths of a map must close the circle in equal steps: {theta.size} columns ask for steps of "
-                f"{np.rad2deg(step):.4g}°, from {np.rad2deg(theta[0]) if theta.size else 0:.4g}° on, without the first again at 360°."
+                f"the azimuths of a map must close the circle in equal steps: {theta.size} columns need steps of "
+                f"{np.rad2deg(step):.4g}°, from {np.rad2deg(theta[0]) if theta.size else 0:.4g}° on, without a repeat at 360°."
             )
         if not np.all(np.isfinite(self.values)):
             raise ShellError(
-                f"the map has {int(np.sum(~np.isfinite(self.values)))} empty cells: fit harmonics to the points that there "
-                "are (hrg scan), or fill them."
+                f"the map has {int(np.sum(~np.isfinite(self.values)))} empty cells: fit harmonics to the measured "
+                "points (hrg scan), or fill them."
             )
 
     @property

@@ -152,7 +152,7 @@ class Pair:
     def _edge(self) -> tuple[CrossSection, Array]:
         """The edge of the rim, and the areas per radian that its heights stand for."""
         if self.resonator.support == "clamped-rim" or self.resonator.ends_on_axis:
-            raise ShellError("the meridian has no free rim whose edge could stand out.")
+            raise ShellError("the meridian has no free rim, so no edge that could depart.")
         eta, weights = gauss(max(self.solution.system.level.through) + 2)
         edge = cut(self.resonator, self.solution.system, 1.0, eta)
         return edge, edge.table.volume[0, 0] * weights

@@ -45,7 +45,7 @@ QuantityLimits: Any = _declare_quantities()
 class Limits(Keys, frozen=True, kw_only=True):
     """What an acceptance test is judged by."""
 
-    schema: Annotated[str, says("what the file is")] = SCHEMA
+    schema: Annotated[str, says("kind of file")] = SCHEMA
     limits: QuantityLimits
     warm_up: WarmUp = WarmUp()
 

@@ -259,7 +259,7 @@ def measure_decays(decays: "Sequence[Decay]") -> Found:
     for decay in decays:
         tau = decay.estimates.get("decay_time_s")
         if tau is None:
-            raise InputError(f"{decay.path}: two lines in a spectrum are no run-down; give a decay over time.")
+            raise InputError(f"{decay.path}: two lines in a spectrum are not a run-down; give a decay over time.")
         if "run_down_time_s" in found and tau.value > found["run_down_time_s"].value:
             continue
         found = {"run_down_time_s": _around(tau.value, tau.sd, decay.path)}

@@ -54,7 +54,7 @@ def warn(found: CardFit, estimates: Sequence[Estimate], ladder: Mapping[str, Run
     told = sum(rows[name].count for name in rows)
     if len(estimates) > told:
         warnings.append(
-            f"{told} data cannot determine {len(estimates)} uncertain values: {stayed} stay at their prior."
+            f"{told} data points cannot determine {len(estimates)} uncertain values: {stayed} stay at their prior."
         )
     return tuple(warnings)
 

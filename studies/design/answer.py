@@ -199,7 +199,7 @@ def _refuse_infeasible(search: Search, best: int) -> None:
     ]
     bound = f" There {' and '.join(ends)}: wider bounds may help." if ends else ""
     raise InputError(
-        f"no design found keeps all constraints. The nearest one, {at}, fails so: {'; '.join(words)}.{bound} Loosen one of these"
+        f"no design found meets all constraints. The nearest one, {at}, has {'; '.join(words)}.{bound} Relax one of these"
         " constraints or widen the bounds; the designs computed are kept."
     )
 

@@ -81,7 +81,7 @@ class SearchKeys(Keys, frozen=True, kw_only=True):
     """How long and from where the search goes."""
 
     seed: Annotated[int, number("of the designs drawn first", least=0, most=2**63 - 1)] = 0
-    starts: Annotated[int, number("regions from which it descends", least=1, most=100)] = 5
+    starts: Annotated[int, number("regions in which it searches locally", least=1, most=100)] = 5
     evaluations: Annotated[int, number("full solves, at most, about", least=10, most=10**6)] = 600
     front: Annotated[int, number("designs on the front between those best in one objective", least=1, most=200)] = 5
 
@@ -89,18 +89,18 @@ class SearchKeys(Keys, frozen=True, kw_only=True):
 class DesignKeys(Keys, frozen=True, kw_only=True):
     """A whole task."""
 
-    schema: Annotated[Literal["hrg.design/1"], says("what the file is")] = "hrg.design/1"
+    schema: Annotated[Literal["hrg.design/1"], says("kind of file")] = "hrg.design/1"
     name: Annotated[str, says("the file's unless given", example="8 kHz dome")] = ""
     note: Annotated[str, says("free text")] = ""
     card: Annotated[str, says("a shipped card, or the path of one beside this file", example="hrg-30mm")]
     fixed: (
         Annotated[dict[str, float | str], says("other values of the card", example={"loss.unbalance_mg": 2.0})] | None
     ) = None
-    search: Annotated[SearchKeys, says("how long and from where")] = SearchKeys()
-    margin: Annotated[Margin, says("what constraints keep in hand for tolerances")] | None = None
-    parameter: Annotated[tuple[Free, ...], says("what is free; one or more")] = ()
-    derived: Annotated[tuple[Derived, ...], says("what follows from it, in lengths tied together")] = ()
-    quantity: Annotated[tuple[AnyQuantity, ...], says("what needs keys other than the default ones")] = ()
-    objective: Annotated[tuple[Objective, ...], says("what is wanted; one or more")] = ()
+    search: Annotated[SearchKeys, says("effort and start of the search")] = SearchKeys()
+    margin: Annotated[Margin, says("margin of the constraints for tolerances")] | None = None
+    parameter: Annotated[tuple[Free, ...], says("free parameters; one or more")] = ()
+    derived: Annotated[tuple[Derived, ...], says("lengths tied to free parameters by formulas")] = ()
+    quantity: Annotated[tuple[AnyQuantity, ...], says("quantities with keys other than the defaults")] = ()
+    objective: Annotated[tuple[Objective, ...], says("objectives; one or more")] = ()
     constraint: Annotated[tuple[Requirement, ...], says("what must hold")] = ()
-    tolerance: Annotated[tuple[Tolerance, ...], says("how far values may be off")] = ()
+    tolerance: Annotated[tuple[Tolerance, ...], says("tolerances")] = ()

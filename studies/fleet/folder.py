@@ -95,7 +95,7 @@ def _read_table(path: Path, serials: Collection[str]) -> dict[str, tuple[date | 
             except ValueError:
                 raise InputError(f"{path}, line {line}: date '{row['date']}' is not of the form 2024-05-31.") from None
             if serial in found:
-                raise InputError(f"{path}, line {line}: device '{serial}' stands there twice.")
+                raise InputError(f"{path}, line {line}: device '{serial}' is listed twice.")
             found[serial] = made, (row.get("batch") or "").strip()
     return found
 

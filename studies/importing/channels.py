@@ -183,7 +183,7 @@ class ChannelTable(RawTable):
                 values.append(np.array(own[column].read(-1), dtype=float))
             if len(values[-1]) != part.rows:
                 raise InputError(
-                    f"{part.path}: '{column}' has {len(values[-1])} values where {part.rows} are announced; export it again."
+                    f"{part.path}: '{column}' has {len(values[-1])} values, but {part.rows} are declared; export it again."
                 )
         return np.concatenate(values)
 
@@ -213,8 +213,8 @@ def read_channel_table(paths: Sequence[str | Path], file: FileMap) -> ChannelTab
             used = [known[name] for name in wanted]
             if len({(channel.clock.key if channel.clock else "", channel.rows) for channel in used}) > 1:
                 raise InputError(
-                    f"{path}: {', '.join(repr(channel.name) for channel in used)} have several clocks or lengths; give those of each"
-                    " a [[file]] table of its own (same_file = true)."
+                    f"{path}: {', '.join(repr(channel.name) for channel in used)} have several clocks or lengths; give each its own"
+                    " [[file]] table (same_file = true)."
                 )
             tables.append(dict(zip(wanted, used, strict=True)))
             parts.append(Part(str(path), _digest(path), 1, used[0].rows))

@@ -70,7 +70,7 @@ def read_times(table: RawTable, file: "FileMap") -> Times:
     if file.timezone is not None and origin is not None and origin.tzinfo is None:
         origin, seconds, twice = _place(origin, seconds, table, file)
         if twice:
-            notes.append(f"{twice} rows in the hour that {file.timezone} has twice, told apart by their order")
+            notes.append(f"{twice} rows in the hour that {file.timezone} has twice, distinguished by their order")
     if file.clock_rate:
         seconds = seconds / (1 + file.clock_rate)
         notes.append(f"its clock runs {file.clock_rate * 1e6:g} ppm fast: times divided by {1 + file.clock_rate!r}")
@@ -160,10 +160,7 @@ def drop_repeated(
 
 def _mend(table: RawTable, file: "FileMap", row: int) -> str:
     if row in table.starts():
-        return (
-            "Give files that continue one another in the order of their times; files whose clocks start anew are imported"
-            " one by one."
-        )
+        return "Give consecutive files in the order of their times; import files whose clocks restart one by one."
     winter = (
         ""
         if file.timezone or file.time_format in SECONDS

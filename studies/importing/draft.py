@@ -63,7 +63,8 @@ def draft_map(paths: Sequence[str]) -> Draft:
                 written.insert(2, "same_file = true")
             elif len(group) > 1:
                 written.insert(
-                    2, f"parts = {len(group)}    # CHECK: these continue one another: {', '.join(map(_comment, group))}"
+                    2,
+                    f"parts = {len(group)}    # CHECK: these are consecutive files: {', '.join(map(_comment, group))}",
                 )
             begun = begun or bool(found)
             files.append(written if found or look.group is None else [f"# {line}".rstrip() for line in written])
@@ -142,12 +143,12 @@ def _find_offsets(paths: Sequence[str], files: list[list[str]]) -> list[str]:
         ours, theirs = _source_of(base, one), _source_of(other, two)
         place = next(k for k, line in enumerate(written) if line.startswith("# clock_offset_s"))
         written[place : place + 1] = [
-            f"# {_comment(theirs)} here follows {_comment(ours)} of the first file best with",
+            f"# {_comment(theirs)} here follows {_comment(ours)} of the first file best with an offset of",
             f"# {said}, correlation {offset.correlation:.4f};",
-            "# a real lag between two places looks the same: take it only if both show one thing.",
+            "# a thermal lag between two places looks the same: use it only if both sensors are at one place.",
             f"# clock_offset_s = {offset.value:.2f}    # CHECK: added to this file's times",
         ]
-        notes.append(f"{path}: its clock seems to need {said}, from {theirs} against {ours}; see the draft.")
+        notes.append(f"{path}: its clock seems to be off: add {said}, by {theirs} against {ours}; see the draft.")
     return notes
 
 
@@ -187,7 +188,7 @@ def _describe_notation(path: str, look: Look) -> list[str]:
     if look.group is not None:
         named, clock = look.group, look.group.clock
         units = ", ".join(f"{name} [{c.unit}]" if c.unit else name for name, c in named.channels.items())
-        about = f", {clock.step!r} s apart" if clock and clock.step else ", by a clock of their own" if clock else ""
+        about = f", {clock.step!r} s apart" if clock and clock.step else ", with their own clock" if clock else ""
         said = [f"# {_comment(units)}: {named.rows} rows{about}"]
         return [*lines, *([f"group = {spell_value(named.name)}"] if named.name else []), *said]
     if look.kind == "text":
@@ -295,7 +296,7 @@ def _draft_unknown(name: str, numbers: Sequence[float]) -> list[str]:
     """Leave a form to fill for a column without a meaning."""
     span = f"{min(numbers):.6g} to {max(numbers):.6g}; " if numbers else ""
     return [
-        f"# no meaning found for the column {spell_value(name)}",
+        f"# unknown column: {spell_value(name)}",
         f"# {span}if it belongs to the record:",
         "# [[file.column]]",
         f"# from = {spell_value(name)}",

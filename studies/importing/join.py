@@ -66,7 +66,7 @@ def import_records(paths: Sequence[str], import_map: LoadedMap) -> dict[str, Rec
     for number, (one, shift) in enumerate(zip(series, shifts, strict=True), 1):
         notes += [f"file {number}, {note}" for note in one.notes]
         if number > 1:
-            notes.append(f"file {number}, its zero lies at {shift - float(base.time[0]):.6g} s of the record")
+            notes.append(f"file {number}, its time 0 is at {shift - float(base.time[0]):.6g} s of the record")
         notes += [f"file {number}, {note}" for note in _report_gaps(one)]
         for column in one.file.columns:
             values = one.columns[column.target, column.axis]
@@ -120,8 +120,8 @@ def share_out(paths: Sequence[str], import_map: LoadedMap) -> list[Sequence[str]
     counts = [0 if file.same_file else file.parts or (len(paths) if alone else 1) for file in files]
     if sum(counts) != len(paths):
         raise InputError(
-            f"{import_map.path}: describes {sum(counts)} raw files, but {len(paths)} are given ('parts' in a [[file]] says"
-            " how many files continue one another)."
+            f"{import_map.path}: describes {sum(counts)} raw files, but {len(paths)} are given ('parts' in a [[file]] is"
+            " its number of consecutive files)."
         )
     ends = list(itertools.accumulate(counts))
     own = [paths[end - count : end] for end, count in zip(ends, counts, strict=True)]

@@ -37,7 +37,7 @@ class ColumnMap(Keys, frozen=True, kw_only=True):
     ] = msgspec.field(name="unit")
     scale: Annotated[float, number("reading × scale + offset is in the unit")] = 1.0
     offset: Annotated[float, number("see scale")] = 0.0
-    sign: Annotated[float, number("-1 turns the converted value's sign", least=-1, most=1)] = 1.0
+    sign: Annotated[float, number("-1 reverses the sign of the converted value", least=-1, most=1)] = 1.0
     stated_resample: (
         Annotated[
             Literal["linear", "mean", "nearest", "previous"],
@@ -45,7 +45,7 @@ class ColumnMap(Keys, frozen=True, kw_only=True):
         ]
         | None
     ) = msgspec.field(name="resample", default=None)
-    axis: Annotated[str, says("one record for each axis, with the columns that have none in all of them")] = ""
+    axis: Annotated[str, says("one record for each axis; columns without an axis go into every record")] = ""
     drop: Annotated[
         tuple[Literal["spikes", "stuck", "zeros"], ...],
         says("readings that become missing values; the import counts them"),
@@ -53,7 +53,7 @@ class ColumnMap(Keys, frozen=True, kw_only=True):
     clock_Hz: Annotated[float, number("clock that is counted, of unit period-counts", above=0.0)] | None = None
     periods: Annotated[float, number("periods in which it is counted, of unit period-counts", above=0.0)] | None = None
     gate_s: Annotated[float, number("gate in which periods are counted, of unit gate-counts", above=0.0)] | None = None
-    nominal_Hz: Annotated[float, number("from where units ppm and ppb count", above=0.0)] | None = None
+    nominal_Hz: Annotated[float, number("reference of the units ppm and ppb", above=0.0)] | None = None
 
     def __post_init__(self) -> None:
         known = (*TARGETS, "temperature_degC")
@@ -114,12 +114,12 @@ class FileMap(Keys, frozen=True, kw_only=True):
         Annotated[int, number("first line with numbers; the one after the header unless given", least=1, most=LAST)]
         | None
     ) = msgspec.field(name="data_line", default=None)
-    last_line: Annotated[int, number("what follows is not data", least=1, most=LAST)] | None = None
+    last_line: Annotated[int, number("last line of the data", least=1, most=LAST)] | None = None
     sheet: Annotated[str, says("of an Excel workbook")] = ""
     group: (
         Annotated[str, says("of a TDMS, MDF, HDF5 or MATLAB file; without it channels are named group/channel")] | None
     ) = None
-    same_file: Annotated[bool, says("of the [[file]] before: another group of it, or another clock")] = False
+    same_file: Annotated[bool, says("raw file of the previous [[file]]: another group or another clock")] = False
     missing: Annotated[tuple[str, ...], says('cells that mean "no value", besides empty ones')] = ()
     time_columns: Annotated[
         str | Annotated[tuple[str, ...], says("", least=1)],
@@ -133,7 +133,7 @@ class FileMap(Keys, frozen=True, kw_only=True):
     )
     timezone: Annotated[str, says("of stamps that do not state one, such as Europe/Berlin")] | None = None
     parts: (
-        Annotated[int, number("files that continue one another; 1, or all files with one [[file]]", least=1, most=LAST)]
+        Annotated[int, number("number of consecutive files; 1, or all files with one [[file]]", least=1, most=LAST)]
         | None
     ) = None
     start: Annotated[datetime.datetime, says("when a clock that counts from 0 was started")] | None = None
@@ -142,10 +142,11 @@ class FileMap(Keys, frozen=True, kw_only=True):
     ] = msgspec.field(name="clock_offset_s", default=0.0)
     clock_rate_ppm: Annotated[float, number("by how much its clock runs fast", least=-1e5, most=1e5)] = 0.0
     repeated_times: Annotated[
-        Literal["error", "first", "spread"], says("first keeps one row, spread lays rows evenly up to the next time")
+        Literal["error", "first", "spread"],
+        says("first keeps one row, spread spaces the rows evenly up to the next time"),
     ] = "error"
     longest_gap: (
-        Annotated[float, number("nothing is interpolated across longer ones; 10 steps unless given", above=0.0)] | None
+        Annotated[float, number("longer gaps are not interpolated; 10 steps unless given", above=0.0)] | None
     ) = msgspec.field(name="longest_gap_s", default=None)
     columns: Annotated[tuple[ColumnMap, ...], says("of the raw file that the record gets", least=1)] = msgspec.field(
         name="column"
@@ -184,7 +185,7 @@ class FileMap(Keys, frozen=True, kw_only=True):
 class ImportMap(Keys, frozen=True, kw_only=True):
     """A whole map."""
 
-    schema: Annotated[str, says("what the file is")] = SCHEMA
+    schema: Annotated[str, says("kind of file")] = SCHEMA
     instrument: Annotated[str, says("goes into the record's header")] = ""
     source: Annotated[str, says("goes into the record's header")] = ""
     step: Annotated[float, number("regular time grid; without it the times of the first file", above=0.0)] | None = (

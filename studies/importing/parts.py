@@ -27,7 +27,7 @@ def read_parts(paths: Sequence[str | Path], file: FileMap) -> RawTable:
     for other in tables[1:]:
         if list(other.cells) != list(first.cells):
             raise InputError(
-                f"{other.path}: its columns differ from those of {first.path}; give it a [[file]] table of its own."
+                f"{other.path}: its columns differ from those of {first.path}; give it its own [[file]] table."
             )
     cells = pd.concat([table.cells for table in tables], ignore_index=True)
     return TextTable(tuple(part for table in tables for part in table.parts), first.missing, cells, first.decimal)

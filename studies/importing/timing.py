@@ -57,7 +57,7 @@ def find_time(
     if not named and (evenly or not rising):
         return [], "", "no column is a time; by how many seconds do the rows lie apart?"
     time = named[0] if named else rising[0]
-    unsure = "" if named else "no column is named time; the first that only rises was taken"
+    unsure = "" if named else "no column is named time; the first increasing one was taken"
     values = numbers[time]
     first = values[0] if values else 0.0
     for size, form in UNIX_BY_SIZE:

@@ -43,7 +43,7 @@ OF_GEOMETRY = ("resonator", "material", "thermal", "mount", "imperfection", "ele
 class Head(Keys, frozen=True, kw_only=True):
     """The keys of a card outside its tables."""
 
-    schema: Annotated[str, says("what the file is", example=SCHEMA)]
+    schema: Annotated[str, says("kind of file", example=SCHEMA)]
     name: Annotated[str, says("of the instrument", example="free-dome")]
     note: Note = ""
     reference_temperature_degC: Annotated[

@@ -124,7 +124,7 @@ def read_uncertain(raw: Any, keys: Any, where: str, name: str) -> "tuple[Any, li
             return raw
         spread = read_keys(raw, Spread, place)
         if spread.value == 0 and spread.relative_sd:
-            raise InputError(f"{place}: a part of 0 is 0; give sd instead of relative_sd.")
+            raise InputError(f"{place}: a relative uncertainty of 0 is 0; give sd instead of relative_sd.")
         low, high = bounds(node)
         for word, end in (("low", spread.low), ("high", spread.high)):
             if end is not None and not low <= end <= high:

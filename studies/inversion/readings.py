@@ -60,7 +60,7 @@ def read_modes(path: str) -> ModeReadings:
     count = len(table.values["frequency_Hz"])
     n, k, f, sd, T = (table.values.get(name, np.full(count, np.nan)) for name in COLUMNS)
     if not count:
-        raise InputError(f"{path}: no mode in it; give one row a mode.")
+        raise InputError(f"{path}: it has no modes; give one row per mode.")
     for column, name, most in ((n, "harmonic", HIGHEST), (k, "index", HIGHEST)):
         wrong = ~np.isnan(column) & ((column < 0) | (column != np.round(column)) | (column > most))
         _refuse(table, wrong, f"{name} must be a whole number from 0 to {most}, or empty where it is not known")
@@ -68,7 +68,7 @@ def read_modes(path: str) -> ModeReadings:
     _refuse(table, ~np.isnan(sd) & ~(sd > 0), "sd_Hz must be positive, or empty")
     named = [(a, b, c) for a, b, c in zip(n, k, T, strict=True) if not np.isnan(a) and not np.isnan(b)]
     if len({tuple(map(repr, one)) for one in named}) < len(named):
-        raise InputError(f"{path}: a mode stands there twice; give the mean of its readings, and of a split pair.")
+        raise InputError(f"{path}: a mode is listed twice; give the mean of its readings, and of a split pair.")
     stated = np.where(np.isnan(sd), USUAL * f, sd)
     lines = tuple(table.line(row) for row in range(count))
     return ModeReadings(path, n, k, f, stated, T + zero_Celsius, lines, bool(np.isnan(sd).any()))

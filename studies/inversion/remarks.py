@@ -21,15 +21,15 @@ def warn(fit: ModeFit, readings: ModeReadings, misfit: float, doubted: bool, rel
     if doubted:
         worst = int(np.argmax(np.abs(fit.residual / fit.noise)))
         found.append(
-            f"the readings lie {np.sqrt(misfit):.2g} times as far from the card as they should; the largest residual is"
-            f" {1e6 * fit.residual[worst]:+.2g} ppm in line {readings.lines[worst]}. The intervals are widened by that; a wrong assignment,"
+            f"the readings lie {np.sqrt(misfit):.2g} times as far from the card as expected; the largest residual is"
+            f" {1e6 * fit.residual[worst]:+.2g} ppm in line {readings.lines[worst]}. The intervals are widened accordingly; a wrong assignment,"
             " an exact value that is wrong, charged electrodes, films or a wall that is not as the card says can be the cause."
         )
     solver = np.sqrt(np.maximum(fit.noise**2 - relative**2, 0.0))
     if (solver > relative).any():
         found.append(
             f"the solver's own error, up to {1e6 * solver.max():.2g} ppm, is larger than the readings' and counts as noise; a stem with a"
-            " fillet is solved more closely."
+            " fillet is solved more accurately."
         )
     return found
 

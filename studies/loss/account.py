@@ -60,9 +60,9 @@ class StatedLoss:
     def verdict(self) -> str:
         """What follows from the interval; nothing where it holds the whole."""
         if self.high < 1:
-            return "More is lost than these parts allow: look for a cause that the card does not have."
+            return "The stated loss exceeds these contributions: look for a cause that the card does not have."
         if self.low > 1:
-            return "Less is lost than these parts say: one of them is too large."
+            return "The stated loss is below these contributions: one of them is too large."
         return ""
 
 

@@ -113,7 +113,7 @@ def loss_model(
             causes += through_stem
             ripples += unequal
         elif instrument.resonator.stem is not None and parts.anchor_inverse_q is None:
-            left_out.append("anchor: --anchor computes what the stem sends into its base.")
+            left_out.append("anchor: --anchor computes the loss from the stem into its base.")
     if not causes:
         raise InputError(f"{instrument.path} [loss]: it states no loss of energy. {' '.join(left_out)}")
     return LossModel(vibration, tuple(causes), tuple(left_out), tuple(ripples), mode.bryan_factor, mode.frequency)
@@ -131,7 +131,9 @@ def _thermoelastic(instrument: "Instrument", vibration: "Vibration", heat: "Call
         thermal.get("thermal.heat_capacity_J_per_kg_K", 0.0),
         thermal.get("thermal.conductivity_W_per_m_K", 0.0),
     )
-    return thermoelastic_cause(vibration, heat, relative, f"heat through the wall; {material.name}, law {material.law}")
+    return thermoelastic_cause(
+        vibration, heat, relative, f"heat conduction through the wall; {material.name}, law {material.law}"
+    )
 
 
 def _heat_law(instrument: "Instrument") -> "tuple[Callable[[float], Heat] | None, str]":

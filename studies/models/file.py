@@ -90,15 +90,15 @@ class ModelSource(msgspec.Struct, frozen=True):
 class ModelKeys(Keys, frozen=True, kw_only=True):
     """A fitted compensation: what it applies to, where it holds, its coefficients, where they come from."""
 
-    schema: Annotated[str, says("what the file is")] = SCHEMA
+    schema: Annotated[str, says("kind of file")] = SCHEMA
     kind: Annotated[str, says("frequency, bias, scale or cross-damping", example="bias")]
     compensates: Annotated[str, says("the column of a record that gets a compensated copy", example="bias_deg_per_h")]
     made_by: Annotated[str, says("the command that fitted it")] = ""
-    settings: Annotated[dict[str, Setting], says("what the formula needs beside its coefficients")] = msgspec.field(
+    settings: Annotated[dict[str, Setting], says("settings of the formula besides its coefficients")] = msgspec.field(
         default_factory=dict
     )
     validity: Annotated[
-        dict[str, tuple[float, float]], says("lowest and highest value of each variable that the fit has seen")
+        dict[str, tuple[float, float]], says("lowest and highest value of each variable in the fitted data")
     ] = msgspec.field(default_factory=dict)
     parts: Annotated[tuple[ModelPart, ...], says("what was fitted together; one or more", least=1)] = msgspec.field(
         name="part"

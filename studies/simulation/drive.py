@@ -193,7 +193,7 @@ def drive_by_record(record: Record, boundary: Boundary | None = None, time: Arra
         boundary = "chamber" if COLUMN["housing"] not in record and COLUMN["chamber"] in record else "housing"
     if COLUMN[boundary] not in record:
         raise InputError(
-            f"{record.path}: nothing says what drives the run; add the column {COLUMN['housing']} or {COLUMN['chamber']}."
+            f"{record.path}: no temperature drives the run; add the column {COLUMN['housing']} or {COLUMN['chamber']}."
             if not any(column in record for column in COLUMN.values())
             else f"{record.path}: the column {COLUMN[boundary]} is missing; choose the other boundary, or add it."
         )

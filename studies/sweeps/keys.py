@@ -182,15 +182,15 @@ class ToleranceSearch(Search, frozen=True, kw_only=True, tag="tolerance"):
 class StudyKeys(Keys, frozen=True, kw_only=True):
     """A whole spec."""
 
-    schema: Annotated[Literal["hrg.study/1"], says("what the file is")] = "hrg.study/1"
+    schema: Annotated[Literal["hrg.study/1"], says("kind of file")] = "hrg.study/1"
     name: Annotated[str, says("the file's unless given", example="thickness and radius tolerance")] = ""
     note: Annotated[str, says("free text")] = ""
     card: Annotated[str, says("a shipped card, or the path of one beside this file", example="hrg-30mm")]
     sampling: Annotated[Sampling, says("how designs are drawn")]
     parameter: Annotated[tuple[ParameterKeys, ...], says("what is varied")] = ()
-    derived: Annotated[tuple[Derived, ...], says("what follows from it")] = ()
-    quantity: Annotated[tuple[AnyQuantity, ...], says("what is computed; one or more")] = ()
-    requirement: Annotated[tuple[Requirement, ...], says("may change without computing anew")] = ()
+    derived: Annotated[tuple[Derived, ...], says("parameters derived by formulas")] = ()
+    quantity: Annotated[tuple[AnyQuantity, ...], says("quantities to compute; one or more")] = ()
+    requirement: Annotated[tuple[Requirement, ...], says("limits; they may change without a new computation")] = ()
     search: Annotated[
-        tuple[WorstCase | Inversion | ToleranceSearch, ...], says("what is looked for after the sampled cases")
+        tuple[WorstCase | Inversion | ToleranceSearch, ...], says("searches after the sampled cases")
     ] = ()

@@ -60,7 +60,7 @@ def claim_store(folder: str | Path) -> Store:
             _leave_out(store.file, path)
             count = len(store.file.damaged)
             warnings.warn(
-                f"{path}: damaged in {count} place{'s' * (count > 1)}; what was there is left out and computed again.",
+                f"{path}: damaged in {count} place{'s' * (count > 1)}; the damaged cases are left out and computed again.",
                 stacklevel=3,
             )
             store = Store(path.open("r+b", buffering=0), path, lock)

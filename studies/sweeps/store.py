@@ -241,7 +241,7 @@ class Store:
         except OSError as error:
             raise MissingEnvironment(
                 f"{self.path}: cannot be written ({error.strerror}); everything computed before is kept. Make room on the disk or"
-                " give the folder its rights back, then run the same command again to resume."
+                " restore write access to the folder, then run the same command again to resume."
             ) from error
         self._take(kind, at, content)
 
@@ -260,8 +260,8 @@ def memory_store() -> Store:
 def say_damaged(path: Path) -> InputError:
     """Return the error that names a damaged store and says how to mend it."""
     return InputError(
-        f"{path}: the store is damaged. Run 'hrg study run' with the same spec and folder again: what is damaged is computed"
-        " anew, the rest is kept."
+        f"{path}: the store is damaged. Run 'hrg study run' with the same spec and folder again: the damaged cases are"
+        " computed again, the rest is kept."
     )
 
 

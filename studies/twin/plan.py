@@ -142,13 +142,13 @@ def _refuse(instrument: "Instrument") -> None:
     """Raise for what the C code does not hold."""
     if instrument.loop is not None and instrument.loop.mode == "whole-angle":
         raise InputError(
-            f'{instrument.path} [loop]: mode = "whole-angle" cannot be carried: the twin holds its wave; set mode ='
+            f'{instrument.path} [loop]: mode = "whole-angle" is not available in a twin, whose wave is held; set mode ='
             ' "force-rebalance", or use the records of hrg simulate.'
         )
     for effect in instrument.effects:
         if effect.name.replace("-", "_") not in EFFECTS:
             raise InputError(
-                f"{instrument.path} [[effect]]: '{effect.name}' cannot be carried; leave this effect out of the card."
+                f"{instrument.path} [[effect]]: '{effect.name}' is not available in a twin; leave this effect out of the card."
             )
 
 

@@ -87,7 +87,7 @@ def test_a_mode_can_be_sent_to_another_process() -> None:
 
 
 def test_a_shell_too_thick_for_its_theory_is_warned_of_by_how_much() -> None:
-    with pytest.warns(TheoryRangeWarning, match=r"h/R = 0.2 is 2 times the thickest"):
+    with pytest.warns(TheoryRangeWarning, match=r"h/R = 0.2 is 2 times the limit"):
         solve_modes(hemisphere(15e-3, 3e-3), SILICA, theory="shell")
     solve_modes(hemisphere(15e-3, 3e-3), SILICA)
 

@@ -423,7 +423,7 @@ def test_the_offset_of_a_second_clock_is_offered(tmp_path, offset):
     draft = draft_map([str(tmp_path / "one.csv"), str(tmp_path / "two.csv")])
     (line,) = [line for line in draft.text.splitlines() if line.startswith("# clock_offset_s") and "CHECK" in line]
     assert float(line.split("=")[1].split("#")[0]) == pytest.approx(offset, abs=0.5)
-    assert "its clock seems to need" in draft.notes[0]
+    assert "its clock seems to be off" in draft.notes[0]
 
 
 def test_two_sensors_of_one_step_tell_the_offset_of_their_clocks(tmp_path):
@@ -446,7 +446,7 @@ def test_two_sensors_of_one_step_tell_the_offset_of_their_clocks(tmp_path):
     draft = draft_map([str(tmp_path / "one.csv"), str(tmp_path / "two.csv")])
     (said,) = draft.notes
     value, low, high = (
-        float(x) for x in re.findall(r"-?\d+\.?\d*(?:e[+-]?\d+)?(?= s|to| to)", said.split("need")[1])[:3]
+        float(x) for x in re.findall(r"-?\d+\.?\d*(?:e[+-]?\d+)?(?= s|to| to)", said.split("add")[1])[:3]
     )
     assert low <= -37 <= high
     assert value == pytest.approx(-37, abs=2)

@@ -125,7 +125,7 @@ def test_every_command_that_takes_a_card_is_tried_above():
         ({"loss": {"inverse_q": {"value": 1e-7, "low": 2e-7, "high": 1e-8}}}, "low must be below high"),
         ({"loss": {"inverse_q": {"value": 3e-7, "low": 1e-8, "high": 2e-7}}}, "value = 3e-07 lies outside low and high"),
         ({"loss": {"inverse_q": {"value": 1e-7, "low": -1e-7, "high": 2e-7}}}, "low = -1e-07 lies beyond 0"),
-        ({"loss": {"curvature_per_K2": {"value": 0, "relative_sd": 0.2}}}, "a part of 0 is 0; give sd"),
+        ({"loss": {"curvature_per_K2": {"value": 0, "relative_sd": 0.2}}}, "a relative uncertainty of 0 is 0; give sd"),
     ],
 )  # fmt: skip
 def test_an_unusable_value_is_named_with_its_mend(table, words):

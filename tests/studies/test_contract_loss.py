@@ -134,7 +134,7 @@ def test_anchor_of_a_stem(capsys):
 @pytest.mark.parametrize(
     ("quality", "words"),
     [
-        (4e6, "More is lost than these parts allow"),
+        (4e6, "The stated loss exceeds these contributions"),
         (2.5e7, "Explained share of the stated loss"),
         (9e8, "one of them is too large"),
     ],

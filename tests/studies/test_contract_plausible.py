@@ -34,7 +34,7 @@ def record(card):
 
 def test_calibrate_and_diagnose_ask(card, record):
     with pytest.raises(
-        InputError, match="run.csv: frequency_Hz is near .* the card hrg-30mm rings at 4432.*" + QUESTION
+        InputError, match="run.csv: frequency_Hz is near .* the card hrg-30mm resonates at 4432.*" + QUESTION
     ):
         calibrate(card, [record])
     with pytest.raises(

@@ -90,7 +90,7 @@ REFUSED = {
     "trim free-dome --split 0.1 --axis 3 --unbalance 4:3@2": "write k:µg@degrees",
     "trim free-dome --split 0.5 --axis 3 --cut edge": "no depth of these cuts",  # it relieves what its mass does
     "trim free-dome --split 1e-4 --axis 3": "measure more accurately before cutting",
-    "trim free-dome --split 500 --axis 3": "beyond the wall",
+    "trim free-dome --split 500 --axis 3": "deeper than allowed",
     "twin free-dome": "--fmu",
     **{
         f"{words} {number}": "must be a finite number"

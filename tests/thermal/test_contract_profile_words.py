@@ -52,7 +52,7 @@ def test_the_value_at_a_jump_is_the_one_after_it():
         ("soak 20 5d", "a duration such as 5h, 30min or 90s"),
         ("soak 20 -5h", r"DURATION .* must be positive, not -5h"),
         ("soak 20 nan", "DURATION must be a duration such as 5h, 30min or 90s, not 'nan'"),
-        ("ramp 20 20 1", "goes nowhere"),
+        ("ramp 20 20 1", "changes nothing"),
         ("ramp 20 40 0", r"RATE \(K/min\) must be positive"),
         ("staircase -20 40 7 1h", "steps of 7 K do not lead from -20 to 40"),
         ("cycle 20 0 40 1 1h 1.5", "whole number of times"),

@@ -53,7 +53,7 @@ class MassKeys(Keys, frozen=True, kw_only=True):
 class MapKeys(Keys, frozen=True, kw_only=True):
     """A table of measured departures."""
 
-    of: Annotated[Literal["wall", "outer", "inner", "offset"], says("what departs; offset: the middle surface")]
+    of: Annotated[Literal["wall", "outer", "inner", "offset"], says("surface that departs; offset: the middle surface")]
     file: Annotated[
         str, says("µm over position and azimuth, beside the card (hrg scan reads the same tables)", example="outer.csv")
     ]
@@ -64,12 +64,12 @@ class SplitKeys(Keys, frozen=True, kw_only=True):
 
     harmonic: Annotated[int, number("waves around", least=1, most=12)] = 2
     split_Hz: Annotated[
-        float, number("at the reference temperature, whatever causes it, beside all that", least=0.0, example=0.12)
+        float, number("at the reference temperature, of any cause, in addition to the above", least=0.0, example=0.12)
     ]
     slow_axis_deg: Annotated[float, number("azimuth of an antinode of the slower mode", example=31.0)]
 
 
-WavePart = Annotated[float, number("of the wall, Σ c cos mθ + s sin mθ, beside the waves: for studies")]
+WavePart = Annotated[float, number("of the wall, Σ c cos mθ + s sin mθ, in addition to the waves: for studies")]
 
 
 class WallKeys(Keys, frozen=True, kw_only=True):

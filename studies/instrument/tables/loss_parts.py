@@ -40,7 +40,7 @@ class FilmKeys(Keys, frozen=True, kw_only=True):
         Annotated[
             float,
             number(
-                "relative amplitude of the wave 2n of its thickness around (4θ for n = 2)",
+                "relative amplitude of the circumferential wave 2n of its thickness (4θ for n = 2)",
                 least=0.0,
                 most=1.0,
                 relative_sd=1.0,
@@ -71,7 +71,9 @@ class ActivatedKeys(Keys, frozen=True, kw_only=True):
 
     height: Annotated[float, number("1/Q at the peak", least=0.0, relative_sd=0.5, example=1e-09)]
     energy_eV: Annotated[Positive, says("activation energy", example=0.5)]
-    peak_degC: Annotated[float, number("where it is at the mode's frequency", above=-zero_Celsius, example=120.0)]
+    peak_degC: Annotated[
+        float, number("temperature of the peak at the mode's frequency", above=-zero_Celsius, example=120.0)
+    ]
 
 
 class LossParts(Keys, frozen=True, kw_only=True):
@@ -112,13 +114,14 @@ class LossParts(Keys, frozen=True, kw_only=True):
     ) = None
     surface_anisotropy: (
         Annotated[
-            float, number("wave 2n around of the surface's loss", least=0.0, most=1.0, relative_sd=1.0, example=0.01)
+            float,
+            number("circumferential wave 2n of the surface loss", least=0.0, most=1.0, relative_sd=1.0, example=0.01),
         ]
         | None
     ) = None
     surface_anisotropy_angle_deg: Annotated[float, number("azimuth of its crest", sd=13.0)] = 0.0
     anchor_inverse_q: (
-        Annotated[float, number("what leaves through the mount", least=0.0, relative_sd=1.0, example=1e-09)] | None
+        Annotated[float, number("loss through the mount", least=0.0, relative_sd=1.0, example=1e-09)] | None
     ) = None
     unbalance_mg: (
         Annotated[

@@ -22,11 +22,11 @@ class NoiseKeys(Keys, frozen=True, kw_only=True):
         Level, says("rate random walk: standard deviation of the change in 1 h")
     ] = 0.01
     bias_turn_on_deg_per_h: Annotated[
-        Level, says("standard deviation of the offset that each run has of its own; 0: nothing is said of it")
+        Level, says("standard deviation of the offset from run to run; 0: not specified")
     ] = 0.0
     inverse_q_white: Annotated[Level, says("relative, Allan deviation at 1 s")] = 0.01
     pattern_angle_white_deg: Annotated[
-        Level, says("of a measured azimuth (whole angle), Allan deviation at 1 s; it walks besides as the bias does")
+        Level, says("of a measured azimuth (whole angle), Allan deviation at 1 s; it also walks as the bias does")
     ] = 3e-5
     quadrature_white_V: Annotated[Level, says("Allan deviation at 1 s, of a card with loops")] = 1e-4
     housing_white_K: Annotated[Level, says("of the housing sensor, Allan deviation at 1 s")] = 5e-3

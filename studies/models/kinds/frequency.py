@@ -110,7 +110,7 @@ def emit_c(model: Model) -> str:
     turns = (
         ""
         if _is_monotonic(model)
-        else "\n   The curve turns round in this range: there is no inverse, *ok is always 0."
+        else "\n   The curve has a turning point in this range: there is no inverse, *ok is always 0."
     )
     return f"""{head(model)}
 {polynomial("hrg_frequency_about", "shift", model.part("frequency").values)}

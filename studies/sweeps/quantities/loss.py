@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from shell.damping.budget import Budget
 
 PARTS = {
-    "thermoelastic": "heat through the wall",
+    "thermoelastic": "heat conduction through the wall",
     "bulk": "the bulk",
     "surface": "the surface",
     "gas": "gas",
@@ -25,7 +25,7 @@ MOUNT = ("mount", "anchor", "unbalance")
 class Loss(ModeQuantity, frozen=True, kw_only=True, tag="loss"):
     """1/Q from the loss budget of the card and its parts; a part that the card does not state is 0."""
 
-    anchor: Annotated[bool, says("compute what a balanced mode sends down its stem, half a second a design")] = True
+    anchor: Annotated[bool, says("compute the anchor loss of a balanced mode, half a second per design")] = True
 
     def list_columns(self) -> tuple[Column, ...]:
         """Return the columns of the sum and of its parts."""

@@ -12,8 +12,8 @@ class ModeSeparation(ModeQuantity, frozen=True, kw_only=True, tag="mode-separati
     """Signed distance of the nearest other mode, among harmonics 0 ... `highest`, and its harmonic."""
 
     highest: Annotated[int, number("highest harmonic that is searched", least=0, most=20)] = 4
-    each: Annotated[int, number("modes of each harmonic that are solved at least", least=1, most=10)] = 2
-    distances: Annotated[bool, says("a column besides for the distance of each of these modes")] = False
+    each: Annotated[int, number("least number of modes solved for each harmonic", least=1, most=10)] = 2
+    distances: Annotated[bool, says("an extra column for the distance to each of these modes")] = False
 
     def list_columns(self) -> tuple[Column, ...]:
         """Return the columns of the distance and of the other mode's harmonic."""

@@ -15,8 +15,8 @@ class Python(Quantity, frozen=True, kw_only=True, tag="python"):
     """A user's own function (instrument, parameters) -> number; needs --allow-python."""
 
     function: Annotated[str, says('"package.module:name" or "file.py:name" beside the spec', example="mine.py:area")]
-    unit: Annotated[str, says("of what it returns")] = "1"
-    time_limit_s: Annotated[float, number("that one design may take", above=0.0)] = 30.0
+    unit: Annotated[str, says("of the value that it returns")] = "1"
+    time_limit_s: Annotated[float, number("time limit of one design", above=0.0)] = 30.0
 
     def __post_init__(self) -> None:
         module, colon, name = self.function.rpartition(":")
@@ -24,7 +24,7 @@ class Python(Quantity, frozen=True, kw_only=True, tag="python"):
             raise ValueError(f'function = \'{self.function}\' must be "package.module:name" or "file.py:name".')
 
     def list_columns(self) -> tuple[Column, ...]:
-        """Return the column of what it returns."""
+        """Return the column of the value that it returns."""
         name = self.function.rpartition(":")[2]
         return (Column(name, self.unit, name.replace("_", " ")),)
 

@@ -11,7 +11,7 @@ from studies.sweeps.quantity import Column, ModeQuantity, Number
 class QualityFactor(ModeQuantity, frozen=True, kw_only=True, tag="q"):
     """Q from the loss budget of the card: heat, bulk, surface, films, gas, activated losses and mount."""
 
-    anchor: Annotated[bool, says("compute what a balanced mode sends down its stem, half a second a design")] = False
+    anchor: Annotated[bool, says("compute the anchor loss of a balanced mode, half a second per design")] = False
 
     def list_columns(self) -> tuple[Column, ...]:
         """Return the columns of Q and of the share of heat."""

@@ -74,7 +74,7 @@ def test_contradicting_limits_and_an_objective_without_value_are_said(tmp_path, 
     both = TASK.replace("[[constraint]]", '[[constraint]]\ncolumn = "mass_g"\nhigh = 1.0\n[[constraint]]')
     assert main(["optimise", write(tmp_path, both), *out]) == 2
     told = capsys.readouterr().err
-    assert "no design found keeps all constraints" in told
+    assert "no design found meets all constraints" in told
     assert "mass_g = " in told or "frequency_n2_Hz = " in told
     constant = TASK.replace('"mass_g"', '"tcf_n2_ppm_per_degC"').replace(
         'card = "free-dome"', 'card = "free-dome"\nfixed = { "material.name" = "own", "material.youngs_modulus_GPa" = 70.0,'

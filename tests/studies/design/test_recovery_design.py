@@ -136,7 +136,7 @@ def test_limits_that_contradict_are_named_with_what_lacks(pose):
         constraint=[{"column": "product", "low": 1.0}, {"column": "sum", "high": 1.5}],
     )
     with pytest.raises(
-        InputError, match=r"no design found keeps all constraints.*product = .* below its limit 1; sum = "
+        InputError, match=r"no design found meets all constraints.*product = .* below its limit 1; sum = "
     ):
         ask(posed)
 
