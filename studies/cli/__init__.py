@@ -18,82 +18,88 @@ from studies.threads import ONE_THREAD
 
 TYPE_CHECKING = False  # `typing` takes as long to load as all the rest here, and until `run` nobody heeds Ctrl-C
 if TYPE_CHECKING:
-    from cyclopts import App, Argument, Group
+    from cyclopts import App, Argument
 
 for _name, _count in ONE_THREAD.items():  # read by the libraries when numpy is first imported
     os.environ.setdefault(_name, _count)
 
-COMMANDS: dict[str, tuple[str, str]] = {
-    # name: (module:function, one line of help)
-    "reproduce": ("studies.cli.reproduce:reproduce", "Recompute the tables and figures of the source papers."),
-    "modes": ("studies.cli.modes:modes", "Frequencies, Bryan factors and sensitivities of the modes."),
-    "tcf": ("studies.cli.tcf:tcf", "Temperature coefficient of the frequency and its contributions."),
-    "loss": ("studies.cli.loss:loss", "Q over temperature, with loss contributions and what to reduce first."),
-    "simulate": ("studies.cli.simulate:simulate", "Simulate a run of an instrument through a chamber profile."),
-    "twin": ("studies.cli.twin:twin", "Write the virtual gyro of a card as an FMU or as C."),
-    "loop": ("studies.cli.loop:loop", "Control loops: stability margins, bias and noise by source, start-up, runs."),
-    "thermal": ("studies.cli.thermal:thermal", "Temperatures along the heat path for a chamber profile."),
-    "fit frequency": (
-        "studies.cli.fit_frequency:fit_frequency",
-        "f(T) and its inverse from a steady-state table or records.",
-    ),
-    "fit bias": (
-        "studies.cli.fit_bias:fit_bias",
-        "Bias model over frequency or temperature and their rates.",
-    ),
-    "fit thermal": ("studies.cli.fit_thermal:fit_thermal", "Thermal time constants of a gyro from records."),
-    "fit cross-damping": ("studies.cli.fit_cross_damping:fit_cross_damping", "Cross-damping bias over temperature."),
-    "fit whole-angle": (
-        "studies.cli.fit_whole_angle:fit_whole_angle",
-        "Splits, axes and gains from a whole-angle run.",
-    ),
-    "fit ringdown": ("studies.cli.fit_ringdown:fit_ringdown", "Frequencies, Q and axes from free decays."),
-    "calibrate": (
-        "studies.cli.calibrate:calibrate",
-        "Estimate the uncertain values of a card from records, with intervals.",
-    ),
-    "diagnose": (
-        "studies.cli.diagnose:diagnose",
-        "Find what the simulation gets wrong, its cause, and the gain from correcting it.",
-    ),
-    "fleet": (
-        "studies.cli.fleet:fleet",
-        "Calibrate and diagnose a lot of devices: what it shares, who differs, charts.",
-    ),
-    "acceptance": ("studies.cli.acceptance:acceptance", "Evaluate records against limits with the tests of IEEE 1431."),
-    "derive": ("studies.cli.derive:derive", "Symbolic derivation as equations, LaTeX or code."),
-    "render": ("studies.cli.render:render", "Mode shape as a picture, animation, page or mesh."),
-    "mesh": ("studies.cli.mesh:mesh", "Quadratic mesh of the solid for a finite-element program."),
-    "scan": ("studies.cli.scan:scan", "Wall maps, harmonics and frequency splits from measured faces."),
-    "trim": ("studies.cli.trim:trim", "Plan trimming cuts from measured splits."),
-    "electrodes": (
-        "studies.cli.electrodes:electrodes",
-        "Electrode softening, split, pull-in and trim voltages.",
-    ),
-    "import": ("studies.cli.import_:import_", "Convert laboratory files to the record format."),
-    "show": ("studies.cli.show:show", "Look at records: columns, faults, noise, and what they can be used for."),
-    "export": ("studies.cli.export:export", "Write a record for other programs: Parquet, MATLAB, TDMS, MDF, HDF5."),
-    "compensate": ("studies.cli.compensate:compensate", "Apply a saved model to a record, or emit it as C code."),
-    "temperature": ("studies.cli.temperature:temperature", "Resonator temperature from its frequency."),
-    "fit scale": ("studies.cli.fit_scale:fit_scale", "Bias and scale factor of a bell-shaped gyro, step by step."),
-    "study run": ("studies.cli.study:run", "Run or resume a parametric study."),
-    "study status": ("studies.cli.study:status", "Show the progress of a study and its failed cases."),
-    "study report": ("studies.cli.study:report", "Write a page: results, sensitivities, yield and provenance."),
-    "study export": ("studies.cli.study:export", "Export the results as CSV, with a file of units."),
-    "optimise": (
-        "studies.cli.optimise:optimise",
-        "Find dimensions for objectives under constraints, with tolerances.",
-    ),
-    "compare": ("studies.cli.compare:compare", "Compare designs: differences between cards and their effects."),
-    "cards": ("studies.cli.cards:cards", "List the built-in instrument cards, or the uncertain values of a card."),
-    "keys": ("studies.cli.keys:keys", "List the keys of a card, map, model or limits file: units, defaults, bounds."),
-    "card new": ("studies.cli.new:card", "Write a card template."),
-    "design new": ("studies.cli.new:design", "Write a task for hrg optimise."),
-    "study new": ("studies.cli.new:study", "Write a study template."),
-    "materials": ("studies.cli.cards:materials", "List the materials and their published laws."),
-    "effects": ("studies.cli.effects:effects", "List the physical effects for diagnosis and cards."),
-    "doctor": ("studies.cli.doctor:doctor", "Check the environment for missing programs and packages."),
+CHAPTERS: dict[str, dict[str, str]] = {
+    # of the list of commands: name, one line of help
+    "Design a resonator": {
+        "modes": "Frequencies, Bryan factors and sensitivities of the modes.",
+        "tcf": "Temperature coefficient of the frequency and its contributions.",
+        "loss": "Q over temperature, with loss contributions and what to reduce first.",
+        "loop": "Control loops: stability margins, bias and noise by source, start-up, runs.",
+        "compare": "Compare designs: differences between cards and their effects.",
+        "optimise": "Find dimensions for objectives under constraints, with tolerances.",
+        "design new": "Write a task for hrg optimise.",
+        "render": "Mode shape as a picture, animation, page or mesh.",
+        "mesh": "Quadratic mesh of the solid for a finite-element program.",
+        "study run": "Run or resume a parametric study.",
+        "study status": "Show the progress of a study and its failed cases.",
+        "study report": "Write a page: results, sensitivities, yield and provenance.",
+        "study export": "Export the results as CSV, with a file of units.",
+        "study new": "Write a study template.",
+        "derive": "Symbolic derivation as equations, LaTeX or code.",
+    },
+    "Manufacture": {
+        "scan": "Wall maps, harmonics and frequency splits from measured faces.",
+        "trim": "Plan trimming cuts from measured splits.",
+        "electrodes": "Electrode softening, split, pull-in and trim voltages.",
+    },
+    "Simulate and import": {
+        "simulate": "Simulate a run of an instrument through a chamber profile.",
+        "twin": "Write the virtual gyro of a card as an FMU or as C.",
+        "thermal": "Temperatures along the heat path for a chamber profile.",
+        "import": "Convert laboratory files to the record format.",
+        "show": "Look at records: columns, faults, noise, and what they can be used for.",
+        "export": "Write a record for other programs: Parquet, MATLAB, TDMS, MDF, HDF5.",
+    },
+    "Calibrate, diagnose and accept": {
+        "calibrate": "Estimate the uncertain values of a card from records, with intervals.",
+        "diagnose": "Find what the simulation gets wrong, its cause, and the gain from correcting it.",
+        "fleet": "Calibrate and diagnose a lot of devices: what it shares, who differs, charts.",
+        "effects": "List the physical effects for diagnosis and cards.",
+        "acceptance": "Evaluate records against limits with the tests of IEEE 1431.",
+    },
+    "Compensate": {
+        "fit frequency": "f(T) and its inverse from a steady-state table or records.",
+        "fit bias": "Bias model over frequency or temperature and their rates.",
+        "fit thermal": "Thermal time constants of a gyro from records.",
+        "fit cross-damping": "Cross-damping bias over temperature.",
+        "fit whole-angle": "Splits, axes and gains from a whole-angle run.",
+        "fit ringdown": "Frequencies, Q and axes from free decays.",
+        "fit scale": "Bias and scale factor of a bell-shaped gyro, step by step.",
+        "compensate": "Apply a saved model to a record, or emit it as C code.",
+        "temperature": "Resonator temperature from its frequency.",
+    },
+    "Library and setup": {
+        "cards": "List the built-in instrument cards, or the uncertain values of a card.",
+        "card new": "Write a card template.",
+        "keys": "List the keys of a card, map, model or limits file: units, defaults, bounds.",
+        "materials": "List the materials and their published laws.",
+        "reproduce": "Recompute the tables and figures of the source papers.",
+        "doctor": "Check the environment for missing programs and packages.",
+    },
 }
+GROUPS = {
+    "card": "Write your own card.",
+    "design": "Write a design task.",
+    "fit": "Fit a compensation model to measured data.",
+    "study": "Parametric studies: create, run, monitor, report, export.",
+}
+
+
+def _find(name: str) -> str:
+    """Return module and function of a command: its own file, but what is written as a template, and studies."""
+    group, _, command = name.partition(" ")
+    if command == "new":
+        return f"studies.cli.new:{group}"
+    word = re.sub("[ -]", "_", name) + "_" * (name == "import")
+    return f"studies.cli.study:{command}" if group == "study" else f"studies.cli.{word}:{word}"
+
+
+COMMANDS = {name: (_find(name), words) for chapter in CHAPTERS.values() for name, words in chapter.items()}
 EPILOGUE = "With --json a command prints one JSON object; --report FILE.html, where it is listed, writes a page; --debug shows the traceback of an error."
 
 
@@ -153,28 +159,32 @@ def _command_line(words: Sequence[str]) -> "App":
     )
     app.register_install_completion_command(help="Install completion for the shell in use (bash, zsh or fish).")
     groups: dict[str, App] = {}
-    headings = [(Group(title, sort_key=k), names) for k, (title, names) in enumerate(CHAPTERS.items())]
-
-    def chapter(command: str) -> "Group | str":
-        return next((heading for heading, names in headings if command in names), "Commands")
-
-    for name, (target, help_line) in COMMANDS.items():
-        *group, command = name.split(" ")
-        parent = app
-        if group:
-            if group[0] not in groups:
-                groups[group[0]] = App(name=group[0], help=GROUPS[group[0]], group=chapter(group[0]))
-                app.command(groups[group[0]])
-            parent = groups[group[0]]
-        # the line stands in lists of commands; a command's own help page shows its whole docstring
-        more = {} if words[: len(group) + 1] == name.split(" ") else {"help": help_line}
-        parent.command(target, name=command, **(more if group else {**more, "group": chapter(command)}))
+    for place, (title, commands) in enumerate(CHAPTERS.items()):
+        heading = Group(title, sort_key=place)
+        for name, help_line in commands.items():
+            *group, command = name.split(" ")
+            parent = app
+            if group:
+                if group[0] not in groups:
+                    groups[group[0]] = App(name=group[0], help=GROUPS[group[0]], group=heading)
+                    app.command(groups[group[0]])
+                parent = groups[group[0]]
+            # the line stands in lists of commands; a command's own help page shows its whole docstring
+            more = {} if words[: len(group) + 1] == name.split(" ") else {"help": help_line}
+            parent.command(COMMANDS[name][0], name=command, **(more if group else {**more, "group": heading}))
     return app
 
 
 def _judge(error: Exception, words: Sequence[str]) -> tuple[str, int]:
     """Return the sentence that a user reads of an error, and the exit status."""
-    from cyclopts import CoercionError, CycloptsError, MissingArgumentError, UnknownCommandError, UnusedCliTokensError
+    from cyclopts import (
+        CoercionError,
+        CycloptsError,
+        MissingArgumentError,
+        UnknownCommandError,
+        UnusedCliTokensError,
+        ValidationError,
+    )
 
     from studies.errors import UNUSABLE_INPUT, MissingEnvironment, nearest
     from studies.files.lines import point_out
@@ -186,15 +196,13 @@ def _judge(error: Exception, words: Sequence[str]) -> tuple[str, int]:
             word = " ".join([*words[:1], *(error.unused_tokens or [])[:1]] if words[0] in GROUPS else words[:1])
             return f"unknown command '{word}'{nearest(word, (*COMMANDS, *GROUPS))}", 2
         case MissingArgumentError() if error.argument is not None and not error.tokens_so_far:
-            return (
-                f"{f'{error.keyword}: its value' if error.keyword else _spell(error.argument)} is missing. {_see(words)}",
-                2,
-            )
+            lacking = f"{error.keyword}: its value" if error.keyword else _spell(error.argument)
+            return f"{lacking} is missing. {_see(words)}", 2
         case CoercionError() if error.token is not None and error.target_type in KINDS:
-            return (
-                f"{error.token.keyword or _spell(error.argument)} {error.token.value}: give {KINDS[error.target_type]}. {_see(words)}",
-                2,
-            )
+            given = f"{error.token.keyword or _spell(error.argument)} {error.token.value}"
+            return f"{given}: give {KINDS[error.target_type]}. {_see(words)}", 2
+        case ValidationError() if error.argument is not None and isinstance(error.__cause__, UNUSABLE_INPUT):
+            return f"{_spell(error.argument)} {error.__cause__}", 2
         case CycloptsError():
             return f"{' '.join(str(error).split())} {_see(words)}", 2
         case _ if isinstance(error, UNUSABLE_INPUT):
@@ -230,33 +238,6 @@ def _spell(argument: "Argument | None") -> str:
 
 KINDS: dict[object, str] = {int: "a whole number", float: "a number", bool: "yes or no"}
 PROFILE_WORDS = ("soak", "step", "ramp", "staircase", "cycle")
-CHAPTERS = {
-    # of the list of commands
-    "Design a resonator": (
-        "modes",
-        "tcf",
-        "loss",
-        "loop",
-        "compare",
-        "optimise",
-        "design",
-        "render",
-        "mesh",
-        "study",
-        "derive",
-    ),
-    "Manufacture": ("scan", "trim", "electrodes"),
-    "Simulate and import": ("simulate", "twin", "thermal", "import", "show", "export"),
-    "Calibrate, diagnose and accept": ("calibrate", "diagnose", "fleet", "effects", "acceptance"),
-    "Compensate": ("fit", "compensate", "temperature"),
-    "Library and setup": ("cards", "card", "keys", "materials", "reproduce", "doctor"),
-}
-GROUPS = {
-    "card": "Write your own card.",
-    "design": "Write a design task.",
-    "fit": "Fit a compensation model to measured data.",
-    "study": "Parametric studies: create, run, monitor, report, export.",
-}
 
 
 def _command_words(words: Sequence[str]) -> list[str]:
@@ -293,7 +274,7 @@ def run() -> None:
         heed()
         gc.set_threshold(
             20_000
-        )  # what is imported stays: looking through it again and again takes a tenth of a short command
+        )  # what is imported stays: to look through it again and again costs a tenth of a command
         for stream in (sys.stdout, sys.stderr):
             if stream is not None and hasattr(stream, "reconfigure"):
                 stream.reconfigure(errors="backslashreplace")

@@ -19,22 +19,22 @@ from studies.instrument.card import load_card
 from studies.record import read_record
 from studies.reports import style
 from studies.reports.digits import plain
-from studies.results import Chapter, Column, Drawing, Facts, Figure, Part, Result, Sentence, Table
+from studies.results import Chapter, Column, Drawing, Facts, Figure, Part, Result, Sentence, Table, row_of
 from studies.ringdown import is_decay, read_decay
 from studies.schema.reader import read_file
 
 VERDICTS = {"pass": "all limits met", "fail": "a limit is not met", "incomplete": "not all limits could be judged"}
-SECTION, QUANTITY = Column("section", "section"), Column("words", "quantity")
+QUANTITY = Column("words", "quantity")
 MEASURED = (
     QUANTITY,
-    SECTION,
+    "section",
     Column("value", "value", within=("low", "high")),
     Column("value", "95 % interval", interval=("low", "high"), digits=0),
     Column("shown_unit", "unit"),
     Column("shown_limit", "limit"),
-    Column("verdict", "verdict"),
+    "verdict",
 )
-MISSING = (QUANTITY, SECTION, Column("limited", "has a limit"), Column("needs", "needs"))
+MISSING = (QUANTITY, "section", Column("limited", "has a limit"), "needs")
 RECORDS = (
     Column("path", "file"),
     Column(lambda record: np.ptp(record["time_s"]) / 3600, "duration", "h", digits=3),
@@ -84,25 +84,13 @@ def acceptance(card: str, *runs: str, limits: str | None = None, output: str = "
     payload = {
         "schema": "hrg.acceptance/1",
         "card": instrument.name,
-        "verdict": found.verdict,
+        **row_of(found, "verdict", records="used", warm_up_band_deg_per_h="band"),
         "confidence": CONFIDENCE,
         "quantities": lines,
         "elsewhere": elsewhere,
-        "records": found.used,
-        "warm_up_band_deg_per_h": found.band,
         "report": None,
     }
-    rows = [
-        {
-            **line,
-            **_nothing(line),
-            "words": one.quantity.words,
-            "shown_unit": one.quantity.unit.replace("deg", "°"),
-            "shown_limit": "" if one.limit is None else f"{'≤' if one.quantity.upper else '≥'} {plain(one.limit, 6)}",
-            "limited": "no" if one.limit is None else "yes",
-        }
-        for line, one in zip(lines, found.lines, strict=True)
-    ]
+    rows = [line | _shown(line, one) for line, one in zip(lines, found.lines, strict=True)]
     missing = [row for row in rows if row["needs"]]
     missing += [{**one, "words": one["test"], "limited": "no"} for one in elsewhere]
     missing.sort(key=lambda row: float(row["section"].split("–")[0].split(".")[1]))
@@ -132,26 +120,23 @@ def acceptance(card: str, *runs: str, limits: str | None = None, output: str = "
 
 def _line(line: JudgedQuantity) -> dict[str, Any]:
     q, m = line.quantity, line.measured
-    return {
-        "key": q.key,
-        "section": q.section,
-        "unit": q.unit,
-        "value": m.value if m else None,
-        "low": m.low if m else None,
-        "high": m.high if m else None,
-        "limit": line.limit,
-        "bound": "most" if q.upper else "least",
-        "verdict": line.verdict,
-        "records": list(m.sources) if m else [],
-        "needs": None if m else q.needs,
-    }
+    said = {"bound": "most" if q.upper else "least", "records": m.sources if m else (), "needs": None if m else q.needs}
+    return (
+        row_of(q, "key", "section", "unit")
+        | row_of(m, "value", "low", "high")
+        | row_of(line, "limit", "verdict")
+        | said
+    )
 
 
-def _nothing(line: dict[str, Any]) -> dict[str, Any]:
-    """What stands for a value of 0 at the end of its interval."""
-    if line["value"] != 0 or not line["high"]:
-        return {}
-    return {"value": f"not detected (< {plain(line['high'], 2)})", "low": None, "high": None}
+def _shown(line: dict[str, Any], one: JudgedQuantity) -> dict[str, Any]:
+    """A line as people read it; a value of 0 at the end of its interval was not detected."""
+    q, shown = one.quantity, {}
+    if line["value"] == 0 and line["high"]:
+        shown = {"value": f"not detected (< {plain(line['high'], 2)})", "low": None, "high": None}
+    limit = "" if one.limit is None else f"{'≤' if q.upper else '≥'} {plain(one.limit, 6)}"
+    unit = q.unit.replace("deg", "°")
+    return shown | {"words": q.words, "shown_unit": unit, "shown_limit": limit, "limited": "yes" if limit else "no"}
 
 
 def _facts(found: Acceptance) -> list[tuple[str, str, str]]:
@@ -187,12 +172,10 @@ def _drift(found: Acceptance) -> list[Figure | Sentence]:
     def draw() -> Drawing:
         with style.figure(height=3.6, x="averaging time τ (s)", y="Allan deviation (°/h)") as (made, axes):
             axes.fill_between(allan.tau, allan.low, allan.high, color=style.SKY, alpha=0.3, label="95 % interval")
-            axes.loglog(
-                allan.tau, allan.deviation, "o-", color=style.BLUE, markersize=3, label="overlapping Allan deviation"
-            )
+            axes.loglog(allan.tau, allan.deviation, "o-", markersize=3, label="overlapping Allan deviation")
             tau = np.geomspace(allan.tau[first], allan.tau[-1], 100)
             axes.loglog(tau, noise.deviation(tau), "--", color=style.VERMILION, label="fit N, B, K")
-            return made  # fmt: skip
+            return made
 
     caption = "Allan deviation of the longest drift record."
     return [Figure(draw, caption, "Allan deviation over averaging time, both logarithmic."), Sentence(words)]

@@ -1,16 +1,39 @@
-"""Arguments that several commands share."""
+"""Arguments that several commands share: what they are, and within which limits."""
 
-from typing import Annotated, Literal
+from collections.abc import Callable
+from math import inf
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 from cyclopts import Parameter
-from cyclopts.validators import Number
 from numpy.typing import NDArray
 
 from shell.constants import zero_Celsius
 from studies.errors import InputError
+from studies.files.given import refuse_unsound
+
+if TYPE_CHECKING:
+    from studies.instrument.card import Instrument
 
 Array = NDArray[np.float64]
+
+
+def numbers(good: Callable[[Any], bool], words: str, **more: Any) -> Parameter:
+    """Declare an argument whose number, or every one of them, must be as `words` say."""
+
+    def check(_: Any, value: Any) -> None:
+        for one in value if isinstance(value, tuple) else (value,):
+            if one is not None and not good(one):
+                raise InputError(f"{one:g}: must be {words}.")
+
+    return Parameter(validator=(refuse_unsound, check), **more)
+
+
+MANY = Parameter(consume_multiple=True)
+COUNT = numbers(lambda one: one >= 1, "at least 1")
+WHOLE = numbers(lambda one: one >= 0, "0 or above")
+POSITIVE = numbers(lambda one: 0 < one < inf, "positive")
+FRACTION = numbers(lambda one: 0 < one < 1, "between 0 and 1")
 
 CARD = "Path of a card, or the name of one that ships (hrg cards)."
 REFERENCE = "Temperature in °C; the card's reference temperature unless given."
@@ -18,15 +41,25 @@ Card = Annotated[str, Parameter(help=CARD)]
 Temperature = Annotated[float | None, Parameter(help=REFERENCE, show_default=False)]
 Theory = Annotated[Literal["solid", "shell"], Parameter(help="solid (three-dimensional) or shell (Naghdi).")]
 Harmonic = Annotated[int, Parameter(help="Circumferential harmonic n.")]
-Seed = Annotated[int, Parameter(help="Seed of the random numbers.", validator=Number(gte=0))]
+Seed = Annotated[int, WHOLE, Parameter(help="Seed of the random numbers.")]
 FromDegC = Annotated[float, Parameter(name="--from", help="Lowest temperature in °C.")]
 ToDegC = Annotated[float, Parameter(name="--to", help="Highest temperature in °C.")]
 Step = Annotated[float, Parameter(help="Step in °C.")]
-Confidence = Annotated[float, Parameter(help="Confidence level of the intervals.")]
+Confidence = Annotated[float, FRACTION, Parameter(help="Confidence level of the intervals.")]
+Workers = Annotated[int | None, COUNT, Parameter(help="Processes on this machine; default: one per core.")]
+Quiet = Annotated[bool, Parameter(help="Show no progress.")]
 SaveModel = Annotated[str | None, Parameter(help="Write the model (TOML) for hrg compensate.")]
 EmitC = Annotated[str | None, Parameter(help="Write the model as C99 source for firmware.")]
 Folder = Annotated[str, Parameter(help="Folder of the study (hrg study run --out).")]
 MOST_TEMPERATURES = 10_000
+
+
+def open_card(card: str, temperature: float | None) -> "tuple[Instrument, float]":
+    """Return the instrument of a card, and the temperature (K) of --temperature or the card's own."""
+    from studies.instrument.card import load_card
+
+    instrument = load_card(card)
+    return instrument, instrument.reference_temperature if temperature is None else temperature + zero_Celsius
 
 
 def lay_temperatures(from_degC: float, to_degC: float, step: float) -> Array:

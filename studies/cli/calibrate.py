@@ -20,14 +20,12 @@ from studies.calibration.calibrate import Calibration
 from studies.calibration.observed import UNITS
 from studies.cli.arguments import Card
 from studies.cli.calibrate_modes import calibrate_modes
-from studies.cli.output import answers, say
+from studies.cli.output import answers, keep_card, say
 from studies.errors import InputError
-from studies.instrument.card import load_card, save_card
+from studies.instrument.card import load_card
 from studies.inversion.readings import is_mode_table
 from studies.reports import calibration as parts
-from studies.results import Result
-
-VALUE = ("parameter", "unit", "card", "value", "low", "high", "shift_sd", "width", "told_by", "bound", "interval")
+from studies.results import Result, row_of
 
 
 @answers("hrg.calibration/1; hrg.mode-calibration/1 for a table of modes")
@@ -74,9 +72,7 @@ def calibrate(
     if refused:
         say(f"{save} not saved: {found.unsaved}.")
         save = None
-    if save is not None:
-        save_card(found.instrument, save)
-        say(f"card: {save}")
+    keep_card(found.instrument, save)
     payload = _payload(found, list(data), save)
     title, lead = f"Calibration of {found.card.name}", parts.lead(found, data)
     return Result(payload, title, lead, parts.calibration_parts(found, payload), 2 if refused else 0)
@@ -89,14 +85,8 @@ def _payload(found: Calibration, data: list[str], save: str | None) -> dict[str,
         return None if values is None else {"as_shipped": values[0], "calibrated": values[1]}
 
     responses = {
-        name: {
-            "unit": UNITS[name],
-            "as_shipped": rung.as_shipped,
-            "calibrated": rung.calibrated,
-            "noise": rung.noise,
-            "run_offset": rung.offset,
-            "outliers": found.fit.outliers[name],
-        }
+        name: row_of(rung, "as_shipped", "calibrated", "noise", run_offset="offset")
+        | {"unit": UNITS[name], "outliers": found.fit.outliers[name]}
         for name, rung in found.ladder.items()
     }
     predicted = None if held is None else {
@@ -112,12 +102,12 @@ def _payload(found: Calibration, data: list[str], save: str | None) -> dict[str,
         "schema": "hrg.calibration/1",
         "card": found.card.name,
         "records": data,
-        "values": [{key: getattr(one, key) for key in VALUE} for one in found.estimates],
-        "inseparable": [list(group) for group in found.groups],
+        "values": [row_of(one, *parts.VALUE) for one in found.estimates],
+        "inseparable": found.groups,
         "responses": responses,
         "held_out": None if held is None else {"record": held.path, "responses": predicted},
         "settled": [{"table": one.path} | one.as_dict() for one in found.settled],
         "converged": found.fit.converged,
-        "warnings": list(found.warnings),
+        "warnings": found.warnings,
         "calibrated_card": save,
     }

@@ -14,18 +14,18 @@ from typing import Any
 
 import numpy as np
 
-from studies.cli.output import say
-from studies.instrument.card import Instrument, save_card
+from studies.cli.output import keep_card, say
+from studies.instrument.card import Instrument
 from studies.instrument.display import display_name
 from studies.inversion.invert import EXCLUDED, ModeCalibration, decided, invert
 from studies.inversion.readings import read_modes
-from studies.reports.calibration import KEY, TOLD, VALUES
-from studies.results import Column, Result, Sentence, Table
+from studies.reports.calibration import KEY, TOLD, VALUE, VALUES
+from studies.results import Column, Result, Sentence, Table, row_of
 
 MODES = (
-    Column("line", "line"),
+    "line",
     Column("harmonic", "n"),
-    Column("index", "index"),
+    "index",
     Column("frequency_Hz", "measured", "Hz", digits=9),
     Column("predicted_Hz", "calibrated", "Hz", digits=9),
     Column("residual_ppm", "residual", "ppm", "+.2g"),
@@ -36,12 +36,11 @@ MODES = (
 NEXT = (
     Column("parameter", "quantity", spell=display_name),
     Column("harmonic", "n"),
-    Column("index", "index"),
+    "index",
     Column("frequency_Hz", "near", "Hz", digits=6),
     Column("sd", "± now", form=".2g"),
     Column("sd_then", "± then", form=".2g"),
 )
-VALUE = ("parameter", "unit", "card", "value", "low", "high", "shift_sd", "width", "told_by", "bound", "interval")
 UNTOUCHED = 0.9995
 WIDTHS = "Shift: change in prior standard deviations. Width: posterior over prior standard deviation; the modes determine a value up to 0.5."
 READ = (
@@ -60,10 +59,9 @@ def calibrate_modes(instrument: Instrument, path: str, save: str | None, exact: 
     refused = save is not None and unsaved(found)
     if refused:
         say(f"{save} not saved: {refused}.")
-    elif save is not None:
-        save_card(found.instrument, save)
-        say(f"card: {save}")
-    payload = _payload(found, None if refused else save)
+        save = None
+    keep_card(found.instrument, save)
+    payload = _payload(found, save)
     values = [
         {**one, "unit": one["unit"] if one["unit"] != "1" else "", "told": TOLD[one["told_by"]]}
         for one in sorted(payload["values"], key=lambda one: float(one["width"]))
@@ -81,7 +79,7 @@ def calibrate_modes(instrument: Instrument, path: str, save: str | None, exact: 
             *(Sentence(one, "warning") for one in payload["warnings"]),
             Table("Values, best known first", values, (*VALUES, KEY), WIDTHS, "page"),
             Table("Values, best known first", values, VALUES, WIDTHS, "terminal"),
-            *(Sentence(TIED.format(", ".join(map(display_name, group)))) for group in found.groups),
+            *(TIED.format(", ".join(map(display_name, group))) for group in found.groups),
             Table("Modes", modes, MODES, READ),
             Table("Measure next", payload["next_modes"], NEXT, MEASURE),
         ],
@@ -95,11 +93,10 @@ def unsaved(found: ModeCalibration) -> str:
         return "the fit did not converge"
     if not decided(found):
         return "the assignment of a reading is not decided. Give its harmonic, or measure more modes"
-    far = [
-        f"{display_name(one.parameter)} ({one.parameter})" for one in found.estimates if abs(one.shift_sd) > EXCLUDED
-    ]
+    far = [one.parameter for one in found.estimates if abs(one.shift_sd) > EXCLUDED]
     if far:
-        return f"{', '.join(far)} would have to move by more than {EXCLUDED:g} of the card's standard deviations"
+        named = ", ".join(f"{display_name(name)} ({name})" for name in far)
+        return f"{named} would have to move by more than {EXCLUDED:g} of the card's standard deviations"
     return ""
 
 
@@ -114,7 +111,7 @@ def _payload(found: ModeCalibration, save: str | None) -> dict[str, Any]:
         "schema": "hrg.mode-calibration/1",
         "card": found.card.name,
         "table": readings.path,
-        "values": [{key: getattr(one, key) for key in VALUE} for one in found.estimates],
+        "values": [row_of(one, *VALUE) for one in found.estimates],
         "modes": [
             {
                 "line": line,
@@ -131,8 +128,7 @@ def _payload(found: ModeCalibration, save: str | None) -> dict[str, Any]:
         ],
         "decided": decided(found),
         "next_modes": [asdict(one) for one in found.next_modes],
-        "inseparable": [list(group) for group in found.groups],
-        "misfit": found.misfit,
+        **row_of(found, "misfit", inseparable="groups"),
         "warnings": [*found.warnings, *said],
         "calibrated_card": save,
     }

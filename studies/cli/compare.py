@@ -11,7 +11,7 @@ from studies.cli.output import answers
 from studies.comparison import compare as compare_designs
 from studies.errors import InputError
 from studies.instrument.card import load_card
-from studies.results import Column, Result, Sentence, Table
+from studies.results import Column, Result, Table, row_of
 
 
 @answers("hrg.compare/1")
@@ -27,36 +27,27 @@ def compare(*card: str) -> Result:
         raise InputError("name two cards or more: hrg compare A.toml B.toml.")
     found = compare_designs([load_card(one) for one in card])
     figures = [
-        {
-            "name": row[0].name,
-            "unit": row[0].unit,
-            "values": [one.value for one in row],
-            "uncertainties": [one.uncertainty for one in row],
-        }
+        row_of(row[0], "name", "unit")
+        | {"values": [one.value for one in row], "uncertainties": [one.uncertainty for one in row]}
         for row in found.figures
     ]
     payload = {"schema": "hrg.compare/1", "cards": found.names, "figures": figures, "differing": found.differing}
     names = [f"{name} ({k})" if found.names.count(name) > 1 else name for k, name in enumerate(found.names, 1)]
     note = "±: one standard deviation from the published values of the material, common to designs of one material."
-    keys = [
-        {"key": key, "values": ["—" if v is None else _short(v) for v in values]}
-        for key, values in found.differing.items()
-    ]
+    keys = [{"key": key, "values": list(map(_short, values))} for key, values in found.differing.items()]
     return Result(
         payload,
         "Comparison of designs",
         f"{', '.join(names)}: natural frequencies, slope, settling, and the keys in which the cards differ.",
         [
             Table("Designs", _known(figures), [
-                Column("name", "quantity"), Column("unit", "unit"),
+                Column("name", "quantity"), "unit",
                 *(Column(f"values.{k}", name, error=f"uncertainties.{k}") for k, name in enumerate(names)),
             ], note),
-            *(Sentence(f"{row[0].name.capitalize()}: {'; '.join(f'{name}: {one.of}' for name, one in zip(names, row, strict=True))}.")
+            *(f"{row[0].name.capitalize()}: {'; '.join(f'{name}: {one.of}' for name, one in zip(names, row, strict=True))}."
                 for row in found.figures if row[0].of),
-            Table("Where the cards differ", keys, [
-                Column("key", "key"), *(Column(f"values.{k}", name) for k, name in enumerate(names)),
-            ]),
-            *([] if keys else [Sentence("The cards are the same.")]),
+            Table("Where the cards differ", keys, ["key", *(Column(f"values.{k}", name) for k, name in enumerate(names))]),
+            None if keys else "The cards are the same.",
         ],
     )  # fmt: skip
 
@@ -67,5 +58,5 @@ def _known(figures: list[dict[str, Any]]) -> list[dict[str, Any]]:
 
 
 def _short(value: object) -> str:
-    text = str(value)
+    text = "—" if value is None else str(value)
     return text if len(text) <= 40 else text[:37] + "..."

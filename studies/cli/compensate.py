@@ -8,13 +8,12 @@ from compensation.decimation import average_blocks
 from compensation.errors import CompensationError
 from studies import models
 from studies.cli.arguments import Array, EmitC
-from studies.cli.output import answers, say
+from studies.cli.output import answers, keep_model, say
 from studies.errors import InputError
-from studies.files.writing import write_text
 from studies.instrument.units import unit_of
 from studies.record import COMPENSATED, RESONATOR, Record, read_record, write_record
 from studies.reports import style
-from studies.results import Column, Drawing, Figure, Result, Sentence, Table
+from studies.results import Column, Drawing, Figure, Part, Result, Sentence, Table
 
 AVERAGE = 100.0  # s
 NOISE = 0.02  # relative: what the noise of a model's inputs may add to a record that has nothing to compensate
@@ -22,9 +21,7 @@ WORSE = (
     "{} is worse than the record: the standard deviation of {:g} s averages goes from {:.4g} to {:.4g}. Use it only if the model"
     " is of this gyro and this sign of the output."
 )
-OPPOSITE = (
-    0.5  # of the record's deviation: what a correction of the opposite sign leaves where the output's sign is changed
-)
+OPPOSITE = 0.5  # of the record's deviation: what a correction of the opposite sign leaves where the output's is changed
 SIGN = " With the opposite sign the correction would leave {:.4g}: check the sign of the output."
 OWN_THERMOMETER = (
     "{1} has no thermometer, so {0} has the resonator's temperature, found from the frequency, instead of a compensated frequency."
@@ -34,20 +31,14 @@ COLUMNS = (
     Column("name", "Column"),
     Column("stability_before", "Before"),
     Column("stability_after", "After"),
-    Column("unit", "Unit"),
+    "Unit",
     Column("rows_not_compensated", "Empty rows"),
 )
 
 
 @answers("hrg.compensate/1")
 def compensate(
-    model: str,
-    run: str | None = None,
-    /,
-    *,
-    out: str | None = None,
-    extrapolate: bool = False,
-    emit: EmitC = None,
+    model: str, run: str | None = None, /, *, out: str | None = None, extrapolate: bool = False, emit: EmitC = None
 ) -> Result:
     """Apply a model saved by one of the hrg fit commands: write the record with compensated_… columns added.
 
@@ -71,40 +62,40 @@ def compensate(
         raise InputError("a record and --out go together: hrg compensate MODEL RUN --out FILE.")
     if run is None and emit is None:
         raise InputError("nothing to do: give a record and --out FILE, or --emit FILE.c.")
-    if emit is not None:
-        write_text(emit, models.emit_c(loaded))
-        say(f"C source: {emit}")
+    keep_model(loaded, None, emit)
     columns: dict[str, dict[str, Any]] = {}
     added: list[str] = []
-    parts: list[Table | Sentence | Figure] = []
+    parts: list[Part] = []
     if run is not None and out is not None:
         models.emit_c(loaded)  # a formula that lacks a key is refused before a long record is read
         say(f"reading {run}")
         record = read_record(run)
         result = models.compensate(loaded, record, extrapolate=extrapolate)
-        write_record(
-            result, out, lambda rows: say(f"written {rows:,} of {len(result):,} rows") if rows % 500_000 == 0 else None
-        )
+        write_record(result, out, lambda rows: _progress(rows, len(result)))
         say(f"record: {out}")
         added = [name for name in result.columns if name not in record]
         columns = {name: _judge(record, result, name) for name in added if name.startswith(COMPENSATED)}
         parts = _show(record, result, columns)
         if RESONATOR in added:
-            parts.append(Sentence(OWN_THERMOMETER.format(out, run)))
+            parts.append(OWN_THERMOMETER.format(out, run))
             if empty := int(np.count_nonzero(np.isnan(result[RESONATOR]))):
                 stay = "row stays" if empty == 1 else "rows stay"
-                parts.append(Sentence(f"{empty} {stay} empty: the frequency is missing, or outside the fitted range."))
+                parts.append(f"{empty} {stay} empty: the frequency is missing, or outside the fitted range.")
             parts.append(Figure(lambda: _draw(record, result, RESONATOR), "Temperature of the resonator."))
-    payload = {
+    payload: dict[str, Any] = {
         "schema": "hrg.compensate/1",
         "model": model,
         "kind": loaded.kind,
         "run": run,
         "out": out,
-        "added": added,
-        "columns": columns,
     }
+    payload |= {"added": added, "columns": columns}
     return Result(payload, "Compensation of a record", f"{run or 'No record'}, compensated with {model}.", parts)
+
+
+def _progress(written: int, rows: int) -> None:
+    if written % 500_000 == 0:
+        say(f"written {written:,} of {rows:,} rows")
 
 
 def _judge(record: Record, result: Record, name: str) -> dict[str, Any]:
@@ -119,16 +110,16 @@ def _judge(record: Record, result: Record, name: str) -> dict[str, Any]:
     }
 
 
-def _show(record: Record, result: Record, columns: dict[str, dict[str, Any]]) -> list[Table | Sentence | Figure]:
+def _show(record: Record, result: Record, columns: dict[str, dict[str, Any]]) -> list[Part]:
     rows = [{"name": name, "unit": unit_of(name).removeprefix("1") or ""} | one for name, one in columns.items()]
     note = f"Before, after: standard deviation of {AVERAGE:g} s averages."
     if any(one["rows_not_compensated"] for one in rows):
         note += " Empty rows: an input is missing, or there are too few earlier samples for its rate."
-    parts: list[Table | Sentence | Figure] = [Table("Compensated columns", rows, COLUMNS, note)]
+    parts: list[Part] = [Table("Compensated columns", rows, COLUMNS, note)]
     for name, one in columns.items():
         was, now = one["stability_before"], one["stability_after"]
         if now is None:
-            parts.append(Sentence(f"{name}: too few rows for {AVERAGE:g} s averages."))
+            parts.append(f"{name}: too few rows for {AVERAGE:g} s averages.")
         elif was is not None and now > was * (1 + NOISE):
             words = WORSE.format(name, AVERAGE, was, now)
             before = record[name.removeprefix(COMPENSATED)]

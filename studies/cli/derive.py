@@ -22,7 +22,7 @@ from studies.cli.output import answers, say
 from studies.errors import InputError
 from studies.files.writing import write_text
 from studies.papers.bvg_theory import compare_bell_theory
-from studies.results import Chapter, Column, Part, Result, Sentence, Table
+from studies.results import Chapter, Column, Result, Sentence, Table
 from studies.results.terminal import print_result
 
 if TYPE_CHECKING:
@@ -101,10 +101,11 @@ def derive(
         )
     if harmonic > MOST_HARMONIC:
         raise InputError(
-            f"--harmonic {harmonic}: closed forms are derived up to n = {MOST_HARMONIC}; choose a lower one."
+            f"--harmonic {harmonic}: closed forms are derived up to n = {MOST_HARMONIC}; choose a lower n."
         )
     shape = rayleigh_integrals(harmonic, radians(pole_angle_deg), radians(rim_angle_deg))
     case = DerivedCase.from_degrees(harmonic, pole_angle_deg, rim_angle_deg)
+    closed_forms = {"I": case.bending, "J": case.mass, "bryan_factor": case.precession}
     # On a cap of a thousandth of a degree a hundred digits do not suffice to evaluate the closed forms.
     for closed, integral in ((case.bending, shape.I), (case.mass, shape.J)):
         if abs(complex(closed.evalf(20)) / integral - 1) > 1e-9:
@@ -117,9 +118,7 @@ def derive(
         "harmonic": case.harmonic,
         "pole_angle_deg": pole_angle_deg,
         "rim_angle_deg": rim_angle_deg,
-        "I": {"closed_form": str(case.bending), "value": float(case.bending.evalf(20))},
-        "J": {"closed_form": str(case.mass), "value": float(case.mass.evalf(20))},
-        "bryan_factor": {"closed_form": str(case.precession), "value": float(case.precession.evalf(20))},
+        **{name: {"closed_form": str(one), "value": float(one.evalf(20))} for name, one in closed_forms.items()},
         "d_ln_f_d_rim_angle_per_rad": float(case.rim_derivative.evalf(20)),
     }
     say("deriving the equations ...")
@@ -163,20 +162,21 @@ def _derive_bell(latex: bool) -> Result:
     if latex:
         return Result(payload, title, lead, _chapters(chain), printed=text)
     theory = compare_bell_theory()
-    numbers = [dataclasses.asdict(row) for row in (*theory.rows, theory.free, theory.solid)]
     columns = [
         Column("name", "pattern"),
         Column("frequency", "f", "Hz", ".6g"),
         Column("precession_factor", "precession factor", form=".5f"),
         Column("membrane_share", "membrane share of the energy", form=".3g"),
     ]
-    table = Table(f"Equations (21), (22) with these patterns, and the solver: card {theory.card}", numbers, columns)
-    parts: list[Chapter | Part] = [
-        Sentence(text, "source", "terminal"),
-        Chapter("Against the solver", [table]),
-        *_chapters(chain),
-    ]
-    return Result(payload | {"numbers": dataclasses.asdict(theory)}, title, lead, parts)
+    title_of = f"Equations (21), (22) with these patterns, and the solver: card {theory.card}"
+    table = Table(title_of, [*theory.rows, theory.free, theory.solid], columns)
+    printed = Sentence(text, "source", "terminal")
+    return Result(
+        payload | {"numbers": dataclasses.asdict(theory)},
+        title,
+        lead,
+        [printed, Chapter("Against the solver", [table]), *_chapters(chain)],
+    )
 
 
 def _chapters(chain: "Sequence[Step]") -> list[Chapter]:
@@ -187,25 +187,16 @@ def _chapters(chain: "Sequence[Step]") -> list[Chapter]:
 
 
 def _write(
-    payload: dict[str, Any],
-    steps: "Sequence[Step]",
-    title: str,
-    latex: bool,
-    code: str | None = None,
-    emitted: str | None = None,
-) -> str:
+    payload: dict[str, Any], steps: "Sequence[Step]", title: str, latex: bool, code: str | None = None, emitted: str | None = None,
+) -> str:  # fmt: skip
     """Put the equations of a derivation, and its code, into the payload; return what is printed of them."""
     from studies.derivation import emit_latex, emit_text, typeset, write_plainly
 
     payload["equations"] = [
-        {
-            "number": step.number or None,
-            "title": step.title,
-            "latex": [typeset(equation) for equation in step.equations],
-            "plain": [write_plainly(equation) for equation in step.equations],
-        }
+        {"number": step.number or None, "title": step.title, "latex": list(map(typeset, step.equations)),
+         "plain": list(map(write_plainly, step.equations))}
         for step in steps
-    ]
+    ]  # fmt: skip
     if emitted is not None:
         payload["code"] = {"language": code, "text": emitted}
         return emitted

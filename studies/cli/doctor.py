@@ -3,6 +3,7 @@
 from studies.cli.output import answers
 from studies.results import Column, Result, Table
 
+NEEDED = ["numpy", "scipy", "sympy", "pandas", "pyvista", "vtk", "trimesh", "matplotlib", "cyclopts", "rich", "jinja2"]
 OPTIONAL = (
     # package, extra of pyproject.toml, what it brings
     ("distributed", "cluster", "for studies on several machines"),
@@ -29,24 +30,14 @@ def doctor() -> Result:
     from shell.render import can_draw
     from studies.cli.guard import PACKAGES, package_home
 
-    checks = [("Python", True, platform.python_version(), "")]
-    for name in (
-        "numpy",
-        "scipy",
-        "sympy",
-        "pandas",
-        "pyvista",
-        "vtk",
-        "trimesh",
-        "matplotlib",
-        "cyclopts",
-        "rich",
-        "jinja2",
-    ):
+    def installed(name: str, missing: tuple[bool, str, str]) -> tuple[str, bool, str, str]:
         try:
-            checks.append((name, True, version(name), ""))
+            return name, True, version(name), ""
         except PackageNotFoundError:
-            checks.append((name, False, "missing", f"pip install {name}"))
+            return name, *missing
+
+    checks = [("Python", True, platform.python_version(), "")]
+    checks += [installed(name, (False, "missing", f"pip install {name}")) for name in NEEDED]
     checks += [(f"package '{name}'", True, str(package_home(name)), "") for name in PACKAGES]
     drawn, remedy = can_draw()
     checks.append(("OpenGL", drawn, "pictures can be drawn" if drawn else "no pictures", remedy))
@@ -54,19 +45,15 @@ def doctor() -> Result:
     needed = "" if compiler else "needed only to compile code that 'hrg twin', 'hrg derive' and models emit"
     checks.append(("C compiler", True, compiler or "not found (optional)", needed))
     for name, extra, brings in OPTIONAL:
-        try:
-            checks.append((name, True, version(name), ""))
-        except PackageNotFoundError:
-            remedy = f"needed only {brings}: pip install 'hrg-workbench[{extra}]'"
-            checks.append((name, True, "not installed (optional)", remedy))
+        remedy = f"needed only {brings}: pip install 'hrg-workbench[{extra}]'"
+        checks.append(installed(name, (True, "not installed (optional)", remedy)))
     healthy = all(ok for _, ok, _, _ in checks)
     described = [dict(zip(("name", "ok", "found", "remedy"), check, strict=True)) for check in checks]
     rows = [{**check, "state": "ok" if check["ok"] else "missing"} for check in described]
-    columns = [Column("name", "part"), Column("state", "state"), Column("found", "found"), Column("remedy", "remedy")]
     return Result(
         {"schema": "hrg.doctor/1", "healthy": healthy, "checks": described},
         "Environment",
         "Versions, OpenGL and optional parts.",
-        [Table("Environment", rows, columns)],
+        [Table("Environment", rows, (Column("name", "part"), "state", "found", "remedy"))],
         status=0 if healthy else 3,
     )

@@ -5,7 +5,7 @@ from typing import Any
 from studies.cli.output import answers
 from studies.diagnosis.response import RESPONSES
 from studies.effects import Effect, find_effect, library
-from studies.results import Column, Result, Sentence, Table
+from studies.results import Column, Result, Sentence, Table, row_of
 
 
 @answers("hrg.effects/1")
@@ -22,11 +22,10 @@ def effects(name: str = "") -> Result:
     payload = {"schema": "hrg.effects/1", "effects": entries}
     if not name:
         rows = [{**entry, "acts": _words(effect)} for entry, effect in zip(entries, chosen, strict=True)]
-        columns = [Column("name", "name"), Column("acts", "acts on"), Column("summary", "description")]
+        columns = ("name", Column("acts", "acts on"), Column("summary", "description"))
         table = Table("Effects", rows, columns, "hrg effects NAME shows one of them in full.")
-        return Result(
-            payload, "Effects", "What a diagnosis can name, and an [[effect]] table of a card can have.", [table]
-        )
+        lead = "What a diagnosis can name, and an [[effect]] table of a card can have."
+        return Result(payload, "Effects", lead, [table])
     effect, entry = chosen[0], entries[0]
     said = {
         "Acts on": ", ".join(_words(effect)),
@@ -44,14 +43,9 @@ def effects(name: str = "") -> Result:
             Table(
                 "Parameters of its [[effect]] table",
                 entry["parameters"],
-                [
-                    Column("name", "key"),
-                    Column("kind", "kind"),
-                    Column("bounds", "bounds"),
-                    Column("meaning", "meaning"),
-                ],
+                (Column("name", "key"), "kind", "bounds", "meaning"),
             ),
-            *(Sentence(f"{label}: {words}.") for label, words in said.items() if words),
+            *(f"{label}: {words}." for label, words in said.items() if words),
         ],
     )
 
@@ -65,20 +59,16 @@ DRIVES = {
 
 
 def _words(effect: Effect) -> tuple[str, ...]:
-    return (
-        ("temperature of the resonator",) if effect.thermal else tuple(RESPONSES[one].word for one in effect.responses)
-    )
+    if effect.thermal:
+        return ("temperature of the resonator",)
+    return tuple(RESPONSES[one].word for one in effect.responses)
 
 
 def parameters(effect: Effect) -> list[dict[str, str]]:
     """Return every key of the effect's table: its shape, and its coefficients for the first response."""
     rows = [
-        {
-            "name": p.name,
-            "kind": "shape, optional" if p.steady else "shape",
-            "bounds": f"{p.low:g} to {p.high:g}",
-            "meaning": p.meaning,
-        }
+        row_of(p, "name", "meaning")
+        | {"kind": "shape, optional" if p.steady else "shape", "bounds": f"{p.low:g} to {p.high:g}"}
         for p in effect.shape
     ]
     names = effect.coefficient_names(effect.responses[0])
@@ -93,14 +83,5 @@ def parameters(effect: Effect) -> list[dict[str, str]]:
 
 def describe(effect: Effect) -> dict[str, Any]:
     """Return an effect as a plain object."""
-    return {
-        "name": effect.name,
-        "summary": effect.summary,
-        "responses": list(effect.responses),
-        "acts_on": effect.acts_on,
-        "parameters": parameters(effect),
-        "drives": [DRIVES[need] for need in effect.needs],
-        "isolate": effect.isolate,
-        "sensor": effect.sensor,
-        "source": effect.source,
-    }
+    told = row_of(effect, "name", "summary", "responses", "acts_on", "isolate", "sensor", "source")
+    return told | {"parameters": parameters(effect), "drives": [DRIVES[need] for need in effect.needs]}

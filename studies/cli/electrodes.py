@@ -8,19 +8,18 @@ a split was given: {voltages_V, left_Hz, shift_ppm}.
 
 import math
 from math import isinf
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
 from shell.constants import zero_Celsius
 from shell.electrodes import reach, trim_voltages
 from shell.modes import solve_modes
-from studies.cli.arguments import Temperature
+from studies.cli.arguments import COUNT, POSITIVE, Temperature, open_card
 from studies.cli.output import answers
 from studies.errors import InputError, naming
-from studies.instrument.card import load_card
 from studies.instrument.tables.electrodes import ElectrodeKeys
-from studies.results import Column, Part, Result, Sentence, Table
+from studies.results import Column, Part, Result, Sentence, Table, row_of
 from studies.splitting import SplitPair
 
 
@@ -28,10 +27,10 @@ from studies.splitting import SplitPair
 def electrodes(
     card: str,
     *,
-    harmonic: int = 2,
+    harmonic: Annotated[int, COUNT] = 2,
     split: float | None = None,
     axis: float | None = None,
-    limit: float = 100.0,
+    limit: Annotated[float, POSITIVE] = 100.0,
     temperature: Temperature = None,
 ) -> Result:
     """Show what the card's table [electrodes] does to a pair: softening, split, coefficients, pull-in, trim voltages.
@@ -51,16 +50,11 @@ def electrodes(
     """
     if (split is None) != (axis is None):
         raise InputError("a split that is to be nulled needs both --split (Hz) and --axis (degrees).")
-    if harmonic < 1:
-        raise InputError(f"--harmonic {harmonic}: pairs have harmonics from 1 up.")
-    if not limit > 0:
-        raise InputError(f"--limit {limit:g}: the largest trim voltage is positive.")
-    instrument = load_card(card)
+    instrument, T = open_card(card, temperature)
     if "electrodes" not in instrument.content:
         raise InputError(
             f"{instrument.path}: the card has no table [electrodes]; add it (gap_um, count, coverage, voltage_V)."
         )
-    T = instrument.reference_temperature if temperature is None else temperature + zero_Celsius
     keys = instrument.part("electrodes").keys
     with naming(f"{instrument.path} [electrodes]"):
         resonator, elastic = instrument.at(T)
@@ -73,31 +67,25 @@ def electrodes(
         else:
             wave = whole.split.wave
         factor, most = charged.pull_in, reach(charged, limit)
-        asked = split is not None or (
-            whole.split.resolved and abs(wave) <= most
-        )  # the card's own split only where it can be nulled
+        # the card's own split only where it can be nulled
+        asked = split is not None or (whole.split.resolved and abs(wave) <= most)
         trim = trim_voltages(charged, wave, limit) if asked else None
+    nulled = trim and {
+        "voltages_V": trim.voltages, "left_Hz": abs(trim.left) * mode.frequency, "shift_ppm": 1e6 * trim.shift
+    }  # fmt: skip
     payload: dict[str, Any] = {
         "schema": "hrg.electrodes/1",
         "card": instrument.name,
         "temperature_degC": T - zero_Celsius,
         "harmonic": harmonic,
         "frequency_Hz": mode.frequency,
-        "softening_ppm": 1e6 * own.shift,
-        "split_Hz": own.hertz,
-        "slow_axis_deg": math.degrees(own.slow_axis),
+        **row_of(own, softening_ppm=("shift", 1e6), split_Hz="hertz", slow_axis_deg=("slow_axis", math.degrees(1))),
         "per_volt_ppm": 1e6 * charged.per_volt(),
         "per_kelvin_ppm": 1e6 * charged.per_kelvin(keys.gap_expansion_per_K),
         "pull_in_factor": factor,
         "limit_V": limit,
         "reach_Hz": most * mode.frequency,
-        "trim": None
-        if trim is None
-        else {
-            "voltages_V": list(trim.voltages),
-            "left_Hz": abs(trim.left) * mode.frequency,
-            "shift_ppm": 1e6 * trim.shift,
-        },
+        "trim": nulled,
     }
     return Result(
         payload,
@@ -119,32 +107,18 @@ def _parts(payload: dict[str, Any], split: float, resolved: bool, keys: Electrod
         ("pull-in safety factor of the voltages", "unlimited" if isinf(factor) else factor, ""),
         (f"largest split nulled by up to {limit:g} V, any axis", 1e3 * payload["reach_Hz"], "mHz"),
     )
-    rows = [{"quantity": name, "value": value, "unit": unit} for name, value, unit in quantities]
-    columns = [Column("quantity", "quantity"), Column("value", "value"), Column("unit", "unit")]
-    parts: list[Part] = [Table(f"{payload['card']}, n = {payload['harmonic']}, {where}", rows, columns)]
-    if trim is None and split > payload["reach_Hz"]:
-        parts.append(
-            Sentence(f"{limit:g} V cannot null the card's split of {1e3 * split:.4g} mHz; see hrg trim.", "warning")
-        )
-    if trim is not None:
-        step = 360 / keys.count
-        voltages = [
-            {"electrode": k, "azimuth": keys.azimuth_deg + step * k, "voltage": v}
-            for k, v in enumerate(trim["voltages_V"])
-            if v > 0
-        ]
-        note = f"They lower the frequency of the pair by {abs(trim['shift_ppm']):.3g} ppm. Squares of voltages add; in a card these are trim_V."
-        columns = [
-            Column("electrode", "electrode"),
-            Column("azimuth", "azimuth", "°", ".2f"),
-            Column("voltage", "voltage", "V", ".3f"),
-        ]
-        parts.append(
-            Table(
-                f"Trim voltages for a split of {1e3 * split:.4g} mHz, in addition to the card's own voltages",
-                voltages,
-                columns,
-                note,
-            )
-        )
-    return parts
+    rows = [dict(zip(("quantity", "value", "unit"), one, strict=True)) for one in quantities]
+    head = Table(f"{payload['card']}, n = {payload['harmonic']}, {where}", rows, ("quantity", "value", "unit"))
+    if trim is None:
+        words = f"{limit:g} V cannot null the card's split of {1e3 * split:.4g} mHz; see hrg trim."
+        return [head, Sentence(words, "warning") if split > payload["reach_Hz"] else None]
+    step = 360 / keys.count
+    voltages = [
+        {"electrode": k, "azimuth": keys.azimuth_deg + step * k, "voltage": v}
+        for k, v in enumerate(trim["voltages_V"])
+        if v > 0
+    ]
+    title = f"Trim voltages for a split of {1e3 * split:.4g} mHz, in addition to the card's own voltages"
+    note = f"They lower the frequency of the pair by {abs(trim['shift_ppm']):.3g} ppm. Squares of voltages add; in a card these are trim_V."
+    columns = ("electrode", Column("azimuth", "azimuth", "°", ".2f"), Column("voltage", "voltage", "V", ".3f"))
+    return [head, Table(title, voltages, columns, note)]

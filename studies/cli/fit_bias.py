@@ -11,14 +11,12 @@ from typing import Any, Literal
 
 from studies.bias import BiasStudy, Judged, study_bias
 from studies.cli.arguments import EmitC, SaveModel
-from studies.cli.output import answers, say
+from studies.cli.output import answers, keep_model, say
 from studies.errors import InputError
-from studies.files.writing import write_text
-from studies.models import emit_c, write_model
 from studies.models.kinds.bias import name_term
 from studies.record import read_record
 from studies.reports import bias as parts
-from studies.results import Chapter, Result, Sentence
+from studies.results import Chapter, Result, Sentence, row_of
 from studies.stability import Stability
 
 
@@ -62,12 +60,7 @@ def fit_bias(
         say(f"reading {path}")
         records.append(read_record(path))
     study = study_bias(records, method, average, window, causal=causal, over=over, progress=say)
-    if save is not None:
-        write_model(study.model, save)
-        say(f"model: {save}")
-    if emit is not None:
-        write_text(emit, emit_c(study.model))
-        say(f"C source: {emit}")
+    keep_model(study.model, save, emit)
     judged, other = study.by(method), study.by("paper" if method == "guarded" else "guarded")
     variable = judged.fit.variable.name
     return Result(
@@ -75,86 +68,55 @@ def fit_bias(
         f"Bias over {variable} and its rate",
         f"Zero-rate output of {', '.join(data)}, with terms selected from the nine of the HRG paper's equation (21).",
         [
-            parts.facts(study, method),
-            Sentence(parts.verdict(study, method)),
-            *parts.doubts(study),
+            parts.facts(study, method), parts.verdict(study, method), *parts.doubts(study),
             Chapter("Before and after", [parts.runs_figure(study, method), parts.gain_table(study)]),
-            Chapter(
-                "Selection of terms",
-                [parts.path_table(judged), parts.path_table(other, "page"), Sentence(parts.PATH_NOTE, "note", "page")],
-            ),
-            Chapter(
-                "Coefficients",
-                [
-                    parts.coefficients_table(judged, study.output),
-                    Sentence(parts.how_rows_were_made(study), "note", "page"),
-                ],
-            ),
+            Chapter("Selection of terms", [
+                parts.path_table(judged), parts.path_table(other, "page"), Sentence(parts.PATH_NOTE, "note", "page"),
+            ]),
+            Chapter("Coefficients", [
+                parts.coefficients_table(judged, study.output), Sentence(parts.how_rows_were_made(study), "note", "page"),
+            ]),
             Chapter("Stability", parts.stability_parts(study)),
         ],
         sources=parts.SOURCES,
-    )
+    )  # fmt: skip
 
 
 def _payload(study: BiasStudy, method: str, data: tuple[str, ...]) -> dict[str, Any]:
+    allan = {"step_s": study.allan_step, "before": _spectrum(study.before), "after": _spectrum(study.after)}
     return {
         "schema": "hrg.fit-bias/1",
         "data": data,
-        "output": study.output,
-        "over": study.column,
-        "lag_s": study.runs[0].memory.lag,
-        "play_half_width_degC": study.runs[0].memory.play,
+        **row_of(study, "output", over="column", opposite_sign="opposite"),
+        **row_of(study.runs[0], lag_s="memory.lag", play_half_width_degC="memory.play", rate_lag_s="lag"),
         "method": method,
         "rows": [int(run.time.size) for run in study.runs],
-        "opposite_sign": study.opposite,
-        "missing": sum(run.missing for run in study.runs),
-        "spikes": sum(run.spikes for run in study.runs),
-        "rate_lag_s": study.runs[0].lag,
+        **{count: sum(getattr(run, count) for run in study.runs) for count in ("missing", "spikes")},
         "methods": {judged.method: _judged(judged) for judged in study.judged},
-        "allan": {"step_s": study.allan_step, "before": _spectrum(study.before), "after": _spectrum(study.after)}
-        if study.before and study.after
-        else None,
+        "allan": allan if study.before and study.after else None,
     }
 
 
 def _judged(judged: Judged) -> dict[str, Any]:
     fit, held_out = judged.fit, judged.held_out
-    steps = fit.selection.steps if fit.selection else ()
+    held = held_out and row_of(held_out, "before", "after", "gain", "coverage") | {
+        "of": "runs" if held_out.by_runs else "blocks"
+    }
     return {
-        "reference": fit.reference,
+        **row_of(fit, "reference", "coefficients", "standard_errors", "theta", naive_standard_errors="naive_errors"),
         "terms": ["constant", *(name_term(name, fit.variable) for name in fit.terms)],
-        "coefficients": fit.coefficients,
-        "standard_errors": fit.standard_errors,
-        "naive_standard_errors": fit.naive_errors,
-        "theta": fit.theta,
         "path": [
-            {
-                "added": step.added,
-                "term": name_term(step.term, fit.variable),
-                "F": step.F,
-                "p_value": step.p_value,
-                "bic": step.criterion,
-            }
-            for step in steps
+            {"term": name_term(step.term, fit.variable)} | row_of(step, "added", "F", "p_value", bic="criterion")
+            for step in (fit.selection.steps if fit.selection else ())
         ],
         "training": {"before": judged.training[0], "after": judged.training[1], "gain": judged.training_gain},
-        "held_out": None
-        if held_out is None
-        else {
-            "before": held_out.before,
-            "after": held_out.after,
-            "gain": held_out.gain,
-            "coverage": held_out.coverage,
-            "of": "runs" if held_out.by_runs else "blocks",
-        },
+        "held_out": held,
     }
 
 
-def _spectrum(spectrum: Stability) -> dict[str, Any]:
-    noise, allan = spectrum.noise, spectrum.allan
-    return {
-        "tau_s": allan.tau, "deviation": allan.deviation, "low": allan.low, "high": allan.high,
-        "confidence": allan.confidence, "bias_instability": allan.bias_instability[0],
-        "N": noise.N, "N_uncertainty": noise.N_uncertainty, "B": noise.B, "B_uncertainty": noise.B_uncertainty,
-        "K": noise.K, "K_uncertainty": noise.K_uncertainty, "misfit": noise.misfit,
-    }  # fmt: skip
+def _spectrum(spectrum: Stability | None) -> dict[str, Any]:
+    if spectrum is None:
+        return {}
+    curve = row_of(spectrum.allan, "deviation", "low", "high", "confidence", tau_s="tau")
+    levels = row_of(spectrum.noise, "N", "N_uncertainty", "B", "B_uncertainty", "K", "K_uncertainty", "misfit")
+    return curve | levels | {"bias_instability": spectrum.allan.bias_instability[0]}

@@ -8,10 +8,10 @@ import numpy as np
 from compensation.improvement import Change
 from shell.constants import zero_Celsius
 from studies.cli.arguments import SaveModel
-from studies.cli.output import answers, say
+from studies.cli.output import answers, keep_model, say
 from studies.cross_damping import CrossDampingStudy, study_cross_damping
 from studies.errors import InputError, naming
-from studies.models import source_of, write_model
+from studies.models import source_of
 from studies.models.kinds.cross_damping import OUTPUTS, save_cross_damping
 from studies.plausible import records_of_one_gyro
 from studies.record import Record, read_record
@@ -19,7 +19,7 @@ from studies.reports import style
 from studies.reports.cross_damping import SOURCES, draw_runs
 from studies.reports.digits import lowered, raised
 from studies.rest import RestData, gather_rest
-from studies.results import Chapter, Column, Drawing, Facts, Figure, Result, Sentence, Table
+from studies.results import Chapter, Column, Drawing, Facts, Figure, Result, Sentence, Table, row_of
 
 LABELS = {
     "training": "fitted, rows",
@@ -30,7 +30,7 @@ LABELS = {
 COEFFICIENTS = (
     Column("name", "Coefficient"),
     Column("value", "Value", error="error"),
-    Column("unit", "Unit"),
+    "Unit",
     Column("ratio", "Ratio to ζ₀"),
 )
 USELESS = (
@@ -86,92 +86,50 @@ def fit_cross_damping(
             f"--calibration-temperature {calibration_temperature:g} °C: no gyro has this temperature; give one within the record, in °C."
         )
     gathered = gather_rest(records, OUTPUTS)
+    T = calibration_temperature + zero_Celsius
     with naming(", ".join(data)):
         study = study_cross_damping(
-            gathered.runs,
-            k=2 * math.pi * carrier,
-            zeta=1 / (2 * quality),
-            calibration_temperature=calibration_temperature + zero_Celsius,
-            order=order,
+            gathered.runs, k=2 * math.pi * carrier, zeta=1 / (2 * quality), calibration_temperature=T, order=order
         )
-    if save is not None:
-        sources = tuple(source_of(record) for record in records)
-        made_by = "hrg-workbench, hrg fit cross-damping"
-        write_model(
-            save_cross_damping(study.model, gathered.output, gathered.temperature_column, sources, made_by), save
-        )
-        say(f"model: {save}")
+    sources, made_by = tuple(map(source_of, records)), "hrg-workbench, hrg fit cross-damping"
+    model = save_cross_damping(study.model, gathered.output, gathered.temperature_column, sources, made_by)
+    keep_model(model, save)
     summary = _summarise(study, gathered)
     unit = {"bias_deg_per_h": "°/h", "measured_rate_deg_per_s": "°/s"}[gathered.output]
     changes = [{"label": label} | summary[key] for key, label in LABELS.items()]
-    before_after = Column("before", "Before", unit), Column("after", "After", unit)
     fitted, held_out = study.training.averages, study.held_out.averages
-    facts = [
-        ("Improvement, fitted data", f"{fitted.ratio:.2f}×", "100 s averages"),
-        (
-            "Improvement, held-out data",
-            f"{held_out.ratio:.2f}×",
-            f"100 s averages; rows {study.held_out.rows.ratio:.2f}×",
-        ),
-        (
-            "Residual, held-out data",
-            f"{summary['held_out_averages_100s']['after']:.3g} {unit}",
-            "rms of 100 s averages",
-        ),
-        (
-            "Effect of the filter (9)",
-            f"{summary['dynamic_part']:.2g} {unit}",
-            "largest change that it makes to the correction",
-        ),
-    ]
+    residual, dynamic = summary["held_out_averages_100s"]["after"], summary["dynamic_part"]
+    left = f"{gathered.left_out} rows with an empty cell or an outlier were left out." if gathered.left_out else ""
+    averaged = f"Long records were averaged over {gathered.block_s:g} s before the fit." if gathered.block_s else ""
     return Result(
         {"schema": "hrg.fit-cross-damping/1", "records": list(data), **summary},
         "Cross-damping over temperature",
         f"Zero-rate output of {', '.join(data)}, fitted with a cross-damping of order {order} in temperature.",
         [
-            Facts(facts),
-            *([] if study.is_useful else [Sentence(USELESS, "warning")]),
-            *(Sentence(sentence) for sentence in _left_out(gathered)),
-            Chapter(
-                "Output before and after",
-                [
-                    Figure(
-                        lambda: draw_runs(study.runs, study.model, OUTPUTS[gathered.output], unit),
-                        "Temperature, and zero-rate output before and after compensation, 100 s averages.",
-                    ),
-                    Table(
-                        "Zero-rate output",
-                        changes,
-                        [Column("label", "Data"), *before_after, Column("improvement", "Improvement", form=".2f")],
-                        HELD_OUT,
-                    ),
-                ],
-            ),
-            Chapter(
-                "Cross-damping over temperature",
-                [
-                    Figure(
-                        lambda: _draw_curve(study),
-                        "Cross-damping over temperature, relative to its value at calibration.",
-                    ),
-                    Table(
-                        f"Cross-damping about {calibration_temperature:g} °C",
-                        _coefficients(summary),
-                        COEFFICIENTS,
-                        "The errors allow for white noise plus a random walk of the bias.",
-                    ),
-                    Sentence(SCALE, "note", "page"),
-                ],
-            ),
+            Facts([
+                ("Improvement, fitted data", f"{fitted.ratio:.2f}×", "100 s averages"),
+                ("Improvement, held-out data", f"{held_out.ratio:.2f}×", f"100 s averages; rows {study.held_out.rows.ratio:.2f}×"),
+                ("Residual, held-out data", f"{residual:.3g} {unit}", "rms of 100 s averages"),
+                ("Effect of the filter (9)", f"{dynamic:.2g} {unit}", "largest change that it makes to the correction"),
+            ]),
+            None if study.is_useful else Sentence(USELESS, "warning"), left, averaged,
+            Chapter("Output before and after", [
+                Figure(lambda: draw_runs(study.runs, study.model, OUTPUTS[gathered.output], unit),
+                    "Temperature, and zero-rate output before and after compensation, 100 s averages."),
+                Table("Zero-rate output", changes, [
+                    Column("label", "Data"), Column("before", "Before", unit), Column("after", "After", unit),
+                    Column("improvement", "Improvement", form=".2f"),
+                ], HELD_OUT),
+            ]),
+            Chapter("Cross-damping over temperature", [
+                Figure(lambda: _draw_curve(study), "Cross-damping over temperature, relative to its value at calibration."),
+                Table(f"Cross-damping about {calibration_temperature:g} °C", _coefficients(summary), COEFFICIENTS,
+                    "The errors allow for white noise plus a random walk of the bias."),
+                Sentence(SCALE, "note", "page"),
+            ]),
         ],
         sources=SOURCES,
-    )
-
-
-def _left_out(data: RestData) -> list[str]:
-    """Say which rows were left out or averaged before the fit."""
-    said = [f"{data.left_out} rows with an empty cell or an outlier were left out."] if data.left_out else []
-    return said + ([f"Long records were averaged over {data.block_s:g} s before the fit."] if data.block_s else [])
+    )  # fmt: skip
 
 
 def _coefficients(summary: dict[str, Any]) -> list[dict[str, Any]]:
@@ -191,34 +149,29 @@ def _draw_curve(study: CrossDampingStudy) -> Drawing:
     size = model.coefficients[0]
     spread = 1.645 * np.sqrt(np.einsum("ni,ij,nj->n", powers, model.covariance, powers)) / abs(size)
     middle = powers @ model.coefficients / size
+    degrees = T - zero_Celsius
     with style.figure(height=3.0, x="temperature (°C)", y="ζ₁₂ / ζ₀") as (made, axes):
-        axes.fill_between(
-            T - zero_Celsius, middle - spread, middle + spread, color=style.SKY, alpha=0.4, label="90 % band"
-        )
-        axes.plot(T - zero_Celsius, middle, color=style.BLUE, label="fitted")
+        axes.fill_between(degrees, middle - spread, middle + spread, color=style.SKY, alpha=0.4, label="90 % band")
+        axes.plot(degrees, middle, label="fitted")
         return made
 
 
 def _summarise(study: CrossDampingStudy, data: RestData) -> dict[str, Any]:
     """Numbers of the fit; before, after and dynamic_part in the unit of the output column."""
     unit, model = OUTPUTS[data.output], study.model
+    judged = {"training": study.training, "held_out": study.held_out}
     return {
-        "output": data.output,
-        "temperature": data.temperature_column,
+        **row_of(data, "output", temperature="temperature_column", rows_left_out="left_out"),
         "frequency_Hz": model.k / (2 * math.pi),
         "quality": 1 / (2 * model.zeta),
         "calibration_temperature_degC": round(model.calibration_temperature - zero_Celsius, 9),
         "coefficients": model.coefficients,
         "standard_errors": np.sqrt(np.diag(model.covariance)),
-        "training": _change(study.training.rows, unit),
-        "training_averages_100s": _change(study.training.averages, unit),
-        "held_out": _change(study.held_out.rows, unit),
-        "held_out_averages_100s": _change(study.held_out.averages, unit),
-        "improvement_training": study.training.rows.ratio,
-        "improvement_held_out": study.held_out.rows.ratio,
+        **{name: _change(one.rows, unit) for name, one in judged.items()},
+        **{f"{name}_averages_100s": _change(one.averages, unit) for name, one in judged.items()},
+        **{f"improvement_{name}": one.rows.ratio for name, one in judged.items()},
         "useful": study.is_useful,
         "dynamic_part": study.memory / unit,
-        "rows_left_out": data.left_out,
     }
 
 

@@ -6,23 +6,23 @@ distance from the last reading to the settled state of a hold that was extrapola
 """
 
 from pathlib import Path
-from typing import Any
 
 from studies.cli.arguments import Array, SaveModel
-from studies.cli.output import answers, say
+from studies.cli.output import answers, keep_model, say
 from studies.errors import naming
 from studies.files.columns import read_header
-from studies.models import ModelSource, write_model
+from studies.models import ModelSource
 from studies.models.kinds.frequency import save_frequency
 from studies.papers.hrg import study_table
 from studies.plausible import records_of_one_gyro
 from studies.record import read_frequency_table, read_record, reading_resolution
 from studies.reports import frequency as parts
-from studies.results import Chapter, Column, Result, Sentence, Table
+from studies.results import Chapter, Column, Result, Table, row_of
 from studies.settled import Soak, advise_hold, find_soaks, settled_table
 
+SHOWN = ("temperature_degC", "frequency_Hz", "error_Hz", "left_K", "extrapolated_K")
 SOAKS = (
-    Column("record", "Record"),
+    "Record",
     Column("start_s", "From", "s", ".0f"),
     Column("end_s", "To", "s", ".0f"),
     Column("temperature_degC", "Temperature", "°C", ".3f"),
@@ -68,24 +68,17 @@ def fit_frequency(
     with naming(table):
         study = study_table(T, f, order, reference_temperature, step if resolution is None else resolution)
     fit = study.fit
-    if save is not None:
-        write_model(save_frequency(fit, (source,), "hrg-workbench, hrg fit frequency"), save)
-        say(f"model: {save}")
-    rows = [_describe(soak) for soak in soaks]
+    keep_model(save_frequency(fit, (source,), "hrg-workbench, hrg fit frequency"), save)
+    rows = [row_of(soak, *SHOWN, record="path", start_s="start", end_s="end") for soak in soaks]
     slowest = max((soak.time_constant for soak in soaks), default=0.0)
     payload = {
         "schema": "hrg.fit-frequency/1",
         "table": table,
-        "order": fit.order,
-        "reference_temperature_degC": fit.reference_temperature_degC,
-        "coefficients": fit.coefficients,
-        "standard_errors": fit.standard_errors,
-        "resolution_Hz": fit.resolution,
-        "sum_of_squares_Hz2": fit.sum_of_squares,
-        "leave_one_out_Hz": fit.leave_one_out_rms,
-        "calculated_degC": study.calculated_degC,
-        "error_degC": study.error_degC,
-        "recommended_order": study.orders.recommended,
+        **row_of(
+            fit, "order", "reference_temperature_degC", "coefficients", "standard_errors", resolution_Hz="resolution"
+        ),
+        **row_of(fit, sum_of_squares_Hz2="sum_of_squares", leave_one_out_Hz="leave_one_out_rms"),
+        **row_of(study, "calculated_degC", "error_degC", recommended_order="orders.recommended"),
         **({"soaks": rows, "time_constant_s": slowest} if soaks else {}),
     }
     low, high = fit.temperature_range_degC
@@ -97,7 +90,7 @@ def fit_frequency(
         f"{len(f)} settled points of {table} from {low:.4g} to {high:.4g} °C, fitted with a {parts.name_order(fit.order)}.",
         [
             parts.facts(study),
-            Sentence(parts.order_sentence(study)),
+            parts.order_sentence(study),
             Chapter("Settled parts", [Table("Settled parts of the records", rows, SOAKS, note)]),
             Chapter("Fit and inverse", [parts.coefficients_table(study), parts.inverse_table(study), *figures]),
             Chapter("Order of the polynomial", parts.order_parts(study)),
@@ -123,20 +116,6 @@ def _read_points(
         sha256 = records[0].sha256
         shown = max(soak.time_constant for soak in soaks)
         if shown > time_constant:
-            say(
-                f"the records show a time constant of {shown / 60:.0f} min, used instead of {time_constant / 60:.0f} min."
-            )
+            usual = f"{time_constant / 60:.0f} min"
+            say(f"the records show a time constant of {shown / 60:.0f} min, used instead of {usual}.")
     return T, f, step, ModelSource(Path(first).name, sha256, len(f)), soaks
-
-
-def _describe(soak: Soak) -> dict[str, Any]:
-    return {
-        "record": soak.path,
-        "start_s": soak.start,
-        "end_s": soak.end,
-        "temperature_degC": soak.temperature_degC,
-        "frequency_Hz": soak.frequency_Hz,
-        "error_Hz": soak.error_Hz,
-        "left_K": soak.left_K,
-        "extrapolated_K": soak.extrapolated_K,
-    }

@@ -7,20 +7,21 @@ With --json one object, schema `hrg.fit-ringdown/2`: `decays` (a list: `data`, `
 `left_out_rows`), `saved`.
 """
 
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from studies.cli.arguments import Harmonic
-from studies.cli.output import answers, say
+from studies.cli.output import answers, keep_card, say
 from studies.decays import fit_laws, is_table, read_table, table_of, write_decays
 from studies.errors import InputError
-from studies.instrument.card import load_card, save_card
+from studies.instrument.card import load_card
 from studies.law import law_of
 from studies.reports import style
 from studies.reports.decays import law_chapter, law_row
-from studies.results import Chapter, Column, Drawing, Figure, Result, Sentence, Table
+from studies.results import Chapter, Column, Drawing, Figure, Result, Sentence, Table, row_of
 from studies.ringdown import Decay, read_decay, with_decay
 
 QUANTITIES = {
@@ -41,12 +42,12 @@ QUANTITIES = {
     "drift_Hz_per_s": "drift of the frequency (Hz/s)",
 }
 ESTIMATE = (
-    Column("quantity", "quantity"),
+    "quantity",
     Column("value", "value", error="sd"),
     Column("low", "90 % interval", interval=("low", "high"), error="sd"),
 )
 DECAY = (
-    Column("file", "file"),
+    "file",
     Column("frequency_Hz", "f", "Hz", digits=9),
     Column("q", "Q"),
     Column("q", "90 % interval of Q", interval=("q_low", "q_high")),
@@ -110,14 +111,11 @@ def fit_ringdown(
             f"{tables[0]}: no law can be fitted; a table of decays needs four readings or more of frequency_Hz or inverse_q that vary with a column beside them."
         )
     if save is not None and instrument is not None:
-        save_card(with_decay(instrument, decays[0], harmonic), save)
-        say(f"card: {save}")
+        keep_card(with_decay(instrument, decays[0], harmonic), save)
     if out is not None:
         write_decays(table, out)
         say(f"record: {out}")
     rows = [_row(decay) for decay in decays]
-    remarks = [Sentence(f"{row['file']}: {' '.join(row['remarks'])}", "warning") for row in rows if row["remarks"]]
-    values = [Table(f"Ring-down {row['file']}", row["estimates"], ESTIMATE) for row in rows]
     return Result(
         {
             "schema": "hrg.fit-ringdown/2",
@@ -128,54 +126,45 @@ def fit_ringdown(
         "Ring-down",
         f"Free decay of {data[0]}." if len(data) == 1 and not tables else "Free decays of one resonator.",
         [
-            *(values if len(rows) <= 3 else []),
+            *(Table(f"Ring-down {row['file']}", row["estimates"], ESTIMATE) for row in rows if len(rows) <= 3),
             Table("Decays", rows, DECAY),
-            *remarks,
+            *(Sentence(f"{row['file']}: {' '.join(row['remarks'])}", "warning") for row in rows if row["remarks"]),
             law_chapter(laws, table),
-            Chapter("Records and fits", [_figure(decay) for decay in decays]),
+            Chapter("Records and fits", [
+                Figure(partial(_draw, one), f"{Path(one.path).name}: record, fitted decay (orange), residual.") for one in decays
+            ]),
         ],
-    )
+    )  # fmt: skip
 
 
 def _row(decay: Decay) -> dict[str, Any]:
-    q = decay.inverse_q
-    estimates = decay.estimates
+    q, estimates = decay.inverse_q, decay.estimates
     return {
         "data": decay.path,
         "file": Path(decay.path).name,
-        "window_s": None if decay.window is None else list(decay.window),
-        "frequency_Hz": decay.frequency,
-        "q": None if q is None else 1 / q.value,
-        "q_low": None if q is None else 1 / q.high,
-        "q_high": None if q is None or q.low <= 0 else 1 / q.low,
+        "q": q and 1 / q.value,
+        "q_low": q and 1 / q.high,
+        "q_high": 1 / q.low if q is not None and q.low > 0 else None,
         "estimates": [
-            {"name": name, "quantity": QUANTITIES[name], "value": e.value, "sd": e.sd, "low": e.low, "high": e.high}
+            {"name": name, "quantity": QUANTITIES[name]} | row_of(estimates[name], "value", "sd", "low", "high")
             for name in QUANTITIES
-            if (e := estimates.get(name)) is not None
+            if name in estimates
         ],
-        "noise": decay.noise,
-        "widening": decay.widening,
-        "interference_Hz": decay.interference,
-        "remarks": list(decay.remarks),
+        **row_of(
+            decay,
+            "noise",
+            "widening",
+            "remarks",
+            frequency_Hz="frequency",
+            interference_Hz="interference",
+            window_s="window",
+        ),
     }
 
 
-def _figure(decay: Decay) -> Figure:
-    return Figure(lambda: _draw(decay), f"{Path(decay.path).name}: record, fitted decay (orange), residual.")
-
-
 def _draw(decay: Decay) -> Drawing:
-    with style.figure(
-        2,
-        1,
-        height=4.6,
-        sharex=True,
-        x="frequency (Hz)" if decay.spectrum else "time (s)",
-        y=("level (dB)", "residual"),
-    ) as (
-        drawn,
-        (top, bottom),
-    ):
+    x, y = "frequency (Hz)" if decay.spectrum else "time (s)", ("level (dB)", "residual")
+    with style.figure(2, 1, height=4.6, sharex=True, x=x, y=y) as (drawn, (top, bottom)):
         for time, values, fitted, residual in decay.curves():
             rows = style.few_rows(time.size)
             top.plot(time[rows], values[rows], ".", markersize=1.5)

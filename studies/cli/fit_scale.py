@@ -6,14 +6,14 @@ from typing import Any
 
 from compensation.rate_law import SURE, RateLaw
 from studies.cli.arguments import SaveModel
-from studies.cli.output import answers, say
+from studies.cli.output import answers, keep_model
 from studies.errors import InputError
-from studies.models import source_of, write_model
+from studies.models import source_of
 from studies.models.kinds.scale import save_scale
 from studies.record import read_record
-from studies.reports.bell import SOURCES, draw_steps, steps_table
+from studies.reports.bell import ERRORS, SOURCES, draw_steps, steps_table
 from studies.reports.digits import raised
-from studies.results import Chapter, Column, Facts, Figure, Result, Sentence, Table
+from studies.results import Chapter, Column, Facts, Figure, Result, Table, row_of
 from studies.scale import ScaleStudy, study_scale
 
 STEPS = {
@@ -23,7 +23,7 @@ STEPS = {
     "scale_over_temperature": "scale over temperature (36)",
 }
 FORMS = (
-    Column("form", "Form"),
+    "Form",
     Column("gain", "Evidence over the line", digits=3),
     Column("held_out_deg_per_s", "Error on rates left out", "°/s", digits=2),
     Column("chosen", ""),
@@ -33,10 +33,10 @@ FORM_NOTE = (
     " coefficients below follow the paper's quadratic form."
 )
 COEFFICIENTS = (
-    Column("step", "Step"),
+    "Step",
     Column("name", "Coefficient"),
     Column("value", "Value", error="standard_error"),
-    Column("unit", "Unit"),
+    "Unit",
 )
 NOTE = (
     "Each step is fitted to the output of the steps before it; its errors assume that those are exact, and allow for white noise plus"
@@ -46,11 +46,7 @@ NOTE = (
 
 @answers("hrg.fit-scale/1")
 def fit_scale(
-    *data: str,
-    cutoff: float = 1.0,
-    order: int = 50,
-    no_filter: bool = False,
-    save: SaveModel = None,
+    *data: str, cutoff: float = 1.0, order: int = 50, no_filter: bool = False, save: SaveModel = None
 ) -> Result:
     """Fit null, bias over temperature, and scale over rate and over temperature (BVG paper, equations 32 to 36).
 
@@ -79,9 +75,7 @@ def fit_scale(
     study = study_scale(records, None if no_filter else cutoff, order)
     sources = tuple(source_of(record) for record in records)
     model = save_scale(study.chain, study.output, study.temperature_column, sources, "hrg-workbench, hrg fit scale")
-    if save is not None:
-        write_model(model, save)
-        say(f"model: {save}")
+    keep_model(model, save)
     parts: dict[str, dict[str, dict[str, Any]]] = {
         part.name: {
             name: {"value": value, "standard_error": error, "unit": unit}
@@ -93,15 +87,13 @@ def fit_scale(
     payload: dict[str, Any] = {
         "schema": "hrg.fit-scale/1",
         "records": list(data),
-        "output": study.output,
-        "temperature": study.temperature_column,
+        **row_of(
+            study, "output", temperature="temperature_column", rows_left_out="left_out", filter_delay_s="chain.delay"
+        ),
+        **row_of(study, error_before_deg_per_s="error_before", error_held_out_deg_per_s="error_held_out"),
         "parts": parts,
         "steps": steps,
-        "error_before_deg_per_s": study.error_before,
-        "error_held_out_deg_per_s": study.error_held_out,
         "rate_law": _law_row(study.law),
-        "filter_delay_s": study.chain.delay,
-        "rows_left_out": study.left_out,
     }
     rows = [
         {"step": STEPS.get(step, step), "name": name} | one | {"unit": _spell_unit(one["unit"])}
@@ -109,37 +101,25 @@ def fit_scale(
         for name, one in found.items()
     ]
     shown = [step for step in steps if step["step"] != "filtered" or len(study.chain.taps)]
-    caption = "Rate error after the first step (rough) and after all steps (compensated), before the filter."
+    law = study.law
     return Result(
         payload,
         "Bias and scale of a bell-shaped gyro",
         f"Null, bias over temperature, and scale over rate and temperature, fitted step by step to {', '.join(data)}.",
         [
-            _facts(study),
-            *(Sentence(sentence) for sentence in _remarks(study)),
-            Chapter(
-                "Output after each step",
-                [
-                    steps_table(shown, "Output after each step, fitted records"),
-                    Figure(lambda: draw_steps(study.chain, study.runs), caption),
-                ],
-            ),
-            Chapter(
-                "Law over rate",
-                [
-                    Table(
-                        "Forms of the raw output over rate",
-                        payload["rate_law"]["forms"] if payload["rate_law"] else [],
-                        FORMS,
-                        FORM_NOTE,
-                    ),
-                    *([Sentence(_law_words(study.law))] if study.law else []),
-                ],
-            ),
+            _facts(study), *_remarks(study),
+            Chapter("Output after each step", [
+                steps_table(shown, "Output after each step, fitted records"),
+                Figure(lambda: draw_steps(study.chain, study.runs), ERRORS),
+            ]),
+            Chapter("Law over rate", [
+                Table("Forms of the raw output over rate", payload["rate_law"]["forms"] if law else [], FORMS, FORM_NOTE),
+                _law_words(law) if law else None,
+            ]),
             Chapter("Coefficients", [Table("Coefficients", rows, COEFFICIENTS, NOTE)]),
         ],
         sources=SOURCES,
-    )
+    )  # fmt: skip
 
 
 def _law_row(law: RateLaw | None) -> dict[str, Any] | None:
@@ -158,11 +138,8 @@ def _law_row(law: RateLaw | None) -> dict[str, Any] | None:
 
 
 def _law_words(law: RateLaw) -> str:
-    alike = [
-        form.name
-        for form in law.forms
-        if form.name not in (law.chosen.name, "line") and abs(form.gain - law.chosen.gain) < SURE
-    ]
+    rivals = [form for form in law.forms if form.name not in (law.chosen.name, "line")]
+    alike = [form.name for form in rivals if abs(form.gain - law.chosen.gain) < SURE]
     words = f"The output over rate follows this form: {law.chosen.name}."
     if alike and law.chosen.name != "line":
         words += f" These rates do not separate it from: {', '.join(alike)}."
@@ -177,9 +154,8 @@ def _facts(study: ScaleStudy) -> Facts:
     if first.nonlinearity is not None and last.nonlinearity is not None:
         change = f"{100 * first.nonlinearity:.3f} → {100 * last.nonlinearity:.3f} %"
         facts.append(("Nonlinearity", change, "largest deviation from a line, of full scale"))
-    facts.append(
-        ("Output at rest", f"{first.at_rest:.4f} → {last.at_rest:.4f} °/s", "standard deviation over temperature")
-    )
+    rest = f"{first.at_rest:.4f} → {last.at_rest:.4f} °/s"
+    facts.append(("Output at rest", rest, "standard deviation over temperature"))
     if len(study.chain.taps):
         facts.append(("Filter delay", f"{study.chain.delay:.2f} s", f"FIR with {len(study.chain.taps)} taps"))
     return Facts(facts)
@@ -199,6 +175,5 @@ def _spell_unit(unit: str) -> str:
     """Return a unit of a model file as people write it: °/s/K² for deg/s/degC^2."""
     spelled = (
         unit.replace("deg/s per counts", "°/s per count").replace("/degC", "/K").replace("deg", "°").removeprefix("1")
-        or ""
     )
-    return re.sub(r"\^(\d+)", lambda power: raised(int(power[1])), re.sub("^/", "per ", spelled))
+    return re.sub(r"\^(\d+)", lambda power: raised(int(power[1])), re.sub("^/", "per ", spelled or ""))

@@ -15,7 +15,7 @@ from studies.instrument.card import load_card
 from studies.record import read_record
 from studies.reports import style
 from studies.reports.digits import to_interval
-from studies.results import Column, Drawing, Figure, Payload, Result, Sentence, Table
+from studies.results import Column, Drawing, Figure, Payload, Result, Sentence, Table, row_of
 
 NAMES = {
     "radiated_share": ("Radiated share of the heat exchange at 20 °C", ""),
@@ -46,8 +46,6 @@ def fit_thermal(*data: str, card: str | None = None, lags: int | None = None, co
     """
     if not data:
         raise InputError("name at least one record (CSV) with a step, a ramp or a cycle of temperature.")
-    if not 0 < confidence < 1:
-        raise InputError(f"--confidence {confidence:g}: a confidence level lies between 0 and 1, such as 0.9.")
     records = [read_record(path) for path in data]
     with Told("lags") as told:
         found = fit_thermal_constants(records, load_card(card) if card else None, lags, confidence, told)
@@ -60,36 +58,28 @@ def fit_thermal(*data: str, card: str | None = None, lags: int | None = None, co
         )
     rms, white = float(found.residual.std()), found.noise.innovation
     estimates = {
-        name: {"value": e.value, "low": e.low, "high": e.high, "determined": e.value is not None}
+        name: row_of(e, "value", "low", "high") | {"determined": e.value is not None}
         for name, e in found.estimates.items()
     }
     payload = {
         "schema": "hrg.fit-thermal/1",
-        "data": list(data),
-        "confidence": found.confidence,
+        "data": data,
+        **row_of(found, "confidence", "warnings", row_step_s="row_step", initial_departure_K="departures"),
         "estimates": estimates,
         "undetermined": [direction.parts for direction in found.undetermined],
-        "initial_departure_K": [departure.tolist() for departure in found.departures],
         "residual_rms_Hz": rms,
-        "row_step_s": found.row_step,
-        "warnings": list(found.warnings),
     }
-    rows = [dict(zip(("name", "unit"), _name(name), strict=True)) | e for name, e in estimates.items()]
-    columns = [
-        Column("name", "Constant"),
-        Column("shown", "Value"),
-        Column("range", f"{100 * confidence:g} % interval"),
-        Column("unit", "Unit"),
-    ]
+    rows = [e | dict(zip(("constant", "unit"), _name(name), strict=True)) for name, e in estimates.items()]
+    ends = Column("value", f"{100 * confidence:g} % interval", interval=("low", "high"), digits=0)
     note = f"Fitted to averages over {found.row_step:g} s; rms residual {rms:.2g} Hz."
     return Result(
         payload,
         "Thermal time constants",
         f"Lag of the resonator behind its housing in {', '.join(data)}.",
         [
-            Table("Thermal constants", [row | _write(row) for row in rows], columns, note),
+            Table("Thermal constants", rows, ("Constant", Column(_value, "Value"), ends, "Unit"), note),
             *(Sentence(OPEN.format(_combine(one.parts)), "warning") for one in found.undetermined),
-            *([Sentence(MISFIT.format(rms / white), "warning")] if rms > COLOURED * white else []),
+            Sentence(MISFIT.format(rms / white), "warning") if rms > COLOURED * white else None,
             Figure(lambda: _draw(found), "Residual of the frequency, all runs in order."),
         ],
     )
@@ -107,19 +97,13 @@ def _name(key: str) -> tuple[str, str]:
     return NAMES.get(key) or (key.replace("_", " ").capitalize(), "s" if key.startswith("time_constant") else "")
 
 
-def _write(row: Payload) -> dict[str, str]:
-    if row["value"] is None:
-        return {"shown": "not determined", "range": ""}
-    value, low, high = to_interval(*(row[key] for key in ("value", "low", "high")))
-    return {"shown": value, "range": f"{low} … {high}"}
+def _value(row: Payload) -> str:
+    return "not determined" if row["value"] is None else to_interval(row["value"], row["low"], row["high"])[0]
 
 
 def _combine(parts: dict[str, float]) -> str:
-    return " ".join(f"{share:+.2f} × {_lower(_name(key)[0])}" for key, share in parts.items())
-
-
-def _lower(text: str) -> str:
-    return text[:1].lower() + text[1:]
+    named = ((share, _name(key)[0]) for key, share in parts.items())
+    return " ".join(f"{share:+.2f} × {name[:1].lower()}{name[1:]}" for share, name in named)
 
 
 def _draw(found: Identification) -> Drawing:

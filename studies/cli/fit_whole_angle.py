@@ -11,9 +11,9 @@ import numpy as np
 from compensation.wave_fit import WaveFit
 from compensation.wave_fit import fit_whole_angle as fit
 from studies.cli.arguments import Confidence
-from studies.cli.output import answers, say
+from studies.cli.output import answers, keep_card, say
 from studies.errors import InputError, naming
-from studies.instrument.card import Instrument, load_card, save_card
+from studies.instrument.card import Instrument, load_card
 from studies.instrument.tables.loop import Loop
 from studies.law import law_of
 from studies.record import read_record
@@ -67,8 +67,6 @@ def fit_whole_angle(
     save : str
         Write the card with the estimates and their uncertainties.
     """
-    if not 0 < confidence < 1:
-        raise InputError(f"--confidence {confidence:g}: a confidence level lies between 0 and 1, such as 0.9.")
     instrument = load_card(card) if card else None
     if save is not None and instrument is None:
         raise InputError("--save writes a card with the estimates: name the card to start from with --card.")
@@ -83,24 +81,17 @@ def fit_whole_angle(
     found, frequency = _fit_record(run, bryan_factor, quadrature_volts_per_hertz, loop, confidence)
     estimates = _in_card_units(found, frequency)
     if save is not None and instrument is not None:
-        save_card(_with_estimates(instrument, estimates), save)
-        say(f"card: {save}")
-    payload = {
-        "schema": "hrg.fit-whole-angle/1",
-        "data": run,
-        "confidence": confidence,
-        "estimates": estimates,
-        "undetermined": list(found.undetermined),
-        "saved": save,
-    }
-    rows = [{"name": NAMES[key][0], "unit": NAMES[key][1], "key": key} | e for key, e in estimates.items()]
-    columns = [
-        Column("name", "Quantity"),
+        keep_card(_with_estimates(instrument, estimates), save)
+    payload = {"schema": "hrg.fit-whole-angle/1", "data": run, "confidence": confidence, "saved": save}
+    payload |= {"estimates": estimates, "undetermined": found.undetermined}
+    rows = [{"quantity": NAMES[key][0], "unit": NAMES[key][1], "key": key} | e for key, e in estimates.items()]
+    columns = (
+        "Quantity",
         Column("value", "Value", error="sd"),
         Column("low", f"{100 * confidence:g} % interval", interval=("low", "high"), error="sd"),
-        Column("unit", "Unit"),
+        "Unit",
         Column("key", "Key of the card"),
-    ]
+    )
     return Result(
         payload,
         "Errors of a whole-angle gyro",
@@ -127,7 +118,7 @@ def _fit_record(
     if "inverse_q" in record:
         if frequency is None:
             raise InputError(
-                f"{path}: inverse_q gives the decay rate only together with frequency_Hz; add that column."
+                f"{path}: inverse_q gives the decay rate only with frequency_Hz beside it; add that column."
             )
         decay = np.pi * frequency * record["inverse_q"]
     with naming(path):

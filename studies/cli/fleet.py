@@ -1,7 +1,10 @@
 """`hrg fleet`: a folder a device, all calibrated and diagnosed, with the lot as prior."""
 
+from dataclasses import replace
 from pathlib import Path
+from typing import Annotated
 
+from studies.cli.arguments import COUNT
 from studies.cli.output import answers, say
 from studies.cli.telling import Told
 from studies.errors import InputError
@@ -10,7 +13,7 @@ from studies.results import Result
 
 
 @answers("hrg.fleet/2", page=False)
-def fleet(folder: str, *, out: str, card: str | None = None, workers: int = 1) -> Result:
+def fleet(folder: str, *, out: str, card: str | None = None, workers: Annotated[int, COUNT] = 1) -> Result:
     """Calibrate and diagnose all devices of a lot: what it shares, which devices and batches differ, control charts.
 
     Run it again to go on, or after adding devices: only what is missing or has changed is worked out.
@@ -33,8 +36,6 @@ def fleet(folder: str, *, out: str, card: str | None = None, workers: int = 1) -
     from studies.reports import fleet as parts
     from studies.results.page import render_result
 
-    if workers < 1:
-        raise InputError(f"--workers {workers}: give at least 1.")
     if Path(out).resolve().is_relative_to(Path(folder).resolve()):
         raise InputError(f"--out {out}: give a folder outside {folder}, where every folder is a device.")
     if card is not None:
@@ -45,13 +46,9 @@ def fleet(folder: str, *, out: str, card: str | None = None, workers: int = 1) -
         lot = run_lot(read_lot(folder, card), out, workers, told)
     for why in lot.failed.values():
         say(f"hrg: {why}")
-    result = Result(
-        lot.as_dict(),
-        f"Lot {Path(folder).resolve().name}",
-        parts.headline(lot),
-        parts.fleet_parts(lot, lambda s: f"devices/{s}.html"),
-    )
+    chapters = parts.fleet_parts(lot, lambda serial: f"devices/{serial}.html")
+    result = Result(lot.as_dict(), f"Lot {Path(folder).resolve().name}", parts.headline(lot), chapters)
     write_text(Path(out) / "lot.json", dump_json(result.payload))
     write_text(Path(out) / "lot.html", render_result(result))
     say(f"report: {Path(out) / 'lot.html'}")
-    return Result(result.payload, result.title, result.lead, result.parts, 4 if lot.failed else 0)
+    return replace(result, status=4 if lot.failed else 0)

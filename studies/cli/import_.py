@@ -81,8 +81,8 @@ def _draft(raw: tuple[str, ...], path: str) -> Result:
         "What was recognized in the raw files.",
         [
             *(Sentence(note, "note") for note in draft.notes),
-            Sentence(f"{path}: drafted. Mapped columns: {mapped}. Unmapped columns: {left}."),
-            Sentence("Next: read the map, correct the lines marked CHECK, then run hrg import with --map and --out."),
+            f"{path}: drafted. Mapped columns: {mapped}. Unmapped columns: {left}.",
+            "Next: read the map, correct the lines marked CHECK, then run hrg import with --map and --out.",
         ],
     )
 
@@ -96,12 +96,8 @@ def _import(raw: tuple[str, ...], path: str, out: str) -> Result:
     for axis, record in records.items():
         write_record(record, files[axis])
     first = next(iter(records.values()))
-    return _show(
-        {files[axis]: record.columns for axis, record in records.items()},
-        first.comments,
-        first.start.isoformat() if first.start else None,
-        {"axes": files} if len(records) > 1 else {},
-    )
+    start, more = first.start.isoformat() if first.start else None, {"axes": files} if len(records) > 1 else {}
+    return _show({files[axis]: record.columns for axis, record in records.items()}, first.comments, start, more)
 
 
 def _import_table(raw: tuple[str, ...], import_map: LoadedMap, out: str) -> Result:
@@ -131,16 +127,11 @@ def _show(records: Mapping[str, Columns], notes: Sequence[str], start: str | Non
         ranges = [find_range(key, values, found.get("time_s")).as_row() for key, values in found.items()]
         rows = rows_of({key: values[:FIRST_ROWS] for key, values in found.items()})
         caption = "All columns." + (" Shaded: no values." if "time_s" in found else "")
-        chapters.append(
-            Chapter(
-                name,
-                [
-                    Figure(lambda found=found: draw_columns(found), caption),  # type: ignore[misc]
-                    Table(f"{name}: {len(next(iter(found.values()))):,} rows", ranges, COLUMNS),
-                    Table("First rows", rows, [Column(key, key, form=".10g") for key in found], where="page"),
-                ],
-            )
-        )
+        chapters.append(Chapter(name, [
+            Figure(lambda found=found: draw_columns(found), caption),  # type: ignore[misc]
+            Table(f"{name}: {len(next(iter(found.values()))):,} rows", ranges, COLUMNS),
+            Table("First rows", rows, [Column(key, key, form=".10g") for key in found], where="page"),
+        ]))  # fmt: skip
     chapters.append(Chapter("Changes", [Sentence("\n".join(notes), "source")]))
     lead = "The data as converted. Compare them with what you know about the run before you use them."
     return Result(payload, "Import", lead, chapters)

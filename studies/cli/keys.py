@@ -11,13 +11,13 @@ from studies.results import Column, Result, Table
 from studies.schema.reference import list_keys, spell_uncertainty
 
 COLUMNS = (
-    Column("key", "key"),
-    Column("unit", "unit"),
+    "key",
+    "unit",
     Column("default_words", "default"),
-    Column("bounds", "bounds"),
+    "bounds",
     Column("uncertainty", "known to"),
-    Column("type", "type"),
-    Column("meaning", "meaning"),
+    "type",
+    "meaning",
 )
 
 
@@ -47,10 +47,8 @@ def keys(kind: str = "card", *, table: str = "") -> Result:
         )
         for name, only in headings
     ]
-    payload = {"schema": "hrg.keys/1", "kind": kind, "keys": rows}
-    return Result(
-        payload, f"Keys of a {kind}", "A plain number in a card is as uncertain as its key says here.", tables
-    )
+    lead = "A plain number in a card is as uncertain as its key says here."
+    return Result({"schema": "hrg.keys/1", "kind": kind, "keys": rows}, f"Keys of a {kind}", lead, tables)
 
 
 def _words(row: Mapping[str, Any]) -> dict[str, str]:

@@ -10,21 +10,20 @@ force); `out` and `rows` of the run, or null. --state-space writes another objec
 """
 
 from math import degrees, log10
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
 from compensation.controllers import Loops
 from shell.constants import zero_Celsius
-from studies.cli.arguments import Card, Seed, Temperature
+from studies.cli.arguments import POSITIVE, Card, Seed, Temperature, open_card
 from studies.cli.output import answers, say
 from studies.errors import InputError
-from studies.instrument.card import load_card
 from studies.law import law_of
 from studies.loss.damping_law import damping_law, settled_loss
 from studies.record import Record, write_record
 from studies.reports.loop import describe, loop_parts
-from studies.results import Result
+from studies.results import Result, row_of
 from studies.simulation.chamber import load_profile
 from studies.simulation.drive import MOST_ROWS
 from studies.simulation.loop import columns_of, require_loop, run_loops, without_loop
@@ -41,8 +40,8 @@ def loop(
     rate: float = 0.0,
     out: str | None = None,
     state_space: str | None = None,
-    hours: float | None = None,
-    row: float | None = None,
+    hours: Annotated[float | None, POSITIVE] = None,
+    row: Annotated[float | None, POSITIVE] = None,
     profile: str | None = None,
     both_ways: bool = False,
     seed: Seed = 0,
@@ -73,7 +72,7 @@ def loop(
     noiseless : bool
         Run without noise.
     """
-    instrument = load_card(card)
+    instrument, T = open_card(card, temperature)
     keys = require_loop(instrument)
     if both_ways and (keys.mode != "whole-angle" or keys.self_precession_deg_per_s == 0):
         raise InputError(
@@ -83,7 +82,6 @@ def loop(
     given = {"hours": hours, "row": row, "profile": profile, "both-ways": both_ways, "noiseless": noiseless}
     _check_run([name for name, value in given.items() if value not in (None, False)], out, hours, row)
     reference = instrument.reference_temperature
-    T = reference if temperature is None else temperature + zero_Celsius
     law = law_of(instrument, min(T, reference) - 5, max(T, reference) + 5)
     frequency = float(np.ravel(law.frequency(T))[0])
     inverse_q, instrument = settled_loss(instrument, T)
@@ -118,9 +116,6 @@ def _check_run(given: list[str], out: str | None, hours: float | None, row: floa
         raise InputError(f"{named}: only for a simulated run; add --out RUN.csv to write one, or leave it out.")
     if "hours" in given and "profile" in given:
         raise InputError("--hours: the profile sets the length of the run; leave out --hours or --profile.")
-    for name, value in (("hours", hours), ("row", row)):
-        if value is not None and not 0 < value < float("inf"):
-            raise InputError(f"--{name} {value:g}: must be positive.")
     hours, row = hours or 1.0, row or 1.0
     if hours * 3600 / row > MOST_ROWS:
         raise InputError(f"--hours {hours:g} --row {row:g}: more than {MOST_ROWS} rows; increase --row.")
@@ -129,38 +124,25 @@ def _check_run(given: list[str], out: str | None, hours: float | None, row: floa
 def _describe(study: LoopStudy) -> dict[str, Any]:
     return {
         "settled": study.settled,
-        "bias": [{"source": s.name, "deg_per_h": s.bias, "sd_deg_per_h": s.sd} for s in study.sources],
+        "bias": [row_of(s, source="name", deg_per_h="bias", sd_deg_per_h="sd") for s in study.sources],
         "noise": [
             {"source": name, "deg_per_h_over_1s": one, "deg_per_rt_h": walk}
             for name, (one, walk) in study.noise.items()
         ],
         "margins": [
-            {
-                "loop": m.loop,
-                "paper": Loops.PAPER[m.loop],
-                "crossover_Hz": m.crossover,
-                "phase_margin_deg": degrees(m.phase),
-                "gain_margin_dB": 20 * log10(m.gain),
-                "reversal_Hz": m.reversal,
-            }
+            row_of(m, "loop", crossover_Hz="crossover", phase_margin_deg=("phase", degrees(1)), reversal_Hz="reversal")
+            | {"paper": Loops.PAPER[m.loop], "gain_margin_dB": 20 * log10(m.gain)}
             for m in study.margins
         ],
-        "start": {"locked_s": study.start.locked, "ready_s": study.start.ready},
+        "start": row_of(study.start, locked_s="locked", ready_s="ready"),
         "range": {name: float(getattr(study.use, name).max()) for name in ("rate", "quadrature", "drive", "across")},
     }
 
 
 def _run(
-    study: LoopStudy,
-    temperature: float,
-    out: str,
-    hours: float,
-    row: float,
-    rate: float,
-    profile: str | None,
-    both_ways: bool,
-    seed: int | None,
-) -> Record:
+    study: LoopStudy, temperature: float, out: str, hours: float, row: float, rate: float, profile: str | None,
+    both_ways: bool, seed: int | None,
+) -> Record:  # fmt: skip
     """Run the wave through the loops and write the record."""
     instrument, damping = study.instrument, None
     f, loss = np.array(study.frequency), np.array(study.inverse_q)

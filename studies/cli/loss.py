@@ -12,17 +12,18 @@ from typing import Any
 import numpy as np
 
 from shell.constants import zero_Celsius
-from shell.damping.budget import Budget, LossPart
+from shell.damping.budget import Budget
 from shell.damping.thermoelastic import trace_share
 from studies.cli.arguments import Card, FromDegC, Harmonic, Step, Theory, ToDegC, lay_temperatures
 from studies.cli.output import answers
 from studies.instrument.card import Instrument, load_card
-from studies.loss.account import DampingAround, StatedLoss, damping_around, stated_loss
+from studies.loss.account import StatedLoss, damping_around, stated_loss
 from studies.loss.model import LossModel, loss_model
 from studies.reports import loss as pictures
 from studies.reports.digits import plain
-from studies.results import Chapter, Column, Facts, Figure, Result, Sentence, Table, rows_of
+from studies.results import Chapter, Column, Facts, Figure, Result, Sentence, Table, row_of, rows_of
 
+DEG = float(np.degrees(1))
 WALL = (
     "The cost of a surface treatment depends on its place: a damaged layer or a film dissipates in proportion to the energy, heat in"
     " a film to the square of the area strain, gas damping to the normal motion. A film or a scratch does least harm where these"
@@ -64,21 +65,17 @@ def loss(
         "schema": "hrg.loss/1",
         "card": instrument.name,
         **_describe(model, budget, theory),
-        "anisotropy": _around(around),
-        "left_out": list(model.left_out),
-        "stated": None if stated is None else {
-            "inverse_q": stated.inverse_q,
-            "explained": stated.explained,
-            "explained_low": stated.low,
-            "explained_high": stated.high,
-        },
-    }  # fmt: skip
+        "anisotropy": around
+        and row_of(around, inverse_q_split="split", damping_axis_deg=("axis", DEG), largest_drift_deg_per_h="drift"),
+        "left_out": model.left_out,
+        "stated": stated and row_of(stated, "inverse_q", "explained", explained_low="low", explained_high="high"),
+    }
     at = int(np.argmin(abs(T - model.vibration.reference)))
     return Result(
         payload,
         f"Loss budget of {instrument.name}",
         f"1/Q of the mode n = {harmonic} at {model.frequency:.1f} Hz as a sum of parts, each computed from the mode ({theory} theory).",
-        [*_parts(payload, model, budget, stated, at), Chapter("In a simulation", [Sentence(_simulated(instrument))])],
+        [*_parts(payload, model, budget, stated, at), Chapter("In a simulation", [_simulated(instrument)])],
     )
 
 
@@ -97,45 +94,19 @@ def _simulated(instrument: Instrument) -> str:
 def _describe(model: LossModel, budget: Budget, theory: str) -> dict[str, Any]:
     low, high = budget.interval
     return {
-        "harmonic": model.harmonic,
+        **row_of(model, "harmonic", frequency_Hz="frequency"),
         "theory": theory,
-        "frequency_Hz": model.frequency,
         "temperature_degC": budget.temperatures - zero_Celsius,
-        "inverse_q": budget.inverse_q,
         "inverse_q_low": low,
         "inverse_q_high": high,
         "q": 1 / budget.inverse_q,
-        "slope_per_K": budget.slope,
-        "parts": [_part(part) for part in budget.parts],
-        "attack_first": {
-            "part": budget.first.name,
-            "q_without": budget.without(budget.first.name),
-            "advice": budget.first.advice,
-        },
-        "least_known": budget.least_known.name,
-    }
-
-
-def _part(part: LossPart) -> dict[str, Any]:
-    low, high = part.interval
-    return {
-        "name": part.name,
-        "inverse_q": part.inverse_q,
-        "low": low,
-        "high": high,
-        "slope_per_K": part.slope,
-        "relative_sd": part.relative_sd,
-        "source": part.source,
-    }
-
-
-def _around(found: DampingAround | None) -> dict[str, Any] | None:
-    if found is None:
-        return None
-    return {
-        "inverse_q_split": found.split,
-        "damping_axis_deg": np.degrees(found.axis),
-        "largest_drift_deg_per_h": found.drift,
+        **row_of(budget, "inverse_q", slope_per_K="slope", least_known="least_known.name"),
+        "parts": [
+            row_of(part, "name", "inverse_q", "relative_sd", "source", slope_per_K="slope")
+            | dict(zip(("low", "high"), part.interval, strict=True))
+            for part in budget.parts
+        ],
+        "attack_first": row_of(budget.first, "advice", part="name") | {"q_without": budget.without(budget.first.name)},
     }
 
 
@@ -145,44 +116,29 @@ def _parts(
     """What people read: the answer, the parts, their course, where on the wall, around the axis, what is left out."""
     degrees, around = payload["temperature_degC"], payload["anisotropy"]
     low, high = budget.interval
-    over = {
-        "T": degrees,
-        "inverse_q": budget.inverse_q,
-        "q": payload["q"],
-        "q_low": 1 / high,
-        "q_high": 1 / low,
-        "slope": budget.slope,
-    }
-    share, half, without = {}, {}, {}
-    for part in budget.parts:
-        share[part.name] = 100 * part.inverse_q[at] / budget.inverse_q[at]
-        half[part.name] = 1 / (budget.inverse_q[at] - part.inverse_q[at] / 2)
-        rest = float(budget.without(part.name)[at])
-        without[part.name] = rest if np.isfinite(rest) else "nothing left"
-    rows = [
-        {
-            **entry,
-            "share": share[part.name],
-            "half": half[part.name],
-            "without": without[part.name],
-            "advice": _sentence(part.advice),
-        }
-        for entry, part in zip(payload["parts"], budget.parts, strict=True)
-    ]
+    over = rows_of({
+        "T": degrees, "inverse_q": budget.inverse_q, "q": payload["q"], "q_low": 1 / high, "q_high": 1 / low, "slope": budget.slope,
+    })  # fmt: skip
+    rows = []
+    for entry, part in zip(payload["parts"], budget.parts, strict=True):
+        own, total, rest = part.inverse_q[at], budget.inverse_q[at], float(budget.without(part.name)[at])
+        shown = {"share": 100 * own / total, "half": 1 / (total - own / 2), "advice": _sentence(part.advice)}
+        rows.append(entry | shown | {"without": rest if np.isfinite(rest) else "nothing left"})
     picked = sorted({0, at, len(degrees) - 1})
     name = Column("name", "part")
     interval = Column("inverse_q", "90 % interval", "1e-9", digits=2, scale=1e9, interval=(f"low.{at}", f"high.{at}"))
     values = [Column(f"inverse_q.{k}", f"1/Q at {degrees[k]:.0f} °C", "1e-9", ".3g", scale=1e9) for k in picked]
     damped = [] if around is None else rows_of({"T": degrees, **around})
     T = Column("T", "T", "°C", ".1f")
-    words = [f"Reduce first: {budget.first.name}. {_sentence(budget.first.advice)}"]
-    words += [f"Largest share of the uncertainty of the total: {budget.least_known.name}."]
-    if stated is not None:
-        words += [f"{stated.verdict}"] if stated.verdict else []
+    words = [
+        f"Reduce first: {budget.first.name}. {_sentence(budget.first.advice)}",
+        f"Largest share of the uncertainty of the total: {budget.least_known.name}.",
+        stated.verdict if stated is not None else "",
+    ]
     return [
         Chapter("In short", [
             Facts(_facts(budget, stated, at, degrees[at])),
-            *(Sentence(one) for one in words),
+            *words,
             Figure(lambda: pictures.bars(budget, at), f"Parts of 1/Q at {degrees[at]:g} °C with 90 % intervals."),
         ]),
         Chapter(f"Parts at {degrees[at]:g} °C", [
@@ -195,11 +151,11 @@ def _parts(
             ]),
         ]),
         Chapter("Over temperature", [
-            Table("Q", rows_of(over), [
+            Table("Q", over, [
                 T, Column("q", "Q", digits=3), Column("q", "90 % interval", digits=3, interval=("q_low", "q_high")),
                 Column("inverse_q", "1/Q", "1e-9", ".3g", scale=1e9), Column("slope", "slope of 1/Q", "%/°C", "+.2f", scale=100.0),
             ]),
-            *([Figure(lambda: pictures.course(budget, stated, model.vibration.reference), "1/Q and its parts.")] if len(degrees) > 1 else []),
+            Figure(lambda: pictures.course(budget, stated, model.vibration.reference), "1/Q and its parts.") if len(degrees) > 1 else None,
         ]),
         Chapter("Along the meridian", [
             Sentence(WALL, where="page"),

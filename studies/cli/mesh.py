@@ -10,12 +10,11 @@ from shell.constants import zero_Celsius
 from shell.inertia import weigh
 from shell.volume import build_volume
 from shell.volume_files import VolumeKind, encode_volume
-from studies.cli.arguments import Card, Temperature
+from studies.cli.arguments import Card, Temperature, open_card
 from studies.cli.output import answers
 from studies.errors import InputError, naming
 from studies.files.writing import written_whole
-from studies.instrument.card import load_card
-from studies.results import Result, Sentence
+from studies.results import Result, row_of
 
 KINDS = (".vtu", ".msh", ".inp")
 
@@ -58,11 +57,8 @@ def mesh(
     if os.path.isdir(out):
         raise InputError(f"--out {out}: is a folder; give the name of a file.")
     if complete and kind == ".inp":
-        raise InputError(
-            "--complete: an .inp file has elements of 20 and 15 nodes only; leave it out, or take .msh or .vtu."
-        )
-    instrument = load_card(card)
-    T = instrument.reference_temperature if temperature is None else temperature + zero_Celsius
+        raise InputError("--complete: an .inp file has elements of 20 and 15 nodes only; leave it out, or take .msh.")
+    instrument, T = open_card(card, temperature)
     with naming(instrument.path):
         resonator, elastic = instrument.at(T)
         found = build_volume(resonator, layers, around, None if spacing_mm is None else 1e-3 * spacing_mm)
@@ -87,12 +83,9 @@ def mesh(
         "temperature_degC": T - zero_Celsius,
         "file": out,
         "bytes": len(data),
-        "nodes": len(found.nodes),
-        "hexahedra": len(found.hexahedra),
-        "wedges": len(found.wedges),
+        **{name: len(getattr(found, name)) for name in ("nodes", "hexahedra", "wedges")},
         "held_nodes": len(found.held),
-        "volume_mm3": 1e9 * exact.volume,
-        "mass_g": 1e3 * exact.mass,
+        **row_of(exact, volume_mm3=("volume", 1e9), mass_g=("mass", 1e3)),
     }
     said = (
         f"{out}: {len(found.nodes):,} nodes, {len(found.hexahedra):,} hexahedra, {len(found.wedges):,} wedges,"
@@ -100,6 +93,4 @@ def mesh(
     )
     if fields is not None:
         said += " The mesh includes the geometric departures of the card's [imperfection], but not its masses or material variations."
-    return Result(
-        payload, f"Mesh of {instrument.name}", f"Quadratic elements at {T - zero_Celsius:g} °C.", [Sentence(said)]
-    )
+    return Result(payload, f"Mesh of {instrument.name}", f"Quadratic elements at {T - zero_Celsius:g} °C.", [said])

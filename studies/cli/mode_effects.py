@@ -5,14 +5,17 @@ Each function returns what is under its key of a mode in the JSON, or None where
 
 from dataclasses import dataclass
 from math import degrees, isfinite, pi, radians
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from shell.elastic import Elastic
 from shell.modes import Mode
 from studies.errors import InputError, naming
 from studies.instrument.card import Instrument
 from studies.instrument.imperfect import is_imperfect
-from studies.results import Column, Table
+from studies.results import Column, Table, row_of
+
+if TYPE_CHECKING:
+    from shell.imperfection import Split
 
 MICROMETRE = 1e-6
 Entry = dict[str, Any]
@@ -59,19 +62,13 @@ def _split(m: Mode, asked: Asked) -> Entry | None:
 
     whole = SplitPair(asked.instrument, m, asked.T)
     slow, fast = whole.split.frequencies
-    parts = {"imperfection": whole.imperfection, "measured": whole.measured, "electrodes": whole.electrodes}
-    return {
-        "split_Hz": whole.split.hertz,
-        "slow_Hz": slow,
-        "fast_Hz": fast,
-        "slow_axis_deg": degrees(whole.split.slow_axis),
-        "shift_ppm": 1e6 * whole.split.shift,
-        "every_order_split_Hz": whole.of_every_order().hertz,
-        "parts": {
-            name: {"split_Hz": p.hertz, "slow_axis_deg": degrees(p.slow_axis), "shift_ppm": 1e6 * p.shift}
-            for name, p in parts.items()
-        },
-    }
+
+    def told(one: "Split") -> Entry:
+        return row_of(one, split_Hz="hertz", slow_axis_deg=("slow_axis", degrees(1)), shift_ppm=("shift", 1e6))
+
+    parts = {name: told(getattr(whole, name)) for name in ("imperfection", "measured", "electrodes")}
+    every = {"slow_Hz": slow, "fast_Hz": fast, "every_order_split_Hz": whole.of_every_order().hertz, "parts": parts}
+    return told(whole.split) | every
 
 
 def _spin(m: Mode, asked: Asked) -> Entry | None:
@@ -83,15 +80,9 @@ def _spin(m: Mode, asked: Asked) -> Entry | None:
     shift, omega = spin_shift(m, asked.elastic), radians(asked.spin)
     mean = m.frequency * (1 + shift.total * omega**2)
     apart = m.harmonic * abs(m.bryan_factor * omega) / (2 * pi)
-    return {
-        "rate_deg_per_s": asked.spin,
-        "shift_ppm": 1e6 * shift.total * omega**2,
-        "stress_ppm": 1e6 * shift.stress * omega**2,
-        "centrifugal_ppm": 1e6 * shift.centrifugal * omega**2,
-        "coriolis_ppm": 1e6 * shift.coriolis * omega**2,
-        "lower_wave_Hz": mean - apart,
-        "upper_wave_Hz": mean + apart,
-    }
+    ppm = {f"{name}_ppm": (name, 1e6 * omega**2) for name in ("stress", "centrifugal", "coriolis")}
+    waves = {"rate_deg_per_s": asked.spin, "lower_wave_Hz": mean - apart, "upper_wave_Hz": mean + apart}
+    return waves | row_of(shift, shift_ppm=("total", 1e6 * omega**2), **ppm)
 
 
 def _amplitude(m: Mode, asked: Asked) -> Entry | None:
@@ -101,13 +92,9 @@ def _amplitude(m: Mode, asked: Asked) -> Entry | None:
     from shell.duffing import amplitude_shift
 
     shift, square = amplitude_shift(m), (asked.amplitude * MICROMETRE) ** 2
-    return {
-        "amplitude_um": asked.amplitude,
-        "shift_ppb": 1e9 * shift.total * square,
-        "static_ppb": 1e9 * shift.static * square,
-        "inertial_ppb": 1e9 * shift.inertial * square,
-        "shift_Hz_per_um2": shift.total * m.frequency * MICROMETRE**2,
-    }
+    ppb = 1e9 * square
+    parts = row_of(shift, shift_ppb=("total", ppb), static_ppb=("static", ppb), inertial_ppb=("inertial", ppb))
+    return parts | {"amplitude_um": asked.amplitude, "shift_Hz_per_um2": shift.total * m.frequency * MICROMETRE**2}
 
 
 def _mount(m: Mode, asked: Asked) -> Entry | None:
@@ -136,14 +123,8 @@ def _films(m: Mode, asked: Asked) -> list[Entry] | None:
         return None
     from studies.loss.films import film_shifts
 
-    return [
-        {
-            "film": one.material,
-            "shift_ppm": None if one.relative is None else 1e6 * one.relative,
-            "missing": one.missing,
-        }
-        for one in film_shifts(asked.instrument, m)
-    ] or None
+    shifts = film_shifts(asked.instrument, m)
+    return [row_of(one, "missing", film="material", shift_ppm=("relative", 1e6)) for one in shifts] or None
 
 
 def _crystal(m: Mode, asked: Asked) -> Entry | None:
@@ -162,13 +143,10 @@ def _crystal(m: Mode, asked: Asked) -> Entry | None:
         if given is not None:
             raise
         return None  # of a stem or a clamp; the material's caveat says so
-    return {
-        "antinode_along_100_Hz": pair.along_100,
-        "other_Hz": pair.along_110,
-        "split_Hz": abs(pair.along_110 - pair.along_100),
-        "relative_split": pair.relative_split,
-        "relative_error_estimate": pair.relative_error_estimate,
-    }
+    lines = row_of(
+        pair, "relative_split", "relative_error_estimate", antinode_along_100_Hz="along_100", other_Hz="along_110"
+    )
+    return lines | {"split_Hz": abs(pair.along_110 - pair.along_100)}
 
 
 EFFECTS = {
@@ -183,27 +161,21 @@ EFFECTS = {
 MODE = (Column("harmonic", "n"), Column("index", "index"))
 SPLIT = (
     *MODE,
-    Column("split.slow_Hz", "slow", "Hz", ".5f"),
-    Column("split.fast_Hz", "fast", "Hz", ".5f"),
-    Column("split.split_Hz", "split", "Hz", ".5f"),
+    *(Column(f"split.{key}_Hz", key, "Hz", ".5f") for key in ("slow", "fast", "split")),
     Column("split.every_order_split_Hz", "split, all orders", "Hz", ".5f"),
     Column("split.slow_axis_deg", "slow axis", "°", ".2f"),
     Column("split.shift_ppm", "shift", "ppm", "+.3f"),
 )
 SPIN = (
     MODE[0],
-    Column("spin.lower_wave_Hz", "lower wave", "Hz", ".5f"),
-    Column("spin.upper_wave_Hz", "upper wave", "Hz", ".5f"),
-    Column("spin.shift_ppm", "shift of the mean", "ppm", "+.3g"),
-    Column("spin.stress_ppm", "by stress", "ppm", "+.3g"),
-    Column("spin.centrifugal_ppm", "centrifugal", "ppm", "+.3g"),
-    Column("spin.coriolis_ppm", "Coriolis", "ppm", "+.3g"),
-)
+    *(Column(f"spin.{key}_wave_Hz", f"{key} wave", "Hz", ".5f") for key in ("lower", "upper")),
+    *(Column(f"spin.{key}_ppm", name, "ppm", "+.3g") for key, name in (
+        ("shift", "shift of the mean"), ("stress", "by stress"), ("centrifugal", "centrifugal"), ("coriolis", "Coriolis"),
+    )),
+)  # fmt: skip
 AMPLITUDE = (
     *MODE,
-    Column("amplitude.shift_ppb", "shift", "ppb", "+.4g"),
-    Column("amplitude.static_ppb", "static", "ppb", "+.4g"),
-    Column("amplitude.inertial_ppb", "inertial", "ppb", "+.4g"),
+    *(Column(f"amplitude.{key}_ppb", key, "ppb", "+.4g") for key in ("shift", "static", "inertial")),
     Column("amplitude.shift_Hz_per_um2", "coefficient", "Hz/µm²", "+.4g"),
 )
 MOUNT = (
@@ -215,11 +187,11 @@ MOUNT = (
 FILMS = (*MODE, Column("film", "film"), Column("shift_ppm", "shift", "ppm", "+.4g"))
 CRYSTAL = (
     MODE[0],
-    Column("crystal.antinode_along_100_Hz", "antinode along [100]", "Hz", ".4f"),
-    Column("crystal.other_Hz", "other mode", "Hz", ".4f"),
-    Column("crystal.split_Hz", "split", "Hz", ".4f"),
+    *(Column(f"crystal.{key}_Hz", name, "Hz", ".4f") for key, name in (
+        ("antinode_along_100", "antinode along [100]"), ("other", "other mode"), ("split", "split"),
+    )),
     Column("crystal.relative_error_estimate", "solver error, relative", form=".0e"),
-)
+)  # fmt: skip
 ROTATION = (
     "In the frame of the resonator. Bryan's effect separates the two waves; their mean shifts with the square of the rate,"
     " by the stress of rotation, centrifugal softening and Coriolis forces."

@@ -15,21 +15,19 @@ from dataclasses import asdict
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from cyclopts import Parameter
 
 from shell.constants import zero_Celsius
-from shell.modes import Mode, solve_modes
-from shell.resonator import Resonator
-from studies.cli.arguments import Card, Temperature
+from shell.modes import solve_modes
+from studies.cli.arguments import COUNT, FRACTION, MANY, WHOLE, Card, Temperature, open_card
 from studies.cli.mode_effects import MODE, Asked, describe_effects, effect_tables
 from studies.cli.output import answers
-from studies.errors import InputError, naming
-from studies.instrument.card import Instrument, load_card
+from studies.errors import naming
+from studies.instrument.card import Instrument
 from studies.law import law_of
 from studies.reports.digits import to_numerical_error
 from studies.reports.mode_picture import THEORIES
-from studies.reports.scenes import show_mode
-from studies.results import Blocks, Chapter, Column, Result, Sentence, Table, Where
+from studies.reports.scenes import live_chapter, show_mode
+from studies.results import Blocks, Column, Result, Sentence, Table, Where, row_of
 from studies.results.page import Block
 
 FAR = 0.1
@@ -49,11 +47,11 @@ COLUMNS = (
 def modes(
     card: Card,
     *,
-    harmonic: Annotated[tuple[int, ...], Parameter(consume_multiple=True)] = (2,),
-    count: int = 1,
+    harmonic: Annotated[tuple[int, ...], MANY, WHOLE] = (2,),
+    count: Annotated[int, COUNT] = 1,
     temperature: Temperature = None,
     theory: Literal["solid", "shell", "rayleigh"] = "solid",
-    tolerance: float = 1e-5,
+    tolerance: Annotated[float, FRACTION] = 1e-5,
     sensitivities: bool = False,
     spin: float | None = None,
     amplitude: float | None = None,
@@ -77,35 +75,26 @@ def modes(
     amplitude : float
         Largest displacement in µm: shift of the frequency by geometric nonlinearity.
     """
-    if count < 1:
-        raise InputError(f"--count {count}: at least one mode must be asked for.")
-    if min(harmonic) < 0:
-        raise InputError(f"--harmonic {min(harmonic)}: a harmonic is a whole number from 0 up.")
-    if not 0 < tolerance < 1:
-        raise InputError(f"--tolerance {tolerance:g}: it is a relative error between 0 and 1.")
-    instrument = load_card(card)
-    T = instrument.reference_temperature if temperature is None else temperature + zero_Celsius
+    instrument, T = open_card(card, temperature)
     detailed = theory != "rayleigh"
     with naming(instrument.path):
         resonator, elastic = instrument.at(T)
         found = [m for n in harmonic for m in solve_modes(resonator, elastic, n, count, theory, tolerance)]
         asked = Asked(instrument, T, elastic, tolerance, spin, amplitude)
         more = describe_effects(found, asked)
-    share, mean = _material_share(instrument, T), _mean_thickness(resonator)
+    share = float(law_of(instrument, T, T).uncertainty(np.array([T]))[0])
+    mean = float(sum(h for _, h in resonator.thickness) / len(resonator.thickness))
     entries = []
     for m, effects in zip(found, more, strict=True):
-        entry = {
-            "harmonic": m.harmonic,
-            "index": m.index,
-            "label": m.label,
-            "frequency_Hz": m.frequency,
-            "bryan_factor": m.bryan_factor,
-            "relative_error_estimate": m.relative_error_estimate,
-        }
+        entry = row_of(
+            m, "harmonic", "index", "label", "bryan_factor", "relative_error_estimate", frequency_Hz="frequency"
+        )
         if detailed:
+            # of a wall that grows everywhere by the same part
+            per_micrometre = float(m.frequency * m.sensitivities.thickness / mean * 1e-6)
             entry |= {
                 "material_uncertainty_Hz": share * m.frequency if share else None,
-                "frequency_per_thickness_Hz_per_um": _per_micrometre(m, mean),
+                "frequency_per_thickness_Hz_per_um": per_micrometre,
                 "modal_mass_kg": m.modal_mass,
                 "sensitivities": asdict(m.sensitivities),
                 "energy_fractions": asdict(m.energy_fractions),
@@ -123,11 +112,7 @@ def modes(
             *_all_orders(entries),
             *_detail_tables(entries if detailed else [], "everywhere" if sensitivities else "page"),
             Blocks(lambda: _view(instrument, sorted(set(harmonic)), T, theory)),
-            *(
-                [Chapter("Over dimensions and temperature", [Blocks(lambda: _live(instrument, harmonic[0], theory))])]
-                if detailed
-                else []
-            ),
+            live_chapter(instrument, harmonic[0], theory),
         ],
     )
 
@@ -137,17 +122,9 @@ def _view(instrument: Instrument, harmonics: list[int], T: float, theory: str) -
     from studies.reports.mode_picture import view_blocks
 
     drawn: Literal["solid", "shell"] = "solid" if theory == "solid" else "shell"
-    remark = (
-        " Rayleigh's closed form gives the frequencies of the table, not these shapes." if theory == "rayleigh" else ""
-    )
+    words = " Rayleigh's closed form gives the frequencies of the table, not these shapes."
+    remark = words if theory == "rayleigh" else ""
     return view_blocks([show_mode(instrument, n, temperature=T, theory=drawn) for n in harmonics], remark)
-
-
-def _live(instrument: Instrument, harmonic: int, theory: Literal["solid", "shell", "rayleigh"]) -> Sequence[Block]:
-    """Sliders that move the lowest mode and its neighbour."""
-    from studies.reports.live import live_blocks
-
-    return live_blocks(instrument, harmonic, theory)
 
 
 def _to_error(row: dict[str, Any]) -> str:
@@ -158,25 +135,9 @@ def _to_error(row: dict[str, Any]) -> str:
 def _note(theory: str, share: float) -> str:
     if theory == "rayleigh":
         return "Rayleigh's closed form ignores the free edge: on a hemisphere it lies about 10 % too high. Its error is not estimated more closely."
-    spread = (
-        "from the published values of the material, one standard deviation"
-        if share
-        else "not known: the card gives none"
-    )
+    known = "from the published values of the material, one standard deviation"
+    spread = known if share else "not known: the card gives none"
     return f"Solver error: against the exact solution of the same theory. Material uncertainty: {spread}."
-
-
-def _material_share(instrument: Instrument, T: float) -> float:
-    return float(law_of(instrument, T, T).uncertainty(np.array([T]))[0])
-
-
-def _mean_thickness(resonator: Resonator) -> float:
-    return float(sum(h for _, h in resonator.thickness) / len(resonator.thickness))
-
-
-def _per_micrometre(mode: Mode, thickness: float) -> float:
-    """Return df/dh in Hz/µm, for a wall that grows everywhere by the same part."""
-    return float(mode.frequency * mode.sensitivities.thickness / thickness * 1e-6)
 
 
 def _all_orders(modes: list[dict[str, Any]]) -> list[Sentence]:

@@ -49,9 +49,8 @@ def card(path: str, *, like: str = "hrg-30mm", name: str | None = None) -> int:
     return 0
 
 
-OtherCard = Annotated[
-    str | None, Parameter(name="--card", help="The card: a built-in one, or a path relative to the file.")
-]
+OTHER = Parameter(name="--card", help="The card: a built-in one, or a path relative to the file.")
+OtherCard = Annotated[str | None, OTHER]
 
 
 def study(path: str, *, like: str = "dimension-tolerance", card_: OtherCard = None) -> int:

@@ -15,19 +15,19 @@ from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
+from studies.cli.arguments import Quiet, Workers
 from studies.cli.output import answers
 from studies.design.answer import Answer
 from studies.design.run import CARD, TABLE, best_instrument
 from studies.design.run import optimise as find_best
-from studies.errors import InputError
 from studies.reports import design as pictures
 from studies.reports.digits import plain
-from studies.results import Blocks, Chapter, Column, Facts, Figure, Result, Sentence, Table
+from studies.results import Blocks, Chapter, Column, Facts, Figure, Result, Table, row_of
 from studies.results.page import Block
 
 
 @answers("hrg.optimise/1")
-def optimise(design: str, *, out: str, workers: int | None = None, quiet: bool = False) -> Result:
+def optimise(design: str, *, out: str, workers: Workers = None, quiet: Quiet = False) -> Result:
     """Find dimensions of a resonator for objectives under constraints; every answer is verified by full solves.
 
     Run again with the same folder to resume: designs that are computed are never computed again, and objectives, limits and bounds
@@ -40,13 +40,7 @@ def optimise(design: str, *, out: str, workers: int | None = None, quiet: bool =
         hrg design new FILE writes one to start from; hrg keys design lists its keys.
     out : str
         Folder for the best design as a card (best.toml), all designs (evaluations.csv) and the store.
-    workers : int
-        Processes on this machine; default: one per core.
-    quiet : bool
-        Show no progress.
     """
-    if workers is not None and workers < 1:
-        raise InputError(f"--workers {workers}: must be at least 1.")
     try:
         found = find_best(design, out, workers=workers, show_progress=not quiet)
     except KeyboardInterrupt:
@@ -55,15 +49,20 @@ def optimise(design: str, *, out: str, workers: int | None = None, quiet: bool =
         ) from None
     payload: dict[str, Any] = {
         "schema": "hrg.optimise/1",
-        "design": found.task.name,
-        "card": found.task.study.instrument.name,
-        "evaluations": found.evaluations,
+        **row_of(found, "evaluations", design="task.name", card="task.study.instrument.name"),
         "failed": len(found.failures),
         "parameters": _parameters(found),
         "columns": _columns(found),
-        "constraints": _constraints(found),
+        "constraints": [
+            row_of(one, "column", "limit", "value", "room", "margin", "price")
+            | {"kind": "most" if one.sign > 0 else "least", "active": one.price is not None}
+            for one in found.limits
+        ],
         "front": _front(found),
-        "tolerances": _tolerances(found),
+        "tolerances": [
+            row_of(one, "column", "value", "sd", "low", "high", "passed", worst_case="first_order")
+            for one in found.spreads
+        ],
         "out": out,
         "best_card": str(Path(out) / CARD),
     }
@@ -77,84 +76,31 @@ def optimise(design: str, *, out: str, workers: int | None = None, quiet: bool =
 
 def _parameters(found: Answer) -> list[dict[str, Any]]:
     rows = []
-    for p, start, best, free in zip(
-        found.task.study.parameters, found.start, found.best, range(len(found.best)), strict=True
-    ):
-        if free < found.task.free:
-            near = 1e-3 * (p.high - p.low)
-            at = "low" if best - p.low < near else "high" if p.high - best < near else None
-            rows.append(
-                {
-                    "name": p.name,
-                    "start": float(start),
-                    "best": float(best),
-                    "low": p.low,
-                    "high": p.high,
-                    "at_bound": at,
-                }
-            )
+    for p, start, best in zip(found.task.study.parameters[: found.task.free], found.start, found.best, strict=False):
+        near = 1e-3 * (p.high - p.low)
+        at = "low" if best - p.low < near else "high" if p.high - best < near else None
+        rows.append(row_of(p, "name", "low", "high") | {"start": float(start), "best": float(best), "at_bound": at})
     return rows
 
 
 def _columns(found: Answer) -> list[dict[str, Any]]:
     wanted = set(found.task.wanted)
+    solved = {"start": found.before, "interpolant": found.foretold, "best": found.after, "verified": found.verified}
     rows = [
-        {
-            "column": column.name,
-            "label": column.label,
-            "unit": column.unit,
-            "start": float(found.before[k]),
-            "interpolant": float(found.foretold[k]),
-            "best": float(found.after[k]),
-            "verified": float(found.verified[k]),
-        }
+        row_of(column, "label", "unit", column="name") | {name: float(of[k]) for name, of in solved.items()}
         for k, column in enumerate(found.task.study.columns)
         if "_of_n" not in column.name and not column.name.endswith("nearest_harmonic")
     ]
     return sorted(rows, key=lambda row: row["column"] not in wanted)
 
 
-def _constraints(found: Answer) -> list[dict[str, Any]]:
-    return [
-        {
-            "column": one.column,
-            "kind": "most" if one.sign > 0 else "least",
-            "limit": one.limit,
-            "value": one.value,
-            "room": one.room,
-            "margin": one.margin,
-            "active": one.price is not None,
-            "price": one.price,
-        }
-        for one in found.limits
-    ]
-
-
 def _front(found: Answer) -> list[dict[str, Any]]:
-    if len(found.task.keys.objective) < 2:
-        return []
     names = found.task.study.names[: found.task.free]
     return [
-        {
-            **dict(zip(names, design.tolist(), strict=False)),
-            **{column: float(values[found.place(column)]) for column in found.task.wanted},
-        }
+        dict(zip(names, design.tolist(), strict=False))
+        | {column: float(values[found.place(column)]) for column in found.task.wanted}
         for design, values in zip(found.front, found.front_values, strict=True)
-    ]
-
-
-def _tolerances(found: Answer) -> list[dict[str, Any]]:
-    return [
-        {
-            "column": one.column,
-            "value": one.value,
-            "worst_case": one.first_order,
-            "sd": one.sd,
-            "low": one.low,
-            "high": one.high,
-            "passed": one.passed,
-        }
-        for one in found.spreads
+        if len(found.task.keys.objective) > 1
     ]
 
 
@@ -165,15 +111,13 @@ def _parts(found: Answer, payload: dict[str, Any]) -> list[Any]:
     def named(column: str) -> str:
         return f"{label[column]}{unit[column].replace(' ', ' (', 1) + ')' if unit[column] else ''}"
 
-    facts = []
-    for goal in found.task.keys.objective:
-        k = found.place(goal.column)
-        facts.append(
-            (label[goal.column], f"{plain(found.after[k])}{unit[goal.column]}", f"before: {plain(found.before[k])}")
-        )
+    goals = [(goal.column, found.place(goal.column)) for goal in found.task.keys.objective]
+    facts = [
+        (label[name], f"{plain(found.after[k])}{unit[name]}", f"before: {plain(found.before[k])}") for name, k in goals
+    ]
     reasons = Counter(reason for _, reason in found.failures)
-    several = len(found.task.keys.objective) > 1
-    price = "price, parts of the ranges" if several else f"price, {label[found.task.keys.objective[0].column]} per unit"
+    several = len(goals) > 1
+    price = "price, parts of the ranges" if several else f"price, {label[goals[0][0]]} per unit"
     words = "" if all(_agree(row) for row in payload["columns"]) else " The solve from the card differs: see the table."
     keys = found.task.study.names[: found.task.free]
     front = [Column(itemgetter(name), name.removeprefix("resonator."), digits=5) for name in keys]
@@ -181,10 +125,10 @@ def _parts(found: Answer, payload: dict[str, Any]) -> list[Any]:
     return [
         Chapter("The design", [
             Facts(facts),
-            Sentence(f"{payload['best_card']} is the best design as a card; {TABLE} beside it has all {found.evaluations} designs.{words}"),
+            f"{payload['best_card']} is the best design as a card; {TABLE} beside it has all {found.evaluations} designs.{words}",
             Table("Parameters", payload["parameters"], [
                 Column(lambda row: row["name"].removeprefix("resonator."), "parameter"), Column("start", "before", digits=7), Column("best", "best", digits=7),
-                Column("low", "lowest"), Column("high", "highest"), Column("at_bound", "at bound"),
+                Column("low", "lowest"), Column("high", "highest"), "at bound",
             ]),
             Table("Before and after", payload["columns"], [
                 Column("label", "quantity"), Column(lambda row: row["unit"] if row["unit"] != "1" else None, "unit"), Column("start", "before", digits=6), Column("interpolant", "best, by the interpolant", digits=7),
@@ -202,8 +146,8 @@ def _parts(found: Answer, payload: dict[str, Any]) -> list[Any]:
                " nothing back."),
         ]),
         Chapter("Front", [
-            *([Sentence("One design is best in every objective: they do not conflict here.")] if several and len(payload["front"]) == 1 else []),
-            *([Figure(lambda: pictures.front(found), "All designs that keep the constraints, and those that no other beats.")] if several else []),
+            "One design is best in every objective: they do not conflict here." if several and len(payload["front"]) == 1 else None,
+            Figure(lambda: pictures.front(found), "All designs that keep the constraints, and those that no other beats.") if several else None,
             Table("Designs that no other beats", payload["front"], front),
         ]),
         Chapter("Tolerances", [
@@ -214,9 +158,8 @@ def _parts(found: Answer, payload: dict[str, Any]) -> list[Any]:
         ]),
         Chapter("Search", [
             Figure(lambda: pictures.history(found), "Objective and excess over the limits of the designs, in the order in which they were computed."),
-            Table("Designs that could not be computed", [{"reason": reason, "designs": count} for reason, count in reasons.most_common(8)], [
-                Column("designs", "designs"), Column("reason", "reason"),
-            ], where="page"),
+            Table("Designs that could not be computed", [{"reason": reason, "designs": count} for reason, count in reasons.most_common(8)],
+                ("designs", "reason"), where="page"),
         ]),
     ]  # fmt: skip
 

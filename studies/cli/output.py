@@ -7,7 +7,7 @@ import math
 import sys
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
@@ -16,6 +16,10 @@ from studies.files.paths import guarded
 from studies.instrument.caveats import caveats_of
 from studies.results import Result, Sentence
 from studies.results.terminal import print_result
+
+if TYPE_CHECKING:
+    from studies.instrument.card import Instrument
+    from studies.models import Model
 
 
 def answers(schema: str, page: bool = True) -> Callable[[Callable[..., Result]], Callable[..., int]]:
@@ -60,6 +64,28 @@ def answers(schema: str, page: bool = True) -> Callable[[Callable[..., Result]],
         return run
 
     return give
+
+
+def keep_card(instrument: "Instrument", path: str | None) -> None:
+    """Save a card where a path was given, and say so."""
+    from studies.instrument.card import save_card
+
+    if path is not None:
+        save_card(instrument, path)
+        say(f"card: {path}")
+
+
+def keep_model(model: "Model", save: str | None, emit: str | None = None) -> None:
+    """Save a model as TOML and as C where paths were given, and say so."""
+    from studies.files.writing import write_text
+    from studies.models import emit_c, write_model
+
+    if save is not None:
+        write_model(model, save)
+        say(f"model: {save}")
+    if emit is not None:
+        write_text(emit, emit_c(model))
+        say(f"C source: {emit}")
 
 
 def print_json(payload: Mapping[str, Any]) -> None:

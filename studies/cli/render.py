@@ -3,23 +3,25 @@
 import os
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from cyclopts import Parameter
 
 from shell.constants import zero_Celsius
 from shell.mesh import encode_animation, encode_mesh
 from shell.scene import EXAGGERATION
-from studies.cli.arguments import Theory
+from studies.cli.arguments import MANY, WHOLE, Theory
 from studies.cli.output import answers
 from studies.errors import InputError, MissingEnvironment
 from studies.files.writing import written_whole
 from studies.instrument.card import load_card
-from studies.reports.scenes import ModeScene, ShellTemperature, read_field, show_mode
-from studies.results import Blocks, Chapter, Column, Result, Sentence, Table
+from studies.reports.scenes import Colour, ModeScene, ShellTemperature, read_field, show_mode
+from studies.results import Blocks, Chapter, Column, Result, Sentence, Table, row_of
 from studies.results.page import render_result
 
 KINDS = (".png", ".webp", ".gif", ".html", ".glb", ".stl", ".ply")
+View = Literal["oblique", "axis", "side"]
+HIDDEN = Parameter(show_default=False)
 MOST = 4  # resonators in one picture
 COLUMNS = (
     Column("card", "card"),
@@ -34,13 +36,13 @@ COLUMNS = (
 def render(
     *card: str,
     out: str,
-    harmonic: Annotated[tuple[int, ...], Parameter(consume_multiple=True, show_default=False)] = (2,),
-    index: int = 0,
-    temperature: Annotated[tuple[float, ...], Parameter(consume_multiple=True, show_default=False)] = (),
+    harmonic: Annotated[tuple[int, ...], MANY, HIDDEN] = (2,),
+    index: Annotated[int, WHOLE] = 0,
+    temperature: Annotated[tuple[float, ...], MANY, HIDDEN] = (),
     theory: Theory = "solid",
-    colour: Literal["displacement", "energy", "temperature"] = "displacement",
+    colour: Colour = "displacement",
     field: str | None = None,
-    view: Literal["oblique", "axis", "side"] = "oblique",
+    view: View = "oblique",
     swing_mm: float | None = None,
 ) -> Result:
     """Show a mode shape: the real solid, its nodes (red) and antinodes (black dots), the undeformed shape in grey.
@@ -94,16 +96,7 @@ def render(
         data = _mesh(shown[0], kind, colour, along, swing_mm)
     with written_whole(out) as file:
         file.write(data)
-    modes = [
-        {
-            "card": one.instrument.name,
-            "temperature_degC": one.temperature - zero_Celsius,
-            "harmonic": one.mode.harmonic,
-            "index": one.mode.index,
-            "frequency_Hz": one.mode.frequency,
-        }
-        for one in shown
-    ]
+    modes = [_row(one) for one in shown]
     return Result(
         {"schema": "hrg.render/1", "file": out, "bytes": len(data), "modes": modes},
         f"Mode shapes of {', '.join(dict.fromkeys(one.instrument.name for one in shown))}",
@@ -117,18 +110,12 @@ def render(
 
 
 def _solve(
-    cards: Sequence[str],
-    harmonics: Sequence[int],
-    index: int,
-    temperatures: Sequence[float],
-    theory: Literal["solid", "shell"],
-    kind: str,
-) -> list[ModeScene]:
+    cards: Sequence[str], harmonics: Sequence[int], index: int, temperatures: Sequence[float],
+    theory: Literal["solid", "shell"], kind: str,
+) -> list[ModeScene]:  # fmt: skip
     """Solve every mode that is to be shown: cards × temperatures × harmonics."""
     if not cards:
         raise InputError("a card is missing: give its path or the name of one that ships ('hrg cards').")
-    if index < 0:
-        raise InputError(f"--index {index}: modes are counted from 0.")
     count = len(cards) * max(len(temperatures), 1)
     most = MOST if kind in (".png", ".webp", ".gif") else 1
     if count > most:
@@ -140,11 +127,7 @@ def _solve(
 
 
 def _picture(
-    shown: Sequence[ModeScene],
-    kind: str,
-    colour: Literal["displacement", "energy", "temperature"],
-    field: ShellTemperature | None,
-    view: Literal["oblique", "axis", "side"],
+    shown: Sequence[ModeScene], kind: str, colour: Colour, field: ShellTemperature | None, view: View
 ) -> bytes:
     from shell.render import NoOpenGL, render_animation, render_png
 
@@ -161,29 +144,21 @@ def _page(shown: Sequence[ModeScene]) -> bytes:
     from studies.reports.mode_picture import view_blocks
 
     first = shown[0]
-    rows = [
-        {
-            "harmonic": one.mode.harmonic,
-            "index": one.mode.index,
-            "frequency_Hz": one.mode.frequency,
-            "bryan_factor": one.mode.bryan_factor,
-        }
-        for one in shown
-    ]
+    rows = [_row(one) | row_of(one.mode, "bryan_factor") for one in shown]
     lead = f"Mode shapes of {first.instrument.name} at {first.temperature - zero_Celsius:g} °C, {first.mode.theory} theory."
     table = Table("Modes of this page", rows, [*COLUMNS[2:], Column("bryan_factor", "Bryan factor", form=".5f")])
     chapter = Chapter("Mode shapes", [Blocks(lambda: view_blocks(shown)), table])
     return render_result(Result({}, first.instrument.name, lead, [chapter])).encode()
 
 
-def _mesh(
-    one: ModeScene,
-    kind: str,
-    colour: Literal["displacement", "energy", "temperature"],
-    field: ShellTemperature | None,
-    swing_mm: float | None,
-) -> bytes:
+def _row(one: ModeScene) -> dict[str, Any]:
+    row = row_of(
+        one, card="instrument.name", harmonic="mode.harmonic", index="mode.index", frequency_Hz="mode.frequency"
+    )
+    return row | {"temperature_degC": one.temperature - zero_Celsius}
 
+
+def _mesh(one: ModeScene, kind: str, colour: Colour, field: ShellTemperature | None, swing_mm: float | None) -> bytes:
     colours = one.colours(colour, field)
     if kind == ".glb":
         visible = EXAGGERATION * one.surface.size

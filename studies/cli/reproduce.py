@@ -37,13 +37,8 @@ def reproduce(*, out: str = "report") -> Result:
     T, f = study.temperature_degC, study.frequency
     columns = {"temperature_degC": T, "frequency_Hz": f, "cubic_Hz": study.fit.frequency(T)}
     write_text(folder / "table1.csv", _csv(columns))
-    columns = {
-        "frequency_Hz": f,
-        "actual_temperature_degC": T,
-        "calculated_temperature_degC": study.calculated_degC,
-        "error_degC": study.error_degC,
-    }
-    write_text(folder / "table2.csv", _csv(columns))
+    found = {"calculated_temperature_degC": study.calculated_degC, "error_degC": study.error_degC}
+    write_text(folder / "table2.csv", _csv({"frequency_Hz": f, "actual_temperature_degC": T, **found}))
     write_text(folder / "summary.json", dump_json(result.payload))
     write_text(folder / "report.html", render_result(result))
     sensitivity = result.payload["sensitivity_ppm_per_degC"]

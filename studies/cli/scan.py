@@ -14,46 +14,48 @@ import numpy as np
 from cyclopts import Parameter
 
 from shell.constants import zero_Celsius
-from studies.cli.arguments import Card, Temperature, Theory
+from studies.cli.arguments import COUNT, MANY, Card, Temperature, Theory, open_card
 from studies.cli.output import answers, say
 from studies.errors import InputError, naming
 from studies.files.writing import write_text
-from studies.instrument.card import Instrument, load_card, save_card
+from studies.instrument.card import Instrument, save_card
 from studies.reports import scan as pictures
 from studies.reports.digits import plain, to_interval
-from studies.results import Chapter, Column, Facts, Figure, Result, Sentence, Table
+from studies.results import Chapter, Column, Facts, Figure, Result, Sentence, Table, row_of
 from studies.scan import Scan, ScanInterval, scan_faces
 
 NONE = "none"
+
+
+def _with_interval(key: str, heading: str, unit: str, form: str = "", scale: float = 1.0) -> tuple[Column, Column]:
+    """A value and its 90 % interval."""
+    ends = Column(key, "90 % interval", unit, form, interval=(f"{key}.low", f"{key}.high"), scale=scale)
+    return Column(f"{key}.value", heading, unit, form, scale=scale), ends
+
+
 SPLITS = (
     Column("harmonic", "n"),
     Column("frequency_Hz", "frequency", "Hz", ".3f"),
-    Column("split_Hz.value", "split", "mHz", scale=1e3),
-    Column("split_Hz", "90 % interval", "mHz", scale=1e3, interval=("split_Hz.low", "split_Hz.high")),
-    Column("slow_axis_deg.value", "slow axis", "°", ".2f"),
-    Column("slow_axis_deg", "90 % interval", "°", ".2f", interval=("slow_axis_deg.low", "slow_axis_deg.high")),
+    *_with_interval("split_Hz", "split", "mHz", scale=1e3),
+    *_with_interval("slow_axis_deg", "slow axis", "°", ".2f"),
     Column("every_order.split_Hz", "split, all orders", "mHz", scale=1e3),
     Column("every_order.slow_axis_deg", "slow axis, all orders", "°", ".2f"),
 )
 NAMES = {"wall": "wall", "offset": "middle surface", "inner": "inner face", "outer": "outer face"}
 HARMONICS = (
     Column("order", "harmonic"),
-    Column("amplitude_um.value", "amplitude", "µm", ".3f"),
-    Column("amplitude_um", "90 % interval", "µm", ".3f", interval=("amplitude_um.low", "amplitude_um.high")),
+    *_with_interval("amplitude_um", "amplitude", "µm", ".3f"),
     Column("crest", "azimuth of a crest", "°", ".1f"),
 )
 FACES = (
-    Column("face", "face"),
-    Column("file", "file"),
-    Column("points", "points"),
-    Column("outliers", "outliers"),
+    *(Column(key, key) for key in ("face", "file", "points", "outliers")),
     Column("noise_um", "noise", "nm", ".1f", scale=1e3),
     Column("position", "positions", form=".3f", interval=("position.0", "position.1")),
     *(Column(f"offset_um.{k}", f"offset {axis}", "µm", ".1f") for k, axis in enumerate("xyz")),
     Column("tilt_deg", "tilt", "°", ".3f"),
 )
 ROUNDNESS = (
-    Column("face", "face"),
+    "face",
     Column("position", "position", form=".3f"),
     Column("peak_to_valley_um", "peak to valley", "µm", ".3f"),
     Column("rms_um", "rms", "µm", ".3f"),
@@ -68,7 +70,7 @@ def scan(
     *,
     unit: Literal["mm", "um", "m"] = "mm",
     frames: Literal["own", "common"] = "own",
-    harmonic: Annotated[tuple[int, ...], Parameter(consume_multiple=True)] = (1, 2, 3, 4),
+    harmonic: Annotated[tuple[int, ...], MANY, COUNT] = (1, 2, 3, 4),
     highest: int = 12,
     temperature: Temperature = None,
     theory: Theory = "solid",
@@ -104,18 +106,13 @@ def scan(
     files = {name: path for name, path in (("inner", inner), ("outer", outer)) if path != NONE}
     if not files:
         raise InputError("no face given: name the file of the inner face, of the outer face, or of both.")
-    if min(harmonic) < 1:
-        raise InputError(f"--harmonic {min(harmonic)}: split modes have n = 1 or higher.")
-    instrument = load_card(card)
-    T = instrument.reference_temperature if temperature is None else temperature + zero_Celsius
+    instrument, T = open_card(card, temperature)
     with naming(instrument.path):
         resonator, elastic = instrument.at(T)
     found = scan_faces(
         resonator, elastic, files, unit=unit, frames=frames, harmonics=harmonic, highest=highest, theory=theory, say=say
     )  # fmt: skip
     if map_file is not None:
-        from studies.files.writing import write_text
-
         write_text(map_file, _map_csv(found))
         say(f"wrote {map_file}")
     if save is not None:
@@ -142,9 +139,9 @@ def _parts(found: Scan, payload: dict[str, Any]) -> list[Chapter]:
     note = "First order: from harmonic 2n alone. All orders: with products of harmonics. Slow axis: an antinode of the slower mode."
     if any(one["slow_axis_deg"] is None for one in splits):
         note += " <: 95 % limit of a split that is not significant and has no axis."
-    only = "Only one face was measured; the other is assumed perfect." if len(faces) == 1 else ""
+    only = Sentence("Only one face was measured; the other is assumed perfect.", "warning") if len(faces) == 1 else None
     return [
-        Chapter("In short", [Facts(_facts(payload), "page"), *([Sentence(only, "warning")] if only else []),
+        Chapter("In short", [Facts(_facts(payload), "page"), only,
             Table("Frequency splits from the measured faces", list(map(_significant, splits)), SPLITS, note)]),
         Chapter("Maps", [Figure(lambda: pictures.maps(found), "Fitted deviations over azimuth and meridian.")]),
         Chapter("Circumferential harmonics", [
@@ -178,53 +175,35 @@ def _facts(payload: dict[str, Any]) -> list[tuple[str, str, str]]:
 
 def _payload(found: Scan, name: str, temperature: float, files: dict[str, str]) -> dict[str, Any]:
     def of(interval: ScanInterval | None, factor: float) -> dict[str, float] | None:
-        if interval is None:
-            return None
-        return {key: factor * getattr(interval, key) for key in ("value", "low", "high")}
+        ends = {key: (key, factor) for key in ("value", "low", "high")}
+        return None if interval is None else row_of(interval, **ends)
 
     degrees = float(np.rad2deg(1.0))
+    moved = {"offset_um": ("motion.offset", 1e6), "tilt_deg": ("motion.tilt", degrees), "told": "motion.told"}
     faces = {
-        side: {
-            "file": files[side],
-            "points": face.points,
-            "outliers": face.outliers,
-            "noise_um": 1e6 * face.noise,
-            "position": [face.low, face.high],
-            "offset_um": None if face.motion is None else (1e6 * face.motion.offset).tolist(),
-            "tilt_deg": None if face.motion is None else degrees * face.motion.tilt,
-            "told": None if face.motion is None else list(face.motion.told),
-        }
+        side: {"file": files[side], "position": [face.low, face.high]}
+        | row_of(face, "points", "outliers", noise_um=("noise", 1e6))
+        | (row_of(face, **moved) if face.motion else row_of(None, *moved))  # type: ignore[arg-type]
         for side, face in found.faces.items()
     }
     splits = [
-        {
-            "harmonic": one.split.harmonic,
-            "frequency_Hz": one.split.frequency,
+        row_of(one, harmonic="split.harmonic", frequency_Hz="split.frequency", shift_ppm=("split.shift", 1e6))
+        | {
             "split_Hz": of(one.hertz, 1.0),
             "relative_ppm": of(one.relative, 1e6),
             "slow_axis_deg": of(one.slow_axis, degrees),
-            "shift_ppm": 1e6 * one.split.shift,
-            "every_order": {
-                "split_Hz": one.whole.hertz,
-                "slow_axis_deg": degrees * one.whole.slow_axis,
-                "shift_ppm": 1e6 * one.whole.shift,
-            },
+        }
+        | {
+            "every_order": row_of(
+                one.whole, split_Hz="hertz", slow_axis_deg=("slow_axis", degrees), shift_ppm=("shift", 1e6)
+            )
         }
         for one in found.splits
     ]
     waves = [
-        {
-            "quantity": w.quantity,
-            "order": w.order,
-            "position": w.position,
-            "amplitude_um": of(w.amplitude, 1e6),
-            "azimuth_deg": degrees * w.azimuth,
-        }
+        row_of(w, "quantity", "order", "position", azimuth_deg=("azimuth", degrees))
+        | {"amplitude_um": of(w.amplitude, 1e6)}
         for w in found.waves
-    ]
-    roundness = [
-        {"face": r.face, "position": r.position, "peak_to_valley_um": 1e6 * r.peak_to_valley, "rms_um": 1e6 * r.rms}
-        for r in found.roundness
     ]
     return {
         "schema": "hrg.scan/1",
@@ -233,7 +212,10 @@ def _payload(found: Scan, name: str, temperature: float, files: dict[str, str]) 
         "faces": faces,
         "splits": splits,
         "waves": waves,
-        "roundness": roundness,
+        "roundness": [
+            row_of(r, "face", "position", peak_to_valley_um=("peak_to_valley", 1e6), rms_um=("rms", 1e6))
+            for r in found.roundness
+        ],
     }
 
 

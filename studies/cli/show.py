@@ -14,7 +14,7 @@ from studies.errors import InputError
 from studies.record import read_record
 from studies.reports import survey as parts
 from studies.reports.digits import plain
-from studies.results import Chapter, Facts, Result, Sentence
+from studies.results import Facts, Result, Sentence, row_of
 from studies.survey import Survey, survey_record
 from studies.uses import find_uses
 
@@ -42,33 +42,24 @@ def show(*runs: str) -> Result:
             say(f"looking at {len(record):,} rows of {record.path}")
         surveys.append(survey_record(record))
     told = [parts.tell(survey) for survey in surveys]
-    uses = find_uses(records)
+    uses, pairs = find_uses(records), list(zip(surveys, told, strict=True))
     payload = {
         "schema": "hrg.show/1",
         "records": told,
-        "uses": [{"command": u.command, "line": u.line, "ready": not u.missing, "missing": u.missing} for u in uses],
+        "uses": [row_of(use, "command", "line", "missing") | {"ready": not use.missing} for use in uses],
     }
-    chapters = [
-        chapter
-        for survey, one in zip(surveys, told, strict=True)
-        for chapter in parts.run_chapters(survey, one, several=len(runs) > 1)
-    ]
     lead = f"{', '.join(runs)} as recorded: nothing is fitted, and nothing left out."
     return Result(
         payload,
         f"Record {Path(runs[0]).name}" if len(runs) == 1 else f"{len(runs)} records",
         lead,
         [
-            *(
-                part
-                for survey, one in zip(surveys, told, strict=True)
-                for part in (Facts(_facts(survey)), parts.columns_table(survey.record.path, one["columns"]))
-            ),
+            *(part for survey, one in pairs for part in (Facts(_facts(survey)), parts.columns_table(survey, one))),
             *_warnings(surveys),
             *parts.use_parts(uses),
-            *chapters,
+            *(chapter for survey, one in pairs for chapter in parts.run_chapters(survey, one, several=len(runs) > 1)),
         ],
-    )
+    )  # fmt: skip
 
 
 def _facts(survey: Survey) -> list[tuple[str, str, str]]:
@@ -82,7 +73,7 @@ def _facts(survey: Survey) -> list[tuple[str, str, str]]:
     ]
 
 
-def _warnings(surveys: list[Survey]) -> list[Sentence | Chapter]:
+def _warnings(surveys: list[Survey]) -> list[Sentence]:
     """Say which readings look wrong, and how to leave them out."""
     found = [
         f"{survey.record.path}, {column.name}: {words} {count}"

@@ -6,16 +6,15 @@ With --json one object, schema `hrg.simulate/1`: `card`, `out`, `rows`, `columns
 rms over the run, that the card's uncertainties leave), `warnings`.
 """
 
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 
-from studies.cli.arguments import Card, Seed, Theory
+from studies.cli.arguments import POSITIVE, Card, Seed, Theory
 from studies.cli.output import answers, say
-from studies.errors import InputError
 from studies.instrument.card import load_card
 from studies.record import write_record
-from studies.results import Column, Figure, Result, Sentence, Table
+from studies.results import Column, Figure, Result, Sentence, Table, row_of
 from studies.simulation.chamber import load_drive
 from studies.simulation.virtual_gyro import simulate_run
 
@@ -26,7 +25,7 @@ def simulate(
     profile: str,
     *,
     out: str,
-    row: float = 1.0,
+    row: Annotated[float, POSITIVE] = 1.0,
     seed: Seed = 0,
     noiseless: bool = False,
     theory: Theory = "solid",
@@ -61,8 +60,6 @@ def simulate(
     spread : bool
         Show the standard deviation of every column, without noise, that follows from the uncertainties of the card.
     """
-    if not 0 < row < np.inf:
-        raise InputError(f"--row {row:g}: the time between rows must be positive (s).")
     instrument = load_card(card)
     run = simulate_run(instrument, load_drive(profile, boundary, 1 / row), 1 / row, seed, not noiseless, theory)
     rows = len(run.record)
@@ -90,10 +87,9 @@ def simulate(
         "boundary": run.prediction.drive.boundary,
         "seed": None if noiseless else seed,
         "frequency_Hz": {"first": run.record["frequency_Hz"][0], "last": run.record["frequency_Hz"][-1]},
-        "solver_relative_error": run.law.solver_error,
-        "interpolation_relative_error": run.law.interpolation_error,
+        **row_of(run.law, solver_relative_error="solver_error", interpolation_relative_error="interpolation_error"),
         "spread": known,
-        "warnings": list(run.warnings),
+        "warnings": run.warnings,
     }
     span = float(np.ptp(run.record["resonator_temperature_degC"]))
     length = run.record["time_s"][-1] - run.record["time_s"][0]
@@ -102,16 +98,13 @@ def simulate(
         f"Virtual run of {instrument.name}",
         f"A run through {profile}; the {summary['boundary']} is imposed.",
         [
-            Sentence(f"{out}: {rows} rows over {length:g} s; the resonator's temperature varies by {span:.2f} K."),
-            Sentence(
-                f"Frequency law: interpolation error {run.law.interpolation_error:.0e}, solver error"
-                f" {run.law.solver_error:.0e}, both relative."
-            ),
+            f"{out}: {rows} rows over {length:g} s; the resonator's temperature varies by {span:.2f} K.",
+            f"Frequency law: interpolation error {run.law.interpolation_error:.0e}, solver error {run.law.solver_error:.0e}, both relative.",
             *(Sentence(one, "warning", "page") for one in run.warnings),
             Table(
                 "Uncertainty of the prediction (standard deviation, rms over the run)",
                 [{"column": name, "sd": value} for name, value in (known or {}).items()],
-                [Column("column", "column"), Column("sd", "standard deviation", digits=3)],
+                ("column", Column("sd", "standard deviation", digits=3)),
             ),
             Figure(run.record.plot, "The columns of the record."),
         ],

@@ -5,10 +5,10 @@ from typing import Annotated, Any
 
 from cyclopts import Parameter
 
-from studies.cli.arguments import Folder
+from studies.cli.arguments import Folder, Quiet, Workers
 from studies.cli.output import answers, say
 from studies.errors import InputError
-from studies.results import Column, Result, Sentence, Table
+from studies.results import Column, Result, Table, row_of
 from studies.sweeps.results import Results, open_results
 from studies.sweeps.run import Effort, check_functions, estimate_study, run_study
 from studies.sweeps.spec import read_study
@@ -23,13 +23,13 @@ def run(
     spec: str,
     *,
     out: str | None = None,
-    workers: int | None = None,
+    workers: Workers = None,
     scheduler: str | None = None,
     card: str | None = None,
     allow_python: bool = False,
     retry_failed: bool = False,
     dry_run: bool = False,
-    quiet: bool = False,
+    quiet: Quiet = False,
 ) -> Result:
     """Run or resume a parametric study. Finished cases are kept and never computed again.
 
@@ -49,8 +49,6 @@ def run(
         inversion with vary and targets, or tolerance with share (the tolerances with which that share of designs meets the requirements). Example: hrg study new spec.toml.
     out : str
         Folder for the results; required except with --dry-run. Run again with the same folder to resume.
-    workers : int
-        Processes on this machine; default: one per core. Interpolated designs need no extra processes.
     scheduler : str
         Address of a Dask scheduler (tcp://HOST:8786) whose workers compute the study. Use only one that you trust: the scheduler
         and its workers can run code on this machine. A public address needs tls:// and certificates in Dask's configuration.
@@ -62,13 +60,9 @@ def run(
         Compute failed cases again; cases whose worker was lost are always repeated.
     dry_run : bool
         Estimate the number of cases, time and memory; save nothing.
-    quiet : bool
-        Show no progress.
     """
     from studies.reports.sweep_analysis import tolerance_table
 
-    if workers is not None and workers < 1:
-        raise InputError(f"--workers {workers}: must be at least 1.")
     if workers is not None and scheduler is not None:
         raise InputError("--workers and --scheduler cannot be combined: give one of them.")
     if out is None and not dry_run:
@@ -81,18 +75,12 @@ def run(
     if out is None or dry_run:
         estimate = estimate_study(study, workers)
         payload = {"schema": "hrg.study-estimate/1", **vars(estimate)}
-        return Result(payload, f"Estimate of {study.name}", "", [Sentence(_estimate_words(estimate))])
+        return Result(payload, f"Estimate of {study.name}", "", [_estimate_words(estimate)])
     try:
         results = run_study(
-            spec,
-            out,
-            card=card,
-            workers=workers,
-            scheduler=scheduler,
-            allow_python=allow_python,
-            retry_failed=retry_failed,
-            show_progress=not quiet,
-        )
+            spec, out, card=card, workers=workers, scheduler=scheduler, allow_python=allow_python,
+            retry_failed=retry_failed, show_progress=not quiet,
+        )  # fmt: skip
     except KeyboardInterrupt:
         raise KeyboardInterrupt(
             f"interrupted; finished cases are kept in {out}. Run the same command again to resume."
@@ -102,10 +90,10 @@ def run(
     done = f"{results.total} cases computed, {failed} failed. Next: hrg study report {out}, hrg study export {out}."
     searches = [one for one in results.store.findings().values() if one.get("kind") == "tolerance"]
     tolerances = [
-        Sentence(f"No tolerances were found: {one['failed']}") if "failed" in one else tolerance_table(results, one)
+        f"No tolerances were found: {one['failed']}" if "failed" in one else tolerance_table(results, one)
         for one in searches
     ]
-    parts = [Sentence(done), _reasons(results), *tolerances]
+    parts = [done, _reasons(results), *tolerances]
     return Result(found, f"Study {study.name}", "What was computed.", parts, 4 if failed else 0)
 
 
@@ -117,7 +105,7 @@ def status(folder: Folder) -> Result:
     results = open_results(folder)
     found = _status(results, folder, is_running(folder))
     rows = [{"item": key.replace("_", " "), "value": found[key]} for key in STATUS]
-    columns = (Column("item", "item"), Column("value", "value", digits=3))
+    columns = ("item", Column("value", "value", digits=3))
     table = Table(results.study.name, rows, columns, results.study.note)
     return Result(found, f"Study {results.study.name}", "Its progress.", [table, _reasons(results)])
 
@@ -161,17 +149,10 @@ def export(folder: Folder, *, out: str | None = None) -> Result:
     results = open_results(folder)
     path = Path(out) if out else Path(folder) / "results.csv"
     units = export_results(results, path)
-    payload = {
-        "schema": "hrg.study-export/1",
-        "table": str(path),
-        "units_file": str(units),
-        "rows": len(results),
-        "done": results.done,
-        "cases": results.total,
-        "columns": results.units,
-    }
+    payload = {"schema": "hrg.study-export/1", "table": str(path), "units_file": str(units), "rows": len(results)}
+    payload |= row_of(results, "done", cases="total", columns="units")
     _say_unfinished(results)
-    return Result(payload, "Export", "", [Sentence(f"{_done(results)} cases: {path}; units: {units}")])
+    return Result(payload, "Export", "", [f"{_done(results)} cases: {path}; units: {units}"])
 
 
 def _done(results: Results) -> str:
@@ -180,9 +161,8 @@ def _done(results: Results) -> str:
 
 def _say_unfinished(results: Results) -> None:
     if results.done < results.total:
-        say(
-            f"note: the study is not finished: {results.done} of {results.total} cases are done. Run it again to resume."
-        )
+        counts = f"{results.done} of {results.total} cases are done"
+        say(f"note: the study is not finished: {counts}. Run it again to resume.")
 
 
 def _status(results: Results, folder: str, running: bool) -> dict[str, Any]:
@@ -206,14 +186,13 @@ def _status(results: Results, folder: str, running: bool) -> dict[str, Any]:
 
 def _reasons(results: Results) -> Table:
     rows = [{"cases": count, "reason": reason} for reason, count in results.store.reasons(8)]
-    return Table("Failed cases", rows, (Column("cases", "cases"), Column("reason", "reason")))
+    return Table("Failed cases", rows, ("cases", "reason"))
 
 
 def _estimate_words(estimate: Effort) -> str:
+    why = f" ({estimate.why_full})" if estimate.why_full else ""
     return (
-        f"{estimate.cases} cases in {estimate.batches} batch{'es' * (estimate.batches != 1)}, {SOLVERS[estimate.solver]}"
-        + (f" ({estimate.why_full})" if estimate.why_full else "")
-        + ";"
+        f"{estimate.cases} cases in {estimate.batches} batch{'es' * (estimate.batches != 1)}, {SOLVERS[estimate.solver]}{why};"
         f" {estimate.seconds_each:.3g} s per case, about {_duration(estimate.seconds)} in total; memory about {estimate.memory_MB:.0f} MB."
         " Nothing was saved."
     )

@@ -1,6 +1,5 @@
 """`hrg tcf`: frequency against temperature and its parts."""
 
-from collections.abc import Sequence
 from typing import Any, Literal
 
 import numpy as np
@@ -11,14 +10,14 @@ from shell.law import FrequencyLaw
 from studies.cli.arguments import Card, FromDegC, Harmonic, Step, ToDegC, lay_temperatures
 from studies.cli.output import answers
 from studies.errors import InputError
-from studies.instrument.card import Instrument, load_card
+from studies.instrument.card import load_card
 from studies.instrument.display import display_name
 from studies.law import check_slope_known, law_of
 from studies.papers import hrg
 from studies.record import read_frequency_table
 from studies.reports import style
-from studies.results import Blocks, Chapter, Column, Drawing, Figure, Result, Table, rows_of
-from studies.results.page import Block
+from studies.reports.scenes import live_chapter
+from studies.results import Column, Drawing, Figure, Result, Table, rows_of
 
 MOST_HARMONIC = 50  # a law of a higher one takes minutes
 PARTS = {"E": "E", "nu": "ν", "rho": "ρ", "h": "h", "r": "r", "base": "base"}
@@ -80,7 +79,7 @@ def tcf(
         Column("slope_ppm_per_degC", "slope", error="uncertainty_ppm_per_degC"),
     ]
     shown = sorted({0, len(T) // 2, len(T) - 1})
-    at = [
+    moved = [
         Column(f"moves_slope_ppm_per_degC.{k}", f"at {points[k]['temperature_degC']:g} °C", form="+.2f") for k in shown
     ]
     uncertain = [one for one in moves if max(map(abs, one["moves_slope_ppm_per_degC"])) >= LEAST]
@@ -90,36 +89,17 @@ def tcf(
         f"Mode n = {harmonic}, {theory} theory: the slope of the frequency and its parts from elastic constants, density and dimensions.",
         [
             Table(f"{instrument.name}, n = {harmonic}, {theory}", points, columns, note),
-            *([Figure(lambda: _curves(points, parts, local), CAPTION)] if len(points) > 1 else []),
-            Table(
-                "Uncertainty of the law: change of the slope by one standard deviation (ppm/°C)",
-                uncertain,
-                [
-                    Column("coefficient", "quantity", spell=display_name),
-                    Column("coefficient", "key"),
-                    Column("sd", "standard deviation", form=".2g"),
-                    *at,
-                ],
-            ),
-            Table(
-                "Measured slope between neighbouring points",
-                local,
-                [Column("temperature_degC", "T", "°C", ".1f"), Column("slope_ppm_per_degC", "slope", "ppm/°C", ".2f")],
-            ),
-            *(
-                []
-                if theory == "rayleigh"
-                else [Chapter("Over dimensions and temperature", [Blocks(lambda: _live(instrument, harmonic, theory))])]
-            ),
+            Figure(lambda: _curves(points, parts, local), CAPTION) if len(points) > 1 else None,
+            Table("Uncertainty of the law: change of the slope by one standard deviation (ppm/°C)", uncertain, [
+                Column("coefficient", "quantity", spell=display_name), Column("coefficient", "key"),
+                Column("sd", "standard deviation", form=".2g"), *moved,
+            ]),
+            Table("Measured slope between neighbouring points", local, [
+                Column("temperature_degC", "T", "°C", ".1f"), Column("slope_ppm_per_degC", "slope", "ppm/°C", ".2f"),
+            ]),
+            live_chapter(instrument, harmonic, theory),
         ],
-    )
-
-
-def _live(instrument: Instrument, harmonic: int, theory: Literal["solid", "shell", "rayleigh"]) -> Sequence[Block]:
-    """Sliders that move frequency and TCF."""
-    from studies.reports.live import live_blocks
-
-    return live_blocks(instrument, harmonic, theory)
+    )  # fmt: skip
 
 
 def _curves(points: list[dict[str, Any]], parts: list[str], local: list[dict[str, float]]) -> Drawing:
@@ -142,17 +122,14 @@ def _curves(points: list[dict[str, Any]], parts: list[str], local: list[dict[str
 
 def _points(law: FrequencyLaw, T: NDArray[np.float64]) -> list[dict[str, Any]]:
     parts = law.parts(T)
-    f, slope, spread = law.frequency(T), 1e6 * parts.total, 1e6 * law.slope_uncertainty(T)
-    return [
-        {
-            "temperature_degC": float(T[k]) - zero_Celsius,
-            "frequency_Hz": float(f[k]),
-            "slope_ppm_per_degC": float(slope[k]),
-            "uncertainty_ppm_per_degC": float(spread[k]),
-            "parts_ppm_per_degC": {name: 1e6 * float(getattr(parts, name)[k]) for name in PARTS},
-        }
-        for k in range(len(T))
-    ]
+    rows = rows_of({
+        "temperature_degC": T - zero_Celsius,
+        "frequency_Hz": law.frequency(T),
+        "slope_ppm_per_degC": 1e6 * parts.total,
+        "uncertainty_ppm_per_degC": 1e6 * law.slope_uncertainty(T),
+    })  # fmt: skip
+    shares = rows_of({name: 1e6 * getattr(parts, name) for name in PARTS})
+    return [row | {"parts_ppm_per_degC": share} for row, share in zip(rows, shares, strict=True)]
 
 
 def _moves(law: FrequencyLaw, T: NDArray[np.float64]) -> list[dict[str, Any]]:

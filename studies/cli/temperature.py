@@ -45,52 +45,37 @@ def temperature(model: str, run: str, /, *, out: str | None = None) -> Result:
     with naming(run):
         found = find_temperature(loaded, record["frequency_Hz"], run)
     known = np.isfinite(found)
-    facts = {
-        "rows": len(record),
-        "rows_without_frequency": int(np.count_nonzero(~known)),
-        "lowest_degC": float(found[known].min()),
-        "highest_degC": float(found[known].max()),
-        "curve_uncertainty_K": max(
-            temperature_error(loaded, float(T)) for T in np.percentile(found[known], [0, 50, 100])
-        ),
-    }
-    true = record.columns.get("resonator_temperature_degC")
-    if true is not None:
-        facts["rms_difference_from_simulated_K"] = float(np.sqrt(np.nanmean((found - true) ** 2)))
+    sd = max(temperature_error(loaded, float(T)) for T in np.percentile(found[known], [0, 50, 100]))
+    low, high, empty = float(found[known].min()), float(found[known].max()), int(np.count_nonzero(~known))
+    facts = {"rows": len(record), "rows_without_frequency": empty, "lowest_degC": low, "highest_degC": high}
+    facts["curve_uncertainty_K"] = sd
+    differs, doubt = "", None
+    if (true := record.columns.get("resonator_temperature_degC")) is not None:
+        off = facts["rms_difference_from_simulated_K"] = float(np.sqrt(np.nanmean((found - true) ** 2)))
+        differs = f"The record's own, simulated temperature differs by {off:.2g} K rms."
+        words = f"That is {off / sd:.0f} times the uncertainty of the curve: is the model of this gyro?"
+        doubt = Sentence(words, "warning") if off > FAR * sd else None
     if out is not None:
         write_record(record.with_columns({"resonator_temperature_degC": found}), out)
         say(f"record: {out}")
-    payload = {"schema": "hrg.temperature/1", "model": model, "run": run, "out": out, **facts}
-    low, high, sd = (float(facts[key]) for key in ("lowest_degC", "highest_degC", "curve_uncertainty_K"))
-    cells = [
-        ("Lowest", f"{low:.3f} °C", ""),
-        ("Highest", f"{high:.3f} °C", ""),
-        ("Uncertainty of the curve", f"± {sd:.2g} K", "one standard deviation of the fitted f(T)"),
-    ]
-    said, warned = [], []
-    if true is not None:
-        said.append(
-            f"The record's own, simulated temperature differs by {facts['rms_difference_from_simulated_K']:.2g} K rms."
-        )
-        if facts["rms_difference_from_simulated_K"] > FAR * sd:
-            warned.append(
-                f"That is {facts['rms_difference_from_simulated_K'] / sd:.0f} times the uncertainty of the curve: is the model of this gyro?"
-            )
-    if facts["rows_without_frequency"]:
-        said.append(f"{facts['rows_without_frequency']} rows have no frequency and stay empty.")
     return Result(
-        payload,
+        {"schema": "hrg.temperature/1", "model": model, "run": run, "out": out, **facts},
         "Resonator temperature from its frequency",
         f"The resonator's temperature in {run}, read from its frequency with {model}.",
         [
-            Facts(cells),
-            *(Sentence(one) for one in said),
-            *(Sentence(one, "warning") for one in warned),
+            Facts([
+                ("Lowest", f"{low:.3f} °C", ""),
+                ("Highest", f"{high:.3f} °C", ""),
+                ("Uncertainty of the curve", f"± {sd:.2g} K", "one standard deviation of the fitted f(T)"),
+            ]),
+            differs,
+            f"{empty} rows have no frequency and stay empty." if empty else "",
+            doubt,
             Figure(lambda: _figure(record, found), "Temperature of the resonator over time."),
             Sentence(NOTE, "note", "page"),
         ],
         sources=SOURCES,
-    )
+    )  # fmt: skip
 
 
 def _figure(record: Record, found: Array) -> Drawing:

@@ -7,14 +7,13 @@ relative change per relative change of each constant; `energy_balance_error`, re
 """
 
 import re
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
 from shell.constants import zero_Celsius
-from studies.cli.arguments import Array, Card
+from studies.cli.arguments import Array, Card, numbers
 from studies.cli.output import answers
-from studies.errors import InputError
 from studies.instrument.card import load_card
 from studies.instrument.display import name_constant
 from studies.reports import style
@@ -31,7 +30,9 @@ from thermal.transient import Transient
 
 
 @answers("hrg.thermal/1")
-def thermal(card: Card, profile: str, *, rows: int = 13) -> Result:
+def thermal(
+    card: Card, profile: str, *, rows: Annotated[int, numbers(lambda one: one > 1, "at least 2")] = 13
+) -> Result:
     """Show time constants, their sensitivities, and the temperatures of housing, base, stem and shell in time.
 
     The heat path is the card's table [thermal] with its defaults (hrg keys card).
@@ -46,8 +47,6 @@ def thermal(card: Card, profile: str, *, rows: int = 13) -> Result:
     rows : int
         Rows of the table, evenly spaced in time.
     """
-    if rows < 2:
-        raise InputError(f"--rows {rows}: a table in time needs at least two rows.")
     instrument = load_card(card)
     chamber = load_profile(profile)
     check_profile(chamber, instrument)
@@ -60,7 +59,8 @@ def thermal(card: Card, profile: str, *, rows: int = 13) -> Result:
     mean = shell_weights(transient.nodes, instrument.heat_path.cells.volume)
     picks = [[float(node == name) for node in transient.nodes] for name in shown]
     rim = [float(node == transient.nodes[-1]) for node in transient.nodes]
-    T = transient.observe(time, np.array([*picks, mean, rim])) - zero_Celsius
+    weights = np.array([*picks, mean, rim])
+    T = transient.observe(time, weights) - zero_Celsius
     names = [*shown, "shell", "rim"]
     energy = check_energy(network, {"chamber": chamber}, transient)
     influence = _influence(network, T0)
@@ -82,32 +82,23 @@ def thermal(card: Card, profile: str, *, rows: int = 13) -> Result:
         for words, modes in (("whole heat path", whole), ("shell and stem alone", alone))
     ]
     decisive = [{"constant": name, "effect": value} for name, value in list(influence.items())[:6]]
+    orders = [Column(f"tau.{k}", name, "s", ".0f") for k, name in enumerate(("slowest", "second", "third"))]
+    over_time = [Column("time_s", "time", "s", ".0f"), Column("chamber_temperature_degC", "chamber", form=".3f")]
     return Result(
         payload,
         f"Heat path of {instrument.name}",
         f"Time constants and temperatures of the heat path for the chamber profile {profile}.",
         [
-            Table(
-                f"{instrument.name}: time constants at {T0 - zero_Celsius:g} °C",
-                constants,
-                [Column("network", "network")]
-                + [Column(f"tau.{k}", name, "s", ".0f") for k, name in enumerate(("slowest", "second", "third"))],
-            ),
-            Table(
-                "Sensitivity of the slowest time constant τ to each constant p",
-                decisive,
-                [Column("constant", "constant", spell=name_constant), Column("effect", "d ln τ / d ln p", form="+.3f")],
-            ),
-            Figure(lambda: _curves(transient, chamber, np.array([*picks, mean, rim]), names), "Temperatures in time."),
-            Table(
-                "Temperatures (°C)" + (", with radiation" if not network.is_linear else ", linearised"),
-                rows_of(housed | temperatures),
-                [Column("time_s", "time", "s", ".0f"), Column("chamber_temperature_degC", "chamber", form=".3f")]
-                + [Column(name, name, form=".3f") for name in names],
-                f"Shell: its mean. The heat balance closes to {energy.error:.0e} of the heat that flowed.",
-            ),
+            Table(f"{instrument.name}: time constants at {T0 - zero_Celsius:g} °C", constants, ["network", *orders]),
+            Table("Sensitivity of the slowest time constant τ to each constant p", decisive, [
+                Column("constant", "constant", spell=name_constant), Column("effect", "d ln τ / d ln p", form="+.3f"),
+            ]),
+            Figure(lambda: _curves(transient, chamber, weights, names), "Temperatures in time."),
+            Table("Temperatures (°C)" + (", with radiation" if not network.is_linear else ", linearised"),
+                rows_of(housed | temperatures), [*over_time, *(Column(name, name, form=".3f") for name in names)],
+                f"Shell: its mean. The heat balance closes to {energy.error:.0e} of the heat that flowed."),
         ],
-    )
+    )  # fmt: skip
 
 
 def _curves(transient: Transient, chamber: Profile, weights: Array, names: list[str]) -> Drawing:

@@ -12,22 +12,20 @@ from math import degrees
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from cyclopts import Parameter
 
 from shell.constants import zero_Celsius
 from shell.resonator import Resonator
 from shell.trimming import SplitWave
-from studies.cli.arguments import Card, Temperature
+from studies.cli.arguments import MANY, Card, Temperature, open_card
 from studies.cli.measured_splits import pair_splits, read_scan, read_unbalance
 from studies.cli.output import answers, say
 from studies.errors import naming
-from studies.instrument.card import load_card
+from studies.files.writing import write_text
 from studies.reports.digits import plain, to_error
 from studies.reports.trim import polar
-from studies.results import Chapter, Column, Facts, Figure, Result, Sentence, Table
+from studies.results import Chapter, Column, Facts, Figure, Result, Sentence, Table, row_of
 from studies.trim import SURE, CardPlan, Teeth, Tool, other_cuts, plan_for_card
 
-MANY = Parameter(consume_multiple=True)
 KINDS = {"mass": "unstrained mass", "edge": "off the rim", "inner": "off the inner face", "outer": "off the outer face"}
 CUTS = (
     Column("number", "cut"),
@@ -35,10 +33,10 @@ CUTS = (
     Column("height_mm", "height z", "mm", ".3f"),
     Column("mass_ug", "mass", "µg", ".3f"),
     Column("depth_um", "depth", "µm", ".3f"),
-    Column("done", "done"),
+    "done",
 )
 STATES = (
-    Column("state", "state"),
+    "state",
     Column("harmonic", "n"),
     Column("split_Hz", "split", "mHz", ".3f", scale=1e3),
     Column("error_Hz", "standard error", "mHz", ".3f", scale=1e3),
@@ -122,11 +120,11 @@ def trim(
     out : str
         Write the cuts as CSV, for the machine.
     """
-    instrument = load_card(card)
-    measured = (
-        read_scan(scan, harmonic) if scan is not None else pair_splits(split, axis, harmonic, reading_error, instrument)
-    )
-    T = instrument.reference_temperature if temperature is None else temperature + zero_Celsius
+    instrument, T = open_card(card, temperature)
+    if scan is not None:
+        measured = read_scan(scan, harmonic)
+    else:
+        measured = pair_splits(split, axis, harmonic, reading_error, instrument)
     tool = Tool(1e-3 * width_mm, 1e-3 * length_mm, depth_limit)
     with naming(instrument.path):
         resonator, elastic = instrument.at(T)
@@ -151,8 +149,6 @@ def trim(
         "measure": measure_after(planned),
     }
     if out is not None:
-        from studies.files.writing import write_text
-
         write_text(out, _csv(payload))
         say(f"wrote {out}")
     return Result(
@@ -185,7 +181,7 @@ def _parts(planned: CardPlan, payload: dict[str, Any]) -> list[Chapter]:
                 ("Expected split", limit, f"95 % limit; {goal}"),
             ]),
             Table("Cuts of this round", cuts, CUTS, f"Total {first['mass_ug']:.4g} µg."),
-            *map(Sentence, payload["measure"]),
+            *payload["measure"],
             Sentence(f"Type of cut in this plan: {KINDS[payload['cut']]}. Effect of the same mass at the rim by type of cut, relative to this one: {kinds}."
                 " Negative: the split changes in the opposite direction.", "note", "page"),
         ]),
@@ -197,33 +193,20 @@ def _parts(planned: CardPlan, payload: dict[str, Any]) -> list[Chapter]:
 
 def gains(planned: CardPlan) -> list[dict[str, float]]:
     """The change by each planned groove over that by the shape derivative, with its 90 % interval."""
-    return [
-        {
-            "position": x,
-            "harmonic": n,
-            "value": cut.gain(n),
-            "low": cut.gain(n) - SURE * cut.error * abs(cut.gain(n)),
-            "high": cut.gain(n) + SURE * cut.error * abs(cut.gain(n)),
-        }
-        for x, cut in planned.cuts.items()
-        for n in cut.splits
+    found = [
+        (x, n, cut.gain(n), SURE * cut.error * abs(cut.gain(n))) for x, cut in planned.cuts.items() for n in cut.splits
     ]
+    return [{"position": x, "harmonic": n, "value": v, "low": v - reach, "high": v + reach} for x, n, v, reach in found]
 
 
 def _round(planned: CardPlan, resonator: Resonator) -> dict[str, Any]:
     one, cuts = planned.plan.round, planned.cuts
-
     return {
-        "share": one.share,
-        "mass_ug": 1e9 * one.mass,
+        **row_of(one, "share", mass_ug=("mass", 1e9)),
         "cuts": [
-            {
-                "azimuth_deg": float(np.rad2deg(c.azimuth)),
-                "position": c.position,
-                "height_mm": 1e3 * float(resonator.at([c.position * resonator.length]).z[0]),
-                "mass_ug": 1e9 * c.mass,
-                "depth_um": 1e6 * cuts[c.position].depth(c.mass) if cuts else None,
-            }
+            row_of(c, "position", azimuth_deg=("azimuth", degrees(1)), mass_ug=("mass", 1e9))
+            | {"height_mm": 1e3 * float(resonator.at([c.position * resonator.length]).z[0])}
+            | {"depth_um": 1e6 * cuts[c.position].depth(c.mass) if cuts else None}
             for c in one.cuts
         ],
         "after": [_state(s) for s in one.after],
@@ -253,21 +236,13 @@ def measure_after(planned: CardPlan) -> list[str]:
             f"Expected: {expected} mHz. If it is off by more than twice that error, plan the next round with --gain, the measured over the predicted change "
             "(negative if the split changed in the opposite direction)."
         )
-    found.append(
-        "Let the shell return to its temperature before each reading, and measure the same mode with the same electrodes."
-    )
-    return found
+    still = "Let the shell return to its temperature before each reading, and measure the same mode with the same electrodes."
+    return [*found, still]
 
 
 def _state(state: SplitWave) -> dict[str, Any]:
-    return {
-        "harmonic": state.harmonic,
-        "frequency_Hz": state.frequency,
-        "split_Hz": state.hertz,
-        "error_Hz": state.error * state.frequency,
-        "most_Hz": state.most,
-        "slow_axis_deg": degrees(state.slow_axis),
-    }
+    row = row_of(state, "harmonic", frequency_Hz="frequency", split_Hz="hertz", most_Hz="most")
+    return row | {"error_Hz": state.error * state.frequency, "slow_axis_deg": degrees(state.slow_axis)}
 
 
 def _csv(payload: dict[str, Any]) -> str:
@@ -275,7 +250,6 @@ def _csv(payload: dict[str, Any]) -> str:
     for k, one in enumerate(payload["rounds"], 1):
         for c in one["cuts"]:
             depth = "" if c["depth_um"] is None else f"{c['depth_um']:.4f}"
-            lines.append(
-                f"{k},{c['azimuth_deg']:.4f},{c['position']:.6f},{c['height_mm']:.4f},{c['mass_ug']:.5f},{depth}"
-            )
+            place = f"{c['azimuth_deg']:.4f},{c['position']:.6f},{c['height_mm']:.4f}"
+            lines.append(f"{k},{place},{c['mass_ug']:.5f},{depth}")
     return "\n".join(lines) + "\n"

@@ -18,6 +18,11 @@ from studies.twin.fmu import write_fmu
 from studies.twin.plan import input_starts, plan_twin, symbol
 from studies.twin.source import PROGRAM, exposed, outputs_of, sources
 
+NO_BINARY = (
+    "The FMU has no binary, because no C compiler for 64-bit Linux was found or it failed: the importing tool must compile its sources."
+    " Install gcc or set CC, and run this command again for a binary."
+)
+
 
 @answers("hrg.twin/1")
 def twin(
@@ -49,45 +54,30 @@ def twin(
     if fmu is None and c is None:
         raise InputError("nothing to do: give --fmu FILE.fmu, --c FOLDER, or both.")
     plan = plan_twin(load_card(card), boundary, theory)
-    sentences, compiled = [], None
+    sentences: list[Sentence | str] = []
+    compiled = size = None
     if c is not None:
         folder = check_folder(c)
         for name, text in sources(plan, PROGRAM).items():
             write_text(folder / name, text)
-        sentences.append(Sentence(f"{c}: C11 sources; compile with cc -std=c11 -O2 *.c -lm -o twin."))
+        sentences.append(f"{c}: C11 sources; compile with cc -std=c11 -O2 *.c -lm -o twin.")
     if fmu is not None:
         compiled = write_fmu(plan, fmu, fmi)
         size = os.path.getsize(fmu)
-        sentences.append(Sentence(f"{fmu}: FMI {fmi} for co-simulation, {size / 1000:.0f} kB, with its sources."))
+        sentences.append(f"{fmu}: FMI {fmi} for co-simulation, {size / 1000:.0f} kB, with its sources.")
         if not compiled:
-            sentences.append(
-                Sentence(
-                    "The FMU has no binary, because no C compiler for 64-bit Linux was found or it failed: the importing tool must compile its"
-                    " sources. Install gcc or set CC, and run this command again for a binary.",
-                    "warning",
-                )
-            )
-    parameters = [
-        {"name": key, "unit": symbol(key), "start": value}
-        for key, value in plan.parameters.items()
-        if exposed(plan, key)
-    ]
+            sentences.append(Sentence(NO_BINARY, "warning"))
+    exposed_ones = ((key, value) for key, value in plan.parameters.items() if exposed(plan, key))
+    parameters = [{"name": key, "unit": symbol(key), "start": value} for key, value in exposed_ones]
     inputs = [{"name": name, "unit": symbol(name), "start": start} for name, start in input_starts(plan).items()]
     outputs = [{"name": name, "unit": symbol(name)} for name in outputs_of(plan)]
     payload = {
         "schema": "hrg.twin/1",
         "card": plan.instrument.name,
-        "boundary": boundary,
-        "fmu": fmu,
-        "c": c,
-        "fmi": fmi if fmu is not None else None,
-        "compiled": compiled,
-        "bytes": None if fmu is None else size,
-        "inputs": inputs,
-        "outputs": outputs,
-        "parameters": parameters,
+        **{"boundary": boundary, "fmu": fmu, "c": c, "fmi": fmi if fmu is not None else None, "compiled": compiled},
+        **{"bytes": size, "inputs": inputs, "outputs": outputs, "parameters": parameters},
     }
-    columns = (Column("name", "name"), Column("unit", "unit"), Column("start", "start", digits=6))
+    columns = ("name", "unit", Column("start", "start", digits=6))
     return Result(
         payload,
         f"Twin of {plan.instrument.name}",

@@ -23,6 +23,8 @@ SHOWN = {
     SETTLED: ("mHz", 1e3),
 }
 """Unit in which small numbers of a response are shown, and how many of it make one."""
+VALUE = ("parameter", "unit", "card", "value", "low", "high", "shift_sd", "width", "told_by", "bound", "interval")
+"""What is told of each value in the JSON."""
 TOLD = {"data": "data", "prior": "prior", "both": "data and prior"}
 RESPONSE = (Column("response", "response"), Column("unit", "unit"))
 VALUES = (
@@ -98,7 +100,7 @@ def calibration_parts(found: Calibration, payload: Mapping[str, Any]) -> list[Ch
     title = "Values, best known first"
     return [
         Chapter("From the card to the noise", [
-            *(Sentence(" ".join(one.sentences)) for one in found.settled),
+            *(" ".join(one.sentences) for one in found.settled),
             Facts(facts, "page"),
             *(Sentence(warning, "warning", "page") for warning in found.warnings),
             Table("Residuals", responses, RESIDUALS, " ".join(notes)),
@@ -108,7 +110,7 @@ def calibration_parts(found: Calibration, payload: Mapping[str, Any]) -> list[Ch
         Chapter("Values", [
             Table(title, touched, (*VALUES, KEY), WIDTHS, "page", sortable=True),
             Table(title, touched, VALUES, WIDTHS + unchanged, "terminal"),
-            *(Sentence(f"The data determine only a combination of {', '.join(map(display_name, group))}.") for group in found.groups),
+            *(f"The data determine only a combination of {', '.join(map(display_name, group))}." for group in found.groups),
             Figure(lambda: _draw_shifts(found), "Shifts of the values that the data determine at least in part, with 90 % intervals; shaded: 90 % of the prior."),
             Table("Values that the data do not depend on", rest, (*VALUES[:3], KEY), "", "page", sortable=True),
         ]),

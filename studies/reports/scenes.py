@@ -1,22 +1,26 @@
 """What a picture of an instrument's mode shows: the solved mode, its surface, and the quantity that colours it."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
+import numpy as np
+from numpy.typing import NDArray
+
 from shell.constants import zero_Celsius
 from studies.errors import InputError
 from studies.instrument.card import Instrument
+from studies.results import Blocks, Chapter
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
     from shell.imperfection import Imperfection, Split
+    from shell.levels import Theory
     from shell.modes import Mode
     from shell.resonator import Resonator
     from shell.scene import Scene
     from shell.surface import Surface
+    from studies.results.page import Block
 
 Colour = Literal["displacement", "energy", "temperature"]
 FIELD_COLUMNS = ("position", "temperature_degC")
@@ -59,10 +63,8 @@ class ModeScene:
         departures = f", departures x {self.exaggeration:.0f}" if self.exaggeration > 1 else ""
         return f"{line}\nslower mode, split {1e3 * self.split.hertz:.4g} mHz{departures}"
 
-    def values(self, colour: Colour, field: "ShellTemperature | None" = None) -> "NDArray[np.float64]":
+    def values(self, colour: Colour, field: "ShellTemperature | None" = None) -> NDArray[np.float64]:
         """Return the coloured quantity on every vertex, in the unit of its legend."""
-        import numpy as np
-
         if colour == "displacement":
             return np.asarray(np.linalg.norm(self.surface.displacement, axis=1))
         if colour == "energy":
@@ -82,10 +84,9 @@ class ModeScene:
             axes = draw_axes(self.surface, self.split.slow_axis)
         return compose_scene(self.surface, self.values(colour, field), LEGENDS[colour], self.title, axes)
 
-    def colours(self, colour: Colour = "displacement", field: "ShellTemperature | None" = None) -> "NDArray[np.uint8]":
+    def colours(self, colour: Colour = "displacement", field: "ShellTemperature | None" = None) -> NDArray[np.uint8]:
         """Return the colour of every vertex (N, 4) as bytes, cividis between the smallest and the largest value."""
         import matplotlib as mpl
-        import numpy as np
 
         values = self.values(colour, field)
         top = np.percentile(values, 99.5) if colour == "energy" else values.max()
@@ -98,8 +99,8 @@ class ModeScene:
 class ShellTemperature:
     """A temperature (°C) along the meridian, position 0 ... 1, linear between the points."""
 
-    position: "NDArray[np.float64]"
-    temperature: "NDArray[np.float64]"
+    position: NDArray[np.float64]
+    temperature: NDArray[np.float64]
 
 
 def show_mode(
@@ -142,6 +143,17 @@ def _show_split(
     return replace(scene, surface=surface, exaggeration=factor)
 
 
+def live_chapter(instrument: Instrument, harmonic: int, theory: "Theory") -> Chapter | None:
+    """Return sliders that move the lowest mode of a card and its neighbour; none of Rayleigh's closed form."""
+
+    def blocks() -> "Sequence[Block]":
+        from studies.reports.live import live_blocks
+
+        return live_blocks(instrument, harmonic, theory)
+
+    return None if theory == "rayleigh" else Chapter("Over dimensions and temperature", [Blocks(blocks)])
+
+
 def read_field(path: str | Path) -> ShellTemperature:
     """Read a temperature along the meridian: a table `position,temperature_degC` with rising positions.
 
@@ -150,8 +162,6 @@ def read_field(path: str | Path) -> ShellTemperature:
     InputError
         Not such a table.
     """
-    import numpy as np
-
     from studies.files.columns import read_columns
 
     table = read_columns(path, FIELD_COLUMNS, required=FIELD_COLUMNS)

@@ -13,6 +13,8 @@ from studies.results import Drawing
 BLACK, ORANGE, SKY, GREEN, YELLOW, BLUE, VERMILION, PURPLE = (
     "#000000", "#E69F00", "#56B4E9", "#009E73", "#F0E442", "#0072B2", "#D55E00", "#CC79A7",
 )  # fmt: skip
+COLOURS = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY, YELLOW)
+"""In the order in which the lines of a figure take them."""
 _STYLE = {
     "font.size": 10,
     "axes.grid": True,
@@ -21,12 +23,11 @@ _STYLE = {
     "axes.spines.top": False,
     "axes.spines.right": False,
     "axes.axisbelow": True,
+    "axes.prop_cycle": f"cycler(color={COLOURS})",
     "legend.frameon": False,
     "legend.fontsize": 9,
     "lines.linewidth": 1.6,
 }
-
-
 MOST_POINTS = 4000  # of a line or a cloud; more only make the page heavy
 
 

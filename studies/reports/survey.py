@@ -95,9 +95,9 @@ def use_parts(uses: Sequence[Use]) -> list[Table | Sentence]:
     ]
 
 
-def columns_table(path: str, columns: Sequence[dict[str, Any]]) -> Table:
+def columns_table(survey: Survey, told: dict[str, Any]) -> Table:
     """Return the table of one record's columns."""
-    return Table(f"Columns of {path}", columns, COLUMNS, COLUMNS_NOTE)
+    return Table(f"Columns of {survey.record.path}", told["columns"], COLUMNS, COLUMNS_NOTE)
 
 
 def run_chapters(survey: Survey, told: dict[str, Any], several: bool) -> list[Chapter]:

@@ -7,6 +7,7 @@ column is added in one place.
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import reduce
 from math import isfinite
 from typing import Any, Literal
 
@@ -119,20 +120,37 @@ def rows_of(columns: Mapping[str, Iterable[Any]]) -> list[dict[str, Any]]:
     return [dict(zip(columns, row, strict=True)) for row in zip(*plain_columns, strict=True)]
 
 
+def row_of(found: Any, *keys: str, **named: str | tuple[str, float]) -> dict[str, Any]:
+    """Return a row of what an object has: attributes by their own names, others under new ones (q="fit.quality", f_mHz=("f", 1e3)).
+
+    Of nothing (None) it has every key, and None.
+    """
+    row = {}
+    for name, key in (dict(zip(keys, keys, strict=True)) | named).items():
+        path, factor = key if isinstance(key, tuple) else (key, 1.0)
+        value = None if found is None else reduce(getattr, path.split("."), found)
+        row[name] = value if value is None or factor == 1.0 else factor * value
+    return row
+
+
 @dataclass(frozen=True)
 class Table:
-    """Rows, of the payload or of any objects, as people see them; without rows it is not shown, and neither is a column of which no row has anything."""
+    """Rows, of the payload or of any objects, as people see them; without rows it is not shown, and neither is a column of which no row has anything.
+
+    A column that is a text stands for the key that it spells: "At bound" for `at_bound`.
+    """
 
     title: str
     rows: Sequence[Any]
-    columns: Sequence[Column]
+    columns: Sequence[Column | str]
     note: str = ""
     where: Where = "everywhere"
     sortable: bool = False
 
     def cells(self, where: Where = "everywhere") -> tuple[list[str], list[list[str]]]:
         """Return headings and rows of text, in the terminal or on the page."""
-        columns = [column for column in self.columns if column.where in ("everywhere", where)]
+        named = [Column(c.lower().replace(" ", "_"), c) if isinstance(c, str) else c for c in self.columns]
+        columns = [column for column in named if column.where in ("everywhere", where)]
         written = [(column.title, [column.write(row) for row in self.rows]) for column in columns]
         shown = [(title, cells) for title, cells in written if any(cells)]
         return [title for title, _ in shown], [list(row) for row in zip(*(cells for _, cells in shown), strict=True)]
@@ -171,7 +189,8 @@ class Blocks:
     make: Callable[[], Sequence[Any]]
 
 
-Part = Table | Facts | Sentence | Figure | Blocks
+Part = Table | Facts | Sentence | Figure | Blocks | str | None
+"""What people read; a text is a plain sentence, and what is empty or None is left out."""
 
 
 @dataclass(frozen=True)
@@ -211,5 +230,5 @@ class Result:
     @property
     def chapters(self) -> list[Chapter]:
         """The parts by chapter."""
-        loose = [part for part in self.parts if not isinstance(part, Chapter)]
+        loose = [part for part in self.parts if part and not isinstance(part, Chapter)]
         return [*([Chapter("Results", loose)] if loose else []), *(p for p in self.parts if isinstance(p, Chapter))]

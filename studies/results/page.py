@@ -81,6 +81,9 @@ def _blocks(part: Part | Block) -> Iterator[Block]:
             yield draw(part.draw(), part.caption, part.alt or part.caption)
         case Blocks():
             yield from part.make()
+        case str() | None:
+            if part:
+                yield Sentence(part)
         case Table():
             if part.rows and part.where != "terminal":
                 yield Cells(part.title, *part.cells("page"), part.note, part.sortable)

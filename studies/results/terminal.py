@@ -37,6 +37,8 @@ def _print(part: Part) -> None:
         case Facts() if part.where != "page":
             for label, value, remark in part.facts:
                 print(printable(f"{label}: {value}" + (f" ({remark})" if remark else "")))
+        case str() if part:
+            print(printable(part))
         case Sentence() if part.where != "page":
             print(printable(part.text))
 
