@@ -7,8 +7,8 @@ material adds over temperature, m(T) = ½ ln(E/ρ) − ln g, and of ν(T):
 """
 
 import hashlib
+import re
 from collections.abc import Callable, Sequence
-from importlib.resources import files
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -23,8 +23,8 @@ from shell.separation import nearest_mode
 from studies.errors import UNUSABLE_INPUT
 from studies.instrument.card import Instrument
 from studies.law import unknown_slope
-from studies.results import Sentence
-from studies.results.page import Block, Embedded
+from studies.results import Sentence, row_of
+from studies.results.page import Block, Embedded, fill_template
 from studies.sweeps.case import Case
 from studies.sweeps.expressions import Derived
 from studies.sweeps.parameters import find_nominal, set_parameters
@@ -44,12 +44,9 @@ MARGIN = 1e-3  # of ν beyond its range over temperature
 
 
 def live_blocks(
-    instrument: Instrument,
-    harmonic: int = 2,
-    theory: Theory = "solid",
-    names: Sequence[str] = (),
+    instrument: Instrument, harmonic: int = 2, theory: Theory = "solid", names: Sequence[str] = (),
     derived: Sequence[Derived] = (),
-) -> list[Block]:
+) -> list[Block]:  # fmt: skip
     """Return sliders for main dimensions and temperature; one sentence where they cannot be had.
 
     Parameters
@@ -61,17 +58,13 @@ def live_blocks(
         data = describe_family(instrument, harmonic, theory, names, derived)
     except UNUSABLE_INPUT as error:
         return [Sentence(f"There are no sliders for the dimensions: {error}", "note")]
-    from jinja2 import Environment, StrictUndefined
-
-    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
-    template = (files("studies.reports") / "templates" / "live.html").read_text(encoding="utf-8")
     identity = "live-" + hashlib.sha256(repr(data).encode()).hexdigest()[:12]
     worst = max(one["error"] for one in data["modes"])
     caption = (
         f"Interpolated between full solves ({theory} theory) within the ranges of the sliders; f is held to {1e6 * worst:.2g} ppm of"
         " a full solve there. Without imperfection, electrodes and the stress of a mount."
     )
-    return [Embedded(environment.from_string(template).render(id=identity, data=data), caption)]
+    return [Embedded(fill_template("live.html", id=identity, data=data), caption)]
 
 
 def describe_family(
@@ -90,26 +83,19 @@ def describe_family(
     for part in RANGES:
         axes = [Axis(key, value * (1 - part), value * (1 + part)) for key, value in varied]
         try:
+            build = _builder(instrument, [key for key, _ in varied], derived)
+            nus = float(nu.min()) - MARGIN, float(nu.max()) + MARGIN
             families = [
                 build_family(
-                    _builder(instrument, [key for key, _ in varied], derived),
-                    axes,
-                    nu=(float(nu.min()) - MARGIN, float(nu.max()) + MARGIN),
-                    harmonic=mode.harmonic,
-                    index=mode.index,
-                    theory=theory,
-                    tolerance=TOLERANCE,
-                    most=MOST_SOLVES,
+                    build, axes, nu=nus, harmonic=mode.harmonic, index=mode.index, theory=theory, tolerance=TOLERANCE, most=MOST_SOLVES
                 )
                 for mode in (own, other)
-            ]
+            ]  # fmt: skip
             break
         except UNUSABLE_INPUT:
             if part == RANGES[-1]:
                 raise
-    labels = [
-        key.removeprefix("resonator.").replace("_mm", "").replace("_", " ").replace(".", " ") for key, _ in varied
-    ]
+    labels = [re.sub("[_.]", " ", key.removeprefix("resonator.").replace("_mm", "")) for key, _ in varied]
     return {
         "axes": [
             {"key": axis.name, "label": label, "low": axis.low, "high": axis.high, "value": value}
@@ -166,9 +152,7 @@ def _series(instrument: Instrument, T: tuple[float, float]) -> dict[str, list[fl
 
 def _spell(family: Family) -> dict[str, Any]:
     polynomial = family.polynomial
-    return {
-        "harmonic": family.harmonic,
-        "index": family.index,
+    return row_of(family, "harmonic", "index") | {
         "error": float(family.error.frequency),
         "indices": [list(index) for index in polynomial.indices],
         "surpluses": polynomial.surpluses[:, :2].tolist(),

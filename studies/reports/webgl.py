@@ -8,19 +8,20 @@ import base64
 import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass
-from importlib.resources import files
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from studies.results.page import Embedded
+from studies.results.page import Embedded, fill_template
 
 if TYPE_CHECKING:
     from shell.imperfection import Imperfection, Split
     from shell.modes import Mode
     from shell.outline import Outline
     from shell.resonator import Resonator
+
+    Members = np.ndarray[Any, np.dtype[np.int64]]
 
 HIGHEST = 12  # wave of the departures that is drawn
 KINK = np.radians(35.0)  # where the outline turns by more than this, the shading breaks
@@ -36,14 +37,9 @@ class Drawn:
 
 
 def view_modes(
-    resonator: "Resonator",
-    modes: "Sequence[Mode]",
-    title: str,
-    png: bytes | None,
-    alt: str,
-    caption: str = "",
+    resonator: "Resonator", modes: "Sequence[Mode]", title: str, png: bytes | None, alt: str, caption: str = "",
     splits: "Sequence[Drawn | None]" = (),
-) -> Embedded:
+) -> Embedded:  # fmt: skip
     """Return an interactive view of several modes of one resonator.
 
     Parameters
@@ -56,13 +52,9 @@ def view_modes(
     caption : below the view.
     splits : of every mode, where it is one of a split pair.
     """
-    from jinja2 import Environment, StrictUndefined
-
     size = resonator.size
-    described = [
-        _describe(resonator, mode, size, split)
-        for mode, split in zip(modes, splits or [None] * len(modes), strict=True)
-    ]
+    pairs = zip(modes, splits or [None] * len(modes), strict=True)
+    described = [_describe(resonator, mode, size, split) for mode, split in pairs]
     middle, reach = _bounds(resonator)
     start, rim = resonator.at([0.0]), resonator.at([resonator.length])
     data = {
@@ -72,9 +64,8 @@ def view_modes(
         "reach": reach / size,
         "opens_up": bool(rim.z[0] > start.z[0]),
     }
-    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
-    template = (files("studies.reports") / "templates" / "mode_view.html").read_text(encoding="utf-8")
-    html = environment.from_string(template).render(
+    html = fill_template(
+        "mode_view.html",
         id="mode-" + hashlib.sha256(repr(data).encode()).hexdigest()[:12],
         title=title,
         data=data,
@@ -105,10 +96,7 @@ def _describe(resonator: "Resonator", mode: "Mode", size: float, drawn: Drawn | 
 
 
 def _imperfect(
-    resonator: "Resonator",
-    runs: "list[tuple[Outline, np.ndarray[Any, np.dtype[np.int64]]]]",
-    size: float,
-    drawn: Drawn,
+    resonator: "Resonator", runs: "list[tuple[Outline, Members]]", size: float, drawn: Drawn
 ) -> dict[str, Any]:
     """The slow axis (rad), where the axes lie on the rim, and the departures: for each wave and point its parts along r and z."""
     from shell.imperfection.surface import find_departures

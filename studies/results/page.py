@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from importlib.metadata import version
 from importlib.resources import files
 from io import BytesIO
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from studies.results import Blocks, Chapter, Drawing, Facts, Figure, Part, Result, Sentence, Table
 from studies.results.curves import read_curves
@@ -96,17 +96,12 @@ def _blocks(part: Part | Block) -> Iterator[Block]:
 
 def render_page(title: str, lead: str, chapters: Sequence[Chapter], sources: Sequence[str] = ()) -> str:
     """Return the page as HTML text; chapters without anything to show are left out."""
-    from jinja2 import Environment, StrictUndefined
-
-    folder = files("studies.reports") / "templates"
-    template, script = ((folder / name).read_text(encoding="utf-8") for name in ("page.html", "curves.js"))
-    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
-    environment.filters.update(typeset=typeset, prose=_prose, cell=_cell)
-    environment.tests.update(kind=_is_kind, stacked=_stacked)
+    script = (files("studies.reports") / "templates" / "curves.js").read_text(encoding="utf-8")
     made = [(chapter.title, make_blocks(*chapter.parts)) for chapter in chapters]
     made = [(heading, blocks) for heading, blocks in made if blocks]
     folded = _folded([blocks for _, blocks in made])
-    return environment.from_string(template).render(
+    return fill_template(
+        "page.html",
         title=title,
         lead=lead,
         chapters=[(heading, blocks, fold) for (heading, blocks), fold in zip(made, folded, strict=True)],
@@ -120,8 +115,15 @@ def render_page(title: str, lead: str, chapters: Sequence[Chapter], sources: Seq
     )
 
 
-def _is_kind(block: Block, name: str) -> bool:
-    return isinstance(block, KINDS[name])
+def fill_template(name: str, **values: Any) -> str:
+    """Return a template of the pages with its values, which are escaped."""
+    from jinja2 import Environment, StrictUndefined
+
+    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    environment.filters.update(typeset=typeset, prose=_prose, cell=_cell)
+    environment.tests.update(kind=lambda block, kind: isinstance(block, KINDS[kind]), stacked=_stacked)
+    text = (files("studies.reports") / "templates" / name).read_text(encoding="utf-8")
+    return environment.from_string(text).render(**values)
 
 
 def typeset(text: str) -> str:
@@ -170,47 +172,42 @@ def _stacked(table: Cells) -> bool:
 
 def _folded(chapters: Sequence[Sequence[Block]]) -> list[bool]:
     """Return which chapters are folded: from the first on that would end below `OPEN_HEIGHT`, never the first two."""
-    reached, phone = 260.0 + 26 * len(chapters), 420.0 + 26 * len(chapters)
+    reached = {False: 260.0 + 26 * len(chapters), True: 420.0 + 26 * len(chapters)}  # on a screen, and on a phone
     folded: list[bool] = []
     for k, chapter in enumerate(chapters):
-        reached += 80 + sum(_height(block, k == 0) for block in chapter)
-        phone += 80 + sum(_height_on_a_phone(block, k == 0) for block in chapter)
-        folded.append((k > 1 and max(reached, phone) > OPEN_HEIGHT) or any(folded))
+        for phone in reached:
+            reached[phone] += 80 + sum(_height(block, k == 0, phone) for block in chapter)
+        folded.append((k > 1 and max(reached.values()) > OPEN_HEIGHT) or any(folded))
     return folded
 
 
-def _height_on_a_phone(block: "Block", answer: bool) -> float:
-    """Return about how many pixels a block is high at a width of 390 px."""
-    if isinstance(block, Sentence):
-        return 25 * (1 + len(block.text) / 40) + 12
-    if isinstance(block, Cells):
-        if len(block.rows) > (LONG_ANSWER if answer else LONG_TABLE):
+def _height(block: Block, answer: bool, phone: bool) -> float:
+    """Return about how many pixels a block is high, at a width of 1280 px or on a phone of 390 px."""
+    match block:
+        case Sentence(text, "source") if not phone:
+            return 25 * len(text.splitlines()) + 25
+        case Sentence(text):
+            return 25 * (1 + len(text) / 40) + 12 if phone else 25 * (1 + len(text) / 95) + 25
+        case Cells(rows=rows) if len(rows) > (LONG_ANSWER if answer else LONG_TABLE):
             return 60
-        cells = len(block.columns) * (sum(map(len, block.columns)) / max(1, len(block.columns)) + 3)
-        if _stacked(block):
-            lines = sum(1 + (sum(len(str(cell)) for cell in row) + cells) / 46 for row in block.rows)
-        else:
-            lines = sum(1 + max((len(str(cell)) for cell in row), default=0) // 25 for row in block.rows) + 2.0
-        return 70 + 24 * lines + len(block.note) / 2
-    if isinstance(block, Picture):
-        return 0.51 * block.height + 45 + 0.6 * len(block.caption)
-    return 100.0 * len(block.facts) if isinstance(block, Facts) else 450
-
-
-def _height(block: "Block", answer: bool) -> float:
-    """Return about how many pixels a block is high at a width of 1280 px."""
-    if isinstance(block, Sentence):
-        lines = len(block.text.splitlines()) if block.kind == "source" else 1 + len(block.text) / 95
-        return 25 * lines + 25
-    if isinstance(block, Cells):
-        if len(block.rows) > (LONG_ANSWER if answer else LONG_TABLE):
-            return 60
-        share = 110 / max(1, len(block.columns))
-        lines = sum(1 + max((len(str(cell)) // max(28.0, share) for cell in row), default=0) for row in block.rows)
-        return 100 + 33 * lines + len(block.note) / 4
-    if isinstance(block, Picture):
-        return block.height + 70
-    return 110.0 * (1 + len(block.facts) // 5) if isinstance(block, Facts) else 700
+        case Cells(columns=columns, rows=rows, note=note):
+            widest = (max((len(str(cell)) for cell in row), default=0) for row in rows)
+            if not phone:
+                return (
+                    100 + 33 * sum(1 + wide // max(28.0, 110 / max(1, len(columns))) for wide in widest) + len(note) / 4
+                )
+            headings = sum(map(len, columns)) + 3 * len(columns)
+            stacked = (1 + (sum(len(str(cell)) for cell in row) + headings) / 46 for row in rows)
+            return (
+                70
+                + 24 * (sum(stacked) if _stacked(block) else sum(1 + wide // 25 for wide in widest) + 2)
+                + len(note) / 2
+            )
+        case Picture():
+            return 0.51 * block.height + 45 + 0.6 * len(block.caption) if phone else block.height + 70
+        case Facts(facts):
+            return 100.0 * len(facts) if phone else 110.0 * (1 + len(facts) // 5)
+    return 450 if phone else 700
 
 
 def draw(figure: Drawing, caption: str, alt: str) -> Picture:
