@@ -102,24 +102,14 @@ def study_bias(
 
     Parameters
     ----------
-    records : sequence of Record
-        Runs with time_s, bias_deg_per_h (or measured_rate_deg_per_s) at zero rate, and frequency_Hz or a temperature.
-    method : "guarded" or "paper"
-        Whose terms `model` takes; both are computed.
+    records : sequence of Record, runs with time_s, bias_deg_per_h (or measured_rate_deg_per_s) at zero rate, and frequency_Hz or a temperature.
+    method : "guarded" or "paper", whose terms `model` takes; both are computed.
     width, window : float
         Averaging before the fit and window of the rate, s. Unless given, 100 s, less for runs of less than 200 such rows,
         and three times that.
-    causal : bool
-        The rate uses past samples only.
-    over : "auto", "frequency" or "temperature"
-        What the bias is a function of; "auto" takes the frequency where every record has it.
-    progress : callable
-        Told in words what is being done.
-
-    Raises
-    ------
-    InputError
-        A record that lacks a column or was not at rest, records of different gyros; the message names the file.
+    causal : bool, the rate uses past samples only.
+    over : "auto", "frequency" or "temperature", what the bias is a function of; "auto" takes the frequency where every record has it.
+    progress : callable, told in words what is being done.
     """
     records = records_of_one_gyro(records, progress)
     check_lengths(records)
@@ -209,13 +199,7 @@ def choose_width(records: Sequence[Record]) -> float:
 
 
 def find_output(records: Sequence[Record]) -> str:
-    """Return the zero-rate output column that all records have.
-
-    Raises
-    ------
-    InputError
-        No such column in all of them, or a record that was not at rest.
-    """
+    """Return the zero-rate output column that all records have."""
     for record in records:
         where = record.path or "record"
         if "rate_deg_per_s" in record and np.any(np.abs(record["rate_deg_per_s"]) > LARGEST_REST):
@@ -231,13 +215,7 @@ def find_output(records: Sequence[Record]) -> str:
 
 
 def find_state(records: Sequence[Record], over: Over = "auto") -> str:
-    """Return the column that the bias is a function of: the frequency, or a temperature where there is none.
-
-    Raises
-    ------
-    InputError
-        The records do not share such a column, or a frequency cannot be a resonator's.
-    """
+    """Return the column that the bias is a function of: the frequency, or a temperature where there is none."""
     if over == "temperature" or (over == "auto" and not all("frequency_Hz" in record for record in records)):
         return choose_column(records, TEMPERATURES, "a bias over temperature (no frequency in every record)")
     for record in records:

@@ -51,13 +51,7 @@ def is_table(path: str | Path) -> bool:
 
 
 def read_table(path: str | Path) -> Decays:
-    """Read a table of decays.
-
-    Raises
-    ------
-    InputError
-        A column that is unknown, a reading that is not possible, or times that do not increase.
-    """
+    """Read a table of decays."""
     table = read_columns(path, COLUMNS)
     check_plausible(table.values, lambda row: f"{path}, line {table.line(row)}")
     time = table.values.get("time_s")
@@ -95,13 +89,7 @@ def table_of(decays: Sequence[Decay]) -> Decays:
 
 
 def fit_laws(decays: Decays) -> "dict[str, Law]":
-    """Fit the laws of ln f and of 1/Q, `fitted` in their own units; none where there are fewer than four readings or nothing varies.
-
-    Raises
-    ------
-    InputError
-        A table that holds too few readings for its conditions.
-    """
+    """Fit the laws of ln f and of 1/Q, `fitted` in their own units; none where there are fewer than four readings or nothing varies."""
     from compensation.ringdown.laws import Rows, fit_law
 
     found = {}
@@ -140,13 +128,7 @@ def fit_laws(decays: Decays) -> "dict[str, Law]":
 
 
 def write_decays(decays: Decays, path: str | Path) -> None:
-    """Write decays as a record, a row each, that `hrg calibrate` and `hrg diagnose` take: temperature, frequency, 1/Q.
-
-    Raises
-    ------
-    InputError
-        A decay without its start or its temperature.
-    """
+    """Write decays as a record, a row each, that `hrg calibrate` and `hrg diagnose` take: temperature, frequency, 1/Q."""
     columns = decays.columns
     for name, comment in (("time_s", "start"), (TEMPERATURE, "temperature_degC")):
         if not np.isfinite(columns.get(name, np.array([np.nan]))).all():

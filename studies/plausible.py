@@ -24,13 +24,7 @@ SAME_GYRO = 0.01  # relative: one gyro over temperature, beyond the range of its
 
 
 def check_card_frequency(instrument: "Instrument", frequency: Array, path: str) -> None:
-    """Ask whether a record is of the card's gyro where its frequency lies far from the card's.
-
-    Raises
-    ------
-    InputError
-        Further than 3 %, and than 6 standard deviations of what the card's uncertain values allow.
-    """
+    """Ask whether a record is of the card's gyro where its frequency lies far from the card's."""
     known = frequency[np.isfinite(frequency)]
     if not known.size:
         return
@@ -55,14 +49,7 @@ def check_card_frequency(instrument: "Instrument", frequency: Array, path: str) 
 
 
 def check_one_gyro(readings: "Sequence[tuple[str, Array | None, Array]]") -> None:
-    """Refuse records of different gyros: path, temperature (°C; None where it is not known) and frequency (Hz) of each.
-
-    Raises
-    ------
-    InputError
-        Frequencies further apart than 0.5 % beside what 300 ppm/K make of their temperatures, or beside what they span
-        themselves where a temperature is not known.
-    """
+    """Refuse records of different gyros: path, temperature (°C; None where it is not known) and frequency (Hz) of each."""
     levels = []
     for path, T, f in readings:
         known = np.isfinite(f) if T is None else np.isfinite(T) & np.isfinite(f)
@@ -81,13 +68,7 @@ def check_one_gyro(readings: "Sequence[tuple[str, Array | None, Array]]") -> Non
 
 
 def records_of_one_gyro(records: "Sequence[Record]", say: Callable[[str], None]) -> "list[Record]":
-    """Return the records that a fit may take: one given twice counts once, which is said, and all are of one gyro.
-
-    Raises
-    ------
-    InputError
-        Records of different gyros; see `check_one_gyro`.
-    """
+    """Return the records that a fit may take: one given twice counts once, which is said, and all are of one gyro."""
     from studies.record import drop_repeats
     from studies.rest import TEMPERATURES
 
@@ -102,13 +83,7 @@ def records_of_one_gyro(records: "Sequence[Record]", say: Callable[[str], None])
 
 
 def check_model_frequency(frequency: Array, lowest: float, highest: float, path: str, model: str) -> None:
-    """Ask whether a record is of the gyro that a frequency model was fitted to.
-
-    Raises
-    ------
-    InputError
-        All of it more than 1 % beyond the model's frequencies.
-    """
+    """Ask whether a record is of the gyro that a frequency model was fitted to."""
     known = frequency[np.isfinite(frequency)]
     if not known.size:
         return

@@ -128,13 +128,7 @@ def place_in_time(records: Sequence[Record]) -> tuple[list[float], bool]:
 
 
 def read_record(path: str | Path) -> Record:
-    """Read one run.
-
-    Raises
-    ------
-    InputError
-        Not a record: the message names file, line or column, and the mend.
-    """
+    """Read one run."""
     import numpy as np
 
     if "time_s" not in (names := read_header(path)) and "temperature_degC" in names:

@@ -58,13 +58,7 @@ def celsius_range(lowest: float, highest: float) -> tuple[float, float]:
 
 
 def choose_column(records: "Sequence[Record]", candidates: Sequence[str], purpose: str) -> str:
-    """Return the first candidate that every record has.
-
-    Raises
-    ------
-    InputError
-        When there is none; the message names the file and what would do.
-    """
+    """Return the first candidate that every record has."""
     for name in candidates:
         if all(name in record for record in records):
             return name
@@ -76,13 +70,7 @@ def choose_column(records: "Sequence[Record]", candidates: Sequence[str], purpos
 
 
 def gather_rest(records: "Sequence[Record]", outputs: "dict[str, float]") -> RestData:
-    """Return the runs of these records in SI units; `outputs` gives the output columns and their unit in rad/s.
-
-    Raises
-    ------
-    InputError
-        A column is missing, the gyro turns, or a record has no complete row.
-    """
+    """Return the runs of these records in SI units; `outputs` gives the output columns and their unit in rad/s."""
     import numpy as np
 
     from compensation.cross_damping import RestRun

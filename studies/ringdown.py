@@ -153,19 +153,10 @@ def read_decay(
 
     Parameters
     ----------
-    path : str or Path
-        The file; the module says what it may hold.
-    frequency : float, optional
-        Hz: carrier of raw samples, reference of a lock-in, frequency of a trace; in place of the file's.
-    harmonic : int
-        n, 2 unless said otherwise.
-    expected : float, optional
-        Hz: what a card predicts; raw samples whose frequency is an alias of it are refused.
-
-    Raises
-    ------
-    InputError
-        Columns that are no decay, or a decay that cannot be analysed, with the file's name.
+    path : str or Path, the file; the module says what it may hold.
+    frequency : float, optional, Hz: carrier of raw samples, reference of a lock-in, frequency of a trace; in place of the file's.
+    harmonic : int, n.
+    expected : float, optional, Hz: what a card predicts; raw samples whose frequency is an alias of it are refused.
     """
     import numpy as np
 
@@ -327,13 +318,7 @@ def _refuse_other(path: str | Path, found: float, expected: float) -> None:
 
 
 def with_decay(instrument: "Instrument", decay: Decay, harmonic: int = 2) -> "Instrument":
-    """Return the card with what a decay of two channels says: split and slow axis, 1/Q, damping split and axis.
-
-    Raises
-    ------
-    InputError
-        A decay of one channel: it has no axes.
-    """
+    """Return the card with what a decay of two channels says: split and slow axis, 1/Q, damping split and axis."""
     if decay.phased is None or "frequency_axis_deg" not in decay.phased.estimates:
         raise InputError(
             f"{decay.path}: a card takes a split with its axis; this decay shows none: record both pick-offs, with both modes excited, for longer."

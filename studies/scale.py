@@ -107,13 +107,7 @@ def settled_rows(rate: Real, rows: int) -> NDArray[np.bool_]:
 
 
 def study_scale(records: "Sequence[Record]", cutoff: float | None, order: int) -> ScaleStudy:
-    """Sort the records, fit the chain, and judge it.
-
-    Raises
-    ------
-    InputError
-        A column is missing, or there is not one record each of rates, of rest and of turning over temperature.
-    """
+    """Sort the records, fit the chain, and judge it."""
     output = choose_column(records, RAW, "a fit of the scale")
     column = choose_column(records, TEMPERATURES, "a fit of the scale over temperature")
     sorted_runs: dict[str, tuple[BellRun, str]] = {}

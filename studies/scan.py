@@ -119,8 +119,7 @@ def scan_faces(
     resonator, elastic : of the card at the temperature.
     files : "inner" and/or "outer" with their paths.
     unit : of the points.
-    frames : "own" aligns each face by itself, so that its first wave holds no rigid motion; "common" keeps them where they lie
-        to each other.
+    frames : "own" aligns each face by itself, so that its first wave holds no rigid motion; "common" keeps them where they lie to each other.
     harmonics : n of the splits.
     highest : wave around up to which the faces are fitted, at least twice the highest harmonic.
     say : hears what is being done.

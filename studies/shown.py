@@ -14,8 +14,7 @@ class Shown:
 
     Attributes
     ----------
-    drawn_by : str
-        "module:function" of the picture, by name: results do not import the pages, which import them.
+    drawn_by : str, "module:function" of the picture, by name: results do not import the pages, which import them.
     """
 
     drawn_by: ClassVar[str] = ""

@@ -156,8 +156,7 @@ def mean_shift(instrument: "Instrument", temperature: Array, voltage_squared: Ar
     Parameters
     ----------
     temperature : array, K
-    voltage_squared : array, V², optional
-        Of the common voltage, in place of the card's.
+    voltage_squared : array, V², optional, of the common voltage, in place of the card's.
     """
     electrodes: CardElectrodes = instrument.part("electrodes")
     card: CardImperfection = instrument.part("imperfection")

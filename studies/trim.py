@@ -199,11 +199,6 @@ def plan_for_card(
     measured : (harmonic, split in Hz, azimuth of the slow axis in rad, reading error in Hz), one for each harmonic.
     goal : Hz. heights : positions of the cuts. tool, teeth : what is cut. removal_error, gain_error, unbalance : see `plan_trim`.
     gain : effect of the last round over its prediction, of either sign, which scales what a cut is taken to do.
-
-    Raises
-    ------
-    ShellError
-        The sites cannot take off what is needed, or what the cuts do is not known well enough.
     """
     if not 0 < goal < np.inf:
         raise InputError(f"--goal {goal:g}: must be a positive split in Hz.")

@@ -88,13 +88,7 @@ def judge(
     output: str = "bias_deg_per_h",
     decays: "Sequence[Decay]" = (),
 ) -> Acceptance:
-    """Measure what the records and the free decays give and set it against the limits.
-
-    Raises
-    ------
-    InputError
-        A record that its test cannot use: a run-down that does not decay, a warm-up that does not settle.
-    """
+    """Measure what the records and the free decays give and set it against the limits."""
     sorted_runs, left = sort_records(records, output)
     found: Found = measure_seal(records)
     allan = noise = band = None

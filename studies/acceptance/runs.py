@@ -20,13 +20,7 @@ MOVING = 0.5
 
 
 def test_of(record: "Record", output: str) -> Test | None:
-    """Return the test that a record serves; None when it serves none.
-
-    Raises
-    ------
-    InputError
-        A comment names a test that does not exist.
-    """
+    """Return the test that a record serves; None when it serves none."""
     for comment in record.comments:
         key, colon, name = (part.strip() for part in comment.partition(":"))
         if colon and key == "test":

@@ -95,13 +95,7 @@ class Answer:
 def diagnose_device(
     device: Device, key: str, progress: Callable[[str], None] = lambda words: None
 ) -> "tuple[Answer, Inference]":
-    """Calibrate and diagnose one device.
-
-    Raises
-    ------
-    InputError, ThermalError, ShellError
-        Records or a card that cannot be used.
-    """
+    """Calibrate and diagnose one device."""
     from studies.workbench import infer_records
 
     if not device.records:

@@ -46,13 +46,7 @@ class Device:
 
 
 def read_lot(folder: str, card: str | None = None) -> list[Device]:
-    """Return the devices of a folder, a subfolder each, in the order of their serials; a card in a subfolder counts before the common one.
-
-    Raises
-    ------
-    InputError
-        No subfolders; a lot.csv that names other columns or devices.
-    """
+    """Return the devices of a folder, a subfolder each, in the order of their serials; a card in a subfolder counts before the common one."""
     root = Path(folder)
     inside = (
         sorted(path for path in root.iterdir() if path.is_dir() and not path.name.startswith("."))
@@ -101,13 +95,7 @@ def _read_table(path: Path, serials: Collection[str]) -> dict[str, tuple[date | 
 
 
 def read_devices(devices: Sequence[str] = (), manifest: str | None = None, card: str | None = None) -> list[Device]:
-    """Return devices from words such as "A=a1.csv,a2.csv", or from a TOML file with a table [devices].
-
-    Raises
-    ------
-    InputError
-        A device twice, without records, or a file that says something else.
-    """
+    """Return devices from words such as "A=a1.csv,a2.csv", or from a TOML file with a table [devices]."""
     paths: dict[str, Sequence[str]] = {}
     for words in devices:
         name, equals, files = words.partition("=")

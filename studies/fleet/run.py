@@ -30,16 +30,9 @@ def run_lot(
     Parameters
     ----------
     devices : sequence of Device
-    out : str, optional
-        Folder that keeps the answer and the page of each device.
-    workers : int
-        Processes.
+    out : str, optional, folder that keeps the answer and the page of each device.
+    workers : int, processes.
     progress : callable
-
-    Raises
-    ------
-    InputError
-        Fewer than two devices, or none whose records can be used.
     """
     if len(devices) < 2:
         raise InputError("a fleet needs at least two devices, such as --device A=a1.csv,a2.csv --device B=b1.csv.")

@@ -62,10 +62,8 @@ def simulate_runs(generator: np.random.Generator, random_walk: float = RANDOM_WA
 
     Parameters
     ----------
-    generator : numpy Generator
-        Draws the noise.
-    random_walk : float
-        White noise of the rate (°/√h).
+    generator : numpy Generator, draws the noise.
+    random_walk : float, white noise of the rate (°/√h).
     """
     gyro = read_printed_chain()
     sweep = (zero_Celsius + np.linspace(LOWEST, HIGHEST, round(SWEEP / STEP))).astype(np.float64)
@@ -113,16 +111,11 @@ class Claims:
     bias_deviation, scale_deviation : (float, float)
         Standard deviation (°/s) that (34), and (36) at 300 °/s, have over −45…55 °C; and the one that the printed
         before and after imply, √(before² − after²).
-    curvature_nonlinearity : float
-        Nonlinearity (1) that the quadratic term of (35) makes over ±360 °/s.
-    mapped : (float, float)
-        What (35), and (35) with (36) at 25 °C, make of the printed −361.4 °/s.
-    noise_deviation : float
-        Standard deviation (°/s) of samples that are white noise of the printed random walk before the filter.
-    averaging : tuple of (τ in s, factor)
-        Factor by which the FIR filter lowers the Allan deviation of white noise, read at τ.
-    cutoff_for_printed : float
-        Cut-off (Hz) with which the order-50 filter lowers it at τ = 1 s by the printed ratio of random walks.
+    curvature_nonlinearity : float, nonlinearity (1) that the quadratic term of (35) makes over ±360 °/s.
+    mapped : (float, float), what (35), and (35) with (36) at 25 °C, make of the printed −361.4 °/s.
+    noise_deviation : float, standard deviation (°/s) of samples that are white noise of the printed random walk before the filter.
+    averaging : tuple of (τ in s, factor), factor by which the FIR filter lowers the Allan deviation of white noise, read at τ.
+    cutoff_for_printed : float, cut-off (Hz) with which the order-50 filter lowers it at τ = 1 s by the printed ratio of random walks.
     """
 
     bias_deviation: tuple[float, float]

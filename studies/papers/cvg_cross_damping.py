@@ -63,14 +63,10 @@ def simulate_rest(
 
     Parameters
     ----------
-    generator : numpy Generator
-        Draws the noise.
-    lag : float
-        Time constant (s) between the sensor and the resonator.
-    random_walk : float
-        White noise of the rate (°/√h).
-    soak_h : float
-        Length of the soaks of the profile (h).
+    generator : numpy Generator, draws the noise.
+    lag : float, time constant (s) between the sensor and the resonator.
+    random_walk : float, white noise of the rate (°/√h).
+    soak_h : float, length of the soaks of the profile (h).
     """
     time, sensed = make_profile(soak_h)
     resonator = sensed

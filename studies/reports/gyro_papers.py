@@ -31,8 +31,7 @@ def reproduce_gyro_papers(seeds: int = 20) -> tuple[list[Chapter], dict[str, Any
 
     Parameters
     ----------
-    seeds : int
-        Virtual runs for the spread of the cross-damping improvement.
+    seeds : int, virtual runs for the spread of the cross-damping improvement.
     """
     damping, study, chain = reproduce_cross_damping(seeds), study_filters(), reproduce_bell()
     claims = study_claims()

@@ -155,13 +155,7 @@ def live_chapter(instrument: Instrument, harmonic: int, theory: "Theory") -> Cha
 
 
 def read_field(path: str | Path) -> ShellTemperature:
-    """Read a temperature along the meridian: a table `position,temperature_degC` with rising positions.
-
-    Raises
-    ------
-    InputError
-        Not such a table.
-    """
+    """Read a temperature along the meridian: a table `position,temperature_degC` with rising positions."""
     from studies.files.columns import read_columns
 
     table = read_columns(path, FIELD_COLUMNS, required=FIELD_COLUMNS)

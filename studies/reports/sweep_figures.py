@@ -30,13 +30,7 @@ def column_label(column: Column) -> str:
 
 
 def first_figure(results: Results) -> Drawing:
-    """Draw the first column against the parameters.
-
-    Raises
-    ------
-    InputError
-        No design has a value.
-    """
+    """Draw the first column against the parameters."""
     column = results.study.columns[0]
     if not _is_drawable(results, column):
         raise InputError(f"no design of the study '{results.study.name}' has a value of '{column.name}'.")

@@ -29,23 +29,16 @@ class Column:
     key : str or callable
         Where a row has it: a key or an attribute, or several and places in a list joined by dots ("split.slow_Hz"), or what makes it
         of the row; what a row lacks leaves the cell empty.
-    heading, unit : str
-        What people read above it.
-    form : str
-        A format such as ".4f" or "+.3g"; without one a number has `digits` significant digits and no exponent where it can be avoided.
-    error : str
-        The key of its standard error: the value is written as far as the error's second digit, with ± and the error.
+    heading, unit : str, what people read above it.
+    form : str, a format such as ".4f" or "+.3g"; without one a number has `digits` significant digits and no exponent where it can be avoided.
+    error : str, the key of its standard error: the value is written as far as the error's second digit, with ± and the error.
     interval : (str, str)
         Keys of the ends of its interval, shown as "low … high" instead of the value; with `error` to its second digit too, with digits=0
         to the second digit of the width.
-    within : (str, str)
-        Keys of the ends of its interval: the value is written to the second digit of the width.
-    scale : float
-        What the row has times this is shown, for example 1e6 for ppm.
-    spell : callable
-        What makes a text of the row a name for people, such as `display_name` for a key of a card.
-    where : str
-        Whether it stands in the terminal, on the page, or on both.
+    within : (str, str), keys of the ends of its interval: the value is written to the second digit of the width.
+    scale : float, what the row has times this is shown, for example 1e6 for ppm.
+    spell : callable, what makes a text of the row a name for people, such as `display_name` for a key of a card.
+    where : str, whether it stands in the terminal, on the page, or on both.
     """
 
     key: Key
@@ -207,16 +200,11 @@ class Result:
 
     Attributes
     ----------
-    payload : Mapping
-        The object for programs, with its `schema`; a key `report` gets the path of the page.
-    title, lead : str
-        Of the page: a name, and one sentence of what it shows.
-    parts : Sequence[Chapter | Part]
-        What people read, in reading order; parts before the first chapter stand under "Results".
-    status : int
-        The exit status, where it is not 0.
-    printed : str
-        What the terminal shows instead of the parts, such as code or LaTeX.
+    payload : Mapping, the object for programs, with its `schema`; a key `report` gets the path of the page.
+    title, lead : str, of the page: a name, and one sentence of what it shows.
+    parts : Sequence[Chapter | Part], what people read, in reading order; parts before the first chapter stand under "Results".
+    status : int, the exit status, where it is not 0.
+    printed : str, what the terminal shows instead of the parts, such as code or LaTeX.
     """
 
     payload: dict[str, Any]

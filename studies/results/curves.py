@@ -26,8 +26,7 @@ def read_curves(figure: Drawing, left: float, bottom: float, width: float, heigh
     Parameters
     ----------
     figure : matplotlib Figure, drawn
-    left, bottom, width, height : float, inch
-        The part of the figure that the picture shows.
+    left, bottom, width, height : float, inch, the part of the figure that the picture shows.
     """
     wide, high = figure.get_size_inches()
 
