@@ -53,11 +53,9 @@ def is_table(path: str | Path) -> bool:
 def read_table(path: str | Path) -> Decays:
     """Read a table of decays."""
     table = read_columns(path, COLUMNS)
-    check_plausible(table.values, lambda row: f"{path}, line {table.line(row)}")
-    time = table.values.get("time_s")
-    if time is not None and not np.all(np.diff(time) > 0):
-        row = int(np.flatnonzero(~(np.diff(time) > 0))[0]) + 1
-        raise InputError(f"{path}, line {table.line(row)}: time_s is empty or does not increase; sort the rows.")
+    check_plausible(table.values, table.place)
+    if "time_s" in table.values:
+        table.check_order("time_s", "time_s is empty or does not increase; sort the rows.")
     return Decays(dict(table.values), {}, path=str(path))
 
 

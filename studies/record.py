@@ -9,6 +9,9 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+from numpy.typing import NDArray
+
 from studies.errors import InputError, nearest
 from studies.files.columns import Columns, read_columns, read_header
 from studies.files.parquet import is_parquet, write_table
@@ -16,9 +19,9 @@ from studies.files.writing import written_whole
 from studies.results import Drawing
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
     from pandas import DataFrame
+
+Array = NDArray[np.float64]
 
 COLUMNS = {
     "time_s": "time since the start of the run",
@@ -59,7 +62,7 @@ PROFILE_COLUMNS = ("time_s", "chamber_temperature_degC")
 class Record:
     """One run: its columns by name, and what its comment lines say of it."""
 
-    columns: "Mapping[str, NDArray[np.float64]]"
+    columns: Mapping[str, Array]
     path: str = ""
     sha256: str = ""
     instrument: str = ""
@@ -68,7 +71,7 @@ class Record:
     resolution: Mapping[str, float] = field(default_factory=dict)
     comments: tuple[str, ...] = ()
 
-    def __getitem__(self, name: str) -> "NDArray[np.float64]":
+    def __getitem__(self, name: str) -> Array:
         if name not in self.columns:
             raise InputError(
                 f"{self.path or 'record'}: the column '{name}' is missing; it has {', '.join(self.columns)}."
@@ -105,7 +108,7 @@ class Record:
 
         return f"<p>{escape(repr(self))}</p>{self.to_frame().describe().to_html()}"
 
-    def with_columns(self, more: "Mapping[str, NDArray[np.float64]]") -> "Record":
+    def with_columns(self, more: Mapping[str, Array]) -> "Record":
         """Return a new record with further (or replaced) columns."""
         return replace(self, columns={**self.columns, **more})
 
@@ -129,50 +132,31 @@ def place_in_time(records: Sequence[Record]) -> tuple[list[float], bool]:
 
 def read_record(path: str | Path) -> Record:
     """Read one run."""
-    import numpy as np
-
     if "time_s" not in (names := read_header(path)) and "temperature_degC" in names:
         raise InputError(f"{path}: this is a steady-state table (no time_s), but a record in time is needed.")
     table = read_columns(path, COLUMNS, required=("time_s",), prefixes=(COMPENSATED,))
-    time = table.values["time_s"]
-    if np.isnan(time).any():
-        row = int(np.flatnonzero(np.isnan(time))[0])
-        raise InputError(f"{path}, line {table.line(row)}: time_s is empty; every row needs its time.")
-    backwards = np.flatnonzero(np.diff(time) <= 0)
-    if len(backwards):
-        line = table.line(int(backwards[0]) + 1)
-        raise InputError(f"{path}, line {line}: time_s does not increase; sort the rows and remove repeated ones.")
+    table.refuse(np.isnan(table.values["time_s"]), "time_s is empty; every row needs its time.")
+    table.check_order("time_s", "time_s does not increase; sort the rows and remove repeated ones.")
     _check_temperatures(table)
-    check_plausible(table.values, lambda row: f"{path}, line {table.line(row)}")
+    check_plausible(table.values, table.place)
     notes = _read_notes(path, table)
     return Record(table.values, str(path), table.sha256, **notes)  # type: ignore[arg-type]
 
 
 def read_frequency_table(path: str | Path) -> Columns:
     """Read a steady-state table `temperature_degC,frequency_Hz` (HRG paper, Table 1); no value may be missing."""
-    import numpy as np
-
     table = read_columns(path, TABLE_COLUMNS, required=TABLE_COLUMNS)
-    for name in TABLE_COLUMNS:
-        gaps = np.flatnonzero(np.isnan(table.values[name]))
-        if len(gaps):
-            line = table.line(int(gaps[0]))
-            raise InputError(f"{path}, line {line}: {name} is empty; a steady-state table needs every value.")
+    table.require(TABLE_COLUMNS, "a steady-state table")
     _check_temperatures(table)
-    if (table.values["frequency_Hz"] <= 0).any():
-        line = table.line(int(np.flatnonzero(table.values["frequency_Hz"] <= 0)[0]))
-        raise InputError(f"{path}, line {line}: frequency_Hz must be positive.")
-    usual = float(np.median(f := table.values["frequency_Hz"]))
-    away = np.flatnonzero(np.abs(np.log(f / usual)) > FAR)
-    if away.size:
-        line, value = table.line(int(away[0])), f[away[0]]
-        raise InputError(
-            f"{path}, line {line}: frequency_Hz = {value:g} is far from the others (median {usual:.6g} Hz); correct or remove the line."
-        )
+    f = table.values["frequency_Hz"]
+    table.refuse(f <= 0, "frequency_Hz must be positive.")
+    usual = float(np.median(f))
+    far = f"is far from the others (median {usual:.6g} Hz); correct or remove the line."
+    table.refuse(np.abs(np.log(f / usual)) > FAR, lambda row: f"frequency_Hz = {f[row]:g} {far}")
     return table
 
 
-def reading_resolution(values: "NDArray[np.float64]") -> float:
+def reading_resolution(values: Array) -> float:
     """Return the step of readings that were rounded to decimals: one unit of the last digit that any of them shows."""
     decimals = max(len(repr(float(value)).partition(".")[2].rstrip("0")) for value in values)
     return float(10.0**-decimals)
@@ -192,8 +176,6 @@ def drop_repeats(records: "Sequence[Record]") -> tuple[list[Record], list[str]]:
 
 
 def _same(one: Record, two: Record) -> bool:
-    import numpy as np
-
     if one.sha256 and one.sha256 == two.sha256:
         return True
     return set(one.columns) == set(two.columns) and all(
@@ -203,24 +185,15 @@ def _same(one: Record, two: Record) -> bool:
 
 def read_profile(path: str | Path) -> Columns:
     """Read a chamber profile `time_s,chamber_temperature_degC`, linear between its rows."""
-    import numpy as np
-
     table = read_columns(path, PROFILE_COLUMNS, required=PROFILE_COLUMNS)
-    for name in PROFILE_COLUMNS:
-        gaps = np.flatnonzero(np.isnan(table.values[name]))
-        if len(gaps):
-            raise InputError(f"{path}, line {table.line(int(gaps[0]))}: {name} is empty; a profile needs every value.")
-    backwards = np.flatnonzero(np.diff(table.values["time_s"]) <= 0)
-    if len(backwards):
-        raise InputError(f"{path}, line {table.line(int(backwards[0]) + 1)}: time_s does not increase; sort the rows.")
+    table.require(PROFILE_COLUMNS, "a profile")
+    table.check_order("time_s", "time_s does not increase; sort the rows.")
     _check_temperatures(table)
     return table
 
 
 def write_record(record: Record, path: str | Path, progress: Callable[[int], None] | None = None) -> None:
     """Write one run, whole or not at all, as CSV or (by the end of its name) Parquet; `progress` is told the rows written so far."""
-    import numpy as np
-
     notes = header_notes(record)
     with written_whole(path) as file:
         if is_parquet(path):
@@ -244,35 +217,28 @@ def header_notes(record: Record) -> list[str]:
     return [*notes, *(f"resolution {name}: {value!r}" for name, value in record.resolution.items())]
 
 
-def check_plausible(columns: "Mapping[str, NDArray[np.float64]]", where: Callable[[int], str]) -> None:
+def check_plausible(columns: Mapping[str, Array], where: Callable[[int], str]) -> None:
     """Refuse readings that no instrument gives, naming the first; `where` tells the place of a row."""
-    import numpy as np
-
     for name, values in columns.items():
-        limits = next((ends for ending, ends in LIMITS.items() if name.endswith(ending)), None)
-        if limits is None:
-            continue
-        outside = np.flatnonzero((values < limits[0]) | (values > limits[1]))
-        if len(outside):
-            row = int(outside[0])
+        low, high = next((ends for ending, ends in LIMITS.items() if name.endswith(ending)), (-np.inf, np.inf))
+        wrong = (values < low) | (values > high)
+        if wrong.any():
+            row = int(wrong.argmax())
             raise InputError(
-                f"{where(row)}: {name} = {values[row]:g} is not a possible reading (allowed: {limits[0]:g} to {limits[1]:g}); check its"
+                f"{where(row)}: {name} = {values[row]:g} is not a possible reading (allowed: {low:g} to {high:g}); check its"
                 " unit, or leave the cell empty where the value is missing."
             )
 
 
 def _check_temperatures(table: Columns) -> None:
-    import numpy as np
-
     for name, values in table.values.items():
-        if not name.endswith("temperature_degC"):
-            continue
-        outside = np.flatnonzero((values < -200) | (values > 200))
-        if len(outside):
-            row = int(outside[0])
-            value = values[row]
-            hint = "it looks like kelvin: subtract 273.15" if 200 < value < 500 else "check its unit"
-            raise InputError(f"{table.path}, line {table.line(row)}: {name} = {value:g} cannot be in °C; {hint}.")
+        if name.endswith("temperature_degC"):
+            table.refuse(np.abs(values) > 200, lambda row: _misread(name, values[row]))  # noqa: B023
+
+
+def _misread(name: str, value: float) -> str:
+    hint = "it looks like kelvin: subtract 273.15" if 200 < value < 500 else "check its unit"
+    return f"{name} = {value:g} cannot be in °C; {hint}."
 
 
 def _read_notes(path: str | Path, table: Columns) -> dict[str, object]:
@@ -287,9 +253,8 @@ def _read_notes(path: str | Path, table: Columns) -> dict[str, object]:
             try:
                 notes["start"] = datetime.datetime.fromisoformat(value)
             except ValueError:
-                raise InputError(
-                    f"{path}: '# start: {value}' is not an ISO 8601 time such as 2026-01-31T12:00:00."
-                ) from None
+                example = "2026-01-31T12:00:00"
+                raise InputError(f"{path}: '# start: {value}' is not an ISO 8601 time such as {example}.") from None
         elif colon and key.startswith("resolution "):
             column = key.removeprefix("resolution ").strip()
             if column not in COLUMNS:

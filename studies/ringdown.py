@@ -179,11 +179,7 @@ def read_decay(
         with naming(path):
             return Decay(str(path), notes, spectrum=fit_spectrum(columns["frequency_Hz"], power))
     time = columns["time_s"]
-    if time.size > 1 and not np.all(np.diff(time) > 0):
-        row = int(np.flatnonzero(np.diff(time) <= 0)[0]) + 1
-        raise InputError(
-            f"{path}, line {table.line(row)}: time_s does not increase; a decay is one record in order of time."
-        )
+    table.check_order("time_s", "time_s does not increase; a decay is one record in order of time.")
     reference = notes.get("reference_frequency_Hz")
     with naming(path):
         if power is not None:

@@ -10,7 +10,7 @@ import hashlib
 import io
 import re
 from collections import Counter
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, TypeAlias
@@ -52,6 +52,28 @@ class Columns:
     def line(self, row: int) -> int:
         """Return the line of the file on which a row (from 0) stands, when no empty line comes before it."""
         return self.first_line + row
+
+    def place(self, row: int) -> str:
+        """Return file and line of a row, for a message."""
+        return f"{self.path}, line {self.line(row)}"
+
+    def refuse(self, wrong: "NDArray[np.bool_]", words: str | Callable[[int], str]) -> None:
+        """Refuse the first row that is wrong, by its line, and say why."""
+        if wrong.any():
+            row = int(wrong.argmax())
+            raise InputError(f"{self.place(row)}: {words if isinstance(words, str) else words(row)}")
+
+    def require(self, names: Collection[str], what: str) -> None:
+        """Refuse an empty cell in columns of which every value is needed."""
+        for name in names:
+            self.refuse(self.values[name] != self.values[name], f"{name} is empty; {what} needs every value.")
+
+    def check_order(self, name: str, words: str) -> None:
+        """Refuse a column that does not increase from row to row."""
+        values = self.values[name]
+        wrong = values != values
+        wrong[1:] |= ~(values[1:] > values[:-1])
+        self.refuse(wrong, words)
 
 
 def read_columns(
@@ -277,12 +299,8 @@ def _check_size(columns: Columns) -> None:
     import numpy as np
 
     for name, values in columns.values.items():
-        large = np.flatnonzero(np.abs(values) > LARGEST)
-        if len(large):
-            row = int(large[0])
-            raise InputError(
-                f"{columns.path}, line {columns.line(row)}: {name} = {values[row]:g} is not a possible reading; correct it."
-            )
+        large = np.abs(values) > LARGEST
+        columns.refuse(large, lambda row: f"{name} = {values[row]:g} is not a possible reading; correct it.")  # noqa: B023
 
 
 def _number(path: str | Path, line: int, name: str, cell: str) -> float:

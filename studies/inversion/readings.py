@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from shell.constants import zero_Celsius
 from studies.errors import InputError
-from studies.files.columns import Columns, read_columns, read_header
+from studies.files.columns import read_columns, read_header
 
 Array = NDArray[np.float64]
 COLUMNS = ("harmonic", "index", "frequency_Hz", "sd_Hz", "temperature_degC")
@@ -63,17 +63,12 @@ def read_modes(path: str) -> ModeReadings:
         raise InputError(f"{path}: it has no modes; give one row per mode.")
     for column, name, most in ((n, "harmonic", HIGHEST), (k, "index", HIGHEST)):
         wrong = ~np.isnan(column) & ((column < 0) | (column != np.round(column)) | (column > most))
-        _refuse(table, wrong, f"{name} must be a whole number from 0 to {most}, or empty where it is not known")
-    _refuse(table, ~(f > 0), "frequency_Hz must be a positive number")
-    _refuse(table, ~np.isnan(sd) & ~(sd > 0), "sd_Hz must be positive, or empty")
+        table.refuse(wrong, f"{name} must be a whole number from 0 to {most}, or empty where it is not known.")
+    table.refuse(~(f > 0), "frequency_Hz must be a positive number.")
+    table.refuse(~np.isnan(sd) & ~(sd > 0), "sd_Hz must be positive, or empty.")
     named = [(a, b, c) for a, b, c in zip(n, k, T, strict=True) if not np.isnan(a) and not np.isnan(b)]
     if len({tuple(map(repr, one)) for one in named}) < len(named):
         raise InputError(f"{path}: a mode is listed twice; give the mean of its readings, and of a split pair.")
     stated = np.where(np.isnan(sd), USUAL * f, sd)
     lines = tuple(table.line(row) for row in range(count))
     return ModeReadings(path, n, k, f, stated, T + zero_Celsius, lines, bool(np.isnan(sd).any()))
-
-
-def _refuse(table: Columns, wrong: NDArray[np.bool_], rule: str) -> None:
-    if wrong.any():
-        raise InputError(f"{table.path}, line {table.line(int(np.flatnonzero(wrong)[0]))}: {rule}.")

@@ -160,8 +160,7 @@ def read_field(path: str | Path) -> ShellTemperature:
 
     table = read_columns(path, FIELD_COLUMNS, required=FIELD_COLUMNS)
     position, temperature = (table.values[name] for name in FIELD_COLUMNS)
-    if np.isnan(position).any() or np.isnan(temperature).any():
-        raise InputError(f"{path}: a temperature field needs every value.")
+    table.require(FIELD_COLUMNS, "a temperature field")
     if (np.diff(position) <= 0).any() or position[0] < 0 or position[-1] > 1:
         raise InputError(f"{path}: position must rise within 0 (start of the meridian) to 1 (rim).")
     return ShellTemperature(position, temperature)
