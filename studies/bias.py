@@ -172,7 +172,7 @@ def study_bias(
 def _spectrum(values: Array, step: float) -> Stability | None:
     if values.size < FEWEST_FOR_ALLAN:
         return None
-    allan = allan_deviation(values, step)
+    allan = allan_deviation(values, step, confidence=0.9)
     return Stability(allan, fit_noise(allan))
 
 

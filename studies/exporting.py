@@ -6,8 +6,8 @@ from typing import IO, Any
 
 from studies.files.writing import written_whole
 from studies.importing.formats import load_library
+from studies.instrument.units import unit_of
 from studies.record import Record, header_notes, write_record
-from studies.reports.survey import unit_of
 
 GROUP = "record"
 
@@ -28,7 +28,7 @@ def export_record(record: Record, kind: str, path: str) -> None:
 
 
 def _unit(name: str) -> str:
-    return "s" if name == "time_s" else unit_of(name)
+    return "s" if name == "time_s" else unit_of(name).removeprefix("1")
 
 
 def write_matlab(record: Record, file: IO[bytes]) -> None:

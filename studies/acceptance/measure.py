@@ -29,7 +29,7 @@ BLOCK = 100.0
 """Averaging of the output over temperature (s)."""
 WARM_BLOCK = 10.0
 MOST_POINTS = 100_000
-CONFIDENCE = 0.95
+CONFIDENCE = 0.9
 YEAR = 365.25 * 86400.0
 
 

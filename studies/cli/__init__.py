@@ -58,7 +58,7 @@ CHAPTERS: dict[str, dict[str, str]] = {
     "Calibrate, diagnose and accept": {
         "calibrate": "Estimate the uncertain values of a card from records, with intervals.",
         "diagnose": "Find what the simulation gets wrong, its cause, and the gain from correcting it.",
-        "fleet": "Calibrate and diagnose a lot of devices: what it shares, who differs, charts.",
+        "fleet": "Calibrate and diagnose a lot of devices: shared causes, odd devices, charts.",
         "effects": "List the physical effects for diagnosis and cards.",
         "acceptance": "Evaluate records against limits with the tests of IEEE 1431.",
     },

@@ -29,7 +29,7 @@ MEASURED = (
     QUANTITY,
     "section",
     Column("value", "value", within=("low", "high")),
-    Column("value", "95 % interval", interval=("low", "high"), digits=0),
+    Column("value", "90 % interval", interval=("low", "high"), digits=0),
     Column("shown_unit", "unit"),
     Column("shown_limit", "limit"),
     "verdict",
@@ -49,7 +49,7 @@ def acceptance(card: str, *runs: str, limits: str | None = None, output: str = "
 
     Each record serves the test that its columns show: rest over temperature, rest for an hour or more, several applied rates, a swept
     rate, or a free decay: vibration_amplitude_V, or raw samples, lock-in pairs or a power as hrg fit ringdown reads them. A line '# test: warm-up' (or temperature, scale-factor, drift, run-down, transfer,
-    angle-storage) above the header overrides this; warm-up and angle storage need it. Every value has a 95 % interval; a limit is
+    angle-storage) above the header overrides this; warm-up and angle storage need it. Every value has a 90 % interval; a limit is
     judged only if the whole interval lies on one side of it.
 
     Parameters
@@ -113,7 +113,7 @@ def acceptance(card: str, *runs: str, limits: str | None = None, output: str = "
     ]  # fmt: skip
     lead = (
         f"{len(runs)} record{'s' * (len(runs) != 1)} of {instrument.name}, judged in the order of section 12 of IEEE"
-        f" Std 1431-2004. Intervals are 95 %; the zero-rate output is {output}."
+        f" Std 1431-2004. Intervals are 90 %; the zero-rate output is {output}."
     )
     return Result(payload, f"Acceptance of {instrument.name}: {found.verdict}", lead, parts)
 
@@ -171,7 +171,7 @@ def _drift(found: Acceptance) -> list[Figure | Sentence]:
 
     def draw() -> Drawing:
         with style.figure(height=3.6, x="averaging time τ (s)", y="Allan deviation (°/h)") as (made, axes):
-            axes.fill_between(allan.tau, allan.low, allan.high, color=style.SKY, alpha=0.3, label="95 % interval")
+            axes.fill_between(allan.tau, allan.low, allan.high, color=style.SKY, alpha=0.3, label="90 % interval")
             axes.loglog(allan.tau, allan.deviation, "o-", markersize=3, label="overlapping Allan deviation")
             tau = np.geomspace(allan.tau[first], allan.tau[-1], 100)
             axes.loglog(tau, noise.deviation(tau), "--", color=style.VERMILION, label="fit N, B, K")

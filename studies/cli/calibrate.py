@@ -43,7 +43,7 @@ def calibrate(
     ----------
     data : str
         Records (CSV) of one device, and steady-state tables (temperature_degC,frequency_Hz); or one table of modes
-        (harmonic,frequency_Hz, and if known index, sd_Hz, temperature_degC; harmonic may be empty): then elastic values and dimensions.
+        (harmonic,frequency_Hz, and if known index, sd_Hz, temperature_degC; harmonic may be empty), which calibrates elastic values and dimensions.
     save : str
         Write the calibrated card: most probable values with their posterior widths. Not saved, with exit status 2, if the fit
         did not converge, determined no value, or moved one by more than 6 of the card's standard deviations.

@@ -45,12 +45,10 @@ UNTOUCHED = 0.9995
 WIDTHS = "Shift: change in prior standard deviations. Width: posterior over prior standard deviation; the modes determine a value up to 0.5."
 READ = (
     "Noise: of the reading and of the solver. Chance: probability that the reading is of this mode. The modes are those of the bare"
-    " resonator, of a pair the mean: electrodes, films and the mount are not in them."
+    " resonator (of a pair, the mean), without electrodes, films or mount."
 )
-TIED = (
-    "Known only together: {}. The modes do not tell all of them; weigh the resonator, or measure what they leave open."
-)
-MEASURE = "The mode not yet measured that would lower the variance of each value most, read as well as the others; ± one standard deviation."
+TIED = "Only a combination is determined: {}. Weigh the resonator, or measure one of these directly."
+MEASURE = "For each value, the unmeasured mode that would reduce its variance most, read with the same noise; ± one standard deviation."
 
 
 def calibrate_modes(instrument: Instrument, path: str, save: str | None, exact: Sequence[str]) -> Result:
@@ -106,7 +104,7 @@ def _payload(found: ModeCalibration, save: str | None) -> dict[str, Any]:
         readings.lines, fit.modes, readings.frequency, fit.residual, fit.noise, found.chance, found.rivals, strict=True
     )
     undecided = [line for line, chance in zip(readings.lines, found.chance, strict=True) if chance < 0.95]
-    said = [f"{readings.path}, line {line}: the readings do not decide which mode this is." for line in undecided]
+    said = [f"{readings.path}, line {line}: the readings do not determine which mode this is." for line in undecided]
     return {
         "schema": "hrg.mode-calibration/1",
         "card": found.card.name,

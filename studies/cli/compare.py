@@ -16,7 +16,7 @@ from studies.results import Column, Result, Table, row_of
 
 @answers("hrg.compare/1")
 def compare(*card: str) -> Result:
-    """Show designs side by side: where their cards differ, and what that does to modes, slope and settling.
+    """Show designs side by side: where their cards differ, and the effects on modes, TCF and settling.
 
     Parameters
     ----------

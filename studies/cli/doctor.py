@@ -18,7 +18,7 @@ OPTIONAL = (
 
 @answers("hrg.doctor/1")
 def doctor() -> Result:
-    """Show versions, OpenGL and the optional parts, with the remedy for what is missing.
+    """Show versions, OpenGL and the optional parts, and how to install what is missing.
 
     Exit status 3 when pictures cannot be drawn.
 

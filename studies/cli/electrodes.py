@@ -33,7 +33,7 @@ def electrodes(
     limit: Annotated[float, POSITIVE] = 100.0,
     temperature: Temperature = None,
 ) -> Result:
-    """Show what the card's table [electrodes] does to a pair: softening, split, coefficients, pull-in, trim voltages.
+    """Show the effects of the card's table [electrodes] on a mode pair: softening, split, coefficients, pull-in, trim voltages.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ def electrodes(
     harmonic : int
         Harmonic n of the pair.
     split : float
-        Split in Hz to be nulled; that of the whole card, if it has one, unless given.
+        Split in Hz to be nulled; by default that of the card.
     axis : float
         Azimuth in degrees of an antinode of its slower mode.
     limit : float
@@ -103,7 +103,7 @@ def _parts(payload: dict[str, Any], split: float, resolved: bool, keys: Electrod
         ("softening by the card's voltages", payload["softening_ppm"], "ppm"),
         ("split by the card's voltages", *((1e3 * payload["split_Hz"], "mHz") if resolved else ("none", ""))),
         ("sensitivity to all voltages", payload["per_volt_ppm"], "ppm/V"),
-        ("sensitivity to temperature, by the gap", payload["per_kelvin_ppm"], "ppm/K"),
+        ("sensitivity to temperature, through the gap", payload["per_kelvin_ppm"], "ppm/K"),
         ("pull-in safety factor of the voltages", "unlimited" if isinf(factor) else factor, ""),
         (f"largest split nulled by up to {limit:g} V, any axis", 1e3 * payload["reach_Hz"], "mHz"),
     )

@@ -29,7 +29,7 @@ COLOURED = 3.0  # residual over its white part, above which the chain of lags is
 
 @answers("hrg.fit-thermal/1")
 def fit_thermal(*data: str, card: str | None = None, lags: int | None = None, confidence: Confidence = 0.9) -> Result:
-    """Find the time constants with which the resonator follows its housing, with intervals, and what the records leave open.
+    """Find the time constants with which the resonator follows its housing, with intervals, and what the records do not determine.
 
     The records need time_s, frequency_Hz and housing_temperature_degC (or chamber_temperature_degC). The model is a series of
     lags with heat exchange by conduction and radiation. The initial temperatures of each run are fitted, and the noise may

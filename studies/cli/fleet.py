@@ -14,9 +14,9 @@ from studies.results import Result
 
 @answers("hrg.fleet/2", page=False)
 def fleet(folder: str, *, out: str, card: str | None = None, workers: Annotated[int, COUNT] = 1) -> Result:
-    """Calibrate and diagnose all devices of a lot: what it shares, which devices and batches differ, control charts.
+    """Calibrate and diagnose all devices of a lot: common causes, odd devices and batches, control charts.
 
-    Run it again to go on, or after adding devices: only what is missing or has changed is worked out.
+    Run it again to go on, or after adding devices: only new or changed devices are computed.
 
     Parameters
     ----------
@@ -28,7 +28,7 @@ def fleet(folder: str, *, out: str, card: str | None = None, workers: Annotated[
     card : str
         The card of the design. Without it each device gets a polynomial card from its records.
     workers : int
-        Devices that are worked out at the same time.
+        Devices processed at the same time.
     """
     from studies.cli.output import dump_json
     from studies.fleet.folder import read_lot

@@ -47,8 +47,8 @@ def loss(
 ) -> Result:
     """Show Q over temperature, its loss contributions, and which of them to reduce first.
 
-    Heat through the wall, loss of the bulk and of the surface follow from geometry and material; films, gas, activated losses,
-    imbalance and what the mount takes are keys of the card's table [loss] and of [[loss.film]] and [[loss.activated]].
+    Thermoelastic, bulk and surface losses follow from geometry and material. Films, gas, activated losses, imbalance and
+    mount loss are set in the card's table [loss], in [[loss.film]] and [[loss.activated]].
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ def loss(
     return Result(
         payload,
         f"Loss budget of {instrument.name}",
-        f"1/Q of the mode n = {harmonic} at {model.frequency:.1f} Hz as a sum of parts, each computed from the mode ({theory} theory).",
+        f"1/Q of the mode n = {harmonic} at {model.frequency:.1f} Hz as a sum of contributions, each computed from the mode ({theory} theory).",
         [*_parts(payload, model, budget, stated, at), Chapter("In a simulation", [_simulated(instrument)])],
     )
 
@@ -86,8 +86,8 @@ def _simulated(instrument: Instrument) -> str:
     own = instrument.loss.inverse_q
     given = "the card's" if "inverse_q" in instrument.content.get("loss", {}) else "the default of"
     return (
-        f"Simulations do not use this budget: they take {given} [loss] inverse_q = {own:.3g} (Q = {1 / own:.3g}). State a part of the"
-        " loss in the card, such as loss.surface_layer_pm, to simulate with the budget."
+        f"Simulations do not use this budget: they use {given} [loss] inverse_q = {own:.3g} (Q = {1 / own:.3g}). Give a contribution"
+        " in the card, such as loss.surface_layer_pm, to simulate with the budget."
     )
 
 
@@ -136,16 +136,16 @@ def _parts(
         stated.verdict if stated is not None else "",
     ]
     return [
-        Chapter("In short", [
+        Chapter("Summary", [
             Facts(_facts(budget, stated, at, degrees[at])),
             *words,
             Figure(lambda: pictures.bars(budget, at), f"Parts of 1/Q at {degrees[at]:g} °C with 90 % intervals."),
         ]),
         Chapter(f"Parts at {degrees[at]:g} °C", [
             Table("Share and gain", rows, [
-                name, Column("share", "share", "%", ".3g"), *values, interval, Column(f"slope_per_K.{at}", "slope", "%/°C", "+.2f", scale=100.0),
+                name, Column("share", "share", "%", ".3g"), *values, interval, Column(f"slope_per_K.{at}", "slope", "%/°C", "+.2g", scale=100.0),
                 Column("half", "Q if halved", digits=3), Column("without", "Q without it", digits=3),
-            ], "Largest first; all columns but 1/Q at the temperature above."),
+            ], "Largest first; all columns except 1/Q are at the temperature above."),
             Table("Remedies and sources", rows, [
                 name, Column("relative_sd", "standard uncertainty", "%", ".0f", scale=100.0), Column("advice", "remedy"), Column("source", "source"),
             ]),
@@ -153,7 +153,7 @@ def _parts(
         Chapter("Over temperature", [
             Table("Q", over, [
                 T, Column("q", "Q", digits=3), Column("q", "90 % interval", digits=3, interval=("q_low", "q_high")),
-                Column("inverse_q", "1/Q", "1e-9", ".3g", scale=1e9), Column("slope", "slope of 1/Q", "%/°C", "+.2f", scale=100.0),
+                Column("inverse_q", "1/Q", "1e-9", ".3g", scale=1e9), Column("slope", "slope of 1/Q", "%/°C", "+.2g", scale=100.0),
             ]),
             Figure(lambda: pictures.course(budget, stated, model.vibration.reference), "1/Q and its parts.") if len(degrees) > 1 else None,
         ]),
@@ -166,7 +166,7 @@ def _parts(
             Table("Damping anisotropy", damped, [
                 T, Column("inverse_q_split", "Δ(1/Q)", "1e-9", ".3g", scale=1e9), Column("damping_axis_deg", "axis", "°", ".2f"),
                 Column("largest_drift_deg_per_h", "largest drift", "°/h"),
-            ], "Axis: azimuth of the pattern with the largest damping. The drift goes as sin 2n of the angle from it."),
+            ], "Axis: azimuth of the pattern with the largest damping. The drift is proportional to sin 2n of the angle from it."),
         ]),
         Chapter("Not included", [
             *(Sentence(_sentence(words), where="page") for words in model.left_out),
@@ -178,7 +178,7 @@ def _parts(
 def _facts(budget: Budget, stated: StatedLoss | None, at: int, degrees: float) -> list[tuple[str, str, str]]:
     low, high = (float(end[at]) for end in budget.interval)
     without = float(budget.without(budget.first.name)[at])
-    gain = f"Q would be {plain(without)} without it" if np.isfinite(without) else "no other part is known"
+    gain = f"Q would be {plain(without)} without it" if np.isfinite(without) else "no other contribution is known"
     facts = [
         (f"Q at {degrees:g} °C", plain(1 / budget.inverse_q[at]), f"90 %: {plain(1 / high)} … {plain(1 / low)}"),
         ("Largest part", budget.first.name, gain),

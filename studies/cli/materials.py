@@ -19,7 +19,7 @@ def materials(name: str = "", *, compare: bool = False, card: Card = "", harmoni
     name : str
         Show one material's laws with their properties, sources and ranges.
     compare : bool
-        Compare all laws in the geometry of --card (free-dome unless given): frequency, its slope, thermoelastic Q and what the surface must be.
+        Compare all laws in the geometry of --card (free-dome unless given): frequency, TCF, thermoelastic Q, and the surface loss worth reaching.
     """
     from shell.materials import read_materials, spell
     from studies.errors import InputError, nearest
@@ -55,13 +55,12 @@ COMPARED = (
     Column("frequency_Hz", "f", "Hz", error="frequency_sd_Hz"),
     Column("slope_ppm_per_degC", "TCF", "ppm/°C", error="slope_sd_ppm_per_degC"),
     Column("thermoelastic_q", "thermoelastic Q", digits=3),
-    Column("surface_q", "Q of the surface", digits=3),
-    Column("surface_layer_pm", "surface worth", "pm", ".3g"),
+    Column("surface_q", "surface Q", digits=3),
+    Column("surface_layer_pm", "break-even surface", "pm", ".3g"),
 )
 WORTH = (
-    "Thermoelastic Q: of the heat flow alone. Q of the surface: where a source states a surface layer's depth times loss. Surface worth: the"
-    " depth times loss of a surface layer that loses as much as the heat flow; a better surface gains little. Empty: no source states what it"
-    " needs (below)."
+    "Thermoelastic Q: from heat conduction alone. Surface Q: where a source gives the depth times loss of a surface layer. Break-even surface:"
+    " the depth times loss at which the surface loses as much as heat conduction; a better surface gains little. Empty: no source (see below)."
 )
 
 
@@ -83,7 +82,7 @@ def _compare(card: str, harmonic: int) -> Result:
         f"Mode n = {harmonic} at {head['temperature_degC']:g} °C in one geometry, by thermoelastic Q; ± one standard deviation.",
         [
             Table(f"Geometry of {instrument.name}, n = {harmonic}", rows, COMPARED, WORTH),
-            Table("Not stated, or taken as", remarks, ("material", "law", "remark")),
+            Table("Remarks", remarks, ("material", "law", "remark")),
         ],
     )  # fmt: skip
 

@@ -32,11 +32,11 @@ def mesh(
 ) -> Result:
     """Mesh the solid for a finite-element program: shell, roots, fillets, corners and stem, node on node.
 
-    The elements are quadratic hexahedra, and wedges on the axis; all nodes lie on the true surfaces. The ending of --out
-    chooses: .vtu for VTK and ParaView, .msh for Gmsh (format 2.2), .inp for Abaqus and CalculiX. Lengths are in m. What
-    the support holds is the group or set "held" (in .vtu: the point data "held"). The faces and the rim depart as the card's
-    [imperfection] says; its masses and changes of the material are not in a mesh. The mesh of free-dome as it comes gives n = 2
-    in CalculiX 0.5 % too high, with --around 72 --spacing-mm 1.5 0.2 %.
+    The elements are quadratic hexahedra, and wedges on the axis; all nodes lie on the true surfaces. The extension of
+    --out selects the format: .vtu for VTK and ParaView, .msh for Gmsh (2.2), .inp for Abaqus and CalculiX. Lengths are in m.
+    The supported nodes form the group or set "held" (in .vtu: the point data "held"). The mesh includes the departures of faces
+    and rim in the card's [imperfection], but not its masses and material variations. With the default mesh of free-dome, CalculiX
+    gives n = 2 0.5 % too high; with --around 72 --spacing-mm 1.5, 0.2 %.
 
     Parameters
     ----------

@@ -67,9 +67,9 @@ def modes(
     theory : str
         solid (three-dimensional), shell (Naghdi) or rayleigh (closed form, hemisphere of constant thickness).
     tolerance : float
-        Relative error that the frequency may have against its own theory.
+        Largest relative discretization error of the frequency.
     sensitivities : bool
-        Show how each frequency follows E, ν, ρ, thickness and radius, and where its energy is.
+        Show the sensitivities of each frequency to E, ν, ρ, thickness and radius, and where its energy is.
     spin : float
         Rate of rotation about the axis in °/s: frequencies of the two travelling waves, with second-order effects.
     amplitude : float
@@ -157,7 +157,7 @@ def _detail_tables(modes: list[dict[str, Any]], where: Where) -> list[Table]:
     kinds = {"bending": "bending", "membrane": "membrane", "shear": "transverse shear", "root": "root", "stem": "stem"}
     shares = [Column(f"energy_fractions.{key}", name, form=".3f", scale=100.0) for key, name in kinds.items()]
     mass = Column("modal_mass_kg", "modal mass", "g", ".4f", scale=1e3)
-    note = "ν at constant E; ln r scales every length but the thickness. Modal mass for a largest displacement of 1."
+    note = "ν at constant E; ln r scales every length but the thickness. Modal mass: for a maximum displacement of 1."
     return [
         Table("Derivatives of ln f", modes, [*MODE, *slopes, mass], note, where),
         Table("Strain energy (%)", modes, [*MODE, *shares], "Root: the solid cap, fillet or corner.", where),

@@ -30,7 +30,7 @@ from studies.results.page import Block
 def optimise(design: str, *, out: str, workers: Workers = None, quiet: Quiet = False) -> Result:
     """Find dimensions of a resonator for objectives under constraints; every answer is verified by full solves.
 
-    Run again with the same folder to resume: designs that are computed are never computed again, and objectives, limits and bounds
+    Run again with the same folder to resume: finished designs are never computed again, and objectives, limits and bounds
     may change between runs.
 
     Parameters
@@ -117,7 +117,7 @@ def _parts(found: Answer, payload: dict[str, Any]) -> list[Any]:
     ]
     reasons = Counter(reason for _, reason in found.failures)
     several = len(goals) > 1
-    price = "price, parts of the ranges" if several else f"price, {label[goals[0][0]]} per unit"
+    price = "price, by fractions of the ranges" if several else f"price, {label[goals[0][0]]} per unit"
     words = "" if all(_agree(row) for row in payload["columns"]) else " The solve from the card differs: see the table."
     keys = found.task.study.names[: found.task.free]
     front = [Column(itemgetter(name), name.removeprefix("resonator."), digits=5) for name in keys]
@@ -131,27 +131,27 @@ def _parts(found: Answer, payload: dict[str, Any]) -> list[Any]:
                 Column("low", "lowest"), Column("high", "highest"), "at bound",
             ]),
             Table("Before and after", payload["columns"], [
-                Column("label", "quantity"), Column(lambda row: row["unit"] if row["unit"] != "1" else None, "unit"), Column("start", "before", digits=6), Column("interpolant", "best, by the interpolant", digits=7),
+                Column("label", "quantity"), Column(lambda row: row["unit"] if row["unit"] != "1" else None, "unit"), Column("start", "before", digits=6), Column("interpolant", "best, interpolated", digits=7),
                 Column("best", "best, full solve", digits=7),
-            ], "The interpolant goes through all other designs; full solve: the design itself, solved again from its card with the same result."
-               " A separation counts by its magnitude; its sign says on which side the nearest mode is."),
-            Figure(lambda: pictures.section(best_instrument(found)), "Section of the best design, at rest and at full swing."),
+            ], "Interpolated: from all other designs. Full solve: the design itself, solved again from its card with the same result."
+               " Only the magnitude of a separation counts; its sign shows on which side the nearest mode lies."),
+            Figure(lambda: pictures.section(best_instrument(found)), "Section of the best design, at rest and at maximum displacement."),
         ]),
         Chapter("About the best design", [Blocks(lambda: _live(found))]),
         Chapter("Constraints", [
-            Table("Limits and what they cost", payload["constraints"], [
+            Table("Cost of the limits", payload["constraints"], [
                 Column(lambda row: named(row["column"]), "quantity"), Column("kind", "limit is"), Column("limit", "limit", digits=7), Column("value", "value", digits=7),
                 Column("room", "room", digits=3), Column(lambda row: row["margin"] or None, "margin for tolerances", digits=3), Column("price", price, digits=3),
-            ], "Price: what the objective would gain if the limit gave way by one unit of its column, to first order and before rounding; empty where the limit holds"
-               " nothing back."),
+            ], "Price: gain of the objective per unit by which the limit is relaxed, to first order and before rounding; empty where the limit"
+               " is not active."),
         ]),
         Chapter("Front", [
             "One design is best in every objective: they do not conflict here." if several and len(payload["front"]) == 1 else None,
-            Figure(lambda: pictures.front(found), "All designs that keep the constraints, and those that no other beats.") if several else None,
-            Table("Designs that no other beats", payload["front"], front),
+            Figure(lambda: pictures.front(found), "All designs that meet the constraints, and the Pareto front.") if several else None,
+            Table("Pareto front", payload["front"], front),
         ]),
         Chapter("Tolerances", [
-            Table("What the tolerances do", payload["tolerances"], [
+            Table("Effect of the tolerances", payload["tolerances"], [
                 Column(lambda row: named(row["column"]), "quantity"), Column("value", "value", digits=6), Column("worst_case", "worst case ±", digits=3), Column("sd", "standard deviation", digits=3),
                 Column("value", "full solves", digits=6, interval=("low", "high")), Column("passed", "within limits", "%", ".1f", scale=100.0),
             ], "Worst case and standard deviation to first order; full solves: the extremes among the worst corners and designs drawn from the tolerances."),

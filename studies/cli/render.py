@@ -47,7 +47,7 @@ def render(
 ) -> Result:
     """Show a mode shape: the real solid, its nodes (red) and antinodes (black dots), the undeformed shape in grey.
 
-    The ending of --out chooses: .png a picture, .webp or .gif a looping animation, .html an interactive page that works
+    The extension of --out selects the format: .png a picture, .webp or .gif a looping animation, .html an interactive page that works
     offline, .glb a mesh in which the mode swings, .stl or .ply the solid for slicers, in mm.
     A card with an imperfection shows the slower mode of the split pair on its axis, the shell's departures exaggerated in
     pictures and true in .stl and .ply; lines across the rim are the axes of the slower (blue) and the faster mode (orange).
@@ -61,7 +61,7 @@ def render(
     out : str
         File to write.
     harmonic : tuple[int, ...]
-        Circumferential harmonic n, 2 unless given; several only for .html, where one chooses among them.
+        Circumferential harmonic n, 2 unless given; several only for .html, which lets you choose among them.
     index : int
         0 for the lowest mode of its harmonic.
     temperature : tuple[float, ...]

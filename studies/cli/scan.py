@@ -141,7 +141,7 @@ def _parts(found: Scan, payload: dict[str, Any]) -> list[Chapter]:
         note += " <: 95 % limit of a split that is not significant and has no axis."
     only = Sentence("Only one face was measured; the other is assumed perfect.", "warning") if len(faces) == 1 else None
     return [
-        Chapter("In short", [Facts(_facts(payload), "page"), only,
+        Chapter("Summary", [Facts(_facts(payload), "page"), only,
             Table("Frequency splits from the measured faces", list(map(_significant, splits)), SPLITS, note)]),
         Chapter("Maps", [Figure(lambda: pictures.maps(found), "Fitted deviations over azimuth and meridian.")]),
         Chapter("Circumferential harmonics", [

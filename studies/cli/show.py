@@ -11,6 +11,7 @@ import numpy as np
 
 from studies.cli.output import answers, say
 from studies.errors import InputError
+from studies.instrument.display import display_name
 from studies.record import read_record
 from studies.reports import survey as parts
 from studies.reports.digits import plain
@@ -48,7 +49,7 @@ def show(*runs: str) -> Result:
         "records": told,
         "uses": [row_of(use, "command", "line", "missing") | {"ready": not use.missing} for use in uses],
     }
-    lead = f"{', '.join(runs)} as recorded: nothing is fitted, and nothing left out."
+    lead = f"{', '.join(runs)} as recorded, without fitting or editing."
     return Result(
         payload,
         f"Record {Path(runs[0]).name}" if len(runs) == 1 else f"{len(runs)} records",
@@ -64,7 +65,7 @@ def show(*runs: str) -> Result:
 
 def _facts(survey: Survey) -> list[tuple[str, str, str]]:
     record, span = survey.record, float(np.ptp(survey.record["time_s"]))
-    even = "even" if survey.even else "uneven or with gaps"
+    even = "regular" if survey.even else "irregular or with gaps"
     about = " ".join(filter(None, (record.instrument, record.start.isoformat() if record.start else "")))
     return [
         (record.path, f"{len(record):,} rows", about),
@@ -76,7 +77,7 @@ def _facts(survey: Survey) -> list[tuple[str, str, str]]:
 def _warnings(surveys: list[Survey]) -> list[Sentence]:
     """Say which readings look wrong, and how to leave them out."""
     found = [
-        f"{survey.record.path}, {column.name}: {words} {count}"
+        f"{survey.record.path}, {display_name(column.name)}: {words}: {count}"
         for survey in surveys
         for column in survey.columns
         for count, words in (

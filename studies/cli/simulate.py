@@ -32,7 +32,7 @@ def simulate(
     boundary: Literal["chamber", "housing"] | None = None,
     spread: bool = False,
 ) -> Result:
-    """Run a virtual gyro through a chamber profile, or drive it as a record was driven, and write the record.
+    """Run a virtual gyro through a chamber profile, or through the temperatures of a record, and write the record.
 
     With [loop] in mode whole-angle, the wave precesses with the applied rate, the self-precession, and the drift by damping and
     electronics; a column pattern_angle_deg of the record or profile prescribes its azimuth instead.
@@ -48,7 +48,7 @@ def simulate(
         durations as 5h, 30min or 90s, and rates in K/min: "soak T DURATION", "step FROM TO DURATION",
         "ramp FROM TO RATE", "staircase FROM TO STEP HOLD", "cycle START FIRST SECOND RATE HOLD COUNT", joined by "then";
         for example "step 20 -10 5h then ramp -10 40 1". Or a record: its housing column, else its chamber column, is
-        imposed on its own rows. The gyro has settled at the first temperature.
+        imposed on its own rows. The gyro starts settled at the first temperature.
     out : str
         The record to write.
     row : float
@@ -58,7 +58,7 @@ def simulate(
     boundary : str
         Column of a record that is imposed: chamber or housing.
     spread : bool
-        Show the standard deviation of every column, without noise, that follows from the uncertainties of the card.
+        Show the standard deviation of every column due to the uncertainties of the card, without noise.
     """
     instrument = load_card(card)
     run = simulate_run(instrument, load_drive(profile, boundary, 1 / row), 1 / row, seed, not noiseless, theory)
@@ -96,7 +96,7 @@ def simulate(
     return Result(
         summary,
         f"Virtual run of {instrument.name}",
-        f"A run through {profile}; the {summary['boundary']} is imposed.",
+        f"Run through {profile}; the {summary['boundary']} temperature is imposed.",
         [
             f"{out}: {rows} rows over {length:g} s; the resonator's temperature varies by {span:.2f} K.",
             f"Frequency law: interpolation error {run.law.interpolation_error:.0e}, solver error {run.law.solver_error:.0e}, both relative.",

@@ -21,7 +21,7 @@ from studies.results import Column, Drawing, Figure, Result, Table, rows_of
 
 MOST_HARMONIC = 50  # a law of a higher one takes minutes
 PARTS = {"E": "E", "nu": "ν", "rho": "ρ", "h": "h", "r": "r", "base": "base"}
-CAPTION = "Slope of the frequency with its standard deviation (band), and its parts."
+CAPTION = "Slope of the frequency with its standard deviation (band), and its contributions."
 LEAST = 0.005  # ppm/°C, that is shown
 
 
@@ -36,15 +36,15 @@ def tcf(
     theory: Literal["solid", "shell", "rayleigh"] = "solid",
     measured: str | None = None,
 ) -> Result:
-    """Show the frequency over temperature, its slope in ppm/°C, and the slope's parts from E, ν, ρ, h, r and a [mount].
+    """Show the frequency over temperature, its slope in ppm/°C, and the contributions of E, ν, ρ, h, r and the [mount].
 
     Parameters
     ----------
     theory : str
         solid (three-dimensional), shell (Naghdi) or rayleigh (closed form).
     measured : str
-        A steady-state table (temperature_degC,frequency_Hz) whose local slopes stand beside; with the card hrg-30mm it is
-        the HRG paper's Table 1 unless another is given.
+        A steady-state table (temperature_degC,frequency_Hz) to compare by its local slopes; for the card hrg-30mm,
+        Table 1 of the HRG paper unless another is given.
     """
     if harmonic > MOST_HARMONIC and theory != "rayleigh":
         raise InputError(
@@ -69,7 +69,7 @@ def tcf(
         "measured": local,
     }
     parts = [name for name in PARTS if name != "base" or law.mount]
-    note = f"Slopes in ppm/°C; ±: one standard deviation by the prior of the law '{instrument.material.law}'."
+    note = f"Slopes in ppm/°C; ±: one standard deviation, from the prior of law '{instrument.material.law}'."
     if law.mount:
         note += " Base: stress from the thermal mismatch of the card's [mount]."
     columns = [
@@ -86,7 +86,7 @@ def tcf(
     return Result(
         payload,
         f"Frequency of {instrument.name} over temperature",
-        f"Mode n = {harmonic}, {theory} theory: the slope of the frequency and its parts from elastic constants, density and dimensions.",
+        f"Mode n = {harmonic}, {theory} theory: the slope of the frequency, and the contributions of elastic constants, density and dimensions.",
         [
             Table(f"{instrument.name}, n = {harmonic}, {theory}", points, columns, note),
             Figure(lambda: _curves(points, parts, local), CAPTION) if len(points) > 1 else None,
@@ -94,7 +94,7 @@ def tcf(
                 Column("coefficient", "quantity", spell=display_name), Column("coefficient", "key"),
                 Column("sd", "standard deviation", form=".2g"), *moved,
             ]),
-            Table("Measured slope between neighbouring points", local, [
+            Table("Measured slope between adjacent points", local, [
                 Column("temperature_degC", "T", "°C", ".1f"), Column("slope_ppm_per_degC", "slope", "ppm/°C", ".2f"),
             ]),
             live_chapter(instrument, harmonic, theory),

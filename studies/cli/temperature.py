@@ -24,7 +24,7 @@ NOTE = (
 def temperature(model: str, run: str, /, *, out: str | None = None) -> Result:
     """Turn the frequency of a record into the resonator's temperature (HRG paper, equation 18, Table 2 and Figure 5).
 
-    No thermometer is needed: the resonator is its own. The record is written again with a column
+    No thermometer is needed: the resonator serves as one. The record is written again with a column
     resonator_temperature_degC, over which 'hrg fit bias --over temperature' can compensate other outputs.
 
     Parameters
@@ -34,7 +34,7 @@ def temperature(model: str, run: str, /, *, out: str | None = None) -> Result:
     run : str
         A record (CSV) with frequency_Hz.
     out : str
-        Where the record with the temperature goes.
+        Write the record with the temperature.
     """
     loaded = read_model(model)
     if loaded.kind != "frequency":
@@ -69,7 +69,7 @@ def temperature(model: str, run: str, /, *, out: str | None = None) -> Result:
                 ("Uncertainty of the curve", f"± {sd:.2g} K", "one standard deviation of the fitted f(T)"),
             ]),
             differs,
-            f"{empty} rows have no frequency and stay empty." if empty else "",
+            f"{empty} rows have no frequency and remain empty." if empty else "",
             doubt,
             Figure(lambda: _figure(record, found), "Temperature of the resonator over time."),
             Sentence(NOTE, "note", "page"),

@@ -43,7 +43,7 @@ def thermal(
         A CSV file (time_s,chamber_temperature_degC, linear between its rows), or words in quotes with temperatures in °C,
         durations as 5h, 30min or 90s, and rates in K/min: "soak T DURATION", "step FROM TO DURATION",
         "ramp FROM TO RATE", "staircase FROM TO STEP HOLD", "cycle START FIRST SECOND RATE HOLD COUNT", joined by "then";
-        for example "step 20 -10 5h then ramp -10 40 1". The gyro has settled at its first temperature.
+        for example "step 20 -10 5h then ramp -10 40 1". The gyro starts settled at its first temperature.
     rows : int
         Rows of the table, evenly spaced in time.
     """
@@ -96,7 +96,7 @@ def thermal(
             Figure(lambda: _curves(transient, chamber, weights, names), "Temperatures in time."),
             Table("Temperatures (°C)" + (", with radiation" if not network.is_linear else ", linearised"),
                 rows_of(housed | temperatures), [*over_time, *(Column(name, name, form=".3f") for name in names)],
-                f"Shell: its mean. The heat balance closes to {energy.error:.0e} of the heat that flowed."),
+                f"Shell: mean temperature. The heat balance closes within {energy.error:.0e} of the heat exchanged."),
         ],
     )  # fmt: skip
 

@@ -44,7 +44,7 @@ STATES = (
     Column("slow_axis_deg", "slow axis", "°", ".2f"),
 )
 
-LIMIT = "Upper limit: a split is the length of a vector, both of whose parts have the standard error; 95 of 100 are shorter than it."
+LIMIT = "Upper limit: the split is the length of a vector with this standard error in each component; it lies below with 95 % probability."
 
 
 @answers("hrg.trim/1")
@@ -154,7 +154,7 @@ def trim(
     return Result(
         payload,
         f"Trimming plan for {instrument.name}",
-        "Make these cuts, let the shell return to its temperature, measure, and plan the next round from the measurement.",
+        "Make these cuts, let the shell return to thermal equilibrium, measure, and plan the next round from the measurement.",
         _parts(planned, payload),
     )
 
@@ -186,7 +186,7 @@ def _parts(planned: CardPlan, payload: dict[str, Any]) -> list[Chapter]:
                 " Negative: the split changes in the opposite direction.", "note", "page"),
         ]),
         Chapter("Position of the cuts", [Figure(lambda: polar(plan, cuts),
-            "Rim over azimuth. Curves bulge where the slower mode has its antinodes (dashed); black bars: the cuts of the table, by mass.")]),
+            "Rim against azimuth. Curves bulge where the slower mode has its antinodes (dashed); black bars: the cuts of the table, by mass.")]),
         Chapter("Expected result", [Table("Splits before and after the cuts", states, STATES, LIMIT)]),
     ]  # fmt: skip
 
@@ -236,7 +236,7 @@ def measure_after(planned: CardPlan) -> list[str]:
             f"Expected: {expected} mHz. If it is off by more than twice that error, plan the next round with --gain, the measured over the predicted change "
             "(negative if the split changed in the opposite direction)."
         )
-    still = "Let the shell return to its temperature before each reading, and measure the same mode with the same electrodes."
+    still = "Let the shell return to thermal equilibrium before each reading, and measure the same mode with the same electrodes."
     return [*found, still]
 
 

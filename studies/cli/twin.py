@@ -45,11 +45,11 @@ def twin(
     fmu : str
         The FMU to write, with its sources; it holds a binary for 64-bit Linux if a C compiler is found (the variable CC, cc or gcc).
     c : str
-        A folder for the C sources, made if absent. main.c runs a profile (CSV) and writes a record: cc -std=c11 -O2 *.c -lm -o twin
+        A folder for the C sources, created if it does not exist. main.c runs a profile (CSV) and writes a record: cc -std=c11 -O2 *.c -lm -o twin
     fmi : str
         Version of the FMU.
     boundary : str
-        Temperature that is an input: that of the chamber, or of the housing itself.
+        Input temperature: that of the chamber, or of the housing.
     """
     if fmu is None and c is None:
         raise InputError("nothing to do: give --fmu FILE.fmu, --c FOLDER, or both.")
@@ -81,7 +81,7 @@ def twin(
     return Result(
         payload,
         f"Twin of {plan.instrument.name}",
-        "The virtual gyro for other programs, from the numbers of the card.",
+        "The virtual gyro of the card, for use in other programs.",
         [
             *sentences,
             Table("Inputs", inputs, columns),

@@ -6,6 +6,7 @@ The key itself stays in JSON, in cards, and beside the name where the reader edi
 from studies.instrument.units import split_unit
 
 WHOLE = {
+    "inverse_q": "1/Q",
     "bias.offset_deg_per_h": "bias offset",
     "bias.pattern_angle_deg": "azimuth of the standing wave",
     "law.f0_Hz": "frequency at the reference temperature",

@@ -4,7 +4,9 @@ import re
 from functools import lru_cache
 
 SYMBOLS = {"um": "µm", "deg": "°", "degC": "°C", "day": "d", "rt": "√"}
-UNIT = re.compile(r"(10)?(per|rt|degC|deg|mrad|ppm|day|[GMkmun]?(?:Pa|Hz|W|J|V|eV|N|g|K|s)|[cmunp]?m|pF|h|1)([2-9])?")
+UNIT = re.compile(
+    r"(10)?(per|rt|degC|deg|mrad|ppm|day|counts|[GMkmun]?(?:Pa|Hz|W|J|V|eV|N|g|K|s)|[cmunp]?m|pF|h|1)([2-9])?"
+)
 RATES = {
     # words of a key: one unit, so that what follows belongs to it as a whole
     "deg per h": "°/h",

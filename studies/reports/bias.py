@@ -214,7 +214,7 @@ def gain_table(study: BiasStudy) -> Table:
         rows.append((METHOD[judged.method], terms, "fitted", before, after, judged.training_gain, 1.0))
         if held is not None:
             data = f"held-out {'runs' if held.by_runs else 'blocks'}"
-            reselected = (METHOD[judged.method], "reselected without them", data)
+            reselected = (METHOD[judged.method], "reselected without the held-out data", data)
             rows.append((*reselected, held.before, held.after, held.gain, held.coverage))
     columns = [
         Column("0", "Selection"),
@@ -235,7 +235,7 @@ def stability_parts(study: BiasStudy) -> list[Part]:
     """Return Allan deviation and noise coefficients before and after, where the longest run is long enough."""
     if study.before is None:
         return []
-    caption = "Overlapping Allan deviation with its 68.3 % band; dashed: fitted N, B, K."
+    caption = "Overlapping Allan deviation with its 90 % interval; dashed: fitted N, B, K."
     figure = Figure(lambda: _draw_allan(study), caption, "Allan deviation before and after compensation.")
     return [figure, noise_table(study), Sentence(_where_read(study.output), "note", "page")]
 
@@ -259,7 +259,7 @@ def noise_table(study: BiasStudy) -> Table:
         Column(lambda row: _measured(row[1].noise.N * n_scale, row[1].noise.N_uncertainty * n_scale), "N", n_unit),
         Column(lambda row: _measured(row[1].noise.B, row[1].noise.B_uncertainty), "B", unit),
         Column(lambda row: _measured(row[1].noise.K * k_scale, row[1].noise.K_uncertainty * k_scale), "K", k_unit),
-        Column(lambda row: "{:.3g} ({:.3g} … {:.3g})".format(*row[1].allan.bias_instability), f"Minimum over {FLAT:.3f}", unit),
+        Column(lambda row: "{:.3g} ({:.3g} … {:.3g})".format(*row[1].allan.bias_instability), f"Minimum over {FLAT:.3f}, 90 %", unit),
         Column("1.noise.misfit", "Misfit", form=".1f"),
     ]  # fmt: skip
     note = (

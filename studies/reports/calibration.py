@@ -57,7 +57,7 @@ DRIVEN = "The measured housing drives the other responses where there is one."
 ROWS = "Settled frequency: rms over the rows of the tables; its noise is their scatter about the calibrated card."
 WIDTHS = (
     "Shift: change in prior standard deviations. Width: posterior over prior standard deviation; the data determine a value up to 0.5,"
-    " from 0.95 it stays at its prior. Of a material's properties: deviation from its law, relative where it has no unit."
+    " from 0.95 it stays at its prior. Material properties: deviation from the law, relative where no unit is given."
 )
 
 
@@ -99,7 +99,7 @@ def calibration_parts(found: Calibration, payload: Mapping[str, Any]) -> list[Ch
     ]
     title = "Values, best known first"
     return [
-        Chapter("From the card to the noise", [
+        Chapter("Fit of the card to the data", [
             *(" ".join(one.sentences) for one in found.settled),
             Facts(facts, "page"),
             *(Sentence(warning, "warning", "page") for warning in found.warnings),

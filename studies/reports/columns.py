@@ -5,6 +5,8 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from studies.instrument.display import display_name
+from studies.instrument.units import unit_of
 from studies.reports import style
 from studies.results import Drawing
 
@@ -15,11 +17,17 @@ LONG = 10.0  # usual steps between two values that make a gap, whatever the rows
 SKIPPED = 1.5  # the same where rows between them are empty
 
 
+def column_title(name: str, per: str = "") -> str:
+    """Return the name of a column with its unit, for a picture."""
+    unit = unit_of(name)
+    return f"{display_name(name)}{f' ({unit}{per})' if per or unit != '1' else ''}".replace("$", r"\$")
+
+
 def draw_columns(columns: Columns) -> Drawing:
     """Return a figure with every column over time, or over the first column of a table of settled readings."""
     names = list(columns)
     timed = names[0] == "time_s"
-    x, label = (columns["time_s"] / 3600, "Time (h)") if timed else (columns[names[0]], names[0])
+    x, label = (columns["time_s"] / 3600, "Time (h)") if timed else (columns[names[0]], column_title(names[0]))
     shown = names[1:]
     mark = "-" if timed and len(x) >= FEW else "."
     with style.figure(len(shown), height=1.9 * len(shown) + 0.6, squeeze=False, sharex=True) as (figure, axes):
@@ -34,8 +42,8 @@ def draw_columns(columns: Columns) -> Drawing:
                     spans, (0, 1), transform=axis.get_xaxis_transform(), color=style.ORANGE, alpha=0.35, linewidth=0.8
                 )
             axis.plot(*drawn, mark, color=style.BLUE, linewidth=0.9)
-            axis.set_title(name.replace("$", r"\$"), fontsize=9, loc="left")
-        axes[-1, 0].set_xlabel(label.replace("$", r"\$"))
+            axis.set_title(column_title(name), fontsize=9, loc="left")
+        axes[-1, 0].set_xlabel(label)
         made: Drawing = figure
     return made
 

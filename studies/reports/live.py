@@ -61,8 +61,8 @@ def live_blocks(
     identity = "live-" + hashlib.sha256(repr(data).encode()).hexdigest()[:12]
     worst = max(one["error"] for one in data["modes"])
     caption = (
-        f"Interpolated between full solves ({theory} theory) within the ranges of the sliders; f is held to {1e6 * worst:.2g} ppm of"
-        " a full solve there. Without imperfection, electrodes and the stress of a mount."
+        f"Interpolated between full solves ({theory} theory) within the ranges of the sliders; f agrees within {1e6 * worst:.2g} ppm of"
+        " a full solve there. Imperfection, electrodes and mount stress are not included."
     )
     return [Embedded(fill_template("live.html", id=identity, data=data), caption)]
 

@@ -60,7 +60,7 @@ def loop_parts(study: LoopStudy, payload: dict[str, Any], run: Record | None) ->
     headroom, offset = study.instrument.loop.drive_headroom, study.instrument.loop.start_offset_Hz  # type: ignore[union-attr]
     start = f"Start from rest with {headroom:g} times the steady-state drive: phase locked after {study.start.locked:.3g} s, amplitude within 1 % after {study.start.ready:.4g} s."
     return [
-        Chapter("In short", [
+        Chapter("Summary", [
             Sentence(f"Loops of {payload['card']}. {describe(payload)}", where="terminal"),
             Facts(_facts(study, payload), "page"),
             *_largest(slopes, study.sources[-1].sd),

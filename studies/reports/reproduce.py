@@ -83,7 +83,7 @@ def reproduce_result(parts: Reproduction) -> Result:
     study, physics = parts.study, parts.physics
     shapes = Blocks(lambda: mode_picture.mode_blocks(physics.instrument))
     chapters = [
-        Chapter("In short", [_facts(parts), *_short(parts)]),
+        Chapter("Summary", [_facts(parts), *_short(parts)]),
         _first_diagnosis(parts),
         Chapter(
             "Table 1 and figure 4: frequency over temperature",

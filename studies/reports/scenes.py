@@ -151,7 +151,7 @@ def live_chapter(instrument: Instrument, harmonic: int, theory: "Theory") -> Cha
 
         return live_blocks(instrument, harmonic, theory)
 
-    return None if theory == "rayleigh" else Chapter("Over dimensions and temperature", [Blocks(blocks)])
+    return None if theory == "rayleigh" else Chapter("Effect of dimensions and temperature", [Blocks(blocks)])
 
 
 def read_field(path: str | Path) -> ShellTemperature:

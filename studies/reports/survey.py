@@ -8,8 +8,10 @@ from typing import Any
 import numpy as np
 
 from compensation.noise import FLAT
+from studies.instrument.display import display_name
+from studies.instrument.units import unit_of
 from studies.reports import style
-from studies.reports.columns import draw_columns
+from studies.reports.columns import column_title, draw_columns
 from studies.rest import TEMPERATURES
 from studies.results import Chapter, Column, Drawing, Figure, Part, Sentence, Table
 from studies.survey import CONFIDENCE, Survey, average_evenly
@@ -23,7 +25,8 @@ def _count(key: str, unit: str = "") -> Column:
 
 
 COLUMNS = (
-    Column("column", "Column"),
+    Column("column", "Column", spell=display_name),
+    Column("unit", "Unit"),
     Column("low", "Minimum", form=".7g"),
     Column("high", "Maximum", form=".7g"),
     Column("resolution", "Resolution", digits=2),
@@ -37,7 +40,7 @@ COLUMNS = (
 )
 COLUMNS_NOTE = "Missing values, gaps, spikes, stuck readings, dropouts to 0 and steps are counted where there are any."
 NOISE = (
-    Column("column", "Column"),
+    Column("column", "Column", spell=display_name),
     Column("unit", "Unit"),
     Column("noise.white", "White, at 1 s", error="noise.white_sd"),
     Column("noise.flicker", "Flicker, flat part", error="noise.flicker_sd"),
@@ -54,7 +57,7 @@ NOISE = (
 )
 NOISE_NOTE = (
     "White noise, flicker and random walk have the Allan deviations N/√τ, a flat part and K √(τ/3), fitted together. Where they do not explain"
-    " the curve (misfit above 3), as where temperature drives a column, only the white noise is given, from second differences of the rows:"
+    " the curve (misfit above 3), for example where temperature drives a column, only the white noise is given, from second differences of the rows:"
     " judge the others on a settled run."
 )
 USES = (
@@ -64,7 +67,7 @@ USES = (
     Column("missing", "Missing"),
 )
 STEPS = (
-    Column("column", "Column"),
+    Column("column", "Column", spell=display_name),
     Column("time_s", "At", "s", ".1f"),
     Column("size", "Size"),
 )
@@ -76,12 +79,12 @@ SETTLED = (
     Column("left_K", "Still to settle, at most", "K", digits=2),
 )
 CORRELATIONS = (
-    Column("one", "Column"),
-    Column("two", "With"),
-    Column("values", "Of values", form="+.3f"),
-    Column("changes", "Of changes", form="+.3f"),
+    Column("one", "Column", spell=display_name),
+    Column("two", "With", spell=display_name),
+    Column("values", "Correlation of values", form="+.3f"),
+    Column("changes", "Correlation of changes", form="+.3f"),
 )
-CORRELATION_NOTE = "Two columns that drift slowly are correlated without a cause; correlated changes (of means over 1/200 of the record) tell more."
+CORRELATION_NOTE = "Slow drifts correlate without a common cause; the correlation of changes (of means over 1/200 of the record) is more telling."
 DRIVEN = 3.0  # misfit from which on a column is driven by something, and its curve is not that of noise
 FEW = 1500  # means that are drawn over temperature
 
@@ -105,7 +108,7 @@ def run_chapters(survey: Survey, told: dict[str, Any], several: bool) -> list[Ch
     before = f"{Path(survey.record.path).name}: " if several else ""
     count = len(survey.record)
     drawn = (
-        f" Of {count:,} rows the least and the largest of every {2 * count // style.MOST_POINTS} are drawn, and a part that is enlarged shows no more."
+        f" Of {count:,} rows the least and the largest of every {2 * count // style.MOST_POINTS} are drawn; enlarging shows no more."
         if count > style.MOST_POINTS
         else ""
     )
@@ -134,12 +137,6 @@ def run_chapters(survey: Survey, told: dict[str, Any], several: bool) -> list[Ch
     return [chapter for chapter in chapters if chapter.parts]
 
 
-def unit_of(column: str) -> str:
-    """Return the unit that a column's name carries."""
-    ends = {"_degC": "°C", "_Hz": "Hz", "_deg_per_h": "°/h", "_deg_per_s": "°/s", "_V": "V", "_deg": "°", "_counts": "counts"}  # fmt: skip
-    return next((unit for end, unit in ends.items() if column.endswith(end)), "")
-
-
 def _grid(count: int, x: str, log: bool = False) -> Any:
     rows = ceil(count / 2)
     return style.figure(rows, 2 if count > 1 else 1, height=2.5 * rows + 0.3, x=x, squeeze=False)
@@ -152,20 +149,20 @@ def _temperature_parts(survey: Survey) -> list[Figure]:
     others = [c.name for c in survey.columns if c.name != temperature and c.varies]
     if temperature is None or not others:
         return []
-    caption = "Each column over temperature, means over equal times; red: warming, blue: cooling. Two separate lines are a lag or a hysteresis."
+    caption = "Each column against temperature, means over equal times; red: warming, blue: cooling. Two separate lines indicate a lag or hysteresis."
     return [Figure(lambda: _draw_over_temperature(survey, temperature, others), caption)]
 
 
 def _draw_over_temperature(survey: Survey, temperature: str, others: Sequence[str]) -> Drawing:
     time, T = survey.record["time_s"], survey.record[temperature]
-    with _grid(len(others), f"{temperature.removesuffix('_degC').replace('_', ' ')} (°C)") as (made, axes):
+    with _grid(len(others), column_title(temperature)) as (made, axes):
         for axis, name in zip(axes.flat, others, strict=False):
             both = np.isfinite(T) & np.isfinite(survey.record[name])
             x, y = (average_evenly(time[both], values[both], FEW)[1] for values in (T, survey.record[name]))
             warming = np.gradient(np.convolve(np.pad(x, 7, mode="edge"), np.full(15, 1 / 15), mode="valid")) > 0 if len(x) > 2 else x > 0  # fmt: skip
             for rows, colour, label in ((warming, style.VERMILION, "warming"), (~warming, style.BLUE, "cooling")):
                 axis.plot(x[rows], y[rows], ".", color=colour, markersize=2, label=label)
-            axis.set_title(name, fontsize=9, loc="left")
+            axis.set_title(column_title(name), fontsize=9, loc="left")
         _blank(axes, len(others))
         return made
 
@@ -178,7 +175,7 @@ def _draw_stability(survey: Survey) -> Drawing:
             axis.fill_between(tau, found.allan.low, found.allan.high, color=style.SKY, alpha=0.35)
             axis.loglog(tau, found.allan.deviation, color=style.BLUE, label="Allan deviation")
             axis.loglog(tau, found.noise.deviation(tau), "--", color=style.ORANGE, linewidth=1, label="fitted noise")
-            _title(axis, name)
+            axis.set_title(column_title(name), fontsize=9, loc="left")
         _blank(axes, len(shown))
         return made
 
@@ -188,14 +185,9 @@ def _draw_spectra(survey: Survey) -> Drawing:
     with _grid(len(shown), "frequency (Hz)") as (made, axes):
         for axis, (name, found) in zip(axes.flat, shown, strict=False):
             axis.loglog(found.frequency, np.sqrt(found.density), color=style.BLUE, linewidth=1)
-            _title(axis, name, "/√Hz")
+            axis.set_title(column_title(name, "/√Hz"), fontsize=9, loc="left")
         _blank(axes, len(shown))
         return made
-
-
-def _title(axis: Any, name: str, per: str = "") -> None:
-    unit = unit_of(name)
-    axis.set_title(f"{name}{f' ({unit or 1}{per})' if unit or per else ''}", fontsize=9, loc="left")
 
 
 def _blank(axes: Any, count: int) -> None:
@@ -208,7 +200,7 @@ def _blank(axes: Any, count: int) -> None:
 def _spectrum_words(survey: Survey) -> str:
     made = [column.density.even for column in survey.columns if column.density is not None]
     how = "Welch's, of even rows" if all(made) else "Lomb's, since rows are uneven or missing" if not any(made) else "Welch's, and Lomb's of columns with missing rows"  # fmt: skip
-    return f"Amplitude spectral density ({how}), mean and slope taken off."
+    return f"Amplitude spectral density ({how}), mean and slope removed."
 
 
 def tell(survey: Survey) -> dict[str, Any]:
@@ -221,7 +213,7 @@ def tell(survey: Survey) -> dict[str, Any]:
     columns = []
     for column in survey.columns:
         row: dict[str, Any] = column.range.as_row() | {
-            "unit": unit_of(column.name), "mean": column.mean, "spikes": column.spikes, "stuck": column.stuck,
+            "unit": unit_of(column.name).removeprefix("1"), "mean": column.mean, "spikes": column.spikes, "stuck": column.stuck,
             "zeros": column.zeros, "steps": len(column.steps),
         }  # fmt: skip
         if column.stability is not None:

@@ -52,7 +52,7 @@ def study_result(results: Results) -> Result:
         f"Study: {study.name}",
         lead,
         [
-            Chapter("In short", _short(results)),
+            Chapter("Summary", _short(results)),
             Chapter("Definition", _asked(results)),
             Chapter("Failed cases", _failures(results)),
             Chapter("Results", shown),
@@ -75,7 +75,7 @@ def _short(results: Results) -> list[Part]:
     found = yield_of(results)
     if found is not None:
         low, high = found.low, found.high
-        words = "of the designs" if low is None or high is None else f"95 % interval {_percent(low)} … {_percent(high)}"
+        words = "of the designs" if low is None or high is None else f"90 % interval {_percent(low)} … {_percent(high)}"
         facts.append(("Meet all requirements", _percent(found.share), words))
     unfinished = "The study is not finished. Run it again to resume, then write this page again."
     return [Facts(facts), *([Sentence(unfinished, "warning")] if results.done < results.total else [])]

@@ -20,9 +20,9 @@ EITHER_SIDE = Column("half_width", "±", form=".2g")
 SOBOL = (
     PARAMETER,
     Column("first", "First order", form=".4f"),
-    Column("first", "95 % interval", form=".4f", interval=("first_low", "first_high")),
+    Column("first", "90 % interval", form=".4f", interval=("first_low", "first_high")),
     Column("total", "Total", form=".4f"),
-    Column("total", "95 % interval", form=".4f", interval=("total_low", "total_high")),
+    Column("total", "90 % interval", form=".4f", interval=("total_low", "total_high")),
 )
 SHARES = (PARAMETER, SLOPE, EITHER_SIDE, UNIT, Column("share", "Share of variance", "%", ".2f", scale=100.0))
 YIELD = (
@@ -30,7 +30,7 @@ YIELD = (
     Column("from", "From", form=".8g"),
     Column("to", "To", form=".8g"),
     Column("share", "Designs that meet it", "%", ".2f", scale=100.0),
-    Column("share", "95 % interval", "%", ".2f", scale=100.0, interval=("low", "high")),
+    Column("share", "90 % interval", "%", ".2f", scale=100.0, interval=("low", "high")),
     Column("unknown", "Without a result"),
 )
 INVERSION = (Column("column", "Column"), Column("target", "Target", form=".8g"), Column("found", "Found", form=".8g"))
@@ -102,7 +102,7 @@ def _shares(results: Results, column: Output) -> list[Part]:
         for name, slope, half, share in zip(found.parameters, found.slope, found.half_width, found.share, strict=True)
     ]
     note = (
-        f"A linear model explains {100 * found.r_squared:.2f} % of the variance. ± is half of the 95 % interval; a slope"
+        f"A linear model explains {100 * found.r_squared:.2f} % of the variance. ± is half of the 90 % interval; a slope"
         " smaller than ± is not significant."
     )
     return [Table(f"Linear influence on {column.label}", rows, SHARES, note, sortable=True)]

@@ -57,7 +57,7 @@ def response_figures(results: Results, column: Column) -> list[Figure]:
 def sobol_figure(indices: SobolIndices, column: Column) -> Figure:
     """Return first-order and total indices with their intervals."""
     alt = "Bars of first-order and total indices for each parameter."
-    return Figure(lambda: _draw_sobol(indices, column), "Sobol indices with 95 % intervals.", alt)
+    return Figure(lambda: _draw_sobol(indices, column), "Sobol indices with 90 % intervals.", alt)
 
 
 def tornado_figure(slopes: list[LocalSlope], column: Column) -> Figure:

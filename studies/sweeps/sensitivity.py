@@ -24,7 +24,7 @@ SHOWN = 10
 
 @dataclass(frozen=True)
 class SobolIndices:
-    """First-order and total indices of every parameter with 95 % bootstrap intervals, arrays (parameters,).
+    """First-order and total indices of every parameter with 90 % bootstrap intervals, arrays (parameters,).
 
     `variance` is that of the column; where it is zero, so are all indices.
     """
@@ -58,7 +58,7 @@ class LocalSlope:
 
 @dataclass(frozen=True)
 class LinearShares:
-    """Least squares of a column on all parameters: slopes with 95 % intervals, share of the variance, R²."""
+    """Least squares of a column on all parameters: slopes with 90 % intervals, share of the variance, R²."""
 
     parameters: tuple[str, ...]
     slope: Array
@@ -84,7 +84,7 @@ def sobol_indices(results: "Results", column: str) -> SobolIndices:
     draws = np.random.default_rng(study.sampling.seed).integers(0, n, (RESAMPLES, n))
     first, total = _indices(A, B, AB)
     spread = np.array([_indices(A[i], B[i], AB[:, i]) for i in draws])
-    low, high = np.quantile(spread, [0.025, 0.975], axis=0)
+    low, high = np.quantile(spread, [0.05, 0.95], axis=0)
     return SobolIndices(study.names, first, low[0], high[0], total, low[1], high[1], variance)
 
 
@@ -155,7 +155,7 @@ def linear_shares(results: "Results", column: str) -> LinearShares | None:
     slopes = np.linalg.lstsq(scaled, y - y.mean(), rcond=None)[0]
     residual = y - y.mean() - scaled @ slopes
     deviation = np.sqrt(residual @ residual / free * np.diag(np.linalg.pinv(scaled.T @ scaled)))
-    half = t.ppf(0.975, free) * deviation
+    half = t.ppf(0.95, free) * deviation
     spread = X.std(axis=0)
     share = slopes**2 / y.var()
     return LinearShares(tuple(numeric), slopes / spread, half / spread, share, float(1 - residual.var() / y.var()))

@@ -31,7 +31,7 @@ class Yield:
     cases: int  # cases, passed, unknown: numbers of designs; `unknown` are those without a value
     passed: int
     unknown: int
-    # low, high: a 95 % interval (Wilson) in which every unknown design counts once as failing and once as passing; None
+    # low, high: a 90 % interval (Wilson) in which every unknown design counts once as failing and once as passing; None
     # where the designs are no sample, such as a grid
     low: float | None
     high: float | None
@@ -73,8 +73,8 @@ def find_yield(results: "Results", requirements: "tuple[Requirement, ...]") -> Y
     n, passed, open_ = len(good), int(good.sum()), int(unknown.sum())
     if results.study.sampling.method not in DRAWN or n == 0:
         return Yield(limits, n, passed, open_, None, None)
-    low = binomtest(passed, n).proportion_ci(0.95, "wilson").low
-    high = binomtest(passed + open_, n).proportion_ci(0.95, "wilson").high
+    low = binomtest(passed, n).proportion_ci(0.9, "wilson").low
+    high = binomtest(passed + open_, n).proportion_ci(0.9, "wilson").high
     return Yield(limits, n, passed, open_, float(low), float(high))
 
 

@@ -73,7 +73,7 @@ def test_it_is_said_which_q_a_simulation_takes(capsys, tmp_path):
     """A budget of 2e7 once stood beside a simulation of 1e7 without a word."""
     path = tmp_path / "card.toml"
     path.write_text(tomli_w.dumps(DOME), encoding="utf-8")
-    assert "they take the default of [loss] inverse_q = 1e-07 (Q = 1e+07)" in _run(capsys, str(path))[1]
+    assert "they use the default of [loss] inverse_q = 1e-07 (Q = 1e+07)" in _run(capsys, str(path))[1]
     path.write_text(tomli_w.dumps(DOME | {"loss": {"film": [GOLD]}}), encoding="utf-8")
     assert "Simulations take 1/Q from this budget." in _run(capsys, str(path))[1]
 
