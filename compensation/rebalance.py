@@ -111,11 +111,7 @@ def simulate_rebalance(
 
 
 def settle_rebalance(
-    wave: StandingWave,
-    electronics: Electronics,
-    rate: ArrayLike = 0.0,
-    angle: ArrayLike = 0.0,
-    turn: ArrayLike = 0.0,
+    wave: StandingWave, electronics: Electronics, rate: ArrayLike = 0.0, angle: ArrayLike = 0.0, turn: ArrayLike = 0.0
 ) -> LoopRun:
     """Return what settled loops say, without noise, for any number of rows at once: exact in the electronics' errors.
 

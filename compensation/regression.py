@@ -112,12 +112,7 @@ class FTest:
 
 
 def fit_linear(
-    X: ArrayLike,
-    y: ArrayLike,
-    names: Sequence[str],
-    *,
-    constant: bool = True,
-    least_variance: float = 0.0,
+    X: ArrayLike, y: ArrayLike, names: Sequence[str], *, constant: bool = True, least_variance: float = 0.0
 ) -> LinearFit:
     """Fit y = b₀ + X b by least squares, HRG paper eqs. (19), (20)."""
     X, y = _check(X, y, names)

@@ -112,14 +112,7 @@ def _value(terms: Complex, e: Complex) -> Real:
     return np.asarray(np.real(sum(c * e**j for j, c in enumerate(terms))))
 
 
-def _integrate(
-    rows: StandingWave,
-    electronics: Electronics,
-    t: Real,
-    rate: Real,
-    command: Real,
-    angle: float,
-) -> Real:
+def _integrate(rows: StandingWave, electronics: Electronics, t: Real, rate: Real, command: Real, angle: float) -> Real:
     """The azimuth at the rows: Runge-Kutta steps of what departs from the turn that rate and command would make alone."""
     from scipy.interpolate import CubicHermiteSpline
 

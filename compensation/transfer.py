@@ -46,8 +46,7 @@ class TransferFunction:
         if not isinstance(other, TransferFunction):
             return TransferFunction(tuple(other * np.asarray(self.numerator)), self.denominator)
         return TransferFunction(
-            tuple(np.polymul(self.numerator, other.numerator)),
-            tuple(np.polymul(self.denominator, other.denominator)),
+            tuple(np.polymul(self.numerator, other.numerator)), tuple(np.polymul(self.denominator, other.denominator))
         )
 
     def respond(self, frequency: ArrayLike) -> Any:

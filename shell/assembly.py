@@ -209,8 +209,4 @@ def sections(resonator: Resonator, chain: Chain, xi: Array, weights: Array) -> S
         points = resonator.at(s[there].ravel(), int(segment))
         for name in names:
             gathered[name][there] = getattr(points, name).reshape(-1, len(xi))
-    return Section(
-        **gathered,
-        ds=np.broadcast_to(halves[:, None], s.shape),
-        weight=np.broadcast_to(weights, s.shape),
-    )
+    return Section(**gathered, ds=np.broadcast_to(halves[:, None], s.shape), weight=np.broadcast_to(weights, s.shape))

@@ -139,10 +139,7 @@ def constrain(mesh: Mesh, boundary: Support, ties: tuple[Tie, ...], degree: int,
     at_edges = start + 3 * count + np.arange(3 * inside * len(a)).reshape(-1, inside, 3).transpose(0, 2, 1)
     rows = Rows()
     on_axis, held = boundary.on_axis, boundary.held
-    for own, is_held, axial in (
-        (at_vertices, held, on_axis),
-        (at_edges, held[a] & held[b], on_axis[a] & on_axis[b]),
-    ):
+    for own, is_held, axial in ((at_vertices, held, on_axis), (at_edges, held[a] & held[b], on_axis[a] & on_axis[b])):
         rows.hold(own[is_held])
         _regular_on_axis(rows, own[axial & ~is_held], n)
     for tie, eta in zip(ties, boundary.heights, strict=True):

@@ -44,11 +44,7 @@ def hemisphere(
 
 
 def cylinder(
-    radius: float,
-    thickness: Profile,
-    height: float,
-    bottom_thickness: float | None = None,
-    clamp_radius: float = 0.0,
+    radius: float, thickness: Profile, height: float, bottom_thickness: float | None = None, clamp_radius: float = 0.0
 ) -> Resonator:
     """A tube, open or with a flat bottom that meets the wall in a square corner.
 

@@ -33,12 +33,7 @@ DEEP = 0.7  # wavenumber times thickness beyond which the first order through th
 
 
 def refine(
-    resonator: Resonator,
-    elastic: Elastic | VaryingElastic,
-    n: int,
-    count: int,
-    theory: Theory,
-    tolerance: float,
+    resonator: Resonator, elastic: Elastic | VaryingElastic, n: int, count: int, theory: Theory, tolerance: float
 ) -> tuple[list[Solution], list[float]]:
     """The `count` lowest elastic modes of the first level whose estimated errors lie within `tolerance`, and these errors.
 

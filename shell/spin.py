@@ -67,9 +67,7 @@ def spin_shift(mode: Mode, elastic: Elastic) -> SpinShift:
     g = float(solution.vector @ load) / mass
     others = _response(system, elastic, solution, load, mass)
     return SpinShift(
-        stiffening / (2 * eigenvalue),
-        -softening / mass / (2 * eigenvalue),
-        g**2 / (2 * eigenvalue) - 2 * others / mass,
+        stiffening / (2 * eigenvalue), -softening / mass / (2 * eigenvalue), g**2 / (2 * eigenvalue) - 2 * others / mass
     )
 
 

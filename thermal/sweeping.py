@@ -128,10 +128,7 @@ def sweep(network: Network, boundaries: Mapping[str, Profile], initial: ArrayLik
 
 
 def run_sweeps(
-    network: Network,
-    boundaries: Mapping[str, Profile],
-    initial: ArrayLike | None = None,
-    longest: float | None = None,
+    network: Network, boundaries: Mapping[str, Profile], initial: ArrayLike | None = None, longest: float | None = None
 ) -> Sweep:
     """Sweep until no temperature changes by more than 1e-7 K, with knots at most `longest` (s) apart, `LONGEST_ROW` when absent."""
     corners = find_corners(network, boundaries)

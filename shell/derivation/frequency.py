@@ -8,22 +8,7 @@ import sympy as sp
 from shell.derivation.displacements import integrate_around, kinetic_energy
 from shell.derivation.energies import surface_energy_of
 from shell.derivation.inextensional import inextensional_displacement, inextensional_mode, mode_deformation
-from shell.derivation.symbols import (
-    C,
-    E,
-    h,
-    in_half_angle,
-    n,
-    nu,
-    omega,
-    phi,
-    phi_1,
-    phi_2,
-    r,
-    rho,
-    t,
-    tan_half,
-)
+from shell.derivation.symbols import C, E, h, in_half_angle, n, nu, omega, phi, phi_1, phi_2, r, rho, t, tan_half
 
 I, J = sp.symbols("I J", real=True)  # the shape integrals of bending and of mass
 
@@ -130,10 +115,7 @@ def log_derivatives() -> LogDerivatives:
 @cache
 def integral_definitions() -> tuple[sp.Integral, sp.Integral]:
     """Return I and J as integrals over the shell's range φ₁…φ₂ for any harmonic."""
-    return (
-        sp.Integral(bending_integrand(), (phi, phi_1, phi_2)),
-        sp.Integral(mass_integrand(), (phi, phi_1, phi_2)),
-    )
+    return (sp.Integral(bending_integrand(), (phi, phi_1, phi_2)), sp.Integral(mass_integrand(), (phi, phi_1, phi_2)))
 
 
 @cache

@@ -60,11 +60,7 @@ def free_expansion() -> sp.Expr:
     """Return d ln f/dT of a shell that expands freely: ½ G'/G + ½ α, since f ∝ √(E/((1+ν)ρ)) h/r² measures G."""
     T = temperature
     E_of_T, nu_of_T, rho_of_T, h_of_T, r_of_T = (OVER_TEMPERATURE[symbol] for symbol in (E, nu, rho, h, r))
-    slopes = {
-        rho_of_T.diff(T): -3 * alpha * rho_of_T,
-        h_of_T.diff(T): alpha * h_of_T,
-        r_of_T.diff(T): alpha * r_of_T,
-    }
+    slopes = {rho_of_T.diff(T): -3 * alpha * rho_of_T, h_of_T.diff(T): alpha * h_of_T, r_of_T.diff(T): alpha * r_of_T}
     modulus = 2 * G(T) * (1 + nu_of_T)
     whole = temperature_parts().total.subs(slopes).subs(E_of_T, modulus).doit()
     return sp.expand(sp.simplify(whole))

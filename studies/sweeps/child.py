@@ -139,11 +139,7 @@ def _end_children() -> None:
 def ask(function: str, limit: float, case: "Case") -> float:
     """Return what a user's function says of a case."""
     instrument = case.instrument
-    request = {
-        "content": instrument.content,
-        "path": instrument.path,
-        "parameters": dict(case.parameters),
-    }
+    request = {"content": instrument.content, "path": instrument.path, "parameters": dict(case.parameters)}
     try:
         return _ask(function, request, limit)
     except FunctionLost:  # by chance, perhaps; not so the second time

@@ -53,11 +53,7 @@ class Cluster:
         self.executor = self.client.get_executor(pure=False, retries=0)
         self.count = sum(self.client.nthreads().values())
         self.lost: tuple[type[BaseException], ...] = (distributed.scheduler.KilledWorker,)
-        self.gone: tuple[type[BaseException], ...] = (
-            CancelledError,
-            distributed.client.FutureCancelledError,
-            OSError,
-        )
+        self.gone: tuple[type[BaseException], ...] = (CancelledError, distributed.client.FutureCancelledError, OSError)
 
     def submit(self, function: Callable[..., Any], *arguments: Any) -> "Future[Any]":
         """Queue a call on the cluster."""

@@ -13,8 +13,7 @@ class Split(ModeQuantity, frozen=True, kw_only=True, tag="split"):
 
     theory: Annotated[Literal["solid", "shell"], says("solid (three-dimensional) or shell (Naghdi)")] = "solid"
     order: Annotated[
-        Literal["first", "every"],
-        says("first order in the imperfection, or every order with the harmonics coupled"),
+        Literal["first", "every"], says("first order in the imperfection, or every order with the harmonics coupled")
     ] = "first"
 
     def list_columns(self) -> tuple[Column, ...]:
