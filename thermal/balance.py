@@ -33,12 +33,11 @@ def check_energy(network: Network, boundaries: Mapping[str, Profile], transient:
     received = turnover = 0.0
     for start, end in zip(transient.knots[:-1], transient.knots[1:], strict=True):
         time, weight = _graded_gauss(float(start), float(end))
-        held = np.array([boundaries[boundary.name].at(time) for boundary in network.boundaries])
-        T = np.vstack([transient.at(time).T, held])
-        power = np.array([network.power(moment) for moment in time]).T
-        inflow = np.vstack([network.outflow(T)[n:], power])
-        received += float((inflow @ weight).sum())
-        turnover += float((np.abs(inflow) @ weight).sum())
+        held = np.column_stack([boundaries[boundary.name].at(time) for boundary in network.boundaries])
+        outflow = network.outflow(np.hstack([transient.at(time), held]))
+        inflow = np.hstack([outflow[:, n:], network.power(time)])
+        received += float((weight @ inflow).sum())
+        turnover += float((weight @ np.abs(inflow)).sum())
     first, last = transient.at(transient.knots[[0, -1]])
     stored = [_enthalpy(network, i, first[i], last[i]) for i in range(n)]
     turnover += float(np.abs(stored).sum())

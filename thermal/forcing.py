@@ -38,17 +38,6 @@ def boundary_forcing(network: Network, boundaries: Mapping[str, Profile], time: 
     return value, slope
 
 
-def source_powers(network: Network, time: Array, derivative: int) -> Array:
-    """Heat put into the nodes (W), or its slope (W/s), shape (times, nodes)."""
-    q = np.zeros((time.size, network.count))
-    for source in network.sources:
-        if isinstance(source.power, Profile):
-            q[:, network.index(source.node)] += source.power.segments(time)[derivative]
-        elif derivative == 0:
-            q[:, network.index(source.node)] += source.power
-    return q
-
-
 def initial_state(network: Network, boundaries: Mapping[str, Profile], initial: ArrayLike | None) -> Array:
     """Temperatures (K) of the nodes at the start: as given, else the steady state before the profiles begin."""
     if initial is None:

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from thermal.constants import Stefan_Boltzmann
 from thermal.errors import ThermalError
@@ -48,12 +48,11 @@ class Boundary:
 
 
 @dataclass(frozen=True)
-class Conductor:
-    """Heat flow g (T_other − T_one) into `one`; `conductance` g in W/K."""
+class Link:
+    """What lets heat from one end to the other."""
 
     one: str
     other: str
-    conductance: float
 
     @property
     def name(self) -> str:
@@ -62,17 +61,17 @@ class Conductor:
 
 
 @dataclass(frozen=True)
-class Radiator:
-    """Heat flow σ a (T_other⁴ − T_one⁴) into `one`; `exchange_area` a = area × effective emissivity, in m²."""
+class Conductor(Link):
+    """Heat flow g (T_other − T_one) into `one`."""
 
-    one: str
-    other: str
-    exchange_area: float
+    conductance: float  # g, W/K
 
-    @property
-    def name(self) -> str:
-        """The two ends."""
-        return f"{self.one}-{self.other}"
+
+@dataclass(frozen=True)
+class Radiator(Link):
+    """Heat flow σ a (T_other⁴ − T_one⁴) into `one`."""
+
+    exchange_area: float  # a = area × effective emissivity, m²
 
 
 @dataclass(frozen=True)
@@ -141,10 +140,10 @@ class Network:
         return C
 
     def outflow(self, temperature: Array) -> Array:
-        """Heat leaving each node and boundary, L T + σ R T⁴ (W); `temperature` has shape (count, ...)."""
-        flow: Array = self.conduction @ temperature
+        """Heat leaving each node and boundary, L T + σ R T⁴ (W); `temperature` has shape (..., nodes and boundaries)."""
+        flow: Array = temperature @ self.conduction
         if self.radiators:
-            flow = flow + Stefan_Boltzmann * (self.radiation @ temperature**4)
+            flow += Stefan_Boltzmann * (temperature**4 @ self.radiation)
         return flow
 
     def outflow_slope(self, temperature: Array) -> Array:
@@ -152,12 +151,14 @@ class Network:
         slope: Array = self.conduction + 4 * Stefan_Boltzmann * self.radiation * temperature**3
         return slope
 
-    def power(self, time: float) -> Array:
-        """Heat (W) that the sources put into each node at one time (s)."""
-        q = np.zeros(self.count)
+    def power(self, time: ArrayLike, derivative: int = 0) -> Array:
+        """Heat that the sources put into each node at times (s), W, or its slope, W/s: shape (..., count)."""
+        q = np.zeros((*np.shape(time), self.count))
         for source in self.sources:
-            power = source.power
-            q[self.index(source.node)] += power.at(time) if isinstance(power, Profile) else power
+            if isinstance(source.power, Profile):
+                q[..., self.index(source.node)] += source.power.segments(time)[derivative]
+            elif derivative == 0:
+                q[..., self.index(source.node)] += source.power
         return q
 
     def _laplacian(self, links: Sequence[tuple[str, str, float]]) -> Array:
@@ -213,7 +214,7 @@ def _check_names(network: Network) -> None:
     for name in names:
         if names.count(name) > 1:
             raise ThermalError(f"the name '{name}' is given to more than one node or boundary.")
-    links: tuple[Conductor | Radiator, ...] = (*network.conductors, *network.radiators)
+    links: tuple[Link, ...] = (*network.conductors, *network.radiators)
     for part in links:
         for end in (part.one, part.other):
             if end not in names:
@@ -233,16 +234,11 @@ def _check_values(network: Network) -> None:
     for node in network.nodes:
         if not callable(node.capacity):
             node.capacity_at(math.nan)
-    for conductor in network.conductors:
-        if not (math.isfinite(conductor.conductance) and conductor.conductance > 0):
-            raise ThermalError(
-                f"the conductance '{conductor.name}' must be positive, not {conductor.conductance:g} W/K."
-            )
-    for radiator in network.radiators:
-        if not (math.isfinite(radiator.exchange_area) and radiator.exchange_area > 0):
-            raise ThermalError(
-                f"the exchange area '{radiator.name}' must be positive, not {radiator.exchange_area:g} m²."
-            )
+    conductances = [("conductance", one.name, one.conductance, "W/K") for one in network.conductors]
+    areas = [("exchange area", one.name, one.exchange_area, "m²") for one in network.radiators]
+    for kind, name, value, unit in conductances + areas:
+        if not (math.isfinite(value) and value > 0):
+            raise ThermalError(f"the {kind} '{name}' must be positive, not {value:g} {unit}.")
     for source in network.sources:
         if not isinstance(source.power, Profile) and not math.isfinite(source.power):
             raise ThermalError(f"the power put into '{source.node}' must be a number, not {source.power}.")

@@ -17,7 +17,7 @@ from thermal.constants import Stefan_Boltzmann
 from thermal.network import Array, Network
 from thermal.profile import Profile
 from thermal.steady import find_steady_state
-from thermal.sweeping import MOST_SWEEPS, Sweep, SweepError, capacity_ratio, hermite, hold, outflow, run_sweeps
+from thermal.sweeping import MOST_SWEEPS, Sweep, SweepError, capacity_ratio, hermite, hold, run_sweeps
 from thermal.transient import BLOCK
 
 RELATIVE_TOLERANCE = 1e-7  # of the derivatives, at the last sweep
@@ -119,11 +119,8 @@ def _observe_block(swept: Sweep, boundaries: Mapping[str, Profile], rows: Array,
     T, rate = first[:, :count], first[:, count:]
     held = np.column_stack([boundaries[b.name].at(rows) for b in linear.boundaries])
     rate = rate - held @ (weights @ drain[:, n:]).T
-    if any(isinstance(source.power, Profile) for source in linear.sources):
-        power = np.array([linear.power(float(t)) for t in rows])
-    else:
-        power = linear.power(float(rows[0]))
-    rate = rate + (power / grid.modes.capacity) @ weights.T
+    varies = any(isinstance(source.power, Profile) for source in linear.sources)
+    rate = rate + (linear.power(rows if varies else rows[:1]) / grid.modes.capacity) @ weights.T
     delta, delta_rate = hermite(grid, rows, swept.beyond @ weights.T, swept.beyond_rate @ weights.T)
     return T + delta, rate + delta_rate
 
@@ -139,7 +136,7 @@ class _Slopes:
         self.cube: Array = 4 * Stefan_Boltzmann * everything**3
         self.varies = any(callable(node.capacity) for node in network.nodes)
         self.ratio = capacity_ratio(network, linear, everything) if self.varies else np.ones(n)
-        self.flow = self.ratio * (swept.power - outflow(network, everything)[..., :n])  # C₀ dT/dt
+        self.flow = self.ratio * (swept.power - network.outflow(everything)[..., :n])  # C₀ dT/dt
         if self.varies:
             warm, cold = (capacity_ratio(network, linear, everything + d) for d in (CAPACITY_STEP, -CAPACITY_STEP))
             self.log_slope = (np.log(cold) - np.log(warm)) / (2 * CAPACITY_STEP)  # d ln C/dT

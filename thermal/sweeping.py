@@ -16,9 +16,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from thermal.constants import Stefan_Boltzmann
 from thermal.errors import ThermalError
-from thermal.forcing import MOST_ROWS, find_corners, initial_state, source_powers
+from thermal.forcing import MOST_ROWS, find_corners, initial_state
 from thermal.network import Array, Network, linearise
 from thermal.profile import Profile
 from thermal.relaxation import Relaxation, find_relaxation
@@ -138,7 +137,7 @@ def run_sweeps(
     linear = linearise(network, float(held.mean()))
     modes = find_relaxation(linear, 1.0)
     grid = Grid(knots, modes)
-    power = np.array([source_powers(network, t, 0) for t in grid.moments])
+    power = network.power(grid.moments)
     first = propagate(linear, boundaries, T0)
     start = np.zeros((1, network.count))
     moments = grid.moments
@@ -165,18 +164,10 @@ def _beyond(network: Network, linear: Network, T: Array, held: Array, power: Arr
     n = network.count
     everything = np.concatenate([T, held], axis=2)
     if not any(callable(node.capacity) for node in network.nodes):
-        return outflow(linear, everything)[..., :n] - outflow(network, everything)[..., :n]
-    flow = (power - outflow(network, everything)[..., :n]) * capacity_ratio(network, linear, everything)
-    beyond: Array = flow - (power - outflow(linear, everything)[..., :n])
+        return linear.outflow(everything)[..., :n] - network.outflow(everything)[..., :n]
+    flow = (power - network.outflow(everything)[..., :n]) * capacity_ratio(network, linear, everything)
+    beyond: Array = flow - (power - linear.outflow(everything)[..., :n])
     return beyond
-
-
-def outflow(network: Network, temperature: Array) -> Array:
-    """Heat leaving each node and boundary, L T + σ R T⁴ (W); `temperature` has shape (..., N)."""
-    flow: Array = temperature @ network.conduction
-    if network.radiators:
-        flow += Stefan_Boltzmann * (temperature**4 @ network.radiation)
-    return flow
 
 
 def capacity_ratio(network: Network, linear: Network, temperature: Array) -> Array:

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from thermal.errors import ThermalError
-from thermal.forcing import boundary_forcing, find_corners, initial_state, source_powers
+from thermal.forcing import boundary_forcing, find_corners, initial_state
 from thermal.lag import scan
 from thermal.network import Array, Network
 from thermal.profile import Profile
@@ -71,8 +71,8 @@ def propagate(network: Network, boundaries: Mapping[str, Profile], initial: Arra
     modes = find_relaxation(network, 1.0)  # a linear network has the same modes at every temperature
     rate, shapes = 1 / modes.time_constants, modes.shapes
     value, slope = boundary_forcing(network, boundaries, knots[:-1])
-    u0 = (value @ modes.coupling.T + source_powers(network, knots[:-1], 0)) @ shapes
-    u1 = (slope @ modes.coupling.T + source_powers(network, knots[:-1], 1)) @ shapes
+    u0 = (value @ modes.coupling.T + network.power(knots[:-1])) @ shapes
+    u1 = (slope @ modes.coupling.T + network.power(knots[:-1], 1)) @ shapes
     trend = u1 / rate
     level = (u0 - trend) / rate
     length = np.diff(knots)[:, None]
