@@ -22,10 +22,9 @@ from compensation.controllers import Loops, require_stable
 from compensation.electronics import Electronics
 from compensation.errors import CompensationError
 from compensation.samples import require_regular
-from compensation.wave import StandingWave, turn
+from compensation.wave import PHYSICAL, StandingWave, turn
 
 Real = NDArray[np.float64]
-PHYSICAL = ("omega", "tau", "damping_split", "damping_axis", "frequency_split", "frequency_axis")
 LOST = 0.3  # node over antinode at which a wave that its force cannot hold has left its azimuth
 ALIKE = 0.01
 """Part of 1/τ, and of n k per rad/s, within which rows share one matrix; what drives the wave is exact in every row."""
@@ -67,7 +66,7 @@ def simulate_rebalance(
     t = np.asarray(time, dtype=float)
     samples = samples_in_row(t, loops)
     require_stable(loops, float(np.max(1 / np.asarray(wave.tau))))
-    rows = spread_over_rows(wave, len(t))
+    rows = wave.over_rows(len(t))
     turning, azimuth = (np.broadcast_to(np.asarray(x, dtype=float), t.shape) for x in (rate, angle))
     forcing = np.empty((len(t), 4))
     start = float(rows.omega[0] + rows.detuning(azimuth)[0])  # type: ignore[index]
@@ -79,9 +78,8 @@ def simulate_rebalance(
     state, limits, limited = None, electronics.actuators, 0
     for block in _alike(rows, turning, azimuth):
         middle = (block.start + block.stop) // 2
-        loop, offset = close_loops(
-            at_row(rows, middle), electronics, loops, float(turning[middle]), float(azimuth[middle])
-        )
+        here = rows.at_row(middle)
+        loop, offset = close_loops(here, electronics, loops, float(turning[middle]), float(azimuth[middle]))
         if block.start == 0 or azimuth[block.start] != azimuth[block.start - 1]:
             loop.require_stable()
             state = loop.settle(forcing[block.start], offset)
@@ -125,9 +123,9 @@ def settle_rebalance(
     """
     values = [np.asarray(getattr(wave, name), dtype=float) for name in PHYSICAL]
     shape = np.broadcast_shapes(*(np.shape(x) for x in (*values, rate, angle)), (1,))
-    rows = spread_over_rows(wave, shape[0])
+    rows = wave.over_rows(shape[0])
     turning, azimuth, turned = (np.broadcast_to(np.asarray(x, dtype=float), shape) for x in (rate, angle, turn))
-    A = _dynamics(rows, turning, azimuth)
+    A = rows.envelope(turning, azimuth)
     c, s = np.cos(rows.harmonic * azimuth), np.sin(rows.harmonic * azimuth)
     R = np.moveaxis(np.array([[c, -s], [s, c]]), -1, 0)
     back = np.swapaxes(R, 1, 2)
@@ -154,18 +152,6 @@ def leak_quadrature(quadrature: ArrayLike, phase: ArrayLike, coupling: float = 1
     return np.asarray(np.asarray(quadrature) * np.asarray(phase) / coupling)
 
 
-def _dynamics(rows: StandingWave, rate: Real, angle: Real) -> NDArray[np.complex128]:
-    """Return A (N, 2, 2) of the averaged wave in the frame at each azimuth, about the mean frequency."""
-    damped = np.asarray(rows.damping_split) / 2 * np.exp(2j * rows.harmonic * (np.asarray(rows.damping_axis) - angle))
-    detuned = (
-        np.asarray(rows.frequency_split) / 2 * np.exp(2j * rows.harmonic * (np.asarray(rows.frequency_axis) - angle))
-    )
-    along, across = -damped.real + 1j * detuned.real, -damped.imag + 1j * detuned.imag
-    decay, coriolis = -1 / np.asarray(rows.tau), rows.coupling * rate
-    A = np.array([[decay + along, across - coriolis], [across + coriolis, decay - along]])
-    return np.moveaxis(A, -1, 0)
-
-
 def samples_in_row(time: Real, loops: Loops) -> int:
     """Return how many samples of the loops make one row, or say that they do not."""
     step = require_regular(time, "the simulation of the loops")
@@ -177,32 +163,10 @@ def samples_in_row(time: Real, loops: Loops) -> int:
     return samples
 
 
-def spread_over_rows(wave: StandingWave, count: int) -> StandingWave:
-    """Return the wave with every physical value as an array of rows."""
-    rows = {name: np.broadcast_to(np.asarray(getattr(wave, name), float), (count,)) for name in PHYSICAL}
-    return StandingWave(harmonic=wave.harmonic, bryan_factor=wave.bryan_factor, **rows)
-
-
-def at_row(wave: StandingWave, row: int) -> StandingWave:
-    """Return the wave at one row, in numbers."""
-    values = {name: float(getattr(wave, name)[row]) for name in PHYSICAL}
-    return StandingWave(harmonic=wave.harmonic, bryan_factor=wave.bryan_factor, **values)
-
-
 def _alike(rows: StandingWave, rate: Real, angle: Real) -> Iterator[slice]:
     """Cut the rows where the averaged dynamics have changed by more than `ALIKE`, and where the azimuth moves."""
-    scale = 1 / np.asarray(rows.tau)
-    columns = np.stack(
-        [
-            scale,
-            np.asarray(rows.damping_split) * np.cos(2 * rows.harmonic * np.asarray(rows.damping_axis)),
-            np.asarray(rows.damping_split) * np.sin(2 * rows.harmonic * np.asarray(rows.damping_axis)),
-            np.asarray(rows.frequency_split) * np.cos(2 * rows.harmonic * np.asarray(rows.frequency_axis)),
-            np.asarray(rows.frequency_split) * np.sin(2 * rows.harmonic * np.asarray(rows.frequency_axis)),
-            rows.coupling * rate,
-        ],
-        axis=1,
-    )
+    scale, damped, detuned = 1 / np.asarray(rows.tau), 2 * rows.damped(), 2 * rows.detuned()
+    columns = np.stack([scale, damped.real, damped.imag, detuned.real, detuned.imag, rows.coupling * rate], axis=1)
     width = np.concatenate([np.full(5, ALIKE * scale[0]), [ALIKE * rows.coupling]])
     cell = np.column_stack([np.floor(columns / width + 0.5), angle])
     edges = np.flatnonzero(np.any(np.diff(cell, axis=0) != 0, axis=1)) + 1
@@ -216,7 +180,7 @@ def close_loops(
     """Return the loops closed about a wave held at an azimuth (rad), and what the pick-offs' errors add to their reading."""
     R = turn(wave.harmonic * angle)
     settled = settle_rebalance(wave, electronics, rate, angle)
-    A = R.T @ wave.envelope(rate) @ R - 1j * (settled.omega[0] - float(wave.omega)) * np.eye(2)
+    A = wave.envelope(rate, angle) - 1j * (settled.omega[0] - float(wave.omega)) * np.eye(2)
     if electronics.actuators.stiff:
         A = A + 1j * settled.quadrature[0] * np.array([[0.0, 1.0], [1.0, 0.0]])
     pickoff = R.T @ electronics.pickoff.matrix(wave.harmonic) @ R

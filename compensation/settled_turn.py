@@ -18,8 +18,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from compensation.electronics import Electronics
 from compensation.errors import CompensationError
-from compensation.rebalance import PHYSICAL, LoopRun, settle_rebalance, spread_over_rows
-from compensation.wave import StandingWave
+from compensation.rebalance import LoopRun, settle_rebalance
+from compensation.wave import PHYSICAL, StandingWave
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -45,7 +45,7 @@ def turn_settled(
     t = np.asarray(time, dtype=float)
     if t.ndim != 1 or not (np.diff(t) > 0).all():
         raise CompensationError("the times of a run must increase.")
-    rows = spread_over_rows(wave, len(t))
+    rows = wave.over_rows(len(t))
     turning, commanded = (np.broadcast_to(np.asarray(x, dtype=float), t.shape) for x in (rate, precession))
     theta = _integrate(rows, electronics, t, turning, commanded, _seen(electronics, wave.harmonic, angle))
     return read_turning(rows, electronics, theta, rate=turning, precession=commanded, time=t)

@@ -1,13 +1,14 @@
 """The standing wave of a shell between its two patterns: decay, detuning, precession, and what they do to a rate.
 
-    (Ẋ, Ẏ) = M (X, Y) + u,   M = n k Ω J − 1/τ − ½ Δ(1/τ) S(n θ_τ) + ½ i Δω S(n θ_ω)
+    (Ẋ, Ẏ) = M (X, Y) + u,   M = n k Ω J − 1/τ − ½ Δ(1/τ) S(n θ_τ) + ½ i Δω S(n θ_ω),   S(α) = [[cos 2α, sin 2α], [sin 2α, −cos 2α]]
 
 for x = Re{X e^{iωt}} along cos nθ and y along sin nθ; derived, and shown equal to the CVG paper's eqs. (7)–(25), in
 `compensation.derivation`. u = −i F/(2ω) is the force per modal mass F = Re{F e^{iωt}}. Azimuths θ are physical angles on
 the shell, counted in the sense in which a positive rate turns the wave.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,7 +17,7 @@ from compensation.errors import CompensationError
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
-TURN = np.array([[0.0, -1.0], [1.0, 0.0]])
+PHYSICAL = ("omega", "tau", "damping_split", "damping_axis", "frequency_split", "frequency_axis")
 
 
 @dataclass(frozen=True)
@@ -63,21 +64,29 @@ class StandingWave:
 
     def decay(self, angle: ArrayLike) -> Real:
         """1/τ of a wave at the azimuth θ (1/s): 1/τ + ½ Δ(1/τ) cos 2n(θ − θ_τ)."""
-        along = see_along(angle, self.damping_axis, self.harmonic)
-        return np.asarray(1 / self.tau + self.damping_split / 2 * along)
+        return np.asarray(1 / self.tau + self.damped(angle).real)
 
     def drift(self, angle: ArrayLike) -> Real:
         """Rate (rad/s) that damping feigns at the azimuth θ: Δ(1/τ)/(2 n k) sin 2n(θ − θ_τ)."""
-        across = see_across(angle, self.damping_axis, self.harmonic)
-        return feign_rate(self.damping_split * across, self.harmonic, self.bryan_factor)
+        return np.asarray(-self.damped(angle).imag / self.coupling)
 
     def quadrature(self, angle: ArrayLike) -> Real:
         """Growth of the quadrature over the amplitude at the azimuth θ (1/s): ½ Δω sin 2n(θ − θ_ω)."""
-        return np.asarray(self.frequency_split / 2 * see_across(angle, self.frequency_axis, self.harmonic))
+        return np.asarray(-self.detuned(angle).imag)
 
     def detuning(self, angle: ArrayLike) -> Real:
         """Angular frequency of a wave at the azimuth θ less the mean (rad/s): ½ Δω cos 2n(θ − θ_ω)."""
-        return np.asarray(self.frequency_split / 2 * see_along(angle, self.frequency_axis, self.harmonic))
+        return np.asarray(self.detuned(angle).real)
+
+    def damped(self, angle: ArrayLike = 0.0) -> Complex:
+        """½ Δ(1/τ) e^{2in(θ_τ − θ)} of a wave at the azimuth θ (1/s)."""
+        return np.asarray(self.damping_split / 2 * np.exp(2j * self.harmonic * (self.damping_axis - np.asarray(angle))))
+
+    def detuned(self, angle: ArrayLike = 0.0) -> Complex:
+        """½ Δω e^{2in(θ_ω − θ)} (rad/s)."""
+        return np.asarray(
+            self.frequency_split / 2 * np.exp(2j * self.harmonic * (self.frequency_axis - np.asarray(angle)))
+        )
 
     def mean_rate(self, rate: float) -> float:
         """Mean indicated rate (rad/s) of a free wave: sign(Ω) √(Ω² − Ω_d²), and 0 where it locks, |Ω| ≤ Ω_d.
@@ -87,23 +96,25 @@ class StandingWave:
         most = abs(float(self.damping_split)) / (2 * self.coupling)
         return float(np.sign(rate) * np.sqrt(max(rate**2 - most**2, 0.0)))
 
-    def envelope(self, rate: float = 0.0) -> Complex:
-        """Return M (2, 2) of the complex amplitudes (1/s) for numbers, not rows."""
-        return np.asarray(
-            self.coupling * rate * TURN
-            - np.eye(2) / self.tau
-            - self.damping_split / 2 * split(self.harmonic * np.asarray(self.damping_axis))
-            + 0.5j * self.frequency_split * split(self.harmonic * np.asarray(self.frequency_axis))
-        )
+    def envelope(self, rate: ArrayLike = 0.0, angle: ArrayLike = 0.0) -> Complex:
+        """Return M (..., 2, 2) of the complex amplitudes (1/s), in the frame of a wave at the azimuth θ."""
+        damped, detuned = self.damped(angle), self.detuned(angle)
+        along, across = -damped.real + 1j * detuned.real, -damped.imag + 1j * detuned.imag
+        decay, coriolis = -1 / np.asarray(self.tau), self.coupling * np.asarray(rate)
+        M = np.array([[decay + along, across - coriolis], [across + coriolis, decay - along]])
+        return np.moveaxis(M, (0, 1), (-2, -1))
 
-    def carrier(self, rate: float = 0.0) -> Real:
-        """Return the matrix (4, 4) of d/dt (x, y, ẋ, ẏ), every cycle of the carrier, for numbers, not rows."""
-        damping = 2 / self.tau * np.eye(2) + self.damping_split * split(self.harmonic * np.asarray(self.damping_axis))
-        stiffness = self.omega**2 * np.eye(2) + self.omega * self.frequency_split * split(
-            self.harmonic * np.asarray(self.frequency_axis)
-        )
-        turning = 2 * self.coupling * rate * TURN
-        return np.asarray(np.block([[np.zeros((2, 2)), np.eye(2)], [-stiffness, turning - damping]]))
+    def over_rows(self, count: int) -> "StandingWave":
+        """Return the wave with every physical value as an array of rows."""
+        rows: dict[str, Any] = {
+            name: np.broadcast_to(np.asarray(getattr(self, name), float), count) for name in PHYSICAL
+        }
+        return replace(self, **rows)
+
+    def at_row(self, row: int) -> "StandingWave":
+        """Return the wave at one of its rows, in numbers."""
+        numbers: dict[str, Any] = {name: float(getattr(self, name)[row]) for name in PHYSICAL}
+        return replace(self, **numbers)
 
 
 def see_across(angle: ArrayLike, axis: ArrayLike, harmonic: int = 2) -> Real:
@@ -119,12 +130,6 @@ def see_along(angle: ArrayLike, axis: ArrayLike, harmonic: int = 2) -> Real:
 def feign_rate(across: ArrayLike, harmonic: int, bryan_factor: float) -> Real:
     """Rate (rad/s) that a damping split across the wave, Δ(1/τ) sin 2n(θ − θ_τ) (1/s), feigns: its part 1/(2 n k)."""
     return np.asarray(across) / (2 * harmonic * bryan_factor)
-
-
-def split(axis: ArrayLike) -> Real:
-    """Return S(α) = [[cos 2α, sin 2α], [sin 2α, −cos 2α]], an anisotropy of the plane with its axis at α (rad)."""
-    cosine, sine = np.cos(2 * np.asarray(axis)), np.sin(2 * np.asarray(axis))
-    return np.asarray(np.array([[cosine, sine], [sine, -cosine]]))
 
 
 def turn(angle: float) -> Real:

@@ -19,7 +19,7 @@ from compensation.actuators import require_range
 from compensation.closed_loop import ClosedLoop, RowMap
 from compensation.controllers import Loops, require_stable
 from compensation.electronics import Electronics
-from compensation.rebalance import LoopRun, at_row, samples_in_row, spread_over_rows
+from compensation.rebalance import LoopRun, samples_in_row
 from compensation.wave import StandingWave
 
 Real = NDArray[np.float64]
@@ -49,7 +49,7 @@ def simulate_whole_angle(
     t = np.asarray(time, dtype=float)
     samples = samples_in_row(t, loops)
     require_stable(loops, float(np.max(1 / np.asarray(wave.tau))), WITHOUT_RATE)
-    rows = spread_over_rows(wave, len(t))
+    rows = wave.over_rows(len(t))
     turning, commanded = (np.broadcast_to(np.asarray(x, dtype=float), t.shape) for x in (rate, precession))
     course = _Course(rows, electronics, turning, commanded * rows.harmonic)
     loop = close_without_rate(wave, electronics, loops)
@@ -135,18 +135,10 @@ class _Course:
     def __post_init__(self) -> None:
         rows = self.rows
         n = rows.harmonic
-        first = at_row(rows, 0)
-        self.start = float(first.omega)
-        columns = [
-            1 / np.asarray(rows.tau),
-            np.asarray(rows.damping_split) / 2 * np.cos(2 * n * np.asarray(rows.damping_axis)),
-            np.asarray(rows.damping_split) / 2 * np.sin(2 * n * np.asarray(rows.damping_axis)),
-            np.asarray(rows.frequency_split) / 2 * np.cos(2 * n * np.asarray(rows.frequency_axis)),
-            np.asarray(rows.frequency_split) / 2 * np.sin(2 * n * np.asarray(rows.frequency_axis)),
-            np.asarray(rows.omega) - self.start,
-            rows.coupling * self.rate,
-            self.command,
-        ]
+        self.start = float(rows.at_row(0).omega)
+        parts = [part for one in (rows.damped(), rows.detuned()) for part in (one.real, one.imag)]
+        drift = np.asarray(rows.omega) - self.start
+        columns = [1 / np.asarray(rows.tau), *parts, drift, rows.coupling * self.rate, self.command]
         self.columns = np.stack(columns, axis=1).tolist()
         self.columns.append(self.columns[-1])
         pickoff, drive = self.electronics.pickoff, self.electronics.drive

@@ -22,6 +22,19 @@ FOLLOWING = 0.2
 """Part of a deviation of the angle that corrects the speed of the frame."""
 
 
+def oscillate(wave: StandingWave, rate: float) -> Real:
+    """Return the matrix (4, 4) of d/dt (x, y, ẋ, ẏ), every cycle of the carrier: `compensation.derivation.oscillator`."""
+
+    def split(azimuth: float) -> Real:
+        cosine, sine = np.cos(2 * wave.harmonic * azimuth), np.sin(2 * wave.harmonic * azimuth)
+        return np.array([[cosine, sine], [sine, -cosine]])
+
+    damping = 2 / wave.tau * np.eye(2) + wave.damping_split * split(float(wave.damping_axis))
+    stiffness = wave.omega**2 * np.eye(2) + wave.omega * wave.frequency_split * split(float(wave.frequency_axis))
+    turning = 2 * wave.coupling * rate * np.array([[0.0, -1.0], [1.0, 0.0]])
+    return np.asarray(np.block([[np.zeros((2, 2)), np.eye(2)], [-stiffness, turning - damping]]))
+
+
 @dataclass(frozen=True)
 class CarrierRun:
     """Commands after every sample: `time` (s), `rate` (rad/s), `quadrature`, `decay` (1/s), `omega` (rad/s), `angle` (rad)."""
@@ -84,7 +97,7 @@ def simulate_carrier(
     phase, nu = 0.0, 0.0
     filtered, integral = np.zeros(4), np.array([-1 / tau, 0.0, 0.0, 0.0])
     waiting = [np.array([1 / tau, 0.0, 0.0, 0.0])] * (late + 1)
-    maps = {value: _free_motion(wave.carrier(value), h, count) for value in {0.0, rate}}
+    maps = {value: _free_motion(oscillate(wave, value), h, count) for value in {0.0, rate}}
     steps = round(seconds * loops.sampling)
     speed = wave.coupling * rate + wave.harmonic * (precession or 0.0)
     out, frame, turned = np.empty((steps, 4)), wave.harmonic * angle, np.empty(steps)
@@ -97,7 +110,7 @@ def simulate_carrier(
         if precession is not None:
             command[2] = wave.harmonic * precession
         w = start + nu
-        A, path_map, quadrature = wave.carrier(turning), maps[turning], 1j * command[3]
+        A, path_map, quadrature = oscillate(wave, turning), maps[turning], 1j * command[3]
         if limits.quadrature == "stiffness":  # a spring 2ωκ that couples the patterns of the frame
             A = A.copy()
             A[2:, :2] -= 2 * omega * command[3] * R @ np.array([[0.0, 1.0], [1.0, 0.0]]) @ R.T
