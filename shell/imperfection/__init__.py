@@ -10,7 +10,6 @@ from shell.imperfection.coupled import CoupledHarmonics
 from shell.imperfection.field import Field, Function, Map, Sum, Waves, wave
 from shell.imperfection.imperfect import Imperfection, LineMass, PointMass, holes, teeth
 from shell.imperfection.pair import Pair
-from shell.imperfection.ring import ring_frequency, split_ring
 from shell.imperfection.split import Split, find_split
 
 __all__ = [
@@ -27,8 +26,6 @@ __all__ = [
     "Waves",
     "find_split",
     "holes",
-    "ring_frequency",
-    "split_ring",
     "teeth",
     "wave",
 ]

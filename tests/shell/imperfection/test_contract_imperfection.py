@@ -5,7 +5,7 @@ import pytest
 
 from shell.elastic import Elastic
 from shell.errors import ShellError
-from shell.imperfection import CoupledHarmonics, Imperfection, Map, Pair, PointMass, find_split, split_ring, teeth, wave
+from shell.imperfection import CoupledHarmonics, Imperfection, Map, Pair, PointMass, find_split, teeth, wave
 from shell.meridian import hemisphere
 from shell.modes import solve_modes
 from shell.resonator import Stem
@@ -65,5 +65,3 @@ def test_waves_and_teeth_are_checked():
         teeth(40, 0.2, 1e-4)
     with pytest.raises(ShellError, match="3 errors were given for 4 teeth"):
         teeth(4, 0.2, 1e-4, errors=(0.1, 0.1, 0.1))
-    with pytest.raises(ShellError, match="bends in harmonics from 2"):
-        split_ring(1)

@@ -17,7 +17,6 @@ from shell.imperfection import (
     Sum,
     find_split,
     holes,
-    split_ring,
     teeth,
     wave,
 )
@@ -201,9 +200,3 @@ def test_holes_four_waves_apart_make_their_azimuth_light(pair):
     split = find_split(pair, drilled)
     assert split.fast_axis == pytest.approx(0.1, abs=1e-9)
     assert split.shift > 0
-
-
-def test_the_split_ring_is_the_first_order_of_any_n():
-    for n in (2, 3, 4):
-        expected = (n**2 - 1) / (2 * (n**2 + 1))
-        assert split_ring(n, wave(2 * n, 1e-5, 0.1)).relative / 1e-5 == pytest.approx(expected, rel=1e-6)
