@@ -10,11 +10,11 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from compensation.arrays import Array
 from compensation.errors import CompensationError
 
-Real = NDArray[np.float64]
 NEAR = 0.9  # part of a limit from which a row of the record is followed sample by sample
 
 
@@ -22,13 +22,13 @@ NEAR = 0.9  # part of a limit from which a row of the record is followed sample 
 class RangeUse:
     """Parts of their limits that rate, quadrature and drive use (1): numbers, or one per row."""
 
-    rate: Real
-    quadrature: Real
-    drive: Real
+    rate: Array
+    quadrature: Array
+    drive: Array
     shared: bool
 
     @property
-    def across(self) -> Real:
+    def across(self) -> Array:
         """Part of the force across the wave: of rate and, where it is a force, quadrature together."""
         return np.hypot(self.rate, self.quadrature) if self.shared else self.rate
 
@@ -66,12 +66,12 @@ class Actuators:
         """Return the parts of the limits that commands (1/s) use."""
         holds = self.stiffness if self.stiff else self.force
 
-        def part(command: ArrayLike, limit: float) -> Real:
+        def part(command: ArrayLike, limit: float) -> Array:
             return np.asarray(np.abs(command) / limit, dtype=float)
 
         return RangeUse(part(rate, self.force), part(quadrature, holds), part(drive, self.drive), not self.stiff)
 
-    def give(self, command: Real) -> Real:
+    def give(self, command: Array) -> Array:
         """Return what is given of commands (amplitude, phase, rate, quadrature): a force across keeps its direction in phase."""
         amplitude, phase, rate, quadrature = command
         amplitude = min(max(amplitude, -self.drive), self.drive)
@@ -82,7 +82,7 @@ class Actuators:
             rate, quadrature = rate * self.force / size, quadrature * self.force / size
         return np.array([amplitude, phase, rate, quadrature])
 
-    def is_near(self, *commands: Real) -> bool:
+    def is_near(self, *commands: Array) -> bool:
         """Whether any of the commands is near a limit."""
         return any(self.use(c[2], c[3], c[0]).worst > NEAR for c in commands)
 

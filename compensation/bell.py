@@ -12,14 +12,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from compensation.arrays import Array
 from compensation.constants import zero_Celsius
 from compensation.errors import CompensationError
 from compensation.fir import smooth
 from compensation.samples import read_columns, require_regular
 
-Real = NDArray[np.float64]
 MARGIN = 0.01  # part of a fitted range by which noise may lead out of it before that counts as extrapolation
 
 
@@ -27,18 +27,18 @@ MARGIN = 0.01  # part of a fitted range by which noise may lead out of it before
 class PolynomialCurve:
     """y = Σ cᵢ (x − reference)ⁱ between `lowest` and `highest` x, with the covariance of c."""
 
-    coefficients: Real
-    covariance: Real
+    coefficients: Array
+    covariance: Array
     reference: float
     lowest: float
     highest: float
 
-    def value(self, x: ArrayLike) -> Real:
+    def value(self, x: ArrayLike) -> Array:
         """Return y at x."""
         shift = np.asarray(x, dtype=float) - self.reference
         return np.asarray(np.polynomial.polynomial.polyval(shift, self.coefficients), dtype=float)
 
-    def refuse_outside(self, x: Real, name: str, show: Callable[[float], str]) -> None:
+    def refuse_outside(self, x: Array, name: str, show: Callable[[float], str]) -> None:
         """Raise when x leaves the fitted range by more than `MARGIN` of it; `show` writes an x for people."""
         beyond = MARGIN * (self.highest - self.lowest)
         low, high = float(np.min(x)), float(np.max(x))
@@ -55,11 +55,11 @@ class BellChain:
 
     null: float  # N₁ (counts)
     scale: float  # S₁ (rad/s per count)
-    rough_covariance: Real  # array (2, 2), covariance of null and scale
+    rough_covariance: Array  # array (2, 2), covariance of null and scale
     bias: PolynomialCurve  # N(T), rad/s over kelvin: eq. (34)
     scale_over_rate: PolynomialCurve  # rate (rad/s) over rate (rad/s): eq. (35)
     scale_over_temperature: PolynomialCurve  # factor (1) over kelvin: eq. (36)
-    taps: Real  # array, FIR coefficients, empty for none
+    taps: Array  # array, FIR coefficients, empty for none
     sampling: float  # step (s) that the taps were designed for
 
     @property
@@ -72,11 +72,11 @@ class BellChain:
 class ChainOutput:
     """Rate (rad/s) after each step: (33), (34), (35), (36) and the filter."""
 
-    rough: Real
-    bias_compensated: Real
-    rate_compensated: Real
-    temperature_compensated: Real
-    filtered: Real
+    rough: Array
+    bias_compensated: Array
+    rate_compensated: Array
+    temperature_compensated: Array
+    filtered: Array
 
 
 def apply_chain(
@@ -101,7 +101,7 @@ def apply_chain(
     return ChainOutput(rough, straight, linear, steady, smooth(steady, chain.taps))
 
 
-def invert_chain(chain: BellChain, rate: ArrayLike, temperature: ArrayLike) -> Real:
+def invert_chain(chain: BellChain, rate: ArrayLike, temperature: ArrayLike) -> Array:
     """Return the raw output (counts) that the chain, without its filter, turns into this rate (rad/s).
 
     The quadratic (35) is inverted on its rising branch; this makes the twin of a gyro that the chain describes.
@@ -112,7 +112,7 @@ def invert_chain(chain: BellChain, rate: ArrayLike, temperature: ArrayLike) -> R
     shift = c0 - target
     root = np.sqrt(c1**2 - 4 * c2 * shift)
     straight = chain.scale_over_rate.reference - 2 * shift / (c1 + root)
-    counts: Real = (straight + chain.bias.value(T)) / chain.scale + chain.null
+    counts: Array = (straight + chain.bias.value(T)) / chain.scale + chain.null
     if not np.all(np.isfinite(counts)):
         raise CompensationError("the scale over rate has a turning point in this range and cannot be inverted.")
     return counts

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from compensation.arrays import Array
 from compensation.bell import BellChain, PolynomialCurve
 from compensation.constants import zero_Celsius
 from compensation.errors import CompensationError
@@ -18,7 +19,6 @@ from compensation.noise_regression import correlated_covariance
 from compensation.polynomial import fit_polynomial
 from compensation.samples import read_columns, require_regular
 
-Real = NDArray[np.float64]
 Fitted = TypeVar("Fitted")
 
 
@@ -26,10 +26,10 @@ Fitted = TypeVar("Fitted")
 class BellRun:
     """One calibration run: time (s), raw output (counts), temperature (K), applied rate (rad/s); arrays (N,)."""
 
-    time: Real
-    output: Real
-    temperature: Real
-    rate: Real
+    time: Array
+    output: Array
+    temperature: Array
+    rate: Array
 
     def __post_init__(self) -> None:
         columns = read_columns(time=self.time, output=self.output, temperature=self.temperature, rate=self.rate)
@@ -37,7 +37,7 @@ class BellRun:
             object.__setattr__(self, name, values)
 
 
-def fit_rough(run: BellRun) -> tuple[float, float, Real]:
+def fit_rough(run: BellRun) -> tuple[float, float, Array]:
     """Fit null N₁ (counts) and scale S₁ (rad/s per count), with covariance, to a run at rest and turning: eq. (33).
 
     The output is regressed on the rate, whose values are exact; with the paper's two plateaus the line passes through
@@ -125,7 +125,7 @@ def _fit_curve(x: ArrayLike, y: ArrayLike, order: int, name: str, reference: flo
     return PolynomialCurve(scaled, covariance, reference, float(values.min()), float(values.max()))
 
 
-def _about(centre: float, half_span: float, power: int, reference: float, order: int) -> Real:
+def _about(centre: float, half_span: float, power: int, reference: float, order: int) -> Array:
     """Coefficients in (x − reference) of ((x − centre) / half_span)^power, padded to `order`."""
     base = np.array([(reference - centre) / half_span, 1 / half_span])
     return np.pad(np.polynomial.polynomial.polypow(base, power), (0, order - power))

@@ -13,8 +13,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from compensation.arrays import Array
 from compensation.constants import zero_Celsius
 from compensation.decimation import Blocks, average_blocks
 from compensation.derivative import differentiate
@@ -24,7 +25,6 @@ from compensation.noise_regression import coloured_covariance, fit_coloured
 from compensation.regression import fit_linear
 from compensation.stepwise import StepwiseSelection
 
-Array = NDArray[np.float64]
 # Powers of f and ḟ in the terms of HRG paper eq. (21), in its order k₁ … k₉.
 TERMS: dict[str, tuple[int, int]] = {
     "f": (1, 0), "f^2": (2, 0), "f^3": (3, 0), "fdot": (0, 1), "fdot^2": (0, 2), "fdot^3": (0, 3),

@@ -16,13 +16,13 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from compensation.bias import PARENTS, TERMS, BiasDesign, BiasFit, BiasRun, fit_terms
 from compensation.errors import CompensationError
 from compensation.memory import NO_MEMORY, Memory
 from compensation.noise_regression import estimate_theta, whiten
 from compensation.stepwise import StepwiseSelection, select_stepwise
 
-Array = NDArray[np.float64]
 Method = Literal["paper", "guarded"]
 ENTER, REMOVE = 0.05, 0.10
 # Bias stability is the standard deviation of averages over this many seconds; the paper does not state its own.

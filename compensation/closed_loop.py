@@ -20,12 +20,11 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from compensation.arrays import Array, Complex
 from compensation.controllers import Loops
 from compensation.electronics import Electronics
 from compensation.errors import CompensationError
 
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 CHANNELS = ("amplitude", "phase", "rate", "quadrature")
 FOUR = 4
 
@@ -72,13 +71,13 @@ class ClosedLoop:
         return int(self.places["wave_sum"].stop)
 
     @cached_property
-    def sample(self) -> tuple[Real, Real]:
+    def sample(self) -> tuple[Array, Array]:
         """The map of one sample, and the covariance of the noise that it adds."""
         T, (late, rest) = self.loops.step, self.loops.late
         at, N = self.places, self.size
         rows = np.eye(N)
 
-        def part(name: str) -> Real:
+        def part(name: str) -> Array:
             return rows[at[name]]
 
         A, C_p = real_form(self.A), real_form(self.pickoff)
@@ -132,7 +131,7 @@ class ClosedLoop:
         return F, covariance
 
     @cached_property
-    def drive_map(self) -> Real:
+    def drive_map(self) -> Array:
         """The wave's four rates for the four commands: forces through the channels, phase and stiffness directly."""
         drive = real_form(self.drive)
         drive[:, 1] = [0.0, 1.0, 0.0, 0.0]
@@ -143,18 +142,18 @@ class ClosedLoop:
         return drive
 
     @cached_property
-    def _sample_root(self) -> Real:
+    def _sample_root(self) -> Array:
         return square_root(self.sample[1])
 
     @cached_property
-    def _at_once(self) -> Real | None:
+    def _at_once(self) -> Array | None:
         """What a command does to the wave in the sample that made it; None where every command comes later."""
         late, rest = self.loops.late
         if late:
             return None
         return np.asarray(_held_maps(real_form(self.A), self.loops.step - rest)[1] @ self.drive_map)
 
-    def follow(self, state: Real, samples: int, generator: np.random.Generator | None) -> tuple[Real, bool]:
+    def follow(self, state: Array, samples: int, generator: np.random.Generator | None) -> tuple[Array, bool]:
         """Return the state after a row, each command limited, and whether any was at its limit.
 
         A command beyond its limit is what the actuator gives, and the integral of its channel keeps its value (anti-windup).
@@ -187,7 +186,7 @@ class ClosedLoop:
                 f" (growth {np.log(radius) * self.loops.sampling:.3g} 1/s); lower the bandwidths or the errors."
             )
 
-    def settle(self, forcing: Real, offset: Real) -> Real:
+    def settle(self, forcing: Array, offset: Array) -> Array:
         """Return the state at rest under a constant forcing and measurement offset."""
         at, F = self.places, self.sample[0]
         state = np.zeros(self.size)
@@ -197,7 +196,7 @@ class ClosedLoop:
         state[kept] = np.linalg.solve(left, F[np.ix_(kept, given)] @ state[given])
         return state
 
-    def answer_step(self, channel: str, samples: int, count: int) -> tuple[Real, Real]:
+    def answer_step(self, channel: str, samples: int, count: int) -> tuple[Array, Array]:
         """Return times (s) and what a channel commands against a forcing of 1 that sets in at 0, every `samples` samples."""
         at, k = self.places, CHANNELS.index(channel)
         state, F = np.zeros(self.size), self.row(samples).map
@@ -231,15 +230,15 @@ class RowMap:
 
     loop: ClosedLoop
     samples: int
-    map: Real
-    covariance: Real
+    map: Array
+    covariance: Array
 
     @cached_property
-    def root(self) -> Real:
+    def root(self) -> Array:
         """A square root of the covariance."""
         return square_root(self.covariance)
 
-    def start(self, state: Real, forcing: tuple[Real, Real], offset: tuple[Real, Real], seconds: float) -> Real:
+    def start(self, state: Array, forcing: tuple[Array, Array], offset: tuple[Array, Array], seconds: float) -> Array:
         """Return the state at the start of a row: sums empty, forcing and offset linear from one end to the other."""
         at, begun = self.loop.places, state.copy()
         begun[at["sum"]] = begun[at["wave_sum"]] = 0.0
@@ -249,7 +248,7 @@ class RowMap:
         return begun
 
 
-def real_form(matrix: Complex) -> Real:
+def real_form(matrix: Complex) -> Array:
     """Return a complex (2, 2) matrix as the real (4, 4) one of (Re, Im) pairs."""
     form = np.zeros((FOUR, FOUR))
     form[0::2, 0::2] = form[1::2, 1::2] = matrix.real
@@ -258,13 +257,13 @@ def real_form(matrix: Complex) -> Real:
     return form
 
 
-def square_root(covariance: Real) -> Real:
+def square_root(covariance: Array) -> Array:
     """Return R with R Rᵀ = covariance."""
     values, vectors = np.linalg.eigh(covariance)
     return np.asarray(vectors * np.sqrt(np.clip(values, 0.0, None)))
 
 
-def _held_maps(A: Real, time: float) -> tuple[Real, Real, Real]:
+def _held_maps(A: Array, time: float) -> tuple[Array, Array, Array]:
     """e^{At}, ∫ e^{As} ds and ∫ (t − s) e^{As} ds: free motion, a constant and a linear input."""
     n = len(A)
     block = np.zeros((3 * n, 3 * n))

@@ -17,7 +17,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from compensation.errors import CompensationError
 
-Real = NDArray[np.float64]
 CORNER = 0.25  # corner of the integral part over the bandwidth: 14° of phase margin for it
 LEAST_BANDWIDTH = 1e-3
 

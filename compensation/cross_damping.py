@@ -15,8 +15,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from compensation.arrays import Array
 from compensation.constants import zero_Celsius
 from compensation.demodulated import expand_secondary, relate_rate_to_secondary
 from compensation.errors import CompensationError
@@ -25,8 +26,6 @@ from compensation.regression import fit_linear, refuse_constant_columns
 from compensation.samples import check_time, read_columns
 from compensation.sensitive_element import SensitiveElement
 from compensation.transfer import TransferFunction
-
-Real = NDArray[np.float64]
 
 
 def relate_cross_damping_to_secondary(element: SensitiveElement) -> TransferFunction:
@@ -61,7 +60,7 @@ def relate_cross_damping_to_rate_when_tuned(k: float, zeta: float, g2: float = 2
     return TransferFunction((2 * k**2 * zeta / g2,), (1.0, k * zeta))
 
 
-def evaluate_cross_damping(coefficients: ArrayLike, shift: ArrayLike) -> Real:
+def evaluate_cross_damping(coefficients: ArrayLike, shift: ArrayLike) -> Array:
     """ζ₁₂(T) = Σ ζᵢ Tⁱ: eq. (10), with T the shift (K) from the calibration temperature, ζᵢ in K⁻ⁱ."""
     shift = np.asarray(shift, dtype=float)
     return np.asarray(np.polynomial.polynomial.polyval(shift, np.asarray(coefficients, dtype=float)), dtype=float)
@@ -71,8 +70,8 @@ def evaluate_cross_damping(coefficients: ArrayLike, shift: ArrayLike) -> Real:
 class CrossDampingModel:
     """ζ₁₂(T) of one gyro and what turns it into rate: eqs. (9), (10)."""
 
-    coefficients: Real  # array (n + 1,), ζᵢ (K⁻ⁱ), constant first
-    covariance: Real  # array (n + 1, n + 1), covariance of the coefficients
+    coefficients: Array  # array (n + 1,), ζᵢ (K⁻ⁱ), constant first
+    covariance: Array  # array (n + 1, n + 1), covariance of the coefficients
     calibration_temperature: float  # temperature (K) from which T is counted
     k: float  # k, zeta, g2: natural frequency (rad/s), relative damping (1) and Coriolis coefficient (1) of eq. (9)
     zeta: float
@@ -81,11 +80,11 @@ class CrossDampingModel:
     highest: float
     noise: float  # standard deviation (rad/s) of what the fit left
 
-    def cross_damping(self, temperature: ArrayLike) -> Real:
+    def cross_damping(self, temperature: ArrayLike) -> Array:
         """Return ζ₁₂ (1) at a temperature (K): eq. (10)."""
         return evaluate_cross_damping(self.coefficients, np.asarray(temperature) - self.calibration_temperature)
 
-    def predict(self, time: ArrayLike, temperature: ArrayLike, *, extrapolate: bool = False) -> Real:
+    def predict(self, time: ArrayLike, temperature: ArrayLike, *, extrapolate: bool = False) -> Array:
         """Return the erroneous rate (rad/s) over time: ζ₁₂(T(t)) through the filter (9), settled at the start."""
         t, T = read_columns(time=time, temperature=temperature)
         _check_range(T, self.lowest, self.highest, extrapolate)
@@ -93,7 +92,7 @@ class CrossDampingModel:
 
     def compensate(
         self, time: ArrayLike, rate: ArrayLike, temperature: ArrayLike, *, extrapolate: bool = False
-    ) -> Real:
+    ) -> Array:
         """Return the rate (rad/s) less its predicted cross-damping error; parameters as for `predict`."""
         _, Omega, _ = read_columns(time=time, rate=rate, temperature=temperature)
         return Omega - self.predict(time, temperature, extrapolate=extrapolate)
@@ -108,7 +107,7 @@ class CrossDampingModel:
         return float(np.max(np.abs(self.predict(time, temperature, extrapolate=True) - static)))
 
 
-def simulate_bias(time: ArrayLike, cross_damping: ArrayLike, k: float, zeta: float, g2: float = 2.0) -> Real:
+def simulate_bias(time: ArrayLike, cross_damping: ArrayLike, k: float, zeta: float, g2: float = 2.0) -> Array:
     """Return the erroneous rate (rad/s) that a history of ζ₁₂ causes, through eq. (9), settled at the start."""
     filter9 = relate_cross_damping_to_rate_when_tuned(k, zeta, g2)
     return np.asarray(filter9.simulate(time, cross_damping, settled=True), dtype=float)
@@ -118,9 +117,9 @@ def simulate_bias(time: ArrayLike, cross_damping: ArrayLike, k: float, zeta: flo
 class RestRun:
     """One run of a gyro that does not turn: time (s), output (rad/s), temperature (K); arrays (N,)."""
 
-    time: Real
-    rate: Real
-    temperature: Real
+    time: Array
+    rate: Array
+    temperature: Array
 
     def __post_init__(self) -> None:
         columns = read_columns(time=self.time, rate=self.rate, temperature=self.temperature)
@@ -180,7 +179,7 @@ def fit_cross_damping(
     )
 
 
-def _check_range(temperature: Real, lowest: float, highest: float, extrapolate: bool) -> None:
+def _check_range(temperature: Array, lowest: float, highest: float, extrapolate: bool) -> None:
     low, high = float(np.min(temperature)), float(np.max(temperature))
     if not extrapolate and (low < lowest or high > highest):
         raise CompensationError(

@@ -10,11 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from compensation.arrays import Array
 from compensation.errors import CompensationError
 from compensation.samples import check_time
 from compensation.spikes import NEIGHBOURS, find_spikes
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

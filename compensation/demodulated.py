@@ -13,13 +13,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from compensation.arrays import Array
 from compensation.errors import CompensationError
 from compensation.motion import propagate_envelope
 from compensation.samples import read_columns
 from compensation.sensitive_element import SensitiveElement, tune
 from compensation.transfer import TransferFunction
-
-Real = NDArray[np.float64]
 
 
 def relate_rate_to_secondary(element: SensitiveElement) -> TransferFunction:
@@ -74,7 +73,7 @@ def find_slow_pole(element: SensitiveElement) -> complex:
     return complex(-constant / slope)
 
 
-def respond_to_oscillating_rate(element: SensitiveElement, frequency: ArrayLike) -> tuple[Real, Real]:
+def respond_to_oscillating_rate(element: SensitiveElement, frequency: ArrayLike) -> tuple[Array, Array]:
     """Return amplitude A(λ) (m per rad/s) and phase φ(λ) (rad) of the secondary for the rate e^{jλt}: eq. (14).
 
     The phase is taken with the sign of numerator and denominator of (14), so it is right in all four quadrants.
@@ -140,9 +139,9 @@ def relate_rate_to_measured_rate(k: float, zeta: float) -> TransferFunction:
 class ErrorMap:
     """Figure 3: the integral error of the simplified dynamics over the mismatch of the two modes."""
 
-    frequency_ratio: Real  # frequency_ratio, damping_ratio: arrays (N,), (M,), δk = k₂/k₁ and δζ = ζ₂/ζ₁ (1)
-    damping_ratio: Real
-    error: Real  # array (M, N), J of eq. (26) over the integral of the realistic amplitude squared (1)
+    frequency_ratio: Array  # frequency_ratio, damping_ratio: arrays (N,), (M,), δk = k₂/k₁ and δζ = ζ₂/ζ₁ (1)
+    damping_ratio: Array
+    error: Array  # array (M, N), J of eq. (26) over the integral of the realistic amplitude squared (1)
 
 
 def map_integral_error(
@@ -177,7 +176,7 @@ def map_integral_error(
     return ErrorMap(ratios, dampings, error)
 
 
-def measure_rate(element: SensitiveElement, time: ArrayLike, rate: ArrayLike) -> Real:
+def measure_rate(element: SensitiveElement, time: ArrayLike, rate: ArrayLike) -> Array:
     """Return the rate (rad/s) that the gyro reports: the full dynamics, demodulated and divided by the scale factor.
 
     The secondary amplitude is detected in the phase that a constant rate gives it, W₂(0), which keeps the sign of the
@@ -185,5 +184,5 @@ def measure_rate(element: SensitiveElement, time: ArrayLike, rate: ArrayLike) ->
     """
     read_columns(time=time, rate=rate)
     secondary = propagate_envelope(element, time, rate).secondary
-    measured: Real = (secondary / relate_rate_to_secondary(element).steady_gain).real
+    measured: Array = (secondary / relate_rate_to_secondary(element).steady_gain).real
     return measured

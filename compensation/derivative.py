@@ -5,10 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from compensation.arrays import Array
 from compensation.errors import CompensationError
 from compensation.samples import check_time
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

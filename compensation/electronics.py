@@ -8,13 +8,12 @@ square, β a turn of the electrodes and φ the phase error that both share. All 
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from compensation.actuators import UNLIMITED, Actuators
+from compensation.arrays import Complex
 from compensation.errors import CompensationError
 from compensation.wave import StandingWave, turn
 
-Complex = NDArray[np.complex128]
 BOLTZMANN = 1.380649e-23  # J/K
 
 

@@ -1,14 +1,13 @@
 """Low-pass FIR filter of an even output, as a gyro's firmware computes it."""
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from compensation.arrays import Array
 from compensation.errors import CompensationError
 
-Real = NDArray[np.float64]
 
-
-def design_smoother(sampling: float, cutoff: float, order: int = 50) -> Real:
+def design_smoother(sampling: float, cutoff: float, order: int = 50) -> Array:
     """Return the taps of a low-pass FIR filter (Hamming window) with unit gain at rest.
 
     Half the amplitude is left at the `cutoff` (Hz), as long as that is above about two over the filter's length; the
@@ -25,7 +24,7 @@ def design_smoother(sampling: float, cutoff: float, order: int = 50) -> Real:
     return np.asarray(firwin(order + 1, cutoff, fs=1 / sampling), dtype=float)
 
 
-def smooth(values: ArrayLike, taps: Real) -> Real:
+def smooth(values: ArrayLike, taps: Array) -> Array:
     """Return the causal FIR output, settled on the first value at the start, as firmware computes it."""
     x = np.asarray(values, dtype=float)
     if not len(taps):

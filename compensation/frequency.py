@@ -10,13 +10,13 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from compensation.arrays import Array
 from compensation.errors import CompensationError
 from compensation.polynomial import PolynomialFit, count_apart, fit_polynomial
 from compensation.regression import FTest, compare_nested
 
-Array = NDArray[np.float64]
 FARTHEST_REFERENCE = 1e4  # °C
 GRID = 2001  # temperatures at which a curve is looked at
 

@@ -9,12 +9,11 @@ from dataclasses import dataclass
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from compensation.errors import CompensationError
 
 Run = TypeVar("Run")
-Real = NDArray[np.float64]
 AVERAGING = 100.0  # seconds of the averages
 
 
@@ -39,7 +38,7 @@ class Improvement:
     averages: Change
 
 
-def compare_outputs(times: Sequence[Real], before: Sequence[Real], after: Sequence[Real]) -> Improvement:
+def compare_outputs(times: Sequence[Array], before: Sequence[Array], after: Sequence[Array]) -> Improvement:
     """Return the improvement of an output that should be zero; its mean before counts as removed by calibration."""
     means = [[_average(t, y) for t, y in zip(times, outputs, strict=True)] for outputs in (before, after)]
     return Improvement(
@@ -47,18 +46,18 @@ def compare_outputs(times: Sequence[Real], before: Sequence[Real], after: Sequen
     )
 
 
-def hold_out(runs: Sequence[Run], compensate: Callable[[Sequence[Run], Run], Real]) -> list[Real]:
+def hold_out(runs: Sequence[Run], compensate: Callable[[Sequence[Run], Run], Array]) -> list[Array]:
     """Return the compensated output of each run, which the compensation has not seen."""
     if len(runs) < 2:
         raise CompensationError("a held-out improvement needs two runs or more.")
     return [compensate([*runs[:i], *runs[i + 1 :]], run) for i, run in enumerate(runs)]
 
 
-def _compare(before: Real, after: Real) -> Change:
+def _compare(before: Array, after: Array) -> Change:
     return Change(float(np.std(before)), float(np.sqrt(np.mean(after**2))))
 
 
-def _average(time: Real, values: Real) -> Real:
+def _average(time: Array, values: Array) -> Array:
     numbers = np.floor((time - time[0]) / AVERAGING).astype(int)
     starts = np.flatnonzero(np.diff(numbers, prepend=-1))
     return np.asarray(np.add.reduceat(values, starts) / np.diff(np.append(starts, values.size)))

@@ -7,11 +7,11 @@ P its covariance, F transition, C measurement matrix, Q and R variances of proce
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from compensation.arrays import Array
 from compensation.errors import CompensationError
 
-Real = NDArray[np.float64]
 SETTLED = 1e-13  # relative change of the covariance in one step below which it has settled
 _NOT_STEADY = "this model has no steady filter: a persistent state is not observed, or no process noise drives it."
 
@@ -20,10 +20,10 @@ _NOT_STEADY = "this model has no steady filter: a persistent state is not observ
 class LinearModel:
     """x⁺ = F x + w, z = C x + v: eq. (37)."""
 
-    transition: Real  # array (n, n), F
-    measurement: Real  # array (m, n), C
-    process_noise: Real  # array (n, n), Q, covariance of w over one step
-    measurement_noise: Real  # array (m, m), R, covariance of v
+    transition: Array  # array (n, n), F
+    measurement: Array  # array (m, n), C
+    process_noise: Array  # array (n, n), Q, covariance of w over one step
+    measurement_noise: Array  # array (m, m), R, covariance of v
 
     def __post_init__(self) -> None:
         for name in ("transition", "measurement", "process_noise", "measurement_noise"):
@@ -55,7 +55,7 @@ def model_gyro(k: float, zeta: float, step: float, process_noise: ArrayLike, mea
     )
 
 
-def observability(model: LinearModel) -> Real:
+def observability(model: LinearModel) -> Array:
     """Return C, C F, … C Fⁿ⁻¹ under each other: eq. (41). The states can be observed if it has rank n."""
     rows = [model.measurement]
     for _ in range(len(model.transition) - 1):
@@ -63,13 +63,13 @@ def observability(model: LinearModel) -> Real:
     return np.vstack(rows)
 
 
-def predict(model: LinearModel, x: Real, P: Real) -> tuple[Real, Real]:
+def predict(model: LinearModel, x: Array, P: Array) -> tuple[Array, Array]:
     """Return state and covariance one step on: F x, F P Fᵀ + Q."""
     F = model.transition
     return F @ x, F @ P @ F.T + model.process_noise
 
 
-def weigh(model: LinearModel, P: Real) -> tuple[Real, Real, Real]:
+def weigh(model: LinearModel, P: Array) -> tuple[Array, Array, Array]:
     """Return the gain K, the covariance of the innovation S = C P Cᵀ + R, and the covariance after a measurement.
 
     The last is (1 − K C) P (1 − K C)ᵀ + K R Kᵀ, Joseph's form, which stays symmetric and positive.
@@ -81,7 +81,7 @@ def weigh(model: LinearModel, P: Real) -> tuple[Real, Real, Real]:
     return K, S, kept @ P @ kept.T + K @ R @ K.T
 
 
-def update(model: LinearModel, x: Real, P: Real, z: Real) -> tuple[Real, Real, Real, Real]:
+def update(model: LinearModel, x: Array, P: Array, z: Array) -> tuple[Array, Array, Array, Array]:
     """Return state and covariance after a measurement z (m,), its innovation (m,) and the innovation's covariance."""
     K, S, after = weigh(model, P)
     innovation = z - model.measurement @ x
@@ -92,13 +92,13 @@ def update(model: LinearModel, x: Real, P: Real, z: Real) -> tuple[Real, Real, R
 class KalmanRun:
     """States (N, n) and covariances (N, n, n) after each measurement, innovations (N, m), their covariances (N, m, m)."""
 
-    states: Real
-    covariances: Real
-    innovations: Real
-    innovation_covariances: Real
+    states: Array
+    covariances: Array
+    innovations: Array
+    innovation_covariances: Array
 
     @property
-    def nis(self) -> Real:
+    def nis(self) -> Array:
         """Normalised innovation squared νᵀ S⁻¹ ν (N,): chi-squared with m degrees of freedom if the model is right."""
         solved = np.linalg.solve(self.innovation_covariances, self.innovations[..., None])[..., 0]
         return np.asarray(np.einsum("ni,ni->n", self.innovations, solved), dtype=float)
@@ -134,7 +134,7 @@ def run_filter(model: LinearModel, measurements: ArrayLike, start: ArrayLike, co
     return KalmanRun(states, covariances, innovations, spreads)
 
 
-def settle(model: LinearModel) -> tuple[Real, Real, Real]:
+def settle(model: LinearModel) -> tuple[Array, Array, Array]:
     """Return gain K, and covariance before and after a measurement, that the filter tends to.
 
     The covariance before solves P = F P Fᵀ − F P Cᵀ (C P Cᵀ + R)⁻¹ C P Fᵀ + Q.
@@ -152,7 +152,7 @@ def settle(model: LinearModel) -> tuple[Real, Real, Real]:
     return K, P, after
 
 
-def noise_of_estimate(model: LinearModel) -> Real:
+def noise_of_estimate(model: LinearModel) -> Array:
     """Return the covariance of what the settled filter leaves of the measurement noise, the truth being still.
 
     With the settled gain K the error of the estimate obeys e⁺ = (1 − K C) F e + K v, so N = A N Aᵀ + K R Kᵀ, A = (1 − K C) F.

@@ -3,16 +3,16 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from compensation.arrays import Array
 from compensation.errors import CompensationError
 from compensation.samples import read_columns
 
-Real = NDArray[np.float64]
 PLATEAU = 1e-3  # part of the largest applied rate within which two rates are the same
 
 
-def same_rate(rate: ArrayLike) -> Real:
+def same_rate(rate: ArrayLike) -> Array:
     """Return the applied rates rounded to a thousandth of the largest, so that a rate table's jitter is one rate."""
     x = np.asarray(rate, dtype=float)
     grain = PLATEAU * float(np.max(np.abs(x), initial=0.0)) or 1.0

@@ -5,12 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from compensation.noise import white_rms
 from compensation.spikes import find_step
 
-Array = NDArray[np.float64]
 AROUND = 101
 """Frequencies about each whose median power is the level of the noise there; a series with fewer rows has no spectrum."""
 LEVEL = 24.0

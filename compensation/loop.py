@@ -14,12 +14,11 @@ amplitudes of p = Im{P e^{jωt}}. The coupling c₁ then stands in quadrature to
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from compensation.arrays import Array
 from compensation.errors import CompensationError
 from compensation.samples import check_time, read_columns
-
-Real = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -48,7 +47,7 @@ class BellResonator:
 
 def read_rate_from_loop(
     resonator: BellResonator, omega: float, time: ArrayLike, p: ArrayLike, q: ArrayLike, force: ArrayLike | None = None
-) -> Real:
+) -> Array:
     """Return the rate (rad/s) from the amplitudes of both axes and of the rebalance force: eqs. (24)–(26).
 
     Ω = Re{ [F/m₀ − (c₁/m₀) P − (ω_n² − ω²) Q − 2jω Q̇] / (4 k jω P) }; Q̈ is neglected against ω Q̇.
@@ -69,7 +68,7 @@ def read_rate_from_loop(
 
 def read_rate_from_drive(
     resonator: BellResonator, omega: float, time: ArrayLike, p: ArrayLike, q: ArrayLike, force: ArrayLike
-) -> Real:
+) -> Array:
     """Return the rate (rad/s) from the force on the driven axis: second form of eq. (24).
 
     The first of (23) gives Ω = [p̈ + ω_n² p + (c₁/m₀) q − f_p/m₀] / (4 k q̇); for amplitudes

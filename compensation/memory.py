@@ -8,11 +8,9 @@ first value at the start.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from compensation.transfer import TransferFunction
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

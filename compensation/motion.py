@@ -10,26 +10,24 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from compensation.arrays import Array, Complex
 from compensation.errors import CompensationError
 from compensation.samples import check_time, read_columns, require_regular
 from compensation.sensitive_element import SensitiveElement
-
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 
 @dataclass(frozen=True)
 class Motion:
     """Primary and secondary motion (m) over time (s): real displacements, or complex amplitudes."""
 
-    time: Real
+    time: Array
     primary: NDArray[Any]
     secondary: NDArray[Any]
 
 
 def write_dynamics(
     element: SensitiveElement, rate: ArrayLike, rate_slope: ArrayLike, zeta12: ArrayLike = 0.0, zeta21: ArrayLike = 0.0
-) -> Real:
+) -> Array:
     """Return the matrices M of ẏ = M y + (0, 0, q₁, 0, 0), y = (x₁, x₂, ẋ₁, ẋ₂, 1): CVG cross-damping eq. (2).
 
     The last state is the constant 1 and carries no force here; the caller adds the excitation in its column.
@@ -95,7 +93,7 @@ def propagate_envelope(
     return Motion(t, y[:, 0], y[:, 1])
 
 
-def demodulate(time: ArrayLike, displacement: ArrayLike, omega: float) -> tuple[Real, Complex]:
+def demodulate(time: ArrayLike, displacement: ArrayLike, omega: float) -> tuple[Array, Complex]:
     """Return the complex amplitude A of x = Im{A e^{jωt}} by synchronous detection over two carrier periods.
 
     2 j x e^{−jωt} = A − A* e^{−2jωt}; a moving mean over one period, taken twice, removes the second term as long
@@ -115,7 +113,7 @@ def demodulate(time: ArrayLike, displacement: ArrayLike, omega: float) -> tuple[
     return t[m - 1 : len(t) - m + 1], np.convolve(mixed, window, mode="valid")
 
 
-def _read_inputs(time: ArrayLike, rate: ArrayLike, zeta12: ArrayLike | None, zeta21: ArrayLike | None) -> list[Real]:
+def _read_inputs(time: ArrayLike, rate: ArrayLike, zeta12: ArrayLike | None, zeta21: ArrayLike | None) -> list[Array]:
     zero = np.zeros(np.shape(time))
     columns = read_columns(
         time=time, rate=rate, zeta12=zero if zeta12 is None else zeta12, zeta21=zero if zeta21 is None else zeta21

@@ -18,10 +18,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from compensation.arrays import Array
 from compensation.errors import CompensationError
 
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 COUNT = 8
 DRIVE_P, SENSE_P, DRIVE_Q, SENSE_Q = (1, 5), (3, 7), (2, 6), (4, 8)
 """Elements of the two axes, section 3.2 of the paper."""
@@ -48,7 +47,7 @@ class PiezoRing:
             raise CompensationError("piezo elements need a stress of the wall and a d31 other than zero.")
 
     @property
-    def coupling(self) -> Real:
+    def coupling(self) -> Array:
         """E (8, 2), C/m and N/V: charge of each element per p and q, and force on p and q per volt on it."""
         azimuth = self.harmonic * 2 * np.pi / COUNT * np.arange(COUNT)
         mean = np.sinc(self.harmonic * self.arc / (2 * np.pi))  # of cos nθ over the arc
@@ -79,6 +78,6 @@ class PiezoRing:
         )
         return p, q
 
-    def forces(self, voltages: ArrayLike) -> Real:
+    def forces(self, voltages: ArrayLike) -> Array:
         """Return f_p and f_q (2, ...), N, of voltages (8, ...) on the elements."""
         return np.asarray(np.tensordot(self.coupling.T, np.asarray(voltages), 1))

@@ -8,12 +8,12 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from compensation.arrays import Array
 from compensation.errors import CompensationError
 from compensation.regression import LinearFit, fit_linear
 
-Array = NDArray[np.float64]
 APART = 0.01
 """Part of the span of x by which two values are apart; closer ones tell a polynomial hardly more than one does."""
 

@@ -15,9 +15,9 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
-Real = NDArray[np.float64]
+from compensation.arrays import Array
+
 SURE = 6.0  # fall of N ln(mean square) + p ln N below the line's for which another form is taken (20:1)
 LEAST = 6
 
@@ -30,20 +30,20 @@ class RateForm:
     values: dict[str, float]
     gain: float
     held_out: float
-    residual: Real
+    residual: Array
 
 
 @dataclass(frozen=True)
 class RateLaw:
     """The forms, the line first, the one that is `chosen`, and whether it leaves more than the means' own errors."""
 
-    rate: Real
+    rate: Array
     forms: tuple[RateForm, ...]
     chosen: RateForm
     structure: bool
 
 
-def fit_rate_law(rate: Real, output: Real, error: Real) -> RateLaw | None:
+def fit_rate_law(rate: Array, output: Array, error: Array) -> RateLaw | None:
     """Choose the form of mean outputs at held rates, with standard errors; None below six rates or of one direction."""
     if len(rate) < LEAST or not rate.min() < 0 < rate.max():
         return None
@@ -67,7 +67,7 @@ def fit_rate_law(rate: Real, output: Real, error: Real) -> RateLaw | None:
     return RateLaw(rate, (line, *forms[1:]), chosen, structure)
 
 
-def _columns(name: str, shape: float, x: Real) -> list[Real]:
+def _columns(name: str, shape: float, x: Array) -> list[Array]:
     rows = {
         "line": [x],
         "directions": [x, np.maximum(x, 0.0)],
@@ -88,15 +88,15 @@ NAMES = {
 }
 
 
-def _value(name: str, values: dict[str, float], x: Real) -> Real:
+def _value(name: str, values: dict[str, float], x: Array) -> Array:
     rest = list(values.values())
     shaped = name in ("sine", "dead band")
     columns = _columns(name, rest[2] if shaped else 1.0, x)
     return np.asarray(rest[0] + sum(b * column for b, column in zip(rest[1:], columns, strict=False)))
 
 
-def _fit(name: str, x: Real, y: Real) -> tuple[dict[str, float], Real]:
-    def solve(shape: float) -> tuple[Real, Real]:
+def _fit(name: str, x: Array, y: Array) -> tuple[dict[str, float], Array]:
+    def solve(shape: float) -> tuple[Array, Array]:
         X = np.column_stack([np.ones_like(x), *_columns(name, shape, x)])
         scale = np.max(np.abs(X), axis=0)
         b = np.linalg.lstsq(X / scale, y, rcond=None)[0] / scale

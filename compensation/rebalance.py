@@ -14,9 +14,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from compensation.actuators import RangeUse, require_range
+from compensation.arrays import Array
 from compensation.closed_loop import ClosedLoop
 from compensation.controllers import Loops, require_stable
 from compensation.electronics import Electronics
@@ -24,7 +25,6 @@ from compensation.errors import CompensationError
 from compensation.samples import require_regular
 from compensation.wave import PHYSICAL, StandingWave, turn
 
-Real = NDArray[np.float64]
 LOST = 0.3  # node over antinode at which a wave that its force cannot hold has left its azimuth
 ALIKE = 0.01
 """Part of 1/τ, and of n k per rad/s, within which rows share one matrix; what drives the wave is exact in every row."""
@@ -39,12 +39,12 @@ class LoopRun:
     azimuth). `limited` counts the rows in which an actuator was at its limit.
     """
 
-    time: Real
-    rate: Real
-    quadrature: Real
-    decay: Real
-    omega: Real
-    angle: Real
+    time: Array
+    rate: Array
+    quadrature: Array
+    decay: Array
+    omega: Array
+    angle: Array
     limited: int = 0
 
 
@@ -147,12 +147,12 @@ def use_of_range(run: LoopRun, electronics: Electronics, coupling: float) -> Ran
     return electronics.actuators.use(coupling * run.rate, run.quadrature, run.decay)
 
 
-def leak_quadrature(quadrature: ArrayLike, phase: ArrayLike, coupling: float = 1.0) -> Real:
+def leak_quadrature(quadrature: ArrayLike, phase: ArrayLike, coupling: float = 1.0) -> Array:
     """Rate (rad/s) that the quadrature's force shows in the rate's channel, ε q/(n k); the loop indicates its negative."""
     return np.asarray(np.asarray(quadrature) * np.asarray(phase) / coupling)
 
 
-def samples_in_row(time: Real, loops: Loops) -> int:
+def samples_in_row(time: Array, loops: Loops) -> int:
     """Return how many samples of the loops make one row, or say that they do not."""
     step = require_regular(time, "the simulation of the loops")
     samples = round(step * loops.sampling)
@@ -163,7 +163,7 @@ def samples_in_row(time: Real, loops: Loops) -> int:
     return samples
 
 
-def _alike(rows: StandingWave, rate: Real, angle: Real) -> Iterator[slice]:
+def _alike(rows: StandingWave, rate: Array, angle: Array) -> Iterator[slice]:
     """Cut the rows where the averaged dynamics have changed by more than `ALIKE`, and where the azimuth moves."""
     scale, damped, detuned = 1 / np.asarray(rows.tau), 2 * rows.damped(), 2 * rows.detuned()
     columns = np.stack([scale, damped.real, damped.imag, detuned.real, detuned.imag, rows.coupling * rate], axis=1)
@@ -176,7 +176,7 @@ def _alike(rows: StandingWave, rate: Real, angle: Real) -> Iterator[slice]:
 
 def close_loops(
     wave: StandingWave, electronics: Electronics, loops: Loops, rate: float, angle: float
-) -> tuple[ClosedLoop, Real]:
+) -> tuple[ClosedLoop, Array]:
     """Return the loops closed about a wave held at an azimuth (rad), and what the pick-offs' errors add to their reading."""
     R = turn(wave.harmonic * angle)
     settled = settle_rebalance(wave, electronics, rate, angle)

@@ -14,9 +14,9 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike, NDArray
 
+from compensation.arrays import Array
 from compensation.errors import CompensationError
 
-Array = NDArray[np.float64]
 CONSTANT = "constant"
 # A column counts as a combination of others when less than this part of its length, or less than what its
 # rounding to double precision amounts to, is its own.

@@ -14,15 +14,14 @@ import math
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from compensation.arrays import Array, Complex
 from compensation.electronics import Electronics
 from compensation.errors import CompensationError
 from compensation.rebalance import LoopRun, settle_rebalance
 from compensation.wave import PHYSICAL, StandingWave
 
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 TURN = 0.3  # largest turn of 2 n θ (rad) in one step
 AZIMUTHS, HARMONICS = 16, 5  # azimuths at which B, g and c are taken, and terms of e^{2 i n θ} that are kept of them
 TIMES = 200  # times at which B is taken; it is linear between them
@@ -54,11 +53,11 @@ def turn_settled(
 def read_turning(
     wave: StandingWave,
     electronics: Electronics,
-    angle: Real,
+    angle: Array,
     *,
     rate: ArrayLike = 0.0,
     precession: ArrayLike | None = None,
-    time: Real | None = None,
+    time: Array | None = None,
 ) -> LoopRun:
     """Return what settled loops say of a wave that turns through measured azimuths, array (N,), rad.
 
@@ -76,7 +75,7 @@ def read_turning(
     return replace(found, time=found.time if time is None else time, rate=turn / k + found.rate)
 
 
-def _pickoff(electronics: Electronics, n: int) -> Real:
+def _pickoff(electronics: Electronics, n: int) -> Array:
     """The pick-offs' plane as the phase loop sees it."""
     return np.asarray((electronics.pickoff.matrix(n) * np.exp(-1j * electronics.pickoff.phase)).real)
 
@@ -101,18 +100,20 @@ def _channels(electronics: Electronics, n: int) -> tuple[Complex, Complex]:
     return _terms(g), _terms(g * arrives)
 
 
-def _terms(values: Real) -> Complex:
+def _terms(values: Array) -> Complex:
     """Terms c_0 ... of Re Σ c_j e^{2 i j ψ} through values at even ψ in 0 ... π, over the last axis."""
     found = np.fft.rfft(values, axis=-1)[..., :HARMONICS] * (2 / AZIMUTHS)
     found[..., 0] /= 2
     return np.asarray(found)
 
 
-def _value(terms: Complex, e: Complex) -> Real:
+def _value(terms: Complex, e: Complex) -> Array:
     return np.asarray(np.real(sum(c * e**j for j, c in enumerate(terms))))
 
 
-def _integrate(rows: StandingWave, electronics: Electronics, t: Real, rate: Real, command: Real, angle: float) -> Real:
+def _integrate(
+    rows: StandingWave, electronics: Electronics, t: Array, rate: Array, command: Array, angle: float
+) -> Array:
     """The azimuth at the rows: Runge-Kutta steps of what departs from the turn that rate and command would make alone."""
     from scipy.interpolate import CubicHermiteSpline
 

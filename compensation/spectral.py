@@ -6,11 +6,10 @@ Spectral densities are rational functions of s, two-sided: variance = ∫ S(jω)
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from compensation.arrays import Array
 from compensation.errors import CompensationError
-
-Real = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -36,10 +35,10 @@ class Spectrum:
         if np.any(_sign(self.numerator, frequency) * _sign(self.denominator, frequency) < 0):
             raise CompensationError("the spectral density is negative at some frequency; check its signs (s² = −ω²).")
 
-    def density(self, frequency: ArrayLike) -> Real:
+    def density(self, frequency: ArrayLike) -> Array:
         """Return S(jω) at angular frequencies (rad/s)."""
         s = 1j * np.asarray(frequency, dtype=float)
-        values: Real = (np.polyval(self.numerator, s) / np.polyval(self.denominator, s)).real
+        values: Array = (np.polyval(self.numerator, s) / np.polyval(self.denominator, s)).real
         return values
 
     @property
@@ -70,14 +69,14 @@ def high_pass_spectrum(gamma: float, sigma: float, B: float) -> Spectrum:
     return Spectrum((-((gamma * sigma) ** 2), 0.0, 0.0), (-1.0, 0.0, B**2))
 
 
-def reflect(polynomial: ArrayLike) -> Real:
+def reflect(polynomial: ArrayLike) -> Array:
     """Return p(−s) for the coefficients of p(s), highest power first."""
     p = np.array(polynomial, dtype=float)
     p[-2::-2] *= -1
     return p
 
 
-def factorise(even: ArrayLike) -> Real:
+def factorise(even: ArrayLike) -> Array:
     """Return the polynomial d with d(s) d(−s) = ± even(s) and all roots to the left, found from the roots in s²."""
     p = np.trim_zeros(np.asarray(even, dtype=float), "f")
     squares = np.roots(p[::2])
@@ -93,7 +92,7 @@ def factorise(even: ArrayLike) -> Real:
     return np.asarray(np.sqrt(abs(p[0])) * np.atleast_1d(factor), dtype=float)
 
 
-def separate(numerator: Real, stable: Real, antistable: Real) -> Real:
+def separate(numerator: Array, stable: Array, antistable: Array) -> Array:
     """Return t of numerator / (stable · antistable) = t / stable + (what has only antistable poles).
 
     t includes the constant part, so it has as many coefficients as `stable` (Wiener–Hopf separation of eq. (34)).
@@ -130,7 +129,7 @@ class CrossSpectrum:
     numerator: tuple[float, ...]
     denominator: tuple[float, ...]
 
-    def split_poles(self) -> tuple[Real, Real]:
+    def split_poles(self) -> tuple[Array, Array]:
         """Return the factors of the denominator with roots to the left (with its leading factor) and to the right."""
         p = np.trim_zeros(np.asarray(self.denominator, dtype=float), "f")
         roots = np.roots(p)
@@ -174,14 +173,14 @@ def require_possible(one: Spectrum, other: Spectrum, cross: CrossSpectrum | None
         )
 
 
-def _sign(polynomial: tuple[float, ...], frequency: Real) -> Real:
+def _sign(polynomial: tuple[float, ...], frequency: Array) -> Array:
     """Sign of an even polynomial at jω; 0 where rounding decides it."""
     terms = np.array(polynomial)[:, None] * (1j * frequency) ** np.arange(len(polynomial) - 1, -1, -1)[:, None]
     value = np.sum(terms.real, axis=0)
     return np.where(np.abs(value) > 1e-12 * np.sum(np.abs(terms), axis=0), np.sign(value), 0.0)
 
 
-def multiply(*polynomials: Real) -> Real:
+def multiply(*polynomials: Array) -> Array:
     """Return the product of polynomials, highest power first."""
     product = np.ones(1)
     for polynomial in polynomials:

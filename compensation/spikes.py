@@ -4,7 +4,8 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from compensation.arrays import Array
+
 REACH = 3
 NEIGHBOURS = 2 * REACH + 1
 SPIKE, ALONE = 6.0, 4.0

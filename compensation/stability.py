@@ -12,12 +12,12 @@ from typing import Literal
 
 import numpy as np
 import scipy
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from compensation.arrays import Array
 from compensation.errors import CompensationError
 from compensation.noise import FLAT, Noise
 
-Array = NDArray[np.float64]
 UNITS = (Noise(white=1.0), Noise(flicker=FLAT), Noise(walk=1.0))  # N, B and K of 1
 NoiseKind = Literal["phase", "white", "flicker", "random walk"]
 # Slope of log σ against log τ: quantisation, angle random walk, bias instability, rate random walk.

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from compensation.arrays import Array
 from compensation.controllers import Loops, require_stable
 from compensation.errors import CompensationError
 from compensation.regression import fit_linear
 from compensation.samples import check_time, read_columns
 
-Real = NDArray[np.float64]
 LOCKED = math.radians(5.0)
 SETTLED = 0.01
 
@@ -24,10 +24,10 @@ class StartUp:
     that did not happen.
     """
 
-    time: Real
-    amplitude: Real
-    phase_error: Real
-    offset: Real
+    time: Array
+    amplitude: Array
+    phase_error: Array
+    offset: Array
     locked: float
     ready: float
 
@@ -91,7 +91,7 @@ def start_up(
     )
 
 
-def _since(time: Real, holds: NDArray[np.bool_]) -> float:
+def _since(time: Array, holds: NDArray[np.bool_]) -> float:
     """Return the time from which a condition holds to the end; NaN when it does not hold there."""
     broken = np.flatnonzero(~holds)
     if not len(broken):

@@ -12,11 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from compensation.errors import CompensationError
 
-Array = NDArray[np.float64]
 # A candidate of which less than this part is not already in the model cannot be told apart from it.
 OWN_PART = 1e-7
 

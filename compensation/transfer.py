@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from compensation.arrays import Complex
 from compensation.errors import CompensationError
 from compensation.recursion import recur
 from compensation.samples import check_time, is_regular
 
-Complex = NDArray[np.complex128]
 SAME_STEP = 1e-9  # part of the usual step by which two steps may differ and still share one matrix exponential
 
 

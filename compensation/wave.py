@@ -11,12 +11,11 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from compensation.arrays import Array, Complex
 from compensation.errors import CompensationError
 
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 PHYSICAL = ("omega", "tau", "damping_split", "damping_axis", "frequency_split", "frequency_axis")
 
 
@@ -34,12 +33,12 @@ class StandingWave:
         n and k: a rate Ω turns the wave with k Ω against the shell.
     """
 
-    omega: float | Real
-    tau: float | Real
-    damping_split: float | Real = 0.0
-    damping_axis: float | Real = 0.0
-    frequency_split: float | Real = 0.0
-    frequency_axis: float | Real = 0.0
+    omega: float | Array
+    tau: float | Array
+    damping_split: float | Array = 0.0
+    damping_axis: float | Array = 0.0
+    frequency_split: float | Array = 0.0
+    frequency_axis: float | Array = 0.0
     harmonic: int = 2
     bryan_factor: float = 0.277
 
@@ -58,23 +57,23 @@ class StandingWave:
         return self.harmonic * self.bryan_factor
 
     @property
-    def quality(self) -> float | Real:
+    def quality(self) -> float | Array:
         """Q = ω τ/2."""
         return self.omega * self.tau / 2
 
-    def decay(self, angle: ArrayLike) -> Real:
+    def decay(self, angle: ArrayLike) -> Array:
         """1/τ of a wave at the azimuth θ (1/s): 1/τ + ½ Δ(1/τ) cos 2n(θ − θ_τ)."""
         return np.asarray(1 / self.tau + self.damped(angle).real)
 
-    def drift(self, angle: ArrayLike) -> Real:
+    def drift(self, angle: ArrayLike) -> Array:
         """Rate (rad/s) that damping feigns at the azimuth θ: Δ(1/τ)/(2 n k) sin 2n(θ − θ_τ)."""
         return np.asarray(-self.damped(angle).imag / self.coupling)
 
-    def quadrature(self, angle: ArrayLike) -> Real:
+    def quadrature(self, angle: ArrayLike) -> Array:
         """Growth of the quadrature over the amplitude at the azimuth θ (1/s): ½ Δω sin 2n(θ − θ_ω)."""
         return np.asarray(-self.detuned(angle).imag)
 
-    def detuning(self, angle: ArrayLike) -> Real:
+    def detuning(self, angle: ArrayLike) -> Array:
         """Angular frequency of a wave at the azimuth θ less the mean (rad/s): ½ Δω cos 2n(θ − θ_ω)."""
         return np.asarray(self.detuned(angle).real)
 
@@ -117,22 +116,22 @@ class StandingWave:
         return replace(self, **numbers)
 
 
-def see_across(angle: ArrayLike, axis: ArrayLike, harmonic: int = 2) -> Real:
+def see_across(angle: ArrayLike, axis: ArrayLike, harmonic: int = 2) -> Array:
     """Sin 2n(θ − θ_axis): what a wave at the azimuth θ (rad) meets of a split across itself, as rate or quadrature."""
     return np.asarray(np.sin(2 * harmonic * (np.asarray(angle, dtype=float) - np.asarray(axis, dtype=float))))
 
 
-def see_along(angle: ArrayLike, axis: ArrayLike, harmonic: int = 2) -> Real:
+def see_along(angle: ArrayLike, axis: ArrayLike, harmonic: int = 2) -> Array:
     """Cos 2n(θ − θ_axis): what it meets of a split along itself, as decay or frequency."""
     return np.asarray(np.cos(2 * harmonic * (np.asarray(angle, dtype=float) - np.asarray(axis, dtype=float))))
 
 
-def feign_rate(across: ArrayLike, harmonic: int, bryan_factor: float) -> Real:
+def feign_rate(across: ArrayLike, harmonic: int, bryan_factor: float) -> Array:
     """Rate (rad/s) that a damping split across the wave, Δ(1/τ) sin 2n(θ − θ_τ) (1/s), feigns: its part 1/(2 n k)."""
     return np.asarray(across) / (2 * harmonic * bryan_factor)
 
 
-def turn(angle: float) -> Real:
+def turn(angle: float) -> Array:
     """Return the rotation R(ψ) of the plane."""
     cosine, sine = np.cos(angle), np.sin(angle)
     return np.array([[cosine, -sine], [sine, cosine]])

@@ -19,13 +19,13 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from compensation.arrays import Array
 from compensation.errors import CompensationError
 from compensation.noise_regression import fit_coloured
 from compensation.samples import read_columns, require_regular
 
-Real = NDArray[np.float64]
 LEAST_TURN = 2 * np.pi  # least span of x (rad): one period of what is looked for
 LEAKS = ("leak", "leak cos", "leak sin")
 LEAST_CONTRAST = 0.05  # least spread of the turn rate over its largest: below it, turning both ways is missing
@@ -149,19 +149,19 @@ def _widen(estimates: dict[str, tuple[float, float]], harmonic: int, coupling: f
     return {name: (value, float(np.hypot(sd, left_out.get(name, 0.0)))) for name, (value, sd) in estimates.items()}
 
 
-def straighten(psi: Real, gain_ratio: float, skew: float) -> Real:
+def straighten(psi: Array, gain_ratio: float, skew: float) -> Array:
     """Return ψ − ψ_m, what the pick-offs' gain ratio and skew take from the angle that they show (rad)."""
     stretch = np.eye(2) + np.array([[gain_ratio, skew], [skew, -gain_ratio]]) / 2
     x, y = np.linalg.solve(stretch, np.array([np.cos(psi), np.sin(psi)]))
     return np.asarray(np.arctan2(y * np.cos(psi) - x * np.sin(psi), x * np.cos(psi) + y * np.sin(psi)))
 
 
-def _smooth(values: Real) -> Real:
+def _smooth(values: Array) -> Array:
     width = max(len(values) // 50, 1)
     return np.convolve(values, np.full(width, 1 / width), mode="valid")
 
 
-def _white(X: Real, y: Real, names: list[str]) -> tuple[Real, Real]:
+def _white(X: Array, y: Array, names: list[str]) -> tuple[Array, Array]:
     """Return coefficients and covariance of a fit in white noise plus a random walk."""
     fit = fit_coloured(X, y, names, [slice(0, len(y))])
     return fit.regression.coefficients, fit.regression.covariance
@@ -170,14 +170,14 @@ def _white(X: Real, y: Real, names: list[str]) -> tuple[Real, Real]:
 class _Turn:
     """Means of cos x and sin x over rows in which x (at their ends) grows evenly."""
 
-    def __init__(self, x: Real) -> None:
+    def __init__(self, x: Array) -> None:
         middle, share = (x[1:] + x[:-1]) / 2, np.sinc(np.diff(x) / (2 * np.pi))
         self.cosine, self.sine = share * np.cos(middle), share * np.sin(middle)
 
 
 def _driven(
-    x: _Turn, decay: ArrayLike | None, swell: Real, leaks: list[Real], undetermined: list[str]
-) -> tuple[Real, Real, float, float] | None:
+    x: _Turn, decay: ArrayLike | None, swell: Array, leaks: list[Array], undetermined: list[str]
+) -> tuple[Array, Array, float, float] | None:
     """Return C, its covariance, and 1/τ with its deviation, from the drive's effort."""
     if decay is None:
         undetermined.append("1/τ, because the drive effort (inverse_q) is not recorded")
@@ -190,12 +190,12 @@ def _driven(
 
 def _detuned(
     x: _Turn,
-    t: Real,
+    t: Array,
     frequency: ArrayLike | None,
     quadrature: ArrayLike | None,
-    leaks: list[Real],
+    leaks: list[Array],
     undetermined: list[str],
-) -> tuple[Real, Real] | None:
+) -> tuple[Array, Array] | None:
     """Return W and its covariance from frequency and quadrature, weighed by their precision."""
     ones, slope = np.ones(len(t) - 1), (t[:-1] - t.mean()) / np.ptp(t)
     names = [*LEAKS[: len(leaks)]]
@@ -219,19 +219,19 @@ def _detuned(
 
 
 def _turned(
-    t: Real,
-    x: Real,
+    t: Array,
+    x: Array,
     true: _Turn,
-    phi: Real,
-    command: Real,
+    phi: Array,
+    command: Array,
     own: tuple[float, float],
-    turns: list[Real],
+    turns: list[Array],
     both_ways: bool,
-) -> tuple[tuple[float, float], Real, Real, tuple[tuple[float, float], tuple[float, float]]]:
+) -> tuple[tuple[float, float], Array, Array, tuple[tuple[float, float], tuple[float, float]]]:
     """Return the mean turn, (S_sin, S_cos) of the damping with their covariance, and (δ, κ) with deviations."""
     step = (t[-1] - t[0]) / (len(t) - 1)
 
-    def integral(values: Real) -> Real:
+    def integral(values: Array) -> Array:
         return np.asarray(np.concatenate([[0.0], np.cumsum(values)]) * step)
 
     along, across = integral(command * true.cosine) / 2, integral(command * true.sine) / 2
@@ -247,8 +247,8 @@ def _turned(
 
 
 def _join(
-    S: Real, S_cov: Real, driven: tuple[Real, Real, float, float] | None, W: tuple[Real, Real] | None
-) -> tuple[Real, Real, tuple[float, float] | None]:
+    S: Array, S_cov: Array, driven: tuple[Array, Array, float, float] | None, W: tuple[Array, Array] | None
+) -> tuple[Array, Array, tuple[float, float] | None]:
     """Return C with its covariance and ε: what drive and turn say of damping together, by their precision.
 
     2 S_sin = C₁ − ε W₁ and −2 S_cos = C₂ − ε W₂; the drive says C₁, C₂ themselves.
@@ -272,7 +272,7 @@ def _join(
     return b[:2], covariance[:2, :2], (epsilon, float(np.sqrt(covariance[2, 2])))
 
 
-def _polar(name: str, vector: Real, covariance: Real, harmonic: int) -> dict[str, tuple[float, float]]:
+def _polar(name: str, vector: Array, covariance: Array, harmonic: int) -> dict[str, tuple[float, float]]:
     """Return a split and its axis from its two components, their deviations to first order."""
     size = float(np.hypot(*vector))
     along, across = vector / size, np.array([-vector[1], vector[0]]) / size

@@ -13,16 +13,16 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from compensation.actuators import require_range
+from compensation.arrays import Array
 from compensation.closed_loop import ClosedLoop, RowMap
 from compensation.controllers import Loops, require_stable
 from compensation.electronics import Electronics
 from compensation.rebalance import LoopRun, samples_in_row
 from compensation.wave import StandingWave
 
-Real = NDArray[np.float64]
 TURN = 0.1  # largest turn of 2ψ (rad) in one step
 Means = tuple[float, float, float, float, float]
 """Means over a step: commands of amplitude and quadrature, the quadrature left, the amplitude, its phase (rad)."""
@@ -129,8 +129,8 @@ class _Course:
 
     rows: StandingWave
     electronics: Electronics
-    rate: Real
-    command: Real
+    rate: Array
+    command: Array
 
     def __post_init__(self) -> None:
         rows = self.rows
@@ -188,7 +188,7 @@ class _Course:
         across = self.forces(psi, command, means)[1]
         return coriolis + damping + detuned + (across.real + across.imag * means[4]) / means[3]
 
-    def forcing(self, row: int, fraction: float, psi: float, means: Means) -> Real:
+    def forcing(self, row: int, fraction: float, psi: float, means: Means) -> Array:
         """What drives amplitude, phase and quadrature from their commands (1/s)."""
         decay, dc, ds, wc, ws, drift, _, command = self.values(row, fraction)
         c, s = math.cos(2 * psi), math.sin(2 * psi)
@@ -205,7 +205,7 @@ class _Course:
             ]
         )
 
-    def offset(self, row: int, psi: float) -> Real:
+    def offset(self, row: int, psi: float) -> Array:
         """What the pick-offs add to amplitude, phase and quadrature."""
         if self.ideal:
             return np.zeros(4)

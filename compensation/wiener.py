@@ -11,13 +11,12 @@ N_a n_w* d_b* / (d_a Δ*).
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from compensation.errors import CompensationError
 from compensation.spectral import CrossSpectrum, Spectrum, factorise, multiply, reflect, require_possible, separate
 from compensation.transfer import TransferFunction
 
-Real = NDArray[np.float64]
 UNITY = TransferFunction((1.0,), (1.0,))
 
 
@@ -112,13 +111,13 @@ def renormalise(candidate: TransferFunction, gyro: TransferFunction) -> Transfer
     return candidate * (1 / (candidate.steady_gain * gyro.steady_gain))
 
 
-def _numerator_over(spectrum: Spectrum, factor: Real) -> Real:
+def _numerator_over(spectrum: Spectrum, factor: Array) -> Array:
     """The numerator that belongs to the denominator factor(s) factor(−s)."""
     square = multiply(factor, reflect(factor))
     return np.array(spectrum.numerator) * float(square[0] / spectrum.denominator[0])
 
 
-def _shape(spectrum: Spectrum, numerator: Real, denominator: Real) -> Spectrum:
+def _shape(spectrum: Spectrum, numerator: Array, denominator: Array) -> Spectrum:
     """The density behind a filter, |numerator/denominator|² S, with odd powers that rounding left taken out."""
     top = multiply(np.array(spectrum.numerator), numerator, reflect(numerator))
     bottom = multiply(np.array(spectrum.denominator), denominator, reflect(denominator))
@@ -126,25 +125,25 @@ def _shape(spectrum: Spectrum, numerator: Real, denominator: Real) -> Spectrum:
     return Spectrum(tuple(top), tuple(bottom))
 
 
-def _factor(weight: Spectrum) -> tuple[Real, Real]:
+def _factor(weight: Spectrum) -> tuple[Array, Array]:
     """Numerator and denominator of Γ with Γ Γ* = R."""
     d = factorise(weight.denominator)
     return factorise(_numerator_over(weight, d)), d
 
 
-def _cross_parts(cross: CrossSpectrum | None) -> tuple[Real, Real, Real]:
+def _cross_parts(cross: CrossSpectrum | None) -> tuple[Array, Array, Array]:
     """The factors of the cross density's denominator to the left and to the right, and its numerator; 1, 1, 0 without one."""
     if cross is None:
         return np.ones(1), np.ones(1), np.zeros(1)
     return *cross.split_poles(), np.asarray(cross.numerator, dtype=float)
 
 
-def _over(one: Real, other: Real) -> Real:
+def _over(one: Array, other: Array) -> Array:
     """The number that one polynomial is of another with the same roots."""
     return np.array([one[0] / other[0]])
 
 
-def _joint_variance(deviation: Real, whole: Real, n: Real, d: Real, cross: CrossSpectrum) -> float:
+def _joint_variance(deviation: Array, whole: Array, n: Array, d: Array, cross: CrossSpectrum) -> float:
     """∫ 2 Re{(G W − H) S_φΩ G*} dω/2π."""
     left, right = cross.split_poles()
     top = np.trim_zeros(multiply(deviation, np.asarray(cross.numerator, dtype=float), reflect(n)), "f")

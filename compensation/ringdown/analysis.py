@@ -4,7 +4,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from compensation.errors import CompensationError
 from compensation.ringdown.envelope import Envelope, thin
@@ -14,8 +13,6 @@ from compensation.ringdown.terms import fit_terms
 from compensation.ringdown.whiteness import Leftover, examine
 from compensation.ringdown.window import find_end, find_jump, find_start
 
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 RESOLVED = 3.0  # standard deviations above zero from which a split has an axis
 LENGTHS = ("split_Hz", "damping_split_per_s")
 ROWS = 1024

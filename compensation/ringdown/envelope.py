@@ -10,10 +10,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from compensation.arrays import Array, Complex
 from compensation.errors import CompensationError
 
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 MOST_BLOCKS = 4096
 CHUNK = 1 << 18
 WRITTEN = 0.5  # part of a step by which the times of an even grid may be off for their few digits
@@ -23,7 +22,7 @@ WRITTEN = 0.5  # part of a step by which the times of an even grid may be off fo
 class Envelope:
     """Complex amplitudes about a carrier."""
 
-    time: Real  # array (rows,), s, middle of each block, from the first sample of the record
+    time: Array  # array (rows,), s, middle of each block, from the first sample of the record
     # array (channels, rows) z of each channel, in the unit of the record, by rows; NaN where a block has no samples
     values: Complex
     carrier: float  # Hz, the frequency that turns e^{2πi f t}: f_c of raw samples, the reference of a lock-in
@@ -95,7 +94,7 @@ def mix_down(time: ArrayLike, channels: ArrayLike, carrier: float | None = None)
     # x = Re{z e^{iωt}}, so the sum of 2 x e^{−iωt} is N z + C z*, with C the sum of e^{−2iωt}
     free = np.where(enough, weight**2 - np.abs(image) ** 2, 1.0)
     values = np.where(enough, (weight * total - image * total.conj()) / free, np.nan + 0j)
-    middle: Real = (np.arange(count, dtype=np.float64) * size + (size - 1) / 2) * step
+    middle: Array = (np.arange(count, dtype=np.float64) * size + (size - 1) / 2) * step
     keep = np.all(np.isfinite(values), axis=0)
     return Envelope(
         middle[keep],
@@ -107,7 +106,7 @@ def mix_down(time: ArrayLike, channels: ArrayLike, carrier: float | None = None)
     )
 
 
-def even_rows(time: Real) -> "tuple[float, NDArray[np.int64]]":
+def even_rows(time: Array) -> "tuple[float, NDArray[np.int64]]":
     """Return the step of evenly sampled rows (s), however few digits their times are written with, and the place of each row."""
     step = float(time[-1] - time[0]) / (time.size - 1)
     whole = np.arange(time.size)
@@ -167,7 +166,7 @@ def thin(envelope: Envelope, rows: int) -> Envelope:
     return envelope
 
 
-def _clipped(x: Real) -> float:
+def _clipped(x: Array) -> float:
     """Part of the samples that stand at the two ends of their range, beyond what a sine leaves there."""
     worst = 0.0
     for channel in x:

@@ -10,14 +10,12 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
+from compensation.arrays import Array, Complex
 from compensation.errors import CompensationError
 from compensation.ringdown.envelope import Envelope
 from compensation.ringdown.model import NAMES, ONE_MODE, TWO_MODES, Decay, propagate
 
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 COARSE = 256  # rows of the averaged envelope on which starting points are looked for
 
 
@@ -30,8 +28,8 @@ class DecayFit:
     start: Complex
     # the rates that were fitted; the real and imaginary parts of `start` follow them in `covariance`
     names: tuple[str, ...]
-    covariance: Real  # array, Cramér–Rao bound of rates and start at the noise found (times `widening`²)
-    noise: Real  # array (channels,), standard deviation of a complex row, √⟨|n|²⟩
+    covariance: Array  # array, Cramér–Rao bound of rates and start at the noise found (times `widening`²)
+    noise: Array  # array (channels,), standard deviation of a complex row, √⟨|n|²⟩
     residual: Complex  # array (channels, rows), data minus model
     widening: float = 1.0  # factor on the bound where the residual is not white
     summed: bool = False  # whether one channel sees the sum of the two modes
@@ -89,7 +87,7 @@ def find_starts(envelope: Envelope, modes: int) -> list[Decay]:
     return [_from_rates(time, z, one) for one in rates if one is not None]
 
 
-def _fit_from(envelope: Envelope, time: Real, names: tuple[str, ...], guess: Decay, summed: bool) -> DecayFit:
+def _fit_from(envelope: Envelope, time: Array, names: tuple[str, ...], guess: Decay, summed: bool) -> DecayFit:
     z = envelope.values
     channels = 2 if summed else z.shape[0]
     fixed = {name: 0.0 for name in NAMES if name not in names}
@@ -102,12 +100,12 @@ def _fit_from(envelope: Envelope, time: Real, names: tuple[str, ...], guess: Dec
         ]
     )
 
-    def of(point: Real) -> tuple[Decay, Complex]:
+    def of(point: Array) -> tuple[Decay, Complex]:
         rates = dict(zip(names, (point[: len(names)] * scale).tolist(), strict=True))
         parts = point[len(names) :] * size
         return Decay(**rates, **fixed), parts[:channels] + 1j * parts[channels:]
 
-    def model(point: Real) -> Complex:
+    def model(point: Array) -> Complex:
         with np.errstate(over="ignore", invalid="ignore"):
             found = propagate(of(point)[0], time, of(point)[1])
         found = found.sum(axis=0, keepdims=True) if summed else found
@@ -119,7 +117,7 @@ def _fit_from(envelope: Envelope, time: Real, names: tuple[str, ...], guess: Dec
     weight = np.full(z.shape[0], size)
     for _ in range(z.shape[0]):  # the second time with each channel's own noise
 
-        def residuals(point: Real, weight: Real = weight) -> Real:
+        def residuals(point: Array, weight: Array = weight) -> Array:
             return _flatten((model(point) - z) / weight[:, None])
 
         solved = scipy.optimize.least_squares(
@@ -148,17 +146,17 @@ def _fit_from(envelope: Envelope, time: Real, names: tuple[str, ...], guess: Dec
     )
 
 
-def _flatten(values: Complex) -> Real:
+def _flatten(values: Complex) -> Array:
     return np.concatenate([values.real.ravel(), values.imag.ravel()])
 
 
-def _differentiate(function: Callable[[Real], Real], point: Real) -> Real:
+def _differentiate(function: Callable[[Array], Array], point: Array) -> Array:
     """Return the derivatives by central differences, a column for each value of the point."""
     steps = 1e-6 * np.maximum(1.0, np.abs(point))
     return np.stack([(function(point + h) - function(point - h)) / (2 * h.max()) for h in np.diag(steps)], axis=1)
 
 
-def _amplitudes(time: Real, z: Complex, decay: Decay, summed: bool) -> Complex:
+def _amplitudes(time: Array, z: Complex, decay: Decay, summed: bool) -> Complex:
     """Return the start amplitudes that fit best, by linear least squares."""
     plain = Decay(**{**{name: getattr(decay, name) for name in NAMES}, "hardening": 0.0, "thickening": 0.0})
     count = 2 if summed else z.shape[0]
@@ -168,7 +166,7 @@ def _amplitudes(time: Real, z: Complex, decay: Decay, summed: bool) -> Complex:
     return np.asarray(np.linalg.lstsq(columns.reshape(-1, count), z.ravel(), rcond=None)[0])
 
 
-def _from_rates(time: Real, z: Complex, rates: Complex) -> Decay:
+def _from_rates(time: Array, z: Complex, rates: Complex) -> Decay:
     """Return the decay with these eigenvalues and the axes that their amplitudes have."""
     mean = complex(np.mean(rates))
     if rates.size == 1:
@@ -188,7 +186,7 @@ def _from_rates(time: Real, z: Complex, rates: Complex) -> Decay:
     return Decay(mean.imag, max(-mean.real, 0.1 / time[-1]), -a.real, -b.real, a.imag, b.imag)
 
 
-def _pencil(time: Real, z: Complex, modes: int) -> Complex | None:
+def _pencil(time: Array, z: Complex, modes: int) -> Complex | None:
     """Return the exponents of the averaged rows: eigenvalues of a shift on the signal space of a Hankel matrix."""
     count = min(COARSE, time.size // 2)
     size = time.size // count
@@ -203,7 +201,7 @@ def _pencil(time: Real, z: Complex, modes: int) -> Complex | None:
     return np.asarray(np.log(poles) / step)
 
 
-def _lines(time: Real, z: Complex, modes: int) -> Complex | None:
+def _lines(time: Array, z: Complex, modes: int) -> Complex | None:
     """Return the exponents of the largest spectral lines: the second is looked for in what the first leaves."""
     step = float(np.median(np.diff(time)))
     grid = np.rint(time / step).astype(int)

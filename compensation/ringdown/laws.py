@@ -18,9 +18,9 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from compensation.errors import CompensationError
 
-Real = NDArray[np.float64]
 Whole = NDArray[np.int64]
 PAYS = 12.0  # least fall of −2 ln L, over the widening², for which time or a bend comes in, beside ln N for each value
 NEIGHBOURS = 32
@@ -41,11 +41,11 @@ class Rows:
     `conditions` may have `temperature` (K, from any origin), `pressure` (Pa), `energy` (amplitude squared).
     """
 
-    value: Real
-    sd: Real
+    value: Array
+    sd: Array
     decay: Whole
-    time: Real
-    conditions: Mapping[str, Real]
+    time: Array
+    conditions: Mapping[str, Array]
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ class Law:
     terms: tuple[Term, ...]
     sessions: tuple[float, ...]
     scatter: float
-    fitted: Real
+    fitted: Array
     left_out: int = 0
 
 
@@ -135,14 +135,14 @@ def find_sessions(rows: Rows) -> tuple[float, ...]:
     return tuple(starts[1:][pauses > max(SESSION, 20 * float(np.median(pauses)))].tolist())
 
 
-def _add_what_pays(rows: Rows, columns: dict[str, Real], begins: tuple[float, ...], loss: bool) -> dict[str, Real]:
+def _add_what_pays(rows: Rows, columns: dict[str, Array], begins: tuple[float, ...], loss: bool) -> dict[str, Array]:
     """Take viscous gas in place of free-molecular, a bend over temperature, ageing and steps where the means of the decays ask for them."""
     pressure = columns.get("pressure")
     if pressure is not None and float(pressure.max()) > VISCOUS:
         rival = columns | {"pressure": np.sqrt(pressure)}
         if _gain(rows, columns, rival, loss) > 0:
             columns = {"root pressure" if name == "pressure" else name: x for name, x in rival.items()}
-    more: list[dict[str, Real]] = []
+    more: list[dict[str, Array]] = []
     if loss and "temperature" in columns and np.ptp(columns["temperature"]) > BEND:
         more.append({"temperature squared": columns["temperature"] ** 2})
     if np.ptp(rows.time) > 0:
@@ -156,13 +156,13 @@ def _add_what_pays(rows: Rows, columns: dict[str, Real], begins: tuple[float, ..
     return columns | more[int(np.argmax(gains))] if gains and max(gains) > 0 else columns
 
 
-def _gain(rows: Rows, columns: Mapping[str, Real], rival: Mapping[str, Real], loss: bool) -> float:
+def _gain(rows: Rows, columns: Mapping[str, Array], rival: Mapping[str, Array], loss: bool) -> float:
     """Return by how much −2 ln L of the decays' means falls, over the correlation that the rival leaves, beyond what it must."""
     (before, _, few), (after, widening, many) = (_misfit(rows, one, loss) for one in (columns, rival))
     return (before - after) / widening - (many - few) * float(np.log(len(np.unique(rows.decay)))) - PAYS
 
 
-def _misfit(rows: Rows, columns: Mapping[str, Real], loss: bool) -> tuple[float, float, int]:
+def _misfit(rows: Rows, columns: Mapping[str, Array], loss: bool) -> tuple[float, float, int]:
     """Return −2 ln L of the decays' means (but for a constant), the correlation of what is left, and the number of values."""
     index = np.unique(rows.decay, return_inverse=True)[1]
     count = np.bincount(index)
@@ -180,7 +180,7 @@ def _misfit(rows: Rows, columns: Mapping[str, Real], loss: bool) -> tuple[float,
     return float(n * np.log(np.mean(square)) - 2 * np.sum(np.log(weight))), (1 + persistence) / (1 - persistence), k
 
 
-def _solve(X: Real, rows: Rows, loss: bool) -> tuple[Real, Real, Real]:
+def _solve(X: Array, rows: Rows, loss: bool) -> tuple[Array, Array, Array]:
     """Return the values, the weights (by each row's own error and the scatter), and what outliers keep of theirs (Huber)."""
     y = rows.value
     scale = np.max(np.abs(X), axis=0)
@@ -198,7 +198,7 @@ def _solve(X: Real, rows: Rows, loss: bool) -> tuple[Real, Real, Real]:
     return found, weight, robust
 
 
-def _covariance(X: Real, residual: Real, weight: Real, rows: Rows) -> Real:
+def _covariance(X: Array, residual: Array, weight: Array, rows: Rows) -> Array:
     scale = np.max(np.abs(X), axis=0)
     A = X / scale * weight[:, None]
     inverse = np.linalg.pinv(A.T @ A, hermitian=True)
@@ -230,10 +230,10 @@ def _places(rows: Rows) -> Whole:
     return place
 
 
-def long_run(group: Whole, scores: Real, neighbours: bool = True) -> Real:
+def long_run(group: Whole, scores: Array, neighbours: bool = True) -> Array:
     """Return Σ S_i S_jᵀ over sums of scores by group, those of neighbours with a weight that falls to 0 at √N."""
-    sums: Real = np.stack([np.bincount(group, column) for column in scores.T], axis=1)
-    found: Real = sums.T @ sums
+    sums: Array = np.stack([np.bincount(group, column) for column in scores.T], axis=1)
+    found: Array = sums.T @ sums
     reach = int(sqrt(len(sums))) if neighbours and len(sums) >= NEIGHBOURS else 0
     for lag in range(1, reach + 1):
         beside = sums[lag:].T @ sums[:-lag]

@@ -12,10 +12,8 @@ the form of an ellipse is of the order of its eccentricity and left out. A slow 
 from dataclasses import dataclass, fields
 
 import numpy as np
-from numpy.typing import NDArray
 
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
+from compensation.arrays import Array, Complex
 
 
 @dataclass(frozen=True)
@@ -54,7 +52,7 @@ class Decay:
         found = np.array([self.mean + s, self.mean - s])
         return found if found[0].imag >= found[1].imag else found[::-1]
 
-    def vector(self, names: tuple[str, ...]) -> Real:
+    def vector(self, names: tuple[str, ...]) -> Array:
         """The named rates as an array."""
         return np.array([getattr(self, name) for name in names])
 
@@ -64,7 +62,7 @@ ONE_MODE = ("detuning", "decay")
 TWO_MODES = (*ONE_MODE, "damping_cos", "damping_sin", "stiffness_cos", "stiffness_sin")
 
 
-def propagate(decay: Decay, time: Real, start: Complex) -> Complex:
+def propagate(decay: Decay, time: Array, start: Complex) -> Complex:
     """Return z (channels, rows) at the times (s) after the start, where it is `start` (channels,).
 
     exp(M t) = e^{mt} (cosh st + (M − m) sinh(st)/s) with s² = C-W determinant, a scalar for one channel.
@@ -84,7 +82,7 @@ def propagate(decay: Decay, time: Real, start: Complex) -> Complex:
     return np.asarray(z)
 
 
-def _amplitude_effect(decay: Decay, time: Real, linear: Complex) -> Complex:
+def _amplitude_effect(decay: Decay, time: Array, linear: Complex) -> Complex:
     """Return the factor of the cubic terms: E = E₀/(1 + 2γ ∫E₀ dt), phase κ ∫E dt, E₀ = |z|² of the linear decay."""
     energy = np.sum(np.abs(linear) ** 2, axis=0)
     passed = _integrate(time, energy)
@@ -94,7 +92,7 @@ def _amplitude_effect(decay: Decay, time: Real, linear: Complex) -> Complex:
     return np.asarray(shrink * np.exp(1j * decay.hardening * phase))
 
 
-def _integrate(time: Real, values: Real) -> Real:
+def _integrate(time: Array, values: Array) -> Array:
     """Return the running integral from t = 0, exact for an exponential between two rows."""
     before = np.concatenate([[values[0]], values])
     steps = np.diff(time, prepend=0.0)

@@ -11,13 +11,13 @@ from math import exp, log, pi
 
 import numpy as np
 import scipy
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from compensation.arrays import Array
 from compensation.errors import CompensationError
 from compensation.ringdown.analysis import Estimate
 from compensation.ringdown.laws import long_run
 
-Real = NDArray[np.float64]
 PAYS = 20.0
 REACH = 1.6449  # standard deviations of the ends of a 90 % interval
 NARROW = 3.0  # points within the width below which the analyser, not the resonator, makes it
@@ -31,9 +31,9 @@ class SpectrumFit:
     """
 
     estimates: dict[str, Estimate]
-    frequency: Real
-    power: Real
-    fitted: Real
+    frequency: Array
+    power: Array
+    fitted: Array
     scatter: float
     widening: float
     remarks: tuple[str, ...]
@@ -97,7 +97,7 @@ def _estimate(value: float, sd: float) -> Estimate:
     return Estimate(value, sd, value - REACH * sd, value + REACH * sd)
 
 
-def _line_at(f: Real, y: Real) -> tuple[float, float, float]:
+def _line_at(f: Array, y: Array) -> tuple[float, float, float]:
     """Return the frequency, ln of the width and ln of the power of the largest line."""
     at = int(np.argmax(y))
     half = (y[at] + np.median(y)) / 2
@@ -107,7 +107,7 @@ def _line_at(f: Real, y: Real) -> tuple[float, float, float]:
     return float(f[at]), log(max(width, step)), log(float(y[at]))
 
 
-def _model(point: Real, f: Real) -> Real:
+def _model(point: Array, f: Array) -> Array:
     middle = (f[0] + f[-1]) / 2
     S = np.exp(np.clip(point[0] + point[1] * (f - middle) / np.ptp(f), -200, 200))
     for f0, width, power in np.reshape(point[2:], (-1, 3)):
@@ -115,10 +115,10 @@ def _model(point: Real, f: Real) -> Real:
     return np.asarray(S)
 
 
-def _fit(f: Real, y: Real, lines: list[tuple[float, float, float]]) -> Real:
+def _fit(f: Array, y: Array, lines: list[tuple[float, float, float]]) -> Array:
     start = np.array([log(float(np.quantile(y, 0.2))), 0.0, *(x for line in lines for x in line)])
 
-    def residuals(point: Real) -> Real:
+    def residuals(point: Array) -> Array:
         ratio = y / _model(point, f)
         return np.asarray(np.sign(ratio - 1) * np.sqrt(2 * np.maximum(ratio - 1 - np.log(ratio), 0.0)))
 
@@ -126,28 +126,28 @@ def _fit(f: Real, y: Real, lines: list[tuple[float, float, float]]) -> Real:
     return np.asarray(scipy.optimize.least_squares(residuals, start, x_scale=steps, method="trf", max_nfev=400).x)
 
 
-def _steps(point: Real) -> Real:
+def _steps(point: Array) -> Array:
     steps = np.full(point.size, 1e-4)
     steps[2::3] = 1e-4 * np.exp(point[3::3])
     return steps
 
 
-def _deviance(point: Real, f: Real, y: Real) -> float:
+def _deviance(point: Array, f: Array, y: Array) -> float:
     ratio = y / _model(point, f)
     return float(2 * np.sum(ratio - 1 - np.log(ratio)))
 
 
-def _scatter(point: Real, f: Real, y: Real) -> float:
+def _scatter(point: Array, f: Array, y: Array) -> float:
     return float(np.sqrt(np.sum((y / _model(point, f) - 1) ** 2) / max(f.size - point.size, 1)))
 
 
-def _misfit(left: Real, scatter: float) -> float:
+def _misfit(left: Array, scatter: float) -> float:
     size = max(4, left.size // 40)
     means = left[: left.size // size * size].reshape(-1, size).mean(axis=1)
     return float(np.sqrt(max(1.0, size * float(np.mean(means**2)) / scatter**2)))
 
 
-def _remark(f: Real, point: Real, split: bool, widening: float) -> list[str]:
+def _remark(f: Array, point: Array, split: bool, widening: float) -> list[str]:
     said = []
     step = float(np.median(np.diff(f)))
     if exp(min(point[3::3])) < NARROW * step:

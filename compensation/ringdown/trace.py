@@ -10,11 +10,11 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from compensation.arrays import Array
 from compensation.errors import CompensationError
 
-Real = NDArray[np.float64]
 BINS = 100
 DROP = 0.25
 """Fall of ln a from one hundredth of the record to the next that is no decay but a drive switched off, where it is six times the usual step."""
@@ -108,7 +108,7 @@ def analyse_trace(time: ArrayLike, amplitude: ArrayLike, *, confidence: float = 
     )
 
 
-def _find_release(t: Real, L: Real) -> int:
+def _find_release(t: Array, L: Array) -> int:
     """Return the first row of the free decay: after the last sudden fall in the first half, or after a plateau."""
     size = max(1, t.size // BINS)
     count = t.size // size
@@ -136,22 +136,22 @@ def _find_release(t: Real, L: Real) -> int:
     return knee * size if knee > 2 else 0
 
 
-def _noise_part(line: Real, noise: float) -> Real:
+def _noise_part(line: Array, noise: float) -> Array:
     return np.asarray(0.5 * noise**2 * np.exp(-2 * line))
 
 
-def _fit_line(x: Real, y: Real, weights: Real) -> tuple[float, float]:
+def _fit_line(x: Array, y: Array, weights: Array) -> tuple[float, float]:
     middle_x, middle_y = np.average(x, weights=weights), np.average(y, weights=weights)
     slope = float(np.sum(weights * (x - middle_x) * (y - middle_y)) / np.sum(weights * (x - middle_x) ** 2))
     return slope, float(middle_y - slope * middle_x)
 
 
-def _fit_scatter(line: Real, L: Real) -> tuple[float, float]:
+def _fit_scatter(line: Array, L: Array) -> tuple[float, float]:
     """Return v₀ and σ by maximum likelihood of the residual about the line."""
     squares = (L - line) ** 2
     top = float(line.max())
 
-    def cost(point: Real) -> float:
+    def cost(point: Array) -> float:
         variance = np.exp(point[0]) + _noise_part(line, float(np.exp(point[1])))
         return float(np.sum(np.log(variance) + squares / variance))
 
@@ -160,7 +160,7 @@ def _fit_scatter(line: Real, L: Real) -> tuple[float, float]:
     return float(np.exp(solved.x[0])), float(np.exp(solved.x[1]))
 
 
-def _widen(scaled: Real) -> float:
+def _widen(scaled: Array) -> float:
     """Return the root of the largest ratio between the variance of block means and that of independent rows."""
     widest, size = 1.0, 2
     while scaled.size // size >= 6:
@@ -171,7 +171,7 @@ def _widen(scaled: Real) -> float:
     return float(np.sqrt(widest))
 
 
-def _find_straight(x: Real, y: Real, weights: Real) -> int:
+def _find_straight(x: Array, y: Array, weights: Array) -> int:
     """Return the rows from the start that one line foretells: each next fortieth within four standard deviations of it."""
     size = max(4, x.size // 40)
     rows = min(x.size, 6 * size)

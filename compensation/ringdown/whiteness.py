@@ -4,10 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
+from compensation.arrays import Array, Complex
+
 BLOCKS = 64
 RARE = 1e-3  # probability below which noise is not held for the reason
 
@@ -23,7 +22,7 @@ class Leftover:
     amplitude: float  # of that line, in the unit of the record
 
 
-def examine(time: Real, residual: Complex) -> Leftover:
+def examine(time: Array, residual: Complex) -> Leftover:
     """Return what a residual shows: a ratio of variances over block lengths, its first blocks, its largest line."""
     channels, rows = residual.shape
     variance = np.mean(np.abs(residual) ** 2, axis=1)
@@ -50,7 +49,7 @@ def examine(time: Real, residual: Complex) -> Leftover:
     return Leftover(float(np.sqrt(widest)), bool(early), line, amplitude)
 
 
-def _find_line(time: Real, scaled: Complex, sd: Real) -> tuple[float | None, float]:
+def _find_line(time: Array, scaled: Complex, sd: Array) -> tuple[float | None, float]:
     """Return the largest line of the residual where its power passes what the noise beside it has once in a thousand records."""
     step = float(np.median(np.diff(time)))
     grid = np.rint((time - time[0]) / step).astype(int)

@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studies.errors import InputError
+from studies.sweeps.block import Array
 from studies.sweeps.keys import MOST_CASES
 
 if TYPE_CHECKING:
     from studies.sweeps.definition import Study, StudyParameter
 
-Array = NDArray[np.float64]
 LEVELS = (-1.0, -0.5, 0.5, 1.0)  # of one parameter at a time, in half ranges about the nominal value
 
 

@@ -18,6 +18,7 @@ from shell.family import MOST_SOLVES, Axis, Family, FamilyResult, build_family
 from shell.law import slope_parts
 from studies.errors import UNUSABLE_INPUT, InputError
 from studies.instrument.card import Instrument
+from studies.sweeps.block import Array
 from studies.sweeps.parameters import TEMPERATURE, set_parameters
 from studies.sweeps.quantities.tcf import PARTS, STEEPEST
 from studies.sweeps.quantity import ModeQuantity, Quantity
@@ -28,7 +29,6 @@ if TYPE_CHECKING:
     from studies.sweeps.definition import Study, StudyParameter
     from studies.sweeps.design import Design
 
-Array = NDArray[np.float64]
 Designs = Mapping[str, NDArray[Any]]  # columns of parameters by name
 FEWEST = 64  # cases from which a family may cost less than solving each design
 SHARE = 2  # designs for each full solve that a family may take, so that it at least halves the work

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from studies.instrument.card import build_instrument
 from studies.shown import Shown
-from studies.sweeps.block import decode
+from studies.sweeps.block import Array, decode
 from studies.sweeps.definition import Study
 from studies.sweeps.design import coding, nominal_row
 from studies.sweeps.opening import open_store
@@ -20,8 +20,6 @@ from studies.sweeps.store import Store, Stored
 
 if TYPE_CHECKING:
     import pandas as pd
-
-Array = NDArray[np.float64]
 
 
 class Chunk(NamedTuple):

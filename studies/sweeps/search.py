@@ -10,9 +10,8 @@ from itertools import product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from studies.sweeps.block import Batch, decode, each_design
+from studies.sweeps.block import Array, Batch, decode, each_design
 from studies.sweeps.design import draw, nominal_row
 from studies.sweeps.engine import BATCH_VECTORISED, compute
 from studies.sweeps.keys import Inversion, Search, ToleranceSearch, WorstCase
@@ -25,7 +24,6 @@ if TYPE_CHECKING:
     from studies.sweeps.store import Store, Stored
     from studies.sweeps.workers import Workers
 
-Array = NDArray[np.float64]
 STEP = 1e-2  # of a range, for differences: large against the solver's noise
 MOST_FACTORS = 20  # factors of the tolerances that are tried
 MOST_CORNERS = 6  # parameters up to which every corner of the box is computed

@@ -9,15 +9,14 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from studies.errors import InputError
+from studies.sweeps.block import Array
 
 if TYPE_CHECKING:
     from studies.sweeps.definition import StudyParameter
     from studies.sweeps.results import Results
 
-Array = NDArray[np.float64]
 RESAMPLES = 1000
 SHOWN = 10
 
