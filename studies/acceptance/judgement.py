@@ -1,6 +1,6 @@
 """The acceptance test: what the records give against limits, and what they do not give."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
@@ -17,7 +17,7 @@ from studies.acceptance.measure import (
     measure_warm_up,
 )
 from studies.acceptance.quantities import ELSEWHERE, QUANTITIES, TestedQuantity
-from studies.acceptance.runs import sort_records
+from studies.acceptance.runs import Test, sort_records
 from studies.acceptance.service import measure_life, measure_storage, measure_transfer
 
 if TYPE_CHECKING:
@@ -25,6 +25,13 @@ if TYPE_CHECKING:
     from studies.record import Record
     from studies.ringdown import Decay
 
+FIRST: "dict[Test, Callable[[Record], Found]]" = {
+    # tests that take the first record that serves them
+    "scale-factor": measure_scale,
+    "run-down": measure_run_down,
+    "transfer": measure_transfer,
+    "angle-storage": measure_storage,
+}
 Verdict = Literal["pass", "fail", "undecided", "no limit", "missing"]
 
 
@@ -99,22 +106,17 @@ def judge(
         found |= more
     if "temperature" in sorted_runs:
         found |= measure_temperature(sorted_runs["temperature"], output)
-    for record in sorted_runs.get("scale-factor", [])[:1]:
-        found |= measure_scale(record)
     if "drift" in sorted_runs:
         more, allan, noise = measure_drift(sorted_runs["drift"], output)
         found |= more
-    for record in sorted_runs.get("run-down", [])[:1]:
-        found |= measure_run_down(record)
+    for test, measure in FIRST.items():
+        for record in sorted_runs.get(test, [])[:1]:
+            found |= measure(record)
     found |= measure_decays(decays)
-    for record in sorted_runs.get("transfer", [])[:1]:
-        found |= measure_transfer(record)
-    for record in sorted_runs.get("angle-storage", [])[:1]:
-        found |= measure_storage(record)
     found |= measure_life(sorted_runs.get("drift", []), output)
     lines = tuple(JudgedQuantity(q, found.get(q.key), None if limits is None else limits.of(q.key)) for q in QUANTITIES)
     used: dict[str, str] = {record.path: test for test, group in sorted_runs.items() for record in group}
-    for test in ("warm-up", "scale-factor", "run-down", "transfer", "angle-storage"):
+    for test in ("warm-up", *FIRST):
         for record in sorted_runs.get(test, [])[1:]:
             used[record.path] = f"{test}, not used: only the first record of this test counts"
     used |= {decay.path: "run-down" for decay in decays}

@@ -4,7 +4,7 @@ from typing import Annotated, Any
 
 import msgspec
 
-from studies.acceptance.quantities import QUANTITIES
+from studies.acceptance.quantities import QUANTITIES, TestedQuantity
 from studies.schema.keys import Keys, number, says
 
 SCHEMA = "hrg.limits/1"
@@ -26,14 +26,10 @@ def _declare_quantities() -> Any:
         if not any(getattr(limits, key) is not None for key in limits.__struct_fields__):
             raise ValueError("no limit is given; add one, such as bias_deg_per_h = 5.0.")
 
-    fields: list[Any] = [
-        (
-            q.key,
-            Annotated[float, number(f"{q.words}; {'at most, in size' if q.upper else 'at least'}", above=0.0)] | None,
-            None,
-        )
-        for q in QUANTITIES
-    ]
+    def declare(q: TestedQuantity) -> Any:
+        return Annotated[float, number(f"{q.words}; {'at most, in size' if q.upper else 'at least'}", above=0.0)] | None
+
+    fields: list[Any] = [(q.key, declare(q), None) for q in QUANTITIES]
     return msgspec.defstruct(
         "QuantityLimits", fields, bases=(Keys,), namespace={"__post_init__": check}, frozen=True, kw_only=True
     )

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from compensation.decimation import average_blocks
 from compensation.linearity import measure_linearity, same_rate
 from compensation.noise_regression import fit_coloured
-from compensation.regression import fit_linear
+from compensation.regression import LinearFit, fit_linear
 from compensation.stability import AllanDeviation, NoiseCoefficients
 from compensation.start_up import fit_run_down
 from studies.acceptance.runs import temperature_column
@@ -46,6 +46,21 @@ class Measured:
 Found = dict[str, Measured]
 
 
+def within(
+    value: float, sd: float, sources: Sequence[str], free: float = np.inf, least: float = -np.inf, scale: float = 1.0
+) -> Measured:
+    """Return a value, times `scale`, with the interval of its standard error of `free` degrees of freedom, not below `least`."""
+    spread = 0.5 + CONFIDENCE / 2
+    reach = sd * float(scipy.special.ndtri(spread) if free == np.inf else scipy.special.stdtrit(free, spread))
+    return Measured(value * scale, max(value - reach, least) * scale, (value + reach) * scale, tuple(sources))
+
+
+def of_fit(fit: LinearFit, place: int, sources: Sequence[str], scale: float = 1.0, shift: float = 0.0) -> Measured:
+    """Return a coefficient of a straight fit, plus `shift`, with its interval."""
+    value, sd = float(fit.coefficients[place]) + shift, float(fit.standard_errors[place])
+    return within(value, sd, sources, fit.degrees_of_freedom, scale=scale)
+
+
 def measure_drift(records: "Sequence[Record]", output: str) -> tuple[Found, AllanDeviation, NoiseCoefficients]:
     """Bias, its repeatability, and the noise coefficients of the longest record (12.11)."""
     means: list[tuple[float, float]] = []
@@ -56,27 +71,19 @@ def measure_drift(records: "Sequence[Record]", output: str) -> tuple[Found, Alla
             fit = fit_coloured(np.ones((len(y), 1)), y, ["bias"], [slice(0, len(y))])
         means.append((float(y.mean()), float(np.sqrt(fit.regression.covariance[0, 0]))))
     found: Found = {}
-    paths = tuple(record.path for record in records)
+    paths = [record.path for record in records]
     values = np.array([value for value, _ in means])
     if len(records) == 1:
-        z = float(scipy.special.ndtri(0.5 + CONFIDENCE / 2))
-        value, sd = means[0]
-        found["bias_deg_per_h"] = Measured(value, value - z * sd, value + z * sd, paths)
+        found["bias_deg_per_h"] = within(*means[0], paths)
     else:
-        spread = float(values.std(ddof=1))
-        reach = float(scipy.special.stdtrit(len(values) - 1, 0.5 + CONFIDENCE / 2)) * spread / math.sqrt(len(values))
-        mean = float(values.mean())
-        found["bias_deg_per_h"] = Measured(mean, mean - reach, mean + reach, paths)
-        low, high = _deviation_interval(spread, len(values) - 1)
-        found["bias_repeatability_deg_per_h"] = Measured(spread, low, high, paths)
+        spread, free = float(values.std(ddof=1)), len(values) - 1
+        found["bias_deg_per_h"] = within(float(values.mean()), spread / math.sqrt(len(values)), paths, free)
+        found["bias_repeatability_deg_per_h"] = _deviation(spread, free, paths)
     longest = max(records, key=lambda record: record["time_s"][-1] - record["time_s"][0])
     allan, noise = _stability(longest, output)
-    z = float(scipy.special.ndtri(0.5 + CONFIDENCE / 2))
-    for key, value, sd in (
-        ("angle_random_walk_deg_per_rt_h", noise.N / 60, noise.N_uncertainty / 60),
-        ("rate_random_walk_deg_per_h_per_rt_h", noise.K * 60, noise.K_uncertainty * 60),
-    ):
-        found[key] = Measured(value, max(value - z * sd, 0.0), value + z * sd, (longest.path,))
+    walk = "angle_random_walk_deg_per_rt_h", "rate_random_walk_deg_per_h_per_rt_h"
+    found[walk[0]] = within(noise.N, noise.N_uncertainty, [longest.path], least=0.0, scale=1 / 60)
+    found[walk[1]] = within(noise.K, noise.K_uncertainty, [longest.path], least=0.0, scale=60.0)
     found["bias_instability_deg_per_h"] = Measured(*allan.bias_instability, (longest.path,))
     return found, allan, noise
 
@@ -92,10 +99,10 @@ def _stability(record: "Record", output: str) -> tuple[AllanDeviation, NoiseCoef
         return found.allan, found.noise
 
 
-def _deviation_interval(deviation: float, free: int) -> tuple[float, float]:
-    """Return the χ² interval of a standard deviation with its degrees of freedom."""
-    ends = [float(scipy.special.chdtri(free, 0.5 - side * CONFIDENCE / 2)) for side in (1, -1)]
-    return deviation * math.sqrt(free / ends[0]), deviation * math.sqrt(free / ends[1])
+def _deviation(deviation: float, free: int, sources: Sequence[str]) -> Measured:
+    """Return a standard deviation with the χ² interval of its degrees of freedom."""
+    low, high = (float(scipy.special.chdtri(free, 0.5 - side * CONFIDENCE / 2)) for side in (1, -1))
+    return Measured(deviation, deviation * math.sqrt(free / low), deviation * math.sqrt(free / high), tuple(sources))
 
 
 def _block_of(record: "Record") -> float:
@@ -129,7 +136,7 @@ def measure_temperature(records: "Sequence[Record]", output: str) -> Found:
             blocks = average_blocks(record["time_s"], {"f": record["frequency_Hz"], "T": record[column]}, BLOCK)
             frequencies.append((blocks.columns["T"], blocks.columns["f"]))
     found: Found = {}
-    paths = tuple(record.path for record in records)
+    paths = [record.path for record in records]
     if runs:
         y, T, slope = (np.concatenate(parts) for parts in columns.values())
         offsets = np.zeros((len(y), len(runs)))
@@ -139,26 +146,22 @@ def measure_temperature(records: "Sequence[Record]", output: str) -> Found:
         names = [*(f"offset {k + 1}" for k in range(len(runs))), "temperature", "rate of temperature"]
         with naming(", ".join(paths)):
             fit = fit_coloured(X, y, names, runs)
-        b, sd = fit.regression.coefficients, np.sqrt(np.diag(fit.regression.covariance))
-        reach = float(scipy.special.stdtrit(max(len(y) - X.shape[1], 1), 0.5 + CONFIDENCE / 2))
-        for key, place in (
-            ("bias_temperature_slope_deg_per_h_per_K", -2),
-            ("bias_temperature_rate_deg_per_h_s_per_K", -1),
-        ):
-            value, width = float(b[place]), reach * float(sd[place])
-            found[key] = Measured(value, value - width, value + width, paths)
+        b, sd, free = (
+            fit.regression.coefficients,
+            np.sqrt(np.diag(fit.regression.covariance)),
+            max(len(y) - X.shape[1], 1),
+        )
+        found["bias_temperature_slope_deg_per_h_per_K"] = within(float(b[-2]), float(sd[-2]), paths, free)
+        found["bias_temperature_rate_deg_per_h_s_per_K"] = within(float(b[-1]), float(sd[-1]), paths, free)
         left = fit.residuals - offsets @ np.array([fit.residuals[rows].mean() for rows in runs])
-        rms, free = float(np.sqrt(np.mean(left**2))), max(len(y) - X.shape[1], 1)
-        low, high = _deviation_interval(rms, free)
-        found["bias_temperature_residual_deg_per_h"] = Measured(rms, low, high, paths)
+        found["bias_temperature_residual_deg_per_h"] = _deviation(float(np.sqrt(np.mean(left**2))), free, paths)
     if frequencies:
         T, f = (np.concatenate(parts) for parts in zip(*frequencies, strict=True))
-        fit_f = fit_linear((T - T.mean())[:, None], f, ["temperature"])
-        scale = 1e6 / float(fit_f.coefficients[0])
-        value, width = float(fit_f.coefficients[1]), 2 * float(fit_f.standard_errors[1])
-        found["frequency_temperature_slope_ppm_per_K"] = Measured(
-            value * scale, (value - width) * scale, (value + width) * scale, paths
-        )
+        line = fit_linear((T - T.mean())[:, None], f, ["temperature"])
+        scale = 1e6 / float(line.coefficients[0])
+        value, width = float(line.coefficients[1]), 2 * float(line.standard_errors[1])
+        low, high = scale * (value - width), scale * (value + width)
+        found["frequency_temperature_slope_ppm_per_K"] = Measured(scale * value, low, high, tuple(paths))
     return found
 
 
@@ -178,31 +181,21 @@ def measure_scale(record: "Record") -> Found:
     rates, means, errors = np.array(levels).T if levels else np.zeros((3, 0))
     if len(np.unique(same_rate(rates))) < 3:
         raise InputError(f"{record.path}: a scale factor needs at least three constant rates of eight rows each.")
-    full, source = float(np.abs(rates).max()), (record.path,)
+    full, source = float(np.abs(rates).max()), [record.path]
     with naming(record.path):
-        line = measure_linearity(rates, means)
+        departure = measure_linearity(rates, means).nonlinearity
         fit = fit_linear(rates[:, None], means, ["rate"])
-    reach = float(scipy.special.stdtrit(fit.degrees_of_freedom, 0.5 + CONFIDENCE / 2)) * float(fit.standard_errors[1])
-    error = float(fit.coefficients[1]) - 1
-    found = {"scale_factor_error_ppm": Measured(error * 1e6, (error - reach) * 1e6, (error + reach) * 1e6, source)}
-    z = float(scipy.special.ndtri(0.5 + CONFIDENCE / 2))
-    width = z * float(np.max(errors)) / full
-    departure = line.nonlinearity
-    found["scale_factor_nonlinearity_ppm"] = Measured(
-        departure * 1e6, max(departure - width, 0.0) * 1e6, (departure + width) * 1e6, source
-    )
-    positive, negative = rates > 0, rates < 0
-    if positive.any() and negative.any():
+    found = {
+        "scale_factor_error_ppm": of_fit(fit, 1, source, 1e6, -1.0),
+        "scale_factor_nonlinearity_ppm": within(departure, float(np.max(errors)) / full, source, least=0.0, scale=1e6),
+    }
+    sides = rates > 0, rates < 0
+    if all(side.any() for side in sides):
         bias = float(fit.coefficients[0])
-        slopes = [
-            float(np.sum((means[side] - bias) * rates[side]) / np.sum(rates[side] ** 2))
-            for side in (positive, negative)
-        ]
-        sd = [float(np.sqrt(np.sum((errors[s] * rates[s]) ** 2)) / np.sum(rates[s] ** 2)) for s in (positive, negative)]
-        uneven, width = slopes[0] - slopes[1], z * math.hypot(*sd)
-        found["scale_factor_asymmetry_ppm"] = Measured(
-            uneven * 1e6, (uneven - width) * 1e6, (uneven + width) * 1e6, source
-        )
+        squares = [float(np.sum(rates[s] ** 2)) for s in sides]
+        slopes = [float(np.sum((means[s] - bias) * rates[s])) / q for s, q in zip(sides, squares, strict=True)]
+        sd = [float(np.sqrt(np.sum((errors[s] * rates[s]) ** 2))) / q for s, q in zip(sides, squares, strict=True)]
+        found["scale_factor_asymmetry_ppm"] = within(slopes[0] - slopes[1], math.hypot(*sd), source, scale=1e6)
     return found
 
 
@@ -262,15 +255,10 @@ def measure_decays(decays: "Sequence[Decay]") -> Found:
             raise InputError(f"{decay.path}: two lines in a spectrum are not a run-down; give a decay over time.")
         if "run_down_time_s" in found and tau.value > found["run_down_time_s"].value:
             continue
-        found = {"run_down_time_s": _around(tau.value, tau.sd, decay.path)}
+        found = {"run_down_time_s": within(tau.value, tau.sd, [decay.path])}
         if (loss := decay.inverse_q) is not None:
-            found["quality_factor"] = _around(1 / loss.value, loss.sd / loss.value**2, decay.path)
+            found["quality_factor"] = within(1 / loss.value, loss.sd / loss.value**2, [decay.path])
     return found
-
-
-def _around(value: float, sd: float, path: str) -> Measured:
-    reach = float(scipy.special.ndtri(0.5 + CONFIDENCE / 2)) * sd
-    return Measured(value, value - reach, value + reach, (path,))
 
 
 def measure_seal(records: "Sequence[Record]") -> Found:
@@ -294,7 +282,4 @@ def measure_seal(records: "Sequence[Record]") -> Found:
     X, names = ((at - at.mean()) / YEAR)[:, None], ["year"]
     if np.ptp(T) > 0.5:
         X, names = np.column_stack([X, T - T.mean()]), ["year", "temperature"]
-    fit = fit_linear(X, loss, names)
-    value = float(fit.coefficients[1])
-    reach = float(scipy.special.stdtrit(fit.degrees_of_freedom, 0.5 + CONFIDENCE / 2)) * float(fit.standard_errors[1])
-    return {"inverse_q_trend_per_year": Measured(value, value - reach, value + reach, tuple(sources))}
+    return {"inverse_q_trend_per_year": of_fit(fit_linear(X, loss, names), 1, sources)}

@@ -54,8 +54,5 @@ def sort_records(records: "Sequence[Record]", output: str) -> "tuple[dict[Test, 
     left: list[Record] = []
     for record in records:
         test = test_of(record, output)
-        if test is None:
-            left.append(record)
-        else:
-            found.setdefault(test, []).append(record)
+        (left if test is None else found.setdefault(test, [])).append(record)
     return found, left

@@ -8,7 +8,7 @@ import numpy as np
 import scipy
 
 from compensation.regression import fit_linear
-from studies.acceptance.measure import CONFIDENCE, YEAR, Found, Measured
+from studies.acceptance.measure import CONFIDENCE, YEAR, Found, Measured, of_fit, within
 from studies.errors import InputError
 
 if TYPE_CHECKING:
@@ -59,25 +59,15 @@ def measure_transfer(record: "Record") -> Found:
         one, two = curve[place - 1], curve[place]
         return float(f[place - 1] + (one - HALF * start) / (one - two) * (f[place] - f[place - 1]))
 
-    value = falls(gain)
-    source = (record.path,)
+    value, source = falls(gain), (record.path,)
     # where it does not fall off, the band that was applied is the least that it is
-    found: Found = {
-        "bandwidth_Hz": Measured(
-            float(f[-1]) if value is None else value,
-            falls(gain * (1 - z * error)) or float(f[-1]),
-            None if value is None else falls(gain * (1 + z * error)),
-            source,
-        )
-    }
+    least = falls(gain * (1 - z * error)) or float(f[-1])
+    most = None if value is None else falls(gain * (1 + z * error))
+    found: Found = {"bandwidth_Hz": Measured(float(f[-1]) if value is None else value, least, most, source)}
     low = f <= (value or f[-1]) / 2
     if low.sum() >= 3:
         fit = fit_linear(2 * np.pi * f[low][:, None], -phase[low], ["delay"])
-        reach = float(scipy.special.stdtrit(fit.degrees_of_freedom, 0.5 + CONFIDENCE / 2)) * float(
-            fit.standard_errors[1]
-        )
-        delay = float(fit.coefficients[1])
-        found["delay_ms"] = Measured(1e3 * delay, 1e3 * (delay - reach), 1e3 * (delay + reach), source)
+        found["delay_ms"] = of_fit(fit, 1, source, 1e3)
     return found
 
 
@@ -103,8 +93,7 @@ def measure_storage(record: "Record") -> Found:
         sides.append((float(fit.coefficients[0]), float(np.sqrt(row @ fit.covariance @ row))))
     (before, one), (after, two) = sides
     error = (after - before + 45.0) % 90.0 - 45.0
-    reach = float(scipy.special.ndtri(0.5 + CONFIDENCE / 2)) * math.hypot(one, two)
-    return {"angle_storage_error_deg": Measured(error, error - reach, error + reach, (record.path,))}
+    return {"angle_storage_error_deg": within(error, math.hypot(one, two), [record.path])}
 
 
 def measure_life(records: "Sequence[Record]", output: str) -> Found:
@@ -117,8 +106,4 @@ def measure_life(records: "Sequence[Record]", output: str) -> Found:
         return {}
     bias = np.array([float(np.nanmean(record[output])) for record in dated])
     fit = fit_linear(((at - at.mean()) / YEAR)[:, None], bias, ["year"])
-    value = float(fit.coefficients[1])
-    reach = float(scipy.special.stdtrit(fit.degrees_of_freedom, 0.5 + CONFIDENCE / 2)) * float(fit.standard_errors[1])
-    return {
-        "bias_trend_deg_per_h_per_year": Measured(value, value - reach, value + reach, tuple(r.path for r in dated))
-    }
+    return {"bias_trend_deg_per_h_per_year": of_fit(fit, 1, [r.path for r in dated])}

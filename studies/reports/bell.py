@@ -11,7 +11,7 @@ from compensation.stability import allan_deviation
 from shell.constants import zero_Celsius
 from studies.papers.bvg import BellTwin, Claims
 from studies.reports import style
-from studies.results import Chapter, Column, Drawing, Figure, Payload, Sentence, Table
+from studies.results import Chapter, Column, Drawing, Figure, Payload, Table
 
 SOURCES = ("Su Z., Liu N., Li Q., Sensors 2015, 15, 23684–23705, doi:10.3390/s150923684: equations (1)–(36).",)
 NAMES = {
@@ -42,14 +42,13 @@ STEP_COLUMNS = (
 def bell_chapters(twin: BellTwin) -> list[Chapter]:
     """Return the chapters of the twin for the page of `hrg reproduce`."""
     steps, claims = Figure(lambda: draw_steps(twin.chain, twin.runs), ERRORS), _claims_table(twin.claims)
-    allan = Figure(
-        lambda: _draw_allan(twin.chain, twin.runs[1]), ALLAN, "Allan deviation over averaging time, three curves."
-    )
+    alt = "Allan deviation over averaging time, three curves."
+    allan = Figure(lambda: _draw_allan(twin.chain, twin.runs[1]), ALLAN, alt)
     held_out = steps_table([asdict(step) for step in twin.held_out], "Held-out runs")
     fitted = steps_table([asdict(step) for step in twin.fitted], "Fitted runs")
     title = "BVG equations (32)–(36): the compensation chain on a virtual gyro"
     return [
-        Chapter(title, [Sentence(TWIN), held_out, fitted, steps, allan]),
+        Chapter(title, [TWIN, held_out, fitted, steps, allan]),
         Chapter("BVG: check of the published claims", [claims]),
     ]
 
@@ -74,11 +73,8 @@ def steps_table(steps: Sequence[Payload], title: str) -> Table:
 
 def _claims_table(claims: Claims) -> Table:
     """Return the printed results beside what the printed coefficients make of them."""
-    short, (bias, printed_bias), (scale, printed_scale) = (
-        dict(claims.averaging),
-        claims.bias_deviation,
-        claims.scale_deviation,
-    )
+    short = dict(claims.averaging)
+    (bias, printed_bias), (scale, printed_scale) = claims.bias_deviation, claims.scale_deviation
     rows = [
         ("σ removed by (34) at rest", f"{printed_bias:.4f} °/s", f"{bias:.4f} °/s", "agrees"),
         ("σ removed by (36) at 300 °/s", f"{printed_scale:.4f} °/s", f"{scale:.4f} °/s", "agrees within 12 %"),
@@ -103,15 +99,15 @@ def _claims_table(claims: Claims) -> Table:
 def draw_steps(chain: BellChain, runs: tuple[BellRun, BellRun, BellRun]) -> Drawing:
     """Draw the error of the rate before and after: at rest and turning over temperature, and over the applied rate."""
     rates, rest, turning = runs
-    with style.figure(1, 3, height=3.2) as (made, axes):
-        for panel, run, x, label in (
-            (axes[0], rest, rest.temperature - zero_Celsius, "temperature (°C)"),
-            (axes[1], rates, rates.rate / DEG, "applied rate (°/s)"),
-            (axes[2], turning, turning.temperature - zero_Celsius, "temperature (°C)"),
-        ):
-            result = apply_chain(
-                replace(chain, taps=np.empty(0)), run.time, run.output, run.temperature, extrapolate=True
-            )
+    unfiltered = replace(chain, taps=np.empty(0))
+    panels = (
+        ("at rest", rest, rest.temperature - zero_Celsius, "temperature (°C)"),
+        ("several rates", rates, rates.rate / DEG, "applied rate (°/s)"),
+        ("constant rate", turning, turning.temperature - zero_Celsius, "temperature (°C)"),
+    )
+    with style.figure(1, 3, height=3.2, y="rate error (°/s)") as (made, axes):
+        for panel, (title, run, x, label) in zip(axes, panels, strict=True):
+            result = apply_chain(unfiltered, run.time, run.output, run.temperature, extrapolate=True)
             rows = style.few_rows(len(run.time))
             for values, colour, name in (
                 (result.rough, style.ORANGE, "rough"),
@@ -121,11 +117,8 @@ def draw_steps(chain: BellChain, runs: tuple[BellRun, BellRun, BellRun]) -> Draw
                 panel.plot(x[rows], error, ".", markersize=1.5, color=colour, label=name, rasterized=True)
             panel.axhline(0, color=style.BLACK, linewidth=0.8)
             panel.set_xlabel(label)
-        axes[0].set_ylabel("rate error (°/s)")
-        axes[0].set_title("at rest", fontsize=10)
-        axes[1].set_title("several rates", fontsize=10)
-        axes[2].set_title("constant rate", fontsize=10)
-        axes[0].legend(markerscale=6, fontsize=8)
+            panel.set_title(title, fontsize=10)
+            panel.legend(markerscale=6, fontsize=8)
         return made
 
 

@@ -1,7 +1,7 @@
 """Chapters on the BVG paper's theory, equations (1)–(22), and on its reading of the rate, (23)–(30), for `hrg reproduce`."""
 
 from studies.papers.bvg_theory import BellTheory, LoopReading
-from studies.results import Chapter, Column, Sentence, Table
+from studies.results import Chapter, Column, Table
 
 EQUATIONS = (
     ("(1)–(3)", "meridian, domain, principal radii", "correct; in (3) roots and a minus sign are missing: ρ₁ of the hyperbola is negative"),
@@ -22,18 +22,9 @@ EQUATIONS = (
 # (20): the printed coefficient as far as its copy shows it, ours, and what stands between them. In the copy the fraction bars, most minus
 # signs and the marks of derivatives are lost: a blank between two terms is a sign that is lost, ′ a derivative where the text says so.
 COEFFICIENTS = (
-    (
-        "m₀",
-        "ρ h π W(φ)",
-        "π ρ ∫ h (U² + V² + W²) r ds",
-        "linear in one component, no integral: kg/m² times a displacement",
-    ),
-    (
-        "b",
-        "ρ h π V(φ) (cos φ + sin φ)",
-        "2 π ρ ∫ h V (−U cos φ − W sin φ) r ds",
-        "linear; of the products V U and V W of the Coriolis force only V remains",
-    ),
+    ("m₀", "ρ h π W(φ)", "π ρ ∫ h (U² + V² + W²) r ds", "linear in one component, no integral: kg/m² times a displacement"),
+    ("b", "ρ h π V(φ) (cos φ + sin φ)", "2 π ρ ∫ h V (−U cos φ − W sin φ) r ds",
+     "linear; of the products V U and V W of the Coriolis force only V remains"),
     (
         "c₀",
         "π { G (W′ sin φ + 2V) / ((ρ₂ + υ)² sin φ) + 1/((ρ₂ + υ) sin φ) [ 2G (W′ sin φ + 2V)/(ρ₂ + υ) + 2G (2V sin φ 4W)/((ρ₂ + υ) sin φ)"
@@ -70,11 +61,9 @@ SYMBOLS_NOTE = (
     " is a missing sign, and … marks illegible parts."
 )
 CHECKED = (Column("0", "Equation"), Column("1", "Content"), Column("2", "Result of the check"))
-CORRECTED = (
-    Column("0", ""),
-    Column("1", "Printed, as far as legible"),
-    Column("2", "Corrected (U, V, W as in (19))"),
-    Column("3", "Difference"),
+CORRECTED = tuple(
+    Column(f"{k}", heading)
+    for k, heading in enumerate(("", "Printed, as far as legible", "Corrected (U, V, W as in (19))", "Difference"))
 )
 
 
@@ -102,26 +91,17 @@ def theory_chapters(theory: BellTheory, reading: LoopReading) -> list[Chapter]:
     }
     rows = [*theory.rows, theory.free, theory.solid]
     return [
-        Chapter(
-            "BVG equations (1)–(22): theory of the bell-shaped resonator",
-            [
-                Sentence(told),
-                Table(f"Card '{theory.card}', n = 2", rows, PATTERNS, PATTERNS_NOTE),
-                Table("Coefficients of (20), printed and corrected", COEFFICIENTS, CORRECTED, SYMBOLS_NOTE),
-                Table("Equation by equation", EQUATIONS, CHECKED),
-            ],
-        ),
-        Chapter(
-            "BVG equations (23)–(30): rate from the control loop",
-            [
-                Table(
-                    "Rate recovered from a simulation of (23) with a coupling c₁",
-                    list(loop.items()),
-                    (Column("0", "Quantity"), Column("1", "Value")),
-                )
-            ],
-        ),
-    ]
+        Chapter("BVG equations (1)–(22): theory of the bell-shaped resonator", [
+            told,
+            Table(f"Card '{theory.card}', n = 2", rows, PATTERNS, PATTERNS_NOTE),
+            Table("Coefficients of (20), printed and corrected", COEFFICIENTS, CORRECTED, SYMBOLS_NOTE),
+            Table("Equation by equation", EQUATIONS, CHECKED),
+        ]),
+        Chapter("BVG equations (23)–(30): rate from the control loop", [
+            Table("Rate recovered from a simulation of (23) with a coupling c₁", list(loop.items()),
+                (Column("0", "Quantity"), Column("1", "Value"))),
+        ]),
+    ]  # fmt: skip
 
 
 def _hertz(value: float) -> str:

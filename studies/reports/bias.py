@@ -41,20 +41,20 @@ NO_TERMS = (
     " removes the mean."
 )
 STEP_COLUMNS = (
-    Column("step", "Step"),
+    "Step",
     Column("action", "Term"),
     Column("F", "F", form=".2f"),
-    Column("p", "p"),
+    "p",
     Column("bic", "BIC", form=".2f"),
     Column("score", "Held out", form=".3f"),
-    Column("model", "Model"),
+    "Model",
 )
 COEFFICIENTS = (
     Column("number", "No."),
-    Column("term", "Term"),
+    "Term",
     Column("value", "Value", error="error"),
     Column("naive", "Error if rows were independent", digits=2),
-    Column("unit", "Unit"),
+    "Unit",
     Column("printed", "In eq. (22)"),
 )
 
@@ -67,13 +67,11 @@ def facts(study: BiasStudy, method: Method) -> Facts:
     if held is not None:
         left_out = _times(held.gain), f"{held.before:.3g} → {held.after:.3g} {unit}"
     count = f"of {len(TERMS)} candidates; the HRG paper selects {len(SELECTED_BY_THE_PAPER)}"
-    return Facts(
-        [
-            ("Improvement, fitted data", _times(judged.training_gain), f"{before:.3g} → {after:.3g} {unit}"),
-            ("Improvement, held-out data", *left_out),
-            ("Terms", str(len(judged.fit.terms)), count),
-        ]
-    )
+    return Facts([
+        ("Improvement, fitted data", _times(judged.training_gain), f"{before:.3g} → {after:.3g} {unit}"),
+        ("Improvement, held-out data", *left_out),
+        ("Terms", str(len(judged.fit.terms)), count),
+    ])  # fmt: skip
 
 
 def _times(gain: float) -> str:
@@ -85,24 +83,17 @@ def verdict(study: BiasStudy, method: Method) -> str:
     judged = study.by(method)
     if not judged.fit.terms:
         return NO_TERMS
-    fitted, held = (
-        f"Improvement of the bias stability: {judged.training_gain:.2f}× on the fitted data",
-        judged.held_out,
-    )
+    fitted, held = f"Improvement of the bias stability: {judged.training_gain:.2f}× on the fitted data", judged.held_out
     if held is None:
         return f"{fitted}. The improvement on other data is unknown: {study.no_held_out}"
     what = "held-out runs" if held.by_runs else "held-out blocks of the same run"
-    inside = (
-        f"{100 * held.coverage:.0f} % of their rows lie inside the fitted range of {judged.fit.variable.name} and rate"
-    )
+    share, variable = 100 * held.coverage, judged.fit.variable.name
+    inside = f"{share:.0f} % of their rows lie inside the fitted range of {variable} and rate"
     sentence = f"{fitted}, {held.gain:.2f}× on {what} ({inside})."
-    if held.by_runs and held.gain <= 1:
-        return f"{sentence} On held-out runs the model makes the bias worse: do not use it unless another run shows an improvement."
-    return (
-        sentence
-        if held.by_runs
-        else f"{sentence} For a stronger test, record a second run, warming if this one cooled."
-    )
+    if not held.by_runs:
+        return f"{sentence} For a stronger test, record a second run, warming if this one cooled."
+    worse = " On held-out runs the model makes the bias worse: do not use it unless another run shows an improvement."
+    return sentence + worse * (held.gain <= 1)
 
 
 def doubts(study: BiasStudy) -> list[Sentence]:
@@ -165,12 +156,9 @@ def path_table(judged: Judged, where: Where = "everywhere") -> Table:
     notes = [f"Candidates left out: {left_out}."] if refused else []
     if len(steps) < 2:
         notes.append("No candidate is significant.")
-    elif judged.fit.held_out:
-        notes.append(
-            "Held out: residual on held-out data over that of a constant; the model with the smallest value is kept."
-        )
-    elif judged.path_scores:
-        notes.append("Held out: residual on held-out data over that of a constant; here the F-tests decide.")
+    elif judged.fit.held_out or judged.path_scores:
+        rule = "the model with the smallest value is kept" if judged.fit.held_out else "here the F-tests decide"
+        notes.append(f"Held out: residual on held-out data over that of a constant; {rule}.")
     return Table(f"Selection, {METHOD[judged.method]}", rows, STEP_COLUMNS, " ".join(notes), where)
 
 
@@ -181,18 +169,11 @@ def coefficients_table(judged: Judged, output: str) -> Table:
         ("constant", *fit.terms), fit.coefficients, fit.standard_errors, fit.naive_errors, strict=True
     ):
         factor, words = _coefficient_unit(_unit(output), name, fit.variable)
-        constant = name == "constant"
-        rows.append(
-            {
-                "number": "B0" if constant else f"k{list(TERMS).index(name) + 1}" if name in TERMS else "",
-                "term": name if constant else _symbol(name, fit.variable.symbol),
-                "value": factor * value,
-                "error": factor * error,
-                "naive": factor * naive,
-                "unit": words,
-                "printed": "" if constant else ("yes" if name in SELECTED_BY_THE_PAPER else "no"),
-            }
-        )
+        number = f"k{list(TERMS).index(name) + 1}" if name in TERMS else ""
+        printed = "yes" if name in SELECTED_BY_THE_PAPER else "no"
+        said = {"number": number, "term": _symbol(name, fit.variable.symbol), "printed": printed}
+        said = {"number": "B0", "term": name, "printed": ""} if name == "constant" else said
+        rows.append(said | {"value": factor * value, "error": factor * error, "naive": factor * naive, "unit": words})
     unit = fit.variable.unit
     per, words = (60.0, "K/min") if unit == "°C" else (1.0, f"{unit}/s")
     (low, high), (slow, fast) = widen(*fit.state_range), (plain(per * end) for end in widen(*fit.rate_range))
@@ -217,9 +198,7 @@ def gain_table(study: BiasStudy) -> Table:
             reselected = (METHOD[judged.method], "reselected without the held-out data", data)
             rows.append((*reselected, held.before, held.after, held.gain, held.coverage))
     columns = [
-        Column("0", "Selection"),
-        Column("1", "Terms"),
-        Column("2", "Data"),
+        *(Column(f"{k}", heading) for k, heading in enumerate(("Selection", "Terms", "Data"))),
         Column("3", "Before", unit),
         Column("4", "After", unit),
         Column("5", "Improvement", form=".2f"),
@@ -274,9 +253,8 @@ def runs_figure(study: BiasStudy, method: Method) -> Figure:
     """Return the averages before and after, and the model, three runs beside each other: like the paper's figure 6."""
     first = f" The first {MOST_RUNS} of {len(study.runs)} runs." if len(study.runs) > MOST_RUNS else ""
     caption = f"Averages of the output with the model (above) and residuals (below), as in the paper's figure 6.{first}"
-    return Figure(
-        lambda: _draw_runs(study, method), caption, "Zero-rate output over time before and after compensation."
-    )
+    alt = "Zero-rate output over time before and after compensation."
+    return Figure(lambda: _draw_runs(study, method), caption, alt)
 
 
 def _draw_runs(study: BiasStudy, method: Method) -> Drawing:
@@ -304,10 +282,8 @@ def _draw_runs(study: BiasStudy, method: Method) -> Drawing:
 
 
 def _draw_allan(study: BiasStudy) -> Drawing:
-    with style.figure(height=3.8, x="averaging time τ (s)", y=f"Allan deviation ({_unit(study.output)})") as (
-        figure,
-        axes,
-    ):
+    label = f"Allan deviation ({_unit(study.output)})"
+    with style.figure(height=3.8, x="averaging time τ (s)", y=label) as (figure, axes):
         for spectrum, colour, label in ((study.before, style.ORANGE, "before"), (study.after, style.BLUE, "after")):
             if spectrum is None:
                 continue
@@ -323,6 +299,8 @@ def _unit(output: str) -> str:
 
 
 def _symbol(term: str, symbol: str) -> str:
+    if term == "constant":
+        return term
     return SYMBOLS[term] if symbol == "f" else SYMBOLS[term].replace("ḟ", "Ṫ").replace("f", symbol)
 
 

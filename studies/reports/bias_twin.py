@@ -8,7 +8,7 @@ from compensation.bias import SELECTED_BY_THE_PAPER, TERMS
 from studies.papers.bias_twin import METHODS, PAPER_AFTER, PAPER_BEFORE, TwinFit, spread
 from studies.reports import style
 from studies.reports.bias import METHOD, SYMBOLS
-from studies.results import Chapter, Column, Drawing, Figure, Part, Sentence, Table
+from studies.results import Chapter, Column, Drawing, Figure, Table
 
 Twins = Sequence[tuple[TwinFit, ...]]
 
@@ -30,11 +30,10 @@ def twin_chapters(twins: Twins) -> list[Chapter]:
         f" {mended or 'none'} of the {len(twins)} gyros worse."
     )
     caption = "Each marker is one virtual gyro, fitted to one cooling run as in the paper. Below the dotted line compensation makes the bias worse."
-    scatter = Figure(
-        lambda: _draw_gains(twins), caption, "Improvement on held-out runs against improvement on the training run."
-    )
-    parts: list[Part] = [Sentence(told), _trace_figure(twins), twin_table(twins), scatter, terms_table(twins)]
-    return [Chapter("Figure 6: compensated bias on held-out runs", parts)]
+    alt = "Improvement on held-out runs against improvement on the training run."
+    scatter = Figure(lambda: _draw_gains(twins), caption, alt)
+    title = "Figure 6: compensated bias on held-out runs"
+    return [Chapter(title, [told, _trace_figure(twins), twin_table(twins), scatter, terms_table(twins)])]
 
 
 def _trace_figure(twins: Twins) -> Figure:
@@ -64,7 +63,7 @@ def _draw_trace(fit: TwinFit) -> Drawing:
 
 
 IMPROVEMENT = (
-    Column("selection", "Selection"),
+    "Selection",
     Column("fitted", "Fitted to"),
     Column("training", "On the training run"),
     Column("cooling", "Held out: new cooling run"),
@@ -91,12 +90,11 @@ def twin_table(twins: Twins) -> Table:
 
 def terms_table(twins: Twins) -> Table:
     """Return how often each term was selected from one cooling run."""
-    rows = []
-    for number, name in enumerate(TERMS, 1):
-        counts = {method: sum(name in fit.terms for fit in _fits(twins, method, 1)) for method in METHODS}
-        printed = "yes" if name in SELECTED_BY_THE_PAPER else "no"
-        words = {method: f"{count} of {len(twins)}" for method, count in counts.items()}
-        rows.append({"number": f"k{number}", "term": SYMBOLS[name], "printed": printed} | words)
+    rows = [
+        {"number": f"k{number}", "term": SYMBOLS[name], "printed": "yes" if name in SELECTED_BY_THE_PAPER else "no"}
+        | {m: f"{sum(name in fit.terms for fit in _fits(twins, m, 1))} of {len(twins)}" for m in METHODS}
+        for number, name in enumerate(TERMS, 1)
+    ]
     columns = [Column("number", ""), Column("term", "Term"), Column("printed", "In eq. (22)")]
     columns += [Column(method, f"Virtual gyros, {METHOD[method]}") for method in METHODS]
     return Table("How often a term is selected from one cooling run", rows, columns)
@@ -106,11 +104,10 @@ def _draw_gains(twins: Twins) -> Drawing:
     """Draw every gyro's improvement, held out against training."""
     paper = _fits(twins, "paper", 1)
     training = [fit.training_gain for fit in paper]
-    cooling, warming = ([fit.cooling.gain for fit in paper], [fit.warming.gain for fit in paper])
-    labels = ("improvement factor, training run", "improvement factor, held-out run")
-    with style.figure(height=3.6, x=labels[0], y=labels[1]) as (made, axes):
-        axes.loglog(training, cooling, "o", color=style.BLUE, markersize=5, label="new cooling run")
-        axes.loglog(training, warming, "x", color=style.VERMILION, markersize=6, label="warming run")
+    x, y = (f"improvement factor, {run} run" for run in ("training", "held-out"))
+    with style.figure(height=3.6, x=x, y=y) as (made, axes):
+        axes.loglog(training, [fit.cooling.gain for fit in paper], "o", markersize=5, label="new cooling run")
+        axes.loglog(training, [fit.warming.gain for fit in paper], "x", markersize=6, label="warming run")
         ends = [0.1, 1.2 * max(training)]
         axes.plot(ends, ends, color=style.BLACK, linewidth=0.8)
         axes.axhline(1.0, color=style.BLACK, linewidth=0.8, linestyle=":")

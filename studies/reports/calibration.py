@@ -166,10 +166,8 @@ def _draw_residuals(found: Calibration) -> Drawing:
 
 def _draw_shifts(found: Calibration) -> Drawing:
     told = [one for one in found.estimates if one.told_by != "prior"][:30] or list(found.estimates)[:30]
-    with style.figure(height=0.24 * len(told) + 0.9, x="shift from the card (prior standard deviations)") as (
-        made,
-        axis,
-    ):
+    label = "shift from the card (prior standard deviations)"
+    with style.figure(height=0.24 * len(told) + 0.9, x=label) as (made, axis):
         place = np.arange(len(told))[::-1]
         axis.axvspan(-1.645, 1.645, color=style.SKY, alpha=0.18)
         shifts, widths = [one.shift_sd for one in told], [1.645 * one.width for one in told]
@@ -183,16 +181,13 @@ def residual_figure(found: Calibration) -> Drawing:
     """Draw measured minus predicted after the calibration, over time; of tables alone over temperature."""
     problem, state = found.fit.problem, found.fit.state
     names = [name for name in problem.responses if name != SETTLED]
-    colours = (style.BLUE, style.VERMILION, style.GREEN, style.PURPLE, style.ORANGE)
-    with style.figure(max(len(names), 1), 1, height=1.8 * len(names) or 2.4, squeeze=False, sharex=True) as (
-        made,
-        axes,
-    ):
+    count = max(len(names), 1)
+    with style.figure(count, 1, 1.8 * len(names) or 2.4, squeeze=False, sharex=True) as (made, axes):
         for axis, name in zip(axes[:, 0], names, strict=False):
             rows, start = problem.rows[name], 0.0
             for run, (t, s) in enumerate(zip(rows.times, rows.slices, strict=True)):
                 values = SHOWN[name][1] * state.residual[name][s]
-                axis.plot((start + t - t[0]) / 3600, values, linewidth=0.7, color=colours[run % 5])
+                axis.plot((start + t - t[0]) / 3600, values, linewidth=0.7, color=style.COLOURS[run % 5])
                 start += t[-1] - t[0] + 600.0
             axis.set_ylabel(f"{NAMES[name]}\n({SHOWN[name][0]})", fontsize=8)
         if not names:

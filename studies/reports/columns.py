@@ -38,9 +38,8 @@ def draw_columns(columns: Columns) -> Drawing:
                 gaps = find_gaps(columns["time_s"], columns[name]) / 3600
                 drawn = _broken(*drawn, gaps)
                 spans = [(begin, end - begin) for begin, end in gaps]
-                axis.broken_barh(
-                    spans, (0, 1), transform=axis.get_xaxis_transform(), color=style.ORANGE, alpha=0.35, linewidth=0.8
-                )
+                shade = {"color": style.ORANGE, "alpha": 0.35, "linewidth": 0.8}
+                axis.broken_barh(spans, (0, 1), transform=axis.get_xaxis_transform(), **shade)
             axis.plot(*drawn, mark, color=style.BLUE, linewidth=0.9)
             axis.set_title(column_title(name), fontsize=9, loc="left")
         axes[-1, 0].set_xlabel(label)

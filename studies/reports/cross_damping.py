@@ -9,7 +9,7 @@ from shell.constants import zero_Celsius
 from studies.papers import cvg_cross_damping as paper
 from studies.papers.cvg_cross_damping import CrossDampingTwin
 from studies.reports import style
-from studies.results import Chapter, Column, Drawing, Figure, Part, Sentence, Table
+from studies.results import Chapter, Column, Drawing, Figure, Sentence, Table
 
 SOURCES = ("Apostolyuk V., Chikovani V., Temperature error model in Coriolis vibratory gyroscopes: eqs. (1)–(10).",)
 
@@ -34,8 +34,8 @@ def twin_chapters(twin: CrossDampingTwin) -> list[Chapter]:
     caption = "Temperature, and zero-rate output before and after compensation, 100 s averages."
     runs = (*twin.study.runs, twin.second)
     picture = Figure(lambda: draw_runs(runs, twin.study.model, unit, "°/h"), caption, "Runs over time.")
-    parts: list[Part] = [Sentence(told), picture, _determinants_table(twin), Sentence(shape, "note")]
-    return [Chapter("CVG figures 1 and 2: cross-damping compensation", parts)]
+    title = "CVG figures 1 and 2: cross-damping compensation"
+    return [Chapter(title, [told, picture, _determinants_table(twin), Sentence(shape, "note")])]
 
 
 def _determinants_table(twin: CrossDampingTwin) -> Table:
@@ -52,14 +52,8 @@ def _determinants_table(twin: CrossDampingTwin) -> Table:
 
 def draw_runs(runs: tuple[RestRun, ...], model: CrossDampingModel, unit: float, name: str) -> Drawing:
     """Draw runs one after the other (CVG cross-damping paper, figures 1 and 2); `unit` in rad/s, called `name`."""
-    with style.figure(
-        2,
-        height=4.8,
-        sharex=True,
-        height_ratios=(1, 2),
-        x="time (h)",
-        y=("temperature (°C)", f"zero-rate output ({name})"),
-    ) as (made, (upper, lower)):
+    labels, heights = ("temperature (°C)", f"zero-rate output ({name})"), (1, 2)
+    with style.figure(2, 1, 4.8, "time (h)", labels, sharex=True, height_ratios=heights) as (made, (upper, lower)):
         begin = 0.0
         for i, run in enumerate(runs):
             after = model.compensate(run.time, run.rate, run.temperature, extrapolate=True)
@@ -69,10 +63,8 @@ def draw_runs(runs: tuple[RestRun, ...], model: CrossDampingModel, unit: float, 
             hours = (blocks.time - run.time[0]) / 3600 + begin
             begin = hours[-1]
             upper.plot(hours, means["T"] - zero_Celsius, color=style.VERMILION)
-            for when, colour, label in (
-                ("before", style.ORANGE, "uncompensated"),
-                ("after", style.BLUE, "compensated"),
-            ):
-                lower.plot(hours, means[when] / unit, color=colour, linewidth=0.9, label=None if i else label)
+            for when, colour in (("before", style.ORANGE), ("after", style.BLUE)):
+                label = None if i else {"before": "uncompensated", "after": "compensated"}[when]
+                lower.plot(hours, means[when] / unit, color=colour, linewidth=0.9, label=label)
         lower.axhline(0, color=style.BLACK, linewidth=0.8)
         return made

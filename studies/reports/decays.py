@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from studies.reports import style
-from studies.results import Chapter, Column, Drawing, Figure, Sentence, Table
+from studies.results import Chapter, Column, Drawing, Figure, Part, Table, row_of
 
 if TYPE_CHECKING:
     from compensation.ringdown.laws import Law, Term
@@ -33,46 +33,29 @@ TERM = (
 
 def law_row(name: str, law: "Law") -> dict[str, Any]:
     """Return a law for --json: relative values of a frequency (1 = the frequency itself), plain ones of 1/Q."""
-    level = np.exp(law.level.value) if name == "frequency_Hz" else law.level.value
+    level = float(np.exp(law.level.value)) if name == "frequency_Hz" else law.level.value
     return {
-        "level": float(level),
-        "level_sd": float(law.level.sd * (level if name == "frequency_Hz" else 1)),
-        "terms": [{"term": t.name, "value": t.value, "sd": t.sd, "low": t.low, "high": t.high} for t in law.terms],
-        "sessions_s": list(law.sessions),
-        "scatter": law.scatter,
-        "left_out_rows": law.left_out,
+        "level": level,
+        "level_sd": law.level.sd * (level if name == "frequency_Hz" else 1),
+        "terms": [row_of(term, "value", "sd", "low", "high", term="name") for term in law.terms],
+        **row_of(law, "scatter", sessions_s="sessions", left_out_rows="left_out"),
     }
 
 
 def law_chapter(laws: "dict[str, Law]", decays: "Decays") -> Chapter:
     """Return tables, what the laws say in words, and pictures of them."""
-    parts: list[Table | Sentence | Figure] = []
+    parts: list[Part] = []
     for name, law in laws.items():
-        rows = [_shown(name, term, law) for term in law.terms]
-        at = (
-            f"{law_row(name, law)['level']:.10g} Hz"
-            if name == "frequency_Hz"
-            else f"{law.level.value:.4g} ± {law.level.sd:.2g}"
-        )
-        note = (
-            f"Level: {at}. Scatter: {1e6 * law.scatter:.3g} ppm." if name == "frequency_Hz" else f"1/Q without these: {at}. Scatter: {100 * law.scatter:.2g} %."
-        )  # fmt: skip
-        parts.append(
-            Table(
-                f"{TITLES[name]} over many decays",
-                rows,
-                TERM,
-                note + " ±: one standard deviation, from the scatter of the decays.",
-            )
-        )
-        parts += [Sentence(f"{TITLES[name]}: {words}") for words in _remarks(law)]
-        if law.terms:
-            parts.append(
-                Figure(
-                    partial(_draw, name, law, decays),
-                    f"{TITLES[name]} of every decay and the law (orange crosses).",
-                )
-            )
+        if name == "frequency_Hz":
+            note = f"Level: {law_row(name, law)['level']:.10g} Hz. Scatter: {1e6 * law.scatter:.3g} ppm."
+        else:
+            level = f"{law.level.value:.4g} ± {law.level.sd:.2g}"
+            note = f"1/Q without these: {level}. Scatter: {100 * law.scatter:.2g} %."
+        rows, over = [_shown(name, term, law) for term in law.terms], f"{TITLES[name]} over many decays"
+        parts.append(Table(over, rows, TERM, note + " ±: one standard deviation, from the scatter of the decays."))
+        parts += [f"{TITLES[name]}: {words}" for words in _remarks(law)]
+        caption = f"{TITLES[name]} of every decay and the law (orange crosses)."
+        parts.append(Figure(partial(_draw, name, law, decays), caption) if law.terms else None)
     return Chapter("Over many decays", parts)
 
 
@@ -110,10 +93,8 @@ def _draw(name: str, law: "Law", decays: "Decays") -> Drawing:
     over = over or ["time_s"]
     labels = {"housing_temperature_degC": "temperature (°C)", "pressure_Pa": "pressure (Pa)", "vibration_amplitude_V": "amplitude", "time_s": "time (d)"}  # fmt: skip
     y, fitted = decays.columns[name], law.fitted
-    with style.figure(1, len(over), height=2.8, sharey=True, y="f (Hz)" if name == "frequency_Hz" else "1/Q") as (
-        made,
-        axes,
-    ):
+    y_label = "f (Hz)" if name == "frequency_Hz" else "1/Q"
+    with style.figure(1, len(over), height=2.8, sharey=True, y=y_label) as (made, axes):
         for axis, column in zip(np.atleast_1d(axes), over, strict=True):
             x = decays.columns[column] / (86400 if column == "time_s" else 1)
             rows = np.argsort(x)[style.few_rows(len(x))]

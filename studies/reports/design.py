@@ -18,10 +18,8 @@ def history(found: "Answer") -> Drawing:
     count = np.arange(1, len(over) + 1)
     held = over == 0
     best = np.minimum.accumulate(np.where(held, t, np.inf))
-    with style.figure(2, 1, 4.2, x="design", y=("objective, scaled", "excess, scaled"), sharex=True) as (
-        made,
-        (top, low),
-    ):
+    labels = ("objective, scaled", "excess, scaled")
+    with style.figure(2, 1, 4.2, "design", labels, sharex=True) as (made, (top, low)):
         top.plot(count[held], t[held], ".", color=style.SKY, label="keeps all limits")
         top.plot(count[np.isfinite(best)], best[np.isfinite(best)], color=style.BLUE, label="best so far")
         if held.any():

@@ -26,9 +26,9 @@ def short_exponent(text: str) -> str:
 
 def to_error(value: float, error: float) -> tuple[str, str]:
     """Return a value and its standard error, both to the second digit of the error."""
-    written, below = (
-        to_interval(value, 0.0, error)[::2] if 0.0 < error < math.inf else (plain(value, 6), plain(error, 2))
-    )
+    if not 0.0 < error < math.inf:
+        return plain(value, 6), plain(error, 2)
+    written, _, below = to_interval(value, 0.0, error)
     return written, below
 
 
@@ -46,17 +46,13 @@ def to_interval(value: float, low: float, high: float) -> list[str]:
     last = math.floor(math.log10(float(f"{width:.1e}"))) - 1  # power of ten of the last digit
     size = max(map(abs, (value, low, high)))
     if SMALLEST <= size < LARGEST or SMALLEST <= width < LARGEST:
-        return [_unsigned_zero(f"{round(x, -last):.{max(-last, 0)}f}") for x in (value, low, high)]
+        return [f"{round(x, -last) + 0.0:.{max(-last, 0)}f}" for x in (value, low, high)]  # no -0
 
     def write(x: float) -> str:
         digits = math.floor(math.log10(abs(x))) - last if x else -1
         return short_exponent(f"{x:.{digits}e}") if digits >= 0 else "0"
 
     return [write(x) for x in (value, low, high)]
-
-
-def _unsigned_zero(text: str) -> str:
-    return text.lstrip("-") if not text.strip("-0.") else text
 
 
 def raised(power: int) -> str:

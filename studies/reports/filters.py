@@ -6,14 +6,16 @@ from compensation.demodulated import ErrorMap, respond_to_oscillating_rate
 from compensation.sensitive_element import SensitiveElement, tune
 from studies.papers.cvg_filters import ZETA, Filtered, FilterStudy, K
 from studies.reports import style
-from studies.results import Chapter, Column, Drawing, Figure, Sentence, Table
+from studies.results import Chapter, Column, Drawing, Figure, Table
 
 MOST_POINTS = 3000
-SOURCES = (
-    "Apostolyuk V., Demodulated dynamics and optimal noise filtering for Coriolis vibratory gyroscopes: eqs. (1)–(41).",
+PAPER = "Demodulated dynamics and optimal noise filtering for Coriolis vibratory gyroscopes"
+SOURCES = (f"Apostolyuk V., {PAPER}: eqs. (1)–(41).",)
+RESPONSES = (
+    "A rate that oscillates at λ acts like an excitation shifted by λ. With matched modes the response is largest for a constant"
+    " rate and falls off above kζ. With split modes it is largest where λ equals the frequency difference, on one side only."
 )
-
-
+APART, LIGHT = 1.02, 0.2
 WIENER = (
     Column("name", "Noise"),
     Column(lambda case: case.optimum.error / case.rate_variance, "Error, optimum", form=".4f"),
@@ -61,11 +63,11 @@ def filter_chapters(study: FilterStudy, error_map: ErrorMap) -> list[Chapter]:
     return [
         Chapter("CVG equations (13), (14): response to an oscillating rate", [
             Figure(draw_responses, responses, "Amplitude and phase over the frequency of the rate."),
-            Sentence(RESPONSES),
+            RESPONSES,
         ]),
         Chapter("CVG figure 3: accuracy of the simplified dynamics", [
             Figure(lambda: draw_error_map(error_map), simplified, "A map of the error, least where both modes agree."),
-            Sentence(map_sentence(error_map)),
+            map_sentence(error_map),
         ]),
         Chapter("CVG equations (35), (36), figure 5: Wiener filter", [
             Table(cases, study.wiener, WIENER, WIENER_NOTE),
@@ -74,16 +76,9 @@ def filter_chapters(study: FilterStudy, error_map: ErrorMap) -> list[Chapter]:
         Chapter("CVG equations (37)–(41), figures 6 and 7: Kalman filter", [
             Figure(lambda: draw_kalman(study), kalman, "Output and rate with their estimates over time."),
             Table("Rate estimate by sampling step", steps, STEPS, STEPS_NOTE),
-            Sentence(kalman_sentence(study)),
+            kalman_sentence(study),
         ]),
     ]  # fmt: skip
-
-
-RESPONSES = (
-    "A rate that oscillates at λ acts like an excitation shifted by λ. With matched modes the response is largest for a constant"
-    " rate and falls off above kζ. With split modes it is largest where λ equals the frequency difference, on one side only."
-)
-APART, LIGHT = 1.02, 0.2
 
 
 def draw_responses() -> Drawing:
@@ -95,13 +90,8 @@ def draw_responses() -> Drawing:
         f"matched modes, ζ = {LIGHT * ZETA:g}": tune(K, LIGHT * ZETA),
     }
     frequency = np.linspace(-60.0, 60.0, 1201)
-    with style.figure(
-        2,
-        height=4.6,
-        sharex=True,
-        x="frequency of the rate λ/2π (Hz)",
-        y=("A(λ) / A(0) of the matched gyro", "phase (°)"),
-    ) as (made, (upper, lower)):
+    labels = ("A(λ) / A(0) of the matched gyro", "phase (°)")
+    with style.figure(2, 1, 4.6, "frequency of the rate λ/2π (Hz)", labels, sharex=True) as (made, (upper, lower)):
         for name, gyro in gyros.items():
             amplitude, phase = respond_to_oscillating_rate(gyro, 2 * np.pi * frequency)
             still, _ = respond_to_oscillating_rate(tuned, 0.0)
@@ -113,16 +103,9 @@ def draw_responses() -> Drawing:
 def draw_error_map(error_map: ErrorMap) -> Drawing:
     """Draw figure 3, the integral error over the ratios of frequency and damping."""
     with style.figure(height=3.8, x="δk = k₂/k₁", y="δζ = ζ₂/ζ₁") as (made, axes):
-        shades = axes.contourf(
-            error_map.frequency_ratio,
-            error_map.damping_ratio,
-            np.log10(error_map.error),
-            levels=np.arange(-6.0, 0.51, 0.5),
-            cmap="viridis",
-            extend="both",
-        )
-        bar = made.colorbar(shades, ax=axes)
-        bar.set_label("log₁₀ (J / ∫A² dt)")
+        grid, levels = (error_map.frequency_ratio, error_map.damping_ratio), np.arange(-6.0, 0.51, 0.5)
+        shades = axes.contourf(*grid, np.log10(error_map.error), levels=levels, cmap="viridis", extend="both")
+        made.colorbar(shades, ax=axes, label="log₁₀ (J / ∫A² dt)")
         axes.plot([1.0], [1.0], "+", color="white", markersize=10)
         axes.grid(visible=False)
         return made
@@ -167,9 +150,8 @@ def draw_kalman(study: FilterStudy) -> Drawing:
         lower.plot(seven.time[rows], seven.output[rows], "--", color=style.ORANGE, label="output without noise")
         lower.plot(seven.time[rows], seven.estimate[rows], color=style.BLUE, label="estimate of the rate")
         for axes in (upper, lower):
-            axes.set_ylabel("rate (rad/s)")
             axes.legend(ncols=3, loc="upper right", fontsize=8)
-            axes.set_ylim(-0.5, 1.75)
+            axes.set(ylabel="rate (rad/s)", ylim=(-0.5, 1.75))
         return made
 
 

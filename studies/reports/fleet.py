@@ -11,7 +11,7 @@ from studies.fleet.population import Quantity
 from studies.reports.diagnosis import NAMES, spell_parameter
 from studies.reports.digits import plain
 from studies.reports.style import BLUE, ORANGE, VERMILION, figure
-from studies.results import Chapter, Column, Drawing, Facts, Figure, Part, Sentence, Table
+from studies.results import Chapter, Column, Drawing, Facts, Figure, Sentence, Table
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -78,35 +78,27 @@ VALUES = (
 def _sizes(one: Share) -> str:
     values = [size.first for size in one.sizes.values()]
     name = next(iter(one.sizes.values())).coefficient
-    return (
-        f"{name} {plain(min(values), 2)} … {plain(max(values), 2)}" if len(values) > 1 else f"{name} {plain(values[0])}"
-    )
+    if len(values) == 1:
+        return f"{name} {plain(values[0])}"
+    return f"{name} {plain(min(values), 2)} … {plain(max(values), 2)}"
 
 
 def device_table(lot: Lot, page: Callable[[str], str] | None = None) -> Table:
     """Return one row a device: its verdict, its causes, and how it differs."""
     rows: list[dict[str, Any]] = [
         {
-            "serial": serial,
-            "made": str(lot.made.get(serial, "")),
+            "device": serial,
+            "date": str(lot.made.get(serial, "")),
             "batch": lot.batches.get(serial, ""),
             "verdict": one.verdict["verdict"],
             "causes": ", ".join(" or ".join([c["effect"], *c["equivalent"]]) for c in one.verdict["causes"]),
-            "odd": "; ".join(lot.reasons[serial]),
+            "differs_from_the_others": "; ".join(lot.reasons[serial]),
             "page": page(serial) if page else "",
         }
         for serial, one in lot.answers.items()
     ]
-    heads = {
-        "serial": "device",
-        "made": "date",
-        "batch": "batch",
-        "verdict": "verdict",
-        "causes": "causes",
-        "odd": "differs from the others",
-        "page": "page",
-    }
-    return Table("Devices", rows, [Column(key, head) for key, head in heads.items()], sortable=True)
+    columns = ("device", "date", "batch", "verdict", "causes", "differs from the others", "page")
+    return Table("Devices", rows, columns, sortable=True)
 
 
 def fleet_parts(lot: Lot, page: Callable[[str], str] | None = None) -> list[Chapter]:
@@ -117,20 +109,19 @@ def fleet_parts(lot: Lot, page: Callable[[str], str] | None = None) -> list[Chap
         ("Odd batches", str(len(lot.bad_batches)), ", ".join(lot.bad_batches)),
     ]
     ordered = _ordered(lot)
-    charts: list[Part] = []
-    if ordered:
-        caption = "Values with 90 % intervals in the order of the serial numbers; band: mean ± 3 scatter."
-        charts.append(Figure(lambda: _draw(lot, ordered[:MOST]), caption))
+    caption = "Values with 90 % intervals in the order of the serial numbers; band: mean ± 3 scatter."
     dated = [one for one in ordered[:DATED] if sum(s in lot.made for s in one.of) > 2]
-    if dated:
-        charts.append(Figure(lambda: _draw(lot, dated, by_date=True), "The same over the date."))
+    charts = [
+        Figure(lambda: _draw(lot, ordered[:MOST]), caption) if ordered else None,
+        Figure(lambda: _draw(lot, dated, by_date=True), "The same over the date.") if dated else None,
+    ]
     failed = [{"serial": serial, "why": why} for serial, why in lot.failed.items()]
     return [
         Chapter("The lot", [
             Sentence(headline(lot), where="terminal"), Facts(facts, "page"),
             Table("Causes", lot.shares, SHARES, "Sizes: smallest and largest of the coefficient."),
             Table("Values", ordered, VALUES, "Mean and scatter of the devices that are like each other."),
-            Table("Devices without an answer", failed, (Column("serial", "device"), Column("why", "why"))),
+            Table("Devices without an answer", failed, (Column("serial", "device"), "why")),
         ]),
         Chapter("Control charts", charts),
         Chapter("Devices", [device_table(lot, page)]),
@@ -167,10 +158,8 @@ def _draw_chart(axis: "Axes", lot: Lot, one: Quantity, by_date: bool) -> None:
         own = one.of[serial]
         colour = VERMILION if serial in one.odd else ORANGE if serial in bad else BLUE
         axis.errorbar([x], [own.value], yerr=[1.645 * own.sd], fmt="o", markersize=3, color=colour, elinewidth=0.8)
-    lot_mean, scatter = (
-        one.population.mean,
-        float(np.hypot(one.population.scatter, np.median([m.sd for m in one.of.values()]))),
-    )
+    lot_mean, error = one.population.mean, np.median([m.sd for m in one.of.values()])
+    scatter = float(np.hypot(one.population.scatter, error))
     axis.axhline(lot_mean, color="0.5", linewidth=0.8)
     axis.axhspan(lot_mean - 3 * scatter, lot_mean + 3 * scatter, color="0.5", alpha=0.12)
     if by_date:

@@ -9,7 +9,7 @@ from studies.models.file import widen
 from studies.papers.hrg import FrequencyStudy
 from studies.reports import style
 from studies.reports.digits import raised
-from studies.results import Column, Drawing, Facts, Figure, Part, Table, rows_of
+from studies.results import Column, Drawing, Facts, Figure, Part, Table, row_of, rows_of
 
 SOURCES = ("Wang X. et al., Sensors 2012, 12, 6434 (the HRG paper), eqs. (16)–(18), Table 2, figures 4 and 5.",)
 ORDERS = {1: "straight line", 2: "quadratic", 3: "cubic", 4: "quartic", 5: "quintic"}
@@ -25,14 +25,12 @@ def facts(study: FrequencyStudy) -> Facts:
     """Return the numbers that carry the answer."""
     fit = study.fit
     middle = float(np.mean(fit.temperature_range_degC))
-    return Facts(
-        [
-            (f"Slope at {middle:.3g} °C", f"{float(fit.slope_ppm(middle)):.2f} ppm/°C", "middle of the range"),
-            ("Largest temperature error", f"{np.abs(study.error_degC).max():.3f} K", "temperature from frequency"),
-            ("Leave-one-out error", f"{fit.leave_one_out_rms:.4f} Hz", "rms of points left out of the fit"),
-            ("Order supported by the data", name_order(study.orders.recommended), "F-test at the 5 % level"),
-        ]
-    )
+    return Facts([
+        (f"Slope at {middle:.3g} °C", f"{float(fit.slope_ppm(middle)):.2f} ppm/°C", "middle of the range"),
+        ("Largest temperature error", f"{np.abs(study.error_degC).max():.3f} K", "temperature from frequency"),
+        ("Leave-one-out error", f"{fit.leave_one_out_rms:.4f} Hz", "rms of points left out of the fit"),
+        ("Order supported by the data", name_order(study.orders.recommended), "F-test at the 5 % level"),
+    ])  # fmt: skip
 
 
 def coefficients_table(study: FrequencyStudy) -> Table:
@@ -41,11 +39,7 @@ def coefficients_table(study: FrequencyStudy) -> Table:
         {"name": f"a{k}" if k else "f0", "value": c, "error": u, "unit": "Hz" + f"/°C{raised(k) * (k > 1)}" * (k > 0)}
         for k, (c, u) in enumerate(zip(study.fit.coefficients, study.fit.standard_errors, strict=True))
     ]
-    columns = [
-        Column("name", "Coefficient"),
-        Column("value", "Value", error="error"),
-        Column("unit", "Unit"),
-    ]
+    columns = (Column("name", "Coefficient"), Column("value", "Value", error="error"), "Unit")
     low, high = widen(*study.fit.temperature_range_degC)
     note = f"With standard errors; a saved model has all digits and is valid from {low:.4g} to {high:.4g} °C."
     return Table(f"Coefficients about T0 = {study.fit.reference_temperature_degC:g} °C", rows, columns, note)
@@ -53,15 +47,9 @@ def coefficients_table(study: FrequencyStudy) -> Table:
 
 def inverse_table(study: FrequencyStudy) -> Table:
     """Return the temperatures that the inverse of the fit gives."""
-    rows = rows_of(
-        {
-            "frequency": study.frequency,
-            "actual": np.round(study.temperature_degC, 3),
-            "calculated": study.calculated_degC,
-            "error": study.error_degC,
-            "residual": study.fit.residuals,
-        }
-    )
+    actual = np.round(study.temperature_degC, 3)
+    found = row_of(study, "frequency", calculated="calculated_degC", error="error_degC", residual="fit.residuals")
+    rows = rows_of({"actual": actual, **found})
     columns = [
         Column("frequency", "Frequency", "Hz", ".2f"),
         Column("actual", "Actual", "°C", "g"),
@@ -105,7 +93,7 @@ def order_sentence(study: FrequencyStudy) -> str:
 
 def order_parts(study: FrequencyStudy) -> list[Part]:
     """Return what shows the order that the data support, and what that means outside the measured range."""
-    return [order_table(study), *([_extrapolation(study, study.next_fit)] if study.next_fit else [])]
+    return [order_table(study), _extrapolation(study, study.next_fit) if study.next_fit else None]
 
 
 def fit_figure(study: FrequencyStudy) -> Figure:
@@ -113,14 +101,9 @@ def fit_figure(study: FrequencyStudy) -> Figure:
 
     def draw() -> Drawing:
         T = np.linspace(*study.fit.temperature_range_degC, 200)
-        with style.figure(
-            2,
-            height=4.6,
-            sharex=True,
-            height_ratios=(3, 1.2),
-            x="temperature (°C)",
-            y=("frequency (Hz)", "residual (mHz)"),
-        ) as (made, (upper, lower)):
+        labels, heights = ("frequency (Hz)", "residual (mHz)"), (3, 1.2)
+        with style.figure(2, 1, 4.6, "temperature (°C)", labels, sharex=True, height_ratios=heights) as (made, axes):
+            upper, lower = axes
             upper.plot(T, study.fit.frequency(T), color=style.BLUE, label=name_order(study.fit.order))
             upper.plot(study.temperature_degC, study.frequency, "o", color=style.BLACK, label="measured")
             upper.ticklabel_format(axis="y", useOffset=False)
@@ -146,9 +129,8 @@ def error_figure(study: FrequencyStudy) -> Figure:
                 axes.plot(study.temperature_degC, error, mark + "-", color=colour, label=name_order(fit.order))
             return made
 
-    return Figure(
-        draw, "Error of the temperature calculated from the frequency.", "Temperature error over temperature."
-    )
+    caption = "Error of the temperature calculated from the frequency."
+    return Figure(draw, caption, "Temperature error over temperature.")
 
 
 def _extrapolation(study: FrequencyStudy, other: FrequencyFit) -> Figure:
@@ -166,9 +148,8 @@ def _extrapolation(study: FrequencyStudy, other: FrequencyFit) -> Figure:
             axes.axvspan(low, high, color=style.SKY, alpha=0.18, label="measured range")
             axes.axhline(0, color=style.BLACK, linewidth=0.8)
             for one, two, (reader, truth), colour in pairs:
-                axes.plot(
-                    T, misreading_degC(one, two, T), color=colour, label=f"read by the {reader} if the {truth} is true"
-                )
+                label = f"read by the {reader} if the {truth} is true"
+                axes.plot(T, misreading_degC(one, two, T), color=colour, label=label)
             return made
 
     caption = (
@@ -186,7 +167,5 @@ def _most(ends: NDArray[np.float64]) -> str:
 
 
 def _fits(study: FrequencyStudy) -> list[tuple[FrequencyFit, str, str]]:
-    shown = [(study.fit, style.BLUE, "o")]
-    if study.next_fit is not None:
-        shown.append((study.next_fit, style.VERMILION, "s"))
-    return shown
+    both = ((study.fit, style.BLUE, "o"), (study.next_fit, style.VERMILION, "s"))
+    return [(fit, colour, mark) for fit, colour, mark in both if fit is not None]

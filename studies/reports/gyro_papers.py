@@ -10,7 +10,7 @@ from studies.papers.cvg_filters import FilterStudy, study_error_map, study_filte
 from studies.papers.loop_claims import LoopClaims, study_claims
 from studies.reports import bell, cross_damping, filters
 from studies.reports.bell_theory import theory_chapters
-from studies.results import Chapter, Column, Part, Sentence, Table
+from studies.results import Chapter, Column, Table, row_of
 
 CLAIMS_SOURCES = (
     "Lynch D., Vibratory gyro analysis by the method of averaging, St. Petersburg 1995; IEEE Std 1431-2004, Annex B.",
@@ -18,7 +18,7 @@ CLAIMS_SOURCES = (
     " s41378-025-00872-z (abstract).",
 )
 CLAIMS = (
-    Column("verdict", "Verdict"),
+    "Verdict",
     Column(lambda one: f"{one.claim} ({one.source})", "Claim and source"),
     Column("twin", "Simulation"),
 )
@@ -34,8 +34,7 @@ def reproduce_gyro_papers(seeds: int = 20) -> tuple[list[Chapter], dict[str, Any
     seeds : int, virtual runs for the spread of the cross-damping improvement.
     """
     damping, study, chain = reproduce_cross_damping(seeds), study_filters(), reproduce_bell()
-    claims = study_claims()
-    theory, reading = compare_bell_theory(), read_planted_rate()
+    claims, theory, reading = study_claims(), compare_bell_theory(), read_planted_rate()
     chapters = [
         *cross_damping.twin_chapters(damping),
         *filters.filter_chapters(study, study_error_map(MAP_POINTS)),
@@ -43,52 +42,47 @@ def reproduce_gyro_papers(seeds: int = 20) -> tuple[list[Chapter], dict[str, Any
         *bell.bell_chapters(chain),
         _claims_chapter(claims),
     ]
-    summary = {
+    return chapters, {
         "cvg_cross_damping": _summarise_damping(damping),
         "cvg_filters": _summarise_filters(study),
         "bvg": _summarise_bell(chain),
         "bvg_theory": {**dataclasses.asdict(theory), "loop": dataclasses.asdict(reading)},
+        "loops": dataclasses.asdict(claims),
     }
-    summary["loops"] = dataclasses.asdict(claims)
-    return chapters, summary
 
 
 def _summarise_damping(twin: CrossDampingTwin) -> dict[str, Any]:
     return {
         "improvement_printed": PRINTED_IMPROVEMENT,
-        "improvement_training": twin.study.training.rows.ratio,
-        "improvement_held_out": twin.improvement.ratio,
-        "improvement_over_seeds_5_50_95": twin.spread,
-        "by_lag_s": twin.lags,
-        "by_random_walk_deg_per_sqrt_h": twin.noises,
+        **row_of(twin, improvement_training="study.training.rows.ratio", improvement_held_out="improvement.ratio"),
+        **row_of(
+            twin, improvement_over_seeds_5_50_95="spread", by_lag_s="lags", by_random_walk_deg_per_sqrt_h="noises"
+        ),
         "improvement_by_lag_and_random_walk": twin.table,
     }
 
 
 def _summarise_filters(study: FilterStudy) -> dict[str, Any]:
+    relative = {"error_of_optimum": "optimum.error", "error_as_printed": "renormalised.error"}
     return {
         "wiener": [
-            {
-                "noise": case.name,
-                "error_of_optimum": case.optimum.error / case.rate_variance,
-                "error_as_printed": case.renormalised.error / case.rate_variance,
-            }
+            {"noise": case.name} | {key: one / case.rate_variance for key, one in row_of(case, **relative).items()}
             for case in study.wiener
         ],
         "figure5_noise_reduction": study.figure5.noise_before / study.figure5.noise_after,
         "figure6_noise_reduction": study.figure6.noise_before / study.figure6.noise_after,
-        "figure7_rms_error_rad_per_s": study.figure7.error_after,
-        "kalman_mean_nis": study.mean_nis,
-        "kalman_nis_band": study.nis_band,
+        **row_of(
+            study,
+            figure7_rms_error_rad_per_s="figure7.error_after",
+            kalman_mean_nis="mean_nis",
+            kalman_nis_band="nis_band",
+        ),
     }
 
 
 def _summarise_bell(twin: BellTwin) -> dict[str, Any]:
-    return {
-        "claims": dataclasses.asdict(twin.claims),
-        "fitted": [dataclasses.asdict(step) for step in twin.fitted],
-        "held_out": [dataclasses.asdict(step) for step in twin.held_out],
-    }
+    steps = {name: [dataclasses.asdict(step) for step in getattr(twin, name)] for name in ("fitted", "held_out")}
+    return {"claims": dataclasses.asdict(twin.claims), **steps}
 
 
 def _claims_chapter(found: LoopClaims) -> Chapter:
@@ -99,5 +93,5 @@ def _claims_chapter(found: LoopClaims) -> Chapter:
         f" At the earth rate of 15.041 °/h a free wave indicates {mean:.3f} °/h on average ({mean_closed:.3f} in closed form). Below"
         " the drift rate the wave is locked and shows no rate."
     )
-    parts: list[Part] = [Sentence(text), Table("Published claims", found.claims, CLAIMS)]
-    return Chapter("Control loops: published claims and simulation", parts)
+    title = "Control loops: published claims and simulation"
+    return Chapter(title, [text, Table("Published claims", found.claims, CLAIMS)])

@@ -14,7 +14,6 @@ from studies.reports.digits import plain, to_error
 from studies.results import Chapter, Column, Drawing, Facts, Figure, Sentence, Table
 from studies.simulation.loop_study import BiasSlope, LoopStudy, answer_steps, bias_around, bias_slopes, noise_over
 
-COLOURS = (style.BLUE, style.VERMILION, style.GREEN, style.PURPLE, style.ORANGE, style.SKY, style.YELLOW)
 LENGTHS = tuple(np.geomspace(0.01, 1e4, 25))
 COLUMNS = {
     # of a run, as far as it has them: label of the axis
@@ -93,7 +92,7 @@ def loop_parts(study: LoopStudy, payload: dict[str, Any], run: Record | None) ->
         ]),
         Chapter("Step response", [Figure(lambda: _steps(study),
             "Command of each loop after a unit step of its input: rate, quadrature, resonance frequency, amplitude disturbance.")]),
-        Chapter("Start-up", [Sentence(start), Figure(lambda: _start(study),
+        Chapter("Start-up", [start, Figure(lambda: _start(study),
             f"Start from rest, the oscillator {offset:g} Hz and 90° off resonance. Dotted: amplitude within 1 %; phase locked.")]),
         *([] if run is None else [Chapter("Simulated run", [Figure(lambda: _course(run), f"The record {run.path}.")])]),
     ]  # fmt: skip
@@ -108,10 +107,7 @@ def _ranges(study: LoopStudy, payload: dict[str, Any]) -> list[dict[str, Any]]:
     rows = [(turning, force, "rate"), ("quadrature", f"stiffness, {keys.quadrature_range_Hz:g} Hz" if stiff else force, "quadrature"),
             *([] if stiff else [(f"{turning} and quadrature", force, "across")]),
             ("amplitude", f"drive, {keys.drive_headroom:g} times the steady-state drive", "drive")]  # fmt: skip
-    return [
-        {"loop": loop, "actuator": actuator, "use": use[key] if use[key] > 1e-5 else "< 0.001"}
-        for loop, actuator, key in rows
-    ]
+    return [{"loop": a, "actuator": b, "use": use[key] if use[key] > 1e-5 else "< 0.001"} for a, b, key in rows]
 
 
 def _facts(study: LoopStudy, payload: dict[str, Any]) -> list[tuple[str, str, str]]:
@@ -129,17 +125,15 @@ def _facts(study: LoopStudy, payload: dict[str, Any]) -> list[tuple[str, str, st
     ]  # fmt: skip
 
 
-def _largest(slopes: tuple[BiasSlope, ...], sd: float) -> list[Sentence]:
-    """What to improve first."""
+def _largest(slopes: tuple[BiasSlope, ...], sd: float) -> list[str]:
     if not slopes or slopes[0].effect == 0:
         return []
     first, share = slopes[0], (slopes[0].effect / sd) ** 2 if sd > 0 else 0.0
+    name, unit = f"{display_name(first.key)} ({first.key})", _unit(first.key)
     return [
-        Sentence(
-            f"Largest contribution to the uncertainty of the bias: {display_name(first.key)} ({first.key}). Its standard deviation of {first.sd:.3g}{_unit(first.key)} contributes"
-            f" {first.effect:.3g} °/h, {100 * share:.0f} % of the variance. A constant bias can be calibrated out; drift of these"
-            " values with age or temperature changes the bias in proportion to the slopes."
-        )
+        f"Largest contribution to the uncertainty of the bias: {name}. Its standard deviation of {first.sd:.3g}{unit} contributes"
+        f" {first.effect:.3g} °/h, {100 * share:.0f} % of the variance. A constant bias can be calibrated out; drift of these"
+        " values with age or temperature changes the bias in proportion to the slopes."
     ]
 
 
@@ -149,19 +143,9 @@ def _unit(key: str) -> str:
 
 
 def _around(study: LoopStudy) -> Drawing:
-    """Return the bias of each source over the azimuth of the wave."""
     azimuth = np.linspace(0.0, np.pi / 2, 181)
-    parts = bias_around(study, azimuth)
     with style.figure(height=3.4, x="azimuth of the wave (°)", y="bias (°/h)") as (made, axis):
-        for k, (name, values) in enumerate(parts.items()):
-            strong = name == "all"
-            axis.plot(
-                np.degrees(azimuth),
-                values,
-                color=style.BLACK if strong else COLOURS[k % len(COLOURS)],
-                linewidth=2.2 if strong else 1.4,
-                label=NAMES.get(name, name),
-            )
+        _draw_sources(axis, np.degrees(azimuth), bias_around(study, azimuth))
         at = np.degrees(study.angle % (np.pi / 2))
         axis.axvline(at, color=style.BLACK, linestyle=":", linewidth=1.0, label="azimuth of the card")
         axis.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=9)
@@ -169,23 +153,20 @@ def _around(study: LoopStudy) -> Drawing:
 
 
 def _noise(study: LoopStudy) -> Drawing:
-    """Return the noise of each source over the averaging time."""
-    found = noise_over(study, LENGTHS)
+    found = {name: np.where(values > 0, values, np.nan) for name, values in noise_over(study, LENGTHS).items()}
     with style.figure(height=3.4, x="averaging time (s)", y="standard deviation (°/h)") as (made, axis):
-        for k, (name, values) in enumerate(found.items()):
-            strong = name == "all"
-            axis.loglog(
-                LENGTHS,
-                np.where(values > 0, values, np.nan),
-                color=style.BLACK if strong else COLOURS[k % len(COLOURS)],
-                linewidth=2.2 if strong else 1.4,
-                label=NAMES[name],
-            )
+        axis.set(xscale="log", yscale="log")
+        _draw_sources(axis, LENGTHS, found)
         return made
 
 
+def _draw_sources(axis: Any, x: Any, found: Mapping[str, Any]) -> None:
+    for name, values in found.items():
+        sum_of_all = {"color": style.BLACK, "linewidth": 2.2} if name == "all" else {"linewidth": 1.4}
+        axis.plot(x, values, label=NAMES.get(name, name), **sum_of_all)
+
+
 def _bode(study: LoopStudy) -> Drawing:
-    """Return gain and phase of the open loops over frequency."""
     half = study.loops.sampling / 2
     low = min(m.crossover for m in study.margins) / 30
     f = np.geomspace(low, half * (1 - 1e-6), 600)
@@ -197,58 +178,51 @@ def _bode(study: LoopStudy) -> Drawing:
             drawn[key] = m.loop
         else:
             drawn[near] += f", {m.loop}"
-    with style.figure(2, 1, height=4.6, sharex=True, x="frequency (Hz)", y=("loop gain", "phase (°)")) as (
-        made,
-        (upper, lower),
-    ):
-        for k, words in enumerate(drawn.values()):
+    labels = ("loop gain", "phase (°)")
+    with style.figure(2, 1, 4.6, "frequency (Hz)", labels, sharex=True) as (made, (upper, lower)):
+        for words in drawn.values():
             name = words.split(", ")[0]
             margin = next(m for m in study.margins if m.loop == name)
             L = study.loops.open_loop(name, study.decay, f)
             phase = np.degrees(np.unwrap(np.angle(L)))
             phase -= 360 * np.round((np.interp(margin.crossover, f, phase) + 90) / 360)
-            upper.loglog(f, np.abs(L), color=COLOURS[k], label=words)
-            lower.semilogx(f, phase, color=COLOURS[k])
-            upper.plot(margin.crossover, 1.0, "o", color=COLOURS[k], markersize=5)
-            lower.plot(margin.crossover, np.degrees(margin.phase) - 180, "o", color=COLOURS[k], markersize=5)
-            lower.plot(margin.reversal, -180, "s", color=COLOURS[k], markersize=5)
+            (line,) = upper.loglog(f, np.abs(L), label=words)
+            dot = {"color": line.get_color(), "markersize": 5}
+            lower.semilogx(f, phase)
+            upper.plot(margin.crossover, 1.0, "o", **dot)
+            lower.plot(margin.crossover, np.degrees(margin.phase) - 180, "o", **dot)
+            lower.plot(margin.reversal, -180, "s", **dot)
         upper.axhline(1.0, color=style.BLACK, linewidth=0.8)
         lower.axhline(-180, color=style.BLACK, linewidth=0.8)
-        lower.set_ylim(-300, -60)
-        lower.set_yticks([-270, -180, -90])
+        lower.set(ylim=(-300, -60), yticks=[-270, -180, -90])
         return made
 
 
 def _steps(study: LoopStudy) -> Drawing:
-    """Return the command of each loop after a step."""
     with style.figure(height=3.0, x="time after the step (s)", y="command / final value") as (made, axis):
         for k, (name, (time, answer)) in enumerate(answer_steps(study).items()):
             dash = ("-", "-", "--", ":")[k % 4]
-            axis.semilogx(time[1:], answer[1:], dash, color=COLOURS[k], label=name)
+            axis.semilogx(time[1:], answer[1:], dash, label=name)
         axis.axhline(1.0, color=style.BLACK, linewidth=0.8)
         return made
 
 
 def _start(study: LoopStudy) -> Drawing:
-    """Return amplitude and phase error of a start from rest."""
     start = study.start
     last = max(int(np.searchsorted(start.time, 1.6 * start.ready)), 2) if np.isfinite(start.ready) else None
     shown = slice(0, last, max((last or len(start.time)) // MOST_POINTS, 1))
     with style.figure(1, 2, height=2.8) as (made, (left, right)):
         left.plot(start.time[shown], start.amplitude[shown], color=style.BLUE)
         left.axvline(start.ready, color=style.BLACK, linestyle=":", linewidth=1.0)
-        left.set_xlabel("time (s)")
-        left.set_ylabel("amplitude / command")
+        left.set(xlabel="time (s)", ylabel="amplitude / command")
         early = slice(0, max(int(np.searchsorted(start.time, 5 / study.loops.phase)), 2))
         right.plot(start.time[early], np.degrees(start.phase_error[early]), color=style.VERMILION)
         right.axvline(start.locked, color=style.BLACK, linestyle=":", linewidth=1.0)
-        right.set_xlabel("time (s)")
-        right.set_ylabel("phase error (°)")
+        right.set(xlabel="time (s)", ylabel="phase error (°)")
         return made
 
 
 def _course(run: Record) -> Drawing:
-    """Return the columns of a run over time."""
     names = [name for name in COLUMNS if name in run]
     time = run["time_s"] / 3600
     width = max(len(time) // MOST_POINTS, 1)
@@ -259,7 +233,7 @@ def _course(run: Record) -> Drawing:
 
     with style.figure(len(names), 1, height=1.35 * len(names) + 0.5, sharex=True, squeeze=False) as (made, axes):
         for k, (axis, name) in enumerate(zip(axes[:, 0], names, strict=True)):
-            axis.plot(thinned(time), thinned(run[name]), linewidth=0.8, color=COLOURS[k % len(COLOURS)])
+            axis.plot(thinned(time), thinned(run[name]), linewidth=0.8, color=style.COLOURS[k])
             axis.set_ylabel(COLUMNS[name], fontsize=9)
             axis.ticklabel_format(axis="y", useOffset=False)
         axes[-1, 0].set_xlabel("time (h)")

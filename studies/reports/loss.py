@@ -9,7 +9,6 @@ from studies.loss.model import LossModel
 from studies.reports import style
 from studies.results import Drawing
 
-COLOURS = (style.BLUE, style.VERMILION, style.GREEN, style.ORANGE, style.PURPLE, style.SKY, style.YELLOW)
 DASHES = ("-", "--", ":")
 SMALLEST = 1e-6  # of the sum: smaller parts are in the tables, not in the pictures
 
@@ -21,13 +20,11 @@ def bars(budget: Budget, at: int) -> Drawing:
         place = np.arange(len(parts))[::-1]
         values = 1e9 * np.array([part.inverse_q[at] for part in parts])
         low, high = (1e9 * np.array([part.interval[end][at] for part in parts]) for end in (0, 1))
-        axis.barh(place, values, color=[COLOURS[k % len(COLOURS)] for k in range(len(parts))], height=0.6)
-        axis.errorbar(
-            values, place, xerr=[values - low, high - values], fmt="none", ecolor=style.BLACK, capsize=3, linewidth=1.0
-        )
-        axis.set_yticks(
-            place, [f"{part.name}, {100 * part.inverse_q[at] / budget.inverse_q[at]:.3g} %" for part in parts]
-        )
+        axis.barh(place, values, color=[style.COLOURS[k % 7] for k in range(len(parts))], height=0.6)
+        ends = {"fmt": "none", "ecolor": style.BLACK, "capsize": 3, "linewidth": 1.0}
+        axis.errorbar(values, place, xerr=[values - low, high - values], **ends)
+        shares = [100 * part.inverse_q[at] / budget.inverse_q[at] for part in parts]
+        axis.set_yticks(place, [f"{part.name}, {share:.3g} %" for part, share in zip(parts, shares, strict=True)])
         axis.set_xlim(left=0.0)
         return made
 
@@ -40,13 +37,8 @@ def course(budget: Budget, stated: StatedLoss | None, reference: float) -> Drawi
         axis.fill_between(degrees, low, high, color=style.BLACK, alpha=0.12, linewidth=0)
         axis.plot(degrees, budget.inverse_q, color=style.BLACK, linewidth=2.2, label="sum, with its 90 % interval")
         for k, part in enumerate(_shown(budget, middle)):
-            axis.plot(
-                degrees,
-                np.where(part.inverse_q > 0, part.inverse_q, np.nan),
-                DASHES[k // len(COLOURS) % len(DASHES)],
-                color=COLOURS[k % len(COLOURS)],
-                label=part.name,
-            )
+            course = np.where(part.inverse_q > 0, part.inverse_q, np.nan)
+            axis.plot(degrees, course, DASHES[k // 7 % 3], color=style.COLOURS[k % 7], label=part.name)
         if stated is not None:
             axis.plot(reference - zero_Celsius, stated.inverse_q, "k*", markersize=11, label="stated in the card")
         axis.set_yscale("log")
@@ -57,24 +49,18 @@ def course(budget: Budget, stated: StatedLoss | None, reference: float) -> Drawi
 def along(model: LossModel) -> Drawing:
     """What the faces of the wall take part in, both together, over the meridian."""
     faces = model.vibration.faces
-    with style.figure(
-        height=3.0, x="position on the meridian, 0 where it starts, 1 where it ends", y="per area, over its mean"
-    ) as (made, axis):
-        for words, field, colour, dash in (
-            ("energy", "energy", style.BLUE, "-"),
-            ("area strain", "stretch", style.VERMILION, "--"),
-            ("normal motion", "moved", style.GREEN, ":"),
-        ):
-            density = 0.0
-            for face in faces:
-                values = {"energy": face.energy, "stretch": face.stretch**2, "moved": face.moved[2] ** 2}[field]
-                density = density + values
-            area = faces[0].area + faces[1].area
-            mean = float(np.sum(density * area) / np.sum(area))
-            order = np.argsort(faces[0].position)
-            axis.plot(
-                faces[0].position[order], np.asarray(density)[order] / (mean or 1.0), dash, color=colour, label=words
-            )
+    area, order = faces[0].area + faces[1].area, np.argsort(faces[0].position)
+    shares = {
+        "energy": [face.energy for face in faces],
+        "area strain": [face.stretch**2 for face in faces],
+        "normal motion": [face.moved[2] ** 2 for face in faces],
+    }
+    x, y = "position on the meridian, 0 where it starts, 1 where it ends", "per area, over its mean"
+    with style.figure(height=3.0, x=x, y=y) as (made, axis):
+        for (words, parts), dash, colour in zip(shares.items(), DASHES, style.COLOURS, strict=False):
+            density = np.sum(parts, axis=0)
+            mean = float(np.sum(density * area) / np.sum(area)) or 1.0
+            axis.plot(faces[0].position[order], density[order] / mean, dash, color=colour, label=words)
         axis.set_ylim(bottom=0.0)
         return made
 

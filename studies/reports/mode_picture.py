@@ -38,11 +38,8 @@ def view_blocks(shown: "Sequence[ModeScene]", remark: str = "") -> list[Block]:
     )
     for one in shown:
         if one.split is not None:
-            larger = (
-                f"; the departures of the shape are drawn {one.exaggeration:.0f} times as large"
-                if one.exaggeration
-                else ""
-            )
+            times = f"{one.exaggeration:.0f} times as large"
+            larger = f"; the departures of the shape are drawn {times}" if one.exaggeration else ""
             caption += (
                 f" n = {one.mode.harmonic}: the slower mode of the pair, which is split by {1e3 * one.split.hertz:.4g} mHz, on its"
                 f" axis at {degrees(one.split.slow_axis):.4g}°{larger}."

@@ -20,7 +20,20 @@ from studies.reports.diagnosis_table import table_parts
 from studies.reports.frequency import coefficients_table, error_figure, fit_figure, order_parts, order_sentence
 from studies.reports.settling import settling_chapter
 from studies.reports.theories import theories_chapter
-from studies.results import Blocks, Chapter, Column, Drawing, Facts, Figure, Part, Result, Sentence, Table, rows_of
+from studies.results import (
+    Blocks,
+    Chapter,
+    Column,
+    Drawing,
+    Facts,
+    Figure,
+    Part,
+    Result,
+    Sentence,
+    Table,
+    row_of,
+    rows_of,
+)
 
 
 @dataclass(frozen=True)
@@ -85,12 +98,9 @@ def reproduce_result(parts: Reproduction) -> Result:
     chapters = [
         Chapter("Summary", [_facts(parts), *_short(parts)]),
         _first_diagnosis(parts),
-        Chapter(
-            "Table 1 and figure 4: frequency over temperature",
-            [_table1(study), coefficients_table(study), fit_figure(study)],
-        ),
+        Chapter("Table 1 and figure 4: frequency over temperature", _table1(study)),
         Chapter("Table 2 and figure 5(a): temperature from frequency", [_table2(study), error_figure(study)]),
-        Chapter("Order of the polynomial", [Sentence(order_sentence(study)), *order_parts(study)]),
+        Chapter("Order of the polynomial", [order_sentence(study), *order_parts(study)]),
         Chapter("First-principles prediction", _physics(physics, study)),
         Chapter("Mode shape", [shapes]),
         theories_chapter(),
@@ -108,40 +118,37 @@ def _summarise(parts: Reproduction) -> dict[str, Any]:
     study, physics = parts.study, parts.physics
     fit, better = study.fit, study.next_fit
     assert better is not None
+    fitted = {"sum_of_squares_Hz2": "sum_of_squares", "leave_one_out_Hz": "leave_one_out_rms"}
+    curvatures = {
+        f"{name}_ppm_per_degC2": name for name in ("curvature_measured", "curvature_law", "curvature_uncertainty")
+    }
     return {
         "schema": "hrg.reproduce/1",
         "cubic": {
-            "reference_temperature_degC": fit.reference_temperature_degC,
-            "coefficients": fit.coefficients,
-            "standard_errors": fit.standard_errors,
-            "sum_of_squares_Hz2": fit.sum_of_squares,
-            "leave_one_out_Hz": fit.leave_one_out_rms,
+            **row_of(
+                fit,
+                "reference_temperature_degC",
+                "coefficients",
+                "standard_errors",
+                "largest_residual_of_span",
+                **fitted,
+            ),
             "largest_residual_Hz": float(np.abs(fit.residuals).max()),
-            "largest_residual_of_span": fit.largest_residual_of_span,
         },
         "quartic": {
-            "sum_of_squares_Hz2": better.sum_of_squares,
-            "leave_one_out_Hz": better.leave_one_out_rms,
-            "chi_squared": better.chi_squared,
-            "degrees_of_freedom": better.degrees_of_freedom,
+            **row_of(better, "chi_squared", "degrees_of_freedom", **fitted),
             "F_against_cubic": study.orders.against_next[fit.order - 1].statistic,
         },
-        "table2": {"calculated_degC": study.calculated_degC, "error_degC": study.error_degC},
+        "table2": row_of(study, "calculated_degC", "error_degC"),
         "sensitivity_ppm_per_degC": {
             "measured": float(fit.slope_ppm(20.0)),
             "simulated": float(physics.slope_ppm[-1]),
             "uncertainty": float(physics.uncertainty_ppm[-1]),
-            "local_degC": study.local_degC,
-            "local_measured": study.local_slope_ppm,
+            **row_of(study, "local_degC", local_measured="local_slope_ppm"),
             "local_simulated": physics.slope_ppm[:-1].tolist(),
             "laws": {name: {"value": value, "uncertainty": u} for name, value, u in physics.laws},
         },
-        "law_imposed": {
-            "residual_rms_Hz": parts.diagnosis.law_rms,
-            "curvature_measured_ppm_per_degC2": physics.curvature_measured,
-            "curvature_law_ppm_per_degC2": physics.curvature_law,
-            "curvature_uncertainty_ppm_per_degC2": physics.curvature_uncertainty,
-        },
+        "law_imposed": {"residual_rms_Hz": parts.diagnosis.law_rms, **row_of(physics, **curvatures)},
         "diagnosis_of_table1": parts.diagnosis.as_dict(),
         "card": physics.instrument.name,
         **parts.gyro_summary,
@@ -150,30 +157,14 @@ def _summarise(parts: Reproduction) -> dict[str, Any]:
 
 def _facts(parts: Reproduction) -> Facts:
     study, physics = parts.study, parts.physics
-    return Facts(
-        [
-            (
-                "Measured slope at 20 °C",
-                f"{float(study.fit.slope_ppm(20.0)):.1f} ppm/°C",
-                "cubic fitted to Table 1; the paper says about 80",
-            ),
-            (
-                "Predicted slope at 20 °C",
-                f"{physics.slope_ppm[-1]:.0f} ± {physics.uncertainty_ppm[-1]:.0f} ppm/°C",
-                "solid solver, default silica law",
-            ),
-            (
-                "Temperature from frequency",
-                f"within {np.abs(study.error_degC).max():.3f} K",
-                "largest error in Table 2, as in the paper",
-            ),
-            (
-                "Misfit with the silica law's curvature fixed",
-                f"{1e3 * parts.diagnosis.law_rms:.0f} mHz rms",
-                "readings are rounded to 10 mHz",
-            ),
-        ]
-    )
+    measured, predicted, sd = float(study.fit.slope_ppm(20.0)), physics.slope_ppm[-1], physics.uncertainty_ppm[-1]
+    within, misfit = np.abs(study.error_degC).max(), 1e3 * parts.diagnosis.law_rms
+    return Facts([
+        ("Measured slope at 20 °C", f"{measured:.1f} ppm/°C", "cubic fitted to Table 1; the paper says about 80"),
+        ("Predicted slope at 20 °C", f"{predicted:.0f} ± {sd:.0f} ppm/°C", "solid solver, default silica law"),
+        ("Temperature from frequency", f"within {within:.3f} K", "largest error in Table 2, as in the paper"),
+        ("Misfit with the silica law's curvature fixed", f"{misfit:.0f} mHz rms", "readings are rounded to 10 mHz"),
+    ])  # fmt: skip
 
 
 def _short(parts: Reproduction) -> list[Part]:
@@ -184,7 +175,7 @@ def _short(parts: Reproduction) -> list[Part]:
     away_curvature = abs(physics.curvature_measured - physics.curvature_law) / physics.curvature_uncertainty
     slopes = [value for _, value, _ in physics.laws]
     return [
-        Sentence(
+        (
             "The two published coefficients of the cubic are reproduced to the last digit, and the temperatures of Table 2 to within"
             f" {_farthest(study):.4f} K. At −10 °C the columns of the paper disagree: it gives −10.058 °C but an error of 0.0578 K"
             f" (here {study.error_degC[1]:.4f} K). The paper concludes that higher orders have little effect; this is not reproduced."
@@ -213,33 +204,20 @@ def _farthest(study: FrequencyStudy) -> float:
     return float(np.max(np.abs(study.calculated_degC - hrg.printed_table2()[0])))
 
 
-def _table1(study: FrequencyStudy) -> Table:
-    fit = study.fit
-    note = (
-        f"Largest residual {1e3 * np.abs(fit.residuals).max():.1f} mHz = {100 * fit.largest_residual_of_span:.2f} % of the"
-        " span; the paper gives 0.12 %."
-    )
-    columns = {
-        "temperature": study.temperature_degC,
-        "frequency": study.frequency,
-        "cubic": study.frequency - fit.residuals,
-        "residual": fit.residuals,
-    }
-    return Table("Table 1 and the fitted cubic", rows_of(columns), TABLE1, note)
+def _table1(study: FrequencyStudy) -> list[Part]:
+    fit, largest = study.fit, 1e3 * np.abs(study.fit.residuals).max()
+    share = 100 * fit.largest_residual_of_span
+    note = f"Largest residual {largest:.1f} mHz = {share:.2f} % of the span; the paper gives 0.12 %."
+    found = row_of(study, "frequency", temperature="temperature_degC", residual="fit.residuals")
+    rows = rows_of({**found, "cubic": study.frequency - fit.residuals})
+    return [Table("Table 1 and the fitted cubic", rows, TABLE1, note), coefficients_table(study), fit_figure(study)]
 
 
 def _table2(study: FrequencyStudy) -> Table:
-    printed, printed_error = hrg.printed_table2()
-    columns = {
-        "frequency": study.frequency,
-        "actual": study.temperature_degC,
-        "printed": printed,
-        "calculated": study.calculated_degC,
-        "printed_error": printed_error,
-        "error": study.error_degC,
-    }
+    printed = dict(zip(("printed", "printed_error"), hrg.printed_table2(), strict=True))
+    found = row_of(study, "frequency", actual="temperature_degC", calculated="calculated_degC", error="error_degC")
     note = "Error: actual minus calculated temperature."
-    return Table("Table 2, published and recomputed", rows_of(columns), TABLE2, note)
+    return Table("Table 2, published and recomputed", rows_of(found | printed), TABLE2, note)
 
 
 def _physics(physics: PhysicsComparison, study: FrequencyStudy) -> list[Part]:
@@ -250,15 +228,12 @@ def _physics(physics: PhysicsComparison, study: FrequencyStudy) -> list[Part]:
         "predicted": [f"{total:.2f} ± {sd:.1f}" for total, sd in predicted],
         "measured": [*study.local_slope_ppm, float(study.fit.slope_ppm(20.0))],
     }
-    unknown = (
-        f"The paper does not give the geometry of its resonator. The card '{physics.instrument.name}' represents it."
-    )
+    name, note = physics.instrument.name, physics.instrument.note
+    unknown = f"The paper does not give the geometry of its resonator. The card '{name}' represents it. {note}"
     title = "Slope of ln f and its contributions (ppm/°C), equation (15)"
-    caption = (
-        "The predicted slope has the right magnitude. The measured slope falls faster and rises again above 25 °C."
-    )
+    caption = "The predicted slope has the right size. The measured slope falls faster and rises again above 25 °C."
     return [
-        Sentence(f"{unknown} {physics.instrument.note}"),
+        unknown,
         Table(title, rows_of(columns), SLOPES, SLOPES_NOTE),
         Figure(lambda: _draw_slopes(physics, study), caption, "Predicted and measured slopes over temperature."),
         Table("Slope at 20 °C by published law of fused silica", physics.laws, LAWS, LAWS_NOTE),

@@ -34,15 +34,11 @@ def harmonics(scan: Scan) -> Drawing:
             mine = [w for w in scan.waves if w.quantity == q and w.position == rim and w.order > 0]
             if not mine:
                 continue
-            value = np.array([1e6 * w.amplitude.value for w in mine])
-            spread = np.array(
-                [
-                    [1e6 * (w.amplitude.value - w.amplitude.low), 1e6 * (w.amplitude.high - w.amplitude.value)]
-                    for w in mine
-                ]
-            )
-            order = np.array([w.order for w in mine])
+            order, value, low, high = np.array([
+                (w.order, *(1e6 * getattr(w.amplitude, key) for key in ("value", "low", "high"))) for w in mine
+            ]).T  # fmt: skip
             ax.bar(order + shift, value, 0.28, color=colour, label="middle surface" if q == "offset" else q)
-            ax.errorbar(order + shift, value, np.maximum(spread.T, 0), fmt="none", ecolor="black", capsize=2)
+            reach = np.maximum([value - low, high - value], 0)
+            ax.errorbar(order + shift, value, reach, fmt="none", ecolor="black", capsize=2)
         ax.set(xlabel="circumferential harmonic", ylabel="amplitude at the rim (µm)", yscale="log")
         return made

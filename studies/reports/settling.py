@@ -1,5 +1,7 @@
 """The chapter on Figure 3 of the HRG paper: how the resonator settles, and what incomplete soak does to Table 1."""
 
+from functools import partial
+
 import numpy as np
 
 from studies.papers.settling import FAST, NETWORKS, PROTOCOLS, SETTLED, POINTS_degC, SettlingStudy
@@ -26,7 +28,7 @@ STEPS = (
 )
 IDENTIFIED = "The mount conductance is identified from the mean of the two radiative steps at 9 000 s; all other values are predictions."
 SOAKS = (
-    Column("soak", "Soak"),
+    "Soak",
     Column("network", "Heat path"),
     Column("slope", "Slope at 20 °C", "ppm/°C", "+.3f"),
     Column("curvature", "Curvature", "ppm/°C²", "+.4f"),
@@ -39,25 +41,16 @@ QUADRATIC = (
 
 def settling_chapter(study: SettlingStudy) -> Chapter:
     """Return the chapter: Figure 3, the share of the step that is left, and the soak error of Table 1."""
-    return Chapter(
-        "Figure 3: settling of the resonator, and effect of the soak time on Table 1",
-        [
-            Sentence(NO_HEAT_PATH),
-            Figure(
-                lambda: _draw_steps(study),
-                "The virtual gyro after the temperature steps of figure 3; dotted lines: 9 000 s and 15 000 s.",
-                "Frequency and remaining part of the step over time, for a step to −10 and a step to 40 degrees.",
-            ),
-            Table("Settling after a chamber step", study.curves, STEPS, IDENTIFIED),
-            Figure(
-                lambda: _draw_soaks(study),
-                "Frequency error of the seven points after a soak of 4 to 5 h from room temperature.",
-                "Frequency error of the seven points for three soak times in two networks.",
-            ),
-            _soak_table(study),
-            Sentence(soak_sentence(study), "note"),
-        ],
-    )
+    steps, soaks = (
+        Figure(partial(_draw_steps, study), "The virtual gyro after the temperature steps of figure 3; dotted lines: 9 000 s and 15 000 s.",
+            "Frequency and remaining part of the step over time, for a step to −10 and a step to 40 degrees."),
+        Figure(partial(_draw_soaks, study), "Frequency error of the seven points after a soak of 4 to 5 h from room temperature.",
+            "Frequency error of the seven points for three soak times in two networks."),
+    )  # fmt: skip
+    table = Table("Settling after a chamber step", study.curves, STEPS, IDENTIFIED)
+    title = "Figure 3: settling of the resonator, and effect of the soak time on Table 1"
+    told = Sentence(soak_sentence(study), "note")
+    return Chapter(title, [NO_HEAT_PATH, steps, table, soaks, _soak_table(study), told])
 
 
 def _draw_steps(study: SettlingStudy) -> Drawing:
@@ -89,10 +82,8 @@ def _draw_soaks(study: SettlingStudy) -> Drawing:
         for soak in (s for s in study.soaks if s.protocol == PROTOCOLS[0]):
             colour, line = COLOURS[soak.network]
             strength = 0.35 + 0.65 * (1 - hours.index(soak.hours) / max(len(hours) - 1, 1))
-            label = f"{soak.network}, {soak.hours:g} h"
-            axes.plot(
-                POINTS_degC, 1e3 * soak.error, line + "o", color=colour, alpha=strength, markersize=3, label=label
-            )
+            look = {"color": colour, "alpha": strength, "markersize": 3, "label": f"{soak.network}, {soak.hours:g} h"}
+            axes.plot(POINTS_degC, 1e3 * soak.error, line + "o", **look)
         axes.legend(fontsize=7, ncols=2)
         return made
 

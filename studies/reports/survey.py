@@ -30,47 +30,30 @@ COLUMNS = (
     Column("low", "Minimum", form=".7g"),
     Column("high", "Maximum", form=".7g"),
     Column("resolution", "Resolution", digits=2),
-    _count("missing"),
-    _count("gaps"),
+    *(_count(key) for key in ("missing", "gaps")),
     _count("longest_gap_s", "s"),
-    _count("spikes"),
-    _count("stuck"),
-    _count("zeros"),
-    _count("steps"),
+    *(_count(key) for key in ("spikes", "stuck", "zeros", "steps")),
 )
 COLUMNS_NOTE = "Missing values, gaps, spikes, stuck readings, dropouts to 0 and steps are counted where there are any."
+ENDS = ("noise.instability_low", "noise.instability_high")
 NOISE = (
     Column("column", "Column", spell=display_name),
     Column("unit", "Unit"),
-    Column("noise.white", "White, at 1 s", error="noise.white_sd"),
-    Column("noise.flicker", "Flicker, flat part", error="noise.flicker_sd"),
-    Column("noise.walk", "Random walk, in 1 s", error="noise.walk_sd"),
+    *(Column(f"noise.{key}", heading, error=f"noise.{key}_sd") for key, heading in (
+        ("white", "White, at 1 s"), ("flicker", "Flicker, flat part"), ("walk", "Random walk, in 1 s"),
+    )),
     Column("noise.misfit", "Misfit", digits=2),
-    Column(
-        "noise.instability",
-        "Minimum / 0.664, 90 %",
-        interval=("noise.instability_low", "noise.instability_high"),
-        digits=3,
-    ),
+    Column("noise.instability", "Minimum / 0.664, 90 %", interval=ENDS, digits=3),
     Column("line.period_s", "Period of a line", "s", digits=4),
     Column("line.rms", "Its rms", digits=2),
-)
+)  # fmt: skip
 NOISE_NOTE = (
     "White noise, flicker and random walk have the Allan deviations N/√τ, a flat part and K √(τ/3), fitted together. Where they do not explain"
     " the curve (misfit above 3), for example where temperature drives a column, only the white noise is given, from second differences of the rows:"
     " judge the others on a settled run."
 )
-USES = (
-    Column("command", "Command"),
-    Column("gives", "Gives"),
-    Column("ready", "Possible"),
-    Column("missing", "Missing"),
-)
-STEPS = (
-    Column("column", "Column", spell=display_name),
-    Column("time_s", "At", "s", ".1f"),
-    Column("size", "Size"),
-)
+USES = ("Command", "Gives", Column("ready", "Possible"), "Missing")
+STEPS = (Column("column", "Column", spell=display_name), Column("time_s", "At", "s", ".1f"), "Size")
 SETTLED = (
     Column("start_s", "From", "s", ".0f"),
     Column("end_s", "To", "s", ".0f"),
@@ -89,13 +72,11 @@ DRIVEN = 3.0  # misfit from which on a column is driven by something, and its cu
 FEW = 1500  # means that are drawn over temperature
 
 
-def use_parts(uses: Sequence[Use]) -> list[Table | Sentence]:
+def use_parts(uses: Sequence[Use]) -> list[Part]:
     """Return what the records can be used for, and the lines to type."""
     lines = "\n".join(use.line for use in uses if not use.missing)
-    return [
-        Table("Use of these records", uses, USES),
-        Sentence(lines or "No command can use these records as they are.", "source" if lines else "plain"),
-    ]
+    told = Sentence(lines, "source") if lines else "No command can use these records as they are."
+    return [Table("Use of these records", uses, USES), told]
 
 
 def columns_table(survey: Survey, told: dict[str, Any]) -> Table:
@@ -107,11 +88,9 @@ def run_chapters(survey: Survey, told: dict[str, Any], several: bool) -> list[Ch
     """Return the chapters of one record; `told` is what the payload says of it."""
     before = f"{Path(survey.record.path).name}: " if several else ""
     count = len(survey.record)
-    drawn = (
-        f" Of {count:,} rows the least and the largest of every {2 * count // style.MOST_POINTS} are drawn; enlarging shows no more."
-        if count > style.MOST_POINTS
-        else ""
-    )
+    drawn, step = "", 2 * count // style.MOST_POINTS
+    if count > style.MOST_POINTS:
+        drawn = f" Of {count:,} rows the least and the largest of every {step} are drawn, and a part that is enlarged shows no more."
     noise = [column for column in survey.columns if column.stability is not None]
     dense = [column for column in survey.columns if column.density is not None]
     found: dict[str, Sequence[Part]] = {
@@ -124,12 +103,10 @@ def run_chapters(survey: Survey, told: dict[str, Any], several: bool) -> list[Ch
         ],
         "over temperature": _temperature_parts(survey),
         "noise": [
-            Figure(
-                lambda: _draw_stability(survey),
-                "Overlapping Allan deviation with its 90 % interval, and (dashed) white noise, flicker and random walk fitted together.",
-            ) if noise else Sentence("No column varies over enough rows for an Allan deviation."),
-            Table("Noise", told["columns"], NOISE, NOISE_NOTE) if noise else Sentence("", where="terminal"),
-        ],
+            Figure(lambda: _draw_stability(survey),
+                "Overlapping Allan deviation with its 90 % interval, and (dashed) white noise, flicker and random walk fitted together."),
+            Table("Noise", told["columns"], NOISE, NOISE_NOTE),
+        ] if noise else ["No column varies over enough rows for an Allan deviation."],
         "spectra": [Figure(lambda: _draw_spectra(survey), _spectrum_words(survey))] if dense else [],
         "correlation": [Table("Correlation between columns", told["correlations"], CORRELATIONS, CORRELATION_NOTE, "page", sortable=True)],
     }  # fmt: skip
@@ -143,9 +120,8 @@ def _grid(count: int, x: str, log: bool = False) -> Any:
 
 
 def _temperature_parts(survey: Survey) -> list[Figure]:
-    temperature = next(
-        (c.name for T in TEMPERATURES for c in survey.columns if c.name == T and c.range.high - c.range.low > 0.1), None
-    )
+    wide = {c.name for c in survey.columns if c.range.high - c.range.low > 0.1}
+    temperature = next((name for name in TEMPERATURES if name in wide), None)
     others = [c.name for c in survey.columns if c.name != temperature and c.varies]
     if temperature is None or not others:
         return []

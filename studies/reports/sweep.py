@@ -30,7 +30,7 @@ METHODS = {
     "one-at-a-time": "one parameter at a time about the nominal design",
 }
 RUNS = (
-    Column("run", "Run"),
+    "Run",
     Column("started_utc", "Started"),
     Column("finished_utc", "Ended"),
     Column(lambda run: run["outcome"] or "killed", "Outcome"),
@@ -78,7 +78,7 @@ def _short(results: Results) -> list[Part]:
         words = "of the designs" if low is None or high is None else f"90 % interval {_percent(low)} … {_percent(high)}"
         facts.append(("Meet all requirements", _percent(found.share), words))
     unfinished = "The study is not finished. Run it again to resume, then write this page again."
-    return [Facts(facts), *([Sentence(unfinished, "warning")] if results.done < results.total else [])]
+    return [Facts(facts), Sentence(unfinished, "warning") if results.done < results.total else None]
 
 
 def _percent(share: float) -> str:
@@ -107,7 +107,7 @@ def _asked(results: Results) -> list[Part]:
     return [
         Table("Parameters", study.parameters, parameters),
         Table("Quantities", study.asked, quantities),
-        Sentence(f"{words}; {solver}."),
+        f"{words}; {solver}.",
     ]
 
 
@@ -115,15 +115,11 @@ def _failures(results: Results) -> list[Part]:
     if not results.failed.size:
         return []
     reasons = [{"cases": count, "reason": reason} for reason, count in results.store.reasons()]
+    columns = (*_design_columns(results), Column(results.remark, "Reason"))
     return [
         Sentence("These designs have no result and are excluded from all figures on this page.", "warning"),
-        Table("Reasons", reasons, (Column("cases", "Cases"), Column("reason", "Reason"))),
-        Table(
-            "Failed designs",
-            results.failed[:MOST_ROWS].tolist(),
-            (*_design_columns(results), Column(results.remark, "Reason")),
-            sortable=True,
-        ),
+        Table("Reasons", reasons, ("Cases", "Reason")),
+        Table("Failed designs", results.failed[:MOST_ROWS].tolist(), columns, sortable=True),
     ]
 
 
@@ -201,7 +197,7 @@ def _shapes(results: Results) -> list[Part]:
     for title, design in designs.items():
         words = ", ".join(f"{name} = {number(value)}" for name, value in design.items())
         instrument = set_parameters(study.instrument, design, study.derived)
-        parts.append(Sentence(f"{title}: {words or 'as in the card'}."))
+        parts.append(f"{title}: {words or 'as in the card'}.")
         parts.append(Blocks(lambda shown=instrument: mode_picture.mode_blocks(shown, (n,))))  # type: ignore[misc]
     return parts
 
@@ -223,10 +219,10 @@ def _provenance(results: Results) -> list[Part]:
     }
     items = [{"item": item, "value": value} for item, value in facts.items()]
     return [
-        Table("Identity", items, (Column("item", "Item"), Column("value", "Value"))),
+        Table("Identity", items, ("Item", "Value")),
         Table("Runs", runs, RUNS),
-        *(Sentence(f"Run {', '.join(counts)}: {words}.") for words, counts in environments.items()),
-        *([Sentence(about["spec_text"], "source")] if about["spec_text"] else []),
+        *(f"Run {', '.join(counts)}: {words}." for words, counts in environments.items()),
+        Sentence(about["spec_text"], "source") if about["spec_text"] else None,
     ]
 
 
@@ -246,7 +242,6 @@ def _distribution(parameter: StudyParameter) -> str:
     if parameter.values:
         return "values"
     if parameter.distribution == "normal":
-        return f"normal, standard deviation {number(parameter.standard_deviation)}" + (
-            "" if parameter.bounded else ", unbounded"
-        )
+        unbounded = "" if parameter.bounded else ", unbounded"
+        return f"normal, standard deviation {number(parameter.standard_deviation)}{unbounded}"
     return parameter.distribution + (f", {parameter.count} points" if parameter.count else "")

@@ -7,7 +7,7 @@ import numpy as np
 
 from studies.errors import InputError
 from studies.reports import sweep_figures as figures
-from studies.results import Column, Part, Sentence, Table
+from studies.results import Column, Part, Sentence, Table, row_of, rows_of
 from studies.sweeps.definition import StudyParameter
 from studies.sweeps.quantity import Column as Output
 from studies.sweeps.results import Results
@@ -26,15 +26,15 @@ SOBOL = (
 )
 SHARES = (PARAMETER, SLOPE, EITHER_SIDE, UNIT, Column("share", "Share of variance", "%", ".2f", scale=100.0))
 YIELD = (
-    Column("requirement", "Requirement"),
+    "Requirement",
     Column("from", "From", form=".8g"),
     Column("to", "To", form=".8g"),
     Column("share", "Designs that meet it", "%", ".2f", scale=100.0),
     Column("share", "90 % interval", "%", ".2f", scale=100.0, interval=("low", "high")),
     Column("unknown", "Without a result"),
 )
-INVERSION = (Column("column", "Column"), Column("target", "Target", form=".8g"), Column("found", "Found", form=".8g"))
-TOLERANCES = (Column("label", "Parameter"), Column("asked", "Specified"), Column("found", "Found"))
+INVERSION = ("Column", Column("target", "Target", form=".8g"), Column("found", "Found", form=".8g"))
+TOLERANCES = (Column("label", "Parameter"), Column("asked", "Specified"), "Found")
 
 
 def main_columns(results: Results) -> list[Output]:
@@ -66,10 +66,7 @@ def _sobol(results: Results, column: Output) -> list[Part]:
     if found.variance == 0:
         return [Sentence(f"{column.label} is the same for every design: no parameter influences it.", "note")]
     names = ("first", "first_low", "first_high", "total", "total_low", "total_high")
-    rows = [
-        {"parameter": parameter} | {name: float(getattr(found, name)[k]) for name in names}
-        for k, parameter in enumerate(found.parameters)
-    ]
+    rows = rows_of({"parameter": found.parameters, **row_of(found, *names)})
     note = "A parameter whose total interval includes zero has no significant influence."
     table = Table(f"Sobol indices of {column.label}", rows, SOBOL, note, sortable=True)
     return [table, figures.sobol_figure(found, column)]
@@ -86,7 +83,7 @@ def _slopes(results: Results, column: Output) -> list[Part]:
         Column("swing", "Change over the range", column.unit, ".6g"),
     )
     note = (
-        "± includes curvature beyond the outer levels and the solver error; a slope smaller than ± is not significant."
+        "± includes curvature beyond the outer levels and the solver error; slopes smaller than ± are not significant."
     )
     table = Table(f"Slopes of {column.label} at the nominal design", found, columns, note, sortable=True)
     return [table, figures.tornado_figure(found, column)]
@@ -97,10 +94,8 @@ def _shares(results: Results, column: Output) -> list[Part]:
     if found is None:
         return []
     units = _slope_units(results, column)
-    rows = [
-        {"parameter": name, "slope": slope, "half_width": half, "unit": units[name], "share": share}
-        for name, slope, half, share in zip(found.parameters, found.slope, found.half_width, found.share, strict=True)
-    ]
+    rows = rows_of({"parameter": found.parameters, **row_of(found, "slope", "half_width", "share")})
+    rows = [row | {"unit": units[row["parameter"]]} for row in rows]
     note = (
         f"A linear model explains {100 * found.r_squared:.2f} % of the variance. ± is half of the 90 % interval; a slope"
         " smaller than ± is not significant."
@@ -128,16 +123,15 @@ def tolerance_parts(results: Results) -> list[Part]:
     except InputError as error:
         return [Sentence(str(error), "warning")]
     note = (
-        "For the interval, a design without a result counts as failed at the lower end and as passed at the upper end."
+        "In the interval, a design without a result counts as failed at the lower end and as passed at the upper end."
     )
     if reach.part is None:
         words = "No sampled design fails: the tolerances can be wider than the ranges of the study."
     else:
+        reached = ", ".join(_reach(p, reach.part) for p in study.parameters if not isinstance(p.nominal, str))
         words = (
             f"The largest box around the nominal design without a failed design covers {100 * reach.part:.3g} % of every range"
-            f" ({reach.inside} designs inside): "
-            + ", ".join(_reach(p, reach.part) for p in study.parameters if not isinstance(p.nominal, str))
-            + ". This is based on the sampled designs only; confirm it with a worst-case search."
+            f" ({reach.inside} designs inside): {reached}. This is based on the sampled designs only; confirm it with a worst-case search."
         )
     return [*search_parts(results, "tolerance"), Table("Yield", rows, YIELD, note), Sentence(words, "note")]
 
@@ -147,8 +141,7 @@ def _end(value: float) -> float | None:
 
 
 def _yield_row(results: Results, requirements: Any) -> dict[str, Any]:
-    found = find_yield(results, requirements)
-    return {"share": found.share, "low": found.low, "high": found.high, "unknown": found.unknown}
+    return row_of(find_yield(results, requirements), "share", "low", "high", "unknown")
 
 
 def _reach(parameter: StudyParameter, part: float) -> str:
@@ -222,8 +215,8 @@ def tolerance_table(results: Results, found: Mapping[str, Any]) -> Table:
     return Table(f"Tolerances with which {share} of designs meet the requirements", rows, TOLERANCES, note)
 
 
-def _tolerances(results: Results, found: Mapping[str, Any]) -> list[Part]:
-    return [tolerance_table(results, found)]
-
-
-SEARCHES = {"worst-case": _worst_case, "inversion": _inversion, "tolerance": _tolerances}
+SEARCHES: dict[str, Callable[[Results, Mapping[str, Any]], list[Part]]] = {
+    "worst-case": _worst_case,
+    "inversion": _inversion,
+    "tolerance": lambda results, found: [tolerance_table(results, found)],
+}

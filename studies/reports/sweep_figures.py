@@ -14,8 +14,6 @@ from studies.sweeps.results import Results
 from studies.sweeps.sensitivity import LocalSlope, SobolIndices
 from studies.sweeps.tolerance import RequirementLimits
 
-COLOURS = (style.BLUE, style.VERMILION, style.GREEN, style.PURPLE, style.ORANGE, style.SKY)
-
 
 def label(name: str, unit: str) -> str:
     """Return a parameter's name without its table and the unit that it carries, and the unit in brackets."""

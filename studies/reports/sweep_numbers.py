@@ -6,21 +6,15 @@ import numpy as np
 
 from studies.errors import InputError
 from studies.reports.digits import plain, to_numerical_error
-from studies.results import Column, Table
+from studies.results import Column, Table, row_of
 from studies.sweeps.quantity import Column as Output
 from studies.sweeps.results import Results
 from studies.sweeps.sensitivity import linear_shares, local_slopes, sobol_indices
 from studies.sweeps.tolerance import Yield, find_yield
 
 STATISTICS = (
-    Column("label", "Quantity"),
-    Column("unit", "Unit"),
-    Column("nominal", "Nominal"),
-    Column("mean", "Mean"),
-    Column("deviation", "Standard deviation"),
-    Column("least", "Minimum"),
-    Column("greatest", "Maximum"),
-    Column("error", "Numerical error"),
+    *(Column("label", "Quantity"), "Unit", "Nominal", "Mean", Column("deviation", "Standard deviation")),
+    *(Column("least", "Minimum"), Column("greatest", "Maximum"), Column("error", "Numerical error")),
 )
 NUMERICAL = "The numerical error is the largest error estimate of the solver over all designs, relative to the exact solution of its theory."
 
@@ -31,8 +25,7 @@ def summarise(results: Results) -> dict[str, Any]:
         "schema": "hrg.study-report/1",
         "study": results.study.name,
         "cases": len(results),
-        "done": results.done,
-        "total": results.total,
+        **row_of(results, "done", "total"),
         "failed": len(results.failed),
         "columns": {c.name: {"unit": c.unit, **numbers_of(results, c)} for c in results.study.columns},
         "searches": results.store.findings(),
@@ -90,12 +83,11 @@ def statistics_table(results: Results) -> Table:
         n = numbers_of(results, column)
         deviation, mean, error = n["deviation"], n["mean"], n["error"]
         to = error if np.isfinite(error) else deviation / 3
-        rows.append(
-            {"label": column.label, "unit": column.unit}
-            | {key: to_digits(n[key], to) for key in ("nominal", "mean", "least", "greatest")}
-            | {
-                "deviation": "" if np.isnan(deviation) else plain(deviation) if deviation > 1e-12 * abs(mean) else "0",
-                "error": plain(error, 2) if np.isfinite(error) else "",
-            }
-        )
+        scatter = plain(deviation) if deviation > 1e-12 * abs(mean) else "0"
+        written = {key: to_digits(n[key], to) for key in ("nominal", "mean", "least", "greatest")}
+        written |= {
+            "deviation": "" if np.isnan(deviation) else scatter,
+            "error": plain(error, 2) if np.isfinite(error) else "",
+        }
+        rows.append({"label": column.label, "unit": column.unit} | written)
     return Table("All designs with a result", rows, STATISTICS, NUMERICAL)

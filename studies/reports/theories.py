@@ -4,7 +4,7 @@ import numpy as np
 
 from studies.papers import theories
 from studies.reports import style
-from studies.results import Chapter, Column, Drawing, Figure, Sentence, Table
+from studies.results import Chapter, Column, Drawing, Figure, Table
 
 FREQUENCIES = (
     Column("ratio", "h/R", form="g"),
@@ -14,7 +14,7 @@ FREQUENCIES = (
     Column("excess", "Rayleigh above solid", "%", "+.2f", scale=100.0),
     Column("coefficient", "Relative excess / √(h/R)", form=".3f"),
 )
-SLOPES = (Column("theory", "Theory"), Column("slope", "Slope", form=".2f", scale=1e6))
+SLOPES = ("Theory", Column("slope", "Slope", form=".2f", scale=1e6))
 
 
 def theories_chapter() -> Chapter:
@@ -22,29 +22,18 @@ def theories_chapter() -> Chapter:
     rows = theories.compare_theories()
     limit = theories.thin_limit(rows[-1], rows[-2])
     at = next(row for row in rows if row.ratio == 0.06)
-    return Chapter(
-        "Comparison of theories",
-        [
-            Sentence(
-                f"Rayleigh's closed form, equation (13) of the paper, ignores the free edge. At h/R = 0.06 it is"
-                f" {100 * at.excess:.1f} % above the solid model. The excess falls only as √(h/R), with a coefficient that"
-                f" tends to {limit:.2f}. All other frequencies and slopes of silica on this page"
-                " come from the solid model."
-            ),
-            Table("Free hemisphere of 15 mm radius, n = 2", rows, FREQUENCIES),
-            Figure(
-                lambda: _draw(rows, limit),
-                "The excess of Rayleigh's form falls as √(h/R); shell theory is within 0.1 % of the solid model everywhere.",
-                "Differences of the theories over thickness, double logarithmic.",
-            ),
-            Table(
-                "Slope at 20 °C by theory (ppm/°C), h/R = 0.06, default law",
-                [{"theory": theory, "slope": slope} for theory, slope in theories.slopes_by_theory().items()],
-                SLOPES,
-                "The free edge changes the slope by several ppm/°C from Rayleigh's simple rule, ½ G′/G + ½ α.",
-            ),
-        ],
-    )
+    slopes = [{"theory": theory, "slope": slope} for theory, slope in theories.slopes_by_theory().items()]
+    return Chapter("Comparison of theories", [
+        f"Rayleigh's closed form, equation (13) of the paper, ignores the free edge. At h/R = 0.06 it is {100 * at.excess:.1f} % above the"
+        f" solid model. The excess falls only as √(h/R), with a coefficient that tends to {limit:.2f}. All other frequencies and slopes of"
+        " silica on this page come from the solid model.",
+        Table("Free hemisphere of 15 mm radius, n = 2", rows, FREQUENCIES),
+        Figure(lambda: _draw(rows, limit),
+            "The excess of Rayleigh's form falls as √(h/R); shell theory is within 0.1 % of the solid model everywhere.",
+            "Differences of the theories over thickness, double logarithmic."),
+        Table("Slope at 20 °C by theory (ppm/°C), h/R = 0.06, default law", slopes, SLOPES,
+            "The free edge changes the slope by several ppm/°C from Rayleigh's simple rule, ½ G′/G + ½ α."),
+    ])  # fmt: skip
 
 
 def _draw(rows: list[theories.TheoryComparison], limit: float) -> Drawing:
