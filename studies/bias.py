@@ -31,7 +31,7 @@ from studies.models import Model, compensate, source_of
 from studies.models.kinds.bias import OUTPUTS, save_bias
 from studies.plausible import records_of_one_gyro
 from studies.record import COMPENSATED, Record
-from studies.rest import LARGEST_REST, TEMPERATURES, choose_column
+from studies.rest import TEMPERATURES, choose_column, require_rest
 from studies.stability import Stability, unbroken
 
 Over = Literal["auto", "frequency", "temperature"]
@@ -129,8 +129,8 @@ def study_bias(
                 runs.append(rate_run(blocks, state, window, causal=causal, variable=variable, memory=memory))
         return runs
 
-    rows = sum(len(record) for record in records)
-    progress(f"averaging {rows:,} rows over {width:g} s")
+    everywhere = ", ".join(record.path or "record" for record in records)
+    progress(f"averaging {sum(map(len, records)):,} rows over {width:g} s")
     averaged = []
     for record in records:
         with naming(record.path or "record"):
@@ -138,12 +138,12 @@ def study_bias(
     runs = prepare(NO_MEMORY)
     if variable is TEMPERATURE:
         progress("looking for a lag and a loop between thermometer and bias")
-        with naming(", ".join(record.path or "record" for record in records)):
+        with naming(everywhere):
             runs = prepare(choose_memory(prepare))
     judged, why = [], ""
     for name in METHODS:
         progress(f"selecting terms stepwise ({name})")
-        with naming(", ".join(record.path or "record" for record in records)):
+        with naming(everywhere):
             fit = fit_bias(runs, name)
         try:
             held_out = score_held_out(runs, name)
@@ -151,14 +151,8 @@ def study_bias(
             held_out, why = None, str(error)
         judged.append(Judged(name, fit, _training(runs, fit), held_out, _score_path(runs, fit)))
     fit = next(j.fit for j in judged if j.method == method)
-    model = save_bias(
-        fit,
-        runs[0],
-        output,
-        column,
-        tuple(source_of(r) for r in records),
-        f"hrg-workbench, hrg fit bias --method {method}",
-    )
+    sources, made_by = tuple(map(source_of, records)), f"hrg-workbench, hrg fit bias --method {method}"
+    model = save_bias(fit, runs[0], output, column, sources, made_by)
     progress("Allan deviation before and after")
     longest = max(records, key=len)
     after = compensate(model, longest, extrapolate=True)[f"{COMPENSATED}{output}"]
@@ -181,10 +175,12 @@ def check_lengths(records: Sequence[Record]) -> None:
     for record in records:
         lasts = float(np.ptp(record["time_s"]))
         if lasts < FEWEST * AVERAGING:
-            hint = (
-                " Is its time in hours or minutes? time_s is in seconds; 'hrg import' converts."
-                if lasts < AVERAGING
-                else ""
+            hint = " Is its time in hours or minutes? time_s is in seconds; 'hrg import' converts." * (
+                lasts < AVERAGING
+            )
+            raise InputError(
+                f"{record.path or 'record'}: lasts {lasts:.3g} s; bias stability is judged on averages over {AVERAGING:g} s, of"
+                f" which a run needs {FEWEST} or more.{hint}"
             )
             raise InputError(
                 f"{record.path or 'record'}: lasts {lasts:.3g} s; bias stability is judged on averages over {AVERAGING:g} s, of"
@@ -201,17 +197,12 @@ def choose_width(records: Sequence[Record]) -> float:
 def find_output(records: Sequence[Record]) -> str:
     """Return the zero-rate output column that all records have."""
     for record in records:
-        where = record.path or "record"
-        if "rate_deg_per_s" in record and np.any(np.abs(record["rate_deg_per_s"]) > LARGEST_REST):
-            raise InputError(
-                f"{where}: rate_deg_per_s is not zero; bias is fitted to runs at rest. Use hrg fit scale for runs with an applied rate."
-            )
+        require_rest(record, "bias is fitted to runs at rest. Use hrg fit scale for runs with an applied rate.")
     for name in OUTPUTS:
         if all(name in record for record in records):
             return name
-    raise InputError(
-        f"{records[0].path or 'record'}: a column {' or '.join(OUTPUTS)} is missing, or not in all records."
-    )
+    where, names = records[0].path or "record", " or ".join(OUTPUTS)
+    raise InputError(f"{where}: a column {names} is missing, or not in all records.")
 
 
 def find_state(records: Sequence[Record], over: Over = "auto") -> str:

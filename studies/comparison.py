@@ -83,19 +83,13 @@ def _figures(instrument: "Instrument") -> Iterator[Figure]:
     drive, share = lowest[DRIVE], float(law.uncertainty(np.array([T0]))[0])
     for n, mode in lowest.items():
         yield Figure(f"frequency, n = {n}", "Hz", mode.frequency, share * mode.frequency)
-    yield Figure(
-        "nearest other mode",
-        "Hz",
-        nearest.frequency - drive.frequency,
-        nothing,
-        f"n = {nearest.harmonic}, index {nearest.index}",
-    )
+    of = f"n = {nearest.harmonic}, index {nearest.index}"
+    yield Figure("nearest other mode", "Hz", nearest.frequency - drive.frequency, nothing, of)
     yield Figure("Bryan factor", "1", drive.bryan_factor, nothing)
     yield Figure("modal mass", "g", 1e3 * drive.modal_mass, nothing)
     mean = float(np.mean([h for _, h in instrument.resonator.thickness]))
-    yield Figure(
-        "frequency per thickness", "Hz/µm", drive.frequency * drive.sensitivities.thickness / mean * 1e-6, nothing
-    )
+    per_micrometre = drive.frequency * drive.sensitivities.thickness / mean * 1e-6
+    yield Figure("frequency per thickness", "Hz/µm", per_micrometre, nothing)
     at, known = np.array([T0]), not instrument.material.constant
     slope = (float(law.slope(at)[0]), float(law.slope_uncertainty(at)[0])) if known else (nothing, nothing)
     yield Figure("slope", "ppm/°C", 1e6 * slope[0], 1e6 * slope[1])

@@ -2,15 +2,13 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
 
 from compensation.cross_damping import CrossDampingModel, RestRun, fit_cross_damping
 from compensation.errors import CompensationError
 from compensation.improvement import Improvement, compare_outputs, hold_out
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
 
 LEAST_ROWS = 50
 BLOCKS = 5
@@ -45,7 +43,7 @@ def study_cross_damping(
     def fit(chosen: Sequence[RestRun]) -> CrossDampingModel:
         return fit_cross_damping(chosen, k=k, zeta=zeta, calibration_temperature=calibration_temperature, order=order)
 
-    def compensate(chosen: Sequence[RestRun], run: RestRun) -> "NDArray[np.float64]":
+    def compensate(chosen: Sequence[RestRun], run: RestRun) -> NDArray[np.float64]:
         return fit(chosen).compensate(run.time, run.rate, run.temperature, extrapolate=True)
 
     model = fit(runs)
@@ -56,9 +54,7 @@ def study_cross_damping(
     after = [model.compensate(run.time, run.rate, run.temperature) for run in runs]
     training = compare_outputs([run.time for run in runs], [run.rate for run in runs], after)
     if training.rows.before == 0 or training.rows.after == 0:
-        raise CompensationError(
-            "the output is constant: there is no error that varies with temperature; check the column."
-        )
+        raise CompensationError("the output is constant: no error varies with temperature; check the column.")
     pieces = runs if len(runs) > 1 else split_run(runs[0], BLOCKS)
     left = hold_out(pieces, compensate)
     held_out = compare_outputs([piece.time for piece in pieces], [piece.rate for piece in pieces], left)
@@ -67,7 +63,5 @@ def study_cross_damping(
 
 def split_run(run: RestRun, parts: int) -> list[RestRun]:
     """Return the run cut into parts of equal length, in order of time."""
-    import numpy as np
-
     pieces = np.array_split(np.arange(len(run.time)), parts)
     return [RestRun(run.time[piece], run.rate[piece], run.temperature[piece]) for piece in pieces]

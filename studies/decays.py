@@ -77,13 +77,13 @@ def table_of(decays: Sequence[Decay]) -> Decays:
         TEMPERATURE: column([decay.notes.get("temperature_degC") for decay in decays]),
         "pressure_Pa": column([decay.notes.get("pressure_Pa") for decay in decays]),
     }
-    sds = {
-        "frequency_Hz": column(
-            [d.estimates["frequency_Hz"].sd if "frequency_Hz" in d.estimates else 0 for d in decays]
-        ),
-        "inverse_q": column([0 if decay.inverse_q is None else decay.inverse_q.sd for decay in decays]),
-    }
+    sds = {name: column([_sd(decay, name) for decay in decays]) for name in RESPONSES}
     return Decays(columns, sds, first)
+
+
+def _sd(decay: Decay, name: str) -> float:
+    found = decay.inverse_q if name == "inverse_q" else decay.estimates.get(name)
+    return 0.0 if found is None else found.sd
 
 
 def fit_laws(decays: Decays) -> "dict[str, Law]":
@@ -103,20 +103,16 @@ def fit_laws(decays: Decays) -> "dict[str, Law]":
             continue
         decay = (known["decay"][keep] if "decay" in known else np.flatnonzero(keep)).astype(np.int64)
         time = known["time_s"][keep] if "time_s" in known else np.zeros(len(decay))
-        conditions = {}
-        for key, column in (("temperature", TEMPERATURE), ("pressure", "pressure_Pa")):
-            if column in known:
-                conditions[key] = known[column][keep]
+        named = (("temperature", TEMPERATURE), ("pressure", "pressure_Pa"))
+        conditions = {key: known[column][keep] for key, column in named if column in known}
         if AMPLITUDE in known:
             conditions["energy"] = _smooth(known[AMPLITUDE][keep], decay) ** 2
         y, sd = value[keep], decays.sd.get(name, np.zeros_like(value))[keep]
         if not (np.ptp(y) > 0 and (np.ptp(time) > 0 or any(np.ptp(x) > 0 for x in conditions.values()))):
             continue
-        rows = (
-            Rows(np.log(y), sd / y, decay, time, conditions)
-            if name == "frequency_Hz"
-            else Rows(y, sd, decay, time, conditions)
-        )
+        rows = Rows(y, sd, decay, time, conditions)
+        if name == "frequency_Hz":
+            rows = replace(rows, value=np.log(y), sd=sd / y)
         with naming(decays.path):
             law = fit_law(rows, loss=name == "inverse_q")
         fitted = np.full(len(value), np.nan)
@@ -130,18 +126,12 @@ def write_decays(decays: Decays, path: str | Path) -> None:
     columns = decays.columns
     for name, comment in (("time_s", "start"), (TEMPERATURE, "temperature_degC")):
         if not np.isfinite(columns.get(name, np.array([np.nan]))).all():
-            raise InputError(
-                f"--out writes a record over time and temperature; give every decay its comment '# {comment}: …'."
-            )
+            asked = f"give every decay its comment '# {comment}: …'"
+            raise InputError(f"--out writes a record over time and temperature; {asked}.")
     if not np.all(np.diff(columns["time_s"]) > 0):
-        raise InputError(
-            "--out writes a record over time, but two decays begin at the same moment; correct '# start: …'."
-        )
-    kept = {
-        key: columns[key]
-        for key in ("time_s", TEMPERATURE, *RESPONSES)
-        if key in columns and np.isfinite(columns[key]).any()
-    }
+        raise InputError("--out writes a record over time, but two decays begin at one moment; correct '# start: …'.")
+    names = ("time_s", TEMPERATURE, *RESPONSES)
+    kept = {key: columns[key] for key in names if key in columns and np.isfinite(columns[key]).any()}
     start = None if decays.start is None else datetime.datetime.fromtimestamp(decays.start, datetime.UTC)
     write_record(Record(kept, source="free decays, hrg fit ringdown", start=start), path)
 

@@ -5,14 +5,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import numpy as np
+from numpy.typing import NDArray
+
+from compensation.cross_damping import RestRun
+from compensation.decimation import average_blocks
+from compensation.spikes import find_spikes
 from shell.constants import zero_Celsius
 from studies.errors import InputError
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
-    from compensation.cross_damping import RestRun
     from studies.record import Record
 
 TEMPERATURES = ("housing_temperature_degC", "resonator_temperature_degC", "chamber_temperature_degC")
@@ -28,19 +30,15 @@ LARGEST_REST = 0.01
 class RestData:
     """Runs for a fit at rest, with the columns that they came from and the rows that were left out."""
 
-    runs: "tuple[RestRun, ...]"
+    runs: tuple[RestRun, ...]
     output: str
     temperature_column: str
     left_out: int
     block_s: float
 
 
-def drop_spikes(keep: "NDArray[np.bool_]", *columns: "NDArray[np.float64]") -> "NDArray[np.bool_]":
+def drop_spikes(keep: NDArray[np.bool_], *columns: NDArray[np.float64]) -> NDArray[np.bool_]:
     """Return the rows to keep without those in which a column is contradicted by its neighbours."""
-    import numpy as np
-
-    from compensation.spikes import find_spikes
-
     cleaned = keep.copy()
     for column in columns:
         cleaned &= ~find_spikes(np.where(keep, column, np.nan), LEAST_SPIKE)
@@ -69,19 +67,19 @@ def choose_column(records: "Sequence[Record]", candidates: Sequence[str], purpos
     raise InputError(f"{records[0].path}: {purpose} needs the same column in every record: {names}.")
 
 
+def require_rest(record: "Record", why: str) -> None:
+    """Refuse a record of a gyro that turned."""
+    if "rate_deg_per_s" in record and np.any(np.abs(record["rate_deg_per_s"]) > LARGEST_REST):
+        raise InputError(f"{record.path or 'record'}: rate_deg_per_s is not zero; {why}")
+
+
 def gather_rest(records: "Sequence[Record]", outputs: "dict[str, float]") -> RestData:
     """Return the runs of these records in SI units; `outputs` gives the output columns and their unit in rad/s."""
-    import numpy as np
-
-    from compensation.cross_damping import RestRun
-    from compensation.decimation import average_blocks
-
     output = choose_column(records, tuple(outputs), "a fit at zero rate")
     column = choose_column(records, TEMPERATURES, "a fit over temperature")
     runs, left_out, widest = [], 0, 0.0
     for record in records:
-        if "rate_deg_per_s" in record and np.any(np.abs(record["rate_deg_per_s"]) > LARGEST_REST):
-            raise InputError(f"{record.path}: rate_deg_per_s is not zero; this fit needs the gyro at rest.")
+        require_rest(record, "this fit needs the gyro at rest.")
         time, values, temperature = record["time_s"], record[output], record[column]
         complete = drop_spikes(np.isfinite(values) & np.isfinite(temperature), values, temperature)
         left_out += int(np.count_nonzero(~complete))

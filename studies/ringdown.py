@@ -22,13 +22,13 @@ from math import inf, pi
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from studies.errors import InputError, naming
 from studies.files.columns import Columns, read_columns, read_header
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
     from compensation.ringdown.analysis import Estimate, RingDown
     from compensation.ringdown.envelope import Envelope
     from compensation.ringdown.spectrum import SpectrumFit
@@ -61,8 +61,8 @@ class Decay:
     trace: "TraceDecay | None" = None
     spectrum: "SpectrumFit | None" = None
     envelope: "Envelope | None" = field(default=None, repr=False)
-    time: "NDArray[np.float64] | None" = field(default=None, repr=False)
-    amplitude: "NDArray[np.float64] | None" = field(default=None, repr=False)
+    time: NDArray[np.float64] | None = field(default=None, repr=False)
+    amplitude: NDArray[np.float64] | None = field(default=None, repr=False)
 
     @property
     def window(self) -> tuple[float, float] | None:
@@ -129,8 +129,6 @@ class Decay:
 
     def curves(self) -> "Iterator[tuple[NDArray[Any], NDArray[Any], NDArray[Any], NDArray[Any]]]":
         """Yield time (of a spectrum: frequency), level (dB), fitted level and residual of each channel, within the window."""
-        import numpy as np
-
         if self.phased is not None:
             fit = self.phased.fit
             for z, r in zip(fit.envelope.values, fit.residual, strict=True):
@@ -158,8 +156,6 @@ def read_decay(
     harmonic : int, n.
     expected : float, optional, Hz: what a card predicts; raw samples whose frequency is an alias of it are refused.
     """
-    import numpy as np
-
     from compensation.ringdown.analysis import analyse_decay
     from compensation.ringdown.envelope import even_rows, from_lock_in, mix_down
     from compensation.ringdown.trace import analyse_trace
@@ -168,10 +164,8 @@ def read_decay(
     if frequency is not None:
         notes = {**notes, "reference_frequency_Hz": frequency}
     columns = table.values
-    power = next(
-        (columns[name] if name.endswith("W") else 10 ** (columns[name] / 10) for name in POWERS if name in columns),
-        None,
-    )
+    powers = ((name, columns[name]) for name in POWERS if name in columns)
+    power = next((values if name.endswith("W") else 10 ** (values / 10) for name, values in powers), None)
     if "time_s" not in columns:
         from compensation.ringdown.spectrum import fit_spectrum
 
@@ -207,8 +201,6 @@ def is_decay(path: str | Path) -> bool:
 
 def _read(path: str | Path) -> tuple[Columns, dict[str, float]]:
     """Return the table and the numbers of its comments; traces with % comments have two columns and no header."""
-    import numpy as np
-
     try:
         with open(path, encoding="utf-8", errors="replace") as file:
             foreign = file.read(1) == "%"
@@ -219,14 +211,12 @@ def _read(path: str | Path) -> tuple[Columns, dict[str, float]]:
     header = set(read_header(path))
     spectrum = "frequency_Hz" in header and bool(header & set(POWERS))
     table = read_columns(path, KNOWN, ["frequency_Hz" if spectrum else "time_s"])
-    if spectrum and not (np.diff(table.values["frequency_Hz"]) > 0).all():
-        raise InputError(
-            f"{path}: frequency_Hz does not increase; a spectrum is one trace in order of frequency, without time_s."
-        )
+    if spectrum:
+        order = "frequency_Hz does not increase; a spectrum is one trace in order of frequency, without time_s."
+        table.check_order("frequency_Hz", order)
     if len(table.values) < 2:
-        raise InputError(
-            f"{path}: only time_s; a decay needs {RAW[0]}, {POLAR[0][0]} with {POLAR[0][1]}, or {POWERS[0]} beside it."
-        )
+        needs = f"{RAW[0]}, {POLAR[0][0]} with {POLAR[0][1]}, or {POWERS[0]} beside it"
+        raise InputError(f"{path}: only time_s; a decay needs {needs}.")
     notes = _read_start(path, table.comments)
     for comment in table.comments:
         match = NOTE.match(comment)
@@ -242,16 +232,13 @@ def _read_start(path: str | Path, comments: Iterable[str]) -> dict[str, float]:
             try:
                 moment = datetime.datetime.fromisoformat(match[1])
             except ValueError:
-                raise InputError(
-                    f"{path}: the comment '{comment}' holds no date and time such as 2026-03-01T10:00:00."
-                ) from None
+                wrong = "holds no date and time such as 2026-03-01T10:00:00"
+                raise InputError(f"{path}: the comment '{comment}' {wrong}.") from None
             return {"start_s": (moment if moment.tzinfo else moment.replace(tzinfo=datetime.UTC)).timestamp()}
     return {}
 
 
 def _read_trace(path: str | Path) -> tuple[Columns, dict[str, float]]:
-    import numpy as np
-
     lines = Path(path).read_text(encoding="utf-8", errors="replace").splitlines()
     comments = [line.lstrip("% ").strip() for line in lines if line.startswith("%")]
     if not comments or comments[-1] != "time [s], power [dBm]":
@@ -268,9 +255,8 @@ def _read_trace(path: str | Path) -> tuple[Columns, dict[str, float]]:
             except ValueError:
                 raise InputError(f"{path}: the comment '{name}' holds no number: {text.strip()!r}.") from None
     try:
-        rows = np.array(
-            [[float(cell) for cell in line.split(",")] for line in lines if line and not line.startswith("%")]
-        )
+        written = (line.split(",") for line in lines if line and not line.startswith("%"))
+        rows = np.array([[float(cell) for cell in cells] for cells in written])
     except ValueError as error:
         raise InputError(f"{path}: {error}; every row needs a time and a power.") from None
     if rows.ndim != 2 or rows.shape[1] != 2:
@@ -278,9 +264,7 @@ def _read_trace(path: str | Path) -> tuple[Columns, dict[str, float]]:
     return Columns(str(path), {"time_s": rows[:, 0], "power_dBm": rows[:, 1]}, tuple(comments)), notes
 
 
-def _pairs(path: str | Path, columns: Mapping[str, "NDArray[np.float64]"]) -> list["NDArray[np.complex128]"]:
-    import numpy as np
-
+def _pairs(path: str | Path, columns: Mapping[str, NDArray[np.float64]]) -> list[NDArray[np.complex128]]:
     found: list[NDArray[np.complex128]] = []
     for first, second in (*POLAR, *CARTESIAN):
         if (first in columns) != (second in columns):
@@ -328,13 +312,11 @@ def with_decay(instrument: "Instrument", decay: Decay, harmonic: int = 2) -> "In
     }
     instrument = instrument.with_table("imperfection", imperfection)
     tau = e["decay_time_s"].value
-    sizes: dict[str, Mapping[str, float]] = {
-        "bias.damping_anisotropy": {
-            "value": e["damping_split_per_s"].value * tau,
-            "sd": e["damping_split_per_s"].sd * tau,
-        },
-        "bias.damping_axis_deg": {"value": e["damping_axis_deg"].value, "sd": e["damping_axis_deg"].sd},
+    sizes = {
+        "bias.damping_anisotropy": ("damping_split_per_s", tau),
+        "bias.damping_axis_deg": ("damping_axis_deg", 1.0),
+        "loss.inverse_q": ("inverse_q", 1.0),
     }
-    if "inverse_q" in e:
-        sizes["loss.inverse_q"] = {"value": e["inverse_q"].value, "sd": e["inverse_q"].sd}
-    return instrument.with_values(sizes)
+    return instrument.with_values({
+        key: {"value": scale * e[name].value, "sd": scale * e[name].sd} for key, (name, scale) in sizes.items() if name in e
+    })  # fmt: skip

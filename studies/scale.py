@@ -83,19 +83,10 @@ def judge_steps(chain: BellChain, rates: BellRun, rest: BellRun, turning: BellRu
         at_rates, at_rest, at_turning = (np.asarray(getattr(output, step), dtype=float) for output in outputs)
         steady = settled_rows(rates.rate, len(chain.taps) if step == "filtered" else 0)
         enough = len(np.unique(same_rate(rates.rate)[steady])) > 2
-        linearity = measure_linearity(rates.rate[steady], at_rates[steady]) if enough else None
         wander, short, long = _read_allan((rest.time[-1] - rest.time[0]) / (len(rest.time) - 1), at_rest)
-        figures.append(
-            StepFigures(
-                step,
-                linearity.nonlinearity if linearity else None,
-                float(np.std(at_rest)) / DEG,
-                float(np.std(at_turning)) / DEG,
-                wander,
-                short,
-                long,
-            )
-        )
+        nonlinearity = measure_linearity(rates.rate[steady], at_rates[steady]).nonlinearity if enough else None
+        rest_sd, turning_sd = (float(np.std(one)) / DEG for one in (at_rest, at_turning))
+        figures.append(StepFigures(step, nonlinearity, rest_sd, turning_sd, wander, short, long))
     return figures
 
 
@@ -135,9 +126,8 @@ def study_scale(records: "Sequence[Record]", cutoff: float | None, order: int) -
         before, after = _hold_out(thin, rough)
         figures = judge_steps(chain, rates, rest, turning)
     averaged = any(len(less.time) < len(run.time) for less, run in zip(thin, runs, strict=True))
-    return ScaleStudy(
-        chain, runs, output, column, left_out, figures, before, after, averaged, rough is not None, read_law(rates)
-    )
+    judged = (figures, before, after, averaged, rough is not None, read_law(rates))
+    return ScaleStudy(chain, runs, output, column, left_out, *judged)
 
 
 ROUGH = "at rest and then at one rate"
@@ -158,9 +148,8 @@ def read_law(run: BellRun) -> RateLaw | None:
     fifths = np.array([[run.output[part].mean() for part in np.array_split(rows, BLOCKS)] for rows in held])
     if not held:
         return None
-    error = np.sqrt(np.mean(fifths.var(axis=1, ddof=1)) / BLOCKS) * np.ones(
-        len(held)
-    )  # one error of all, of many fifths
+    # one error of all, of many fifths
+    error = np.sqrt(np.mean(fifths.var(axis=1, ddof=1)) / BLOCKS) * np.ones(len(held))
     return fit_rate_law(np.array([level[rows[0]] for rows in held]) / DEG, fifths.mean(axis=1), error)
 
 
@@ -229,18 +218,15 @@ def _cut(run: BellRun, block: int) -> tuple[BellRun, BellRun]:
     chosen = np.array_split(np.arange(len(run.time)), BLOCKS)[block]
     inside = np.zeros(len(run.time), dtype=bool)
     inside[chosen] = True
-    parts = [
-        BellRun(run.time[rows], run.output[rows], run.temperature[rows], run.rate[rows]) for rows in (~inside, inside)
-    ]
-    return parts[0], parts[1]
+    columns = (run.time, run.output, run.temperature, run.rate)
+    rest, part = (BellRun(*(values[rows] for values in columns)) for rows in (~inside, inside))
+    return rest, part
 
 
 def _read_allan(step: float, rate: Real) -> tuple[float | None, float | None, float | None]:
     if len(rate) * step < 10 * LONG:
         return None, None, None
     allan = allan_deviation(rate / DEG * 3600, step)
-    short, long = (
-        float(np.exp(np.interp(np.log(tau), np.log(allan.tau), np.log(allan.deviation)))) * np.sqrt(tau) / 60
-        for tau in (SHORT, LONG)
-    )
-    return allan.bias_instability[0], float(short), float(long)
+    curve = np.interp(np.log([SHORT, LONG]), np.log(allan.tau), np.log(allan.deviation))
+    short, long = (np.exp(curve) * np.sqrt([SHORT, LONG]) / 60).tolist()
+    return allan.bias_instability[0], short, long

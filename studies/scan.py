@@ -125,9 +125,8 @@ def scan_faces(
     say : hears what is being done.
     """
     if 2 * max(harmonics) > highest:
-        raise InputError(
-            f"the split of n = {max(harmonics)} needs harmonic {2 * max(harmonics)} of the faces; set --highest to at least that."
-        )
+        needed = f"the split of n = {max(harmonics)} needs harmonic {2 * max(harmonics)} of the faces"
+        raise InputError(f"{needed}; set --highest to at least that.")
     read = {name: read_cloud(path, unit) for name, path in files.items()}
     clouds = {name: cloud for name, cloud in read.items() if not isinstance(cloud, FaceGrid)}
     projector = Projector(resonator) if clouds else None
@@ -151,10 +150,8 @@ def scan_faces(
             faces[name] = survey_map(cloud.position, cloud.azimuth, cloud.values, SIDES[name], files[name], highest)
     faces = {name: faces[name] for name in ("inner", "outer") if name in faces}
     _check_wall(faces, resonator)
-    imperfection = Imperfection(
-        inner=faces["inner"].field if "inner" in faces else None,
-        outer=faces["outer"].field if "outer" in faces else None,
-    )
+    fields = {name: face.field for name, face in faces.items()}
+    imperfection = Imperfection(inner=fields.get("inner"), outer=fields.get("outer"))
     splits = []
     for n in harmonics:
         say(f"computing the split of n = {n}")
@@ -223,9 +220,8 @@ def _waves(faces: dict[str, Face]) -> tuple[FaceWave, ...]:
 
 
 def _wave(faces: dict[str, Face], quantity: str, order: int, position: float) -> FaceWave:
-    factors = {"wall": {"inner": 1.0, "outer": 1.0}, "offset": {"inner": -0.5, "outer": 0.5}}.get(
-        quantity, {quantity: 1.0}
-    )
+    both = {"wall": {"inner": 1.0, "outer": 1.0}, "offset": {"inner": -0.5, "outer": 0.5}}
+    factors = both.get(quantity, {quantity: 1.0})
     c, covariance = 0j, np.zeros((2, 2))
     for name, factor in factors.items():
         one, own = faces[name].at(position, order)
@@ -245,7 +241,6 @@ def _roundness(faces: dict[str, Face]) -> tuple[Roundness, ...]:
             c = face.waves.along(np.array([position]))[0] @ face.coefficients.T
             c = np.where(np.arange(len(c)) >= 2, c, 0)
             departure = (c * np.exp(-1j * np.multiply.outer(theta, np.arange(len(c))))).real.sum(axis=1)
-            found.append(
-                Roundness(name, float(position), float(np.ptp(departure)), float(np.sqrt(np.mean(departure**2))))
-            )
+            rms = float(np.sqrt(np.mean(departure**2)))
+            found.append(Roundness(name, float(position), float(np.ptp(departure)), rms))
     return tuple(found)

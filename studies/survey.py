@@ -155,13 +155,8 @@ def survey_column(name: str, time: Array, values: Array) -> ColumnSurvey:
     if not known.any():
         return ColumnSurvey(own)
     y, spikes = values[known], find_spikes(values, LEAST_SPIKE)
-    found = ColumnSurvey(
-        own,
-        float(y.mean()),
-        int(spikes.sum()),
-        int(find_stuck(values).sum()) if name not in COMMANDED else 0,
-        int(find_dropouts(values).sum()),
-    )
+    stuck = int(find_stuck(values).sum()) if name not in COMMANDED else 0
+    found = ColumnSurvey(own, float(y.mean()), int(spikes.sum()), stuck, int(find_dropouts(values).sum()))
     if len(y) < FEWEST or not found.varies:
         return found
     clean = np.where(spikes, np.nan, values)
@@ -222,9 +217,8 @@ def _candidates(values: Array) -> list[tuple[int, float]]:
     if len(values) < 4 * n:
         return []
     place = np.arange(n) - 0.5 * (n - 1)
-    ahead = 1 / n - place * 0.5 * n / float(
-        place @ place
-    )  # weights of n rows for the value half a row before the first
+    # weights of n rows for the value half a row before the first
+    ahead = 1 / n - place * 0.5 * n / float(place @ place)
     D = np.correlate(values, ahead, mode="valid")[n:] - np.correlate(values, ahead[::-1], mode="valid")[:-n]
     near = np.correlate(values, np.r_[-np.ones(3), np.ones(3)] / 3, mode="valid")[n - 3 : n - 3 + len(D)]
     spread = max(1.4826 * float(np.median(np.abs(D))), 1e-9 * float(np.ptp(values)))
@@ -290,11 +284,10 @@ def _find_settled(record: Record) -> tuple[Soak, ...]:
     if "frequency_Hz" in record and np.isfinite(record["frequency_Hz"]).any():
         return tuple(soak for soak in find_soaks([record]) if not soak.extrapolated_K)
     t, T, _ = average_evenly(record["time_s"], record[column])
-    whole = [rows for rows in find_holds(T) if t[rows[-1]] - t[rows[0]] >= max(LEAST, 0.02 * (t[-1] - t[0]))]
-    return tuple(
-        Soak(record.path, float(t[rows[0]]), float(t[rows[-1]]), float(T[rows].mean()), np.nan, np.nan, np.nan, np.nan)
-        for rows in whole
-    )
+    least = max(LEAST, 0.02 * (t[-1] - t[0]))
+    whole = [(t[rows], float(T[rows].mean())) for rows in find_holds(T) if t[rows[-1]] - t[rows[0]] >= least]
+    unknown = (np.nan,) * 4
+    return tuple(Soak(record.path, float(times[0]), float(times[-1]), mean, *unknown) for times, mean in whole)
 
 
 def _correlate(time: Array, one: str, x: Array, two: str, y: Array) -> dict[str, str | float | None]:

@@ -203,16 +203,14 @@ def plan_for_card(
     if not 0 < goal < np.inf:
         raise InputError(f"--goal {goal:g}: must be a positive split in Hz.")
     if gain == 0 or not np.isfinite(gain):
-        raise InputError(
-            f"--gain {gain:g}: measured over predicted change of the split, a number of either sign, not 0."
-        )
+        raise InputError(f"--gain {gain:g}: measured over predicted change of the split, of either sign, not 0.")
     if not (0 <= removal_error < 1 and 0 <= gain_error < 1):
         raise InputError("the relative standard errors of the cuts must lie between 0 and 1 (0.02 is 2 %).")
     if not all(np.isfinite((split, axis)).all() and 0 <= error < np.inf for _, split, axis, error in measured):
         raise InputError("splits and axes must be finite, and the reading error must not be negative.")
-    if not all(0 <= x <= 1 for x in heights):
-        wrong = next(x for x in heights if not 0 <= x <= 1)
-        raise InputError(f"--position {wrong:g}: must lie between 0 and 1 (rim).")
+    for x in heights:
+        if not 0 <= x <= 1:
+            raise InputError(f"--position {x:g}: must lie between 0 and 1 (rim).")
     pairs = {}
     for n, *_ in measured:
         if n in pairs:
@@ -220,11 +218,10 @@ def plan_for_card(
         pairs[n] = Pair(solve_modes(resonator, elastic, n)[0])
     readings = [SplitWave.of(n, pairs[n].mode.frequency, split, axis, error) for n, split, axis, error in measured]
     largest = max(readings, key=lambda reading: reading.hertz)
-    sites = (
-        tooth_sites(pairs, teeth)
-        if teeth is not None
-        else rim_sites(resonator, pairs, elastic.rho, largest.slow_axis, heights=heights, tool=tool, kind=kind)
-    )
+    if teeth is not None:
+        sites = tooth_sites(pairs, teeth)
+    else:
+        sites = rim_sites(resonator, pairs, elastic.rho, largest.slow_axis, heights=heights, tool=tool, kind=kind)
 
     def plan_with(gains: Mapping[int, Array], error: float) -> TrimPlan:
         scaled = replace(sites, gain={n: gain * w for n, w in gains.items()})
@@ -246,11 +243,8 @@ def plan_for_card(
             return CardPlan(plan, used)
         for x, (mass, spread) in planned.items():
             wall = float(resonator.at([x * resonator.length]).thickness[0])
-            depth = (
-                cuts[x].depth(mass)
-                if x in cuts
-                else mass / (elastic.rho * tool.width * (wall if kind == "edge" else tool.length))
-            )
+            across = wall if kind == "edge" else tool.length
+            depth = cuts[x].depth(mass) if x in cuts else mass / (elastic.rho * tool.width * across)
             groove = Groove(kind, x, tool.width, tool.length, depth)
             first = {n: float(w[sites.position == x][0]) for n, w in sites.gain.items()}
             cuts[x] = PlannedCut(groove, {n: solve_groove(pair, groove) for n, pair in pairs.items()}, first, spread)
