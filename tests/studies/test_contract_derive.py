@@ -225,3 +225,20 @@ def test_out_holds_what_the_terminal_shows(words, tmp_path, capsys):
     assert main(["derive", *words, "--out", str(file), "--json"]) == 0
     assert capsys.readouterr().out.startswith("{")
     assert file.read_text(encoding="utf-8") == shown
+
+
+def test_both_languages_agree(tmp_path, capsys):
+    space = {}
+    exec(speak(capsys, "--dynamics", "--code", "python")[1].out, space)
+    compiled = compile_c(speak(capsys, "--dynamics", "--code", "c")[1].out, tmp_path).averaged_rates
+    rng = np.random.default_rng(5)
+    for _ in range(20):
+        values = rng.uniform(0.2, 2.0, 15)
+        rates = (ctypes.c_double * 4)()
+        compiled(*(ctypes.c_double(value) for value in values), rates)
+        assert list(rates) == pytest.approx(list(space["averaged_rates"](*values)), rel=1e-12)
+
+
+def test_latex_is_plain_ascii(capsys):
+    """Letters that pdflatex does not know end the run of the document that reads the fragment."""
+    assert speak(capsys, "--dynamics", "--latex")[1].out.isascii()

@@ -2,20 +2,24 @@
 
 from dataclasses import replace
 
+import allantools
 import numpy as np
 import pytest
 
+from compensation.noise import Noise
 from shell.elastic import VaryingElastic
 from shell.modes import solve_modes
 from studies.errors import InputError
 from studies.instrument.card import load_card, shipped_cards
 from studies.instrument.tables.bias import Bias
 from studies.instrument.tables.loss import Loss
+from studies.instrument.tables.noise import NoiseKeys
 from studies.law import law_of
 from studies.record import read_record, write_record
 from studies.simulation.chamber import load_profile
 from studies.simulation.drive import drive_by_profile, rows_of
 from studies.simulation.heat_path import build_network, build_shell_and_stem, slowest_lag
+from studies.simulation.noise import bias_noise, quantise
 from studies.simulation.response import cell_weights, to_cells
 from studies.simulation.virtual_gyro import simulate_run
 from thermal.errors import ThermalError
@@ -264,3 +268,26 @@ def test_an_effect_may_warm_the_resonator_beyond_the_drive():
     law = law_of(card, 270.0, 330.0)
     start, end = found.record["frequency_Hz"][[0, -1]]
     assert end / start == pytest.approx(float(law.frequency(293.15 + 30.0) / law.frequency(293.15 + 15.0)), rel=1e-7)
+
+
+def allan(samples, rate, taus):
+    found, deviation, _, _ = allantools.oadev(samples, rate=rate, data_type="freq", taus=taus)
+    assert len(found) == len(taus)
+    return deviation
+
+
+def test_levels_of_the_rate_output_are_in_the_units_of_gyro_data_sheets():
+    """Angle random walk N: N/√τ with τ in h; rate random walk K: K √(τ/3)."""
+    levels = NoiseKeys(bias_white_deg_per_rt_h=0.02, bias_flicker_deg_per_h=0.0, bias_walk_deg_per_h_per_rt_h=0.5)
+    both = bias_noise(levels)
+    rng = np.random.default_rng(3)
+    white = Noise(white=both.white).draw(400_000, 1.0, rng)
+    assert allan(white, 1.0, [36.0]) == pytest.approx([0.02 / np.sqrt(0.01)], rel=0.05)
+    walk = Noise(walk=both.walk).draw(400_000, 1.0, rng)
+    assert allan(walk, 1.0, [360.0]) == pytest.approx([0.5 * np.sqrt(0.1 / 3)], rel=0.15)
+
+
+def test_rounding_rounds():
+    assert quantise(np.array([4432.0749, 4432.0751]), 0.01) == pytest.approx([4432.07, 4432.08])
+    values = np.array([0.123456789])
+    assert quantise(values, 0.0) is values

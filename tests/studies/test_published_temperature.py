@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from studies.cli import main
+from studies.papers import hrg
 from studies.record import read_record
 
 TABLE1 = "studies/papers/hrg_table1.csv"
@@ -86,3 +87,15 @@ def test_a_model_of_another_gyro_is_doubted(model, tmp_path, capsys):
     path.write_text("time_s,frequency_Hz,resonator_temperature_degC\n" + rows)
     assert main(["temperature", model, str(path), "--out", str(tmp_path / "o.csv")]) == 0
     assert "times the uncertainty of the curve: is the model of this gyro?" in capsys.readouterr().out
+
+
+T, F = hrg.printed_table1()
+STUDY = hrg.study_table(T, F, resolution=hrg.RESOLUTION)
+
+
+def test_local_slopes_have_their_published_values():
+    """Theory sheet: slopes between neighbours over the local frequency, each ± 0.09 from rounding."""
+    np.testing.assert_allclose(STUDY.local_slope_ppm, [92.3, 87.0, 82.7, 79.2, 78.7, 82.0], atol=0.06)
+    assert STUDY.local_uncertainty_ppm == pytest.approx(0.09, abs=0.005)
+    assert float(STUDY.fit.slope_ppm(20.0)) == pytest.approx(79.2, abs=0.05)
+    assert float(STUDY.fit.slope_ppm(0.0)) == pytest.approx(84.0, abs=0.05)
