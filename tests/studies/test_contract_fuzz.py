@@ -190,9 +190,25 @@ def table_text():
     return "temperature_degC,frequency_Hz\n" + "\n".join(f"{a:g},{b:.2f}" for a, b in zip(T, F, strict=True)) + "\n"
 
 
-def raw_text():
-    rows = [f"31.01.2026;12:00:{k:02d};{20 + 0.1 * k:.2f};{4430 + k / 100:.3f}".replace(".", ",", 0) for k in range(30)]
-    return "Messung 7\nDatum;Zeit;T Kammer [°C];Frequenz [Hz]\n" + "\n".join(rows) + "\n"
+def raw_text(*columns):
+    """A logger's file, with further columns of hostile names."""
+    rows = [f"31.01.2026,12:00:{k:02d},{20 + 0.1 * k:.2f},{4430 + k / 100:.3f}{',1' * len(columns)}" for k in range(30)]
+    return ",".join(["Messung 7\nDatum,Zeit,T Kammer [°C],Frequenz [Hz]", *columns]) + "\n" + "\n".join(rows) + "\n"
+
+
+def draft(path):
+    """Draft a map of a raw file; whatever it holds, the map is TOML."""
+    text = draft_map([str(path)]).text
+    assert tomllib.loads(text)["schema"] == "hrg.map/1"
+    path.with_suffix(".toml").write_text(text, encoding="utf-8")
+    return load_map(path.with_suffix(".toml"))
+
+
+def through_a_map(path):
+    """Import a raw file through the map of what it was."""
+    whole = path.with_name("whole.csv")
+    whole.write_text(raw_text(), encoding="utf-8")
+    import_records([str(path)], draft(whole))
 
 
 def read_all_of_a_model(path):
@@ -234,8 +250,7 @@ def documents(tmp_path):
     found.append(("model", model.read_text(), read_all_of_a_model))
     raw = tmp_path / "raw.csv"
     raw.write_text(raw_text(), encoding="utf-8")
-    text = draft_map([str(raw)]).text
-    found.append(("map", text, lambda path: import_records([str(raw)], load_map(path))[""]))
+    found.append(("map", draft_map([str(raw)]).text, lambda path: import_records([str(raw)], load_map(path))[""]))
     found.append(("limits", LIMITS, lambda path: read_file(path, Limits, LIMITS_SCHEMA)))
     found += [(f"study {name}", path.read_text(), read_study) for name, path in shipped_specs().items()]
     return found
@@ -267,7 +282,12 @@ TABLES = {
     "record": (record_text, read_record),
     "steady-state table": (table_text, read_frequency_table),
     "profile": (lambda: "time_s,chamber_temperature_degC\n0,20\n60,20\n600,-10\n", read_profile),
-    "raw file": (raw_text, lambda path: draft_map([str(path)])),
+    "raw file": (raw_text, draft),
+    "raw file of hostile names": (
+        lambda: raw_text('Freq"uenz', "Freq\\uenz", "Freq]uenz\x07", "F\x1b#", "F = 1"),
+        draft,
+    ),
+    "raw file through a map": (raw_text, through_a_map),
 }
 
 
@@ -308,48 +328,7 @@ def test_mutated_tables_never_harm(tmp_path, name):
     assert not harmed
     assert not flag.exists()
     assert accepted  # some mutations are harmless
-    assert accepted < CASES or name == "raw file"  # and some refused; any table of numbers can be drafted
-
-
-def test_mutated_raw_files_through_a_map_never_harm(tmp_path):
-    raw, path, harmed = tmp_path / "raw.csv", tmp_path / "map.toml", {}
-    raw.write_text(raw_text(), encoding="utf-8")
-    path.write_text(draft_map([str(raw)]).text, encoding="utf-8")
-    fixed, rng = load_map(path), np.random.default_rng(17)
-    accepted = 0
-    for case in range(CASES):
-        text = mutate_table(
-            raw_text().replace(";", "\x1f").replace(",", ".").replace("\x1f", ","), rng, tmp_path / "evaluated"
-        )
-        text = text.replace(",", ";")
-        raw.write_bytes(mutate_text(text, rng) if rng.random() < 0.4 else text.encode())
-        accepted += check(lambda file: import_records([str(file)], fixed)[""], raw, f"raw file {case}", harmed)
-    assert not harmed
-    assert not (tmp_path / "evaluated").exists()
-    assert 0 < accepted < CASES
-
-
-@pytest.mark.slow
-def test_a_drafted_map_of_a_mutated_file_is_valid_toml(tmp_path):
-    """Names and cells of a hostile file cannot break out of the map that is drafted from it."""
-    rng = np.random.default_rng(5)
-    path, out = tmp_path / "raw.csv", tmp_path / "map.toml"
-    drafted, harmed = 0, {}
-    for case in range(CASES):
-        text = mutate_table(raw_text().replace(";", ","), rng, tmp_path / "evaluated")
-        text = text.replace(
-            "Frequenz", str(rng.choice(['Freq"uenz', "Freq\\uenz", "Freq]uenz\x07", "Freq\x1b#", "Frequenz = 1"]))
-        )
-        path.write_text(text, encoding="utf-8")
-        try:
-            out.write_text(draft_map([str(path)]).text, encoding="utf-8")
-        except ALLOWED:
-            continue
-        tomllib.loads(out.read_text(encoding="utf-8"))
-        check(load_map, out, f"drafted map {case}", harmed)
-        drafted += 1
-    assert not harmed
-    assert drafted > CASES / 4
+    assert accepted < CASES or read is draft  # and some refused; any table of numbers can be drafted
 
 
 def test_mutated_cards_through_the_whole_solver(tmp_path, capsys):
