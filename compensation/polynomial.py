@@ -81,10 +81,9 @@ class PolynomialFit:
 def count_apart(x: ArrayLike) -> int:
     """Return how many values are apart from each other by `APART` of their span: readings of one soak are one value."""
     values = np.unique(np.asarray(x, dtype=np.float64))
-    last, count = -np.inf, 0
-    for value in values:
-        if value - last > APART * np.ptp(values):
-            last, count = value, count + 1
+    place, count = 0, 0
+    while place < len(values):
+        place, count = np.searchsorted(values, values[place] + APART * np.ptp(values), "right"), count + 1
     return count
 
 

@@ -145,6 +145,7 @@ def started_slowly(folder, address, cases):
     spec, slow = folder / "study.toml", f'method = "latin-hypercube"\ncases = {cases}\nbatch = 4'
     spec.write_text(spec_of("slow", slow, 'name = "user.x"\nlow = 0\nhigh = 1'))
     words = words_of("study", "run", str(spec), "--out", str(folder / "out"), "--scheduler", address, "--allow-python")
+    words[2] = f"import studies.sweeps.cluster as cluster; cluster.PATIENCE = 5.0; {words[2]}"
     run = subprocess.Popen(words, stderr=subprocess.PIPE, text=True, env=environment(HRG_TEST_LOG=str(folder / "log")))
     until = time.monotonic() + 600
     while run.poll() is None and time.monotonic() < until and not rows_of(folder / "out"):
