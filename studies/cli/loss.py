@@ -12,16 +12,16 @@ from typing import Any
 import numpy as np
 
 from shell.constants import zero_Celsius
-from shell.damping.budget import Budget
+from shell.damping.budget import Budget, LossPart
 from shell.damping.thermoelastic import trace_share
 from studies.cli.arguments import Card, FromDegC, Harmonic, Step, Theory, ToDegC, lay_temperatures
 from studies.cli.output import answers
 from studies.instrument.card import Instrument, load_card
 from studies.loss.account import StatedLoss, damping_around, stated_loss
 from studies.loss.model import LossModel, loss_model
-from studies.reports import loss as pictures
+from studies.reports import style
 from studies.reports.digits import plain
-from studies.results import Chapter, Column, Facts, Figure, Result, Sentence, Table, row_of, rows_of
+from studies.results import Chapter, Column, Drawing, Facts, Figure, Result, Sentence, Table, row_of, rows_of
 
 DEG = float(np.degrees(1))
 WALL = (
@@ -139,7 +139,7 @@ def _parts(
         Chapter("Summary", [
             Facts(_facts(budget, stated, at, degrees[at])),
             *words,
-            Figure(lambda: pictures.bars(budget, at), f"Parts of 1/Q at {degrees[at]:g} °C with 90 % intervals."),
+            Figure(lambda: _draw_bars(budget, at), f"Parts of 1/Q at {degrees[at]:g} °C with 90 % intervals."),
         ]),
         Chapter(f"Parts at {degrees[at]:g} °C", [
             Table("Share and gain", rows, [
@@ -155,12 +155,12 @@ def _parts(
                 T, Column("q", "Q", digits=3), Column("q", "90 % interval", digits=3, interval=("q_low", "q_high")),
                 Column("inverse_q", "1/Q", "1e-9", ".3g", scale=1e9), Column("slope", "slope of 1/Q", "%/°C", "+.2g", scale=100.0),
             ]),
-            Figure(lambda: pictures.course(budget, stated, model.vibration.reference), "1/Q and its parts.") if len(degrees) > 1 else None,
+            Figure(lambda: _draw_course(budget, stated, model.vibration.reference), "1/Q and its parts.") if len(degrees) > 1 else None,
         ]),
         Chapter("Along the meridian", [
             Sentence(WALL, where="page"),
             Sentence(f"Thermoelastic participation {trace_share(model.vibration.solution):.3g}: {SQUEEZE}", where="page"),
-            Figure(lambda: pictures.along(model), "Energy, area strain and normal motion of the faces, each per area over its mean."),
+            Figure(lambda: _draw_along(model), "Energy, area strain and normal motion of the faces, each per area over its mean."),
         ]),
         Chapter("Around the axis", [
             Table("Damping anisotropy", damped, [
@@ -192,3 +192,63 @@ def _facts(budget: Budget, stated: StatedLoss | None, at: int, degrees: float) -
 
 def _sentence(words: str) -> str:
     return words[:1].upper() + words[1:] + "." * (not words.endswith(".")) if words else ""
+
+
+DASHES = ("-", "--", ":")
+SMALLEST = 1e-6  # of the sum: smaller parts are in the tables, not in the pictures
+
+
+def _draw_bars(budget: Budget, at: int) -> Drawing:
+    """The parts at one temperature with their intervals, largest on top."""
+    parts = _shown(budget, at)
+    with style.figure(height=0.34 * len(parts) + 1.0, x="1/Q (1e−9)") as (made, axis):
+        place = np.arange(len(parts))[::-1]
+        values = 1e9 * np.array([part.inverse_q[at] for part in parts])
+        low, high = (1e9 * np.array([part.interval[end][at] for part in parts]) for end in (0, 1))
+        axis.barh(place, values, color=[style.COLOURS[k % 7] for k in range(len(parts))], height=0.6)
+        ends = {"fmt": "none", "ecolor": style.BLACK, "capsize": 3, "linewidth": 1.0}
+        axis.errorbar(values, place, xerr=[values - low, high - values], **ends)
+        shares = [100 * part.inverse_q[at] / budget.inverse_q[at] for part in parts]
+        axis.set_yticks(place, [f"{part.name}, {share:.3g} %" for part, share in zip(parts, shares, strict=True)])
+        axis.set_xlim(left=0.0)
+        return made
+
+
+def _draw_course(budget: Budget, stated: StatedLoss | None, reference: float) -> Drawing:
+    """1/Q and its parts over temperature."""
+    degrees, middle = budget.temperatures - zero_Celsius, len(budget.temperatures) // 2
+    low, high = budget.interval
+    with style.figure(height=4.0, x="temperature (°C)", y="1/Q") as (made, axis):
+        axis.fill_between(degrees, low, high, color=style.BLACK, alpha=0.12, linewidth=0)
+        axis.plot(degrees, budget.inverse_q, color=style.BLACK, linewidth=2.2, label="sum, with its 90 % interval")
+        for k, part in enumerate(_shown(budget, middle)):
+            course = np.where(part.inverse_q > 0, part.inverse_q, np.nan)
+            axis.plot(degrees, course, DASHES[k // 7 % 3], color=style.COLOURS[k % 7], label=part.name)
+        if stated is not None:
+            axis.plot(reference - zero_Celsius, stated.inverse_q, "k*", markersize=11, label="stated in the card")
+        axis.set_yscale("log")
+        axis.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=9)
+        return made
+
+
+def _draw_along(model: LossModel) -> Drawing:
+    """What the faces of the wall take part in, both together, over the meridian."""
+    faces = model.vibration.faces
+    area, order = faces[0].area + faces[1].area, np.argsort(faces[0].position)
+    shares = {
+        "energy": [face.energy for face in faces],
+        "area strain": [face.stretch**2 for face in faces],
+        "normal motion": [face.moved[2] ** 2 for face in faces],
+    }
+    x, y = "position on the meridian, 0 where it starts, 1 where it ends", "per area, over its mean"
+    with style.figure(height=3.0, x=x, y=y) as (made, axis):
+        for (words, parts), dash, colour in zip(shares.items(), DASHES, style.COLOURS, strict=False):
+            density = np.sum(parts, axis=0)
+            mean = float(np.sum(density * area) / np.sum(area)) or 1.0
+            axis.plot(faces[0].position[order], density[order] / mean, dash, color=colour, label=words)
+        axis.set_ylim(bottom=0.0)
+        return made
+
+
+def _shown(budget: Budget, at: int) -> list["LossPart"]:
+    return [part for part in budget.parts if part.inverse_q[at] > SMALLEST * budget.inverse_q[at]]

@@ -15,14 +15,17 @@ from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from studies.cli.arguments import Quiet, Workers
 from studies.cli.output import answers
 from studies.design.answer import Answer
 from studies.design.run import CARD, TABLE, best_instrument
 from studies.design.run import optimise as find_best
-from studies.reports import design as pictures
+from studies.instrument.card import Instrument
+from studies.reports import style
 from studies.reports.digits import plain
-from studies.results import Blocks, Chapter, Column, Facts, Figure, Result, Table, row_of
+from studies.results import Blocks, Chapter, Column, Drawing, Facts, Figure, Result, Table, row_of
 from studies.results.page import Block
 
 
@@ -135,7 +138,7 @@ def _parts(found: Answer, payload: dict[str, Any]) -> list[Any]:
                 Column("best", "best, full solve", digits=7),
             ], "Interpolated: from all other designs. Full solve: the design itself, solved again from its card with the same result."
                " Only the magnitude of a separation counts; its sign shows on which side the nearest mode lies."),
-            Figure(lambda: pictures.section(best_instrument(found)), "Section of the best design, at rest and at maximum displacement."),
+            Figure(lambda: _draw_section(best_instrument(found)), "Section of the best design, at rest and at maximum displacement."),
         ]),
         Chapter("About the best design", [Blocks(lambda: _live(found))]),
         Chapter("Constraints", [
@@ -147,7 +150,7 @@ def _parts(found: Answer, payload: dict[str, Any]) -> list[Any]:
         ]),
         Chapter("Front", [
             "One design is best in every objective: they do not conflict here." if several and len(payload["front"]) == 1 else None,
-            Figure(lambda: pictures.front(found), "All designs that meet the constraints, and the Pareto front.") if several else None,
+            Figure(lambda: _draw_front(found), "All designs that meet the constraints, and the Pareto front.") if several else None,
             Table("Pareto front", payload["front"], front),
         ]),
         Chapter("Tolerances", [
@@ -157,7 +160,7 @@ def _parts(found: Answer, payload: dict[str, Any]) -> list[Any]:
             ], "Worst case and standard deviation to first order; full solves: the extremes among the worst corners and designs drawn from the tolerances."),
         ]),
         Chapter("Search", [
-            Figure(lambda: pictures.history(found), "Objective and excess over the limits of the designs, in the order in which they were computed."),
+            Figure(lambda: _draw_history(found), "Objective and excess over the limits of the designs, in the order in which they were computed."),
             Table("Designs that could not be computed", [{"reason": reason, "designs": count} for reason, count in reasons.most_common(8)],
                 ("designs", "reason"), where="page"),
         ]),
@@ -180,3 +183,44 @@ def _number(count: int, what: str) -> str:
 def _agree(row: dict[str, Any]) -> bool:
     """Whether the best design's column is the same solved again."""
     return not isfinite(row["verified"]) or abs(row["verified"] - row["best"]) <= 1e-9 * abs(row["best"])
+
+
+def _draw_history(found: "Answer") -> Drawing:
+    """The best so far, and the excess of every design over its limits."""
+    over, t = found.history.T
+    count = np.arange(1, len(over) + 1)
+    held = over == 0
+    best = np.minimum.accumulate(np.where(held, t, np.inf))
+    labels = ("objective, scaled", "excess, scaled")
+    with style.figure(2, 1, 4.2, "design", labels, sharex=True) as (made, (top, low)):
+        top.plot(count[held], t[held], ".", color=style.SKY, label="keeps all limits")
+        top.plot(count[np.isfinite(best)], best[np.isfinite(best)], color=style.BLUE, label="best so far")
+        if held.any():
+            spread = np.ptp(t[held]) or 1.0
+            top.set_ylim(t[held].min() - 0.1 * spread, t[held].max() + 0.1 * spread)
+        low.semilogy(count, np.maximum(over, 1e-9), ".", color=style.VERMILION)
+        return made
+
+
+def _draw_front(found: "Answer") -> Drawing:
+    """The first two objectives: every design that keeps the limits, the front, the design that is handed out."""
+    columns = {column.name: column for column in found.task.study.columns}
+    names = [one.column for one in found.task.keys.objective[:2]]
+    titles = [f"{columns[n].label}{f' ({columns[n].unit})' if columns[n].unit != '1' else ''}" for n in names]
+    a, b = (found.place(name) for name in names)
+    held = found.history[:, 0] == 0
+    with style.figure(height=3.8, x=titles[0], y=titles[1]) as (made, axis):
+        axis.plot(found.values[held, a], found.values[held, b], ".", color=style.SKY, label="keeps all limits")
+        axis.plot(found.front_values[:, a], found.front_values[:, b], "o-", color=style.BLUE, label="front")
+        axis.plot(found.after[a], found.after[b], "*", color=style.VERMILION, markersize=13, label="best design")
+        for c, scale in ((a, axis.set_xscale), (b, axis.set_yscale)):
+            if (found.values[held, c] > 0).all() and np.ptp(np.log10(found.values[held, c])) > 1:
+                scale("log")
+        return made
+
+
+def _draw_section(instrument: "Instrument") -> Drawing:
+    """The section with the swing of the mode n = 2."""
+    from shell.modes import solve_modes
+
+    return solve_modes(*instrument.at(instrument.reference_temperature), 2)[0].plot()

@@ -19,9 +19,9 @@ from studies.cli.output import answers, say
 from studies.errors import InputError, naming
 from studies.files.writing import write_text
 from studies.instrument.card import Instrument, save_card
-from studies.reports import scan as pictures
 from studies.reports.digits import plain, to_interval
-from studies.results import Chapter, Column, Facts, Figure, Result, Sentence, Table, row_of
+from studies.reports.style import BLUE, ORANGE, figure
+from studies.results import Chapter, Column, Drawing, Facts, Figure, Result, Sentence, Table, row_of
 from studies.scan import Scan, ScanInterval, scan_faces
 
 NONE = "none"
@@ -143,9 +143,9 @@ def _parts(found: Scan, payload: dict[str, Any]) -> list[Chapter]:
     return [
         Chapter("Summary", [Facts(_facts(payload), "page"), only,
             Table("Frequency splits from the measured faces", list(map(_significant, splits)), SPLITS, note)]),
-        Chapter("Maps", [Figure(lambda: pictures.maps(found), "Fitted deviations over azimuth and meridian.")]),
+        Chapter("Maps", [Figure(lambda: _draw_maps(found), "Fitted deviations over azimuth and meridian.")]),
         Chapter("Circumferential harmonics", [
-            Figure(lambda: pictures.harmonics(found), "Amplitudes at the rim with 90 % intervals; harmonic 2n splits the modes n."),
+            Figure(lambda: _draw_harmonics(found), "Amplitudes at the rim with 90 % intervals; harmonic 2n splits the modes n."),
             *(Table(f"Circumferential harmonics of the {name} at position {rim:.3f}", waves[key], HARMONICS) for key, name in NAMES.items() if key in waves),
         ]),
         Chapter("Roundness", [Table("Roundness of circles", payload["roundness"], ROUNDNESS,
@@ -245,3 +245,40 @@ def _map_csv(found: Scan) -> str:
             cells = (f"{1e6 * values[i, j]:.5f}" for _, _, values in maps.values())
             lines.append(f"{at:.6f},{np.rad2deg(angle):.3f}," + ",".join(cells))
     return "\n".join(lines) + "\n"
+
+
+def _draw_maps(scan: Scan) -> Drawing:
+    """Return maps of wall and middle surface, or of the one face."""
+    names = ["wall", "offset"] if len(scan.faces) == 2 else list(scan.faces)
+    with figure(len(names), 1, 2.5 * len(names), squeeze=False) as (made, axes):
+        for ax, name in zip(axes[:, 0], names, strict=True):
+            x, theta, values = scan.map_of(name)
+            shown = 1e6 * (values - values.mean(axis=1, keepdims=True))
+            most = max(float(abs(shown).max()), 1e-6)
+            image = ax.pcolormesh(
+                np.rad2deg(theta), x, shown, cmap="RdBu_r", vmin=-most, vmax=most, shading="nearest", rasterized=True
+            )
+            made.colorbar(image, ax=ax, label="µm")
+            ax.set(title={"wall": "wall thickness, mean of each circle removed", "offset": "middle surface"}.get(name, f"{name} face"),
+                   xlabel="azimuth (°)", ylabel="position (1: rim)", xticks=range(0, 361, 45))  # fmt: skip
+            ax.grid(False)
+        return made
+
+
+def _draw_harmonics(scan: Scan) -> Drawing:
+    """Return the amplitudes of the harmonics at the rim."""
+    quantity = "wall" if len(scan.faces) == 2 else next(iter(scan.faces))
+    rim = max(w.position for w in scan.waves)
+    with figure(1, 1, 3.2) as (made, ax):
+        for q, colour, shift in ((quantity, BLUE, -0.15), ("offset", ORANGE, 0.15)):
+            mine = [w for w in scan.waves if w.quantity == q and w.position == rim and w.order > 0]
+            if not mine:
+                continue
+            order, value, low, high = np.array([
+                (w.order, *(1e6 * getattr(w.amplitude, key) for key in ("value", "low", "high"))) for w in mine
+            ]).T  # fmt: skip
+            ax.bar(order + shift, value, 0.28, color=colour, label="middle surface" if q == "offset" else q)
+            reach = np.maximum([value - low, high - value], 0)
+            ax.errorbar(order + shift, value, reach, fmt="none", ecolor="black", capsize=2)
+        ax.set(xlabel="circumferential harmonic", ylabel="amplitude at the rim (µm)", yscale="log")
+        return made

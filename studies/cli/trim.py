@@ -8,6 +8,7 @@ does as another kind of cut over what it does as this one; `measure`, what to me
 one: the next is planned from what is measured after it.
 """
 
+from collections.abc import Sequence
 from math import degrees
 from typing import Annotated, Any, Literal
 
@@ -15,15 +16,15 @@ import numpy as np
 
 from shell.constants import zero_Celsius
 from shell.resonator import Resonator
-from shell.trimming import SplitWave
+from shell.trimming import SplitWave, TrimPlan
 from studies.cli.arguments import MANY, Card, Temperature, open_card
 from studies.cli.measured_splits import pair_splits, read_scan, read_unbalance
 from studies.cli.output import answers, say
 from studies.errors import naming
 from studies.files.writing import write_text
 from studies.reports.digits import plain, to_error
-from studies.reports.trim import polar
-from studies.results import Chapter, Column, Facts, Figure, Result, Sentence, Table, row_of
+from studies.reports.style import BLUE, GREEN, VERMILION, figure
+from studies.results import Chapter, Column, Drawing, Facts, Figure, Result, Sentence, Table, row_of
 from studies.trim import SURE, CardPlan, Teeth, Tool, other_cuts, plan_for_card
 
 KINDS = {"mass": "unstrained mass", "edge": "off the rim", "inner": "off the inner face", "outer": "off the outer face"}
@@ -185,7 +186,7 @@ def _parts(planned: CardPlan, payload: dict[str, Any]) -> list[Chapter]:
             Sentence(f"Type of cut in this plan: {KINDS[payload['cut']]}. Effect of the same mass at the rim by type of cut, relative to this one: {kinds}."
                 " Negative: the split changes in the opposite direction.", "note", "page"),
         ]),
-        Chapter("Position of the cuts", [Figure(lambda: polar(plan, cuts),
+        Chapter("Position of the cuts", [Figure(lambda: _draw_polar(plan, cuts),
             "Rim against azimuth. Curves bulge where the slower mode has its antinodes (dashed); black bars: the cuts of the table, by mass.")]),
         Chapter("Expected result", [Table("Splits before and after the cuts", states, STATES, LIMIT)]),
     ]  # fmt: skip
@@ -253,3 +254,31 @@ def _csv(payload: dict[str, Any]) -> str:
             place = f"{c['azimuth_deg']:.4f},{c['position']:.6f},{c['height_mm']:.4f}"
             lines.append(f"{k},{place},{c['mass_ug']:.5f},{depth}")
     return "\n".join(lines) + "\n"
+
+
+def _draw_polar(plan: TrimPlan, cuts: Sequence[dict[str, Any]]) -> Drawing:
+    """Return the cuts as bars on the rim, and the splits as curves around it, before and as expected after the cuts."""
+    theta = np.linspace(0, 2 * np.pi, 721)
+    with figure(1, 2, 4.2, subplot_kw={"projection": "polar"}) as (made, axes):
+        titles = ("measured, with the cuts", "expected after the cuts")
+        for ax, states, title in zip(axes, (plan.before, plan.round.after), titles, strict=True):
+            size = max(s.hertz for s in plan.before)
+            ax.plot(theta, np.ones_like(theta), color="#888888", lw=1)
+            for state, colour in zip(states, (VERMILION, BLUE, GREEN, "black"), strict=False):
+                rose = 1 + 0.35 * state.hertz / size * np.cos(2 * state.harmonic * (theta - state.slow_axis))
+                label = f"n = {state.harmonic}: {plain(1e3 * state.hertz)} mHz"
+                ax.plot(theta, rose, color=colour, lw=1.6, label=label)
+                for k in range(2 * state.harmonic):
+                    at = state.slow_axis + k * np.pi / state.harmonic
+                    ax.plot([at, at], [0, 0.9], color=colour, lw=0.8, ls="--")
+            if states is plan.before:
+                most = max(cut["mass_ug"] for cut in cuts)
+                for number, cut in enumerate(cuts, 1):
+                    azimuth, length = np.deg2rad(cut["azimuth_deg"]), 0.25 * cut["mass_ug"] / most + 0.03
+                    ax.bar(azimuth, length, width=0.06, bottom=1.0, color="black", alpha=0.75)
+                    ax.text(azimuth, 1.44, str(number), ha="center", va="center", fontsize=8)
+            ax.set(ylim=(0, 1.55), yticks=[])
+            ax.tick_params(labelsize=8, pad=1)  # so that 0° of one and 180° of the other stand apart
+            ax.set_title(title, fontsize=10)
+            ax.legend(loc="lower center", bbox_to_anchor=(0.5, -0.28), fontsize=8)
+        return made
