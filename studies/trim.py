@@ -233,7 +233,10 @@ def plan_for_card(
         return CardPlan(plan_with(sites.gain, gain_error), {})
     cuts: dict[float, PlannedCut] = {}
     for _ in range(MOST_PLANS):
-        gains = {n: w * np.array([_ratio(cuts, x, n) for x in sites.position]) for n, w in sites.gain.items()}
+        gains = {
+            n: w * np.array([cuts[x].gain(n) if x in cuts else 1.0 for x in sites.position])
+            for n, w in sites.gain.items()
+        }
         plan = plan_with(gains, hypot(gain_error, max((cut.error for cut in cuts.values()), default=0.0)))
         planned = {x: _typical(plan, x) for x in sorted({cut.position for cut in plan.round.cuts})}
         if all(x in cuts and abs(mass / cuts[x].mass - 1) < SAME_DEPTH for x, (mass, _) in planned.items()):
@@ -251,10 +254,6 @@ def plan_for_card(
     raise ShellError(
         f"no depth of these cuts achieves the plan: the stress that narrow grooves relieve cancels the effect of the mass they remove. {WIDER}"
     )
-
-
-def _ratio(cuts: Mapping[float, PlannedCut], position: float, harmonic: int) -> float:
-    return cuts[position].gain(harmonic) if position in cuts else 1.0
 
 
 def _typical(plan: TrimPlan, position: float) -> tuple[float, float]:

@@ -5,7 +5,6 @@ its values, null where a card has none).
 """
 
 from math import isfinite
-from typing import Any
 
 from studies.cli.output import answers
 from studies.comparison import compare as compare_designs
@@ -34,13 +33,14 @@ def compare(*card: str) -> Result:
     payload = {"schema": "hrg.compare/1", "cards": found.names, "figures": figures, "differing": found.differing}
     names = [f"{name} ({k})" if found.names.count(name) > 1 else name for k, name in enumerate(found.names, 1)]
     note = "±: one standard deviation from the published values of the material, common to designs of one material."
+    known = [row | {"values": [v if isfinite(v) else "not known" for v in row["values"]]} for row in figures]
     keys = [{"key": key, "values": list(map(_short, values))} for key, values in found.differing.items()]
     return Result(
         payload,
         "Comparison of designs",
         f"{', '.join(names)}: natural frequencies, slope, settling, and the keys in which the cards differ.",
         [
-            Table("Designs", _known(figures), [
+            Table("Designs", known, [
                 Column("name", "quantity"), "unit",
                 *(Column(f"values.{k}", name, error=f"uncertainties.{k}") for k, name in enumerate(names)),
             ], note),
@@ -50,11 +50,6 @@ def compare(*card: str) -> Result:
             None if keys else "The cards are the same.",
         ],
     )  # fmt: skip
-
-
-def _known(figures: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Say of values that are not known that they are not."""
-    return [row | {"values": [value if isfinite(value) else "not known" for value in row["values"]]} for row in figures]
 
 
 def _short(value: object) -> str:

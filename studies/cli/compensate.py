@@ -8,7 +8,7 @@ from compensation.decimation import average_blocks
 from compensation.errors import CompensationError
 from studies import models
 from studies.cli.arguments import Array, EmitC
-from studies.cli.output import answers, keep_model, say
+from studies.cli.output import answers, keep_model, say, tell_rows
 from studies.errors import InputError
 from studies.instrument.units import unit_of
 from studies.record import COMPENSATED, RESONATOR, Record, read_record, write_record
@@ -71,7 +71,7 @@ def compensate(
         say(f"reading {run}")
         record = read_record(run)
         result = models.compensate(loaded, record, extrapolate=extrapolate)
-        write_record(result, out, lambda rows: _progress(rows, len(result)))
+        write_record(result, out, tell_rows(len(result)))
         say(f"record: {out}")
         added = [name for name in result.columns if name not in record]
         columns = {name: _judge(record, result, name) for name in added if name.startswith(COMPENSATED)}
@@ -91,11 +91,6 @@ def compensate(
     }
     payload |= {"added": added, "columns": columns}
     return Result(payload, "Compensation of a record", f"{run or 'No record'}, compensated with {model}.", parts)
-
-
-def _progress(written: int, rows: int) -> None:
-    if written % 500_000 == 0:
-        say(f"written {written:,} of {rows:,} rows")
 
 
 def _judge(record: Record, result: Record, name: str) -> dict[str, Any]:

@@ -14,8 +14,7 @@ from studies.errors import InputError
 from studies.instrument.card import load_card
 from studies.record import read_record
 from studies.reports import style
-from studies.reports.digits import to_interval
-from studies.results import Column, Drawing, Figure, Payload, Result, Sentence, Table, row_of
+from studies.results import Column, Drawing, Figure, Result, Sentence, Table, row_of
 
 NAMES = {
     "radiated_share": ("Radiated share of the heat exchange at 20 °C", ""),
@@ -69,7 +68,10 @@ def fit_thermal(*data: str, card: str | None = None, lags: int | None = None, co
         "undetermined": [direction.parts for direction in found.undetermined],
         "residual_rms_Hz": rms,
     }
-    rows = [e | dict(zip(("constant", "unit"), _name(name), strict=True)) for name, e in estimates.items()]
+    rows = [
+        e | dict(zip(("constant", "unit"), _name(name), strict=True)) | {"shown": "not determined" if e["value"] is None else e["value"]}
+        for name, e in estimates.items()
+    ]  # fmt: skip
     ends = Column("value", f"{100 * confidence:g} % interval", interval=("low", "high"), digits=0)
     note = f"Fitted to averages over {found.row_step:g} s; rms residual {rms:.2g} Hz."
     return Result(
@@ -77,7 +79,12 @@ def fit_thermal(*data: str, card: str | None = None, lags: int | None = None, co
         "Thermal time constants",
         f"Lag of the resonator behind its housing in {', '.join(data)}.",
         [
-            Table("Thermal constants", rows, ("Constant", Column(_value, "Value"), ends, "Unit"), note),
+            Table(
+                "Thermal constants",
+                rows,
+                ("Constant", Column("shown", "Value", within=("low", "high")), ends, "Unit"),
+                note,
+            ),
             *(Sentence(OPEN.format(_combine(one.parts)), "warning") for one in found.undetermined),
             Sentence(MISFIT.format(rms / white), "warning") if rms > COLOURED * white else None,
             Figure(lambda: _draw(found), "Residual of the frequency, all runs in order."),
@@ -95,10 +102,6 @@ MISFIT = (
 def _name(key: str) -> tuple[str, str]:
     """Return the name and the unit of a constant."""
     return NAMES.get(key) or (key.replace("_", " ").capitalize(), "s" if key.startswith("time_constant") else "")
-
-
-def _value(row: Payload) -> str:
-    return "not determined" if row["value"] is None else to_interval(row["value"], row["low"], row["high"])[0]
 
 
 def _combine(parts: dict[str, float]) -> str:

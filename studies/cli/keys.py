@@ -1,6 +1,6 @@
 """`hrg keys`: the keys of the files that people write, from their declaration."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from importlib import import_module
 from typing import Any
 
@@ -10,15 +10,7 @@ from studies.instrument.registry import card_tables
 from studies.results import Column, Result, Table
 from studies.schema.reference import list_keys, spell_uncertainty
 
-COLUMNS = (
-    "key",
-    "unit",
-    Column("default_words", "default"),
-    "bounds",
-    Column("uncertainty", "known to"),
-    "type",
-    "meaning",
-)
+COLUMNS = ("key", "unit", Column("shown", "default"), "bounds", Column("uncertainty", "known to"), "type", "meaning")
 
 
 @answers("hrg.keys/1")
@@ -38,23 +30,14 @@ def keys(kind: str = "card", *, table: str = "") -> Result:
     if not rows:
         names = {row["table"].strip("[]") for row in _keys_of(kind)} - {""}
         raise InputError(f"a {kind} has no table '{table}'{nearest(table, names)}")
-    headings = list(dict.fromkeys((row["table"], row.get("only", "")) for row in rows))
-    tables = [
-        Table(
-            " with ".join(word for word in (name or "At the top", only) if word),
-            [{**row, **_words(row)} for row in rows if (row["table"], row.get("only", "")) == (name, only)],
-            COLUMNS,
-        )
-        for name, only in headings
-    ]
+    tables: dict[str, list[dict[str, Any]]] = {}
+    for row in rows:
+        default = "required" if row["required"] else "" if row["default"] is None else str(row["default"])
+        heading = " with ".join(filter(None, (row["table"] or "At the top", row.get("only", ""))))
+        tables.setdefault(heading, []).append(row | {"shown": default, "uncertainty": spell_uncertainty(row)})
+    shown = [Table(heading, found, COLUMNS) for heading, found in tables.items()]
     lead = "A plain number in a card is as uncertain as its key says here."
-    return Result({"schema": "hrg.keys/1", "kind": kind, "keys": rows}, f"Keys of a {kind}", lead, tables)
-
-
-def _words(row: Mapping[str, Any]) -> dict[str, str]:
-    """Return default and uncertainty as people read them."""
-    default = "required" if row["required"] else "" if row["default"] is None else str(row["default"])
-    return {"uncertainty": spell_uncertainty(row), "default_words": default}
+    return Result({"schema": "hrg.keys/1", "kind": kind, "keys": rows}, f"Keys of a {kind}", lead, shown)
 
 
 KINDS = {

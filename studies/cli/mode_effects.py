@@ -184,7 +184,12 @@ MOUNT = (
     Column("mount.shift_ppm", "shift", "ppm", "+.4g"),
     Column("mount.slope_ppm_per_degC", "slope", "ppm/°C", "+.3g"),
 )
-FILMS = (*MODE, Column("film", "film"), Column("shift_ppm", "shift", "ppm", "+.4g"))
+FILMS = (
+    *MODE,
+    Column("film", "film"),
+    Column("shift_ppm", "shift", "ppm", "+.4g"),
+    Column(lambda film: " and ".join(film["missing"]), "unknown without"),
+)
 CRYSTAL = (
     MODE[0],
     *(Column(f"crystal.{key}_Hz", name, "Hz", ".4f") for key, name in (
@@ -216,7 +221,7 @@ def effect_tables(modes: list[dict[str, Any]], asked: Asked) -> list[Table]:
         return [row for row in modes if key in row]
 
     strain = next((row["mount"]["strain_ppm"] for row in those("mount")), 0.0)
-    films = [{**row, **film, "shift_ppm": _known_shift(film)} for row in those("films") for film in row["films"]]
+    films = [row | film for row in those("films") for film in row["films"]]
     antinode = "Slow axis: an antinode of the slower mode."
     return [
         Table("Pairs with imperfections and electrodes", those("split"), SPLIT, antinode),
@@ -226,8 +231,3 @@ def effect_tables(modes: list[dict[str, Any]], asked: Asked) -> list[Table]:
         Table("Effect of the films", films, FILMS, BARE),
         Table("Pairs of the anisotropic crystal", those("crystal"), CRYSTAL, VOIGT),
     ]
-
-
-def _known_shift(film: Entry) -> float | str:
-    shift: float | None = film["shift_ppm"]
-    return f"unknown without {' and '.join(film['missing'])}" if shift is None else shift

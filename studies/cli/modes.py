@@ -35,7 +35,9 @@ FAR = 0.1
 COLUMNS = (
     *MODE,
     Column("label", "kind"),
-    Column("shown_Hz", "f", "Hz"),
+    Column(
+        lambda m: to_numerical_error(m["frequency_Hz"], m["relative_error_estimate"] * m["frequency_Hz"], 4), "f", "Hz"
+    ),
     Column("bryan_factor", "Bryan factor", form=".5f"),
     Column("relative_error_estimate", "solver error, relative", form=".0e"),
     Column("material_uncertainty_Hz", "material uncertainty", "Hz", ".2g"),
@@ -107,7 +109,7 @@ def modes(
         f"Modes of {instrument.name}",
         f"Natural frequencies and Bryan factors at {T - zero_Celsius:g} °C, {THEORIES[theory]}.",
         [
-            Table(name, [row | {"shown_Hz": _to_error(row)} for row in entries], COLUMNS, _note(theory, share)),
+            Table(name, entries, COLUMNS, _note(theory, share)),
             *effect_tables(entries, asked),
             *_all_orders(entries),
             *_detail_tables(entries if detailed else [], "everywhere" if sensitivities else "page"),
@@ -125,11 +127,6 @@ def _view(instrument: Instrument, harmonics: list[int], T: float, theory: str) -
     words = " Rayleigh's closed form gives the frequencies of the table, not these shapes."
     remark = words if theory == "rayleigh" else ""
     return view_blocks([show_mode(instrument, n, temperature=T, theory=drawn) for n in harmonics], remark)
-
-
-def _to_error(row: dict[str, Any]) -> str:
-    """The frequency to the second digit of its solver error, at most four decimals."""
-    return to_numerical_error(row["frequency_Hz"], row["relative_error_estimate"] * row["frequency_Hz"], 4)
 
 
 def _note(theory: str, share: float) -> str:

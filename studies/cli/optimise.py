@@ -10,7 +10,6 @@ columns; `tolerances`: rows of `column`, `value`, `worst_case` (±, first order)
 
 from collections import Counter
 from collections.abc import Sequence
-from math import isfinite
 from operator import itemgetter
 from pathlib import Path
 from typing import Any
@@ -121,7 +120,11 @@ def _parts(found: Answer, payload: dict[str, Any]) -> list[Any]:
     reasons = Counter(reason for _, reason in found.failures)
     several = len(goals) > 1
     price = "price, by fractions of the ranges" if several else f"price, {label[goals[0][0]]} per unit"
-    words = "" if all(_agree(row) for row in payload["columns"]) else " The solve from the card differs: see the table."
+    words = (
+        ""
+        if all(not abs(row["verified"] - row["best"]) > 1e-9 * abs(row["best"]) for row in payload["columns"])
+        else " The solve from the card differs: see the table."
+    )
     keys = found.task.study.names[: found.task.free]
     front = [Column(itemgetter(name), name.removeprefix("resonator."), digits=5) for name in keys]
     front += [Column(itemgetter(name), named(name), digits=6) for name in found.task.wanted]
@@ -178,11 +181,6 @@ def _live(found: Answer) -> Sequence[Block]:
 
 def _number(count: int, what: str) -> str:
     return f"{count} {what}{'s' * (count != 1)}"
-
-
-def _agree(row: dict[str, Any]) -> bool:
-    """Whether the best design's column is the same solved again."""
-    return not isfinite(row["verified"]) or abs(row["verified"] - row["best"]) <= 1e-9 * abs(row["best"])
 
 
 def _draw_history(found: "Answer") -> Drawing:

@@ -105,6 +105,11 @@ def say(message: str) -> None:
     print(printable(message), file=sys.stderr)
 
 
+def tell_rows(count: int) -> Callable[[int], None]:
+    """Return what tells, of so many rows that are written, every half million."""
+    return lambda done: say(f"written {done:,} of {count:,} rows") if done % 500_000 == 0 else None
+
+
 def _plain(value: Any) -> Any:
     if isinstance(value, Mapping):
         return {str(key): _plain(item) for key, item in value.items()}

@@ -11,7 +11,7 @@ from typing import Annotated, Literal
 import numpy as np
 
 from studies.cli.arguments import POSITIVE, Card, Seed, Theory
-from studies.cli.output import answers, say
+from studies.cli.output import answers, say, tell_rows
 from studies.instrument.card import load_card
 from studies.record import write_record
 from studies.results import Column, Figure, Result, Sentence, Table, row_of
@@ -66,11 +66,7 @@ def simulate(
     for warning in run.warnings:
         say(f"warning: {warning}")
 
-    def progress(written: int) -> None:
-        if written % 500_000 == 0:
-            say(f"written {written} of {rows} rows ({100 * written / rows:.0f} %)")
-
-    write_record(run.record, out, progress)
+    write_record(run.record, out, tell_rows(rows))
     known: dict[str, float] | None = None
     if spread:
         from studies.calibration.ahead import spread_of_prediction

@@ -43,22 +43,14 @@ class Measured:
 
 @dataclass(frozen=True)
 class Standing:
-    """An effect in one device.
+    """An effect in one device."""
 
-    Attributes
-    ----------
-    score : log posterior over nothing being there
-    size, sd : rms of what it makes of the response in the records, and how well that is known
-    first, first_sd : its first coefficient; of a family its size
-    coefficient : name of that
-    """
-
-    score: float
-    size: float
-    sd: float
-    first: float
+    score: float  # log posterior over nothing being there
+    size: float  # rms of what it makes of the response in the records
+    sd: float  # how well that is known
+    first: float  # its first coefficient; of a family its size
     first_sd: float
-    coefficient: str
+    coefficient: str  # name of that
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,6 @@ import multiprocessing
 import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
-from functools import partial
 from pathlib import Path
 
 from compensation.errors import CompensationError
@@ -61,8 +60,7 @@ def _all(devices: Sequence[Device], out: str | None, workers: int, progress: Pro
         for device in devices:
             yield device, _answer(device, out, progress)
         return
-    context = multiprocessing.get_context("spawn")
-    executor = ProcessPoolExecutor(workers, mp_context=context)
+    executor = ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn"))
     waiting: set[Future[Answer | str]] = set()
     try:
         work = {executor.submit(_answer, device, out): device for device in devices}
@@ -81,7 +79,7 @@ def _answer(device: Device, out: str | None, progress: Progress = lambda words: 
         key = device.key
         if (kept := _kept(device, key, out)) is not None:
             return kept
-        answer, found = diagnose_device(device, key, partial(_tell, progress, device.serial))
+        answer, found = diagnose_device(device, key, lambda words: progress(f"{device.serial}: {words}"))
         if out is not None:
             from studies.reports.diagnosis import diagnosis_parts, headline
             from studies.results import Result
@@ -94,10 +92,6 @@ def _answer(device: Device, out: str | None, progress: Progress = lambda words: 
     except (InputError, ThermalError, ShellError, CompensationError, OSError) as error:
         return str(error)
     return answer
-
-
-def _tell(progress: Progress, serial: str, words: str) -> None:
-    progress(f"{serial}: {words}")
 
 
 def _path(out: str, serial: str) -> Path:

@@ -124,17 +124,9 @@ def study_twin(seed: int) -> tuple[TwinFit, ...]:
         for count in (1, 3):
             fit = fit_bias(runs[:count], method)
             left = fit.left(first)
-            fits.append(
-                TwinFit(
-                    method,
-                    count,
-                    fit.terms,
-                    (bias_stability(first), bias_stability(first, left)),
-                    score_runs(fit, [cooling], extrapolate=True),
-                    score_runs(fit, [warming], extrapolate=True),
-                    (first.time, first.bias, left),
-                )
-            )
+            training = bias_stability(first), bias_stability(first, left)
+            met, warmed = (score_runs(fit, [run], extrapolate=True) for run in (cooling, warming))
+            fits.append(TwinFit(method, count, fit.terms, training, met, warmed, (first.time, first.bias, left)))
     return tuple(fits)
 
 

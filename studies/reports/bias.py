@@ -144,7 +144,7 @@ def path_table(judged: Judged, where: Where = "everywhere") -> Table:
             "step": str(k),
             "action": f"{'add' if step.added else 'remove'} {_symbol(step.term, symbol)}" if k else "initial",
             "F": None if math.isnan(step.F) else step.F,
-            "p": "" if math.isnan(step.p_value) else _probability(step.p_value),
+            "p": "" if math.isnan(p := step.p_value) else f"{p:.1e}" if p >= 1e-99 else "< 1e-99",
             "bic": step.criterion,
             "score": None if math.isnan(score) else score,
             "model": ", ".join(_symbol(name, symbol) for name in sorted(step.terms, key=ORDER.index)) or "constant",
@@ -302,10 +302,6 @@ def _symbol(term: str, symbol: str) -> str:
     if term == "constant":
         return term
     return SYMBOLS[term] if symbol == "f" else SYMBOLS[term].replace("ḟ", "Ṫ").replace("f", symbol)
-
-
-def _probability(p: float) -> str:
-    return f"{p:.1e}" if p >= 1e-99 else "< 1e-99"
 
 
 def _measured(value: float, uncertainty: float) -> str:

@@ -28,7 +28,9 @@ METHOD = (
 
 def headline(lot: Lot) -> str:
     """Return what the lot has in common and who differs, in a few sentences."""
-    common = [_spell(one) for one in lot.shares if one.kind in ("all", "all but")]
+    common = [
+        f"{' or '.join(one.names)} ({NAMES[one.response]})" for one in lot.shares if one.kind in ("all", "all but")
+    ]
     text = f"Common to the lot: {', '.join(common)}." if common else "The devices have no cause in common."
     for name, why in lot.bad_batches.items():
         text += f" Batch {name} differs: {_first(why)}."
@@ -43,10 +45,6 @@ def headline(lot: Lot) -> str:
 
 def _first(reasons: list[str]) -> str:
     return reasons[0] + (f", and {len(reasons) - 1} more" if len(reasons) > 1 else "")
-
-
-def _spell(one: Share) -> str:
-    return f"{' or '.join(one.names)} ({NAMES[one.response]})"
 
 
 def _devices(one: Share) -> str:
@@ -108,7 +106,8 @@ def fleet_parts(lot: Lot, page: Callable[[str], str] | None = None) -> list[Chap
         ("Odd devices", str(len(lot.odd)), ", ".join(lot.odd[:6])),
         ("Odd batches", str(len(lot.bad_batches)), ", ".join(lot.bad_batches)),
     ]
-    ordered = _ordered(lot)
+    # those first in which a device or a batch differs
+    ordered = sorted(lot.quantities, key=lambda q: min([*q.odd.values(), *q.bad_batches.values()], default=1.0))
     caption = "Values with 90 % intervals in the order of the serial numbers; band: mean ± 3 scatter."
     dated = [one for one in ordered[:DATED] if sum(s in lot.made for s in one.of) > 2]
     charts = [
@@ -132,11 +131,6 @@ def fleet_parts(lot: Lot, page: Callable[[str], str] | None = None) -> list[Chap
 def _name(one: Quantity) -> str:
     """Return a settled reading by its name, a value of the card by what people call it."""
     return one.name if " " in one.name else spell_parameter(one.name)[0]
-
-
-def _ordered(lot: Lot) -> list[Quantity]:
-    """Those first in which a device or a batch differs."""
-    return sorted(lot.quantities, key=lambda one: min([*one.odd.values(), *one.bad_batches.values()], default=1.0))
 
 
 def _draw(lot: Lot, quantities: list[Quantity], by_date: bool = False) -> Drawing:

@@ -223,11 +223,8 @@ def draw(figure: Drawing, caption: str, alt: str) -> Picture:
         figure.savefig(buffer, format="svg", bbox_inches=shown, metadata={"Date": None})
     height = 96 * float(figure.get_figheight())
     curves = read_curves(figure, *shown.bounds)
-    return Picture(_data_uri("image/svg+xml", buffer.getvalue()), caption, alt, height, curves)
-
-
-def _data_uri(kind: str, data: bytes) -> str:
-    return f"data:{kind};base64,{base64.b64encode(data).decode()}"
+    source = "data:image/svg+xml;base64," + base64.b64encode(buffer.getvalue()).decode()
+    return Picture(source, caption, alt, height, curves)
 
 
 def _provenance() -> str:
