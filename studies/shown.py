@@ -10,14 +10,11 @@ if TYPE_CHECKING:
 
 
 class Shown:
-    """Gives a class with a short `__repr__` and `to_frame` its look in a notebook, and its picture.
+    """Gives a class with a short `__repr__` and `to_frame` its look in a notebook, and its picture."""
 
-    Attributes
-    ----------
-    drawn_by : str, "module:function" of the picture, by name: results do not import the pages, which import them.
-    """
-
-    drawn_by: ClassVar[str] = ""
+    drawn_by: ClassVar[str] = (
+        ""  # "module:function" of the picture, by name: results do not import the pages, which import them
+    )
 
     def to_frame(self) -> "DataFrame":
         """Return what the result holds as a table."""

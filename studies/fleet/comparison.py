@@ -26,28 +26,17 @@ Scores = Mapping[str, Mapping[str, Standing]]
 
 @dataclass(frozen=True)
 class Share:
-    """One cause over the lot.
-
-    Attributes
-    ----------
-    effect, response : str
-    equivalent : names that no device separates from it
-    kind : "all" (that could show it), "all but" (the exceptions lack it), "batch", "few" (the exceptions have it), "some"
-    having, lacking : devices that show it, and that could and do not
-    odd : the exceptions
-    evidence : twice the log posterior over none, summed
-    sizes : device -> Standing
-    """
+    """One cause over the lot."""
 
     effect: str
     response: str
-    equivalent: tuple[str, ...]
-    kind: str
-    having: tuple[str, ...]
+    equivalent: tuple[str, ...]  # names that no device separates from it
+    kind: str  # "all" (that could show it), "all but" (the exceptions lack it), "batch", "few" (the exceptions have it), "some"
+    having: tuple[str, ...]  # devices that show it, and that could and do not
     lacking: tuple[str, ...]
-    odd: tuple[str, ...]
-    evidence: float
-    sizes: Mapping[str, Standing]
+    odd: tuple[str, ...]  # the exceptions
+    evidence: float  # twice the log posterior over none, summed
+    sizes: Mapping[str, Standing]  # device -> Standing
     batch: str = ""
 
     @property

@@ -55,22 +55,14 @@ class Standing:
 
 @dataclass(frozen=True)
 class Answer:
-    """What is kept of a device.
-
-    Attributes
-    ----------
-    verdict : the object of `hrg diagnose --json`
-    level : its frequency (Hz), where it was measured
-    measured : name with unit -> Measured
-    standings : response -> effect -> Standing
-    """
+    """What is kept of a device."""
 
     serial: str
     key: str
-    verdict: Mapping[str, Any]
-    level: float | None
-    measured: Mapping[str, Measured]
-    standings: Mapping[str, Mapping[str, Standing]]
+    verdict: Mapping[str, Any]  # the object of `hrg diagnose --json`
+    level: float | None  # its frequency (Hz), where it was measured
+    measured: Mapping[str, Measured]  # name with unit -> Measured
+    standings: Mapping[str, Mapping[str, Standing]]  # response -> effect -> Standing
 
     def as_dict(self) -> dict[str, Any]:
         """Return the object of its file."""

@@ -22,23 +22,14 @@ TOLD = 0.6
 
 @dataclass(frozen=True)
 class Lot:
-    """Answers of all devices, with those that could not be had, and what they say together.
+    """Answers of all devices, with those that could not be had, and what they say together."""
 
-    Attributes
-    ----------
-    answers : serial -> Answer
-    failed : serial -> why there is none
-    made, batches : serial -> date, and batch, where they are known
-    quantities : values over the lot
-    shares : causes over the lot
-    """
-
-    answers: Mapping[str, Answer]
-    failed: Mapping[str, str]
-    made: Mapping[str, date]
+    answers: Mapping[str, Answer]  # serial -> Answer
+    failed: Mapping[str, str]  # serial -> why there is none
+    made: Mapping[str, date]  # serial -> date, and batch, where they are known
     batches: Mapping[str, str]
-    quantities: tuple[Quantity, ...]
-    shares: tuple[Share, ...]
+    quantities: tuple[Quantity, ...]  # values over the lot
+    shares: tuple[Share, ...]  # causes over the lot
 
     @cached_property
     def reasons(self) -> dict[str, list[str]]:

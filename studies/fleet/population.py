@@ -67,20 +67,12 @@ class Population:
 
 @dataclass(frozen=True)
 class Quantity:
-    """One value over the lot.
+    """One value over the lot."""
 
-    Attributes
-    ----------
-    name : with its unit
-    of : serial -> Measured
-    looks : devices times values that were looked at
-    batches : serial -> batch
-    """
-
-    name: str
-    of: Mapping[str, Measured]
-    looks: int
-    batches: Mapping[str, str] = field(default_factory=dict)
+    name: str  # with its unit
+    of: Mapping[str, Measured]  # serial -> Measured
+    looks: int  # devices times values that were looked at
+    batches: Mapping[str, str] = field(default_factory=dict)  # serial -> batch
 
     def among(self, serials: Iterable[str]) -> Population:
         """Return the population of some devices."""

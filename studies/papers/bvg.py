@@ -104,27 +104,23 @@ def reproduce_bell(seed: int = 0) -> BellTwin:
 
 @dataclass(frozen=True)
 class Claims:
-    """What the printed coefficients imply for the printed results.
+    """What the printed coefficients imply for the printed results."""
 
-    Attributes
-    ----------
-    bias_deviation, scale_deviation : (float, float)
-        Standard deviation (°/s) that (34), and (36) at 300 °/s, have over −45…55 °C; and the one that the printed
-        before and after imply, √(before² − after²).
-    curvature_nonlinearity : float, nonlinearity (1) that the quadratic term of (35) makes over ±360 °/s.
-    mapped : (float, float), what (35), and (35) with (36) at 25 °C, make of the printed −361.4 °/s.
-    noise_deviation : float, standard deviation (°/s) of samples that are white noise of the printed random walk before the filter.
-    averaging : tuple of (τ in s, factor), factor by which the FIR filter lowers the Allan deviation of white noise, read at τ.
-    cutoff_for_printed : float, cut-off (Hz) with which the order-50 filter lowers it at τ = 1 s by the printed ratio of random walks.
-    """
-
-    bias_deviation: tuple[float, float]
+    bias_deviation: tuple[
+        float, float
+    ]  # Standard deviation (°/s) that (34), and (36) at 300 °/s, have over −45…55 °C; and the one that the printed before and after imply, √(before² − after²)
     scale_deviation: tuple[float, float]
-    curvature_nonlinearity: float
-    mapped: tuple[float, float]
-    noise_deviation: float
-    averaging: tuple[tuple[float, float], ...]
-    cutoff_for_printed: float
+    curvature_nonlinearity: float  # nonlinearity (1) that the quadratic term of (35) makes over ±360 °/s
+    mapped: tuple[float, float]  # what (35), and (35) with (36) at 25 °C, make of the printed −361.4 °/s
+    noise_deviation: (
+        float  # standard deviation (°/s) of samples that are white noise of the printed random walk before the filter
+    )
+    averaging: tuple[
+        tuple[float, float], ...
+    ]  # factor by which the FIR filter lowers the Allan deviation of white noise, read at τ
+    cutoff_for_printed: (
+        float  # cut-off (Hz) with which the order-50 filter lowers it at τ = 1 s by the printed ratio of random walks
+    )
 
 
 def examine_claims() -> Claims:

@@ -75,28 +75,17 @@ def compare_bell_theory(card: str = CARD) -> BellTheory:
 
 @dataclass(frozen=True)
 class LoopReading:
-    """A planted rate read from the integrated equations (23): open loop (25) and force rebalance (26), rad/s.
+    """A planted rate read from the integrated equations (23): open loop (25) and force rebalance (26), rad/s."""
 
-    Attributes
-    ----------
-    planted, open_loop, rebalance : the rate, and its mean as read.
-    scale_error : relative error of Ω = K A_q (30) with K of the resonator's constants.
-    singular_share : part of the time in which ṗ of (24) is below a tenth of its amplitude.
-    second_form : the mean read from the driven axis in open loop, second form of (24), rad/s.
-    from_charges : the mean read in force rebalance from the charges of the piezo elements, (27)–(29), rad/s.
-    volts_per_um : sum of the amplifiers of elements 3 and 7 per micrometre of the mouth.
-    printed_share : part of the charge that (27) as printed leaves, σ_φφ over σ_θθ + σ_φφ.
-    """
-
-    planted: float
+    planted: float  # the rate, and its mean as read
     open_loop: float
     rebalance: float
-    scale_error: float
-    singular_share: float
-    second_form: float
-    from_charges: float
-    volts_per_um: float
-    printed_share: float
+    scale_error: float  # relative error of Ω = K A_q (30) with K of the resonator's constants
+    singular_share: float  # part of the time in which ṗ of (24) is below a tenth of its amplitude
+    second_form: float  # the mean read from the driven axis in open loop, second form of (24), rad/s
+    from_charges: float  # the mean read in force rebalance from the charges of the piezo elements, (27)–(29), rad/s
+    volts_per_um: float  # sum of the amplifiers of elements 3 and 7 per micrometre of the mouth
+    printed_share: float  # part of the charge that (27) as printed leaves, σ_φφ over σ_θθ + σ_φφ
 
 
 def read_planted_rate(planted: float = 2.0) -> LoopReading:

@@ -22,36 +22,25 @@ Where = Literal["everywhere", "page", "terminal"]
 
 @dataclass(frozen=True)
 class Column:
-    """One quantity of a table.
+    """One quantity of a table."""
 
-    Attributes
-    ----------
-    key : str or callable
-        Where a row has it: a key or an attribute, or several and places in a list joined by dots ("split.slow_Hz"), or what makes it
-        of the row; what a row lacks leaves the cell empty.
-    heading, unit : str, what people read above it.
-    form : str, a format such as ".4f" or "+.3g"; without one a number has `digits` significant digits and no exponent where it can be avoided.
-    error : str, the key of its standard error: the value is written as far as the error's second digit, with ± and the error.
-    interval : (str, str)
-        Keys of the ends of its interval, shown as "low … high" instead of the value; with `error` to its second digit too, with digits=0
-        to the second digit of the width.
-    within : (str, str), keys of the ends of its interval: the value is written to the second digit of the width.
-    scale : float, what the row has times this is shown, for example 1e6 for ppm.
-    spell : callable, what makes a text of the row a name for people, such as `display_name` for a key of a card.
-    where : str, whether it stands in the terminal, on the page, or on both.
-    """
-
-    key: Key
-    heading: str
+    key: Key  # or callable Where a row has it: a key or an attribute, or several and places in a list joined by dots ("split.slow_Hz"), or what makes it of the row; what a row lacks leaves the cell empty
+    heading: str  # what people read above it
     unit: str = ""
-    form: str = ""
+    form: str = ""  # a format such as ".4f" or "+.3g"; without one a number has `digits` significant digits and no exponent where it can be avoided
     digits: int = 4
-    error: str = ""
-    interval: tuple[str, str] | None = None
-    within: tuple[str, str] | None = None
-    scale: float = 1.0
-    spell: Callable[[str], str] = str
-    where: Where = "everywhere"
+    error: str = ""  # the key of its standard error: the value is written as far as the error's second digit, with ± and the error
+    interval: tuple[str, str] | None = (
+        None  # Keys of the ends of its interval, shown as "low … high" instead of the value; with `error` to its second digit too, with digits=0 to the second digit of the width
+    )
+    within: tuple[str, str] | None = (
+        None  # keys of the ends of its interval: the value is written to the second digit of the width
+    )
+    scale: float = 1.0  # what the row has times this is shown, for example 1e6 for ppm
+    spell: Callable[[str], str] = (
+        str  # what makes a text of the row a name for people, such as `display_name` for a key of a card
+    )
+    where: Where = "everywhere"  # whether it stands in the terminal, on the page, or on both
 
     @property
     def title(self) -> str:
@@ -196,23 +185,16 @@ class Chapter:
 
 @dataclass(frozen=True)
 class Result:
-    """What a command answers.
+    """What a command answers."""
 
-    Attributes
-    ----------
-    payload : Mapping, the object for programs, with its `schema`; a key `report` gets the path of the page.
-    title, lead : str, of the page: a name, and one sentence of what it shows.
-    parts : Sequence[Chapter | Part], what people read, in reading order; parts before the first chapter stand under "Results".
-    status : int, the exit status, where it is not 0.
-    printed : str, what the terminal shows instead of the parts, such as code or LaTeX.
-    """
-
-    payload: dict[str, Any]
-    title: str
+    payload: dict[str, Any]  # the object for programs, with its `schema`; a key `report` gets the path of the page
+    title: str  # of the page: a name, and one sentence of what it shows
     lead: str = ""
-    parts: Sequence[Chapter | Part] = ()
-    status: int = 0
-    printed: str | None = None
+    parts: Sequence[
+        Chapter | Part
+    ] = ()  # what people read, in reading order; parts before the first chapter stand under "Results"
+    status: int = 0  # the exit status, where it is not 0
+    printed: str | None = None  # what the terminal shows instead of the parts, such as code or LaTeX
     sources: Sequence[str] = field(default=())
 
     @property
