@@ -24,23 +24,21 @@ Where = Literal["everywhere", "page", "terminal"]
 class Column:
     """One quantity of a table."""
 
-    key: Key  # or callable Where a row has it: a key or an attribute, or several and places in a list joined by dots ("split.slow_Hz"), or what makes it of the row; what a row lacks leaves the cell empty
-    heading: str  # what people read above it
+    key: Key  # of a row: a key, an attribute, several and places in a list ("split.slow_Hz"), or what makes it; absent: an empty cell
+    heading: str  # what people read above it, with the unit
     unit: str = ""
-    form: str = ""  # a format such as ".4f" or "+.3g"; without one a number has `digits` significant digits and no exponent where it can be avoided
+    form: str = (
+        ""  # such as ".4f" or "+.3g"; without one `digits` significant digits, no exponent where it can be avoided
+    )
     digits: int = 4
-    error: str = ""  # the key of its standard error: the value is written as far as the error's second digit, with ± and the error
-    interval: tuple[str, str] | None = (
-        None  # Keys of the ends of its interval, shown as "low … high" instead of the value; with `error` to its second digit too, with digits=0 to the second digit of the width
-    )
-    within: tuple[str, str] | None = (
-        None  # keys of the ends of its interval: the value is written to the second digit of the width
-    )
+    error: str = ""  # key of its standard error: the value to the second digit of the error, with ± and the error
+    # keys of the ends of its interval, shown as "low … high" instead of the value, to the second digit of `error` or, with digits=0, of
+    # the width; `within`: the value itself to the second digit of the width
+    interval: tuple[str, str] | None = None
+    within: tuple[str, str] | None = None
     scale: float = 1.0  # what the row has times this is shown, for example 1e6 for ppm
-    spell: Callable[[str], str] = (
-        str  # what makes a text of the row a name for people, such as `display_name` for a key of a card
-    )
-    where: Where = "everywhere"  # whether it stands in the terminal, on the page, or on both
+    spell: Callable[[str], str] = str  # makes a text a name for people, such as `display_name` for a key of a card
+    where: Where = "everywhere"
 
     @property
     def title(self) -> str:
