@@ -4,12 +4,11 @@ import dataclasses
 from typing import Any
 
 from studies.papers.bvg import BellTwin, reproduce_bell
-from studies.papers.bvg_theory import compare_bell_theory, read_planted_rate
+from studies.papers.bvg_theory import compare_bell_theory, read_planted_rate, theory_chapters
 from studies.papers.cvg_cross_damping import PRINTED_IMPROVEMENT, CrossDampingTwin, reproduce_cross_damping
 from studies.papers.cvg_filters import FilterStudy, study_error_map, study_filters
 from studies.papers.loop_claims import LoopClaims, study_claims
 from studies.reports import bell, cross_damping, filters
-from studies.reports.bell_theory import theory_chapters
 from studies.results import Chapter, Column, Table, row_of
 
 CLAIMS_SOURCES = (

@@ -10,16 +10,14 @@ from compensation.frequency import fit_frequency
 from shell.constants import zero_Celsius
 from studies.diagnosis.table import TableDiagnosis
 from studies.papers import hrg
-from studies.papers.bias_twin import TwinFit
+from studies.papers.bias_twin import TwinFit, twin_chapters
 from studies.papers.hrg import FrequencyStudy, PhysicsComparison
-from studies.papers.settling import NETWORKS, ROOM_degC, SettlingStudy
+from studies.papers.settling import NETWORKS, ROOM_degC, SettlingStudy, settling_chapter
+from studies.papers.theories import theories_chapter
 from studies.reports import gyro_papers, mode_picture, style
-from studies.reports.bias_twin import twin_chapters
 from studies.reports.diagnosis import headline
 from studies.reports.diagnosis_table import table_parts
 from studies.reports.frequency import coefficients_table, error_figure, fit_figure, order_parts, order_sentence
-from studies.reports.settling import settling_chapter
-from studies.reports.theories import theories_chapter
 from studies.results import (
     Blocks,
     Chapter,

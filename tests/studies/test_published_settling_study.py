@@ -4,8 +4,7 @@ import pytest
 
 from studies.instrument.card import load_card
 from studies.instrument.tables.thermal import IDENTIFIED_MOUNT
-from studies.papers.settling import FAST, SETTLED, identify_mount, study_settling
-from studies.reports.settling import settling_chapter, soak_sentence
+from studies.papers.settling import FAST, SETTLED, identify_mount, settling_chapter, soak_sentence, study_settling
 from studies.results import Figure, Sentence, Table
 
 
@@ -80,5 +79,5 @@ def test_points_taken_upwards_hide_the_soak_in_the_offset(study):
 
 def test_the_chapter_says_so(study):
     chapter = settling_chapter(study)
-    assert [type(part) for part in chapter.parts] == [Sentence, Figure, Table, Figure, Table, Sentence]
+    assert [type(part) for part in chapter.parts] == [str, Figure, Table, Figure, Table, Sentence]
     assert "opposite to" in soak_sentence(study)
