@@ -12,7 +12,7 @@ from shell.errors import ShellError, mm
 from shell.kernel import Orders, Section, shell_table
 from shell.layout import Chain, End, lay_chain
 from shell.levels import Level, Theory
-from shell.quadrature import Array, at_gauss, gauss, legendre, nodal
+from shell.quadrature import Array, at_gauss, gauss, nodal
 from shell.resonator import Resonator
 from shell.root import lay_root
 from shell.sparse import Index, Rows
@@ -133,8 +133,7 @@ def _shell_group(resonator: Resonator, chain: Chain, n: int, level: Level, start
     xi, weights = gauss(p + 2)
     eta = gauss(max(orders) + 2)
     section = sections(resonator, chain, xi, weights)
-    u, v, w = (at_gauss(legendre, order, len(eta[0])) for order in orders)
-    table = shell_table(section, n, (u, v, w), eta, at_gauss(nodal, p, p + 2))
+    table = shell_table(section, n, orders, eta, at_gauss(nodal, p, p + 2))
     elements, m = len(chain.segments), sum(orders) + 3
     nodes = p * np.arange(elements)[:, None] + np.arange(p + 1)
     unknowns = start + (nodes[:, :, None] * m + np.arange(m)).reshape(elements, -1)

@@ -16,7 +16,7 @@ from shell.cells import ZERO, CellTable, R, Z
 from shell.errors import ShellError
 from shell.kernel import shell_gradients
 from shell.modes import Mode
-from shell.quadrature import Array, at_gauss, gauss, legendre
+from shell.quadrature import Array, gauss
 from shell.solution import Solution
 from shell.system import Group, ShellGroup, System
 
@@ -119,6 +119,4 @@ def _meet(A: Array, B: Array, doubled: bool) -> Array:
 
 def _table(system: System, group: ShellGroup) -> Array:
     through = system.level.through
-    eta = gauss(max(through) + 2)
-    u, v, w = (at_gauss(legendre, order, len(eta[0])) for order in through)
-    return shell_gradients(group.place.section, system.n, (u, v, w), eta)
+    return shell_gradients(group.place.section, system.n, through, gauss(max(through) + 2))

@@ -21,10 +21,10 @@ from numpy.typing import NDArray
 
 from shell.errors import ShellError, mm
 from shell.imperfection import Pair
-from shell.imperfection.pair import WAVE
 from shell.imperfection.place import cut
 from shell.quadrature import Array, gauss
 from shell.resonator import Resonator
+from shell.solution import COSINE
 from shell.sparse import Index, assemble_elements, dissect, factor_symmetric
 
 Face: TypeAlias = Literal["edge", "inner", "outer"]
@@ -297,7 +297,7 @@ def _loads(pair: Pair, grid: _Grid, nodes: _Nodes, lam: float, G: float, rho: fl
             weight = volume[mine, chosen].reshape(-1, 3, 3)
             N, strain = functions[chosen].reshape(3, 3, 27), B[mine, chosen].reshape(-1, 3, 3, 6, 81)
             for kind, (even, odd) in enumerate(((cosine, sine), (sine, -cosine))):
-                factor = np.where(WAVE, even[..., None], odd[..., None])
+                factor = np.where(np.isin(np.arange(6), COSINE), even[..., None], odd[..., None])
                 local = np.moveaxis(stress[:, at], 0, -1)[:, None] * factor
                 moved = np.moveaxis(d[:, at], 0, -1)[:, None] * np.where(
                     [True, False, True], even[..., None], odd[..., None]

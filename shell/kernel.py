@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from shell.quadrature import Array, Basis
+from shell.quadrature import Array, Basis, legendre
 
 SHEAR_CORRECTION = 5 / 6
 Orders = tuple[int, int, int]
@@ -79,9 +79,7 @@ class Section:
     position: Array
 
 
-def shell_table(
-    section: Section, n: int, through: tuple[Basis, Basis, Basis], eta: tuple[Array, Array], along: Basis
-) -> StrainTable:
+def shell_table(section: Section, n: int, through: Orders, eta: tuple[Array, Array], along: Basis) -> StrainTable:
     """Strains of a shell of revolution in its own frame, without approximation in z/R.
 
     With ζ = η h/2, A = 1 + κ ζ and ρ = r + ζ n_r (the radius of the point), subscripts for derivatives:
@@ -95,7 +93,7 @@ def shell_table(
     ----------
     section : the middle surface at the stations.
     n : circumferential harmonic; u, w vary as cos nθ, v as sin nθ (for n = 0, v as 1).
-    through : Legendre modes of u, v, w at the thickness points.
+    through : degrees of the Legendre modes of u, v, w through the thickness.
     eta : thickness points on [-1, 1] and their weights.
     along : polynomials along the meridian at the stations.
     """
@@ -117,7 +115,7 @@ def shell_table(
     volume = (A * rho)[..., 0, 0] * share[..., None] * weights
     moved = np.stack([f[:, 0] for f in (u, v, w)])
     displacement = np.broadcast_to(moved, (*section.r.shape, *moved.shape))
-    naghdi = through[2].values.shape[1] == 1
+    naghdi = through[2] == 0
     return StrainTable(
         strain,
         displacement,
@@ -129,7 +127,7 @@ def shell_table(
     )
 
 
-def shell_gradients(section: Section, n: int, through: tuple[Basis, Basis, Basis], eta: tuple[Array, Array]) -> Array:
+def shell_gradients(section: Section, n: int, through: Orders, eta: tuple[Array, Array]) -> Array:
     """All derivatives of the displacements that `shell_table` has the strains of, for geometric stiffness.
 
     Rows ∂_s, ∂_θ, ∂_ζ of u, v, w in the shell's own frame, (elements, stations, 3, 3, points, 2, amplitudes):
@@ -225,17 +223,16 @@ def _frame(section: Section, points: Array) -> tuple[Array, Array, Array, Array,
     return t_r, kappa, n_r, 1 + kappa * zeta, _tall(section.r) + n_r * zeta
 
 
-def _jets(
-    section: Section, through: tuple[Basis, Basis, Basis], points: Array
-) -> tuple[list[Array], list[Array], list[Array]]:
+def _jets(section: Section, through: Orders, points: Array) -> tuple[list[Array], list[Array], list[Array]]:
     """The three displacements, their s- and their ζ-derivatives as rows (point, jet, amplitude)."""
     h, slope, ds = (_tall(a) for a in (section.thickness, section.thickness_slope, section.ds))
-    total, start = sum(basis.values.shape[1] for basis in through), 0
+    total, start = sum(through) + 3, 0
     drift = slope / h * points[:, None, None]
     found: tuple[list[Array], list[Array], list[Array]] = ([], [], [])
-    for basis in through:
-        value, d_eta, d_xi = (np.zeros((len(basis.values), 2, total)) for _ in range(3))
-        columns = slice(start, start := start + basis.values.shape[1])
+    for order in through:
+        basis = legendre(order, points)
+        value, d_eta, d_xi = (np.zeros((len(points), 2, total)) for _ in range(3))
+        columns = slice(start, start := start + order + 1)
         value[:, 0, columns] = d_xi[:, 1, columns] = basis.values
         d_eta[:, 0, columns] = basis.slopes
         for kind, one in zip(found, (value, d_xi / ds - drift * d_eta, 2 / h * d_eta), strict=True):

@@ -22,6 +22,10 @@ class Chain:
     segments: tuple[int, ...]
     ends: tuple[End, End]
 
+    def element(self, k: int) -> "Chain":
+        """One of its elements alone."""
+        return Chain(self.breaks[k : k + 2], (self.segments[k],), self.ends)
+
 
 def lay_chain(resonator: Resonator, start: float, stop: float, ends: tuple[End, End], n: int, level: Level) -> Chain:
     """Break the meridian between two arc lengths into elements.

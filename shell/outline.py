@@ -15,12 +15,12 @@ from shell.assembly import build_system, sections
 from shell.blocks import SIDES, Mesh, surface_sides
 from shell.cells import CellTable, Reference, tabulate_cells
 from shell.errors import ShellError
-from shell.kernel import StrainTable, energy_weights, shell_table
+from shell.kernel import StrainTable, shell_table
 from shell.layout import Chain
 from shell.levels import LEVELS
-from shell.quadrature import Array, legendre, nodal
+from shell.quadrature import Array, nodal
 from shell.resonator import Resonator
-from shell.solution import Solution
+from shell.solution import Constants, Solution
 from shell.system import SolidGroup, System
 
 if TYPE_CHECKING:
@@ -28,7 +28,6 @@ if TYPE_CHECKING:
 
 INSIDE = 1 - 1e-7  # strains are taken this far inside an element, since 1/r is singular on the axis
 MOST_POINTS = 240  # on one side of one element
-SHEARED = (3, 5)  # strains that go as sin nθ; the others go as cos nθ
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,7 +119,7 @@ class _Sides:
                 yield self._shell_side(number, chain, element, np.array([xi]), across)
 
     def _shell_side(self, number: int, chain: Chain, element: int, xi: Array, eta: Array) -> Outline:
-        one = Chain(chain.breaks[element : element + 2], (chain.segments[element],), chain.ends)
+        one = chain.element(element)
         place = self.resonator.at(sum(one.breaks) / 2 + (one.breaks[1] - one.breaks[0]) / 2 * xi, one.segments[0])
         r, z = (one.ravel() for one in place.at_heights(eta))
         position = np.repeat(place.position, len(eta))
@@ -128,9 +127,8 @@ class _Sides:
             return _bare(r, z, position)
         level = self.system.level
         section = sections(self.resonator, one, xi * INSIDE, np.ones_like(xi))
-        u, v, w = (legendre(order, eta * INSIDE) for order in level.through)
         points = eta * INSIDE, np.ones_like(eta)
-        table = shell_table(section, self.system.n, (u, v, w), points, nodal(level.along, xi * INSIDE))
+        table = shell_table(section, self.system.n, level.through, points, nodal(level.along, xi * INSIDE))
         t_r, t_z = section.tangent_r[0][:, None], section.tangent_z[0][:, None]
         (along, around, normal), energy = _fields(self.solution, table, number, element)
         displacement = np.stack([t_r * along - t_z * normal, around, t_z * along + t_r * normal])
@@ -156,12 +154,11 @@ class _Sides:
 def _fields(solution: Solution, table: StrainTable | CellTable, number: int, element: int) -> tuple[Array, Array]:
     """Displacement (3, stations, points) and the two parts of the energy density (2, stations, points)."""
     unknowns = solution.unknowns[number][[element]]
-    lam, G = (float(np.mean(values[element])) for values in solution.constants[number].lame)
-    e = np.moveaxis(table.strains(unknowns)[0], 1, 0)
-    sheared = G / 2 * energy_weights(table.transverse_shear)[:, None, None] * e**2
-    by_sine = sheared[list(SHEARED)].sum(axis=0)
-    by_cosine = lam / 2 * e[:3].sum(axis=0) ** 2 + sheared.sum(axis=0) - by_sine
-    return np.moveaxis(table.displacements(unknowns)[0], 1, 0), np.stack([by_cosine, by_sine])
+    c = solution.constants[number].at([element])
+    E, nu, rho = (np.mean(field, keepdims=True) for field in (c.E, c.nu, c.rho))
+    mean = Constants(E, nu, rho, c.plane_stress)
+    by_cosine, by_sine = mean.parts(table, table.strains(unknowns))
+    return np.moveaxis(table.displacements(unknowns)[0], 1, 0), np.stack([by_cosine[0], by_sine[0]]) / 2
 
 
 def _points(length: float, spacing: float) -> Array:

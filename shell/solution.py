@@ -3,14 +3,17 @@
 from dataclasses import dataclass
 from functools import cached_property
 from math import pi
+from typing import Any
 
 import numpy as np
 
 from shell.cells import CellTable
 from shell.elastic import Elastic, VaryingElastic
 from shell.kernel import StrainTable, energy_weights, lame, lame_slopes, shell_table
-from shell.quadrature import Array, Basis, legendre
+from shell.quadrature import Array, Basis
 from shell.system import Group, ShellGroup, System
+
+COSINE, SINE = [0, 1, 2, 4], [3, 5]  # strains that vary as cos nθ and as sin nθ, in the order of the kernel
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,11 +31,22 @@ class Constants:
         return lame(self.E, self.nu, self.plane_stress)
 
     def stress(self, table: StrainTable | CellTable, strain: Array) -> Array:
-        """Stresses (elements, stations, 6, points) of such strains, Pa."""
+        """Stresses (..., elements, stations, 6, points) of such strains, Pa."""
         lam, G = (field[..., None] for field in self.lame)
-        stress = G[:, :, None] * energy_weights(table.transverse_shear)[:, None] * strain
-        stress[:, :, :3] += (lam * np.add.reduce(strain[:, :, :3], axis=2))[:, :, None]
+        stress = G[..., None] * energy_weights(table.transverse_shear)[:, None] * strain
+        stress[..., :3, :] += (lam * np.add.reduce(strain[..., :3, :], axis=-2))[..., None, :]
         return np.asarray(stress)
+
+    def parts(self, table: StrainTable | CellTable, strain: Array) -> tuple[Array, Array]:
+        """Twice the energy density of such strains, of those that vary as cos nθ and of those that vary as sin nθ."""
+        lam, G = (field[..., None] for field in self.lame)
+        sheared = G[:, :, None] * energy_weights(table.transverse_shear)[:, None] * strain * strain
+        cosine = lam * np.add.reduce(strain[:, :, :3], axis=2) ** 2 + sheared[:, :, COSINE].sum(axis=2)
+        return np.asarray(cosine), np.asarray(sheared[:, :, SINE].sum(axis=2))
+
+    def at(self, where: Any) -> "Constants":
+        """The material of some of the elements or stations."""
+        return Constants(self.E[where], self.nu[where], self.rho[where], self.plane_stress)
 
     @property
     def wave_speed_squared(self) -> float:
@@ -274,20 +288,26 @@ def surface_energies(solution: Solution, number: int) -> tuple[Array, Array]:
     solid the faces are free of traction, so their strain energy is that of plane stress; Naghdi's transverse shear does
     not vanish there and counts.
     """
-    system, group, c = solution.system, solution.system.groups[number], solution.constants[number]
-    assert isinstance(group, ShellGroup)
-    faces = np.array([-1.0, 1.0])
-    u, v, w = (legendre(order, faces) for order in system.level.through)
-    along = Basis(*group.table.along)
-    table = shell_table(group.place.section, system.n, (u, v, w), (faces, np.ones(2)), along)
-    q = solution.unknowns[number]
-    e, d = table.strains(q), table.displacements(q)
-    at_stations = Constants(c.E[..., None], c.nu[..., None], c.rho[..., None], True)
-    cosine, sine = _plane_energies(at_stations, e[:, :, 0], e[:, :, 1], e[:, :, 3])
+    c, table = solution.constants[number], face_table(solution, number)
+    e, d = (find(solution.unknowns[number]) for find in (table.strains, table.displacements))
+    cosine, sine = _plane_energies(c.at((..., None)), e[:, :, 0], e[:, :, 1], e[:, :, 3])
     if table.plane_stress:
         transverse = c.lame[1][..., None] * table.transverse_shear
         cosine, sine = cosine + transverse * e[:, :, 4] ** 2, sine + transverse * e[:, :, 5] ** 2
     heavy = solution.eigenvalue * c.rho[..., None]
-    cosine = cosine - heavy * (d[:, :, 0] ** 2 + d[:, :, 2] ** 2)
-    sine = sine - heavy * d[:, :, 1] ** 2
-    return cosine * table.volume, sine * table.volume
+    along, around = squares_of(d)
+    return (cosine - heavy * along) * table.volume, (sine - heavy * around) * table.volume
+
+
+def face_table(solution: Solution, number: int) -> StrainTable:
+    """Strains of one shell group at its inner and its outer face, at the stations; the volumes are h/2 times the areas."""
+    system, group = solution.system, solution.system.groups[number]
+    assert isinstance(group, ShellGroup)
+    faces = np.array([-1.0, 1.0]), np.ones(2)
+    return shell_table(group.place.section, system.n, system.level.through, faces, Basis(*group.table.along))
+
+
+def squares_of(displacement: Array) -> tuple[Array, Array]:
+    """|u|² of displacements (elements, stations, 3, points), of what varies as cos nθ and of what varies as sin nθ."""
+    u, v, w = np.moveaxis(displacement, 2, 0)
+    return u**2 + w**2, v**2

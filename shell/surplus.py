@@ -26,7 +26,7 @@ from shell.elastic import Elastic, VaryingElastic
 from shell.kernel import StrainTable, pair_stiffness, shell_table, station_stiffness
 from shell.layout import Chain
 from shell.levels import Level
-from shell.quadrature import Array, at_gauss, gauss, hierarchic, legendre, values_to_hierarchic
+from shell.quadrature import Array, at_gauss, gauss, hierarchic, values_to_hierarchic
 from shell.resonator import Resonator
 from shell.solution import Constants, Solution, find_constants, total
 from shell.sparse import Index
@@ -228,13 +228,12 @@ def extend(resonator: Resonator, system: System) -> tuple[Extension, ...]:
 
 def _extend_shell(resonator: Resonator, group: ShellGroup, n: int, level: Level) -> ShellExtension:
     p, orders = level.along, level.through
-    more = tuple(order + 2 for order in orders) if max(orders) > 1 else orders
+    more = (orders[0] + 2, orders[1] + 2, orders[2] + 2) if max(orders) > 1 else orders
     xi, weights = gauss(p + ALONG + 2)
     eta = gauss(max(more) + 2)
     chain = group.place.chain
-    u, v, w = (at_gauss(legendre, order, len(eta[0])) for order in more)
     along = at_gauss(hierarchic, p + ALONG, p + ALONG + 2)
-    table = shell_table(sections(resonator, chain, xi, weights), n, (u, v, w), eta, along)
+    table = shell_table(sections(resonator, chain, xi, weights), n, more, eta, along)
     is_old = np.concatenate([np.arange(many + 1) <= few for few, many in zip(orders, more, strict=True)])
     elements, functions, width = len(chain.segments), p + ALONG + 1, len(is_old)
     asked = np.ones((elements, functions, width), dtype=bool)

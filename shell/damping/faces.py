@@ -14,12 +14,12 @@ from shell.assembly import sections
 from shell.blocks import surface_sides
 from shell.cells import CellTable, Reference, tabulate_cells
 from shell.errors import ShellError
-from shell.kernel import StrainTable, shell_table
+from shell.kernel import StrainTable, lame, shell_table
 from shell.materials import Material
 from shell.modes import Mode
-from shell.quadrature import Array, Basis, gauss, legendre, nodal
+from shell.quadrature import Array, gauss, nodal
 from shell.resonator import Resonator
-from shell.solution import Constants, Solution, total
+from shell.solution import Constants, Solution, face_table, total
 from shell.system import ShellGroup, SolidGroup
 
 Kind = Literal["inner", "outer", "edge", "root"]
@@ -106,16 +106,14 @@ class Vibration:
 def shell_faces(solution: Solution) -> tuple[FreeFaces, FreeFaces]:
     """The inner and the outer face of the shell, without roots and corners; free of traction, so in plane stress."""
     found: tuple[list[FreeFaces], list[FreeFaces]] = ([], [])
-    for group, c, q in zip(solution.system.groups, solution.constants, solution.unknowns, strict=True):
+    for number, group in enumerate(solution.system.groups):
+        c, q = solution.constants[number], solution.unknowns[number]
         if not isinstance(group, ShellGroup):
             continue
-        ends = np.array([-1.0, 1.0])
-        u, v, w = (legendre(order, ends) for order in solution.system.level.through)
-        section = group.place.section
-        table = shell_table(section, solution.system.n, (u, v, w), (ends, np.ones(2)), Basis(*group.table.along))
+        section, table = group.place.section, face_table(solution, number)
         strain, moved = table.strains(q), table.displacements(q)
         area = table.volume * (2 / section.thickness)[..., None]
-        lam, G = c.E * c.nu / (1 - c.nu**2), c.E / (2 * (1 + c.nu))
+        lam, G = lame(c.E, c.nu, True)
         for k, name in enumerate(("inner", "outer")):
             s, theta, twist = (strain[:, :, row, k] for row in (0, 1, 3))
             energy = lam * (s + theta) ** 2 + G * (2 * s**2 + 2 * theta**2 + twist**2)
@@ -154,14 +152,11 @@ def _edge(solution: Solution, resonator: Resonator, group: ShellGroup, c: Consta
     element = slice(0, 1) if end == 0 else slice(len(q) - 1, len(q))
     xi, eta = np.array([-1.0 if end == 0 else 1.0]), gauss(max(level.through) + 2)
     section = sections(resonator, group.place.chain, xi, np.ones(1))
-    u, v, w = (legendre(order, eta[0]) for order in level.through)
-    table = shell_table(section, solution.system.n, (u, v, w), eta, nodal(level.along, xi)).part(element)
+    table = shell_table(section, solution.system.n, level.through, eta, nodal(level.along, xi)).part(element)
     stretch = 1 + section.curvature[element, :, None] * section.thickness[element, :, None] / 2 * eta[0]
     area = table.volume / (section.ds[element, :, None] * stretch)
     nearest = 0 if end == 0 else -1
-    E, nu, rho = (np.full((1, 1), field[nearest, nearest]) for field in (c.E, c.nu, c.rho))
-    there = Constants(E, nu, rho, c.plane_stress)
-    return _surface("edge", table, there, q[element], area)
+    return _surface("edge", table, c.at(([[nearest]], [[nearest]])), q[element], area)
 
 
 def _sides(solution: Solution, group: SolidGroup, c: Constants, q: Array) -> list[FreeFaces]:
@@ -189,8 +184,7 @@ def _sides(solution: Solution, group: SolidGroup, c: Constants, q: Array) -> lis
         across = place.across.slopes if eta is None else place.across.values
         r, z = ((along @ x[cells] @ across.T).reshape(len(cells), -1) for x in mesh.grid)
         area = (np.hypot(r, z) * table.radius * weights)[:, None]
-        there = Constants(c.E[cells], c.nu[cells], c.rho[cells], c.plane_stress)
-        found.append(_surface("root", table, there, q[cells], area))
+        found.append(_surface("root", table, c.at(cells), q[cells], area))
     return found
 
 

@@ -13,7 +13,6 @@ from shell.imperfection.together import Together
 from shell.imperfection.wall import Stretch, Wall, go_around
 from shell.kernel import Section
 from shell.quadrature import Array, gauss
-from shell.solution import Constants
 from shell.system import ShellGroup
 
 RUN = 4  # elements that are treated at once: fields that stay in the fast memory
@@ -88,8 +87,7 @@ def _walls(together: Together, flaw: Imperfection, waves: tuple[int, ...], theta
         for first in range(0, len(group.unknowns), RUN):
             run = slice(first, min(first + RUN, len(group.unknowns)))
             section = Section(**{name: value[run] for name, value in vars(group.place.section).items()})
-            own = Constants(c.E[run], c.nu[run], c.rho[run], c.plane_stress)
-            here = Stretch(section, own, run, table.along, orders, table.transverse_shear, theta)
+            here = Stretch(section, c.at(run), run, table.along, orders, table.transverse_shear, theta)
             stiff, heavy = here.values(flaw.modulus, waves), here.values(flaw.density, waves)
             if faces != (None, None):
                 walls += here.layers(faces, waves, 1 + stiff, 1 + heavy)
@@ -99,9 +97,8 @@ def _walls(together: Together, flaw: Imperfection, waves: tuple[int, ...], theta
         edge = cut(resonator, system, 1.0, gauss(max(orders) + 2)[0])
         width = values_around(flaw.rim, flaw.rim.orders, np.ones(1), theta)[0][0]
         c, at = together.constants[edge.group], slice(edge.element, edge.element + 1)
-        last = Constants(c.E[at, -1:], c.nu[at, -1:], c.rho[at, -1:], c.plane_stress)
         along, shear = edge.along[:, None], edge.table.transverse_shear
-        strip = Stretch(edge.section, last, at, along, orders, shear, theta).strip(width)
+        strip = Stretch(edge.section, c.at((at, slice(-1, None))), at, along, orders, shear, theta).strip(width)
         found[edge.group].append(strip)
     return found
 

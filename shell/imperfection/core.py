@@ -13,12 +13,10 @@ from shell.cells import CellTable
 from shell.imperfection.block import Block
 from shell.imperfection.together import Together
 from shell.imperfection.wall import Around
-from shell.kernel import energy_weights
 from shell.quadrature import Array
-from shell.solution import Constants
+from shell.solution import COSINE, SINE, Constants
 from shell.system import SolidGroup
 
-COSINE, SINE = [0, 1, 2, 4], [3, 5]  # strains, in the order of the kernel
 ALONG, AROUND = [0, 2], [1]  # displacements
 Energies: TypeAlias = Callable[[Block, Block], tuple[Array, Array]]
 """Of two harmonics, what goes as the cosine and what goes as the sine, (shared, shared) each."""
@@ -58,11 +56,14 @@ class Core:
     def _energies(self, one: Block, other: Block) -> tuple[Array, ...]:
         key = one.system.n, other.system.n
         if key not in self._products:
-            (e, d), (f, g) = self._section(one), self._section(other)
-            volume = self._table(one).volume
-            stress, momentum = self._stress(f) * volume, self.constants.rho[:, :, None] * volume * g
+            (e, d), (f, g), table = self._section(one), self._section(other), self._table(one)
+            volume = table.volume[:, :, None]
+            stress, momentum = (
+                self.constants.stress(table, f) * volume,
+                self.constants.rho[..., None, None] * volume * g,
+            )
             pairs = [(e, stress, some) for some in (COSINE, SINE)] + [(d, momentum, some) for some in (ALONG, AROUND)]
-            self._products[key] = tuple(_flat(a[:, :, some]) @ _flat(b[:, :, some]).T for a, b, some in pairs)
+            self._products[key] = tuple(_flat(a[..., some, :]) @ _flat(b[..., some, :]).T for a, b, some in pairs)
         return self._products[key]
 
     def _table(self, block: Block) -> CellTable:
@@ -75,17 +76,10 @@ class Core:
         if block.system.n not in self._sections:
             table, moved = self._table(block), block.inner(self.number)
             self._sections[block.system.n] = (
-                np.array([table.strains(one)[:, 0] for one in moved]),
-                np.array([table.displacements(one)[:, 0] for one in moved]),
+                np.array([table.strains(one) for one in moved]),
+                np.array([table.displacements(one) for one in moved]),
             )
         return self._sections[block.system.n]
-
-    def _stress(self, strain: Array) -> Array:
-        """Stresses of strains (vectors, cells, 6, points)."""
-        lam, G = (one[:, :, None] for one in self.constants.lame)
-        found = G * energy_weights()[:, None] * strain
-        found[:, :, :3] += lam * strain[:, :, :3].sum(axis=2, keepdims=True)
-        return np.asarray(found)
 
 
 def _flat(fields: Array) -> Array:

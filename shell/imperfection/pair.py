@@ -19,14 +19,11 @@ import numpy as np
 from shell.errors import ShellError
 from shell.imperfection.field import Field
 from shell.imperfection.place import CrossSection, cut, fade
-from shell.kernel import energy_weights
 from shell.modes import Mode
 from shell.quadrature import Array, gauss
 from shell.resonator import Resonator
-from shell.solution import Constants, Solution, surface_energies, total
+from shell.solution import Constants, Solution, squares_of, surface_energies, total
 from shell.system import ShellGroup
-
-WAVE = np.array([True, True, True, False, True, False])  # strains that vary as cos nθ, in the order of the kernel
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,8 +102,7 @@ class Pair:
             self.solution.system.groups, self.solution.constants, self.solution.displacement, strict=True
         ):
             heavy = -self.solution.eigenvalue * c.rho[..., None] * group.table.volume
-            cosine, sine = d[:, :, 0] ** 2 + d[:, :, 2] ** 2, d[:, :, 1] ** 2
-            found.append(_columns(group.table.position, heavy, cosine, sine))
+            found.append(_columns(group.table.position, heavy, *squares_of(d)))
         return _gather(found, self.scale)
 
     @cached_property
@@ -114,10 +110,7 @@ class Pair:
         """Per unit relative change of E at constant ν."""
         found = []
         for group, c, e in zip(self.solution.system.groups, self.solution.constants, self.solution.strain, strict=True):
-            lam, G = (field[..., None] for field in c.lame)
-            sheared = G[:, :, None] * energy_weights(group.table.transverse_shear)[:, None] * e * e
-            cosine = lam * e[:, :, :3].sum(axis=2) ** 2 + sheared[:, :, WAVE].sum(axis=2)
-            found.append(_columns(group.table.position, group.table.volume, cosine, sheared[:, :, ~WAVE].sum(axis=2)))
+            found.append(_columns(group.table.position, group.table.volume, *c.parts(group.table, e)))
         return _gather(found, self.scale)
 
     def rim(self) -> Density:
@@ -158,24 +151,20 @@ class Pair:
         return edge, edge.table.volume[0, 0] * weights
 
     def _of_material(self, here: CrossSection, share: Array) -> tuple[float, float]:
-        e, d = here.strains(self.solution.unknowns), here.displacements(self.solution.unknowns)
+        e, d = (find(self.solution.unknowns)[None, None] for find in (here.strains, here.displacements))
         c = self._material(here)
-        lam, G, rho = float(c.lame[0][0, 0]), float(c.lame[1][0, 0]), float(c.rho[0, 0])
-        sheared = G * energy_weights(here.table.transverse_shear)[:, None] * e * e
-        heavy = self.solution.eigenvalue * rho
-        one = share @ (lam * e[:3].sum(axis=0) ** 2 + sheared[WAVE].sum(axis=0) - heavy * (d[0] ** 2 + d[2] ** 2))
-        two = share @ (sheared[~WAVE].sum(axis=0) - heavy * d[1] ** 2)
-        norm = 1 / (2 * np.pi * self.scale * rho)
-        return float(norm * (one + two)), float(norm * (one - two))
+        heavy = self.solution.eigenvalue * c.rho[..., None]
+        pairs = zip(c.parts(here.table, e), squares_of(d), strict=True)
+        one, two = (float(np.sum(share * (energy - heavy * square))) for energy, square in pairs)
+        norm = 1 / (2 * np.pi * self.scale * float(c.rho[0, 0]))
+        return norm * (one + two), norm * (one - two)
 
     def radius(self, position: float, height: float) -> float:
         """Distance from the axis of a place of the wall, m."""
         return float(self.resonator.at([position * self.resonator.length]).at_heights([height])[0].item())
 
     def _material(self, edge: CrossSection) -> Constants:
-        c = self.solution.constants[edge.group]
-        here = (slice(edge.element, edge.element + 1), slice(-1, None))
-        return Constants(c.E[here], c.nu[here], c.rho[here], c.plane_stress)
+        return self.solution.constants[edge.group].at((slice(edge.element, edge.element + 1), slice(-1, None)))
 
 
 def _columns(position: Array, volume: Array, cosine: Array, sine: Array) -> Array:

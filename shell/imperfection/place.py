@@ -6,9 +6,10 @@ from math import sqrt
 
 import numpy as np
 
+from shell.assembly import sections
 from shell.errors import ShellError, mm
 from shell.kernel import Section, StrainTable, shell_table
-from shell.quadrature import Array, legendre, nodal
+from shell.quadrature import Array, nodal
 from shell.resonator import MeridianPoints, Resonator
 from shell.system import ShellGroup, System
 
@@ -85,24 +86,8 @@ def cut(resonator: Resonator, system: System, position: float, heights: Array) -
         xi = np.array([np.clip((2 * s - one - two) / (two - one), -1.0, 1.0)])
         place = resonator.at([s], group.place.chain.segments[element])
         along = nodal(group.table.along.shape[2] - 1, xi)
-        section = Section(
-            *(
-                np.reshape(value, (1, 1))
-                for value in (
-                    place.r,
-                    place.tangent_r,
-                    place.tangent_z,
-                    place.curvature,
-                    place.thickness,
-                    place.thickness_slope,
-                    (two - one) / 2,
-                    2 / (two - one),
-                    place.position,
-                )
-            )
-        )
-        u, v, w = (legendre(order, heights) for order in system.level.through)
-        table = shell_table(section, system.n, (u, v, w), (heights, np.ones(len(heights))), along)
+        section = sections(resonator, group.place.chain.element(element), xi, np.array([2 / (two - one)]))
+        table = shell_table(section, system.n, system.level.through, (heights, np.ones(len(heights))), along)
         return CrossSection(number, element, np.stack([along.values[0], along.slopes[0]]), place, section, table)
     raise ShellError(
         f"the position {position:g} ({mm(s)} along the meridian) lies in a solid root, corner or clamp, where no mass can be "

@@ -7,7 +7,7 @@ from shell.assembly import sections
 from shell.damping.heat import conduct_in_cells, mean_stress, solve_heat
 from shell.kernel import shell_table
 from shell.layout import Chain
-from shell.quadrature import gauss, hierarchic, legendre, nodal
+from shell.quadrature import gauss, hierarchic, nodal
 from shell.resonator import Resonator
 from shell.solution import Solution
 from shell.system import ShellGroup
@@ -32,8 +32,7 @@ def _conduct_in_shell(solution: Solution, resonator: Resonator, index: int, x: f
     level, n, chain = solution.system.level, solution.system.n, group.place.chain
     xi, eta = gauss(level.along + 2), gauss(through + 2)
     section = sections(resonator, chain, *xi)
-    u, v, w = (legendre(order, eta[0]) for order in level.through)
-    table = shell_table(section, n, (u, v, w), eta, nodal(level.along, xi[0]))
+    table = shell_table(section, n, level.through, eta, nodal(level.along, xi[0]))
     stress = mean_stress(c, table.strains(solution.unknowns[index]))
     across, along = hierarchic(through, eta[0]), nodal(level.along, xi[0])
     zeta = section.thickness[..., None] / 2 * eta[0]
