@@ -17,7 +17,7 @@ from compensation.errors import CompensationError
 from compensation.fir import design_smoother
 from compensation.noise_regression import correlated_covariance
 from compensation.polynomial import fit_polynomial
-from compensation.samples import read_columns, require_regular
+from compensation.samples import own_columns, read_columns, require_regular
 
 Fitted = TypeVar("Fitted")
 
@@ -32,9 +32,7 @@ class BellRun:
     rate: Array
 
     def __post_init__(self) -> None:
-        columns = read_columns(time=self.time, output=self.output, temperature=self.temperature, rate=self.rate)
-        for name, values in zip(("time", "output", "temperature", "rate"), columns, strict=True):
-            object.__setattr__(self, name, values)
+        own_columns(self)
 
 
 def fit_rough(run: BellRun) -> tuple[float, float, Array]:
@@ -44,11 +42,9 @@ def fit_rough(run: BellRun) -> tuple[float, float, Array]:
     both means.
     """
     line = fit_polynomial(run.rate, run.output, 1, "rate")
-    (null, slope), _ = line.about(0.0)
+    (null, slope), covariance = line.about(0.0, correlated_covariance(line.regression))
     if slope == 0:
         raise CompensationError("the output does not change with the rate; the rough scale cannot be found.")
-    from_scaled = np.array([[1.0, -line.centre / line.half_span], [0.0, 1 / line.half_span]])
-    covariance = from_scaled @ correlated_covariance(line.regression) @ from_scaled.T
     to_scale = np.diag([1.0, -1 / slope**2])
     return float(null), float(1 / slope), to_scale @ covariance @ to_scale.T
 
@@ -107,28 +103,17 @@ def fit_chain(
     over_temperature = _step(
         "scale over temperature (36)", fit_scale_over_temperature, turning.temperature, constant, turning.rate
     )
-    if cutoff is None:
-        return BellChain(null, scale, covariance, bias, over_rate, over_temperature, np.empty(0), 0.0)
-    step = require_regular(rest.time, "the FIR filter") if sampling is None else sampling
-    return BellChain(
-        null, scale, covariance, bias, over_rate, over_temperature, design_smoother(step, cutoff, order), step
-    )
+    step, taps = 0.0, np.empty(0)
+    if cutoff is not None:
+        step = require_regular(rest.time, "the FIR filter") if sampling is None else sampling
+        taps = design_smoother(step, cutoff, order)
+    return BellChain(null, scale, covariance, bias, over_rate, over_temperature, taps, step)
 
 
 def _fit_curve(x: ArrayLike, y: ArrayLike, order: int, name: str, reference: float) -> PolynomialCurve:
     fit = fit_polynomial(x, y, order, name)
-    scaled, _ = fit.about(reference)
-    # The same change of variable carries the covariance that allows for correlated residuals.
-    change = np.column_stack([_about(fit.centre, fit.half_span, power, reference, order) for power in range(order + 1)])
-    covariance = change @ correlated_covariance(fit.regression) @ change.T
-    values = np.asarray(x, dtype=float)
-    return PolynomialCurve(scaled, covariance, reference, float(values.min()), float(values.max()))
-
-
-def _about(centre: float, half_span: float, power: int, reference: float, order: int) -> Array:
-    """Coefficients in (x − reference) of ((x − centre) / half_span)^power, padded to `order`."""
-    base = np.array([(reference - centre) / half_span, 1 / half_span])
-    return np.pad(np.polynomial.polynomial.polypow(base, power), (0, order - power))
+    coefficients, covariance = fit.about(reference, correlated_covariance(fit.regression))
+    return PolynomialCurve(coefficients, covariance, reference, float(np.min(x)), float(np.max(x)))
 
 
 def _step(name: str, fit: Callable[..., Fitted], *arguments: Any) -> Fitted:

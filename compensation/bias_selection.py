@@ -21,6 +21,7 @@ from compensation.bias import PARENTS, TERMS, BiasDesign, BiasFit, BiasRun, fit_
 from compensation.errors import CompensationError
 from compensation.memory import NO_MEMORY, Memory
 from compensation.noise_regression import estimate_theta, whiten
+from compensation.samples import block_means
 from compensation.stepwise import StepwiseSelection, select_stepwise
 
 Method = Literal["paper", "guarded"]
@@ -255,6 +256,4 @@ def within(values: Array, limits: tuple[float, float]) -> NDArray[np.bool_]:
 
 def _averages(values: Array, run: BiasRun) -> Array:
     """Average consecutive rows over AVERAGING seconds."""
-    count = max(1, round(AVERAGING / run.width))
-    whole = values.size // count * count
-    return np.asarray(values[:whole].reshape(-1, count).mean(axis=1)) if whole else values[:0]
+    return block_means(values, max(1, round(AVERAGING / run.width)))

@@ -23,7 +23,7 @@ from compensation.demodulated import expand_secondary, relate_rate_to_secondary
 from compensation.errors import CompensationError
 from compensation.noise_regression import correlated_covariance
 from compensation.regression import fit_linear, refuse_constant_columns
-from compensation.samples import check_time, read_columns
+from compensation.samples import check_time, own_columns, read_columns
 from compensation.sensitive_element import SensitiveElement
 from compensation.transfer import TransferFunction
 
@@ -122,10 +122,8 @@ class RestRun:
     temperature: Array
 
     def __post_init__(self) -> None:
-        columns = read_columns(time=self.time, rate=self.rate, temperature=self.temperature)
-        for name, values in zip(("time", "rate", "temperature"), columns, strict=True):
-            object.__setattr__(self, name, values)
-        check_time(columns[0])
+        own_columns(self)
+        check_time(self.time)
 
 
 def fit_cross_damping(

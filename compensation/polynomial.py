@@ -64,18 +64,19 @@ class PolynomialFit:
         real = roots[np.abs(roots.imag) < 1e-9].real * self.half_span + self.centre
         return np.sort(real[(real >= low) & (real <= high)])
 
-    def about(self, reference: float) -> tuple[Array, Array]:
-        """Return coefficients b and covariance of the same curve, y = Σ bⱼ (x − reference)ʲ."""
+    def about(self, reference: float, covariance: Array | None = None) -> tuple[Array, Array]:
+        """Return coefficients b and covariance of the same curve, y = Σ bⱼ (x − reference)ʲ.
+
+        `covariance` of c is that of the regression unless it is given.
+        """
+        own = self.regression.covariance if covariance is None else covariance
         size = self.order + 1
         offset = np.longdouble(reference - self.centre) / np.longdouble(self.half_span)
         M = np.zeros((size, size), dtype=np.longdouble)
         for k in range(size):
             for j in range(k + 1):
                 M[j, k] = math.comb(k, j) * offset ** (k - j) / np.longdouble(self.half_span) ** j
-        return (
-            (M @ self.regression.coefficients).astype(np.float64),
-            (M @ self.regression.covariance @ M.T).astype(np.float64),
-        )
+        return (M @ self.regression.coefficients).astype(np.float64), (M @ own @ M.T).astype(np.float64)
 
 
 def count_apart(x: ArrayLike) -> int:

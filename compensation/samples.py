@@ -1,5 +1,7 @@
 """Checks of sampled columns, so that no function here computes with a hole, a NaN or time that runs back."""
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -23,6 +25,18 @@ def read_columns(**columns: ArrayLike) -> list[NDArray[np.float64]]:
                 "fill them or leave these rows out."
             )
     return arrays
+
+
+def own_columns(run: Any) -> None:
+    """Read every field of a frozen dataclass as a column of `read_columns`."""
+    for name, values in zip(list(vars(run)), read_columns(**vars(run)), strict=True):
+        object.__setattr__(run, name, values)
+
+
+def block_means(values: NDArray[Any], size: int) -> NDArray[Any]:
+    """Return the means of every `size` values in a row along the last axis; an incomplete block at the end is left out."""
+    count = values.shape[-1] // size
+    return np.asarray(values[..., : count * size].reshape(*values.shape[:-1], count, size).mean(axis=-1))
 
 
 def check_time(time: NDArray[np.float64]) -> None:

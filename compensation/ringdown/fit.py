@@ -15,6 +15,7 @@ from compensation.arrays import Array, Complex
 from compensation.errors import CompensationError
 from compensation.ringdown.envelope import Envelope
 from compensation.ringdown.model import NAMES, ONE_MODE, TWO_MODES, Decay, propagate
+from compensation.samples import block_means
 
 COARSE = 256  # rows of the averaged envelope on which starting points are looked for
 
@@ -190,7 +191,7 @@ def _pencil(time: Array, z: Complex, modes: int) -> Complex | None:
     """Return the exponents of the averaged rows: eigenvalues of a shift on the signal space of a Hankel matrix."""
     count = min(COARSE, time.size // 2)
     size = time.size // count
-    rows = z[:, : count * size].reshape(z.shape[0], count, size).mean(axis=2)
+    rows = block_means(z, size)[:, :count]
     step = float(time[size] - time[0])
     length = count // 3
     hankel = np.concatenate([np.lib.stride_tricks.sliding_window_view(row, length) for row in rows], axis=0)

@@ -17,6 +17,7 @@ from compensation.arrays import Array
 from compensation.errors import CompensationError
 from compensation.ringdown.analysis import Estimate
 from compensation.ringdown.laws import long_run
+from compensation.samples import block_means
 
 PAYS = 20.0
 REACH = 1.6449  # standard deviations of the ends of a 90 % interval
@@ -143,8 +144,7 @@ def _scatter(point: Array, f: Array, y: Array) -> float:
 
 def _misfit(left: Array, scatter: float) -> float:
     size = max(4, left.size // 40)
-    means = left[: left.size // size * size].reshape(-1, size).mean(axis=1)
-    return float(np.sqrt(max(1.0, size * float(np.mean(means**2)) / scatter**2)))
+    return float(np.sqrt(max(1.0, size * float(np.mean(block_means(left, size) ** 2)) / scatter**2)))
 
 
 def _remark(f: Array, point: Array, split: bool, widening: float) -> list[str]:

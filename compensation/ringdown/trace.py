@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 
 from compensation.arrays import Array
 from compensation.errors import CompensationError
+from compensation.samples import block_means
 
 BINS = 100
 DROP = 0.25
@@ -111,8 +112,8 @@ def analyse_trace(time: ArrayLike, amplitude: ArrayLike, *, confidence: float = 
 def _find_release(t: Array, L: Array) -> int:
     """Return the first row of the free decay: after the last sudden fall in the first half, or after a plateau."""
     size = max(1, t.size // BINS)
-    count = t.size // size
-    means = L[: count * size].reshape(count, size).mean(axis=1)
+    means, t_mean = block_means(L, size), block_means(t, size)
+    count = means.size
     steps = -np.diff(means)
     usual = float(np.median(np.abs(steps)))
     half = steps[: count // 2]
@@ -122,7 +123,7 @@ def _find_release(t: Array, L: Array) -> int:
     # a plateau: the knee of two lines, the first of them level, above the noise floor
     floor = np.flatnonzero(means < float(np.median(means[-(count // 10) :])) + np.log(FLOOR))
     count = max(int(floor[0]), 12) if floor.size and floor[0] < count else count
-    means, t_mean = means[:count], t[: count * size].reshape(count, size).mean(axis=1)
+    means, t_mean = means[:count], t_mean[:count]
     best, knee = np.inf, 0
     for k in range(0, count // 2):
         flat = means[: k + 1]
@@ -164,9 +165,7 @@ def _widen(scaled: Array) -> float:
     """Return the root of the largest ratio between the variance of block means and that of independent rows."""
     widest, size = 1.0, 2
     while scaled.size // size >= 6:
-        count = scaled.size // size
-        means = scaled[: count * size].reshape(count, size).mean(axis=1)
-        widest = max(widest, size * float(np.mean(means**2)))
+        widest = max(widest, size * float(np.mean(block_means(scaled, size) ** 2)))
         size *= 2
     return float(np.sqrt(widest))
 
@@ -179,7 +178,7 @@ def _find_straight(x: Array, y: Array, weights: Array) -> int:
         w, u = weights[:rows], x[:rows]
         slope, level = _fit_line(u, y[:rows], w)
         scaled = (y[:rows] - level - slope * u) * np.sqrt(w)
-        blocks = scaled[: rows // size * size].reshape(-1, size).mean(axis=1)
+        blocks = block_means(scaled, size)
         spread = max(float(np.sum(blocks**2)) / max(len(blocks) - 2, 1), 1.0 / size)  # variance of a block's mean
         middle = np.average(u, weights=w)
         following = slice(rows, rows + size)

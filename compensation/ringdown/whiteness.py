@@ -6,6 +6,7 @@ import numpy as np
 import scipy
 
 from compensation.arrays import Array, Complex
+from compensation.samples import block_means
 
 BLOCKS = 64
 RARE = 1e-3  # probability below which noise is not held for the reason
@@ -31,14 +32,13 @@ def examine(time: Array, residual: Complex) -> Leftover:
     size = 2
     while rows // size >= 8:
         count = rows // size
-        means = scaled[:, : count * size].reshape(channels, count, size).mean(axis=2)
-        ratio = size * float(np.mean(np.abs(means) ** 2))
+        ratio = size * float(np.mean(np.abs(block_means(scaled, size)) ** 2))
         if ratio > scipy.stats.chi2.isf(RARE, 2 * channels * count) / (2 * channels * count):
             widest = max(widest, ratio)
         size *= 2
     count = min(BLOCKS, rows // 4)
     size = rows // count
-    energy = np.mean(np.abs(scaled[:, : count * size].reshape(channels, count, size).mean(axis=2)) ** 2, axis=0)
+    energy = np.mean(np.abs(block_means(scaled, size)[:, :count]) ** 2, axis=0)
     early = False
     for first in (1, 2, 4, 8):
         if first <= count // 4:

@@ -4,6 +4,7 @@ import numpy as np
 
 from compensation.ringdown.envelope import Envelope, estimate_noise, thin
 from compensation.ringdown.terms import examine_without_lines, extend, fit_modes, is_plain
+from compensation.samples import block_means
 
 LATER = (0.35, 0.6, 0.15)  # parts of the record at whose end a free decay is looked for, where the whole is none
 HALVINGS = 4
@@ -19,7 +20,7 @@ def find_end(envelope: Envelope) -> float:
     noise = estimate_noise(z)
     count = min(64, z.shape[1] // 8)
     size = z.shape[1] // count
-    energy = np.sum(np.abs(z[:, : count * size]) ** 2, axis=0).reshape(count, size).mean(axis=1) - noise
+    energy = block_means(np.sum(np.abs(z) ** 2, axis=0), size)[:count] - noise
     above = np.flatnonzero(energy > 0.25 * noise)
     last = int(above[-1]) + 1 if above.size else count
     return float(envelope.time[min(last * size, envelope.time.size) - 1])
