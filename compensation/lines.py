@@ -59,7 +59,9 @@ def find_line(
         window = np.hanning(fast.size)
         amplitude = np.abs(scipy.fft.rfft(fast * window, count)) * 2.0 / window.sum()
         level = scipy.ndimage.median_filter(amplitude**2, AROUND, mode="nearest") / np.log(2.0)
-        real = looked_at & (level > 0.0) & (amplitude > 2.0 * _of_rounding(values))
+        step = find_step(values)  # noise of a step or more blurs the lines that it makes of a slope
+        rounding = step / np.pi if white_rms(values) < step else 0.0
+        real = looked_at & (level > 0.0) & (amplitude > 2.0 * rounding)
         ratio[real] += LEVEL * np.log1p(amplitude[real] ** 2 / level[real] / LEVEL)
         size[real] = np.maximum(size[real], amplitude[real] / np.sqrt(2.0))
     evidence = _improbable(ratio, len(rows)) - np.log(max(int(looked_at.sum()) / 2.0, 1.0))
@@ -83,9 +85,3 @@ def _fast(time: Array, values: Array, sampling: float, slowest: float) -> Array:
     )
     most = TALLEST * 1.4826 * float(np.median(np.abs(fast)))
     return np.asarray(np.clip(fast, -most, most))
-
-
-def _of_rounding(values: Array) -> float:
-    """Return the amplitude of the first line that rounding makes of a slope; noise of a step or more blurs it."""
-    step = find_step(values)
-    return step / np.pi if white_rms(values) < step else 0.0

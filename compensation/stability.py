@@ -141,7 +141,7 @@ def fit_noise(allan: AllanDeviation) -> NoiseCoefficients:
         raise CompensationError(
             f"fitting N, B and K needs at least five values of τ, not {allan.tau.size}; record longer."
         )
-    A, variance = _basis(allan.tau), allan.deviation**2
+    A, variance = np.stack([one.allan_variance(allan.tau) for one in UNITS], axis=-1), allan.deviation**2
     fitted, c = variance, np.zeros(3)
     for _ in range(50):
         weight = np.sqrt(allan.degrees_of_freedom / 2) / fitted
@@ -175,10 +175,6 @@ def _correlation(allan: AllanDeviation, c: Array) -> Array:
     response = 2 * np.sin(angle) ** 4 / angle**2 * S * np.sqrt(np.gradient(f))
     covariance = response @ response.T
     return np.asarray(covariance / np.sqrt(np.outer(np.diag(covariance), np.diag(covariance))))
-
-
-def _basis(tau: Array) -> Array:
-    return np.stack([one.allan_variance(tau) for one in UNITS], axis=-1)
 
 
 def _overlapping(x: Array, m: int, step: float) -> float:

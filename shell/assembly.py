@@ -69,8 +69,9 @@ def assemble(resonator: Resonator, layout: Layout, n: int, level: Level, rigid_m
 def lay_resonator(resonator: Resonator, n: int, level: Level, alongside: tuple[int, ...] = ()) -> Layout:
     """Divide the section: a solid root or clamped face first, then chains of shell with a solid corner at every kink."""
     lowest, highest = min(n, *alongside, n), max(n, *alongside, n)
-    start, first = 0.0, _free_or_pole(resonator.starts_on_axis)
-    stop, last = resonator.length, _free_or_pole(resonator.ends_on_axis)
+    start, stop = 0.0, resonator.length
+    first: End = "pole" if resonator.starts_on_axis else "free"
+    last: End = "pole" if resonator.ends_on_axis else "free"
     solids: list[tuple[Solid, tuple[tuple[int, int], ...]]] = []
     kinks = find_kinks(resonator)
     whole_section = max(level.through) > 1  # a Naghdi shell is clamped as a line and has no singular corners there
@@ -109,10 +110,6 @@ def lay_resonator(resonator: Resonator, n: int, level: Level, alongside: tuple[i
         )
     chains.append(lay_chain(resonator, start, stop, (first, last), highest, level))
     return Layout(tuple(chains), tuple(solids))
-
-
-def _free_or_pole(on_axis: bool) -> End:
-    return "pole" if on_axis else "free"
 
 
 def solid_group(

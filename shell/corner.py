@@ -123,7 +123,7 @@ def _meet(resonator: Resonator, joint: int, inner: float) -> tuple[float, float]
         gap = hypot(r_1 - r_2, z_1 - z_2)
         if not 1e-13 * h < gap < resonator.length:
             break
-        (a_1, b_1), (a_2, b_2) = (_along_face(place, inner) for place in places)
+        (a_1, b_1), (a_2, b_2) = (np.concatenate(place.along_face(inner)) for place in places)
         step = np.linalg.solve([[a_1, -a_2], [b_1, -b_2]], [r_2 - r_1, z_2 - z_1])
         s_1, s_2 = s_1 + float(step[0]), s_2 + float(step[1])
     if not gap <= 1e-9 * h or not resonator._starts[joint] < s_1 <= s <= s_2 < resonator._starts[joint + 2]:
@@ -167,16 +167,6 @@ def _strip(
 def _face(points: MeridianPoints, eta: float) -> Spot:
     r, z = points.at_heights([eta])
     return float(r[0, 0]), float(z[0, 0])
-
-
-def _along_face(points: MeridianPoints, eta: float) -> Spot:
-    """Change of a point of the face η per arc length of the middle surface, (1 + κ ζ) t + η h'/2 n."""
-    stretch = 1 + points.curvature[0] * eta * points.thickness[0] / 2
-    rise = eta * points.thickness_slope[0] / 2
-    return (
-        float(stretch * points.tangent_r[0] + rise * points.normal_r[0]),
-        float(stretch * points.tangent_z[0] + rise * points.normal_z[0]),
-    )
 
 
 def _tangent(points: MeridianPoints) -> Spot:

@@ -127,7 +127,7 @@ class Exploration:
         self._settled.add(index)
         for axis in range(self.dimensions):
             new = _above(index, axis)
-            below = [_below(new, other) for other in range(self.dimensions) if new[other]]
+            below = [_above(new, other, -1) for other in range(self.dimensions) if new[other]]
             if all(one in self._settled for one in below):
                 self._evaluate(new)
 
@@ -137,9 +137,5 @@ class Exploration:
         self.surpluses[index] = value - (self.polynomial()(point[None])[0] if self.surpluses else 0.0)
 
 
-def _above(index: Index, axis: int) -> Index:
-    return (*index[:axis], index[axis] + 1, *index[axis + 1 :])
-
-
-def _below(index: Index, axis: int) -> Index:
-    return (*index[:axis], index[axis] - 1, *index[axis + 1 :])
+def _above(index: Index, axis: int, by: int = 1) -> Index:
+    return (*index[:axis], index[axis] + by, *index[axis + 1 :])

@@ -128,7 +128,7 @@ class FrequencyLaw:
     def parts(self, temperature: ArrayLike) -> SlopeParts:
         """The five parts of d ln f/dT (HRG paper eq. 15), and that of the base."""
         T = self._check(temperature)
-        nu = self._nu(T)
+        nu = self.material.value("poisson_ratio", T)
         base = 0.0 if self.mount is None else self.prestress.by_base * self.mount.strain_slope(self.material, T)
         return slope_parts(self.material, T, self.shape.by_nu(nu), self.shape.by_thickness(nu), base)
 
@@ -225,9 +225,6 @@ class FrequencyLaw:
             )
         return self.inside(T)
 
-    def _nu(self, T: Array) -> Array:
-        return self.material.value("poisson_ratio", T)
-
     def _exact(self, T: Array) -> Array:
         """Ln f at temperatures, the material evaluated at each."""
         E, nu, rho = (self.material.value(name, T) for name in ("youngs_modulus", "poisson_ratio", "density"))
@@ -253,7 +250,9 @@ class FrequencyLaw:
         for name in (name for name in ACTING if name in self.material.properties):
             if name == "expansion":  # ln f holds −∫ α from the reference, and 3/2 ∫ α from where the density is stated
                 at_density = self.material.properties["density"].numbers["at_degC"] + zero_Celsius
-                since = (_integrals(x - about) for x in (T, np.array(at_density), np.array(self.reference_temperature)))
+                # the integrals of 1, x and ½ x² from the reference of the deviation
+                x = (T - about, np.asarray(at_density - about), np.asarray(self.reference_temperature - about))
+                since = ((one, one**2 / 2, one**3 / 6) for one in x)
                 moved = [t / 2 - 1.5 * d + r for t, d, r in zip(*since, strict=True)]
                 if self.mount is not None:
                     by_base = self.mount.by_expansion(self.material, T)
@@ -265,7 +264,7 @@ class FrequencyLaw:
 
     def _elastic_weights(self, T: Array) -> dict[str, Array]:
         """∂ ln f by the logarithm of each modulus that the law states, by ν itself, and by ln ρ, at constant others."""
-        nu = self._nu(T)
+        nu = self.material.value("poisson_ratio", T)
         by_nu, half = self.shape.by_nu(nu), np.full_like(T, 0.5)
         stated = self.material.properties
         if "shear_modulus" not in stated:
@@ -357,8 +356,3 @@ def _ratio_spread(material: Material, T: Array) -> float:
         return float(spread("poisson_ratio").max())
     both = np.hypot(spread("youngs_modulus"), spread("shear_modulus"))
     return float(((1 + material.value("poisson_ratio", T)) * both).max())
-
-
-def _integrals(x: Array) -> tuple[Array, Array, Array]:
-    """Return the integrals of 1, x and ½ x² from 0."""
-    return x, x**2 / 2, x**3 / 6

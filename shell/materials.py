@@ -6,7 +6,8 @@ extrapolation, and a property that no source states is refused by name.
 
 import difflib
 import tomllib
-from collections.abc import Iterator, Mapping, Sequence
+from collections import UserDict
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from pathlib import Path
@@ -248,30 +249,19 @@ def constant_material(name: str, youngs_modulus: float, poisson_ratio: float, de
     return Material(name, "given values", 0.0, 5000.0, properties, "given in the card", constant=open_ones)
 
 
-class Materials(Mapping[str, Mapping[str, Material]]):
+class Materials(UserDict[str, Any]):
     """The materials of a file, each checked when it is first taken."""
 
     def __init__(self, path: str, content: Mapping[str, Any]) -> None:
-        self._path, self._content = path, content
+        super().__init__(content)
+        self._path = path
         self._read: dict[str, Mapping[str, Material]] = {}
 
     def __getitem__(self, name: str) -> Mapping[str, Material]:
         """Return the laws of one material."""
         if name not in self._read:
-            self._read[name] = _read_material(f"{self._path} [{name}]", name, self._content[name])
+            self._read[name] = _read_material(f"{self._path} [{name}]", name, self.data[name])
         return self._read[name]
-
-    def __contains__(self, name: object) -> bool:
-        """Tell whether the file has a material, without reading it."""
-        return name in self._content
-
-    def __iter__(self) -> Iterator[str]:
-        """Yield the names."""
-        return iter(self._content)
-
-    def __len__(self) -> int:
-        """Return how many there are."""
-        return len(self._content)
 
 
 @lru_cache(maxsize=8)

@@ -83,6 +83,11 @@ class MeridianPoints:
         """Axial component of the unit normal."""
         return self.tangent_r
 
+    def along_face(self, eta: float) -> tuple[Array, Array]:
+        """Change of r and z at a height η per arc length of the middle surface, (1 + κ ζ) t + η h'/2 n."""
+        stretch, rise = 1 + self.curvature * eta * self.thickness / 2, eta * self.thickness_slope / 2
+        return stretch * self.tangent_r + rise * self.normal_r, stretch * self.tangent_z + rise * self.normal_z
+
     def at_heights(self, eta: ArrayLike) -> tuple[Array, Array]:
         """R and z at heights η (-1 inner face, 1 outer face), (points, heights)."""
         zeta = np.multiply.outer(self.thickness / 2, np.asarray(eta))
@@ -281,8 +286,7 @@ def _check_stem(resonator: Resonator, stem: Stem) -> None:
     dome = resonator.segments[0]
     points = resonator.at(np.linspace(0, dome.length, 400), 0)
     for face, end in stem.roots:
-        r = points.r + face * points.thickness / 2 * points.normal_r
-        z = points.z + face * points.thickness / 2 * points.normal_z
+        r, z = (coordinate[:, 0] for coordinate in points.at_heights([face]))
         if not stem.radius + stem.fillet < 0.9 * r.max():
             raise ShellError(
                 f"the stem (radius {mm(stem.radius)}, fillet {mm(stem.fillet)}) is larger than the dome it stands on "

@@ -318,12 +318,9 @@ def _crossing(value: Callable[[Array], Array], low: float, high: float) -> float
 def _face(resonator: Resonator, face: int, s: Array) -> tuple[Planar, Planar]:
     """Points of a face of the dome and its unit normals, out of the material."""
     there = resonator.at(s, 0)
-    zeta, rise = face * there.thickness / 2, face * there.thickness_slope / 2
-    stretch = 1 + there.curvature * zeta
-    t_r = stretch * there.tangent_r + rise * there.normal_r
-    t_z = stretch * there.tangent_z + rise * there.normal_z
+    (r, z), (t_r, t_z) = there.at_heights([face]), there.along_face(face)
     scale = face / np.hypot(t_r, t_z)
-    return (there.r + zeta * there.normal_r, there.z + zeta * there.normal_z), (-scale * t_z, scale * t_r)
+    return (r[:, 0], z[:, 0]), (-scale * t_z, scale * t_r)
 
 
 def _point(surface: Callable[[Array], Planar], s: float) -> Spot:

@@ -41,15 +41,9 @@ class Volume:
     nodes: Array  # (N, 3) array, m, places; the axis of the resonator is z
     hexahedra: Index  # (H, 27 or 20) array, node numbers in VTK's order: corners, edges, then faces and middle
     wedges: Index  # (W, 18 or 15) array, the same for the elements on the axis
-    # held_quadrilaterals, held_triangles: (Q, 9 or 8), (T, 6) arrays Faces that the support holds: corners, edges,
-    # middle
+    # (Q, 9 or 8), (T, 6) arrays, faces that the support holds: corners, edges, middle
     held_quadrilaterals: Index
     held_triangles: Index
-
-    @property
-    def is_complete(self) -> bool:
-        """Whether faces and insides have nodes of their own."""
-        return bool(self.hexahedra.shape[1] == 27)
 
     @property
     def held(self) -> Index:
@@ -93,7 +87,8 @@ def build_volume(resonator: Resonator, layers: int = 2, around: int = 48, spacin
 def _cut_section(resonator: Resonator, layers: int, spacing: float) -> Pieces:
     system = build_system(resonator, 2, "solid", LEVEL)
     solids = [group.place for group in system.groups if isinstance(group, SolidGroup)]
-    crossing = [_cells_across(place.boundary) for place in solids]
+    # how many cells of each lie on the cross-section that it shares with the shell
+    crossing = [max((np.isfinite(eta).sum() - 1 for eta in place.boundary.heights), default=1) for place in solids]
     common = int(np.lcm.reduce(crossing)) if crossing else 1
     layers = common * int(np.ceil(layers / common))
     grids: list[Array] = []  # (2, 2a + 1, 2b + 1) points of elements divided into a x b
@@ -106,11 +101,6 @@ def _cut_section(resonator: Resonator, layers: int, spacing: float) -> Pieces:
     for place, count in zip(solids, crossing, strict=True):
         _divide_cells(place.mesh, place.boundary, layers // count, grids, held)
     return _join(grids, held)
-
-
-def _cells_across(boundary: Support) -> int:
-    """How many cells of a solid part lie on the cross-section that it shares with the shell."""
-    return max((int(np.isfinite(eta).sum()) - 1 for eta in boundary.heights), default=1)
 
 
 def _divide_chain(resonator: Resonator, chain: Chain, layers: int, spacing: float) -> list[Array]:
@@ -175,12 +165,9 @@ def _turn(section: Pieces, around: int, size: float) -> Volume:
     rings = [
         np.column_stack([r[k] * spin[: widths[k]], np.full(widths[k], z[k])]) for k in range(len(r))
     ]  # a point of the axis stays one node
-    wedges = np.array(
-        [
-            _axis_first(quad, int(side))
-            for quad, side in zip(quads[touching], np.argmax(axial, axis=0)[touching], strict=True)
-        ]
-    )
+    # turned in their sense until the side on the axis is ξ = 0
+    turns = np.array([3, 1, 0, 2])[np.argmax(axial, axis=0)[touching]]
+    wedges = np.array([np.rot90(quad, turn) for quad, turn in zip(quads[touching], turns, strict=True)])
     lattice = _Lattice(first, on_axis, around)
     edges = _held_edges(section, quads, on_axis)
     off = ~np.any(on_axis[edges], axis=1)
@@ -204,11 +191,6 @@ def _right_handed(quads: Index, r: Array, z: Array) -> Index:
     x, y = r[corners], z[corners]
     area = np.sum(x * np.roll(y, -1, axis=1) - np.roll(x, -1, axis=1) * y, axis=1)
     return np.asarray(np.where((area > 0)[:, None, None], quads[:, ::-1], quads))
-
-
-def _axis_first(quad: Index, side: int) -> Index:
-    """Turn a quadrilateral, keeping its sense, until its side on the axis is ξ = 0."""
-    return np.asarray(np.rot90(quad, {2: 0, 0: 3, 3: 2, 1: 1}[side]))
 
 
 def _held_edges(section: Pieces, quads: Index, on_axis: NDArray[np.bool_]) -> Index:

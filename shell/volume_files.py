@@ -7,10 +7,9 @@ import io
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from shell.errors import ShellError
-from shell.volume import Index, Volume
+from shell.volume import Volume
 
 VolumeKind = Literal["vtu", "msh", "inp"]
 
@@ -71,7 +70,7 @@ def _encode_msh(mesh: Volume) -> bytes:
 
 
 def _encode_inp(mesh: Volume) -> bytes:
-    if mesh.is_complete:
+    if mesh.hexahedra.shape[1] == 27:
         raise ShellError(
             "an .inp file has elements of 20 and 15 nodes: leave out the nodes at the centres of faces and elements."
         )
@@ -82,8 +81,10 @@ def _encode_inp(mesh: Volume) -> bytes:
     for cells in (mesh.hexahedra, mesh.wedges):
         if len(cells):
             text.write(f"*ELEMENT, TYPE={ABAQUS_TYPES[cells.shape[1]]}, ELSET=RESONATOR\n")
-            numbers = np.arange(first, first + len(cells))[:, None]
-            _write_lines(text, np.hstack([numbers, cells + 1]))
+            for number, nodes in enumerate((cells + 1).tolist(), first):  # a line that goes on ends with a comma
+                row = [str(number), *map(str, nodes)]
+                lines = [", ".join(row[k : k + ABAQUS_LINE]) for k in range(0, len(row), ABAQUS_LINE)]
+                text.write(",\n".join(lines) + "\n")
             first += len(cells)
     if len(mesh.held):
         text.write("*NSET, NSET=HELD\n")
@@ -96,10 +97,3 @@ def _write_nodes(text: io.StringIO, mesh: Volume, between: str) -> None:
     """Thirteen digits: CalculiX reads twenty characters of a number and takes what is left of a longer one for the whole."""
     numbers = np.arange(1, len(mesh.nodes) + 1)
     np.savetxt(text, np.column_stack([numbers, mesh.nodes]), between.join(["%d", "%.13g", "%.13g", "%.13g"]))
-
-
-def _write_lines(text: io.StringIO, rows: "Index | NDArray[np.int64]") -> None:
-    """Rows of numbers, a comma at the end of a line that goes on in the next."""
-    for row in rows.tolist():
-        lines = [row[start : start + ABAQUS_LINE] for start in range(0, len(row), ABAQUS_LINE)]
-        text.write(",\n".join(", ".join(map(str, line)) for line in lines) + "\n")

@@ -6,7 +6,7 @@ a part of a sphere) stays as it is. A dome's tilt is then taken from its edge: i
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy
@@ -167,18 +167,18 @@ def _upright(clouds: Sequence[tuple[Array, int]], projector: Projector, motion: 
     by about the distance between points at the edge. Points that do not reach the rim end where the instrument did, and
     tell nothing: the axis stays as it was given.
     """
-    resonator = projector.resonator
+    resonator, dome = projector.resonator, projector.resonator.segments[0]
     for _ in range(3):
         s, theta = _edge(clouds, projector, motion)
         if len(s) < SECTORS // 2 or s.max() < REACHED:
-            return RigidMotion(motion.rotation, motion.offset, motion.told, GIVEN)
+            return replace(motion, tilt_error=GIVEN)
         A = np.column_stack([np.ones(len(s)), np.cos(theta), np.sin(theta)])
         found = scipy.optimize.linprog([1.0, 0.0, 0.0], A_ub=-A, b_ub=-s, bounds=[(None, None)] * 3)
         if found.x is None:
-            return RigidMotion(motion.rotation, motion.offset, motion.told, GIVEN)
+            return replace(motion, tilt_error=GIVEN)
         tilt = found.x[1:] * resonator.length / resonator.size
         spin = scipy.spatial.transform.Rotation.from_rotvec([tilt[1], -tilt[0], 0.0]).as_matrix()
-        center = _center(resonator)
+        center = np.array([0.0, 0.0, dome.center[1] if isinstance(dome, Arc) else 0.0])
         # how far the sectors end below the edge: points are so far apart there, SECTORS times closer over the whole circle
         apart = float(np.median(A @ found.x - s)) * resonator.length / resonator.size / SECTORS
         motion = RigidMotion(spin @ motion.rotation, spin @ (motion.offset - center) + center, motion.told, 4 * apart)
@@ -201,8 +201,3 @@ def _edge(clouds: Sequence[tuple[Array, int]], projector: Projector, motion: Rig
         s.append(x[last])
         theta.append(angle[last])
     return np.concatenate(s), np.concatenate(theta)
-
-
-def _center(resonator: Resonator) -> Array:
-    dome = resonator.segments[0]
-    return np.array([0.0, 0.0, dome.center[1] if isinstance(dome, Arc) else 0.0])

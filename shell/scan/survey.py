@@ -159,7 +159,7 @@ def survey(
         at = projector.place(motion.apply(some))
         return at.position, at.azimuth, side * at.height - at.thickness / 2
 
-    x, theta, off = place(points[:: _stride(len(points))])
+    x, theta, off = place(points[:: max(1, len(points) // SAMPLE)])
     near = abs(off - np.median(off)) < 0.3 * float(np.median(projector.line.thickness))
     x, theta, off = x[near], theta[near], off[near]
     low, high = (float(q) for q in np.percentile(x, [0.05, 99.95]))
@@ -189,7 +189,7 @@ def survey_map(
         return position[cells // len(azimuth)], azimuth[cells % len(azimuth)], values.ravel()[cells]
 
     there = np.flatnonzero(np.isfinite(values.ravel()))
-    rough, limit = waves.fit_roughly(*place(there[:: _stride(len(there))]))
+    rough, limit = waves.fit_roughly(*place(there[:: max(1, len(there) // SAMPLE)]))
     portions = (place(there[k : k + CHUNK]) for k in range(0, len(there), CHUNK))
     sums, used = _sum_cells(waves, rough, limit, portions)
     return _finish(waves, sums, rough, side, (len(there), used), None, name)
@@ -205,10 +205,6 @@ def rigid_shapes(waves: WaveBasis, projector: Projector) -> Array:
         [line.normal_r, ((line.z - middle) * line.normal_r - line.r * line.normal_z) / projector.resonator.size]
     )
     return np.asarray(np.linalg.lstsq(waves.along(x[inside]), shapes[inside], rcond=None)[0])
-
-
-def _stride(count: int) -> int:
-    return max(1, count // SAMPLE)
 
 
 def _sum_cells(waves: WaveBasis, rough: Array, limit: float, portions: Iterable[Points]) -> tuple[Array, int]:

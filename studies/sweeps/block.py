@@ -107,7 +107,8 @@ def unpack(content: bytes, columns: Sequence[int]) -> Array:
     ends = list(accumulate(head["sizes"], initial=start))
     found = np.empty((len(columns), head["rows"]))
     for row, column in zip(found, columns, strict=True):
-        row[:] = _unsqueeze(content[ends[column] : ends[column + 1]])
+        planes = np.frombuffer(zlib.decompress(content[ends[column] : ends[column + 1]]), np.uint8).reshape(8, -1)
+        row[:] = np.ascontiguousarray(planes.T).view("<f8").ravel()
     return found
 
 
@@ -129,8 +130,3 @@ def _squeeze(column: Array) -> bytes:
     packer = zlib.compressobj(1, zlib.DEFLATED, zlib.MAX_WBITS, 9, zlib.Z_RLE)
     planes = np.ascontiguousarray(column.astype("<f8").view(np.uint8).reshape(-1, 8).T)
     return packer.compress(planes.tobytes()) + packer.flush()
-
-
-def _unsqueeze(stream: bytes) -> Array:
-    planes = np.frombuffer(zlib.decompress(stream), np.uint8).reshape(8, -1)
-    return np.ascontiguousarray(planes.T).view("<f8").ravel()

@@ -18,13 +18,14 @@ from importlib import import_module
 from typing import Any
 
 from studies.errors import InputError, MissingEnvironment
+from studies.sweeps.workers import Workers
 
 PATIENCE = 20.0  # s to find the scheduler, its first worker, and another after the last one has ended
 GLANCE = 3.0  # s for the scheduler to say which workers it has
 ENCRYPTED = ("tls", "wss")
 
 
-class Cluster:
+class Cluster(Workers):
     """The workers of a Dask scheduler; they belong to whoever started them and go on when the study ends."""
 
     def __init__(self, address: str) -> None:
@@ -52,17 +53,13 @@ class Cluster:
         self._check_versions()
         self.executor = self.client.get_executor(pure=False, retries=0)
         self.count = sum(self.client.nthreads().values())
-        self.lost: tuple[type[BaseException], ...] = (distributed.scheduler.KilledWorker,)
-        self.gone: tuple[type[BaseException], ...] = (CancelledError, distributed.client.FutureCancelledError, OSError)
+        self.lost = (distributed.scheduler.KilledWorker,)
+        self.gone = (CancelledError, distributed.client.FutureCancelledError, OSError)
 
     def submit(self, function: Callable[..., Any], *arguments: Any) -> "Future[Any]":
         """Queue a call on the cluster."""
         future: Future[Any] = self.executor.submit(call_if_same, self.code, function, *arguments)
         return future
-
-    def restart(self) -> bool:
-        """The scheduler has replaced the lost worker; other tasks go on."""
-        return False
 
     def check(self) -> None:
         """Say when the last worker has ended; give up when no other comes."""

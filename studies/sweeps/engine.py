@@ -83,7 +83,12 @@ def compute(
     while batches or suspects or running:
         if suspects and not running:
             _submit(suspects.popleft(), plan, workers, running)
-        while batches and not suspects and len(running) < MOST_TASKS * workers.count and not _any_alone(running):
+        while (
+            batches
+            and not suspects
+            and len(running) < MOST_TASKS * workers.count
+            and not any(task.alone for task in running.values())
+        ):
             _submit(_Task([batches.popleft() for _ in range(min(size, len(batches)))]), plan, workers, running)
         finished = wait(running, LOOK_EVERY, FIRST_COMPLETED).done
         if not finished:
@@ -115,10 +120,6 @@ def compute(
             computed = True
             each = sum(cases.seconds for cases in found) / len(found)
             size = max(1, min(int(TASK_SECONDS / max(each, 1e-9)), ceil(len(batches) / (8 * workers.count))))
-
-
-def _any_alone(running: dict[Future[Any], _Task]) -> bool:
-    return any(task.alone for task in running.values())
 
 
 def _submit(task: _Task, plan: WorkPlan, workers: "Workers", running: dict[Future[Any], _Task]) -> None:

@@ -26,7 +26,7 @@ from studies.sweeps.quantity import ModeQuantity, Quantity
 if TYPE_CHECKING:
     from shell.materials import Material
     from shell.resonator import Resonator
-    from studies.sweeps.definition import Study, StudyParameter
+    from studies.sweeps.definition import Study
     from studies.sweeps.design import Design
 
 Designs = Mapping[str, NDArray[Any]]  # columns of parameters by name
@@ -54,13 +54,15 @@ class Families:
         values, errors = (np.concatenate([one[part] for one in found], axis=1) for part in (0, 1))
         return values, errors
 
-    def modes(self, asked: ModeQuantity, designs: Designs, bodies: "_Bodies") -> tuple[Family, FamilyResult]:
-        """Return the family that a quantity asks for and what it gives."""
+    def modes(self, asked: ModeQuantity, designs: Designs, count: int) -> "tuple[Family, FamilyResult, _Bodies]":
+        """Return the family that a quantity asks for, what it gives, and what the designs are made of."""
+        bodies = _describe(self.instrument, designs, count, asked.temperature_degC)
         family = self.members[_key(asked)]
         values = np.empty((len(bodies.T), len(family.axes)))
         for k, axis in enumerate(family.axes):
             values[:, k] = designs[axis.name]
-        return family, family.evaluate(values, nu=bodies.nu, E=bodies.E, rho=bodies.rho, growth=bodies.growth)
+        found = family.evaluate(values, nu=bodies.nu, E=bodies.E, rho=bodies.rho, growth=bodies.growth)
+        return family, found, bodies
 
 
 @dataclass(frozen=True)
@@ -99,7 +101,9 @@ def build_families(study: "Study", design: "Design", most: int = MOST_SOLVES) ->
     reason = why_not(study)
     if reason:
         return reason
-    axes = [Axis(p.name, *_range(study, design, k)) for k, p in enumerate(study.parameters) if _is_dimension(p)]
+    axes = [
+        Axis(p.name, *_range(study, design, k)) for k, p in enumerate(study.parameters) if p.name.startswith(DIMENSIONS)
+    ]
 
     def build(values: Array) -> "Resonator":
         named = {axis.name: float(value) for axis, value in zip(axes, values, strict=True)}
@@ -144,22 +148,19 @@ def choose_solver(study: "Study", design: "Design") -> "Families | None":
 
 
 def _frequency(families: Families, asked: ModeQuantity, designs: Designs, count: int) -> tuple[Array, Array]:
-    bodies = _describe(families.instrument, designs, count, asked.temperature_degC)
-    family, found = families.modes(asked, designs, bodies)
+    family, found, _ = families.modes(asked, designs, count)
     error = found.frequency * (family.error.frequency + family.theory_error)
     return found.frequency[:, None], error[:, None]
 
 
 def _bryan_factor(families: Families, asked: ModeQuantity, designs: Designs, count: int) -> tuple[Array, Array]:
-    bodies = _describe(families.instrument, designs, count, asked.temperature_degC)
-    family, found = families.modes(asked, designs, bodies)
+    family, found, _ = families.modes(asked, designs, count)
     return found.bryan_factor[:, None], np.full((count, 1), family.error.bryan_factor + family.theory_error)
 
 
 def _tcf(families: Families, asked: ModeQuantity, designs: Designs, count: int) -> tuple[Array, Array]:
     """Return the five parts of d ln f/dT (HRG paper eq. 15) and their sum."""
-    bodies = _describe(families.instrument, designs, count, asked.temperature_degC)
-    family, found = families.modes(asked, designs, bodies)
+    family, found, bodies = families.modes(asked, designs, count)
     parts, scale = np.empty((count, 5)), np.empty((count, 2))
     for material, places in bodies.materials:
         T = bodies.T[places]
@@ -207,10 +208,6 @@ def _describe(instrument: Instrument, designs: Designs, count: int, temperature_
         materials.append((material, places))
     E, nu, rho, growth = constants
     return _Bodies(T, growth, E, nu, rho, materials)
-
-
-def _is_dimension(parameter: "StudyParameter") -> bool:
-    return parameter.name.startswith(DIMENSIONS)
 
 
 def _range(study: "Study", design: "Design", k: int) -> tuple[float, float]:

@@ -68,8 +68,9 @@ def find_yield(results: "Results", requirements: "tuple[Requirement, ...]") -> Y
 
     limits = tuple(resolve_limits(results, requirement) for requirement in requirements)
     good, unknown = _judge(results, limits)
-    rows = _sample_rows(results)
-    good, unknown = good[rows], unknown[rows]
+    # rows that are independent draws: of Saltelli's design the first two blocks
+    last = 2 * results.study.sampling.cases if results.study.sampling.method == "sensitivity" else None
+    good, unknown = good[:last], unknown[:last]
     n, passed, open_ = len(good), int(good.sum()), int(unknown.sum())
     if results.study.sampling.method not in DRAWN or n == 0:
         return Yield(limits, n, passed, open_, None, None)
@@ -115,10 +116,3 @@ def _judge(results: "Results", limits: tuple[RequirementLimits, ...]) -> tuple[N
     good = inside.all(axis=0)
     fails = (known & ~inside).any(axis=0)
     return good, ~good & ~fails
-
-
-def _sample_rows(results: "Results") -> slice:
-    """Return the rows that are independent draws: of Saltelli's design the first two blocks."""
-    if results.study.sampling.method == "sensitivity":
-        return slice(0, 2 * results.study.sampling.cases)
-    return slice(None)

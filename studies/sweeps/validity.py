@@ -10,7 +10,7 @@ from studies.sweeps.design import nominal_design
 from studies.sweeps.parameters import TEMPERATURE, set_parameters
 
 if TYPE_CHECKING:
-    from studies.sweeps.definition import Study, StudyParameter
+    from studies.sweeps.definition import Study
 
 MOST_CORNERS = 6  # parameters up to which all corners of the box are looked at
 SAMPLES = ("latin-hypercube", "sobol")
@@ -27,7 +27,8 @@ def check_nominal(study: "Study", where: str) -> None:
 def find_invalid(study: "Study") -> list[str]:
     """Return what is wrong with designs at the ends of each parameter and at the corners of the box; they fail as cases."""
     nominal = nominal_design(study)
-    ends = ({**nominal, parameter.name: value} for parameter in study.parameters for value in _extremes(parameter))
+    reach = {p.name: p.values if isinstance(p.nominal, str) else (p.low, p.high) for p in study.parameters}
+    ends = ({**nominal, name: value} for name, values in reach.items() for value in values)
     problems = (_problem(study, {**nominal, **design}) for design in chain(ends, _corners(study)))
     return list(dict.fromkeys(problem for problem in problems if problem))
 
@@ -53,12 +54,6 @@ def _problem(study: "Study", values: Mapping[str, Any]) -> str:
             f" '{theories[0]}' is valid; narrow the range or take theory = 'solid'."
         )
     return ""
-
-
-def _extremes(parameter: "StudyParameter") -> tuple[Any, ...]:
-    if isinstance(parameter.nominal, str):
-        return parameter.values
-    return (parameter.low, parameter.high)
 
 
 def _check_temperatures(study: "Study", where: str) -> None:

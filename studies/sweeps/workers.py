@@ -8,7 +8,7 @@ import sys
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
-from typing import Any, Protocol
+from typing import Any
 
 from studies.threads import ONE_THREAD
 
@@ -17,39 +17,33 @@ ENVIRONMENT = {**ONE_THREAD, "PYTHONSAFEPATH": "1"}
 PR_SET_PDEATHSIG = 1
 
 
-class Workers(Protocol):
+class Workers:
     """What the engine needs: how many there are, a way to submit, restart and close.
 
     `lost`: errors which mean that the worker of that task was lost; `gone`: that all are gone for good.
     """
 
-    count: int
-    lost: tuple[type[BaseException], ...]
-    gone: tuple[type[BaseException], ...]
-
-    def submit(self, function: Callable[..., Any], *arguments: Any) -> "Future[Any]":
-        """Start a call somewhere."""
-        ...
-
-    def restart(self) -> bool:
-        """Be usable again after a worker was lost; True when every other running task was lost with it."""
-        ...
-
-    def check(self) -> None:
-        """Look after the workers while nothing comes back; MissingEnvironment when none is left."""
-        ...
-
-    def close(self) -> None:
-        """End every worker at once; what they were doing is lost."""
-        ...
-
-
-class Here:
-    """The process itself: for vectorised quantities, where starting others would take longer than the work."""
-
     count = 1
     lost: tuple[type[BaseException], ...] = ()
     gone: tuple[type[BaseException], ...] = ()
+
+    def submit(self, function: Callable[..., Any], *arguments: Any) -> "Future[Any]":
+        """Start a call somewhere."""
+        raise NotImplementedError
+
+    def restart(self) -> bool:
+        """Be usable again after a worker was lost; True when every other running task was lost with it."""
+        return False
+
+    def check(self) -> None:
+        """Look after the workers while nothing comes back; MissingEnvironment when none is left."""
+
+    def close(self) -> None:
+        """End every worker at once; what they were doing is lost."""
+
+
+class Here(Workers):
+    """The process itself: for vectorised quantities, where starting others would take longer than the work."""
 
     def submit(self, function: Callable[..., Any], *arguments: Any) -> "Future[Any]":
         """Call now."""
@@ -57,22 +51,11 @@ class Here:
         done.set_result(function(*arguments))
         return done
 
-    def restart(self) -> bool:
-        """Nothing can be lost."""
-        return False
 
-    def check(self) -> None:
-        """Nothing can be lost."""
-
-    def close(self) -> None:
-        """Nothing to end."""
-
-
-class Pool:
+class Pool(Workers):
     """Processes on this machine, each with one thread; they end when this process ends, however it ends."""
 
-    lost: tuple[type[BaseException], ...] = (BrokenProcessPool,)
-    gone: tuple[type[BaseException], ...] = ()
+    lost = (BrokenProcessPool,)
 
     def __init__(self, count: int) -> None:
         self.count = count
@@ -91,9 +74,6 @@ class Pool:
         self.close()
         self._start()
         return True
-
-    def check(self) -> None:
-        """The pool itself tells of a process that is lost."""
 
     def close(self) -> None:
         """Kill the processes."""
