@@ -1,9 +1,10 @@
 """Smooth pieces of a meridian in the (r, z) plane: line, arc and the hyperbola of the bell."""
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 from math import atan2, hypot, pi
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,9 +35,13 @@ class Curve(ABC):
     def jet(self, x: Array) -> Jet:
         """Position, first and second derivative at the parameters x."""
 
-    @abstractmethod
-    def scaled(self, factor: float) -> "Curve":
-        """The curve with all lengths multiplied by `factor`."""
+    def scaled(self, factor: float) -> Self:
+        """The curve with all lengths multiplied by `factor`; what is an angle stays."""
+        given: dict[str, Any] = {field.name: getattr(self, field.name) for field in fields(self)}  # type: ignore[arg-type]
+        for name, value in given.items():
+            if not name.endswith("_angle"):
+                given[name] = tuple(factor * x for x in value) if isinstance(value, tuple) else factor * value
+        return type(self)(**given)
 
     @cached_property
     def length(self) -> float:
@@ -93,10 +98,6 @@ class Line(Curve):
         """Position and derivatives at arc lengths s (m)."""
         return self.jet(s / self.length)
 
-    def scaled(self, factor: float) -> "Line":
-        """The line with all lengths multiplied by `factor`."""
-        return Line((self.start[0] * factor, self.start[1] * factor), (self.end[0] * factor, self.end[1] * factor))
-
 
 @dataclass(frozen=True)
 class Arc(Curve):
@@ -140,11 +141,6 @@ class Arc(Curve):
         """Position and derivatives at arc lengths s (m)."""
         return self.jet(s / self.length)
 
-    def scaled(self, factor: float) -> "Arc":
-        """The arc with all lengths multiplied by `factor`."""
-        center = (self.center[0] * factor, self.center[1] * factor)
-        return Arc(center, self.radius * factor, self.first_angle, self.last_angle)
-
 
 @dataclass(frozen=True)
 class Hyperbola(Curve):
@@ -164,7 +160,3 @@ class Hyperbola(Curve):
         r = np.sqrt(self.radius**2 + spread * x**2)
         dr = spread * x / r
         return Jet(r, self.waist - self.height * x, dr, np.full_like(x, -self.height), (spread - dr**2) / r, 0 * x)
-
-    def scaled(self, factor: float) -> "Hyperbola":
-        """The hyperbola with all lengths multiplied by `factor`."""
-        return Hyperbola(self.radius * factor, self.waist * factor, self.height * factor, self.mouth_radius * factor)

@@ -21,7 +21,7 @@ import numpy as np
 from shell.errors import ShellError
 from shell.finite import QuadraticForce, solved_as_solid
 from shell.modes import Mode, TheoryRangeWarning
-from shell.prestress import is_uniform, neighbour, settle
+from shell.prestress import neighbour, operators, settle
 from shell.quadrature import Array
 from shell.solution import Solution, total
 from shell.sparse import assemble_elements, factor_symmetric
@@ -74,9 +74,8 @@ def amplitude_shift(mode: Mode) -> AmplitudeShift:
 
 def _inertia(z: Solution, force: Array, driven: float) -> tuple[float, float]:
     """Return zᵀ M z_d with (K - Λ M) z_d = f at Λ = `driven`, and its derivative by Λ."""
-    system, constants = z.system, z.constants
-    lam, G, rho = (list(kind) for kind in zip(*((*c.lame, c.rho) for c in constants), strict=True))
-    elements, inertia = system.operators(lam, G, rho, is_uniform(constants))
+    system = z.system
+    elements, inertia = operators(system, z.constants)
     M = inertia.matrix()
     K = assemble_elements(system.pattern.unknowns, elements, system.pattern.size)
     solve = factor_symmetric(K - driven * M, 0.01)

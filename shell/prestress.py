@@ -26,7 +26,7 @@ from shell.finite import QuadraticForce, solved_as_solid
 from shell.modes import Mode
 from shell.quadrature import Array
 from shell.solution import Constants, Solution, total
-from shell.system import ShellGroup, System
+from shell.system import Inertia, ShellGroup, System
 
 STEPS = 60  # of the iteration for rigid motions
 DONE = 1e-9
@@ -123,8 +123,7 @@ def settle(system: System, mode: Mode, load: Array) -> Solution:
     assert mode.resonator is not None
     rigid = system.rigid_motions
     shift = 1e-2 * constants[0].wave_speed_squared / mode.resonator.size**2 if rigid else 0.0
-    lam, G, rho = (list(kind) for kind in zip(*((*c.lame, c.rho) for c in constants), strict=True))
-    K, M = system.operators(lam, G, rho, is_uniform(constants), shift)
+    K, M = operators(system, constants, shift)
     factor = Factor(system.pattern, K)
     f = load[:, None]
     if not rigid:
@@ -141,6 +140,8 @@ def settle(system: System, mode: Mode, load: Array) -> Solution:
     raise ShellError("the static field caused by a mode or a spin did not converge.")
 
 
-def is_uniform(constants: tuple[Constants, ...]) -> bool:
-    """Whether E, ν and ρ are the same everywhere in each group."""
-    return all(np.ptp(field) == 0 for c in constants for field in (c.E, c.nu, c.rho))
+def operators(system: System, constants: tuple[Constants, ...], shift: float = 0.0) -> tuple[list[Array], Inertia]:
+    """Stiffness, plus `shift` times mass, of every element, and the mass, of the material at the stations of every group."""
+    lam, G, rho = (list(kind) for kind in zip(*((*c.lame, c.rho) for c in constants), strict=True))
+    uniform = all(np.ptp(field) == 0 for c in constants for field in (c.E, c.nu, c.rho))
+    return system.operators(lam, G, rho, uniform, shift)

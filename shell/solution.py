@@ -271,13 +271,13 @@ def _membrane(group: ShellGroup, c: Constants, e: Array) -> float:
     """Energy of the mean in-plane strains, in plane stress."""
     weights = group.table.volume / group.table.volume.sum(axis=2, keepdims=True)
     s, theta, twist = (np.einsum("eij,eij->ei", e[:, :, k], weights) for k in (0, 1, 3))
-    cosine, sine = _plane_energies(c, s, theta, twist)
+    cosine, sine = plane_energies(c.E, c.nu, s, theta, twist)
     return float(np.sum((cosine + sine) * group.table.volume.sum(axis=2)))
 
 
-def _plane_energies(c: Constants, s: Array, theta: Array, twist: Array) -> tuple[Array, Array]:
+def plane_energies(E: Array, nu: Array, s: Array, theta: Array, twist: Array) -> tuple[Array, Array]:
     """Twice the energy density of plane stress, of what varies as cos nθ and of the twist, which varies as sin nθ."""
-    lam, G = lame(c.E, c.nu, True)
+    lam, G = lame(E, nu, True)
     return np.asarray(lam * (s + theta) ** 2 + 2 * G * (s**2 + theta**2)), np.asarray(G * twist**2)
 
 
@@ -290,7 +290,7 @@ def surface_energies(solution: Solution, number: int) -> tuple[Array, Array]:
     """
     c, table = solution.constants[number], face_table(solution, number)
     e, d = (find(solution.unknowns[number]) for find in (table.strains, table.displacements))
-    cosine, sine = _plane_energies(c.at((..., None)), e[:, :, 0], e[:, :, 1], e[:, :, 3])
+    cosine, sine = plane_energies(c.E[..., None], c.nu[..., None], e[:, :, 0], e[:, :, 1], e[:, :, 3])
     if table.plane_stress:
         transverse = c.lame[1][..., None] * table.transverse_shear
         cosine, sine = cosine + transverse * e[:, :, 4] ** 2, sine + transverse * e[:, :, 5] ** 2

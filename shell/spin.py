@@ -21,7 +21,7 @@ from shell.elastic import Elastic
 from shell.errors import ShellError
 from shell.finite import solved_as_solid
 from shell.modes import Mode
-from shell.prestress import mean_answer, neighbour
+from shell.prestress import mean_answer, neighbour, operators
 from shell.quadrature import Array, gauss
 from shell.solution import Solution, radial, total
 from shell.system import Group, ShellGroup, System
@@ -65,16 +65,15 @@ def spin_shift(mode: Mode, elastic: Elastic) -> SpinShift:
         forces.append(_pull(group, force))
     load = system.gather(forces)
     g = float(solution.vector @ load) / mass
-    others = _response(system, elastic, solution, load, mass)
+    others = _response(system, solution, load, mass)
     return SpinShift(
         stiffening / (2 * eigenvalue), -softening / mass / (2 * eigenvalue), g**2 / (2 * eigenvalue) - 2 * others / mass
     )
 
 
-def _response(system: System, elastic: Elastic, solution: Solution, load: Array, mass: float) -> float:
+def _response(system: System, solution: Solution, load: Array, mass: float) -> float:
     """Fᵀ (K - λ M)⁺ f without the mode itself: z = K⁻¹ (f + λ M z), which all higher modes let converge."""
-    lam, G, rho = (list(kind) for kind in zip(*((*c.lame, c.rho) for c in solution.constants), strict=True))
-    K, M = system.operators(lam, G, rho, True)
+    K, M = operators(system, solution.constants)
     factor, own = Factor(system.pattern, K), solution.vector[:, None]
     heavy = M @ own
     f = load[:, None] - heavy * (float(own[:, 0] @ load) / mass)

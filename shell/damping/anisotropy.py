@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from shell.damping.budget import Budget
 from shell.damping.faces import FreeFaces
-from shell.damping.film import Film
+from shell.damping.film import Film, film_energies
 from shell.errors import ShellError
 from shell.quadrature import Array
 
@@ -51,18 +51,11 @@ def damping_wave(budget: Budget, ripples: Sequence[Ripple], harmonic: int) -> Co
 
 def film_weight(film: Film, faces: tuple[FreeFaces, ...]) -> float:
     """κ of a film's own loss: its normal strains against its twist."""
-    lam, G = film.E * film.nu / (1 - film.nu**2), film.E / (2 * (1 + film.nu))
-    return _weight(
-        [
-            (
-                face.integrate(
-                    film.carries(face) * (lam * face.stretch**2 + 2 * G * (face.strain[0] ** 2 + face.strain[1] ** 2))
-                ),
-                face.integrate(film.carries(face) * G * face.strain[3] ** 2),
-            )
-            for face in faces
-        ]
-    )
+    pairs = []
+    for face in faces:
+        cosine, sine = (face.integrate(film.carries(face) * part) for part in film_energies(film, face))
+        pairs.append((cosine, sine))
+    return _weight(pairs)
 
 
 def surface_weight(surfaces: tuple[FreeFaces, ...]) -> float:

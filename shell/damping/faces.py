@@ -14,12 +14,12 @@ from shell.assembly import sections
 from shell.blocks import surface_sides
 from shell.cells import CellTable, Reference, tabulate_cells
 from shell.errors import ShellError
-from shell.kernel import StrainTable, lame, shell_table
+from shell.kernel import StrainTable, shell_table
 from shell.materials import Material
 from shell.modes import Mode
 from shell.quadrature import Array, gauss, nodal
 from shell.resonator import Resonator
-from shell.solution import Constants, Solution, face_table, total
+from shell.solution import Constants, Solution, face_table, plane_energies, total
 from shell.system import ShellGroup, SolidGroup
 
 Kind = Literal["inner", "outer", "edge", "root"]
@@ -113,17 +113,15 @@ def shell_faces(solution: Solution) -> tuple[FreeFaces, FreeFaces]:
         section, table = group.place.section, face_table(solution, number)
         strain, moved = table.strains(q), table.displacements(q)
         area = table.volume * (2 / section.thickness)[..., None]
-        lam, G = lame(c.E, c.nu, True)
         for k, name in enumerate(("inner", "outer")):
-            s, theta, twist = (strain[:, :, row, k] for row in (0, 1, 3))
-            energy = lam * (s + theta) ** 2 + G * (2 * s**2 + 2 * theta**2 + twist**2)
+            cosine, sine = plane_energies(c.E, c.nu, *(strain[:, :, row, k] for row in (0, 1, 3)))
             found[k].append(
                 FreeFaces(
                     name,  # type: ignore[arg-type]
                     section.position.ravel(),
                     area[..., k].ravel(),
                     _points(strain[..., k]),
-                    energy.ravel(),
+                    (cosine + sine).ravel(),
                     _points(moved[..., k]),
                     c.E.ravel(),
                     c.nu.ravel(),

@@ -25,7 +25,7 @@ from shell.damping.heat import Heat
 from shell.errors import ShellError, mm
 from shell.modes import Mode
 from shell.quadrature import Array
-from shell.solution import total
+from shell.solution import plane_energies, total
 
 THICKEST = 0.05  # film over wall up to which it follows the face and leaves the mode as it is
 
@@ -76,11 +76,9 @@ def check_film(film: Film, wall: float) -> None:
         )
 
 
-def film_energy(film: Film, face: FreeFaces) -> Array:
-    """σ_f : ε of the film per volume of film, plane stress, at the points of a face (J/m³)."""
-    s, theta, twist = face.strain[0], face.strain[1], face.strain[3]
-    lam, G = film.E * film.nu / (1 - film.nu**2), film.E / (2 * (1 + film.nu))
-    return np.asarray(lam * (s + theta) ** 2 + G * (2 * s**2 + 2 * theta**2 + twist**2))
+def film_energies(film: Film, face: FreeFaces) -> tuple[Array, Array]:
+    """σ_f : ε of the film per volume of film, plane stress, at the points of a face (J/m³): of stretch and of twist."""
+    return plane_energies(np.array(film.E), np.array(film.nu), *face.strain[[0, 1, 3]])
 
 
 def film_shift(mode: Mode, film: Film) -> float:
@@ -91,13 +89,13 @@ def film_shift(mode: Mode, film: Film) -> float:
     eigenvalue, changed = mode.solution.eigenvalue, 0.0
     for face in shell_faces(mode.solution):
         heavy = eigenvalue * film.rho * np.sum(face.moved**2, axis=0)
-        changed += face.integrate(film.carries(face) * (film_energy(film, face) - heavy))
+        changed += face.integrate(film.carries(face) * (sum(film_energies(film, face)) - heavy))
     return film.thickness * changed / (2 * eigenvalue * total(mode.solution.kinetic))
 
 
 def film_internal_loss(film: Film, vibration: Vibration) -> float:
     """1/Q of the film's own loss."""
-    energy = sum(face.integrate(film.carries(face) * film_energy(film, face)) for face in vibration.faces)
+    energy = sum(face.integrate(film.carries(face) * sum(film_energies(film, face))) for face in vibration.faces)
     return film.loss * film.thickness * energy / vibration.strain_energy
 
 
