@@ -110,6 +110,8 @@ def _fit_from(envelope: Envelope, time: Array, names: tuple[str, ...], guess: De
         with np.errstate(over="ignore", invalid="ignore"):
             found = propagate(of(point)[0], time, of(point)[1])
         found = found.sum(axis=0, keepdims=True) if summed else found
+        if np.max(np.abs(found)) < most:  # nor is it no number
+            return found
         real, imaginary = (np.clip(np.nan_to_num(part, nan=most), -most, most) for part in (found.real, found.imag))
         return np.asarray(real + 1j * imaginary)
 

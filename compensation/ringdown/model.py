@@ -73,10 +73,11 @@ def propagate(decay: Decay, time: Array, start: Complex) -> Complex:
     else:
         a, b = decay.matrix[0]
         s = np.sqrt(a * a + b * b + 0j)
-        x = s * time
-        small = np.abs(x) < 1e-4
-        ratio = np.where(small, time * (1 + x**2 / 6), np.sinh(x) / np.where(small, 1.0, s))
-        z = common * (np.cosh(x) * start[:, None] + ratio * (decay.matrix @ start)[:, None])
+        small = np.abs(s) * time < 1e-2
+        up = np.exp(s * time)
+        down, square = 1 / up, (s * time) ** 2
+        ratio = np.where(small, time * (1 + square / 6 * (1 + square / 20)), (up - down) / (2 * (s or 1.0)))
+        z = common * ((up + down) / 2 * start[:, None] + ratio * (decay.matrix @ start)[:, None])
     if decay.hardening or decay.thickening:
         z = z * _amplitude_effect(decay, time, z)
     return np.asarray(z)

@@ -78,6 +78,7 @@ def test_demodulated_carrier_gives_the_transfer_function_and_its_error_falls_wit
     np.testing.assert_allclose(errors, 1.0, atol=0.05)
 
 
+@pytest.mark.slow
 def test_demodulated_transient_of_the_carrier_follows_the_transfer_function():
     time, rate = ramp(TUNED, 0.2, rows=3001, length=6, rise=3)
     motion = integrate_motion(TUNED, time, rate, samples_per_cycle=32)

@@ -45,6 +45,7 @@ def test_transition_and_observability_are_the_printed_ones():
     assert np.linalg.matrix_rank(observability(GYRO)) == 2
 
 
+@pytest.mark.slow
 def test_innovations_and_errors_are_chi_squared():
     runs, rows = 40, 600
     generator = np.random.default_rng(11)

@@ -30,6 +30,7 @@ def test_noise_has_no_line(kind):
     assert all(find_line(pair, SAMPLING, SLOWEST) is None for pair in zip(series[::2], series[1::2], strict=True))
 
 
+@pytest.mark.slow
 def test_its_probability_is_that_of_noise():
     """Of 800 series of white noise as many exceed an evidence of 1, 2 and 4 as it says, e⁻¹, e⁻² and e⁻⁴ of frequencies that are
     independent; a window joins some, so that there are fewer, not more, and far out too: the level is one of noise itself."""

@@ -128,6 +128,7 @@ def test_angle_random_walk_of_thermal_noise():
     assert np.std(run.rate) == pytest.approx(level / wave.coupling, rel=0.05)
 
 
+@pytest.mark.slow
 def test_quantisation_is_the_noise_that_is_said():
     """Rounded samples and commands of the carrier against white noise of step²/12 in the averaged loop."""
     frequency, sample = 4432.07, 8 / 4432.07

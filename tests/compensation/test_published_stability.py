@@ -62,6 +62,7 @@ def test_confidence_bands_cover_the_truth():
     assert np.all(np.abs(rate - 0.683) < 0.1)
 
 
+@pytest.mark.slow
 def test_planted_noise_is_recovered_with_honest_uncertainty():
     near = np.zeros((2, 2))
     runs = 100

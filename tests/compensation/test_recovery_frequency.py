@@ -16,6 +16,7 @@ def reading(rng, noise=0.02):
     return np.polynomial.polynomial.polyval(T, TRUTH) + noise * rng.normal(size=T.size)
 
 
+@pytest.mark.slow
 def test_intervals_of_coefficients_and_temperature_cover_the_truth():
     rng = np.random.default_rng(11)
     inside = np.zeros(5)
@@ -49,6 +50,7 @@ def test_a_falling_curve_is_inverted_too():
     assert fit.temperature(fit.frequency(7.0)) == pytest.approx(7.0, abs=1e-9)
 
 
+@pytest.mark.slow
 def test_a_straight_line_with_noise_asks_for_no_second_order():
     rng = np.random.default_rng(8)
     asked = [compare_orders(T, 4425 + 0.37 * T + 0.02 * rng.normal(size=T.size)).recommended > 1 for _ in range(300)]

@@ -21,6 +21,7 @@ def draw(rows: NoiseRows, noise: Noise, generator: np.random.Generator) -> Array
     return np.concatenate([L @ generator.standard_normal(len(L)) for L in parts])
 
 
+@pytest.mark.slow
 def test_levels_are_recovered_from_drawn_noise():
     generator = np.random.default_rng(11)
     rows = NoiseRows.of([EVEN] * 4)

@@ -88,6 +88,7 @@ def test_rate_from_voltages(sensed, driven):
     assert np.max(np.abs(Q[inside])) < 0.5 * planted * 2 * 0.275 * 0.03 * np.max(np.abs(P))  # the force does hold it
 
 
+@pytest.mark.slow
 def test_second_form_reads_the_same_rate_from_the_driven_axis():
     """(24) has two forms; in open loop, with q in motion, the first of (23) gives the rate too."""
     planted = 3.0

@@ -185,7 +185,7 @@ def test_what_is_no_plain_decay_is_named_and_its_intervals_hold(spoil):
 def test_refused():
     random = np.random.default_rng(8)
     z = ring(draw_gyro(random), random)
-    with pytest.raises(CompensationError, match="one and the same"):
+    with pytest.raises(CompensationError, match="carry the same signal"):
         analyse_decay(from_lock_in(TIME, np.array([z[0], 2 * z[0]]), CARRIER))
     driven = noisy(np.ones((2, TIME.size), dtype=complex) * np.array([[1.0], [0.5j]]), 0.02, random)
     with pytest.raises(CompensationError, match="nothing decays"):

@@ -156,6 +156,7 @@ def satisfies_18_at_the_pole(v, w):
     return all(sp.limit(strain.subs(n, 2) / phi**2, phi, 0) == 0 for strain in amplitudes)
 
 
+@pytest.mark.slow
 def test_only_the_reading_of_19_that_is_used_satisfies_18_at_the_pole():
     """The print leaves open two signs and, by (16), the order of the last two components: eight readings."""
     used = symbolic.rayleigh_functions(with_factor=False)

@@ -35,6 +35,7 @@ def silicon_ring(h: float) -> list[float]:
     return found
 
 
+@pytest.mark.slow
 def test_a_ring_of_silicon() -> None:
     """What is left falls as (h/R)²."""
     errors = []
@@ -64,6 +65,7 @@ def test_a_crystal_that_is_isotropic_is_the_isotropic_body() -> None:
     assert pair.relative_split == pytest.approx(0.0, abs=1e-9)
 
 
+@pytest.mark.slow
 def test_odd_harmonics_do_not_split() -> None:
     pair = solve_cubic(cylinder(1.0, 0.02, 0.06), SILICON, 3, tolerance=1e-3)
     assert pair.relative_split == pytest.approx(0.0, abs=1e-8)

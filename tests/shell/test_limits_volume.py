@@ -156,6 +156,7 @@ def test_impossible_numbers_are_refused():
             build_volume(SHAPES["dome"], **wrong)
 
 
+@pytest.mark.slow
 def test_another_program_finds_the_same_frequency_on_the_mesh():
     """scikit-fem's isoparametric elements of 27 nodes: from above, and nearer as the mesh is refined."""
     dome = hemisphere(R, 4e-3, pole_angle=0.4)  # thick, so that few elements go far

@@ -97,6 +97,7 @@ def test_parts_of_the_temperature_coefficient_add_up_to_its_derivative():
     assert over[E] in frequency_over_temperature().atoms(sp.Function)
 
 
+@pytest.mark.slow
 def test_free_expansion_leaves_half_of_the_shear_modulus_and_of_the_expansion():
     """Theory sheet, section 1: TCF = ½ G'/G + ½ α."""
     assert sp.simplify(free_expansion() - G(temperature).diff(temperature) / (2 * G(temperature)) - alpha / 2) == 0

@@ -129,6 +129,7 @@ def test_hemispherical_zone(row: dict[str, str]) -> None:
     assert found == pytest.approx(float(row["published"]), rel=1.5e-3)
 
 
+@pytest.mark.slow
 def test_clamped_zone_by_finite_elements() -> None:
     """The clamped zone by scikit-fem, in spherical components: an upper bound that comes within 1e-4."""
     zone = hemisphere(1.0, 0.05, pole_angle=pi / 8, support="clamped-pole")

@@ -73,6 +73,7 @@ def test_every_cause_makes_valid_records_at_its_snr(tmp_path, kind, name):
             assert np.std(changed) > truth.floor[column]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("family", FAMILIES)
 def test_a_null_hides_nothing(tmp_path, family):
     truth = make_campaign(4, "null", family, runs=1, folder=tmp_path)

@@ -36,6 +36,7 @@ def test_what_has_not_converged_is_no_card(tmp_path, monkeypatch, capsys):
     assert main(words) == 0
 
 
+@pytest.mark.slow
 def test_tables_are_for_people(tmp_path, capsys):
     """The residual is that of `hrg diagnose`: the level is a value of the card; a scatter of rows is no Allan deviation."""
     page = tmp_path / "page.html"
@@ -94,6 +95,7 @@ def test_what_cannot_be_calibrated_is_refused(run, tmp_path, capsys):
         assert captured.out == ""
 
 
+@pytest.mark.slow
 def test_a_table_whose_level_is_not_the_cards_says_what_would_bridge_it_and_saves_nothing(tmp_path, capsys):
     """The level once went into 112 Hz of noise, with 0 of 27 values determined and the card saved as if it had succeeded."""
     shipped, card, out = (Path("studies/cards/hrg-30mm.toml"), tmp_path / "thick.toml", tmp_path / "out.toml")

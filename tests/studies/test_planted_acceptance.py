@@ -71,6 +71,7 @@ def judged(capsys, folder, names, *options):
 ALL = ("rest0", "rest1", "rest2", "cycle", "rates", "rundown", "warm")
 
 
+@pytest.mark.slow
 def test_planted_quantities_are_found(folder, capsys):
     path = limits(
         folder,

@@ -123,6 +123,7 @@ def test_pure_noise_gains_nothing(tmp_path, capsys):
     assert "does not improve" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_paper_twin():
     """What figure 2's twin gives is near the printed eight times, worse with lag and noise; nothing was tuned for it."""
     twin = reproduce_cross_damping(seeds=6)

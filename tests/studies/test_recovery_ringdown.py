@@ -50,6 +50,7 @@ def test_a_lock_in_file_gives_split_axes_and_q_and_a_card_that_has_them(lock_in,
     assert "Axis of the upper mode".lower() in page.read_text().lower()
 
 
+@pytest.mark.slow
 def test_from_a_raw_decay_to_acceptance_in_five_commands(lock_in, tmp_path, capsys):
     """Decay, split, trim plan, decay of the trimmed shell (2 mHz left), acceptance of its run-down."""
     measured, trimmed = str(tmp_path / "measured.toml"), str(tmp_path / "trimmed.toml")

@@ -69,6 +69,7 @@ def test_a_wrong_key_is_named_with_the_mend(tmp_path, capsys, old, new, words):
     assert told.count("\n") == 1
 
 
+@pytest.mark.slow
 def test_contradicting_limits_and_an_objective_without_value_are_said(tmp_path, capsys):
     out = ["--out", str(tmp_path / "out"), "--workers", "1", "--quiet"]
     both = TASK.replace("[[constraint]]", '[[constraint]]\ncolumn = "mass_g"\nhigh = 1.0\n[[constraint]]')
