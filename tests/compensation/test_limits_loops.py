@@ -209,7 +209,7 @@ def test_start_at_full_drive_takes_what_the_closed_form_says():
     assert run.ready == pytest.approx(tau * np.log(50 / 49), rel=0.03)
     assert run.locked < 1.0
     assert run.offset[-1] == pytest.approx(10.0, rel=1e-3)
-    with pytest.raises(CompensationError, match="it needs more than 1"):
+    with pytest.raises(CompensationError, match="it must exceed 1"):
         start_up(tau, Loops(), headroom=0.9)
 
 

@@ -88,5 +88,5 @@ def test_bad_input_is_said() -> None:
     with pytest.raises(ShellError, match="at most 1"):
         Ripple("surface", 1.5, 0.0, 1.0)
     budget = loss_budget(_dome(0.9e-3), film_causes("gold", GOLD, None, (0, 0), ""), 293.15)
-    with pytest.raises(ShellError, match="no part 'surface'"):
+    with pytest.raises(ShellError, match="no loss 'surface'"):
         damping_wave(budget, [Ripple("surface", 0.1, 0.0, 1.0)], 2)

@@ -150,7 +150,7 @@ def test_departures_decay_from_their_start(drive, law):
 
 
 def test_a_run_without_a_drive_and_an_unknown_start_are_refused(card, drive):
-    with pytest.raises(InputError, match="nothing says what drives the run; add the column housing_temperature_degC"):
+    with pytest.raises(InputError, match="no temperature drives the run; add the column housing_temperature_degC"):
         drive_by_record(Record({"time_s": TIME, "frequency_Hz": TIME}))
     with pytest.raises(InputError, match="chamber_temperature_degC is missing; choose the other boundary"):
         drive_by_record(Record({"time_s": TIME, "housing_temperature_degC": TIME * 0.0}), "chamber")

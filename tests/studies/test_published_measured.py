@@ -55,7 +55,7 @@ def test_a_gyro_in_bursts_with_raw_temperatures(tmp_path, capsys):
 
 def test_a_crystal_against_satellites_without_a_header_line(tmp_path):
     """Nanoseconds since 1970, ppm about 25 MHz: the map is drafted from the values, the frequency is named by hand."""
-    column = '# no meaning found for the column "column 3"'
+    column = '# unknown column: "column 3"'
     named = '[[file.column]]\nfrom = "column 3"\nto = "frequency_Hz"\nunit = "ppm"\nnominal_Hz = 25e6\n'
     record = read_record(bring_in("dcxo_gps.txt", tmp_path, (column, named), preview=True))
     assert record["frequency_Hz"][0] == pytest.approx(25e6 * (1 - 0.7551e-6), abs=1e-6)

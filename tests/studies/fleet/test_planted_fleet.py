@@ -179,7 +179,7 @@ def test_a_manifest_names_devices_beside_it(tmp_path):
         ("date\n2024-01-01\n", "the column serial is missing"),
         ("serial,date\nA,yesterday\n", "line 2: date 'yesterday' is not of the form 2024-05-31"),
         ("serial,date\nZ,2024-01-01\n", "line 2: there is no folder of device 'Z'"),
-        ("serial\nA\nA\n", "line 3: device 'A' stands there twice"),
+        ("serial\nA\nA\n", "line 3: device 'A' is listed twice"),
     ],
 )
 def test_a_wrong_table_of_the_lot_is_told_with_its_line(tmp_path, table, said):
