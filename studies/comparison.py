@@ -4,13 +4,19 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from shell.constants import zero_Celsius
+from shell.modes import solve_modes
+from shell.separation import nearest_mode
+from studies.errors import InputError, naming
+from studies.instrument.card import Instrument
+from studies.law import law_of
 from studies.shown import Shown
+from studies.simulation.heat_path import behind_housing, build_network, slowest_lag
 
 if TYPE_CHECKING:
     from pandas import DataFrame
-
-    from studies.instrument.card import Instrument
 
 HARMONICS = (0, 1, 2, 3)
 DRIVE = 2
@@ -67,14 +73,6 @@ def compare(instruments: "Sequence[Instrument]") -> Comparison:
 
 
 def _figures(instrument: "Instrument") -> Iterator[Figure]:
-    import numpy as np
-
-    from shell.modes import solve_modes
-    from shell.separation import nearest_mode
-    from studies.errors import InputError, naming
-    from studies.law import law_of
-    from studies.simulation.heat_path import behind_housing, build_network, slowest_lag
-
     T0, nothing = instrument.reference_temperature, float("nan")
     with naming(instrument.path):
         lowest = {n: solve_modes(*instrument.at(T0), n)[0] for n in HARMONICS}

@@ -7,13 +7,19 @@ equals the thermoelastic one: a worse surface spoils what the material could giv
 """
 
 from math import isnan, nan
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from shell.materials import Material
-    from shell.resonator import Resonator
+from shell.damping.budget import surface_cause, thermoelastic_cause
+from shell.damping.faces import Vibration
+from shell.damping.heat import Heat
+from shell.damping.sources import known_losses
+from shell.errors import ShellError
+from shell.law import build_law
+from shell.materials import Material, read_materials
+from shell.modes import solve_modes
+from shell.resonator import Resonator
 
 HEAT = ("expansion", "conductivity", "heat_capacity")
 FIGURES = (
@@ -24,8 +30,6 @@ FIGURES = (
 
 def compare_materials(resonator: "Resonator", temperature: float, harmonic: int = 2) -> list[dict[str, Any]]:
     """Return the `FIGURES` of every law of the table at a temperature (K), by thermoelastic Q, and `remarks`; NaN where not known."""
-    from shell.materials import read_materials
-
     laws = [material for laws in read_materials().values() for material in laws.values()]
     rows = [
         {"material": material.name, "law": material.law, **dict.fromkeys(FIGURES, nan)}
@@ -36,14 +40,6 @@ def compare_materials(resonator: "Resonator", temperature: float, harmonic: int 
 
 
 def _figures(resonator: "Resonator", material: "Material", T: float, harmonic: int) -> dict[str, Any]:
-    from shell.damping.budget import surface_cause, thermoelastic_cause
-    from shell.damping.faces import Vibration
-    from shell.damping.heat import Heat
-    from shell.damping.sources import known_losses
-    from shell.errors import ShellError
-    from shell.law import build_law
-    from shell.modes import solve_modes
-
     remarks = list(material.caveats)
     if absent := material.lacks:
         remarks.append(f"no source states its {', '.join(one.replace('_', ' ') for one in absent)}")

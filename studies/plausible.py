@@ -1,18 +1,16 @@
 """Whether a record is of the gyro that a card or a model stands for: a question, with the sentence that confirms it."""
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from shell.constants import zero_Celsius
 from studies.errors import InputError
-from studies.law import check_slope_known
-
-if TYPE_CHECKING:
-    from studies.instrument.card import Instrument
-    from studies.record import Record
+from studies.instrument.card import Instrument
+from studies.law import check_slope_known, law_of
+from studies.record import Record, drop_repeats
+from studies.rest import TEMPERATURES
 
 Array = NDArray[np.float64]
 ANOTHER = 0.2  # relative: no tolerance of one design makes so much
@@ -69,8 +67,6 @@ def check_one_gyro(readings: "Sequence[tuple[str, Array | None, Array]]") -> Non
 
 def records_of_one_gyro(records: "Sequence[Record]", say: Callable[[str], None]) -> "list[Record]":
     """Return the records that a fit may take: one given twice counts once, which is said, and all are of one gyro."""
-    from studies.record import drop_repeats
-    from studies.rest import TEMPERATURES
 
     def thermometer(record: "Record") -> Array | None:
         return next((record[name] for name in TEMPERATURES if name in record), None)
@@ -97,16 +93,12 @@ def check_model_frequency(frequency: Array, lowest: float, highest: float, path:
 
 
 def _frequency(instrument: "Instrument") -> float:
-    from studies.law import law_of
-
     T = instrument.reference_temperature
     return float(law_of(instrument, T, T).frequency(T))
 
 
 def _spread(instrument: "Instrument", own: float) -> float:
     """Relative standard deviation of the card's frequency, by its material's law and by the numbers that it states."""
-    from studies.law import law_of
-
     T = instrument.reference_temperature
     squares = float(law_of(instrument, T, T).uncertainty(np.array([T]))[0]) ** 2
     for value in instrument.uncertain:

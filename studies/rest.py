@@ -3,7 +3,6 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,9 +12,7 @@ from compensation.decimation import average_blocks
 from compensation.spikes import find_spikes
 from shell.constants import zero_Celsius
 from studies.errors import InputError
-
-if TYPE_CHECKING:
-    from studies.record import Record
+from studies.record import Record
 
 TEMPERATURES = ("housing_temperature_degC", "resonator_temperature_degC", "chamber_temperature_degC")
 MOST_ROWS = 20_000

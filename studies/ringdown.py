@@ -20,20 +20,18 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from math import inf, pi
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from compensation.ringdown.analysis import Estimate, RingDown, analyse_decay
+from compensation.ringdown.envelope import Envelope, even_rows, from_lock_in, mix_down
+from compensation.ringdown.spectrum import SpectrumFit, fit_spectrum
+from compensation.ringdown.trace import TraceDecay, analyse_trace
 from studies.errors import InputError, naming
 from studies.files.columns import Columns, read_columns, read_header
-
-if TYPE_CHECKING:
-    from compensation.ringdown.analysis import Estimate, RingDown
-    from compensation.ringdown.envelope import Envelope
-    from compensation.ringdown.spectrum import SpectrumFit
-    from compensation.ringdown.trace import TraceDecay
-    from studies.instrument.card import Instrument
+from studies.instrument.card import Instrument
 
 PARTS = ("cos", "sin")
 RAW = tuple(f"pickoff_{part}_V" for part in PARTS)
@@ -79,8 +77,6 @@ class Decay:
     @property
     def estimates(self) -> "Mapping[str, Estimate]":
         """Values by name; those of a trace are its rate and, where the frequency is known, 1/Q."""
-        from compensation.ringdown.analysis import Estimate
-
         if (t := self.trace) is None:
             one = self.phased or self.spectrum
             return {} if one is None else one.estimates
@@ -156,10 +152,6 @@ def read_decay(
     harmonic : int, n.
     expected : float, optional, Hz: what a card predicts; raw samples whose frequency is an alias of it are refused.
     """
-    from compensation.ringdown.analysis import analyse_decay
-    from compensation.ringdown.envelope import even_rows, from_lock_in, mix_down
-    from compensation.ringdown.trace import analyse_trace
-
     table, notes = _read(path)
     if frequency is not None:
         notes = {**notes, "reference_frequency_Hz": frequency}
@@ -167,8 +159,6 @@ def read_decay(
     powers = ((name, columns[name]) for name in POWERS if name in columns)
     power = next((values if name.endswith("W") else 10 ** (values / 10) for name, values in powers), None)
     if "time_s" not in columns:
-        from compensation.ringdown.spectrum import fit_spectrum
-
         assert power is not None
         with naming(path):
             return Decay(str(path), notes, spectrum=fit_spectrum(columns["frequency_Hz"], power))

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,10 +16,8 @@ from compensation.stability import allan_deviation
 from shell.constants import zero_Celsius
 from studies.errors import InputError, naming
 from studies.models.kinds.scale import RAW
+from studies.record import Record
 from studies.rest import LARGEST_REST, MOST_ROWS, TEMPERATURES, choose_column, drop_spikes
-
-if TYPE_CHECKING:
-    from studies.record import Record
 
 Real = NDArray[np.float64]
 DEG = float(np.pi / 180)

@@ -3,23 +3,21 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import pi
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from shell.elastic import Elastic
 from shell.errors import ShellError
 from shell.imperfection import CoupledHarmonics, Imperfection, Pair, Split, find_split
 from shell.modes import solve_modes
+from shell.resonator import Resonator
 from shell.scan.alignment import RigidMotion, align
 from shell.scan.projection import Projector, check_unit
 from shell.scan.survey import Face, rigid_shapes, survey, survey_map
 from studies.errors import InputError
 from studies.files.clouds import FaceGrid, Unit, read_cloud
-
-if TYPE_CHECKING:
-    from shell.elastic import Elastic
-    from shell.resonator import Resonator
 
 Array = NDArray[np.float64]
 SIDES = {"inner": -1, "outer": 1}

@@ -2,24 +2,19 @@
 
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from shell.elastic import Elastic
 from shell.electrodes import soften_at_gap
-from shell.imperfection import CoupledHarmonics, Pair, Split, find_split
-from shell.modes import solve_modes
+from shell.imperfection import CoupledHarmonics, Imperfection, Pair, Split, find_split
+from shell.modes import Mode, solve_modes
+from shell.resonator import Resonator
 from studies.errors import InputError, naming
-
-if TYPE_CHECKING:
-    from shell.elastic import Elastic
-    from shell.imperfection import Imperfection
-    from shell.modes import Mode
-    from shell.resonator import Resonator
-    from studies.instrument.card import Instrument
-    from studies.instrument.tables.electrodes import CardElectrodes
-    from studies.instrument.tables.imperfection import CardImperfection
+from studies.instrument.card import Instrument
+from studies.instrument.tables.electrodes import CardElectrodes
+from studies.instrument.tables.imperfection import CardImperfection
 
 Array = NDArray[np.float64]
 PLACES = 65  # along the meridian, where waves are held against the wall

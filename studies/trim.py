@@ -7,21 +7,19 @@ solved (shell.groove), and made again with what they do, until the depth stays.
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import hypot, pi
-from typing import TYPE_CHECKING, Literal, TypeAlias
+from typing import Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
+from shell.elastic import Elastic
 from shell.errors import ShellError
 from shell.groove import Groove, GrooveSplit, solve_groove
 from shell.imperfection import Pair
 from shell.modes import solve_modes
+from shell.resonator import Resonator
 from shell.trimming import Sites, SplitWave, TrimPlan, plan_trim
 from studies.errors import InputError
-
-if TYPE_CHECKING:
-    from shell.elastic import Elastic
-    from shell.resonator import Resonator
 
 Array: TypeAlias = NDArray[np.float64]
 CutKind: TypeAlias = Literal["mass", "edge", "inner", "outer"]

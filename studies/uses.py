@@ -12,11 +12,14 @@ import numpy as np
 from compensation.errors import CompensationError
 from studies.acceptance.quantities import QUANTITIES
 from studies.acceptance.runs import sort_records
+from studies.bias import check_lengths, find_output, find_state
 from studies.errors import InputError
+from studies.inference.records import make_ready
 from studies.models.kinds.bias import OUTPUTS
 from studies.models.kinds.scale import RAW
 from studies.record import Record
 from studies.rest import TEMPERATURES, choose_column, gather_rest
+from studies.settled import advise_hold, find_soaks, settled_table
 
 OUTPUT = "bias_deg_per_h"  # that an acceptance test judges unless another is named
 LEAST_SPAN = 1.0  # K, of a temperature that changes
@@ -57,15 +60,11 @@ def _missing(check: Callable[[Sequence[Record]], None], records: Sequence[Record
 
 
 def _frequency(records: Sequence[Record]) -> None:
-    from studies.settled import advise_hold, find_soaks, settled_table
-
     soaks = find_soaks(records)
     settled_table(soaks, records[0].path, advise_hold(records, 3000.0, 0.05) if len(soaks) < 2 else "")
 
 
 def _bias(records: Sequence[Record]) -> None:
-    from studies.bias import check_lengths, find_output, find_state
-
     find_output(records)
     find_state(records)
     check_lengths(records)
@@ -101,8 +100,6 @@ def _whole_angle(records: Sequence[Record]) -> None:
 
 
 def _campaign(records: Sequence[Record]) -> None:
-    from studies.inference.records import make_ready
-
     make_ready(records)
 
 

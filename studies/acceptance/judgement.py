@@ -2,8 +2,9 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
+from compensation.stability import AllanDeviation, NoiseCoefficients
 from studies.acceptance.limits import Limits
 from studies.acceptance.measure import (
     Found,
@@ -19,11 +20,8 @@ from studies.acceptance.measure import (
 from studies.acceptance.quantities import ELSEWHERE, QUANTITIES, TestedQuantity
 from studies.acceptance.runs import Test, sort_records
 from studies.acceptance.service import measure_life, measure_storage, measure_transfer
-
-if TYPE_CHECKING:
-    from compensation.stability import AllanDeviation, NoiseCoefficients
-    from studies.record import Record
-    from studies.ringdown import Decay
+from studies.record import Record
+from studies.ringdown import Decay
 
 FIRST: "dict[Test, Callable[[Record], Found]]" = {
     # tests that take the first record that serves them

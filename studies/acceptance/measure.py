@@ -4,7 +4,6 @@ import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy
@@ -18,11 +17,9 @@ from compensation.stability import AllanDeviation, NoiseCoefficients
 from compensation.start_up import fit_run_down
 from studies.acceptance.runs import temperature_column
 from studies.errors import InputError, naming
+from studies.record import Record
+from studies.ringdown import Decay
 from studies.stability import read_stability
-
-if TYPE_CHECKING:
-    from studies.record import Record
-    from studies.ringdown import Decay
 
 Real = NDArray[np.float64]
 BLOCK = 100.0

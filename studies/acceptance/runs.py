@@ -1,15 +1,13 @@
 """Which record serves which test: by what it shows, or by a comment line such as '# test: warm-up'."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Literal, get_args
+from typing import Literal, get_args
 
 import numpy as np
 
 from studies.errors import InputError, nearest
+from studies.record import Record
 from studies.rest import LARGEST_REST, TEMPERATURES
-
-if TYPE_CHECKING:
-    from studies.record import Record
 
 Test = Literal["warm-up", "temperature", "scale-factor", "drift", "run-down", "transfer", "angle-storage"]
 SPAN = 5.0

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy
@@ -10,9 +9,7 @@ import scipy
 from compensation.regression import fit_linear
 from studies.acceptance.measure import CONFIDENCE, YEAR, Found, Measured, of_fit, within
 from studies.errors import InputError
-
-if TYPE_CHECKING:
-    from studies.record import Record
+from studies.record import Record
 
 SEGMENTS = 8  # of a record, each with its own spectrum; half overlapping
 HEARD = 1e-4  # of the largest power of the applied rate, from which on a frequency is one that was applied
@@ -26,8 +23,6 @@ def measure_transfer(record: "Record") -> Found:
 
     H(f) = S_xy/S_xx where the applied rate has power and coherence; |H| has the relative error √((1 - γ²)/(2 γ² n)) of n segments.
     """
-    from scipy import signal
-
     time, x, y = (record[name] for name in ("time_s", "rate_deg_per_s", "measured_rate_deg_per_s"))
     step = np.diff(time)
     if len(time) < LEAST or np.ptp(step) > 1e-3 * float(np.median(step)) or not np.isfinite(x + y).all():
@@ -35,9 +30,9 @@ def measure_transfer(record: "Record") -> Found:
             f"{record.path}: a transfer function needs both rates in {LEAST} or more evenly spaced rows without gaps."
         )
     rate, size = 1 / float(np.median(step)), max(2 * len(x) // (SEGMENTS + 1), 16)
-    f, across = signal.csd(x, y, rate, nperseg=size)
-    _, applied = signal.welch(x, rate, nperseg=size)
-    _, coherence = signal.coherence(x, y, rate, nperseg=size)
+    f, across = scipy.signal.csd(x, y, rate, nperseg=size)
+    _, applied = scipy.signal.welch(x, rate, nperseg=size)
+    _, coherence = scipy.signal.coherence(x, y, rate, nperseg=size)
     kept = (f > 0) & (applied > HEARD * applied[1:].max()) & (coherence > COHERENT)
     if kept.sum() < 4:
         raise InputError(

@@ -1,13 +1,17 @@
 """`hrg materials`: the published laws of the materials, and how they compare in one geometry."""
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from shell.constants import zero_Celsius
+from shell.materials import Material, Prior, read_materials, spell
+from shell.property import PROPERTIES
 from studies.cli.arguments import Card, Harmonic
 from studies.cli.output import answers
+from studies.errors import InputError, naming, nearest
+from studies.instrument.card import load_card
+from studies.material_choice import compare_materials
+from studies.reports.digits import plain, to_error
 from studies.results import Column, Result, Table, row_of, rows_of
-
-if TYPE_CHECKING:
-    from shell.materials import Material, Prior
 
 
 @answers("hrg.materials-list/1; hrg.materials-compared/1 with --compare")
@@ -21,9 +25,6 @@ def materials(name: str = "", *, compare: bool = False, card: Card = "", harmoni
     compare : bool
         Compare all laws in the geometry of --card (free-dome unless given): frequency, TCF, thermoelastic Q, and the surface loss worth reaching.
     """
-    from shell.materials import read_materials, spell
-    from studies.errors import InputError, nearest
-
     if card and not compare:
         raise InputError(f"--card {card}: it belongs to --compare; add that.")
     if compare:
@@ -65,11 +66,6 @@ WORTH = (
 
 
 def _compare(card: str, harmonic: int) -> Result:
-    from shell.constants import zero_Celsius
-    from studies.errors import naming
-    from studies.instrument.card import load_card
-    from studies.material_choice import compare_materials
-
     instrument = load_card(card)
     T = instrument.reference_temperature
     with naming(instrument.path):
@@ -88,8 +84,6 @@ def _compare(card: str, harmonic: int) -> Result:
 
 
 def _law_tables(law: "Material") -> list[Table]:
-    from shell.property import PROPERTIES
-
     properties = [
         {
             "property": key,
@@ -116,8 +110,6 @@ def _law_tables(law: "Material") -> list[Table]:
 
 def _with_error(name: str, value: Any, error: float, unit: str) -> str:
     """A number of a law with its standard deviation; moduli in GPa."""
-    from studies.reports.digits import plain, to_error
-
     if not isinstance(value, float | int):
         return f"{name} = {value}"
     scale, words = (1e-9, " GPa") if unit == "Pa" and abs(value) > 1e6 else (1.0, "")
@@ -131,8 +123,6 @@ def _correlated(prior: "Prior", k: int) -> str:
 
 
 def _describe(law: "Material") -> "dict[str, Any]":
-    from shell.constants import zero_Celsius
-
     return row_of(law, "name", "law", "source", "note", "caveats", "lacks", "unchecked") | {
         "range_degC": [law.lowest - zero_Celsius, law.highest - zero_Celsius],
         "prior": row_of(law.prior, "sd", "correlation", coefficients="names"),

@@ -1,12 +1,14 @@
 """`hrg mesh`: the solid as a quadratic mesh for another finite-element program."""
 
 import os
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, cast
 
 from cyclopts import Parameter
 
 from shell.constants import zero_Celsius
+from shell.imperfection.surface import depart_points
 from shell.inertia import weigh
 from shell.volume import build_volume
 from shell.volume_files import VolumeKind, encode_volume
@@ -15,6 +17,7 @@ from studies.cli.output import answers
 from studies.errors import InputError, naming
 from studies.files.writing import written_whole
 from studies.results import Result, row_of
+from studies.splitting import solved_pair
 
 KINDS = (".vtu", ".msh", ".inp")
 
@@ -65,11 +68,6 @@ def mesh(
     found = found if complete else found.serendipity()
     fields = instrument.part("imperfection").fields
     if fields is not None:
-        from dataclasses import replace
-
-        from shell.imperfection.surface import depart_points
-        from studies.splitting import solved_pair
-
         with naming(f"{instrument.path} [imperfection]"):
             shape = fields.faded(solved_pair(resonator, elastic, 2).fade)
             found = replace(found, nodes=depart_points(found.nodes, resonator, shape))

@@ -5,17 +5,23 @@ Each function returns what is under its key of a mode in the JSON, or None where
 
 from dataclasses import dataclass
 from math import degrees, isfinite, pi, radians
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from shell.cubic import solve_cubic
+from shell.duffing import amplitude_shift
 from shell.elastic import Elastic
+from shell.errors import ShellError
+from shell.imperfection import Split
+from shell.law import check_mount
 from shell.modes import Mode
+from shell.prestress import Prestress
+from shell.spin import spin_shift
 from studies.errors import InputError, naming
 from studies.instrument.card import Instrument
 from studies.instrument.imperfect import is_imperfect
+from studies.loss.films import film_shifts
 from studies.results import Column, Table, row_of
-
-if TYPE_CHECKING:
-    from shell.imperfection import Split
+from studies.splitting import SplitPair
 
 MICROMETRE = 1e-6
 Entry = dict[str, Any]
@@ -58,8 +64,6 @@ def _split(m: Mode, asked: Asked) -> Entry | None:
     """What the card's imperfection and electrodes make of a pair."""
     if m.theory == "rayleigh" or m.harmonic < 1 or not is_imperfect(asked.instrument):
         return None
-    from studies.splitting import SplitPair
-
     whole = SplitPair(asked.instrument, m, asked.T)
     slow, fast = whole.split.frequencies
 
@@ -75,8 +79,6 @@ def _spin(m: Mode, asked: Asked) -> Entry | None:
     """What a spin makes of a pair, in the frame of the resonator: two waves with f + shift ± g Ω/2π, g = n K of Bryan's factor K."""
     if asked.spin is None or m.theory != "solid" or m.harmonic < 2 or m.index:
         return None
-    from shell.spin import spin_shift
-
     shift, omega = spin_shift(m, asked.elastic), radians(asked.spin)
     mean = m.frequency * (1 + shift.total * omega**2)
     apart = m.harmonic * abs(m.bryan_factor * omega) / (2 * pi)
@@ -89,8 +91,6 @@ def _amplitude(m: Mode, asked: Asked) -> Entry | None:
     """The shift in ppb by the largest displacement that was asked."""
     if asked.amplitude is None or m.theory != "solid" or m.harmonic < 2:
         return None
-    from shell.duffing import amplitude_shift
-
     shift, square = amplitude_shift(m), (asked.amplitude * MICROMETRE) ** 2
     ppb = 1e9 * square
     parts = row_of(shift, shift_ppb=("total", ppb), static_ppb=("static", ppb), inertial_ppb=("inertial", ppb))
@@ -102,9 +102,6 @@ def _mount(m: Mode, asked: Asked) -> Entry | None:
     instrument, mount = asked.instrument, asked.instrument.part("mount")
     if mount is None or m.theory != "solid" or not m.harmonic:
         return None
-    from shell.law import check_mount
-    from shell.prestress import Prestress
-
     with naming(f"{instrument.path} [mount]"):
         strain, slope = (float(x(instrument.material, asked.T)) for x in (mount.strain, mount.strain_slope))
         check_mount(instrument.resonator, m.theory, m.harmonic)
@@ -121,8 +118,6 @@ def _films(m: Mode, asked: Asked) -> list[Entry] | None:
     """Every film and its shift in ppm, null where its numbers are not known."""
     if m.theory == "rayleigh":
         return None
-    from studies.loss.films import film_shifts
-
     shifts = film_shifts(asked.instrument, m)
     return [row_of(one, "missing", film="material", shift_ppm=("relative", 1e6)) for one in shifts] or None
 
@@ -133,9 +128,6 @@ def _crystal(m: Mode, asked: Asked) -> Entry | None:
     crystal = given or material.cubic(asked.T)
     if crystal is None or m.theory != "solid" or m.harmonic < 2 or m.harmonic % 4 == 0 or m.index:
         return None
-    from shell.cubic import solve_cubic
-    from shell.errors import ShellError
-
     assert m.resonator is not None
     try:
         pair = solve_cubic(m.resonator, crystal, m.harmonic, asked.tolerance)

@@ -1,5 +1,6 @@
 """`hrg study`: run, status, report and export of parametric studies."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -8,7 +9,13 @@ from cyclopts import Parameter
 from studies.cli.arguments import Folder, Quiet, Workers
 from studies.cli.output import answers, say
 from studies.errors import InputError
+from studies.files.writing import write_text
+from studies.reports.sweep import study_result
+from studies.reports.sweep_analysis import tolerance_table
 from studies.results import Column, Result, Table, row_of
+from studies.results.page import render_result
+from studies.sweeps.export import export_results
+from studies.sweeps.opening import is_running
 from studies.sweeps.results import Results, open_results
 from studies.sweeps.run import Effort, check_functions, estimate_study, run_study
 from studies.sweeps.spec import read_study
@@ -61,8 +68,6 @@ def run(
     dry_run : bool
         Estimate the number of cases, time and memory; save nothing.
     """
-    from studies.reports.sweep_analysis import tolerance_table
-
     if workers is not None and scheduler is not None:
         raise InputError("--workers and --scheduler cannot be combined: give one of them.")
     if out is None and not dry_run:
@@ -100,8 +105,6 @@ def run(
 @answers("hrg.study-status/1")
 def status(folder: Folder) -> Result:
     """Show the progress of a study and the failed cases with their reasons, also while it runs."""
-    from studies.sweeps.opening import is_running
-
     results = open_results(folder)
     found = _status(results, folder, is_running(folder))
     rows = [{"item": key.replace("_", " "), "value": found[key]} for key in STATUS]
@@ -119,12 +122,6 @@ def report(folder: Folder, *, out: Annotated[str | None, Parameter(name=("--repo
     out : str
         The page; default: report.html in the folder.
     """
-    from dataclasses import replace
-
-    from studies.files.writing import write_text
-    from studies.reports.sweep import study_result
-    from studies.results.page import render_result
-
     results = open_results(folder)
     page = Path(out) if out else Path(folder) / "report.html"
     say("writing the page, with mode shapes if the study has modes ...")
@@ -144,8 +141,6 @@ def export(folder: Folder, *, out: str | None = None) -> Result:
     out : str
         The CSV file; default: results.csv in the folder.
     """
-    from studies.sweeps.export import export_results
-
     results = open_results(folder)
     path = Path(out) if out else Path(folder) / "results.csv"
     units = export_results(results, path)

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,7 @@ from studies.diagnosis.verdict import NINETY
 from studies.effects.effect import UNITS
 from studies.errors import InputError
 from studies.fleet.folder import Device
+from studies.inference.diagnosis import Inference
 from studies.inference.inferred import Inferred
 from studies.inference.model import PRICE, Background, Term
 from studies.instrument.card import load_card
@@ -19,10 +20,8 @@ from studies.record import read_record
 from studies.simulation.drive import Drive
 from studies.simulation.heat_path import slowest_lag
 from studies.simulation.prediction import HEATED, Variations, predict
+from studies.workbench import infer_records
 from thermal.profile import Profile
-
-if TYPE_CHECKING:
-    from studies.inference.diagnosis import Inference
 
 Array = NDArray[np.float64]
 SCHEMA = "hrg.fleet-device/1"
@@ -80,8 +79,6 @@ def diagnose_device(
     device: Device, key: str, progress: Callable[[str], None] = lambda words: None
 ) -> "tuple[Answer, Inference]":
     """Calibrate and diagnose one device."""
-    from studies.workbench import infer_records
-
     if not device.records:
         raise InputError(f"device {device.serial}: its folder has no records (*.csv).")
     records = [read_record(path) for path in device.records]

@@ -8,22 +8,20 @@ judgement that the paper lacks. Gyros are drawn from typical values; nothing is 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cache
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from compensation.bias import SELECTED_BY_THE_PAPER, TERMS, BiasRun, prepare_run
 from compensation.bias_selection import HeldOutRows, Method, bias_stability, fit_bias, score_runs
+from shell.law import FrequencyLaw
 from studies.instrument.card import load_card
 from studies.reports import style
 from studies.reports.bias import METHOD, SYMBOLS
 from studies.results import Chapter, Column, Drawing, Figure, Table
 from studies.simulation.chamber import load_profile
 from studies.simulation.virtual_gyro import simulate_run
-
-if TYPE_CHECKING:
-    from shell.law import FrequencyLaw
 
 CARD = "hrg-30mm"
 COOLING, WARMING = "step 25 -20 5h", "step -20 25 5h"

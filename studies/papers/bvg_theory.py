@@ -1,17 +1,17 @@
 """The BVG paper's theory of the bell, (16)–(22), in numbers beside the shell solver, and its reading of the rate, (23)–(30)."""
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from compensation.piezo import COUNT, DRIVE_Q
+from compensation.loop import BellResonator, read_rate_from_drive, read_rate_from_loop, scale_of_rebalance
+from compensation.motion import demodulate
+from compensation.piezo import COUNT, DRIVE_Q, PiezoRing
+from shell.curves import Arc
+from shell.modes import solve_modes
+from shell.wall_stress import find_wall_stress
 from studies.instrument.card import load_card
 from studies.results import Chapter, Column, Table
-
-if TYPE_CHECKING:
-    from compensation.loop import BellResonator
-    from compensation.piezo import PiezoRing
 
 CARD = "bvg-bell"
 D31_PZT5A = -1.71e-10
@@ -42,15 +42,12 @@ class BellTheory:
 
 def compare_bell_theory(card: str = CARD) -> BellTheory:
     """Hold the pattern (19), the same without its factor cos(5πφ/φ_b), and one that does not stretch against the solver."""
-    from dataclasses import replace
-
     from shell.bell_theory import (
         inextensional_functions,
         rayleigh_functions,
         rayleigh_functions_without_factor,
         two_pattern_model,
     )
-    from shell.modes import solve_modes
 
     instrument = load_card(card)
     resonator = instrument.resonator
@@ -97,9 +94,6 @@ def read_planted_rate(planted: float = 2.0) -> LoopReading:
     planted : rate, rad/s.
     """
     from scipy.integrate import solve_ivp
-
-    from compensation.loop import read_rate_from_drive, read_rate_from_loop, scale_of_rebalance
-    from compensation.motion import demodulate
 
     bell, ring, share = _bell_with_elements()
     omega = bell.omega
@@ -152,12 +146,6 @@ def read_planted_rate(planted: float = 2.0) -> LoopReading:
 
 def _bell_with_elements() -> "tuple[BellResonator, PiezoRing, float]":
     """The card's bell as (23) with a coupling c₁, the elements on its cylinder, and σ_φφ over the sum of the stresses there."""
-    from compensation.loop import BellResonator
-    from compensation.piezo import PiezoRing
-    from shell.curves import Arc
-    from shell.modes import solve_modes
-    from shell.wall_stress import find_wall_stress
-
     instrument = load_card(CARD)
     body = instrument.resonator
     (mode,) = solve_modes(body, instrument.material.elastic(instrument.reference_temperature))

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,10 +14,12 @@ from numpy.typing import NDArray
 from compensation.decimation import average_groups
 from compensation.frequency import FrequencyFit, OrderComparison, compare_orders, fit_frequency
 from shell.constants import zero_Celsius
-
-if TYPE_CHECKING:
-    from shell.law import SlopeParts
-    from studies.instrument.card import Instrument
+from shell.law import SlopeParts, build_law
+from shell.materials import read_materials
+from studies.files.columns import read_columns
+from studies.instrument.card import Instrument
+from studies.law import law_of
+from studies.record import read_frequency_table
 
 Array = NDArray[np.float64]
 RESOLUTION = 0.01  # Hz, last printed digit of Table 1
@@ -86,8 +87,6 @@ class PhysicsComparison:
 
 def printed_table1() -> tuple[Array, Array]:
     """Return temperatures (°C) and frequencies (Hz) of the paper's Table 1."""
-    from studies.record import read_frequency_table
-
     table = read_frequency_table(table1_path())
     return table.values["temperature_degC"], table.values["frequency_Hz"]
 
@@ -99,8 +98,6 @@ def table1_path() -> Path:
 
 def printed_table2() -> tuple[Array, Array]:
     """Return the calculated temperatures and the errors (°C) that the paper's Table 2 prints."""
-    from studies.files.columns import read_columns
-
     names = ("frequency_Hz", "actual_temperature_C", "calculated_temperature_C", "error_C")
     table = read_columns(_data("hrg_table2.csv"), names, required=names)
     return table.values["calculated_temperature_C"], table.values["error_C"]
@@ -144,10 +141,6 @@ def local_slopes(temperature_degC: Array, frequency: Array) -> tuple[Array, Arra
 
 def compare_physics(study: FrequencyStudy, instrument: "Instrument") -> PhysicsComparison:
     """Set first-principles physics, the solid solver over the card's material law, beside a measured table."""
-    from shell.law import build_law
-    from shell.materials import read_materials
-    from studies.law import law_of
-
     T = study.temperature_degC + zero_Celsius
     law = law_of(instrument, float(T.min()), float(T.max()))
     at = np.append(study.local_degC, 20.0) + zero_Celsius

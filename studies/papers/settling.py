@@ -9,14 +9,15 @@ follow each other upwards leave the same share of 10 °C each, which hides in th
 
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from shell.constants import zero_Celsius
 from shell.law import FrequencyLaw
+from studies.instrument.card import Instrument
 from studies.law import law_of
+from studies.papers.hrg import printed_table1
 from studies.reports import style
 from studies.results import Chapter, Column, Drawing, Figure, Sentence, Table
 from studies.simulation.heat_path import build_network, build_shell_and_stem
@@ -26,9 +27,6 @@ from thermal.profile import Profile
 from thermal.radiative import simulate
 from thermal.resonator import shell_weights
 from thermal.settling import identify_conductance, step_remaining
-
-if TYPE_CHECKING:
-    from studies.instrument.card import Instrument
 
 Array = NDArray[np.float64]
 ROOM_degC = 20.0
@@ -108,8 +106,6 @@ def identify_mount(instrument: "Instrument") -> float:
 
 def study_settling(instrument: "Instrument", hours: tuple[float, ...] = (4.0, 4.5, 5.0)) -> SettlingStudy:
     """Compute Figure 3 and the soak errors of Table 1 in the radiative and the linear network."""
-    from studies.papers.hrg import printed_table1
-
     law = _law(instrument)
     weights = cell_weights(instrument, law)
     networks = dict(zip(NETWORKS, _networks(instrument), strict=True))
