@@ -118,7 +118,7 @@ def parse_profile(words: str) -> Profile:
             raise ThermalError(f"'{kind}' is not a kind of profile. {_forms()}")
         names, build = FORMS[kind]
         if len(arguments) != len(names):
-            durations = " (durations without a blank: 5h, 30min, 90s)" if {"DURATION", "HOLD"} & set(names) else ""
+            durations = " (durations without a space: 5h, 30min, 90s)" if {"DURATION", "HOLD"} & set(names) else ""
             raise ThermalError(
                 f"'{' '.join(sentence)}' has {len(arguments)} values after '{kind}', not {len(names)}; write"
                 f" '{kind} {' '.join(names)}'{durations}."

@@ -184,6 +184,8 @@ def _check_names(
     where = f"{path}, line {header_line}" if header_line else str(path)
     if len(names) == 1 and (";" in names[0] or "\t" in names[0]):
         raise InputError(f"{where}: the columns are not separated by commas; 'hrg import' reads such files.")
+    if names[0].startswith(("schema =", "schema=")):
+        raise InputError(f"{path}: a TOML file, not a table (CSV); exchange it for the file with the readings.")
     if all(_is_number(name) for name in names):
         raise InputError(f"{where}: a header line with the column names is missing; add {','.join(required)}.")
     counts = Counter(names)

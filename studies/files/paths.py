@@ -97,7 +97,7 @@ def _spare_read(path: Path, given: str) -> None:
 def _check_folder(path: Path, given: str) -> None:
     parent = path.parent
     if not parent.is_dir():
-        raise InputError(f"{given}: cannot be written: there is no folder '{parent}'; make it, or correct the path.")
+        raise InputError(f"{given}: cannot be written: there is no folder '{parent}'; create it, or correct the path.")
 
 
 def _words(value: object) -> Iterator[str]:

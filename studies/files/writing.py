@@ -38,7 +38,7 @@ def written_whole(path: str | Path) -> Iterator[IO[bytes]]:
         special = target.exists() and not target.is_file()
         if not target.parent.is_dir():
             raise InputError(
-                f"{path}: cannot be written: there is no folder '{target.parent}'; make it, or correct the path."
+                f"{path}: cannot be written: there is no folder '{target.parent}'; create it, or correct the path."
             )
         handle, name = tempfile.mkstemp(prefix=".hrg-", dir=None if special else target.parent)
         temporary = Path(name)
@@ -81,7 +81,7 @@ def check_folder(path: str | Path) -> Path:
     folder = Path(path)
     if not folder.parent.is_dir():
         raise InputError(
-            f"{path}: cannot be written: there is no folder '{folder.parent}'; make it, or correct the path."
+            f"{path}: cannot be written: there is no folder '{folder.parent}'; create it, or correct the path."
         )
     try:
         folder.mkdir(exist_ok=True)

@@ -3,10 +3,12 @@
 import datetime
 import importlib
 import logging
+import subprocess
+import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass, field
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -34,6 +36,17 @@ NUMBERS = "iufb"
 MOST_WIDE = 64  # columns of a matrix that are channels
 OBJECT = "holds objects, not numbers, and is not opened: save it as plain numbers"
 MATLAB = "is of a class that only MATLAB reads (datetime, table, object): save it as a plain vector"
+
+PROBE = """
+import sys, h5py
+def read(_, item):
+    list(item.attrs.items())
+    if isinstance(item, h5py.Dataset) and item.ndim < 3:
+        item[()]
+with h5py.File(sys.argv[1], "r") as file:
+    file.visititems(read)
+"""
+PATIENCE, PACE = 20.0, 1e7  # s for which the library may read a file, and bytes for which it gets a second more
 
 
 @dataclass(frozen=True)
@@ -138,6 +151,7 @@ def _mdf_values(file: Any, place: int, index: int, count: int) -> Array:
 def read_hdf5(path: str, files: ExitStack) -> Iterator[Channel]:
     """Channels of an HDF5 file: datasets of one or two dimensions, fields of compound ones, by group."""
     h5py = load_library("h5py", path, "HDF5")
+    _probe(path, Path(path).stat().st_size, Path(path).stat().st_mtime_ns)
     file = files.enter_context(h5py.File(path, "r"))
     found: dict[str, dict[str, Any]] = {}
 
@@ -150,6 +164,18 @@ def read_hdf5(path: str, files: ExitStack) -> Iterator[Channel]:
     for group, items in found.items():
         about = {**_attributes(file), **_attributes(file[group or "/"])}
         yield from from_arrays(group, items, about)
+
+
+@cache
+def _probe(path: str, size: int, _: int) -> None:
+    """Read a file in a process of its own first: on some damaged ones the HDF5 library never ends, or crashes."""
+    try:
+        command = [sys.executable, "-c", PROBE, path]
+        status = subprocess.run(command, capture_output=True, timeout=PATIENCE + size / PACE, check=False).returncode
+    except subprocess.TimeoutExpired:
+        status = -1
+    if status not in (0, 1):  # 1: an error that this process tells
+        raise InputError(f"{path}: damaged, so that the HDF5 library hangs or crashes on it; copy or export it again.")
 
 
 def read_matlab(path: str, files: ExitStack) -> Iterator[Channel]:

@@ -123,7 +123,7 @@ class FileMap(Keys, frozen=True, kw_only=True):
     missing: Annotated[tuple[str, ...], says('cells that mean "no value", besides empty ones')] = ()
     time_columns: Annotated[
         str | Annotated[tuple[str, ...], says("", least=1)],
-        says("column with the time; a list joins columns with a blank", example="Zeit"),
+        says("column with the time; a list joins columns with a space", example="Zeit"),
     ] = msgspec.field(name="time", default=())
     time_format: Annotated[
         str, says(f"{', '.join(TIME_FORMATS)}, or a pattern such as '%d.%m.%Y %H:%M:%S'", example="s")

@@ -17,7 +17,7 @@ from studies.errors import InputError, nearest
 from studies.files.reading import find_shipped, list_shipped
 from studies.files.writing import write_text
 from studies.instrument.dotted import replaced
-from studies.instrument.registry import CardPlace, ReadTable, card_tables, read_table
+from studies.instrument.registry import CardPlace, ReadTable, card_tables, find_home, read_table
 from studies.instrument.uncertain import UncertainValue
 from studies.schema.keys import Keys, Note, number, says
 from studies.schema.reader import read_keys, read_toml
@@ -240,7 +240,7 @@ def build_instrument(content: Mapping[str, Any], path: str = "card") -> Instrume
     known = (*Head.__struct_fields__, *card_tables())
     for key in content:
         if key not in known:
-            raise InputError(f"{path}: unknown key '{key}'{nearest(key, known)}")
+            raise InputError(f"{path}: unknown key '{key}'{find_home(key) or nearest(key, known)}")
     head = read_keys({key: content[key] for key in Head.__struct_fields__ if key in content}, Head, path)
     reference = head.reference_temperature_degC + zero_Celsius
     bare = Instrument(head.name, reference, {}, head.note, content, path)

@@ -111,6 +111,15 @@ def _read_absent(name: str, reference_temperature: float) -> ReadTable:
     return _read_given(name, None, CardPlace(f"[{name}]", Path(), reference_temperature))
 
 
+def find_home(key: str) -> str:
+    """Say to which table of a card a key belongs that stands in another, or "" where there is no such table."""
+    tables = (
+        (name, [known_keys(describe(entry.keys)) for entry in entries]) for name, entries in card_tables().items()
+    )
+    home = next((name for name, found in tables if key == name or any(key in keys for keys in found)), "")
+    return f"; it belongs to the table [{home}]: add that line above it." if home else ""
+
+
 def _read_given(name: str, raw: Any, place: CardPlace) -> ReadTable:
     entries = card_tables()[name]
     if entries[0].keys_of is not None:
@@ -120,10 +129,8 @@ def _read_given(name: str, raw: Any, place: CardPlace) -> ReadTable:
     given = raw or {}
     own = [known_keys(describe(entry.keys), given) for entry in entries]
     for key in given:
-        if key in card_tables() and not any(key in keys for keys in own):
-            raise InputError(
-                f"{place.where}: unknown key '{key}'; the table of that name begins with a line of its own: [{key}]."
-            )
+        if not any(key in keys for keys in own) and (home := find_home(key)):
+            raise InputError(f"{place.where}: unknown key '{key}'{home}")
         if not any(key in keys for keys in own) and len(entries) > 1:
             raise InputError(f"{place.where}: unknown key '{key}'{nearest(key, [k for keys in own for k in keys])}")
     read: dict[str, Any] = {}

@@ -58,7 +58,9 @@ def read_toml(path: str | FilePath, schema: str | None = None) -> dict[str, Any]
         if found is None:
             raise InputError(f'{path}: the line schema = "{schema}" is missing; add it at the top.')
         if found != schema:
-            raise InputError(f'{path}: schema must be "{schema}", not {found!r}; add or correct that line.')
+            raise InputError(
+                f'{path}: schema must be "{schema}", not {found!r}; give such a file, or correct that line.'
+            )
     return content
 
 

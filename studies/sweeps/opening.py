@@ -44,7 +44,7 @@ def claim_store(folder: str | Path) -> Store:
     path = Path(folder) / FILE
     _refuse_former(folder)
     if not path.parent.absolute().parent.exists():
-        raise InputError(f"{folder}: there is no folder '{path.parent.parent}'; make it, or correct --out.")
+        raise InputError(f"{folder}: there is no folder '{path.parent.parent}'; create it, or correct --out.")
     try:
         path.parent.mkdir(exist_ok=True)
         lock = (path.parent / LOCK).open("a+")

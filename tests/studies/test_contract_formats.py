@@ -153,15 +153,27 @@ def test_contract_damaged_files_are_refused_in_a_sentence(kind, record, tmp_path
         assert err.count("\n") == 2, err
         assert name in err
     rng = np.random.default_rng(1)
-    for _ in range(
-        0 if kind == "hdf5" else 10
-    ):  # the HDF5 library itself may never return from a damaged heap; whatever bytes are turned: a sentence or an answer, never a fault of the program
+    for _ in range(0 if kind == "hdf5" else 10):  # a sentence or an answer, never a fault of the program
         bad = bytearray(whole)
         for place in rng.integers(0, len(bad), 30):
             bad[place] ^= 0xFF
         Path(name).write_bytes(bytes(bad))
         assert main(["import", name, "--map", "map.toml", "--out", "back.csv"]) in (0, 2)
     assert "Traceback" not in capfd.readouterr().err
+
+
+@pytest.mark.parametrize("probe", ["while True: pass", "import os; os.abort()"], ids=["hangs", "crashes"])
+def test_contract_a_file_on_which_the_hdf5_library_hangs_or_crashes_is_refused(probe, tmp_path, monkeypatch, capsys):
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(tmp_path / "bad.h5", "w") as file:
+        file["f"] = np.arange(9.0)
+    monkeypatch.setattr("studies.importing.formats.PROBE", probe)
+    monkeypatch.setattr("studies.importing.formats.PATIENCE", 0.3)
+    assert main(["import", str(tmp_path / "bad.h5"), "--draft", str(tmp_path / "map.toml")]) == 2
+    assert (
+        "bad.h5: damaged, so that the HDF5 library hangs or crashes on it; copy or export it again."
+        in capsys.readouterr().err
+    )
 
 
 @pytest.mark.parametrize("kind", LIBRARIES)
