@@ -78,7 +78,7 @@ def trim(
     Make the cuts, measure, and plan the next round from the new splits. The effect of a cut depends on its place: off the edge
     or a face it also removes strain energy; a tooth carries almost none. A narrow, deep groove relieves stress beside it, which
     can cancel or reverse its effect; the plan solves this for the planned depth. Wide, shallow cuts and teeth are the most
-    predictable.
+    predictable. An edge cut ends along the normal of the wall; ground flat, parallel to the rim, it changes the split 4 to 6 % less.
 
     Parameters
     ----------

@@ -42,7 +42,7 @@ def cut_dome(kind, position, width, length, depth, size, fine, order):
     polar = position * pi / 2
     side = width / (2 * R * sin(polar))
     if kind == "edge":
-        ring = occ.Box(occ.Pnt(0, -1, -1), occ.Pnt(2 * R, 2 * R, depth))
+        ring = between(pi / 2 - depth / R, pi / 2 + 0.01)  # a cone: along the normal of the wall
     else:
         layer = ball(R + H) - ball(R + H / 2 - depth) if kind == "outer" else ball(R - H / 2 + depth)
         ring = layer * between(polar - length / (2 * R), polar + length / (2 * R))
