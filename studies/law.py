@@ -2,12 +2,14 @@
 
 from dataclasses import replace
 from math import inf
-from typing import TYPE_CHECKING, cast
+from typing import cast
 
-if TYPE_CHECKING:
-    from shell.law import FrequencyLaw
-    from shell.levels import Theory
-    from studies.instrument.card import Instrument
+from shell.errors import ShellError
+from shell.law import FrequencyLaw, build_law, check_mount
+from shell.levels import Theory
+from shell.materials import read_materials
+from studies.errors import InputError, naming
+from studies.instrument.card import Instrument
 
 SLOPE_KEYS = {"youngs_modulus": "log_slope_per_K", "shear_modulus": "log_slope_per_K", "expansion": "value"}
 
@@ -20,9 +22,6 @@ def law_of(
     harmonic: int = 2,
 ) -> "FrequencyLaw":
     """Build the frequency law of an instrument between two temperatures (K), within its material's range: over all of it unless given."""
-    from shell.law import build_law, check_mount
-    from studies.errors import naming
-
     if instrument.polynomial is not None:
         return cast("FrequencyLaw", instrument.polynomial.between(lowest, highest))
     T0, material, mount = instrument.reference_temperature, instrument.material, instrument.part("mount")
@@ -42,8 +41,6 @@ def law_of(
 
 def unknown_slope(instrument: "Instrument") -> str:
     """Say why the slope of the frequency is not known, and which keys would tell it; empty where it is known."""
-    from shell.materials import read_materials
-
     missing = () if instrument.polynomial is not None else instrument.material.constant
     if not missing:
         return ""
@@ -60,16 +57,12 @@ def unknown_slope(instrument: "Instrument") -> str:
 
 def check_slope_known(instrument: "Instrument") -> None:
     """Refuse a material that is given at one temperature only: the slope of its frequency is not 0 but unknown."""
-    from studies.errors import InputError
-
     if why := unknown_slope(instrument):
         raise InputError(f"{instrument.path} [material]: {why}")
 
 
 def moved_law(law: "FrequencyLaw", instrument: "Instrument") -> "FrequencyLaw":
     """Return the law of an instrument whose material or mount has moved; solved anew where Poisson's ratio has left the law's."""
-    from shell.errors import ShellError
-
     if instrument.polynomial is not None:
         return law_of(instrument, law.lowest, law.highest)
     try:

@@ -1,8 +1,12 @@
 """`hrg cards`: the instrument cards that ship with the package, and what is uncertain in one."""
 
+from dataclasses import asdict
+from math import exp
 from typing import Any
 
 from studies.cli.output import answers
+from studies.instrument.card import load_card, shipped_cards
+from studies.instrument.display import display_name
 from studies.results import Column, Facts, Result, Table, row_of
 
 WIDE = 0.3
@@ -23,8 +27,6 @@ def cards(card: str = "") -> Result:
     card : str
         Path of a card, or the name of one that ships: show its mass, moments of inertia and uncertain values.
     """
-    from studies.instrument.card import load_card, shipped_cards
-
     if card:
         return _show_values(card)
     found = map(load_card, shipped_cards().values())
@@ -38,8 +40,6 @@ def cards(card: str = "") -> Result:
 
 def _spread(row: dict[str, Any]) -> str:
     """One standard deviation; a factor where the logarithm is normal and wide."""
-    from math import exp
-
     from studies.reports.digits import plain
 
     share = row["sd"] / row["value"] if row["logarithmic"] else 0.0
@@ -47,12 +47,8 @@ def _spread(row: dict[str, Any]) -> str:
 
 
 def _show_values(card: str) -> Result:
-    from dataclasses import asdict
-
     from shell.inertia import weigh
     from studies.calibration.priors import idle_values
-    from studies.instrument.card import load_card
-    from studies.instrument.display import display_name
 
     instrument = load_card(card)
     values, stated = instrument.uncertain, instrument.stated

@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from shell.modes import solve_modes
 from studies.cli.arguments import Quiet, Workers
 from studies.cli.output import answers
 from studies.design.answer import Answer
@@ -219,6 +220,4 @@ def _draw_front(found: "Answer") -> Drawing:
 
 def _draw_section(instrument: "Instrument") -> Drawing:
     """The section with the swing of the mode n = 2."""
-    from shell.modes import solve_modes
-
     return solve_modes(*instrument.at(instrument.reference_temperature), 2)[0].plot()

@@ -10,6 +10,7 @@ from typing import Annotated, Literal
 
 import numpy as np
 
+from studies.calibration.ahead import spread_of_prediction
 from studies.cli.arguments import POSITIVE, Card, Seed, Theory
 from studies.cli.output import answers, say, tell_rows
 from studies.instrument.card import load_card
@@ -69,8 +70,6 @@ def simulate(
     write_record(run.record, out, tell_rows(rows))
     known: dict[str, float] | None = None
     if spread:
-        from studies.calibration.ahead import spread_of_prediction
-
         found = spread_of_prediction(instrument, run.prediction.drive, run.law)
         known = {name: float(np.sqrt(np.mean(values**2))) for name, values in found.items() if name in run.record}
     summary = {

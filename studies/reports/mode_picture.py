@@ -2,9 +2,10 @@
 
 from collections.abc import Sequence
 from math import degrees
-from typing import TYPE_CHECKING
 
 from shell.constants import zero_Celsius
+from studies.instrument.card import Instrument
+from studies.reports.scenes import ModeScene, show_mode
 from studies.results import Sentence
 from studies.results.page import Block
 
@@ -14,15 +15,9 @@ THEORIES = {
     "rayleigh": "Rayleigh's closed form",
 }
 
-if TYPE_CHECKING:
-    from studies.instrument.card import Instrument
-    from studies.reports.scenes import ModeScene
-
 
 def mode_blocks(instrument: "Instrument", harmonics: Sequence[int] = (2, 3)) -> list[Block]:
     """Return the interactive view of the lowest mode of each harmonic, with the picture of the first one behind it."""
-    from studies.reports.scenes import show_mode
-
     return view_blocks([show_mode(instrument, n) for n in harmonics])
 
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from studies.errors import UNUSABLE_INPUT, InputError
 from studies.papers.hrg import study_table
-from studies.reports import frequency
+from studies.reports import frequency, mode_picture
 from studies.reports import sweep_figures as figures
 from studies.reports.sweep_analysis import influence_parts, main_columns, number, search_parts, tolerance_parts
 from studies.reports.sweep_numbers import numbers_of, statistics_table, summarise, to_digits, yield_of
@@ -181,8 +181,6 @@ def _over_temperature(results: Results) -> list[Part]:
 
 
 def _shapes(results: Results) -> list[Part]:
-    from studies.reports import mode_picture
-
     study = results.study
     modal = [one for one in study.asked if "harmonic" in one.options]
     if not modal:

@@ -13,14 +13,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from shell.imperfection import Imperfection, Split
+from shell.imperfection.surface import find_departures
+from shell.modes import Mode
+from shell.outline import Outline, trace_outlines
+from shell.resonator import Resonator
 from studies.results.page import Embedded, fill_template
 
 if TYPE_CHECKING:
-    from shell.imperfection import Imperfection, Split
-    from shell.modes import Mode
-    from shell.outline import Outline
-    from shell.resonator import Resonator
-
     Members = np.ndarray[Any, np.dtype[np.int64]]
 
 HIGHEST = 12  # wave of the departures that is drawn
@@ -77,8 +77,6 @@ def view_modes(
 
 
 def _describe(resonator: "Resonator", mode: "Mode", size: float, drawn: Drawn | None) -> dict[str, Any]:
-    from shell.outline import trace_outlines
-
     outlines = trace_outlines(resonator, size / 40, mode)
     runs = [run for line in outlines for run in _split_at_kinks(line)]
     points = np.concatenate([_columns(line, members, size) for line, members in runs])
@@ -99,8 +97,6 @@ def _imperfect(
     resonator: "Resonator", runs: "list[tuple[Outline, Members]]", size: float, drawn: Drawn
 ) -> dict[str, Any]:
     """The slow axis (rad), where the axes lie on the rim, and the departures: for each wave and point its parts along r and z."""
-    from shell.imperfection.surface import find_departures
-
     rim = resonator.at([resonator.length])
     found: dict[str, Any] = {
         "axis": drawn.split.slow_axis,
@@ -143,8 +139,6 @@ def _split_at_kinks(line: "Outline") -> "list[tuple[Outline, np.ndarray[Any, np.
 
 def _bounds(resonator: "Resonator") -> tuple[float, float]:
     """Height of the middle of the resonator and the radius of the sphere around it, m."""
-    from shell.outline import trace_outlines
-
     line = trace_outlines(resonator, resonator.size / 40)[0]
     middle = float(line.z.max() + line.z.min()) / 2
     return middle, float(np.hypot(line.r, line.z - middle).max())
