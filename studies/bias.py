@@ -102,14 +102,10 @@ def study_bias(
 
     Parameters
     ----------
-    records : sequence of Record, runs with time_s, bias_deg_per_h (or measured_rate_deg_per_s) at zero rate, and frequency_Hz or a temperature.
-    method : "guarded" or "paper", whose terms `model` takes; both are computed.
-    width, window : float
-        Averaging before the fit and window of the rate, s. Unless given, 100 s, less for runs of less than 200 such rows,
-        and three times that.
-    causal : bool, the rate uses past samples only.
-    over : "auto", "frequency" or "temperature", what the bias is a function of; "auto" takes the frequency where every record has it.
-    progress : callable, told in words what is being done.
+    method : whose terms `model` takes; both are computed.
+    width, window : averaging before the fit and window of the rate, s; 100 s, less for runs of less than 200 such rows, and three times that.
+    causal : the rate uses past samples only.
+    over : what the bias is a function of; "auto" takes the frequency where every record has it.
     """
     records = records_of_one_gyro(records, progress)
     check_lengths(records)

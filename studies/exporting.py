@@ -13,13 +13,7 @@ GROUP = "record"
 
 
 def export_record(record: Record, kind: str, path: str) -> None:
-    """Write a record in another format, whole or not at all; `kind` is one of `WRITERS`.
-
-    Raises
-    ------
-    MissingEnvironment
-        The library that writes the format is not installed.
-    """
+    """Write a record in another format, whole or not at all; MissingEnvironment where the library that writes it is not installed."""
     if kind in ("csv", "parquet"):
         write_record(record, path)
         return

@@ -147,10 +147,8 @@ def read_decay(
 
     Parameters
     ----------
-    path : str or Path, the file; the module says what it may hold.
-    frequency : float, optional, Hz: carrier of raw samples, reference of a lock-in, frequency of a trace; in place of the file's.
-    harmonic : int, n.
-    expected : float, optional, Hz: what a card predicts; raw samples whose frequency is an alias of it are refused.
+    frequency : Hz, carrier of raw samples, reference of a lock-in, frequency of a trace; in place of the file's.
+    expected : Hz, what a card predicts; raw samples whose frequency is an alias of it are refused.
     """
     table, notes = _read(path)
     if frequency is not None:

@@ -110,17 +110,12 @@ def scan_faces(
     theory: Literal["solid", "shell"] = "solid",
     say: Callable[[str], None] = lambda _: None,
 ) -> Scan:
-    """Read, align and fit the faces, and find the splits.
+    """Read, align and fit the faces, and find the splits of harmonics n.
 
     Parameters
     ----------
-    resonator, elastic : of the card at the temperature.
-    files : "inner" and/or "outer" with their paths.
-    unit : of the points.
-    frames : "own" aligns each face by itself, so that its first wave holds no rigid motion; "common" keeps them where they lie to each other.
-    harmonics : n of the splits.
+    frames : "own" aligns each face by itself, so that its first wave holds no rigid motion; "common" keeps them as they lie to each other.
     highest : wave around up to which the faces are fitted, at least twice the highest harmonic.
-    say : hears what is being done.
     """
     if 2 * max(harmonics) > highest:
         needed = f"the split of n = {max(harmonics)} needs harmonic {2 * max(harmonics)} of the faces"

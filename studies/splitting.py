@@ -146,12 +146,7 @@ def reference_split(instrument: "Instrument", harmonic: int = 2) -> SplitPair:
 def mean_shift(instrument: "Instrument", temperature: Array, voltage_squared: Array | None = None) -> Array | float:
     """What imperfection and electrodes add to the mean frequency of the n = 2 pair, relative.
 
-    Softening goes as V²/g³ with the gap's expansion; the voltages are the card's, or a common one that is commanded.
-
-    Parameters
-    ----------
-    temperature : array, K
-    voltage_squared : array, V², optional, of the common voltage, in place of the card's.
+    Softening goes as V²/g³ with the gap's expansion; the voltages are the card's, or a common one (V²) that is commanded.
     """
     electrodes: CardElectrodes = instrument.part("electrodes")
     card: CardImperfection = instrument.part("imperfection")

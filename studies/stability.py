@@ -22,10 +22,7 @@ class Stability:
 
 
 def read_stability(series: Array, step: float, confidence: float) -> Stability:
-    """Return the Allan deviation of an even series, and N, B and K read where noise of the angle no longer rules.
-
-    Noise of the angle falls as 1/τ and is no random walk.
-    """
+    """Return the Allan deviation of an even series, and N, B, K read where noise of the angle (as 1/τ, no random walk) no longer rules."""
     allan = allan_deviation(series, step, confidence=confidence)
     angle = sum(1 for _ in itertools.takewhile(lambda kind: kind == "phase", allan.noise))
     if not angle:

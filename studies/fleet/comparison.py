@@ -46,14 +46,7 @@ class Share:
 
 
 def compare(response: str, scores: Scores, batches: Mapping[str, str] | None = None) -> Share | None:
-    """Return the likeliest cause in one place of the lot; None where there is none.
-
-    Parameters
-    ----------
-    response : str
-    scores : device -> effect -> what it would stand at there
-    batches : device -> batch
-    """
+    """Return the likeliest cause in one place of the lot; None where there is none. `scores`: device -> effect -> how it stands there."""
     prior, batches = CONSTANTS["log_prior_effect"], batches or {}
     names = sorted({name for of in scores.values() for name in of})
 

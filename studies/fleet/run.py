@@ -24,15 +24,7 @@ Done = tuple[Device, Answer | str]
 def run_lot(
     devices: Sequence[Device], out: str | None = None, workers: int = 1, progress: Progress = lambda words: None
 ) -> Lot:
-    """Diagnose the devices of a lot and hold them against each other.
-
-    Parameters
-    ----------
-    devices : sequence of Device
-    out : str, optional, folder that keeps the answer and the page of each device.
-    workers : int, processes.
-    progress : callable
-    """
+    """Diagnose the devices of a lot, in so many processes, and compare them; `out` keeps the answer and the page of each."""
     if len(devices) < 2:
         raise InputError("a fleet needs at least two devices, such as --device A=a1.csv,a2.csv --device B=b1.csv.")
     if out is not None:

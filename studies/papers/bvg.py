@@ -58,13 +58,7 @@ def read_printed_chain() -> BellChain:
 
 
 def simulate_runs(generator: np.random.Generator, random_walk: float = RANDOM_WALK) -> tuple[BellRun, BellRun, BellRun]:
-    """Return virtual runs: rates ±360 °/s at 25 °C, rest and 300 °/s over −45…55 °C.
-
-    Parameters
-    ----------
-    generator : numpy Generator, draws the noise.
-    random_walk : float, white noise of the rate (°/√h).
-    """
+    """Return virtual runs with so much white noise (°/√h): rates ±360 °/s at 25 °C, rest and 300 °/s over −45…55 °C."""
     gyro = read_printed_chain()
     sweep = (zero_Celsius + np.linspace(LOWEST, HIGHEST, round(SWEEP / STEP))).astype(np.float64)
     plateaus = np.repeat(np.arange(-360.0, 361.0, 40.0) * DEG, round(DWELL / STEP)).astype(np.float64)

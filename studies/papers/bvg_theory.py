@@ -87,12 +87,7 @@ class LoopReading:
 
 
 def read_planted_rate(planted: float = 2.0) -> LoopReading:
-    """Integrate (23) with a coupling c₁ and read the rate back by (24)–(26) for amplitudes, by (27)–(29) and by (30).
-
-    Parameters
-    ----------
-    planted : rate, rad/s.
-    """
+    """Integrate (23) with a coupling c₁ and read a rate (rad/s) back by (24)–(26) for amplitudes, by (27)–(29) and by (30)."""
     from scipy.integrate import solve_ivp
 
     bell, ring, share = _bell_with_elements()

@@ -59,15 +59,7 @@ def make_profile(soak_h: float = 1.0, slope_K_per_min: float = 1.0) -> tuple[Rea
 def simulate_rest(
     generator: np.random.Generator, *, lag: float = LAG, random_walk: float = RANDOM_WALK, soak_h: float = 1.0
 ) -> RestRun:
-    """Return a virtual zero-rate run: sensed temperature, and the output of a resonator that lags behind it.
-
-    Parameters
-    ----------
-    generator : numpy Generator, draws the noise.
-    lag : float, time constant (s) between the sensor and the resonator.
-    random_walk : float, white noise of the rate (°/√h).
-    soak_h : float, length of the soaks of the profile (h).
-    """
+    """Return a virtual zero-rate run: sensed temperature, and the output of a resonator that lags behind it by `lag` (s), with white noise (°/√h)."""
     time, sensed = make_profile(soak_h)
     resonator = sensed
     if lag:

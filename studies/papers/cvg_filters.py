@@ -28,10 +28,7 @@ STEPS = (1e-3, 5e-4, 2e-4, 1e-4, 5e-5)
 
 @dataclass(frozen=True)
 class Filtered:
-    """A true rate, the gyro's output without and with noise, the filter's estimate, and the same without noise.
-
-    All in rad/s over time (s).
-    """
+    """A true rate, the gyro's output without and with noise, the filter's estimate, and the same without noise: rad/s over time (s)."""
 
     time: Real
     rate: Real

@@ -130,10 +130,7 @@ def study_table(
 
 
 def local_slopes(temperature_degC: Array, frequency: Array) -> tuple[Array, Array]:
-    """Return the mid temperatures (°C) and the slopes over the local frequency (ppm/°C) between neighbours.
-
-    Readings at one temperature count as one, their mean.
-    """
+    """Return mid temperatures (°C) and slopes over the local frequency (ppm/°C) between neighbours; readings at one temperature count as one."""
     T, reading = np.unique(temperature_degC, return_inverse=True)
     f = average_groups(frequency, reading)
     return (T[1:] + T[:-1]) / 2, 2e6 * np.diff(f) / np.diff(T) / (f[1:] + f[:-1])

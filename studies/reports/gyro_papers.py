@@ -26,12 +26,7 @@ MAP_POINTS = 31
 
 
 def reproduce_gyro_papers(seeds: int = 20) -> tuple[list[Chapter], dict[str, Any]]:
-    """Run the virtual gyros of the three papers; return their chapters and the numbers for summary.json.
-
-    Parameters
-    ----------
-    seeds : int, virtual runs for the spread of the cross-damping improvement.
-    """
+    """Run the virtual gyros of the three papers, so many for cross-damping; return chapters and the numbers for summary.json."""
     damping, study, chain = reproduce_cross_damping(seeds), study_filters(), reproduce_bell()
     claims, theory, reading = study_claims(), compare_bell_theory(), read_planted_rate()
     chapters = [

@@ -47,13 +47,7 @@ def live_blocks(
     instrument: Instrument, harmonic: int = 2, theory: Theory = "solid", names: Sequence[str] = (),
     derived: Sequence[Derived] = (),
 ) -> list[Block]:  # fmt: skip
-    """Return sliders for main dimensions and temperature; one sentence where they cannot be had.
-
-    Parameters
-    ----------
-    names : keys of the card that get a slider; the shape's main dimensions unless given.
-    derived : what follows from them.
-    """
+    """Return sliders for keys of the card (main dimensions unless given) and temperature; one sentence where they cannot be had."""
     try:
         data = describe_family(instrument, harmonic, theory, names, derived)
     except UNUSABLE_INPUT as error:

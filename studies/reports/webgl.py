@@ -40,18 +40,7 @@ def view_modes(
     resonator: "Resonator", modes: "Sequence[Mode]", title: str, png: bytes | None, alt: str, caption: str = "",
     splits: "Sequence[Drawn | None]" = (),
 ) -> Embedded:  # fmt: skip
-    """Return an interactive view of several modes of one resonator.
-
-    Parameters
-    ----------
-    resonator : the one that the modes were solved for.
-    modes : of theory solid or shell; the first one is shown first.
-    title : name of the resonator; escaped.
-    png : the picture that stands in where WebGL2 is missing and on paper; None where none could be drawn.
-    alt : what the picture shows, in words.
-    caption : below the view.
-    splits : of every mode, where it is one of a split pair.
-    """
+    """Return an interactive view of modes (solid or shell) of one resonator; `png` stands in where WebGL2 is missing, and on paper."""
     size = resonator.size
     pairs = zip(modes, splits or [None] * len(modes), strict=True)
     described = [_describe(resonator, mode, size, split) for mode, split in pairs]

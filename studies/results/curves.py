@@ -21,13 +21,7 @@ DIGITS = 6
 
 
 def read_curves(figure: Drawing, left: float, bottom: float, width: float, height: float) -> str:
-    """Return the curves of a drawn figure as JSON for `curves.js`; empty where it has none.
-
-    Parameters
-    ----------
-    figure : matplotlib Figure, drawn
-    left, bottom, width, height : float, inch, the part of the figure that the picture shows.
-    """
+    """Return the curves of a drawn figure as JSON for `curves.js`, of the part (inch) that the picture shows; empty where it has none."""
     wide, high = figure.get_size_inches()
 
     def place(x: float, y: float, w: float, h: float) -> list[float]:
