@@ -40,8 +40,7 @@ METHODS: tuple[Method, ...] = ("guarded", "paper")
 AVERAGING, ROWS = 100.0, 150  # s; rows that a run should leave
 FEWEST = 3  # averages over AVERAGING that a run has at least: stability is their standard deviation
 LOWEST_FREQUENCY = 100.0  # Hz
-FEWEST_FOR_ALLAN = 30
-"""Samples below which an Allan deviation says nothing."""
+FEWEST_FOR_ALLAN = 30  # samples below which an Allan deviation says nothing
 
 
 @dataclass(frozen=True)

@@ -32,8 +32,7 @@ class Figure:
     unit: str
     value: float
     uncertainty: float
-    of: str = ""
-    """What it is a quantity of, where designs differ in that."""
+    of: str = ""  # what it is a quantity of, where designs differ in that
 
 
 @dataclass(frozen=True, repr=False)

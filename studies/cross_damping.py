@@ -11,8 +11,7 @@ from compensation.errors import CompensationError
 from compensation.improvement import Improvement, compare_outputs, hold_out
 
 LEAST_ROWS = 50
-BLOCKS = 5
-"""Parts into which a single run is cut, each to be predicted from the others."""
+BLOCKS = 5  # parts into which a single run is cut, each to be predicted from the others
 
 
 @dataclass(frozen=True)

@@ -22,12 +22,12 @@ from studies.rest import LARGEST_REST, MOST_ROWS, TEMPERATURES, choose_column, d
 Real = NDArray[np.float64]
 DEG = float(np.pi / 180)
 STEPS = ("rough", "bias_compensated", "rate_compensated", "temperature_compensated", "filtered")
-SWEPT = 5.0
-"""Span of temperature (K) from which a run counts as one over temperature."""
-STEADY = 0.01
-"""Part of the rate by which a rate table may waver and still turn at one rate."""
-SHORT, LONG = 1.0, 100.0
-"""Averaging times (s) at which the random walk is read: a filter of 5 s changes the first, not the second."""
+SWEPT = 5.0  # span of temperature (K) from which a run counts as one over temperature
+STEADY = 0.01  # part of the rate by which a rate table may waver and still turn at one rate
+SHORT, LONG = (
+    1.0,
+    100.0,
+)  # averaging times (s) at which the random walk is read: a filter of 5 s changes the first, not the second
 BLOCKS = 5
 
 
@@ -129,8 +129,7 @@ def study_scale(records: "Sequence[Record]", cutoff: float | None, order: int) -
 
 ROUGH = "at rest and then at one rate"
 """The paper's run for the rough null and scale, equation (33); without one they come from the run of several rates."""
-PLATEAU = 0.05
-"""Part of a run's rows from which an applied rate counts as a plateau."""
+PLATEAU = 0.05  # part of a run's rows from which an applied rate counts as a plateau
 KINDS = {
     "of several rates at one temperature": "equation (35)",
     "at rest over temperature": "equation (34)",

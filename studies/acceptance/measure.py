@@ -22,8 +22,7 @@ from studies.ringdown import Decay
 from studies.stability import read_stability
 
 Real = NDArray[np.float64]
-BLOCK = 100.0
-"""Averaging of the output over temperature (s)."""
+BLOCK = 100.0  # averaging of the output over temperature (s)
 WARM_BLOCK = 10.0
 MOST_POINTS = 100_000
 CONFIDENCE = 0.9

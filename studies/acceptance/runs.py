@@ -10,11 +10,9 @@ from studies.record import Record
 from studies.rest import LARGEST_REST, TEMPERATURES
 
 Test = Literal["warm-up", "temperature", "scale-factor", "drift", "run-down", "transfer", "angle-storage"]
-SPAN = 5.0
-"""Span of temperature (K) from which a run at rest is one over temperature."""
+SPAN = 5.0  # span of temperature (K) from which a run at rest is one over temperature
 HOUR = 3600.0
-MOVING = 0.5
-"""Part of the rows from which on an applied rate that changes is swept or shaken, not held at levels."""
+MOVING = 0.5  # part of the rows from which on an applied rate that changes is swept or shaken, not held at levels
 
 
 def test_of(record: "Record", output: str) -> Test | None:

@@ -9,8 +9,7 @@ from studies.instrument.card import load_card, shipped_cards
 from studies.instrument.display import display_name
 from studies.results import Column, Facts, Result, Table, row_of
 
-WIDE = 0.3
-"""Standard deviation of a logarithm from which on a factor is shown."""
+WIDE = 0.3  # standard deviation of a logarithm from which on a factor is shown
 LEAD = "The instrument cards that ship with the package."
 
 

@@ -30,8 +30,7 @@ from studies.reports.scenes import live_chapter, show_mode
 from studies.results import Blocks, Column, Result, Sentence, Table, Where, row_of
 from studies.results.page import Block
 
-FAR = 0.1
-"""Relative difference of the first order from all orders from which on a split is doubted."""
+FAR = 0.1  # relative difference of the first order from all orders from which on a split is doubted
 COLUMNS = (
     *MODE,
     Column("label", "kind"),

@@ -3,8 +3,7 @@
 import sys
 import time
 
-PATIENCE = 2.0
-"""Seconds of silence that nobody minds."""
+PATIENCE = 2.0  # seconds of silence that nobody minds
 
 
 class Told:

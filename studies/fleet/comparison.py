@@ -15,12 +15,9 @@ from studies.diagnosis.verdict import temper_of
 from studies.effects import find_effect
 from studies.fleet.device import Standing
 
-SEEN = 2.0
-"""Standard deviations of a limit."""
-LESS = 0.5
-"""Part of the usual size below which a device lacks an effect."""
-FEW = 0.1
-"""Part of the devices that could show an effect which is an exception."""
+SEEN = 2.0  # standard deviations of a limit
+LESS = 0.5  # part of the usual size below which a device lacks an effect
+FEW = 0.1  # part of the devices that could show an effect which is an exception
 Scores = Mapping[str, Mapping[str, Standing]]
 
 

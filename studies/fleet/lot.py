@@ -14,10 +14,8 @@ from studies.fleet.folder import Device
 from studies.fleet.population import FEWEST, Quantity
 from studies.instrument.display import display_name
 
-DESIGN = 0.05
-"""Relative distance of a frequency from the lot's, beyond which a device is of another design."""
-TOLD = 0.6
-"""Part of the devices whose records must tell a value for it to be one of the lot."""
+DESIGN = 0.05  # relative distance of a frequency from the lot's, beyond which a device is of another design
+TOLD = 0.6  # part of the devices whose records must tell a value for it to be one of the lot
 
 
 @dataclass(frozen=True)

@@ -20,14 +20,10 @@ from numpy.typing import NDArray
 from studies.fleet.device import Measured
 
 Array = NDArray[np.float64]
-GRID = np.geomspace(1e-3, 3.0, 60)
-"""Scatters that are tried, in parts of the range of the values."""
-CHANCE = 0.01
-"""Chance, with all looks counted, below which a device or a batch is odd."""
-FEWEST = 4
-"""Devices from which on values tell who is odd."""
-CLEAR = 2.0
-"""Scatter of the others, beyond which a batch is more than another batch."""
+GRID = np.geomspace(1e-3, 3.0, 60)  # scatters that are tried, in parts of the range of the values
+CHANCE = 0.01  # chance, with all looks counted, below which a device or a batch is odd
+FEWEST = 4  # devices from which on values tell who is odd
+CLEAR = 2.0  # scatter of the others, beyond which a batch is more than another batch
 
 
 @dataclass(frozen=True)

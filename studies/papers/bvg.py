@@ -19,13 +19,11 @@ from studies.scale import StepFigures, judge_steps
 
 Real = NDArray[np.float64]
 DEG = float(np.pi / 180)
-STEP = 0.1
-"""Output step (s), printed."""
+STEP = 0.1  # output step (s), printed
 RANDOM_WALK, WANDER = 2.7821, 20.0
 """White noise (°/√h): the printed random walk before compensation. Random walk of the bias (°/h per √h): assumed."""
 LOWEST, HIGHEST, ROOM = -45.0, 55.0, 25.0
-SWEEP, DWELL = 10_000.0, 60.0
-"""Length (s) of a temperature sweep at 0.6 °C/min and of one applied rate: assumed."""
+SWEEP, DWELL = 10_000.0, 60.0  # length (s) of a temperature sweep at 0.6 °C/min and of one applied rate: assumed
 CUTOFF, ORDER = 1.0, 50
 PRINTED = {
     "nonlinearity": (0.002, 0.0003),

@@ -14,8 +14,7 @@ from studies.instrument.card import load_card
 from studies.results import Chapter, Column, Table
 
 CARD = "bvg-bell"
-D31_PZT5A = -1.71e-10
-"""C/N, of PZT-5A (data sheets of makers); the paper names the ceramic and no constant."""
+D31_PZT5A = -1.71e-10  # C/N, of PZT-5A (data sheets of makers); the paper names the ceramic and no constant
 ELEMENT_mm, AMPLIFIER_F = (6.0, 3.0), 1e-9
 """Length along the wall, beginning at the dome, and width of an element; feedback of its amplifier: assumed, none is printed."""
 

@@ -19,11 +19,9 @@ from studies.cross_damping import CrossDampingStudy, study_cross_damping
 Real = NDArray[np.float64]
 DEG_PER_H = np.pi / 180 / 3600
 CALIBRATION = 293.15
-FREQUENCY, QUALITY = 5000.0, 10_000.0
-"""A metal cylinder of a few centimetres (Hz, 1): assumed."""
+FREQUENCY, QUALITY = 5000.0, 10_000.0  # a metal cylinder of a few centimetres (Hz, 1): assumed
 K, ZETA = 2 * np.pi * FREQUENCY, 1 / (2 * QUALITY)
-BIAS_AT_CALIBRATION = 40.0
-"""Scale that the printed shape is given (°/h): assumed; over −40…60 °C it makes 4…290 °/h."""
+BIAS_AT_CALIBRATION = 40.0  # scale that the printed shape is given (°/h): assumed; over −40…60 °C it makes 4…290 °/h
 RANDOM_WALK, WANDER = 0.05, 2.0
 """White noise of the rate (°/√h) and random walk of the bias (°/h per √h): assumed, typical of tactical grade."""
 LAG = 300.0

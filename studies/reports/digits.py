@@ -2,8 +2,7 @@
 
 import math
 
-SMALLEST, LARGEST = 1e-4, 1e6
-"""Between these a number is written without an exponent."""
+SMALLEST, LARGEST = 1e-4, 1e6  # between these a number is written without an exponent
 
 
 def plain(value: float | None, digits: int = 3) -> str:

@@ -13,8 +13,7 @@ from studies.results import Drawing
 BLACK, ORANGE, SKY, GREEN, YELLOW, BLUE, VERMILION, PURPLE = (
     "#000000", "#E69F00", "#56B4E9", "#009E73", "#F0E442", "#0072B2", "#D55E00", "#CC79A7",
 )  # fmt: skip
-COLOURS = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY, YELLOW)
-"""In the order in which the lines of a figure take them."""
+COLOURS = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY, YELLOW)  # in the order in which the lines of a figure take them
 _STYLE = {
     "font.size": 10,
     "axes.grid": True,

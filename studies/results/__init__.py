@@ -15,8 +15,7 @@ from studies.reports.digits import plain, short_exponent, to_error, to_interval
 
 Payload = Mapping[str, Any]
 Key = str | Callable[[Any], Any]
-Drawing = Any
-"""A matplotlib figure, by a name that does not load matplotlib."""
+Drawing = Any  # a matplotlib figure, by a name that does not load matplotlib
 Where = Literal["everywhere", "page", "terminal"]
 
 

@@ -14,10 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 from studies.results import Drawing
 
 Array = NDArray[np.float64]
-MOST = 100_000
-"""Points of a figure beyond which it stays a picture."""
-DIGITS = 6
-"""Digits of the axis's range to which values are kept."""
+MOST = 100_000  # points of a figure beyond which it stays a picture
+DIGITS = 6  # digits of the axis's range to which values are kept
 
 
 def read_curves(figure: Drawing, left: float, bottom: float, width: float, height: float) -> str:
