@@ -87,7 +87,12 @@ class CrossDampingModel:
     def predict(self, time: ArrayLike, temperature: ArrayLike, *, extrapolate: bool = False) -> Array:
         """Return the erroneous rate (rad/s) over time: ζ₁₂(T(t)) through the filter (9), settled at the start."""
         t, T = read_columns(time=time, temperature=temperature)
-        _check_range(T, self.lowest, self.highest, extrapolate)
+        low, high, lowest, highest = (x - zero_Celsius for x in (T.min(), T.max(), self.lowest, self.highest))
+        if not extrapolate and (low < lowest or high > highest):
+            raise CompensationError(
+                f"the temperature runs from {low:.2f} to {high:.2f} °C, but the model was fitted between {lowest:.2f} and"
+                f" {highest:.2f} °C; allow extrapolation or fit a wider record."
+            )
         return simulate_bias(t, self.cross_damping(T), self.k, self.zeta, self.g2)
 
     def compensate(
@@ -175,12 +180,3 @@ def fit_cross_damping(
         highest=float(np.max(temperature)),
         noise=fit.standard_deviation,
     )
-
-
-def _check_range(temperature: Array, lowest: float, highest: float, extrapolate: bool) -> None:
-    low, high = float(np.min(temperature)), float(np.max(temperature))
-    if not extrapolate and (low < lowest or high > highest):
-        raise CompensationError(
-            f"the temperature runs from {low - zero_Celsius:.2f} to {high - zero_Celsius:.2f} °C, but the model was fitted between "
-            f"{lowest - zero_Celsius:.2f} and {highest - zero_Celsius:.2f} °C; allow extrapolation or fit a wider record."
-        )

@@ -67,7 +67,9 @@ def propagate_envelope(
     """
     from scipy.linalg import expm
 
-    t, Omega, cross12, cross21 = _read_inputs(time, rate, zeta12, zeta21)
+    zeta12, zeta21 = (np.zeros(np.shape(time)) if one is None else one for one in (zeta12, zeta21))
+    t, Omega, cross12, cross21 = read_columns(time=time, rate=rate, zeta12=zeta12, zeta21=zeta21)
+    check_time(t)
     h = np.diff(t)
     rise = np.diff(Omega) / h
     middle = [(values[:-1] + values[1:]) / 2 for values in (Omega, cross12, cross21)]
@@ -111,12 +113,3 @@ def demodulate(time: ArrayLike, displacement: ArrayLike, omega: float) -> tuple[
         raise CompensationError(f"demodulation needs two carrier periods, {len(window)} rows, not {len(t)}.")
     mixed = 2j * x * np.exp(-1j * omega * t)
     return t[m - 1 : len(t) - m + 1], np.convolve(mixed, window, mode="valid")
-
-
-def _read_inputs(time: ArrayLike, rate: ArrayLike, zeta12: ArrayLike | None, zeta21: ArrayLike | None) -> list[Array]:
-    zero = np.zeros(np.shape(time))
-    columns = read_columns(
-        time=time, rate=rate, zeta12=zero if zeta12 is None else zeta12, zeta21=zero if zeta21 is None else zeta21
-    )
-    check_time(columns[0])
-    return columns

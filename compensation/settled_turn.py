@@ -46,7 +46,10 @@ def turn_settled(
         raise CompensationError("the times of a run must increase.")
     rows = wave.over_rows(len(t))
     turning, commanded = (np.broadcast_to(np.asarray(x, dtype=float), t.shape) for x in (rate, precession))
-    theta = _integrate(rows, electronics, t, turning, commanded, _seen(electronics, wave.harmonic, angle))
+    n = wave.harmonic
+    x, y = _pickoff(electronics, n) @ [math.cos(n * angle), math.sin(n * angle)]
+    off = (math.atan2(y, x) - n * angle + math.pi) % (2 * math.pi) - math.pi  # of the measured azimuth, times n
+    theta = _integrate(rows, electronics, t, turning, commanded, angle + off / n)
     return read_turning(rows, electronics, theta, rate=turning, precession=commanded, time=t)
 
 
@@ -78,13 +81,6 @@ def read_turning(
 def _pickoff(electronics: Electronics, n: int) -> Array:
     """The pick-offs' plane as the phase loop sees it."""
     return np.asarray((electronics.pickoff.matrix(n) * np.exp(-1j * electronics.pickoff.phase)).real)
-
-
-def _seen(electronics: Electronics, n: int, angle: float) -> float:
-    """The measured azimuth of a true one."""
-    x, y = _pickoff(electronics, n) @ [math.cos(n * angle), math.sin(n * angle)]
-    off = math.atan2(y, x) - n * angle
-    return angle + ((off + math.pi) % (2 * math.pi) - math.pi) / n
 
 
 def _channels(electronics: Electronics, n: int) -> tuple[Complex, Complex]:

@@ -104,7 +104,10 @@ def allan_deviation(
         spaced = np.unique(np.round(2.0 ** (np.arange(count + 1) / points_per_octave)).astype(int))
         factors = spaced[spaced <= longest].tolist()
     x = np.concatenate([[0.0], np.cumsum(y - y.mean())]) * step
-    deviation = np.array([_overlapping(x, m, step) for m in factors])
+    second = (x[2 * m :] - 2 * x[m:-m] + x[: -2 * m] for m in factors)
+    deviation = np.array(
+        [math.sqrt(float(d @ d) / (2 * d.size)) / (m * step) for m, d in zip(factors, second, strict=True)]
+    )
     tau = np.asarray(factors, dtype=np.float64) * step
     noise = _identify(tau, deviation)
     edf = np.array([equivalent_freedom(kind, x.size, m) for kind, m in zip(noise, factors, strict=True)])
@@ -175,11 +178,6 @@ def _correlation(allan: AllanDeviation, c: Array) -> Array:
     response = 2 * np.sin(angle) ** 4 / angle**2 * S * np.sqrt(np.gradient(f))
     covariance = response @ response.T
     return np.asarray(covariance / np.sqrt(np.outer(np.diag(covariance), np.diag(covariance))))
-
-
-def _overlapping(x: Array, m: int, step: float) -> float:
-    second = x[2 * m :] - 2 * x[m:-m] + x[: -2 * m]
-    return math.sqrt(float(second @ second) / (2 * second.size)) / (m * step)
 
 
 def _identify(tau: Array, deviation: Array) -> tuple[NoiseKind, ...]:

@@ -61,7 +61,10 @@ def design_wiener_filter(
     d_a, d_b = factorise(rate.denominator), factorise(noise.denominator)
     # A factor that a density's sign carries, such as −1 in (−1, 0, B²), belongs to the numerator.
     N_a, N_b = _numerator_over(rate, d_a), _numerator_over(noise, d_b)
-    n_g, d_g = (np.ones(1), np.ones(1)) if weight is None else _factor(weight)
+    n_g = d_g = np.ones(1)  # Γ with Γ Γ* = R
+    if weight is not None:
+        d_g = factorise(weight.denominator)
+        n_g = factorise(_numerator_over(weight, d_g))
     left, right, N_c = _cross_parts(cross)
     mirrored = reflect(right)
     if len(right) % 2 == 0:
@@ -123,12 +126,6 @@ def _shape(spectrum: Spectrum, numerator: Array, denominator: Array) -> Spectrum
     bottom = multiply(np.array(spectrum.denominator), denominator, reflect(denominator))
     top[-2::-2] = bottom[-2::-2] = 0.0
     return Spectrum(tuple(top), tuple(bottom))
-
-
-def _factor(weight: Spectrum) -> tuple[Array, Array]:
-    """Numerator and denominator of Γ with Γ Γ* = R."""
-    d = factorise(weight.denominator)
-    return factorise(_numerator_over(weight, d)), d
 
 
 def _cross_parts(cross: CrossSpectrum | None) -> tuple[Array, Array, Array]:

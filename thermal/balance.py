@@ -39,16 +39,14 @@ def check_energy(network: Network, boundaries: Mapping[str, Profile], transient:
         received += float((weight @ inflow).sum())
         turnover += float((weight @ np.abs(inflow)).sum())
     first, last = transient.at(transient.knots[[0, -1]])
-    stored = [_enthalpy(network, i, first[i], last[i]) for i in range(n)]
+    x, w = np.polynomial.legendre.leggauss(POINTS)
+    T = first + np.outer((x + 1) / 2, last - first)
+    capacity = np.array(
+        [[node.capacity_at(float(one)) for node, one in zip(network.nodes, row, strict=True)] for row in T]
+    )
+    stored = (last - first) / 2 * (w @ capacity)
     turnover += float(np.abs(stored).sum())
     return EnergyBalance(float(np.sum(stored)), received, turnover)
-
-
-def _enthalpy(network: Network, i: int, first: float, last: float) -> float:
-    x, w = np.polynomial.legendre.leggauss(POINTS)
-    T = first + (last - first) * (x + 1) / 2
-    capacity = np.array([network.nodes[i].capacity_at(float(value)) for value in T])
-    return float((last - first) / 2 * (w @ capacity))
 
 
 def _graded_gauss(start: float, end: float) -> tuple[Array, Array]:

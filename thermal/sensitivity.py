@@ -95,7 +95,10 @@ def respond(
     steady = find_steady_state(network, first, begin)
     n = network.count
     swept = run_sweeps(network, boundaries, steady[:n] if departure is None else steady[:n] + departure, longest)
-    T, rate = _observe(swept, boundaries, rows, weights)
+    # in blocks of rows, so that only the sums are stored
+    blocks = [rows[k : k + BLOCK] for k in range(0, max(len(rows), 1), BLOCK)]
+    observed = zip(*(_observe(swept, boundaries, block, weights) for block in blocks), strict=True)
+    T, rate = (np.concatenate(one) for one in observed)
     if not changes:
         empty = np.zeros((0, *T.shape))
         return ObservedSums(T, rate, empty, empty)
@@ -103,13 +106,6 @@ def respond(
 
 
 def _observe(swept: Sweep, boundaries: Mapping[str, Profile], rows: Array, weights: Array) -> tuple[Array, Array]:
-    """Sums of temperatures and of their rates, in blocks of rows, so that only the sums are stored."""
-    blocks = [rows[k : k + BLOCK] for k in range(0, max(len(rows), 1), BLOCK)]
-    T, rate = zip(*[_observe_block(swept, boundaries, block, weights) for block in blocks], strict=True)
-    return np.concatenate(T), np.concatenate(rate)
-
-
-def _observe_block(swept: Sweep, boundaries: Mapping[str, Profile], rows: Array, weights: Array) -> tuple[Array, Array]:
     """Sums and rates: of T₁ from its equation, of δ from its cubics."""
     linear, grid = swept.linear, swept.grid
     n = linear.count

@@ -50,7 +50,10 @@ class RingDown:
 
 def analyse_decay(envelope: Envelope, *, harmonic: int = 2, confidence: float = 0.9) -> RingDown:
     """Find the free decay in an envelope and return its frequencies, Q and axes with intervals."""
-    _check(envelope)
+    if len(envelope.values) == 2:
+        x, y = envelope.values
+        if np.linalg.norm(y - np.vdot(x, y) / np.vdot(x, x) * x) < 1e-9 * np.linalg.norm(y):
+            raise CompensationError("the two channels carry the same signal; give each pick-off its own column.")
     jump = find_jump(envelope)
     given = envelope
     if jump is not None:
@@ -66,15 +69,6 @@ def analyse_decay(envelope: Envelope, *, harmonic: int = 2, confidence: float = 
     estimates = _estimate(fit, harmonic, confidence)
     remarks = (*_remark(given, fit, left, beyond, lines, start, jump), *_undetermined(fit, estimates))
     return RingDown(estimates, fit, (float(free.time[0]), float(free.time[-1])), remarks, tuple(lines))
-
-
-def _check(envelope: Envelope) -> None:
-    z = envelope.values
-    if z.shape[0] == 2:
-        x, y = z
-        gain = np.vdot(x, y) / np.vdot(x, x)
-        if np.linalg.norm(y - gain * x) < 1e-9 * np.linalg.norm(y):
-            raise CompensationError("the two channels carry the same signal; give each pick-off its own column.")
 
 
 def _after_jump(envelope: Envelope, jump: float) -> Envelope:

@@ -71,7 +71,10 @@ def mix_down(time: ArrayLike, channels: ArrayLike, carrier: float | None = None)
             f"the frequency {carrier:.6g} Hz is not below half the sampling rate of {rate:.6g} Hz; sample faster."
         )
     period = rate / carrier  # in samples
-    size = _choose_block(max(t.size / MOST_BLOCKS, 8 * period), period)
+    # the block holds a whole number of half periods as nearly as may be
+    least = max(t.size / MOST_BLOCKS, 8 * period)
+    sizes = np.arange(int(np.ceil(least)), int(np.ceil(1.3 * least + 2 * period)) + 1)
+    size = int(sizes[int(np.argmin(np.abs(np.sin(2 * np.pi * sizes / period)) / sizes))])
     block = rows // size
     count = int(block[-1]) + 1
     total = np.zeros((x.shape[0], count), dtype=complex)
@@ -119,12 +122,6 @@ def even_rows(time: Array) -> "tuple[float, NDArray[np.int64]]":
     rows = np.concatenate([[0.0], np.cumsum(np.rint(between / np.median(between)))])
     step = float((time[-1] - time[0]) / rows[-1])
     return step, np.rint((time - time[0]) / step).astype(np.int64)
-
-
-def _choose_block(least: float, period: float) -> int:
-    """Return the samples of a block, at least so many, that hold a whole number of half periods as nearly as may be."""
-    sizes = np.arange(int(np.ceil(least)), int(np.ceil(1.3 * least + 2 * period)) + 1)
-    return int(sizes[int(np.argmin(np.abs(np.sin(2 * np.pi * sizes / period)) / sizes))])
 
 
 def from_lock_in(time: ArrayLike, amplitudes: ArrayLike, carrier: float = 0.0) -> Envelope:

@@ -5,7 +5,7 @@ likelihood, and σ² (JᵀJ)⁻¹ is the bound that no unbiased estimate passes.
 gets its interval from draws of that normal distribution, because a split near zero and an axis bend.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -132,7 +132,9 @@ def _fit_from(envelope: Envelope, time: Array, names: tuple[str, ...], guess: De
         noise = np.sqrt(np.sum(np.abs(r) ** 2, axis=1) / freedom)
         weight = np.maximum(noise, 1e-12 * size)
     # each real part has half of the complex variance
-    J = _differentiate(lambda point: _flatten(model(point) / weight[:, None]), point)
+    steps = np.diag(1e-6 * np.maximum(1.0, np.abs(point)))
+    around = [_flatten((model(point + h) - model(point - h)) / weight[:, None]) / (2 * h.max()) for h in steps]
+    J = np.stack(around, axis=1)
     bound = 0.5 * np.linalg.pinv(J.T @ J, rcond=1e-15, hermitian=True)
     units = np.concatenate([scale, np.full(2 * channels, size)])
     decay, start = of(point)
@@ -151,12 +153,6 @@ def _fit_from(envelope: Envelope, time: Array, names: tuple[str, ...], guess: De
 
 def _flatten(values: Complex) -> Array:
     return np.concatenate([values.real.ravel(), values.imag.ravel()])
-
-
-def _differentiate(function: Callable[[Array], Array], point: Array) -> Array:
-    """Return the derivatives by central differences, a column for each value of the point."""
-    steps = 1e-6 * np.maximum(1.0, np.abs(point))
-    return np.stack([(function(point + h) - function(point - h)) / (2 * h.max()) for h in np.diag(steps)], axis=1)
 
 
 def _amplitudes(time: Array, z: Complex, decay: Decay, summed: bool) -> Complex:

@@ -65,10 +65,10 @@ def fit_spectrum(frequency: ArrayLike, power: ArrayLike) -> SpectrumFit:
         point = np.concatenate([point[:2], point[5:8], point[2:5]])
     fitted = _model(point, f)
     scatter = _scatter(point, f, y)
-    J = np.stack(
-        [(np.log(_model(point + h, f)) - np.log(_model(point - h, f))) / (2 * h.max()) for h in np.diag(_steps(point))],
-        axis=1,
-    )
+    steps = np.full(point.size, 1e-4)
+    steps[2::3] = 1e-4 * np.exp(point[3::3])
+    around = [np.log(_model(point + h, f) / _model(point - h, f)) / (2 * h.max()) for h in np.diag(steps)]
+    J = np.stack(around, axis=1)
     scale = 1 / np.linalg.norm(J, axis=0)
     bread = np.linalg.pinv((J * scale).T @ (J * scale), hermitian=True)
     share = np.minimum(np.sum((J * scale @ bread) * J * scale, axis=1), 0.9)
@@ -90,7 +90,8 @@ def fit_spectrum(frequency: ArrayLike, power: ArrayLike) -> SpectrumFit:
             found["decay_time_s"] = Estimate(tau, tau * rel, tau * exp(-REACH * rel), tau * exp(REACH * rel))
     if split:
         found["split_Hz"] = _estimate(float(point[2] - point[5]), float(np.hypot(sd[2], sd[5])))
-    widening = _misfit(y / fitted - 1, scatter)
+    size = max(4, y.size // 40)
+    widening = float(np.sqrt(max(1.0, size * float(np.mean(block_means(y / fitted - 1, size) ** 2)) / scatter**2)))
     return SpectrumFit(found, f, y, fitted, scatter, widening, tuple(_remark(f, point, split, widening)))
 
 
@@ -127,12 +128,6 @@ def _fit(f: Array, y: Array, lines: list[tuple[float, float, float]]) -> Array:
     return np.asarray(scipy.optimize.least_squares(residuals, start, x_scale=steps, method="trf", max_nfev=400).x)
 
 
-def _steps(point: Array) -> Array:
-    steps = np.full(point.size, 1e-4)
-    steps[2::3] = 1e-4 * np.exp(point[3::3])
-    return steps
-
-
 def _deviance(point: Array, f: Array, y: Array) -> float:
     ratio = y / _model(point, f)
     return float(2 * np.sum(ratio - 1 - np.log(ratio)))
@@ -140,11 +135,6 @@ def _deviance(point: Array, f: Array, y: Array) -> float:
 
 def _scatter(point: Array, f: Array, y: Array) -> float:
     return float(np.sqrt(np.sum((y / _model(point, f) - 1) ** 2) / max(f.size - point.size, 1)))
-
-
-def _misfit(left: Array, scatter: float) -> float:
-    size = max(4, left.size // 40)
-    return float(np.sqrt(max(1.0, size * float(np.mean(block_means(left, size) ** 2)) / scatter**2)))
 
 
 def _remark(f: Array, point: Array, split: bool, widening: float) -> list[str]:

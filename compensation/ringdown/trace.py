@@ -49,12 +49,12 @@ def analyse_trace(time: ArrayLike, amplitude: ArrayLike, *, confidence: float = 
     last = t.size
     noise = scatter = 0.0
     slope = level = 0.0
+
+    def weigh(x: Array) -> Array:
+        return np.asarray(1.0 / (scatter + _noise_part(level + slope * x, noise)))
+
     for _ in range(12):
-        weights = (
-            1.0 / (scatter + _noise_part(level + slope * (t[first:last] - t[first]), noise))
-            if scatter
-            else np.ones(last - first)
-        )
+        weights = weigh(t[first:last] - t[first]) if scatter else np.ones(last - first)
         slope, level = _fit_line(t[first:last] - t[first], L[first:last], weights)
         if not slope < 0:
             break
@@ -65,16 +65,12 @@ def analyse_trace(time: ArrayLike, amplitude: ArrayLike, *, confidence: float = 
         if end == last:
             break
         last = end
-    straight = _find_straight(
-        t[first:last] - t[first],
-        L[first:last],
-        1.0 / (scatter + _noise_part(level + slope * (t[first:last] - t[first]), noise)),
-    )
+    x = t[first:last] - t[first]
+    straight = _find_straight(x, L[first:last], weigh(x))
     bent, last = straight < last - first, first + straight
     used, x = L[first:last], t[first:last] - t[first]
-    slope, level = _fit_line(x, used, 1.0 / (scatter + _noise_part(level + slope * x, noise)))
-    line = level + slope * x
-    weights = 1.0 / (scatter + _noise_part(line, noise))
+    slope, level = _fit_line(x, used, weigh(x))
+    line, weights = level + slope * x, weigh(x)
     bound = float(1 / np.sqrt(np.sum(weights * (x - np.average(x, weights=weights)) ** 2)))
     widening = _widen((used - line) * np.sqrt(weights))
     sd = bound * widening
@@ -128,10 +124,8 @@ def _find_release(t: Array, L: Array) -> int:
     for k in range(0, count // 2):
         flat = means[: k + 1]
         slope, level = _fit_line(t_mean[k:] - t_mean[k], means[k:], np.ones(count - k))
-        left = float(
-            np.sum((flat - means[: k + 1].mean()) ** 2)
-            + np.sum((means[k:] - level - slope * (t_mean[k:] - t_mean[k])) ** 2)
-        )
+        falls = means[k:] - level - slope * (t_mean[k:] - t_mean[k])
+        left = float(np.sum((flat - flat.mean()) ** 2) + np.sum(falls**2))
         if left < best:
             best, knee = left, k
     return knee * size if knee > 2 else 0
