@@ -9,7 +9,7 @@ from shell.blocks import Mesh, Solid, Tie, constrain, find_boundary, mesh_solid,
 from shell.cells import at_gauss_points, tabulate_cells
 from shell.corner import find_kinks, lay_clamped_edge, lay_clamped_face, lay_corner
 from shell.errors import ShellError, mm
-from shell.kernel import Orders, Section, shell_table
+from shell.kernel import Section, shell_table
 from shell.layout import Chain, End, lay_chain
 from shell.levels import Level, Theory
 from shell.quadrature import Array, at_gauss, gauss, nodal
@@ -54,8 +54,10 @@ def assemble(resonator: Resonator, layout: Layout, n: int, level: Level, rigid_m
         elements, inner_rows, size = _shell_group(resonator, chain, n, level, size)
         groups.append(elements)
         rows.extend(inner_rows)
-        for side in (0, 1):
-            ends[k, side] = _chain_end(resonator, chain, elements, side, level.through)
+        for side in (0, 1):  # the cross-section at one end of a chain and its unknowns
+            place, m = resonator.at([chain.breaks[-side]], chain.segments[-side]), sum(level.through) + 3
+            members = elements.unknowns[0, :m] if side == 0 else elements.unknowns[-1, -m:]
+            ends[k, side] = Tie(place, level.through, tuple(members.tolist()))
             _hold_end(rows, chain.ends[side], ends[k, side], n)
     for solid, tied in layout.solids:
         mesh = mesh_solid(solid, level.block)
@@ -171,14 +173,6 @@ def _anchor(
                 above = [unknowns[element, inner].copy()]
             above.append(unknowns[element, outer].copy())
     return tuple(anchors), rows, fresh
-
-
-def _chain_end(resonator: Resonator, chain: Chain, group: ShellGroup, side: int, orders: Orders) -> Tie:
-    """The cross-section at one end of a chain and its unknowns."""
-    place = resonator.at([chain.breaks[-side]], chain.segments[-side])
-    m = sum(orders) + 3
-    members = group.unknowns[0, :m] if side == 0 else group.unknowns[-1, -m:]
-    return Tie(place, orders, tuple(int(k) for k in members))
 
 
 def _hold_end(rows: Rows, end: End, tie: Tie, n: int) -> None:

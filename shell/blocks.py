@@ -10,7 +10,7 @@ from shell.cells import in_order
 from shell.errors import ShellError
 from shell.kernel import Orders
 from shell.patches import Part, Patch
-from shell.quadrature import Array, interpolate_hierarchic, legendre, lobatto, nodal
+from shell.quadrature import Array, legendre, lobatto, nodal, values_to_hierarchic
 from shell.resonator import MeridianPoints
 from shell.sparse import Index, Rows
 
@@ -105,8 +105,13 @@ def find_boundary(mesh: Mesh, solid: Solid, ties: tuple[Tie, ...]) -> Support:
     """Where the vertices of a solid part lie."""
     size = float(np.ptp(mesh.points, axis=1).max())
     held = np.array([solid.held(float(r), float(z)) for r, z in mesh.points.T])
-    heights = tuple(_thickness_coordinate(tie.place, mesh.points, size) for tie in ties)
-    return Support(mesh.points[0] < 1e-9 * size, held, heights)
+    heights = []  # η in [-1, 1] of points on each cross-section, NaN elsewhere
+    for place in (tie.place for tie in ties):
+        r, z = mesh.points[0] - place.r[0], mesh.points[1] - place.z[0]
+        off, h = r * place.tangent_r[0] + z * place.tangent_z[0], place.thickness[0]
+        eta = 2 * (r * place.normal_r[0] + z * place.normal_z[0]) / h
+        heights.append(np.where((abs(off) < 1e-8 * min(size, h)) & (abs(eta) < 1 + 1e-6), eta, np.nan))
+    return Support(mesh.points[0] < 1e-9 * size, held, tuple(heights))
 
 
 def number_functions(mesh: Mesh, degree: int) -> tuple[Index, Array, int]:
@@ -148,7 +153,7 @@ def constrain(mesh: Mesh, boundary: Support, ties: tuple[Tie, ...], degree: int,
         along = there[a] & there[b]
         at = (eta[a] + eta[b])[along, None] / 2 + (eta[b] - eta[a])[along, None] / 2 * lobatto(degree)
         modes = legendre(max(tie.orders), at.ravel()).values.reshape(*at.shape, -1)
-        _follow(rows, at_edges[along], tie, interpolate_hierarchic(degree, modes)[:, 2:])
+        _follow(rows, at_edges[along], tie, (values_to_hierarchic(degree) @ modes)[:, 2:])
     return rows
 
 
@@ -165,15 +170,6 @@ def surface_sides(mesh: Mesh, boundary: Support) -> tuple[tuple[int, int], ...]:
     for where in (boundary.on_axis, *boundary.kinds[2:]):
         outside &= ~(where[a] & where[b])
     return tuple(zip(*(index.tolist() for index in np.nonzero(outside[mesh.edges])), strict=True))
-
-
-def _thickness_coordinate(place: MeridianPoints, points: Array, size: float) -> Array:
-    """η in [-1, 1] of points on a cross-section, NaN elsewhere."""
-    r, z = points[0] - place.r[0], points[1] - place.z[0]
-    off = r * place.tangent_r[0] + z * place.tangent_z[0]
-    h = place.thickness[0]
-    eta = 2 * (r * place.normal_r[0] + z * place.normal_z[0]) / h
-    return np.where((abs(off) < 1e-8 * min(size, h)) & (abs(eta) < 1 + 1e-6), eta, np.nan)
 
 
 def _regular_on_axis(rows: Rows, own: Index, n: int) -> None:

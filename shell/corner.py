@@ -48,7 +48,9 @@ def lay_corner(
     s_1, s_2 = _meet(resonator, joint, inner)
     before, after = resonator.at([s_1], joint), resonator.at([s_2], joint + 1)
     meeting, feet = _face(before, inner), (_face(before, -inner), _face(after, -inner))
-    outer = _cross(feet[0], _tangent(before), feet[1], _tangent(after))
+    (a, b), (c, d), ((r_1, z_1), (r_2, z_2)) = _tangent(before), _tangent(after), feet
+    x = ((r_2 - r_1) * d - (z_2 - z_1) * c) / (a * d - b * c)  # where the outer faces, continued straight, meet
+    outer = r_1 + x * a, z_1 + x * b
     cells = rings(shrinking(ring_count))
     kite = Patch(
         straight(meeting, feet[0]),
@@ -171,10 +173,3 @@ def _face(points: MeridianPoints, eta: float) -> Spot:
 
 def _tangent(points: MeridianPoints) -> Spot:
     return float(points.tangent_r[0]), float(points.tangent_z[0])
-
-
-def _cross(one: Spot, along_one: Spot, two: Spot, along_two: Spot) -> Spot:
-    """Where the straight lines through two points meet."""
-    det = along_one[0] * along_two[1] - along_one[1] * along_two[0]
-    x = ((two[0] - one[0]) * along_two[1] - (two[1] - one[1]) * along_two[0]) / det
-    return one[0] + x * along_one[0], one[1] + x * along_one[1]

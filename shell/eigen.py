@@ -215,7 +215,9 @@ class Iteration:
     def _orthonormal(self, x: Array) -> tuple[tuple[Array, Array], Array]:
         """An M-orthonormal basis of the columns, and M times it; and the factors, x = basis @ factors."""
         # one solve leaves little but the inextensional modes of a thin shell (two at most) in every column
-        columns, right = _set_apart(x)
+        reflectors, tau, _, _ = scipy.linalg.lapack.dgeqrf(x)
+        right = reflectors[: x.shape[1]] * _upper(x.shape[1])
+        columns = np.asarray(scipy.linalg.lapack.dorgqr(reflectors, tau)[0])
         loaded = self.mass @ columns
         squares, axes = _eigenpairs(columns.T @ loaded)
         kept = squares > 1e-14 * squares[-1]
@@ -233,13 +235,6 @@ def _undone(theta: Array, residual: Array, count: int) -> Array:
     with np.errstate(divide="ignore", invalid="ignore"):
         by_angle = np.where(apart > 0, (residual / apart) ** 2, np.inf)
     return np.asarray(np.minimum(by_angle, residual / theta[:count]))
-
-
-def _set_apart(x: Array) -> tuple[Array, Array]:
-    """An orthonormal basis of the columns, and their coefficients in it."""
-    reflectors, tau, _, _ = scipy.linalg.lapack.dgeqrf(x)
-    right = reflectors[: x.shape[1]] * _upper(x.shape[1])
-    return np.asarray(scipy.linalg.lapack.dorgqr(reflectors, tau)[0]), right
 
 
 def _eigenpairs(matrix: Array) -> tuple[Array, Array]:

@@ -76,18 +76,15 @@ def trace_outlines(resonator: Resonator, spacing: float, mode: "Mode | None" = N
     outlines = [_thin(line, 0.02 * spacing, resonator.size) for line in lines]
     outlines.sort(key=lambda line: -abs(line.area))
     turned = [line if (line.area > 0) == (k == 0) else line.reversed() for k, line in enumerate(outlines)]
-    largest = max(_largest(line.displacement, system.n) for line in turned)
+    largest = 0.0
+    for u_r, u_t, u_z in (line.displacement for line in turned):
+        # at θ = 0 in the meridional plane, at a quarter wave around; all at once for n = 0
+        in_plane = np.hypot(u_r, u_z)
+        largest = max(largest, float(np.max(np.maximum(in_plane, abs(u_t)) if system.n else np.hypot(in_plane, u_t))))
     scale = 1 / largest if largest > 0 else 1.0
     return tuple(
         replace(line, displacement=line.displacement * scale, energy=line.energy * scale**2) for line in turned
     )
-
-
-def _largest(displacement: Array, n: int) -> float:
-    """Largest displacement anywhere around: at θ = 0 in the meridional plane, at a quarter wave around; all at once for n = 0."""
-    u_r, u_t, u_z = displacement
-    in_plane = np.hypot(u_r, u_z)
-    return float(np.max(np.hypot(in_plane, u_t) if n == 0 else np.maximum(in_plane, abs(u_t))))
 
 
 @dataclass(frozen=True, eq=False)
@@ -187,8 +184,9 @@ def _join(sides: list[Outline], margin: float) -> list[Outline]:
             gap, j, k = min(ends)
             if gap > margin:
                 break
-            side = sides.pop(j)
-            line = _attach(line, side if k == 0 else side.reversed())
+            more = sides.pop(j) if k == 0 else sides.pop(j).reversed()
+            pairs = ((getattr(line, field.name), getattr(more, field.name)) for field in fields(Outline))
+            line = Outline(*(np.concatenate([one, two[..., 1:]], axis=-1) for one, two in pairs))
         closed = np.hypot(line.r[0] - line.r[-1], line.z[0] - line.z[-1]) < margin
         if not closed and max(line.r[0], line.r[-1]) >= margin:
             raise ShellError(
@@ -196,14 +194,6 @@ def _join(sides: list[Outline], margin: float) -> list[Outline]:
             )
         lines.append(line)
     return lines
-
-
-def _attach(line: Outline, more: Outline) -> Outline:
-    joined = {
-        field.name: np.concatenate([getattr(line, field.name), getattr(more, field.name)[..., 1:]], axis=-1)
-        for field in fields(Outline)
-    }
-    return Outline(**joined)
 
 
 def _thin(line: Outline, least: float, size: float) -> Outline:

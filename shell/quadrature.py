@@ -37,7 +37,8 @@ def lobatto(degree: int) -> Array:
 
 def legendre(degree: int, points: Array) -> Basis:
     """Legendre polynomials P_0 ... P_degree, the modes through the thickness."""
-    return Basis(np.asarray(series.legvander(points, degree), dtype=float), _derivative(degree, points))
+    slopes = series.legvander(points, max(degree - 1, 0)) @ _slopes(degree)
+    return Basis(np.asarray(series.legvander(points, degree), dtype=float), np.asarray(slopes))
 
 
 def nodal(degree: int, points: Array) -> Basis:
@@ -66,11 +67,6 @@ def at_gauss(basis: Callable[[int, Array], Basis], degree: int, count: int) -> B
     return basis(degree, gauss(count)[0])
 
 
-def interpolate_hierarchic(degree: int, values: Array) -> Array:
-    """Coefficients in the hierarchic basis of a polynomial given at the Gauss-Lobatto-Legendre nodes."""
-    return np.asarray(values_to_hierarchic(degree) @ values)
-
-
 @cache
 def values_to_hierarchic(degree: int) -> Array:
     """From values at the Gauss-Lobatto-Legendre nodes to coefficients in the hierarchic basis."""
@@ -87,7 +83,3 @@ def _to_modes(degree: int) -> Array:
 def _slopes(degree: int) -> Array:
     """Legendre coefficients of the derivatives of P_0 ... P_degree."""
     return np.asarray(series.legder(np.eye(degree + 1), axis=0) if degree else np.zeros((1, 1)))
-
-
-def _derivative(degree: int, points: Array) -> Array:
-    return np.asarray(series.legvander(points, max(degree - 1, 0)) @ _slopes(degree))

@@ -59,11 +59,12 @@ def refine(
             level = replace(level, longest=shorter)
             continue
         lacking = estimate_errors(resonator, elastic, solutions)
-        if before:
-            lacking *= [
-                _experience(now, former, float(sum(stated[KINDS.index(kind)] for kind in raised)))
-                for now, former, stated in zip(solutions, before[0], before[1].T, strict=True)
+        if before:  # by how much what was raised since was farther off than was said
+            stated = before[1][[KINDS.index(kind) for kind in raised]].sum(axis=0)
+            moved = [
+                abs(then.eigenvalue / now.eigenvalue - 1) / 2 for then, now in zip(before[0], solutions, strict=True)
             ]
+            lacking *= np.clip(moved / stated, 1.0, DOUBT)
         lacking *= [1.0 if not k or _is_resolved(one) else DOUBT for k, one in enumerate(solutions)]
         before = solutions, lacking
         lost = [_find_loss(solution, factor, density) if thinnest < THIN else 0.0 for solution in solutions]
@@ -150,11 +151,6 @@ def _is_resolved(solution: Solution) -> bool:
         for group, k in zip(solution.system.groups, _wavenumbers(solution), strict=True)
         if isinstance(group, ShellGroup)
     )
-
-
-def _experience(now: Solution, before: Solution, stated: float) -> float:
-    """By how much what was raised since was farther off than was said; 1 if it was not."""
-    return min(max(abs(before.eigenvalue / now.eigenvalue - 1) / 2 / stated, 1.0), DOUBT)
 
 
 def solve_level(

@@ -11,7 +11,7 @@ from shell.cells import in_order
 from shell.quadrature import Array, hierarchic, legendre, nodal
 from shell.resonator import Resonator
 from shell.solution import Solution
-from shell.system import ShellGroup, SolidGroup
+from shell.system import ShellGroup
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -38,7 +38,10 @@ def sample_shape(resonator: Resonator, solution: Solution, points: int) -> tuple
         if isinstance(group, ShellGroup):
             found += _shell_patches(resonator, group, solution.system.level.through, q, x)
         else:
-            found += _solid_patches(group, q, x)
+            degree = group.place.mesh.grid.shape[2] - 1
+            move, (i, j) = hierarchic(degree, x).values, in_order(degree)
+            u = np.einsum("xk,yk,ekc->cexy", move[:, i], move[:, j], q.reshape(len(q), -1, 3))
+            found += [ShapePatch(*fields) for fields in zip(*group.place.mesh.place(x, x), *u, strict=True)]
     return tuple(found)
 
 
@@ -56,15 +59,6 @@ def _shell_patches(
         t_r, t_z = at.tangent_r[:, None], at.tangent_z[:, None]
         found.append(ShapePatch(*at.at_heights(x), t_r * u - t_z * w, v, t_z * u + t_r * w))
     return found
-
-
-def _solid_patches(group: SolidGroup, q: Array, x: Array) -> list[ShapePatch]:
-    degree = group.place.mesh.grid.shape[2] - 1
-    move = hierarchic(degree, x).values
-    r, z = group.place.mesh.place(x, x)
-    i, j = in_order(degree)
-    u = np.einsum("xk,yk,ekc->cexy", move[:, i], move[:, j], q.reshape(len(q), -1, 3))
-    return [ShapePatch(*fields) for fields in zip(r, z, *u, strict=True)]
 
 
 def draw_section(patches: Sequence[ShapePatch], harmonic: int, title: str) -> "Figure":

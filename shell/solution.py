@@ -198,7 +198,10 @@ class Solution:
                 shear = total(
                     [c.lame[1] * group.table.transverse_shear * _integrate(e[:, :, 4] ** 2 + e[:, :, 5] ** 2, group)]
                 )
-                membrane = _membrane(group, c, e)
+                # the energy of the mean in-plane strains, in plane stress
+                volume = group.table.volume.sum(axis=2)
+                mean = (_integrate(e[:, :, k], group) / volume for k in (0, 1, 3))
+                membrane = float(np.sum(sum(plane_energies(c.E, c.nu, *mean)) * volume))
                 found["shear"] += shear
                 found["membrane"] += membrane
                 found["bending"] += total([elastic]) - shear - membrane
@@ -265,14 +268,6 @@ def radial(group: Group, displacement: Array) -> Array:
     return np.asarray(
         section.tangent_r[..., None] * displacement[:, :, 0] - section.tangent_z[..., None] * displacement[:, :, 2]
     )
-
-
-def _membrane(group: ShellGroup, c: Constants, e: Array) -> float:
-    """Energy of the mean in-plane strains, in plane stress."""
-    weights = group.table.volume / group.table.volume.sum(axis=2, keepdims=True)
-    s, theta, twist = (np.einsum("eij,eij->ei", e[:, :, k], weights) for k in (0, 1, 3))
-    cosine, sine = plane_energies(c.E, c.nu, s, theta, twist)
-    return float(np.sum((cosine + sine) * group.table.volume.sum(axis=2)))
 
 
 def plane_energies(E: Array, nu: Array, s: Array, theta: Array, twist: Array) -> tuple[Array, Array]:

@@ -147,7 +147,9 @@ def plan_trim(
         raise ShellError("the goal is a positive split in Hz.")
     known = dict(unbalance or {})
     before = tuple(readings)
-    share = _share(before, goal, removal_error, gain_error)
+    # leaves no split on the far side of 0 by more than the goal, `SURE` errors of the gain allowed for
+    surely = 1 + SURE * sqrt(gain_error**2 + removal_error**2 / 4)
+    share = min([1.0, *((s.hertz + goal / 2) / (s.hertz * surely) for s in before if s.hertz > goal / 2)])
     masses = _least_mass(before, sites, share, sites.capacity, known)
     after = []
     for state in before:
@@ -163,13 +165,6 @@ def plan_trim(
         if m > 1e-6 * masses.max()
     )
     return TrimPlan(before, Round(cuts, share, tuple(after), known), goal)
-
-
-def _share(states: Sequence[SplitWave], goal: float, removal_error: float, gain_error: float) -> float:
-    """The largest share that leaves no split on the far side of 0 by more than the goal, `SURE` errors of the gain allowed for."""
-    spread = SURE * sqrt(gain_error**2 + removal_error**2 / 4)
-    shares = [(s.hertz + goal / 2) / (s.hertz * (1 + spread)) for s in states if s.hertz > goal / 2]
-    return min(1.0, *shares) if shares else 1.0
 
 
 def _least_mass(

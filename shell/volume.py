@@ -8,6 +8,7 @@ hexahedra, and wedges where a side lies on the axis. All nodes lie on the true s
 """
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from math import pi
 from typing import Any
 
@@ -18,7 +19,6 @@ from numpy.typing import NDArray
 from shell.assembly import build_system
 from shell.blocks import Mesh, Support
 from shell.errors import ShellError
-from shell.layout import Chain
 from shell.levels import Level
 from shell.quadrature import Array, nodal
 from shell.resonator import Resonator
@@ -93,24 +93,16 @@ def _cut_section(resonator: Resonator, layers: int, spacing: float) -> Pieces:
     layers = common * int(np.ceil(layers / common))
     grids: list[Array] = []  # (2, 2a + 1, 2b + 1) points of elements divided into a x b
     held: list[NDArray[np.bool_]] = []
-    for group in system.groups:
-        if isinstance(group, ShellGroup):
-            found = _divide_chain(resonator, group.place.chain, layers, spacing)
-            grids += found
-            held += [np.zeros(grid.shape[1:], dtype=bool) for grid in found]
-    for place, count in zip(solids, crossing, strict=True):
-        _divide_cells(place.mesh, place.boundary, layers // count, grids, held)
-    return _join(grids, held)
-
-
-def _divide_chain(resonator: Resonator, chain: Chain, layers: int, spacing: float) -> list[Array]:
-    grids = []
     eta = np.linspace(-1.0, 1.0, 2 * layers + 1)
-    for start, stop, segment in zip(chain.breaks[:-1], chain.breaks[1:], chain.segments, strict=True):
-        count = int(np.ceil((stop - start) / spacing - 1e-9))
-        place = resonator.at(np.linspace(start, stop, 2 * count + 1), segment)
-        grids.append(np.array(place.at_heights(eta)))
-    return grids
+    for chain in (group.place.chain for group in system.groups if isinstance(group, ShellGroup)):
+        for (start, stop), segment in zip(pairwise(chain.breaks), chain.segments, strict=True):
+            count = int(np.ceil((stop - start) / spacing - 1e-9))
+            place = resonator.at(np.linspace(start, stop, 2 * count + 1), segment)
+            grids.append(np.array(place.at_heights(eta)))
+            held.append(np.zeros(grids[-1].shape[1:], dtype=bool))
+    for solid, count in zip(solids, crossing, strict=True):
+        _divide_cells(solid.mesh, solid.boundary, layers // count, grids, held)
+    return _join(grids, held)
 
 
 def _divide_cells(mesh: Mesh, boundary: Support, count: int, grids: list[Array], held: list[NDArray[np.bool_]]) -> None:
@@ -151,7 +143,10 @@ def _turn(section: Pieces, around: int, size: float) -> Volume:
     r, z = section.points
     on_axis: NDArray[np.bool_] = np.asarray(r < 1e-7 * size)
     r = np.where(on_axis, 0.0, r)
-    quads = _right_handed(section.quadrilaterals, r, z)
+    # (ξ, η, θ) is a right-handed frame: clockwise with r to the right and z up
+    corners = section.quadrilaterals[:, [0, 2, 2, 0], [0, 0, 2, 2]]
+    area = np.sum(r[corners] * np.roll(z[corners], -1, axis=1) - np.roll(r[corners], -1, axis=1) * z[corners], axis=1)
+    quads = np.where((area > 0)[:, None, None], section.quadrilaterals[:, ::-1], section.quadrilaterals)
     inner = on_axis[quads]
     axial: NDArray[np.bool_] = np.all(_sides(inner), axis=2)  # (side, quadrilateral)
     touching = inner.any(axis=(1, 2))
@@ -183,14 +178,6 @@ def _turn(section: Pieces, around: int, size: float) -> Volume:
 def _sides(pieces: NDArray[Any]) -> NDArray[Any]:
     """The sides η = -1, η = 1, ξ = -1, ξ = 1 of pieces (Q, 3, 3): (4, Q, 3)."""
     return np.stack([pieces[:, :, 0], pieces[:, :, 2], pieces[:, 0, :], pieces[:, 2, :]])
-
-
-def _right_handed(quads: Index, r: Array, z: Array) -> Index:
-    """Turn quadrilaterals so that (ξ, η, θ) is a right-handed frame: clockwise with r to the right and z up."""
-    corners = quads[:, [0, 2, 2, 0], [0, 0, 2, 2]]
-    x, y = r[corners], z[corners]
-    area = np.sum(x * np.roll(y, -1, axis=1) - np.roll(x, -1, axis=1) * y, axis=1)
-    return np.asarray(np.where((area > 0)[:, None, None], quads[:, ::-1], quads))
 
 
 def _held_edges(section: Pieces, quads: Index, on_axis: NDArray[np.bool_]) -> Index:

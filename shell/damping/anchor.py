@@ -99,7 +99,9 @@ def _stand(mode: Mode, elastic: Elastic | VaryingElastic, base: Elastic | None, 
         level = replace(level, block=4, rings=2)
     layout = lay_resonator(resonator, n, level)
     (root, tied), *others = layout.solids
-    radii = _cuts(mesh_solid(root, level.block).points, end)
+    r, z = mesh_solid(root, level.block).points
+    at_end = np.sort(r[abs(z - end) < 1e-9 * r.max()])  # radii where the cells of the stem meet at its end
+    radii = [0.0, *at_end[at_end > 1e-9 * r.max()].tolist()]
     wavelength = float(np.sqrt(base.G / base.rho)) / mode.frequency
     patches, layer = lay_half_space(radii, end, face < 0, wavelength)
     far = layer.start + layer.width
@@ -116,14 +118,6 @@ def _stand(mode: Mode, elastic: Elastic | VaryingElastic, base: Elastic | None, 
         for group in system.groups
     ]
     return system, assemble_waves(system, (elastic, base), bases, layer)
-
-
-def _cuts(points: Array, end: float) -> list[float]:
-    """Radii where the cells of the stem meet at its end."""
-    r, z = points
-    size = float(r.max())
-    at_end = np.sort(r[abs(z - end) < 1e-9 * size])
-    return [0.0, *at_end[at_end > 1e-9 * size].tolist()]
 
 
 def _rim(resonator: Resonator, system: System) -> list[Array]:

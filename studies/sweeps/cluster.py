@@ -39,7 +39,10 @@ class Cluster(Workers):
             ) from None
         self.address = address
         self.lonely: float | None = None  # since when no worker is left
-        _silence()
+        # what is lost is said here, in a sentence, not by the libraries' tracebacks of connections that end
+        for name in list(logging.root.manager.loggerDict):
+            if name.partition(".")[0] in ("distributed", "tornado", "asyncio"):
+                logging.getLogger(name).setLevel(logging.CRITICAL)
         security = distributed.Security(require_encryption=True) if is_encrypted(address) else None
         try:
             with dask.config.set({"distributed.comm.timeouts.connect": f"{PATIENCE} s"}):
@@ -97,13 +100,6 @@ class Cluster(Workers):
             raise MissingEnvironment(
                 f"worker {address} has {text}, here is {ours}; install the same versions on every machine."
             )
-
-
-def _silence() -> None:
-    """Keep the libraries from logging tracebacks of connections that end: what is lost is said here, in a sentence."""
-    for name in list(logging.root.manager.loggerDict):
-        if name.partition(".")[0] in ("distributed", "tornado", "asyncio"):
-            logging.getLogger(name).setLevel(logging.CRITICAL)
 
 
 def is_encrypted(address: str) -> bool:

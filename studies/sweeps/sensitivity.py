@@ -4,7 +4,6 @@ A case that failed has no value, and nothing is put in its place: where a design
 and lists those that lack.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -14,7 +13,6 @@ from studies.errors import InputError
 from studies.sweeps.block import Array
 
 if TYPE_CHECKING:
-    from studies.sweeps.definition import StudyParameter
     from studies.sweeps.results import Results
 
 RESAMPLES = 1000
@@ -112,19 +110,13 @@ def local_slopes(results: "Results", column: str) -> list[LocalSlope]:
     y = _complete(results, column)
     error = float(np.nan_to_num(results.error(column)).max(initial=0.0))
     slopes = []
-    for k, parameter in enumerate(study.parameters):
-        rows = [0, *range(1 + 4 * k, 5 + 4 * k)]
-        x = results.parameter(parameter.name)[rows].astype(float)
-        slopes.append(_slope(parameter, x, y[rows], error))
+    for k, name in enumerate(study.names):
+        rows, inner = [0, *range(1 + 4 * k, 5 + 4 * k)], [0, 2 + 4 * k, 3 + 4 * k]
+        x = results.parameter(name).astype(float)
+        fine, rough = (_derivative(x[some], y[some]) for some in (rows, inner))
+        uncertainty = abs(fine - rough) + error / float(np.ptp(x[inner]))
+        slopes.append(LocalSlope(name, fine, uncertainty, *y[[1 + 4 * k, 4 + 4 * k, 0]].tolist()))
     return slopes
-
-
-def _slope(parameter: "StudyParameter", x: Array, y: Array, error: float) -> LocalSlope:
-    fine = _derivative(x, y)
-    inner = [0, 2, 3]
-    rough = _derivative(x[inner], y[inner])
-    uncertainty = abs(fine - rough) + error / float(np.ptp(x[inner]))
-    return LocalSlope(parameter.name, fine, uncertainty, float(y[1]), float(y[4]), float(y[0]))
 
 
 def _derivative(x: Array, y: Array) -> float:
@@ -169,13 +161,10 @@ def _complete(results: "Results", column: str) -> Array:
     y = results.column(column)
     lacking = np.flatnonzero(~np.isfinite(y))
     if lacking.size:
+        words = [f"case {place} ({results.remark(place)})" for place in lacking[:SHOWN].tolist()]
+        words += [f"and {lacking.size - SHOWN} more"] if lacking.size > SHOWN else []
         raise InputError(
-            f"{lacking.size} of {len(y)} cases have no {column}(missing values are not filled in): {_list(results, lacking.tolist())}."
+            f"{lacking.size} of {len(y)} cases have no {column}(missing values are not filled in): {'; '.join(words)}."
             " Correct the ranges, or the function, and run a new study."
         )
     return y
-
-
-def _list(results: "Results", places: Sequence[int]) -> str:
-    words = [f"case {place} ({results.remark(place)})" for place in places[:SHOWN]]
-    return "; ".join(words) + (f"; and {len(places) - SHOWN} more" if len(places) > SHOWN else "")

@@ -21,7 +21,13 @@ def check_nominal(study: "Study", where: str) -> None:
     problem = _problem(study, nominal_design(study))
     if problem:
         raise InputError(f"{where}: {problem}")
-    _check_temperatures(study, where)
+    given = [asked.options.get(key) for asked in study.asked for key in ("temperature_degC", "from_degC", "to_degC")]
+    ends = [float(T) for T in given if T is not None]
+    ends += [T for p in study.parameters if p.name == TEMPERATURE for T in (p.low, p.high)]
+    try:
+        study.instrument.material.check([T + zero_Celsius for T in ends])
+    except UNUSABLE_INPUT as error:
+        raise InputError(f"{where}: {error}") from error
 
 
 def find_invalid(study: "Study") -> list[str]:
@@ -54,16 +60,6 @@ def _problem(study: "Study", values: Mapping[str, Any]) -> str:
             f" '{theories[0]}' is valid; narrow the range or take theory = 'solid'."
         )
     return ""
-
-
-def _check_temperatures(study: "Study", where: str) -> None:
-    given = [asked.options.get(key) for asked in study.asked for key in ("temperature_degC", "from_degC", "to_degC")]
-    ends = [float(T) for T in given if T is not None]
-    ends += [T for p in study.parameters if p.name == TEMPERATURE for T in (p.low, p.high)]
-    try:
-        study.instrument.material.check([T + zero_Celsius for T in ends])
-    except UNUSABLE_INPUT as error:
-        raise InputError(f"{where}: {error}") from error
 
 
 def _corners(study: "Study") -> Iterator[Mapping[str, Any]]:
