@@ -93,7 +93,7 @@ def run(
     found = _status(results, out, running=False)
     failed = found["failed"]
     done = f"{results.total} cases computed, {failed} failed. Next: hrg study report {out}, hrg study export {out}."
-    searches = [one for one in results.store.findings().values() if one.get("kind") == "tolerance"]
+    searches = [one for one in results.store.findings.values() if one.get("kind") == "tolerance"]
     tolerances = [
         f"No tolerances were found: {one['failed']}" if "failed" in one else tolerance_table(results, one)
         for one in searches
@@ -175,7 +175,7 @@ def _status(results: Results, folder: str, running: bool) -> dict[str, Any]:
         "lost": counts.get("lost", 0),
         "reasons": [{"reason": reason, "cases": count} for reason, count in results.store.reasons()],
         "seconds_each": results.store.seconds / done if done else None,
-        "runs": len(results.store.runs()),
+        "runs": len(results.store.runs),
     }
 
 

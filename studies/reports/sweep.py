@@ -202,7 +202,7 @@ def _shapes(results: Results) -> list[Part]:
 
 def _provenance(results: Results) -> list[Part]:
     about, identity = results.about, results.about["identity"]
-    runs = [{**run, "run": count} for count, run in enumerate(results.store.runs(), 1)]
+    runs = [{**run, "run": count} for count, run in enumerate(results.store.runs, 1)]
     environments: dict[str, list[str]] = {}
     for run in runs:
         environments.setdefault(_environment(run["provenance"]), []).append(str(run["run"]))

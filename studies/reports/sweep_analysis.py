@@ -152,7 +152,7 @@ def _reach(parameter: StudyParameter, part: float) -> str:
 
 def search_parts(results: Results, *kinds: str) -> list[Part]:
     """Return what the searches of these kinds found."""
-    findings = results.store.findings()
+    findings = results.store.findings
     parts: list[Part] = []
     for search in (one for one in results.study.searches if one.kind in kinds):
         name = name_search(search)

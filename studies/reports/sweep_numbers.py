@@ -28,7 +28,7 @@ def summarise(results: Results) -> dict[str, Any]:
         **row_of(results, "done", "total"),
         "failed": len(results.failed),
         "columns": {c.name: {"unit": c.unit, **numbers_of(results, c)} for c in results.study.columns},
-        "searches": results.store.findings(),
+        "searches": results.store.findings,
     }
     for key, analyse in (("sobol", sobol_indices), ("slopes", local_slopes), ("linear", linear_shares)):
         found[key] = {c.name: _data(analyse, results, c.name) for c in results.study.columns}

@@ -60,7 +60,7 @@ class Batches:
 
 def missing_batches(study: "Study", design: "Design", store: "Store", vectorised: bool) -> Batches:
     """Return, in order, the cases that the store lacks, in the batches that the spec fixes."""
-    count, done = len(design.unique), store.done()
+    count, done = len(design.unique), store.done
     lacking = np.ones(count, dtype=bool)
     lacking[: len(done)] = ~done[:count]
     places = np.flatnonzero(lacking)

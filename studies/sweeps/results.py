@@ -54,7 +54,7 @@ class Results(Shown):
     @property
     def done(self) -> int:
         """Number of different designs that are computed."""
-        return int(self.store.done().sum())
+        return int(self.store.done.sum())
 
     def __len__(self) -> int:
         return self.done if self._repeats is None else len(self._repeats)
@@ -115,7 +115,7 @@ class Results(Shown):
             streams = iter([(np.arange(len(self)), np.array([self._column(k) for k in columns]))])
             remarks = self._remarks
         else:
-            streams, remarks = self.store.read(columns), self.store.remarks()
+            streams, remarks = self.store.read(columns), self.store.remarks
         for places, found in streams:
             there = {row: remarks[k] for row, k in enumerate(places.tolist()) if k in remarks} if remarks else {}
             yield Chunk(decode(coding(self.study), found[:d].T), found[d : d + w].T, found[d + w :].T, there)
@@ -189,18 +189,18 @@ class Results(Shown):
         if not self.about["repeats"]:
             return None
         done = np.zeros(self.total, dtype=bool)
-        done[: len(self.store.done())] = self.store.done()[: self.total]
+        done[: len(self.store.done)] = self.store.done[: self.total]
         places = np.array(self.about["repeats"])
         return np.asarray((np.cumsum(done) - 1)[places[done[places]]])
 
     @cached_property
     def _remarks(self) -> dict[int, tuple[str, str]]:
         """Status and remark by the place of a case among these results."""
-        there = np.flatnonzero(self.store.done())
+        there = np.flatnonzero(self.store.done)
         rows = np.arange(len(there)) if self._repeats is None else self._repeats
-        if not self.store.remarks():
+        if not self.store.remarks:
             return {}
-        said = {int(np.searchsorted(there, place)): one for place, one in self.store.remarks().items()}
+        said = {int(np.searchsorted(there, place)): one for place, one in self.store.remarks.items()}
         return {place: said[row] for place, row in enumerate(rows.tolist()) if row in said}
 
 

@@ -206,8 +206,8 @@ def _describe(store: Store, study: Study, design: Design, identity: Mapping[str,
 
 def _is_finished(store: Store, study: Study, design: Design, sources: Mapping[str, str]) -> bool:
     """Return whether everything that is asked is in the store; if so its families need not be built again to know it."""
-    done = int(store.done().sum()) == len(design.unique) and store.find(nominal_row(study)) is not None
-    if not done or not {name_search(search) for search in study.searches} <= store.findings().keys():
+    done = int(store.done.sum()) == len(design.unique) and store.find(nominal_row(study)) is not None
+    if not done or not {name_search(search) for search in study.searches} <= store.findings.keys():
         return False
     solver = store.about()["identity"]["solver"]
     identity = identify(study, design, sources, solver)
@@ -220,7 +220,7 @@ def _is_finished(store: Store, study: Study, design: Design, sources: Mapping[st
 def _tell_other_versions(store: Store) -> None:
     """Warn when earlier results come from other versions of what computes: digits may differ between them."""
     now = describe_environment()["packages"]
-    then = store.runs()[-1]["provenance"].get("packages", now) if store.runs() else now
+    then = store.runs[-1]["provenance"].get("packages", now) if store.runs else now
     others = [
         f"{name} {then.get(name)} then, {now[name]} now" for name in ("numpy", "scipy") if then.get(name) != now[name]
     ]

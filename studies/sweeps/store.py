@@ -54,11 +54,13 @@ class Store:
         self.seconds = 0.0  # of the sampled cases
         self.judged = np.zeros(0, dtype=bool)  # columns of which some case has an error estimate
         self._of: set[str] = set()
-        self._runs: list[dict[str, Any]] = []
-        self._findings: dict[str, Any] = {}
+        self.runs: list[dict[str, Any]] = []
+        self.findings: dict[str, Any] = {}  # outcomes of searches by name
         self._stretches: list[Stretch] = []
-        self._done = np.zeros(0, dtype=bool)
-        self._remarks: dict[int, tuple[str, str]] = {}
+        self.done = np.zeros(0, dtype=bool)  # for every unique design whether it is computed
+        self.remarks: dict[
+            int, tuple[str, str]
+        ] = {}  # status and remark of cases that failed or were warned of, by place
         self._searched: dict[bytes, Stored] = {}
         for block in self.file.scan():
             self._take(block.kind, block.at, block.content)
@@ -101,14 +103,10 @@ class Store:
 
     def forget(self, *statuses: str) -> None:
         """Let the cases of these statuses be computed again; until then the file keeps what they were."""
-        for place in [place for place, (status, _) in self._remarks.items() if status in statuses]:
-            self._done[place] = False
-            del self._remarks[place]
+        for place in [place for place, (status, _) in self.remarks.items() if status in statuses]:
+            self.done[place] = False
+            del self.remarks[place]
         self._searched = {key: one for key, one in self._searched.items() if one.status not in statuses}
-
-    def done(self) -> NDArray[np.bool_]:
-        """Return for every unique design whether it is computed."""
-        return self._done
 
     def find(self, design: Array) -> Stored | None:
         """Return one design of a search."""
@@ -132,17 +130,13 @@ class Store:
 
     def counts(self) -> dict[str, int]:
         """Return how many sampled cases there are of each status."""
-        others = Counter(status for status, _ in self._remarks.values() if status != "ok")
-        ok = int(self._done.sum()) - others.total()
+        others = Counter(status for status, _ in self.remarks.values() if status != "ok")
+        ok = int(self.done.sum()) - others.total()
         return ({"ok": ok} if ok else {}) | dict(others)
-
-    def remarks(self) -> Mapping[int, tuple[str, str]]:
-        """Return status and remark of the sampled cases that failed or were warned of, by place."""
-        return self._remarks
 
     def reasons(self, most: int = 20) -> list[tuple[str, int]]:
         """Return the reasons of failures, the most frequent first."""
-        found = Counter(text for status, text in self._remarks.values() if status != "ok")
+        found = Counter(text for status, text in self.remarks.values() if status != "ok")
         return sorted(found.items(), key=lambda one: (-one[1], one[0]))[:most]
 
     def about(self) -> dict[str, Any]:
@@ -150,14 +144,6 @@ class Store:
         if self.study is None:
             raise InputError(f"{self.path.parent}: its study has not begun yet; run it again.")
         return self.study
-
-    def runs(self) -> list[dict[str, Any]]:
-        """Return the runs so far."""
-        return self._runs
-
-    def findings(self) -> dict[str, Any]:
-        """Return the outcomes of searches by name."""
-        return self._findings
 
     def check_same(self, identity: Mapping[str, Any]) -> None:
         """Refuse to go on when the results so far belong to something else; InputError says what changed."""
@@ -184,11 +170,11 @@ class Store:
         if kind == "study":
             self.study = said
         elif kind == "run":
-            self._runs.append({"finished_utc": None, "outcome": None, **said})
-        elif kind == "ended" and self._runs:
-            self._runs[-1] |= said
+            self.runs.append({"finished_utc": None, "outcome": None, **said})
+        elif kind == "ended" and self.runs:
+            self.runs[-1] |= said
         elif kind == "finding":
-            self._findings[said["name"]] = said["content"]
+            self.findings[said["name"]] = said["content"]
 
     def _take_cases(self, at: int, content: bytes) -> None:
         head = unpack_head(content)
@@ -198,16 +184,16 @@ class Store:
             self._take_searched(head, content)
             return
         places = unpack(content, [0])[0].astype(int)
-        if head["last"] >= len(self._done):
-            grown = np.zeros(max(head["last"] + 1, 2 * len(self._done)), dtype=bool)
-            grown[: len(self._done)] = self._done
-            self._done = grown
-        if self._remarks:
-            for place in self._remarks.keys() & set(places.tolist()):
-                del self._remarks[place]
-        self._done[places] = True
+        if head["last"] >= len(self.done):
+            grown = np.zeros(max(head["last"] + 1, 2 * len(self.done)), dtype=bool)
+            grown[: len(self.done)] = self.done
+            self.done = grown
+        if self.remarks:
+            for place in self.remarks.keys() & set(places.tolist()):
+                del self.remarks[place]
+        self.done[places] = True
         for status, text, rows in head["remarks"]:
-            self._remarks |= dict.fromkeys(places[rows].tolist(), (status, text))
+            self.remarks |= dict.fromkeys(places[rows].tolist(), (status, text))
         self.seconds += head["seconds"]
         self._stretches.append(Stretch(at, head["first"], head["last"]))
 

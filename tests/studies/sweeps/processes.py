@@ -79,7 +79,7 @@ def rows_of(folder: Path) -> list[tuple[int, str, bytes]]:
         if store.study is None:
             return []
         d, w = len(store.study["spec"].get("parameter", [])), len(store.judged)
-        remarks = store.remarks()
+        remarks = store.remarks
         return [
             (place, remarks.get(place, ("ok", ""))[0], values.tobytes())
             for places, columns in store.read(range(1 + d, 1 + d + w))

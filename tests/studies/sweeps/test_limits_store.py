@@ -30,7 +30,7 @@ def cases_of(first, count):
 def fill(store, total, size):
     """Add what the store lacks, as a run does, and return how many cases these are."""
     done = np.zeros(total, dtype=bool)
-    done[: min(len(store.done()), total)] = store.done()[:total]
+    done[: min(len(store.done), total)] = store.done[:total]
     added = 0
     for first in range(0, total, size):
         lacking = first + np.flatnonzero(~done[first : first + size])
@@ -54,7 +54,7 @@ def begin(store):
 
 def content_of(store):
     found = [columns for _, columns in store.read(range(0, 7))]
-    return np.concatenate(found, axis=1).tobytes(), dict(store.remarks())
+    return np.concatenate(found, axis=1).tobytes(), dict(store.remarks)
 
 
 def make(folder, total, size):
@@ -70,13 +70,13 @@ def check_damage(folder, damaged, total, size, whole):
     (folder / FILE).write_bytes(damaged)
     try:
         with open_store(folder) as store:
-            assert store.done().sum() < total or content_of(store) == whole
+            assert store.done.sum() < total or content_of(store) == whole
     except InputError as error:
         refused = str(error)
     else:
         refused = ""
     with warnings.catch_warnings(record=True, action="always") as said, claim_store(folder) as store:
-        lacking = total - int(store.done().sum())
+        lacking = total - int(store.done.sum())
         begin(store)
         fill(store, total, size)
     assert ["computed again" in str(one.message) for one in said] == ["damaged" in refused] * bool(refused)
@@ -95,8 +95,8 @@ def test_a_flipped_bit_in_any_byte_is_found(tmp_path):
         damaged[place] ^= 1 << place % 8
         store = Store(io.BytesIO(damaged), tmp_path / FILE)
         assert store.file.damaged or store.file.end < len(file)
-        assert int(store.done().sum()) in (16, 24)
-        if store.done().sum() == 24:
+        assert int(store.done.sum()) in (16, 24)
+        if store.done.sum() == 24:
             assert content_of(store) == whole
 
 
@@ -195,6 +195,6 @@ def test_a_store_that_may_only_be_read_is_read_whatever_a_kill_has_left(tmp_path
     tmp_path.chmod(0o555)
     try:
         with open_store(tmp_path) as store:
-            assert store.done()[:24].all()
+            assert store.done[:24].all()
     finally:
         tmp_path.chmod(0o755)

@@ -156,7 +156,7 @@ def test_worst_case_and_inversion(tmp_path, functions):
         ],
     }
     results = run_study(spec, workers=1, allow_python=True)
-    worst, inverse, impossible = (results.store.findings()[name_search(search)] for search in results.study.searches)
+    worst, inverse, impossible = (results.store.findings[name_search(search)] for search in results.study.searches)
     assert worst["least"]["value"] == pytest.approx(0, abs=1e-4)  # inside the box, where no corner is
     assert worst["greatest"]["value"] == pytest.approx(1.3**2 + 1.2**2, rel=1e-12)
     assert worst["greatest"]["parameters"] == {"user.x": -1.0, "user.y": 1.0}
@@ -179,7 +179,7 @@ def test_tolerances_that_a_share_keeps(tmp_path, functions):
         "requirement": [{"column": "size", "high": 0.5}],
         "search": [{"kind": "tolerance", "share": 0.95}],
     }
-    (found,) = run_study(spec, workers=1, allow_python=True).store.findings().values()
+    (found,) = run_study(spec, workers=1, allow_python=True).store.findings.values()
     deviation = 0.25 / math.sqrt(2 * math.log(20))
     assert found["low"] < deviation / 3 < found["high"]
     assert found["factor"] == pytest.approx(deviation / 3, rel=0.05)

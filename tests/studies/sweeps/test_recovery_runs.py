@@ -364,7 +364,7 @@ def test_other_versions_on_resuming_are_said(tmp_path, functions, hrg):
     assert "computed with" not in hrg(*run).stderr
     assert "computed with" not in hrg(*run).stderr
     with claim_store(tmp_path / "out") as store:
-        store.begin_run(json.loads(json.dumps(store.runs()[-1]["provenance"]).replace(np.__version__, "1.0.0")))
+        store.begin_run(json.loads(json.dumps(store.runs[-1]["provenance"]).replace(np.__version__, "1.0.0")))
     assert f"numpy 1.0.0 then, {np.__version__} now" in hrg(*run).stderr
 
 
