@@ -40,7 +40,11 @@ class Improvement:
 
 def compare_outputs(times: Sequence[Array], before: Sequence[Array], after: Sequence[Array]) -> Improvement:
     """Return the improvement of an output that should be zero; its mean before counts as removed by calibration."""
-    means = [[_average(t, y) for t, y in zip(times, outputs, strict=True)] for outputs in (before, after)]
+    means: tuple[list[Array], list[Array]] = ([], [])
+    for t, *outputs in zip(times, before, after, strict=True):
+        starts = np.flatnonzero(np.diff(np.floor((t - t[0]) / AVERAGING), prepend=-1))
+        for found, y in zip(means, outputs, strict=True):
+            found.append(np.add.reduceat(y, starts) / np.diff(np.append(starts, y.size)))
     return Improvement(
         _compare(np.concatenate(before), np.concatenate(after)), _compare(*(np.concatenate(one) for one in means))
     )
@@ -55,9 +59,3 @@ def hold_out(runs: Sequence[Run], compensate: Callable[[Sequence[Run], Run], Arr
 
 def _compare(before: Array, after: Array) -> Change:
     return Change(float(np.std(before)), float(np.sqrt(np.mean(after**2))))
-
-
-def _average(time: Array, values: Array) -> Array:
-    numbers = np.floor((time - time[0]) / AVERAGING).astype(int)
-    starts = np.flatnonzero(np.diff(numbers, prepend=-1))
-    return np.asarray(np.add.reduceat(values, starts) / np.diff(np.append(starts, values.size)))

@@ -118,10 +118,14 @@ def _lowest(systems: list[System], harmonics: list[int], crystal: Cubic, n: int,
     K, M = np.zeros((ends[-1], ends[-1])), np.zeros((ends[-1], ends[-1]))
     waves: dict[int, Array] = {}
     for system, k, a, b in zip(systems, harmonics, ends, ends[1:], strict=False):
-        elastic, mass = _isotropic(system, crystal)
+        # K with λ = C₁₂ and G = C₄₄, and M, of the free unknowns of one harmonic
+        shapes = [group.table.position.shape for group in system.groups]
+        C12, C44, rho = ([np.full(shape, x) for shape in shapes] for x in (crystal.C12, crystal.C44, crystal.rho))
+        elements, mass = system.operators(C12, C44, rho, True)
+        elastic = assemble_elements(system.pattern.unknowns, elements, b - a).toarray()
         axial, around, across, shear = _strains(system)
         K[a:b, a:b] = elastic + crystal.excess * (axial.T @ axial + around.T @ around / 2)
-        M[a:b, a:b] = mass
+        M[a:b, a:b] = mass @ np.eye(b - a)
         for m, wave in ((k + 2, (across + shear) / 2), (k - 2, (across - shear) / 2)):
             whole = waves.setdefault(abs(m), np.zeros((len(axial), ends[-1])))
             whole[:, a:b] += (sign if m < 0 else 1) * wave
@@ -139,15 +143,6 @@ def _lowest(systems: list[System], harmonics: list[int], crystal: Cubic, n: int,
         )
     x = vectors[:, int(np.argmax(share > 0.5))]
     return sqrt(float(x @ K @ x) / float(x @ M @ x)) / (2 * pi)
-
-
-def _isotropic(system: System, crystal: Cubic) -> tuple[Array, Array]:
-    """K with λ = C₁₂ and G = C₄₄, and M, of the free unknowns of one harmonic."""
-    shapes = [group.table.position.shape for group in system.groups]
-    C12, C44, rho = ([np.full(shape, v) for shape in shapes] for v in (crystal.C12, crystal.C44, crystal.rho))
-    elements, mass = system.operators(C12, C44, rho, True)
-    size = system.constraint.shape[1]
-    return assemble_elements(system.pattern.unknowns, elements, size).toarray(), mass @ np.eye(size)
 
 
 def _strains(system: System) -> tuple[Array, Array, Array, Array]:

@@ -79,18 +79,11 @@ def propagate(decay: Decay, time: Array, start: Complex) -> Complex:
         ratio = np.where(small, time * (1 + square / 6 * (1 + square / 20)), (up - down) / (2 * (s or 1.0)))
         z = common * ((up + down) / 2 * start[:, None] + ratio * (decay.matrix @ start)[:, None])
     if decay.hardening or decay.thickening:
-        z = z * _amplitude_effect(decay, time, z)
+        # E = E₀/(1 + 2γ ∫E₀ dt) and the phase κ ∫E dt, E₀ = |z|² of the linear decay
+        energy = np.sum(np.abs(z) ** 2, axis=0)
+        shrink = 1 / np.sqrt(np.maximum(1 + 2 * decay.thickening * _integrate(time, energy), 1e-6))
+        z = z * shrink * np.exp(1j * decay.hardening * _integrate(time, energy * shrink**2))
     return np.asarray(z)
-
-
-def _amplitude_effect(decay: Decay, time: Array, linear: Complex) -> Complex:
-    """Return the factor of the cubic terms: E = E₀/(1 + 2γ ∫E₀ dt), phase κ ∫E dt, E₀ = |z|² of the linear decay."""
-    energy = np.sum(np.abs(linear) ** 2, axis=0)
-    passed = _integrate(time, energy)
-    shrink = 1 / np.sqrt(np.maximum(1 + 2 * decay.thickening * passed, 1e-6))
-    # ∫ E dt of the shrunk energy: ln(1 + 2γ∫E₀)/(2γ), which tends to ∫E₀.
-    phase = _integrate(time, energy * shrink**2)
-    return np.asarray(shrink * np.exp(1j * decay.hardening * phase))
 
 
 def _integrate(time: Array, values: Array) -> Array:

@@ -105,7 +105,7 @@ class Vibration:
 
 def shell_faces(solution: Solution) -> tuple[FreeFaces, FreeFaces]:
     """The inner and the outer face of the shell, without roots and corners; free of traction, so in plane stress."""
-    found: tuple[list[FreeFaces], list[FreeFaces]] = ([], [])
+    found: tuple[list[tuple[Array, ...]], list[tuple[Array, ...]]] = ([], [])
     for number, group in enumerate(solution.system.groups):
         c, q = solution.constants[number], solution.unknowns[number]
         if not isinstance(group, ShellGroup):
@@ -113,22 +113,13 @@ def shell_faces(solution: Solution) -> tuple[FreeFaces, FreeFaces]:
         section, table = group.place.section, face_table(solution, number)
         strain, moved = table.strains(q), table.displacements(q)
         area = table.volume * (2 / section.thickness)[..., None]
-        for k, name in enumerate(("inner", "outer")):
+        for k in (0, 1):
             cosine, sine = plane_energies(c.E, c.nu, *(strain[:, :, row, k] for row in (0, 1, 3)))
-            found[k].append(
-                FreeFaces(
-                    name,  # type: ignore[arg-type]
-                    section.position.ravel(),
-                    area[..., k].ravel(),
-                    _points(strain[..., k]),
-                    (cosine + sine).ravel(),
-                    _points(moved[..., k]),
-                    c.E.ravel(),
-                    c.nu.ravel(),
-                )
-            )
-    inner, outer = (_join(surfaces) for surfaces in found)
-    return inner, outer
+            places = section.position.ravel(), area[..., k].ravel()
+            energy, fields = (cosine + sine).ravel(), (_points(strain[..., k]), _points(moved[..., k]))
+            found[k].append((*places, fields[0], energy, fields[1], c.E.ravel(), c.nu.ravel()))
+    inner, outer = ([np.concatenate(column, axis=-1) for column in zip(*one, strict=True)] for one in found)
+    return FreeFaces("inner", *inner), FreeFaces("outer", *outer)
 
 
 def free_surfaces(solution: Solution, resonator: Resonator) -> tuple[FreeFaces, ...]:
@@ -198,10 +189,3 @@ def _surface(kind: Kind, table: StrainTable | CellTable, c: Constants, q: Array,
 def _points(field: Array) -> Array:
     """(elements, stations, k) or (elements, stations, k, points) to (k, all points)."""
     return np.moveaxis(field, 2, 0).reshape(field.shape[2], -1)
-
-
-def _join(parts: list[FreeFaces]) -> FreeFaces:
-    fields = ("position", "area", "strain", "energy", "moved", "E", "nu")
-    return FreeFaces(
-        parts[0].kind, *(np.concatenate([getattr(part, name) for part in parts], axis=-1) for name in fields)
-    )

@@ -14,7 +14,7 @@ from shell.derivation.symbols import n, omega, phi
 
 def bell_steps() -> list[Row]:
     """Return the chain in the paper's order; a step that the copy prints otherwise says how."""
-    return [*_shape(), *_elasticity(), *_motion(), *_pattern(), *_model()]
+    return [*_body(), *_motion(), *_model()]
 
 
 def shorten(equation: sp.Expr) -> sp.Expr:
@@ -28,23 +28,18 @@ def shorten(equation: sp.Expr) -> sp.Expr:
     return plain.xreplace({one: sp.Symbol(one.func.__name__) for one in plain.atoms(AppliedUndef)})
 
 
-def _shape() -> list[Row]:
+def _body() -> list[Row]:
+    hooke, strain = bell.hooke_in_three_dimensions(), bell.strains_of_the_body()
     ends = "Ends of the domain: faces, a full turn, the mouth (the top is where the stem begins)"
     lengths = "Lengths per φ and around at the height υ (here z), and their derivatives"
     radii = "Principal radii of the hyperbola; roots and a minus sign are missing in print"
+    divergence = "Divergence of the stress along φ, υ (here z) and θ; a comma is a derivative"
+    printed = "terms in ∂ρ₁/∂φ, which vanish on hemisphere and cylinder only, and σ_φθ instead of σ_φυ once: difference from (7)"
     return [
         ("1", "Meridian: hemisphere, cylinder, hyperbola (height z_a)", None, bell.meridian()),
         ("2", ends, None, bell.domain()),
         ("3", radii, "rho_1 rho_2", bell.principal_radii()["hyperbola"]),
         ("4", lengths, "rho_z r_z rho_z,z rho_z,phi", bell.lengths()),
-    ]
-
-
-def _elasticity() -> list[Row]:
-    hooke, strain = bell.hooke_in_three_dimensions(), bell.strains_of_the_body()
-    divergence = "Divergence of the stress along φ, υ (here z) and θ; a comma is a derivative"
-    printed = "terms in ∂ρ₁/∂φ, which vanish on hemisphere and cylinder only, and σ_φθ instead of σ_φυ once: difference from (7)"
-    return [
         ("5", "Hooke's law", " ".join(f"sigma_{name}" for name in hooke), hooke.values()),
         ("6", "Strains of the body (shears are twice the paper's)", " ".join(strain._fields), strain),
         ("7", divergence, _along("R"), bell_dynamics.equilibrium()),
@@ -69,24 +64,19 @@ def _motion() -> list[Row]:
     ]
 
 
-def _pattern() -> list[Row]:
+def _model() -> list[Row]:
     names, plain = "ε_φφ ε_θθ 2ε_φθ", bell.membrane_strains(with_factor=False)
     parity = "different parity along and around, which couples (c₁) two patterns on a perfect bell"
     stretch = "Zero for an inextensional pattern; on the hemisphere they are"
-    return [
-        ("19", "Assumed pattern: meridional, circumferential and normal", "U V W", bell.rayleigh_functions()),
-        ("17, 18", stretch, names, bell.membrane_strains()),
-        ("", "Without the factor cos(5πφ/φ_b)", names, plain),
-        ("16 as printed", parity, "c_1", bell.coupling_stiffness(bell.printed_patterns())),
-    ]
-
-
-def _model() -> list[Row]:
     model, (coupling, mass, stiffness) = bell.galerkin_model(), sp.symbols("b m_0 c_0", positive=True)
     energy = 2 * sp.pi * energies.surface_energy_density() * bell.rho_1(phi) * bell.rho_2(phi) * sp.sin(phi)
     ours = "Coefficients per unit of φ from Lagrange's equations (Galerkin), with the strain amplitudes of the middle surface; c₁ is zero on a perfect bell"
     printed = "m₀ = πρh W and b = πρh V (cos φ + sin φ) lack the integral and the square of the pattern; taken literally, k would be"
     return [
+        ("19", "Assumed pattern: meridional, circumferential and normal", "U V W", bell.rayleigh_functions()),
+        ("17, 18", stretch, names, bell.membrane_strains()),
+        ("", "Without the factor cos(5πφ/φ_b)", names, plain),
+        ("16 as printed", parity, "c_1", bell.coupling_stiffness(bell.printed_patterns())),
         ("20", "Two patterns on a rotating bell", bell.equations_of_motion(), 0),
         ("", ours, "m_0 b c_0", (model.m_0, model.b, energy)),
         ("20 as printed", printed, "k", bell.printed_precession_factor()),

@@ -61,7 +61,7 @@ class DerivedCase:
 
 def steps(case: DerivedCase) -> list[Row]:
     """Return the whole chain, HRG paper eqs. (1)–(15), for any n, with the numbers of one case before (15)."""
-    return [*_elasticity(), *_mode(), *_frequency(), *_numbers(case), *_temperature()]
+    return [*_elasticity(), *_mode(), *_frequency(case)]
 
 
 def _elasticity() -> list[Row]:
@@ -112,7 +112,10 @@ def _mode() -> list[Row]:
     ]
 
 
-def _frequency() -> list[Row]:
+def _frequency(case: DerivedCase) -> list[Row]:
+    number, names = "14" if case.harmonic == 2 else "", f"I_{case.harmonic} J_{case.harmonic} K_{case.harmonic}"
+    values = (case.bending, case.mass, case.precession)
+    closed = [("", "Integrals and Bryan factor in closed form", names, values)]
     greatest = frequency.maximum_kinetic_energy(), frequency.maximum_potential_energy()
     by_logarithm = "∂lnf/∂lnE ∂lnf/∂ν ∂lnf/∂lnρ ∂lnf/∂lnh ∂lnf/∂lnr ∂lnf/∂φ₂"
     turning = (
@@ -128,30 +131,16 @@ def _frequency() -> list[Row]:
         ("13", "Frequency from equal maximum energies", omega**2, frequency.omega_squared()),
         ("", "Derivatives of ln f for design", by_logarithm, frequency.log_derivatives()),
         ("", turning, "M B K", (*coriolis.pattern_coefficients(), coriolis.precession_rate())),
-    ]
-
-
-def _temperature() -> list[Row]:
-    parts = "TCF_E TCF_ν TCF_ρ TCF_h TCF_r"
-    return [
-        ("15", "Frequency as a function of temperature", "f", temperature.frequency_over_temperature()),
-        (
-            "",
-            "Temperature coefficient d ln f/dT and its parts from E, ν, ρ, h and r",
-            parts,
-            temperature.temperature_parts(),
-        ),
-        ("", "Sum of the parts for free isotropic expansion α, E = 2 G (1 + ν)", "TCF", temperature.free_expansion()),
-    ]
-
-
-def _numbers(case: DerivedCase) -> list[Row]:
-    number, names = "14" if case.harmonic == 2 else "", f"I_{case.harmonic} J_{case.harmonic} K_{case.harmonic}"
-    values = (case.bending, case.mass, case.precession)
-    closed = [("", "Integrals and Bryan factor in closed form", names, values)]
-    return [
         (number, f"Frequency in Hz for n = {case.harmonic}", "f", frequency.frequency(case.harmonic)),
         *([] if case.mass.has(sp.Float) else closed),
         ("", "Integrals and Bryan factor, numerical values", names, [sp.N(value, 17) for value in values]),
         ("", "Derivative of ln f with respect to the rim angle (1/rad)", "∂lnf/∂φ₂", sp.N(case.rim_derivative, 17)),
+        ("15", "Frequency as a function of temperature", "f", temperature.frequency_over_temperature()),
+        (
+            "",
+            "Temperature coefficient d ln f/dT and its parts from E, ν, ρ, h and r",
+            "TCF_E TCF_ν TCF_ρ TCF_h TCF_r",
+            temperature.temperature_parts(),
+        ),
+        ("", "Sum of the parts for free isotropic expansion α, E = 2 G (1 + ν)", "TCF", temperature.free_expansion()),
     ]

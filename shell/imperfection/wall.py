@@ -159,9 +159,11 @@ class Stretch:
             out = self.values(face, waves)
             reach = float(np.abs(out).max())
             if reach > 0:
-                nodes, _ = gauss(HEIGHTS)
+                nodes, powers = gauss(HEIGHTS)[0], np.arange(1, HEIGHTS + 1)[:, None]
+                # ∫_0^x of Lagrange's polynomials on the nodes, (stations, nodes, θ)
+                shares = np.linalg.inv(np.vander(nodes, increasing=True)).T @ ((out / reach) ** powers / powers)
                 eta.append(sign * (1 + 2 * reach / self._thickness * nodes))
-                volumes.append(self._share * reach * _shares(nodes, out / reach))
+                volumes.append(self._share * reach * shares)
         if not eta:
             return []
         volume = np.concatenate(volumes, axis=1)
@@ -206,7 +208,11 @@ class Stretch:
         A, rho = 1 + kappa * eta * h / 2, r + n_r * eta * h / 2
         around = (A * rho * (2 * np.pi / self.theta.size))[:, :, None]
         lam, G = self.constants.lame
-        modes = {order: _modes(order, eta, 2 / h) for order in set(self.orders)}
+        modes: dict[int, Array] = {}  # at the heights, with their ζ-derivatives, (2, stations, heights, modes)
+        for order in set(self.orders):
+            basis = legendre(order, eta.ravel())
+            values, slopes = (one.reshape(*eta.shape, -1) for one in (basis.values, basis.slopes))
+            modes[order] = np.stack([values, slopes * (2 / h)[:, :, None]])
         return Wall(
             self.elements,
             self.along,
@@ -230,17 +236,3 @@ class Stretch:
 def _wide(values: Array) -> Array:
     """Values (stations, heights) for all vectors and harmonics."""
     return values[:, :, None, None]
-
-
-def _modes(order: int, eta: Array, steepness: Array) -> Array:
-    """Legendre modes at heights (stations, heights) and their ζ-derivatives, (2, stations, heights, modes)."""
-    basis = legendre(order, eta.ravel())
-    values, slopes = (one.reshape(*eta.shape, -1) for one in (basis.values, basis.slopes))
-    return np.stack([values, slopes * steepness[:, :, None]])
-
-
-def _shares(nodes: Array, x: Array) -> Array:
-    """∫_0^x of Lagrange's polynomials on nodes, for x (stations, 1, θ): (stations, nodes, θ)."""
-    count = len(nodes)
-    powers = x ** np.arange(1, count + 1)[:, None] / np.arange(1, count + 1)[:, None]
-    return np.asarray(np.linalg.inv(np.vander(nodes, increasing=True)).T @ powers)
