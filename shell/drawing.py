@@ -29,8 +29,18 @@ def draw_job(folder: str) -> None:
     plotter = pv.Plotter(
         off_screen=True, shape=(1, len(scenes)), window_size=[window[0] * len(scenes), window[1]], border=False
     )
-    half_height = max(_half_height(scene, view, window[0] / window[1]) for scene in scenes)
-    limits = _common_limits([scene.values for scene in scenes])
+    half_height = 0.0  # of the picture, m, in which every swinging resonator fits above the legend
+    for scene in scenes:
+        _, up, right = _axes(scene, view)
+        corners = np.concatenate([scene.points + sign * scene.displacement for sign in (-1, 1)])
+        high, wide = float(np.ptp(corners @ up)), float(np.ptp(corners @ right))
+        half_height = max(half_height, high / (2 * ROOM), 1.08 * wide / (2 * window[0] / window[1]))
+    # one colour scale for all; a few values at a sharp corner (theory: infinite) do not set it
+    every = np.concatenate([scene.values for scene in scenes])
+    usual, top = float(np.percentile(every, 99.5)), float(every.max())
+    top = usual if top > 4 * usual > 0 else top
+    low = float(min(every.min(), 0.0 if every.min() < 0.5 * top else every.min()))
+    limits = low, top if top > low else low + 1.0
     moving = []
     for k, scene in enumerate(scenes):
         plotter.subplot(0, k)
@@ -138,14 +148,6 @@ def _axes(scene: Scene, view: str) -> tuple[Array, Array, Array]:
     return away, upwards, np.cross(upwards, away)
 
 
-def _half_height(scene: Scene, view: str, aspect: float) -> float:
-    """Half the height of the picture, m, in which the swinging resonator fits above the legend."""
-    _, up, right = _axes(scene, view)
-    corners = np.concatenate([scene.points + sign * scene.displacement for sign in (-1, 1)])
-    high, wide = np.ptp(corners @ up), np.ptp(corners @ right)
-    return float(max(high / (2 * ROOM), 1.08 * wide / (2 * aspect)))
-
-
 def _aim(plotter: Any, scene: Scene, view: str, half_height: float) -> None:
     """Look at the resonator from the view's direction, without perspective; it stands in the upper part of the picture."""
     away, up, right = _axes(scene, view)
@@ -156,12 +158,3 @@ def _aim(plotter: Any, scene: Scene, view: str, half_height: float) -> None:
     plotter.camera_position = [tuple(target + 20 * half_height * away), tuple(target), tuple(up)]
     plotter.camera.parallel_scale = half_height
     plotter.reset_camera_clipping_range()
-
-
-def _common_limits(values: list[Array]) -> tuple[float, float]:
-    """One colour scale for all scenes; a few values at a sharp corner (theory: infinite) do not set it."""
-    every = np.concatenate(values)
-    usual, top = float(np.percentile(every, 99.5)), float(every.max())
-    top = usual if top > 4 * usual > 0 else top
-    low = float(min(every.min(), 0.0 if every.min() < 0.5 * top else every.min()))
-    return low, top if top > low else low + 1.0

@@ -155,7 +155,14 @@ def solve_modes(
         Where the theory is outside its range, or the tolerance is out of reach.
     """
     _check_arguments(harmonic, count, theory, tolerance)
-    _check_range(resonator, theory)
+    ratio = max(value for _, value in resonator.thickness) / resonator.size
+    if theory != "solid" and ratio > THICKEST_SHELL:
+        warnings.warn(
+            f"h/R = {ratio:.3g} is {ratio / THICKEST_SHELL:.2g} times the limit ({THICKEST_SHELL:g}) of the "
+            f"{theory} theory: use the solid theory.",
+            TheoryRangeWarning,
+            stacklevel=2,
+        )
     if theory == "rayleigh":
         return _rayleigh(resonator, elastic, harmonic, count)
     resonator, rest = fit_profile(resonator)
@@ -221,17 +228,6 @@ def _check_arguments(harmonic: int, count: int, theory: str, tolerance: float) -
         raise ShellError(f"at least one mode must be asked for, not {count}.")
     if not 0 < tolerance < 1:
         raise ShellError(f"the tolerance is a relative error between 0 and 1, not {tolerance:g}.")
-
-
-def _check_range(resonator: Resonator, theory: Theory) -> None:
-    ratio = max(value for _, value in resonator.thickness) / resonator.size
-    if theory != "solid" and ratio > THICKEST_SHELL:
-        warnings.warn(
-            f"h/R = {ratio:.3g} is {ratio / THICKEST_SHELL:.2g} times the limit ({THICKEST_SHELL:g}) of the "
-            f"{theory} theory: use the solid theory.",
-            TheoryRangeWarning,
-            stacklevel=3,
-        )
 
 
 def _rayleigh(resonator: Resonator, elastic: Elastic | VaryingElastic, n: int, count: int) -> tuple[Mode, ...]:

@@ -9,7 +9,6 @@ falls only like √(h/R). `shell.derivation` derives every formula of this file.
 from dataclasses import dataclass
 from functools import lru_cache
 from math import cos, pi, sin, tan
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -62,7 +61,11 @@ def rayleigh_frequency(
     phi_1, phi_2 : polar angles (rad) where the shell starts and ends, 0 ≤ phi_1 < phi_2 < π.
     """
     E, nu, rho, h, R = (np.asarray(value, dtype=float) for value in (E, nu, rho, h, R))
-    _require_physical(E, nu, rho, h, R)
+    for name, value in {"Young's modulus": E, "density": rho, "thickness": h, "radius": R}.items():
+        if not np.all(np.isfinite(value) & (value > 0)):
+            raise ShellError(f"{name} must be positive and finite everywhere.")
+    if not np.all((nu > -1) & (nu < 0.5)):
+        raise ShellError("Poisson's ratio must lie between -1 and 0.5 (exclusive) everywhere.")
     shape = rayleigh_integrals(n, phi_1, phi_2)
     omega = n * (n**2 - 1) * h / R**2 * np.sqrt(E * shape.I / (3 * (1 + nu) * rho * shape.J))
     return np.asarray(omega / (2 * pi))
@@ -131,12 +134,3 @@ def _mass(phi: float, n: int) -> float:
 
 def _coriolis(phi: float, n: int) -> float:
     return 2 * sin(phi) ** 3 * tan(phi / 2) ** (2 * n)
-
-
-def _require_physical(E: NDArray[Any], nu: NDArray[Any], rho: NDArray[Any], h: NDArray[Any], R: NDArray[Any]) -> None:
-    names = {"Young's modulus": E, "density": rho, "thickness": h, "radius": R}
-    for name, value in names.items():
-        if not np.all(np.isfinite(value) & (value > 0)):
-            raise ShellError(f"{name} must be positive and finite everywhere.")
-    if not np.all((nu > -1) & (nu < 0.5)):
-        raise ShellError("Poisson's ratio must lie between -1 and 0.5 (exclusive) everywhere.")

@@ -104,7 +104,13 @@ def _find_frame(resonator: Resonator) -> Frame:
             f"leaves no room for the shell, whose meridian is {mm(resonator.length)} long: make the stem or its fillet "
             "smaller, or the shell thinner."
         )
-    radii = _columns(stem.radius, min(0.5 * stem.radius, 2 * h + stem.fillet))
+    # columns of the stem, from its side to the axis, wider the further in
+    inset = min(0.5 * stem.radius, 2 * h + stem.fillet)
+    radii, step = [stem.radius, stem.radius - inset], 3 * inset
+    while radii[-1] > 1.5 * step:
+        radii.append(radii[-1] - step)
+        step *= 3
+    radii.append(0.0)
     above = []
     for contact in contacts:
         far = 0.0 if len(contacts) == 2 else -float(contact.face)
@@ -226,15 +232,6 @@ def _fillet(
         Patch(cross, center_line, circular((r, z), radius, first, middle), roof, layers(steps, cuts), "root"),
         Patch(floor, center_line, circular((r, z), radius, first + turn, middle), wall, layers(steps), "root"),
     ]
-
-
-def _columns(radius: float, inset: float) -> list[float]:
-    """Radii that bound the columns of the stem, from its side to the axis, wider the further in."""
-    radii, step = [radius, radius - inset], 3 * inset
-    while radii[-1] > 1.5 * step:
-        radii.append(radii[-1] - step)
-        step *= 3
-    return [*radii, 0.0]
 
 
 def _stem(radii: list[float], base: Base, end: float, steps: tuple[float, ...], ring_count: int, n: int) -> list[Patch]:

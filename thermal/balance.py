@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from thermal.network import Array, Network
+from thermal.network import Network
 from thermal.profile import Profile
 from thermal.transient import Transient
 
@@ -31,15 +31,18 @@ def check_energy(network: Network, boundaries: Mapping[str, Profile], transient:
     """Compare Σ ∫ C dT with ∫ (heat from the boundaries + sources) dt along a transient."""
     n = network.count
     received = turnover = 0.0
+    x, w = np.polynomial.legendre.leggauss(POINTS)
+    shares = np.concatenate([[0.0], 2.0 ** np.arange(1 - PIECES, 1)])  # of a stretch, finer after its start
     for start, end in zip(transient.knots[:-1], transient.knots[1:], strict=True):
-        time, weight = _graded_gauss(float(start), float(end))
+        edges = start + (end - start) * shares
+        half = np.diff(edges)[:, None] / 2
+        time, weight = (edges[:-1, None] + half * (x + 1)).ravel(), (half * w).ravel()
         held = np.column_stack([boundaries[boundary.name].at(time) for boundary in network.boundaries])
         outflow = network.outflow(np.hstack([transient.at(time), held]))
         inflow = np.hstack([outflow[:, n:], network.power(time)])
         received += float((weight @ inflow).sum())
         turnover += float((weight @ np.abs(inflow)).sum())
     first, last = transient.at(transient.knots[[0, -1]])
-    x, w = np.polynomial.legendre.leggauss(POINTS)
     T = first + np.outer((x + 1) / 2, last - first)
     capacity = np.array(
         [[node.capacity_at(float(one)) for node, one in zip(network.nodes, row, strict=True)] for row in T]
@@ -47,10 +50,3 @@ def check_energy(network: Network, boundaries: Mapping[str, Profile], transient:
     stored = (last - first) / 2 * (w @ capacity)
     turnover += float(np.abs(stored).sum())
     return EnergyBalance(float(np.sum(stored)), received, turnover)
-
-
-def _graded_gauss(start: float, end: float) -> tuple[Array, Array]:
-    edges = start + (end - start) * np.concatenate([[0.0], 2.0 ** np.arange(1 - PIECES, 1)])
-    x, w = np.polynomial.legendre.leggauss(POINTS)
-    half = np.diff(edges)[:, None] / 2
-    return (edges[:-1, None] + half * (x + 1)).ravel(), (half * w).ravel()

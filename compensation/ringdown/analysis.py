@@ -57,7 +57,12 @@ def analyse_decay(envelope: Envelope, *, harmonic: int = 2, confidence: float = 
     jump = find_jump(envelope)
     given = envelope
     if jump is not None:
-        envelope = _after_jump(envelope, jump)
+        if jump > (envelope.time[0] + envelope.time[-1]) / 2:
+            raise CompensationError(
+                f"the phase jumps at {jump:.6g} s: the reference was lost, or samples are missing without a gap in time_s."
+                " Cut the file there and fit the longer part."
+            )
+        envelope = envelope.within(jump, float(envelope.time[-1]))
     end = find_end(envelope)
     whole = envelope.within(envelope.time[0], end)
     start = find_start(whole)
@@ -69,16 +74,6 @@ def analyse_decay(envelope: Envelope, *, harmonic: int = 2, confidence: float = 
     estimates = _estimate(fit, harmonic, confidence)
     remarks = (*_remark(given, fit, left, beyond, lines, start, jump), *_undetermined(fit, estimates))
     return RingDown(estimates, fit, (float(free.time[0]), float(free.time[-1])), remarks, tuple(lines))
-
-
-def _after_jump(envelope: Envelope, jump: float) -> Envelope:
-    """Return what follows a jump of the phase."""
-    first, last = float(envelope.time[0]), float(envelope.time[-1])
-    if jump > (first + last) / 2:
-        raise CompensationError(
-            f"the phase jumps at {jump:.6g} s: the reference was lost, or samples are missing without a gap in time_s. Cut the file there and fit the longer part."
-        )
-    return envelope.within(jump, last)
 
 
 def _check_decays(fit: DecayFit) -> None:

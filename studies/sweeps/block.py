@@ -80,7 +80,11 @@ def pack(cases: Cases, of: str) -> bytes:
     """Return the content of a block; `of` says of which study its results are."""
     batch = cases.batch
     columns = np.vstack([batch.places.astype(float), batch.designs.T, cases.values.T, cases.errors.T])
-    streams = [_squeeze(column) for column in columns]
+    streams = []
+    for column in columns:
+        packer = zlib.compressobj(1, zlib.DEFLATED, zlib.MAX_WBITS, 9, zlib.Z_RLE)
+        planes = np.ascontiguousarray(column.astype("<f8").view(np.uint8).reshape(-1, 8).T)
+        streams.append(packer.compress(planes.tobytes()) + packer.flush())
     head = {
         "of": of,
         "rows": len(batch),
@@ -124,9 +128,3 @@ def each_design(columns: Mapping[str, NDArray[Any]], count: int) -> list[dict[st
     """Return the parameters of every design by name."""
     lists = {name: values.tolist() for name, values in columns.items()}
     return [{name: values[place] for name, values in lists.items()} for place in range(count)]
-
-
-def _squeeze(column: Array) -> bytes:
-    packer = zlib.compressobj(1, zlib.DEFLATED, zlib.MAX_WBITS, 9, zlib.Z_RLE)
-    planes = np.ascontiguousarray(column.astype("<f8").view(np.uint8).reshape(-1, 8).T)
-    return packer.compress(planes.tobytes()) + packer.flush()

@@ -116,10 +116,10 @@ def find_worst_case(explorer: Explorer, search: WorstCase) -> dict[str, Any]:
             return float(scale * explorer.values(_place(study, free, x[None]), [search.column])[0, 0])
 
         def slope(x: Array, scale: float = scale) -> Array:
-            pairs = np.array([_around(x, k) for k in range(len(free))])
+            steps = STEP * np.eye(len(free))
+            pairs = np.clip(np.stack([x - steps, x + steps], axis=1), 0.0, 1.0)
             values = explorer.values(_place(study, free, pairs.reshape(-1, len(free))), [search.column])
-            apart = np.array([np.abs(one - other).max() for one, other in pairs])
-            return np.asarray(scale * (values[1::2, 0] - values[::2, 0]) / apart)
+            return np.asarray(scale * (values[1::2, 0] - values[::2, 0]) / np.diag(pairs[:, 1] - pairs[:, 0]))
 
         box = [(0.0, 1.0)] * len(free)
         outcome = minimize(value, starts[best], jac=slope, method="L-BFGS-B", bounds=box, options={"maxfun": 200})
@@ -141,18 +141,16 @@ def invert(explorer: Explorer, search: Inversion) -> dict[str, Any]:
     free = [p for p in study.parameters if p.name in search.vary]
     wanted = np.array([search.targets[column] for column in columns])
     middle = np.array([_share(p, float(p.nominal)) for p in free])
-    steps = [middle, *(_moved(middle, k) for k in range(len(free)))]
-    first = explorer.values(_place(study, free, np.array(steps)), columns)
+    first = explorer.values(_place(study, free, _moved(middle)), columns)
     scale = np.maximum(np.abs(first[1:] - first[0]).max(axis=0) / STEP, 1e-12 * np.abs(wanted) + 1e-300)
 
     def deviation(x: Array) -> Array:
         return np.asarray((explorer.values(_place(study, free, x[None]), columns)[0] - wanted) / scale)
 
     def slopes(x: Array) -> Array:
-        around = np.array([x, *(_moved(x, k) for k in range(len(free)))])
+        around = _moved(x)
         values = explorer.values(_place(study, free, around), columns)
-        moved = np.array([_moved(x, k)[k] - x[k] for k in range(len(free))])
-        return np.asarray(((values[1:] - values[0]) / moved[:, None] / scale).T)
+        return np.asarray(((values[1:] - values[0]) / np.diag(around[1:] - x)[:, None] / scale).T)
 
     outcome = least_squares(
         deviation, np.clip(middle, 1e-6, 1 - 1e-6), slopes, bounds=(0.0, 1.0), xtol=1e-12, max_nfev=40
@@ -259,14 +257,6 @@ def _share(parameter: "StudyParameter", value: float) -> float:
     return (value - parameter.low) / (parameter.high - parameter.low)
 
 
-def _around(x: Array, k: int) -> tuple[Array, Array]:
-    """Return x with one share a step lower and a step higher, within the box."""
-    lower, upper = x.copy(), x.copy()
-    lower[k], upper[k] = max(x[k] - STEP, 0.0), min(x[k] + STEP, 1.0)
-    return lower, upper
-
-
-def _moved(x: Array, k: int) -> Array:
-    """Return x with one share moved by a step, inwards at the upper end."""
-    step = STEP if x[k] + STEP <= 1 else -STEP
-    return np.asarray(np.where(np.arange(len(x)) == k, x[k] + step, x))
+def _moved(x: Array) -> Array:
+    """Return x, then x with one share after the other moved by a step, inwards at the upper end."""
+    return np.array([x, *(x + np.diag(np.where(x + STEP <= 1, STEP, -STEP)))])
