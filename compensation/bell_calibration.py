@@ -85,15 +85,9 @@ def fit_chain(
 ) -> BellChain:
     """Fit all steps in the paper's order.
 
-    Parameters
-    ----------
-    rates : several applied rates at one temperature: eq. (35).
-    rest : the gyro at rest over temperature: eq. (34).
-    turning : one rate over temperature: eq. (36).
-    rough : a run at rest and turning for (33); `rates` when left out.
-    cutoff : cut-off (Hz) of the FIR filter; None for no filter.
-    order : its order.
-    sampling : step (s) of the output that it will filter; that of `rest` when left out.
+    `rates` has several at one temperature, eq. (35); `rest` is over temperature (34), `turning` one rate over temperature
+    (36), `rough` a run at rest and turning (33), or `rates`. `cutoff` (Hz), None for no filter, and `order` of the FIR filter
+    are for an output with the step `sampling` (s), that of `rest` when left out.
     """
     null, scale, covariance = _step("rough null and scale (33)", fit_rough, rates if rough is None else rough)
     bias = _step("bias over temperature (34)", fit_bias, rest.temperature, scale * (rest.output - null))

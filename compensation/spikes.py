@@ -23,11 +23,9 @@ def find_spikes(values: Array, least: float = 0.0, step: float = 0.0) -> NDArray
     found are left out, and the rest is searched again: one does not hide another beside it. Missing readings, NaN, are not
     marked, nor is anything in fewer than seven.
 
-    Parameters
-    ----------
-    least : part of the series' span, spikes left out of it, by which a spike must stand out too: a smooth column has no
-        noise to measure a spike by.
-    step : what the readings were rounded to, where the values do not show it any more: half of it is the least spread.
+    `least`: part of the series' span, spikes left out of it, by which a spike must stand out too: a smooth column has no
+    noise to measure a spike by. `step`: what the readings were rounded to, where the values do not show it any more: half of
+    it is the least spread.
     """
     marked, rows = np.zeros(len(values), dtype=bool), np.flatnonzero(np.isfinite(values))
     if len(rows) < NEIGHBOURS:

@@ -150,15 +150,9 @@ def build_family(
 ) -> Family:
     """Interpolate one mode over ranges of dimensions and of Poisson's ratio.
 
-    Parameters
-    ----------
-    build : values of the axes (axes,) -> Resonator.
-    axes : the ranges.
-    nu : range of Poisson's ratio.
-    harmonic, index, theory : which mode (`shell.modes.solve_modes`).
-    slopes : whether ∂ ln f/∂ν and ∂ ln f/∂ ln h are wanted.
-    tolerance : of the interpolated frequency, relative, against the full solve.
-    most : full solves that may be spent, about; a finer one counts by the square of its unknowns.
+    `build`: values of the axes (axes,) -> Resonator; `slopes`: whether ∂ ln f/∂ν and ∂ ln f/∂ ln h are wanted; `tolerance` of
+    the interpolated frequency, relative, against the full solve; `most`: full solves that may be spent, about; a finer one
+    counts by the square of its unknowns.
     """
     _check(axes, nu, tolerance, most)
     if theory == "rayleigh":

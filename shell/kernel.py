@@ -89,13 +89,8 @@ def shell_table(section: Section, n: int, through: Orders, eta: tuple[Array, Arr
 
     Where the thickness varies, the derivative at constant ζ is ∂_s - (h'/h) η ∂_η.
 
-    Parameters
-    ----------
-    section : the middle surface at the stations.
-    n : circumferential harmonic; u, w vary as cos nθ, v as sin nθ (for n = 0, v as 1).
-    through : degrees of the Legendre modes of u, v, w through the thickness.
-    eta : thickness points on [-1, 1] and their weights.
-    along : polynomials along the meridian at the stations.
+    u, w vary as cos nθ, v as sin nθ (for n = 0, v as 1). `section` and the polynomials `along` are at the stations, `eta` are
+    thickness points on [-1, 1] with weights, `through` the degrees of the Legendre modes of u, v, w.
     """
     points, weights = eta
     t_r, kappa, n_r, A, rho = _frame(section, points)

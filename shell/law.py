@@ -298,9 +298,7 @@ def build_law(
 
     Parameters
     ----------
-    resonator : with its dimensions at the reference temperature.
-    material : Material
-    reference_temperature : float, K
+    resonator : with its dimensions at the reference temperature (K).
     lowest, highest : K, wanted range; it ends where the material's does. Where both are one temperature, there is a
         single solve, and the law does not follow changes of Poisson's ratio.
     theory : "solid", "shell" or "rayleigh".

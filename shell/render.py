@@ -39,11 +39,7 @@ class NoOpenGL(RuntimeError):
 def render_png(scenes: Scene | Sequence[Scene], view: View = "oblique", width: int = 900, height: int = 700) -> bytes:
     """Return a PNG: the mode at its largest swing, the undeformed shape as a ghost; several scenes stand side by side.
 
-    Parameters
-    ----------
-    scenes : what to draw; all share one colour scale and one length scale.
-    view : "oblique" into the open end, "axis" straight into it, or "side".
-    width, height : pixels of each scene.
+    All share one colour and one length scale; views: "oblique" into the open end, "axis" straight into it, or "side".
     """
     return _draw(scenes, view, (width, height), [1.0])[0]
 

@@ -27,7 +27,7 @@ class Surface:
     energy: Array  # (N,) array, J/m³, largest strain-energy density in a period per square metre of amplitude
     position: Array  # (N,) array, place on the meridian, 0 ... 1
     triangles: Triangles  # (F, 3) array, vertex numbers
-    # tuple of (k, count) arrays Vertex numbers of every outline, point by point (rows) and around (columns); on the
+    # tuple of (k, count) arrays, vertex numbers of every outline, point by point (rows) and around (columns); on the
     # axis a number repeats
     grids: tuple[Triangles, ...]
     harmonic: int  # n; column j lies at θ = 2 π j / count, and cos nθ = 0 falls on columns

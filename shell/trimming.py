@@ -134,14 +134,9 @@ def plan_trim(
 ) -> TrimPlan:
     """The next round of cuts, which brings the splits towards the goal and not beyond.
 
-    Parameters
-    ----------
-    readings : measured splits, one per harmonic.
-    sites : with gains for their harmonics.
-    goal : Hz, of every split.
-    removal_error : relative standard error of the mass of each cut, independent.
-    gain_error : relative standard error that all cuts share: of what a mass does, and of the removal rate.
-    unbalance : k -> u_k = Σ m exp(i k θ) of the resonator, kg, for k of 1 ... 3 as far as known.
+    `readings` are measured splits, one per harmonic, `goal` (Hz) is that of each. Relative standard errors: `removal_error` of
+    the mass of each cut, `gain_error` that all cuts share, of what a mass does and of the removal rate. `unbalance`:
+    k -> u_k = Σ m exp(i k θ) of the resonator, kg, for k of 1 ... 3 as far as known.
     """
     if not goal > 0:
         raise ShellError("the goal is a positive split in Hz.")

@@ -97,14 +97,9 @@ def describe_meridian(
 ) -> list[Part]:
     """Return the parts "shell-1" (at the root) … "shell-N" (at the rim) of a network.
 
-    Parameters
-    ----------
-    root : node or boundary to which the inner end of the meridian is joined.
-    volumetric_capacity : float or callable of temperature (K), ρ c in J/(m³ K).
-    conductivity : k in W/(m K).
-    root_resistance : resistance (K/W) between `root` and the inner end of the meridian.
-    exchange : exchange area per area of the middle surface: the effective emissivities of both faces added.
-    surroundings : node or boundary with which the faces exchange radiation.
+    `root` is joined to the inner end of the meridian, through `root_resistance` (K/W); `volumetric_capacity` ρ c in J/(m³ K),
+    `conductivity` in W/(m K). The faces exchange radiation with the `surroundings`: `exchange` is the area of that per area of
+    the middle surface, the effective emissivities of both faces added.
     """
     names = cell_names(cells.count)
     parts: list[Part] = [
