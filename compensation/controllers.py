@@ -113,7 +113,12 @@ def require_stable(loops: Loops, decay: float, names: tuple[str, ...] = Loops.NA
     margins = find_margins(loops, decay, names)
     for margin in margins:
         if not margin.stable:
-            most = _calm_bandwidth(loops, margin.loop, decay)
+            most: float = getattr(loops, margin.loop)
+            while most > LEAST_BANDWIDTH:  # to a gain margin of 6 dB and a phase margin of 45°
+                most /= 1.2
+                calm = _margin(replace(loops, **{margin.loop: most}), margin.loop, decay)
+                if calm.gain >= 2 and calm.phase >= np.pi / 4:
+                    break
             raise CompensationError(
                 f"the {margin.loop} loop ({Loops.PAPER[margin.loop]}) is unstable: gain margin"
                 f" {20 * np.log10(margin.gain):.1f} dB at {margin.reversal:.3g} Hz, phase margin"
@@ -121,17 +126,6 @@ def require_stable(loops: Loops, decay: float, names: tuple[str, ...] = Loops.NA
                 " shorten the delay or sample faster."
             )
     return margins
-
-
-def _calm_bandwidth(loops: Loops, name: str, decay: float) -> float:
-    """The first lower bandwidth (Hz) with a gain margin of 6 dB and a phase margin of 45°."""
-    bandwidth: float = getattr(loops, name)
-    while bandwidth > LEAST_BANDWIDTH:
-        bandwidth /= 1.2
-        margin = _margin(replace(loops, **{name: bandwidth}), name, decay)
-        if margin.gain >= 2 and margin.phase >= np.pi / 4:
-            break
-    return bandwidth
 
 
 def held(decay: float, time: float) -> float:

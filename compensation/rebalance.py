@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from compensation.actuators import RangeUse, require_range
+from compensation.actuators import require_range
 from compensation.arrays import Array
 from compensation.closed_loop import ClosedLoop
 from compensation.controllers import Loops, require_stable
@@ -140,11 +140,6 @@ def settle_rebalance(
     return LoopRun(
         np.arange(shape[0], dtype=float), -held / rows.coupling, quadrature, decay, rows.omega + nu, azimuth.copy()
     )
-
-
-def use_of_range(run: LoopRun, electronics: Electronics, coupling: float) -> RangeUse:
-    """Return the parts of the actuators' limits that a run uses, row by row; `coupling` is n k."""
-    return electronics.actuators.use(coupling * run.rate, run.quadrature, run.decay)
 
 
 def leak_quadrature(quadrature: ArrayLike, phase: ArrayLike, coupling: float = 1.0) -> Array:

@@ -213,9 +213,7 @@ def _detuned(
     if not found:
         undetermined.append("frequency split, because neither frequency nor quadrature is recorded")
         return None
-    weights = [np.linalg.inv(covariance) for _, covariance in found]
-    covariance = np.linalg.inv(sum(weights, np.zeros((2, 2))))
-    return covariance @ sum((w @ b for w, (b, _) in zip(weights, found, strict=True)), np.zeros(2)), covariance
+    return _combine(found)
 
 
 def _turned(
@@ -256,11 +254,7 @@ def _join(
     flip = np.array([2.0, -2.0])
     turned, turned_cov = flip * S, np.outer(flip, flip) * S_cov
     if driven is None or W is None:
-        if driven is None:
-            return turned, turned_cov, None
-        weights = [np.linalg.inv(turned_cov), np.linalg.inv(driven[1])]
-        covariance = np.linalg.inv(weights[0] + weights[1])
-        return covariance @ (weights[0] @ turned + weights[1] @ driven[0]), covariance, None
+        return (*_combine([(turned, turned_cov), *([driven[:2]] if driven else [])]), None)
     epsilon = 0.0
     for _ in range(3):  # the uncertainty of W counts with ε
         X = np.block([[np.eye(2), np.zeros((2, 1))], [np.eye(2), -W[0][:, None]]])
@@ -270,6 +264,13 @@ def _join(
         b = covariance @ X.T @ weight @ np.concatenate([driven[0], turned])
         epsilon = float(b[2])
     return b[:2], covariance[:2, :2], (epsilon, float(np.sqrt(covariance[2, 2])))
+
+
+def _combine(found: list[tuple[Array, Array]]) -> tuple[Array, Array]:
+    """Return the mean of vectors with their covariances, weighed by their precision, and its covariance."""
+    weights = [np.linalg.inv(covariance) for _, covariance in found]
+    covariance = np.linalg.inv(sum(weights, np.zeros((2, 2))))
+    return covariance @ sum((w @ b for w, (b, _) in zip(weights, found, strict=True)), np.zeros(2)), covariance
 
 
 def _polar(name: str, vector: Array, covariance: Array, harmonic: int) -> dict[str, tuple[float, float]]:

@@ -15,8 +15,7 @@ EXAGGERATION = 0.12  # largest displacement in a picture over the size of the re
 class Scene:
     """One resonator in a picture."""
 
-    # points, displacement: (N, 3) arrays, m, vertices and what is added to them at the largest swing, already
-    # exaggerated
+    # (N, 3) arrays, m, vertices and what is added to them at the largest swing, already exaggerated
     points: Array
     displacement: Array
     triangles: NDArray[np.int64]  # (F, 3) array
@@ -26,8 +25,7 @@ class Scene:
     nodes: NDArray[np.int64]  # (L, k) array, vertex numbers along each nodal line, -1 after its end
     antinodes: NDArray[np.int64]  # (A,) array, vertex numbers
     opens_up: bool  # whether the open end is at the larger z, from where it is then seen
-    # (A, 2, 3) array, m, lines across the rim: the axes of the slower mode of a split pair, then as many of the faster
-    # one
+    # (A, 2, 3) array, m, lines across the rim: axes of the slower mode of a split pair, then as many of the faster
     axes: Array = field(default_factory=lambda: np.zeros((0, 2, 3)))
 
 

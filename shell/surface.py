@@ -27,8 +27,7 @@ class Surface:
     energy: Array  # (N,) array, J/m³, largest strain-energy density in a period per square metre of amplitude
     position: Array  # (N,) array, place on the meridian, 0 ... 1
     triangles: Triangles  # (F, 3) array, vertex numbers
-    # tuple of (k, count) arrays, vertex numbers of every outline, point by point (rows) and around (columns); on the
-    # axis a number repeats
+    # (k, count) arrays, vertex numbers of every outline, point by point (rows) and around; on the axis a number repeats
     grids: tuple[Triangles, ...]
     harmonic: int  # n; column j lies at θ = 2 π j / count, and cos nθ = 0 falls on columns
 
@@ -63,8 +62,7 @@ def build_surface(
 ) -> Surface:
     """Turn the section of a resonator into its surface.
 
-    Points lie `spacing` (m) apart along the outline, R/50 unless given; `count` around, up to a multiple of 4n, 160
-    unless given.
+    Points lie `spacing` (m) apart along the outline, R/50 unless given; `count` (160) around, up to a multiple of 4n.
     """
     n = mode.harmonic if mode else 0
     around = 4 * max(n, 1) * int(np.ceil((count or 160) / (4 * max(n, 1))))

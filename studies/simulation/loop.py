@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from compensation.actuators import Actuators, RangeUse
 from compensation.controllers import Loops, Margin, require_stable
 from compensation.electronics import Channels, Electronics, LoopNoise, thermal_noise
-from compensation.rebalance import LoopRun, settle_rebalance, simulate_rebalance, use_of_range
+from compensation.rebalance import LoopRun, settle_rebalance, simulate_rebalance
 from compensation.settled_turn import read_turning, turn_settled
 from compensation.wave import StandingWave
 from compensation.whole_angle import WITHOUT_RATE, simulate_whole_angle
@@ -108,7 +108,8 @@ def find_range_use(
         turn = wave.harmonic * np.radians(loop.self_precession_deg_per_s)
         most = 1 / np.asarray(wave.tau) + np.abs(wave.damping_split) / 2
         return electronics.actuators.use(turn, np.abs(wave.frequency_split) / 2, most)
-    return use_of_range(settle_rebalance(wave, electronics, rate, angle), electronics, wave.coupling)
+    run = settle_rebalance(wave, electronics, rate, angle)
+    return electronics.actuators.use(wave.coupling * run.rate, run.quadrature, run.decay)
 
 
 def require_range(instrument: "Instrument", use: RangeUse, rate: ArrayLike, coupling: float) -> None:

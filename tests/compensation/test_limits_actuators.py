@@ -9,7 +9,7 @@ from compensation.actuators import Actuators
 from compensation.controllers import Loops
 from compensation.electronics import Channels, Electronics
 from compensation.errors import CompensationError
-from compensation.rebalance import settle_rebalance, simulate_rebalance, use_of_range
+from compensation.rebalance import settle_rebalance, simulate_rebalance
 from compensation.wave import from_quality
 from compensation.whole_angle import simulate_whole_angle
 from tests.compensation.carrier import simulate_carrier
@@ -28,10 +28,11 @@ def test_rate_and_quadrature_share_one_force():
     wave = from_quality(4432.0, 1e7, frequency_split=0.8 * 2 * force / (2 * np.pi))
     electronics = Electronics(actuators=Actuators(force=force))
     run = settle_rebalance(wave, electronics, 0.6 * force / wave.coupling, np.pi / 8)
-    use = use_of_range(run, electronics, wave.coupling)
+    use = electronics.actuators.use(wave.coupling * run.rate, run.quadrature, run.decay)
     assert (use.rate[0], use.quadrature[0], use.across[0]) == pytest.approx((0.6, 0.8, 1.0), rel=1e-6)
     stiff = replace(electronics, actuators=Actuators(force=force, stiffness=2.0, quadrature="stiffness"))
-    use = use_of_range(settle_rebalance(wave, stiff, 0.6, np.pi / 8), stiff, wave.coupling)
+    run = settle_rebalance(wave, stiff, 0.6, np.pi / 8)
+    use = stiff.actuators.use(wave.coupling * run.rate, run.quadrature, run.decay)
     assert (use.quadrature[0], use.across[0]) == pytest.approx((0.4, 0.6 * wave.coupling), rel=1e-6)
 
 
