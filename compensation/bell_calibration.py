@@ -38,8 +38,7 @@ class BellRun:
 def fit_rough(run: BellRun) -> tuple[float, float, Array]:
     """Fit null N₁ (counts) and scale S₁ (rad/s per count), with covariance, to a run at rest and turning: eq. (33).
 
-    The output is regressed on the rate, whose values are exact; with the paper's two plateaus the line passes through
-    both means.
+    The output is regressed on the rate, whose values are exact; the paper's two plateaus give the line through both means.
     """
     line = fit_polynomial(run.rate, run.output, 1, "rate")
     (null, slope), covariance = line.about(0.0, correlated_covariance(line.regression))

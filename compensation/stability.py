@@ -83,8 +83,7 @@ def allan_deviation(
     """Compute the overlapping Allan deviation of equally spaced rate samples.
 
     σ²(m τ₀) = Σ (x_{i+2m} − 2 x_{i+m} + x_i)² / (2 (m τ₀)² (n + 1 − 2m)), x the running integral of the rate.
-    The longest τ is a third of the record unless the `factors` m are given; `confidence` is that of the band `low` to
-    `high`.
+    The longest τ is a third of the record unless the `factors` m are given; `confidence` is that of the band.
     """
     y = np.asarray(rate, dtype=np.float64)
     if y.ndim != 1 or y.size < 9:

@@ -20,8 +20,7 @@ SETTLED = 0.01
 class StartUp:
     """Course of a start: `time` (s), `amplitude` over the command, `phase_error` (rad), `offset` of the oscillator (rad/s).
 
-    `locked` and `ready` are the times (s) from which the phase stays within 5° and the amplitude within 1 %; NaN when
-    that did not happen.
+    `locked` and `ready` are the times (s) from which the phase stays within 5° and the amplitude within 1 %, else NaN.
     """
 
     time: Array

@@ -121,8 +121,7 @@ class TransferFunction:
     def simulate(self, time: ArrayLike, values: ArrayLike, *, settled: bool = False) -> NDArray[Any]:
         """Return the output for an input that is linear between its samples, propagated exactly.
 
-        An even grid is fast, any other is followed step by step; `settled`: from the steady state under the first
-        value.
+        An even grid is fast, any other is followed step by step; `settled` starts at rest under the first value.
         """
         t, u = np.asarray(time, dtype=float), np.asarray(values)
         check_time(t)

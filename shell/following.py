@@ -54,8 +54,7 @@ def follow(solve: Callable[[float, int], Sequence[Mode]], known: Mode) -> Mode:
     """The mode at the end of a way that has the shape of `known` at its start.
 
     Where no mode at the end is like it, the way is halved, so that a shape that changes slowly is followed step by step.
-    solve(place on the way 0 ... 1, count) gives the lowest modes there. ShellError where no mode has the shape any
-    more.
+    solve(place on the way 0 ... 1, count) gives the lowest modes there.
     """
     return _step(solve, known, 0.0, 1.0, DEEPEST)
 

@@ -10,8 +10,7 @@ s by the mode in its stress (shell.prestress). The slope has five parts (HRG pap
     d ln f/dT = ½ E'/E + (∂ ln f/∂ν) ν' − ½ ρ'/ρ + (∂ ln f/∂ ln h) h'/h + (∂ ln f/∂ ln r) r'/r,
 
 with ∂ ln f/∂ ln h + ∂ ln f/∂ ln r = −1 and h'/h = r'/r = α. For a temperature that varies along the meridian, to first
-order in its unevenness, δ ln f = Σ sensitivity (T(s) − T_mean) over the stations of the mode, the stress of uneven expansion
-included.
+order in its unevenness, δ ln f = Σ sensitivity (T(s) − T_mean) over the stations, the stress of uneven expansion included.
 """
 
 from collections.abc import Mapping

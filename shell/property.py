@@ -5,8 +5,7 @@ A published law is a local statement. What it may be wrong by, about a reference
     p(T) = p_law(T) exp(a + b x + ½ c x²)   (moduli, density, conductivity, heat capacity: log_value, log_slope, log_curvature)
     p(T) = p_law(T) + a + b x + ½ c x²      (Poisson's ratio, expansion: value, slope, curvature),
 
-and a, b, c have a joint prior: the stated uncertainties of the form's numbers move all three together, and what no source
-settles is added to each.
+and a, b, c have a joint prior: stated uncertainties of the form's numbers move all three; what is unsettled is added to each.
 """
 
 from collections.abc import Callable, Mapping

@@ -86,8 +86,7 @@ def respond(
 ) -> ObservedSums:
     """Temperatures of a network at the rows, with derivatives by every change.
 
-    `weights` (sums, n) of the nodes; `departure` (n,) of the initial state from the steady one before the profiles
-    begin (K).
+    `weights` (sums, n) of the nodes; `departure` (n,) of the initial state from the steady one at the first values (K).
     """
     rows = np.asarray(time, dtype=float)
     first = {name: float(profile.value[0]) for name, profile in boundaries.items()}

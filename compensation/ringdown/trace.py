@@ -72,8 +72,12 @@ def analyse_trace(time: ArrayLike, amplitude: ArrayLike, *, confidence: float = 
     slope, level = _fit_line(x, used, weigh(x))
     line, weights = level + slope * x, weigh(x)
     bound = float(1 / np.sqrt(np.sum(weights * (x - np.average(x, weights=weights)) ** 2)))
-    widening = _widen((used - line) * np.sqrt(weights))
-    sd = bound * widening
+    # the largest ratio between the variance of block means and that of independent rows
+    scaled, widest, size = (used - line) * np.sqrt(weights), 1.0, 2
+    while scaled.size // size >= 6:
+        widest = max(widest, size * float(np.mean(block_means(scaled, size) ** 2)))
+        size *= 2
+    sd = bound * float(np.sqrt(widest))
     if not -slope > 2 * sd:
         raise CompensationError(
             f"nothing decays in this trace (1/τ = {-slope:.3g} ± {sd:.2g} 1/s); record a free ring-down, longer."
@@ -153,15 +157,6 @@ def _fit_scatter(line: Array, L: Array) -> tuple[float, float]:
     start = np.log([np.median(squares) + 1e-12, np.exp(float(line.min())) + 1e-300])
     solved = scipy.optimize.minimize(cost, start, method="Nelder-Mead", bounds=[(-40, 5), (top - 40, top)])
     return float(np.exp(solved.x[0])), float(np.exp(solved.x[1]))
-
-
-def _widen(scaled: Array) -> float:
-    """Return the root of the largest ratio between the variance of block means and that of independent rows."""
-    widest, size = 1.0, 2
-    while scaled.size // size >= 6:
-        widest = max(widest, size * float(np.mean(block_means(scaled, size) ** 2)))
-        size *= 2
-    return float(np.sqrt(widest))
 
 
 def _find_straight(x: Array, y: Array, weights: Array) -> int:

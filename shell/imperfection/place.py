@@ -40,8 +40,7 @@ class CrossSection:
 def fade(resonator: Resonator, system: System) -> Callable[[Array], Array] | None:
     """What the departures of the faces are multiplied with along the meridian: 1, and 0 where a solid part or clamp holds.
 
-    Solid roots, corners and clamps keep their shape; the faces of the shell join them smoothly over a length √(h R). None
-    where nothing is held.
+    Solid roots, corners and clamps keep their shape; the faces of the shell join them smoothly over √(h R). None: nothing held.
     """
     edges: list[tuple[float, int, float]] = []
     spans: list[tuple[float, float]] = []
