@@ -15,12 +15,8 @@ from studies.errors import InputError
 from studies.record import Record
 
 TEMPERATURES = ("housing_temperature_degC", "resonator_temperature_degC", "chamber_temperature_degC")
-MOST_ROWS = (
-    20_000  # rows beyond which a run is averaged in blocks before a fit: temperature is slow, and noise averages
-)
-LEAST_SPIKE = (
-    1e-3  # part of a column's span by which a spike must stand out: a smooth column has no noise to measure it by
-)
+MOST_ROWS = 20_000  # beyond which a run is averaged in blocks before a fit: temperature is slow, and noise averages
+LEAST_SPIKE = 1e-3  # of a column's span, by which a spike stands out: a smooth column has no noise to measure it by
 LARGEST_REST = 0.01  # applied rate in °/s that still counts as rest: somewhat more than the earth's, 0.0042 °/s
 
 

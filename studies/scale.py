@@ -24,10 +24,7 @@ DEG = float(np.pi / 180)
 STEPS = ("rough", "bias_compensated", "rate_compensated", "temperature_compensated", "filtered")
 SWEPT = 5.0  # span of temperature (K) from which a run counts as one over temperature
 STEADY = 0.01  # part of the rate by which a rate table may waver and still turn at one rate
-SHORT, LONG = (
-    1.0,
-    100.0,
-)  # averaging times (s) at which the random walk is read: a filter of 5 s changes the first, not the second
+SHORT, LONG = 1.0, 100.0  # s, at which the random walk is read: a filter of 5 s changes the first, not the second
 BLOCKS = 5
 
 

@@ -272,9 +272,7 @@ def run() -> None:
     """Entry point of the console script: a request to end counts as Ctrl-C, and a terminal shows what it can."""
     try:
         heed()
-        gc.set_threshold(
-            20_000
-        )  # what is imported stays: to look through it again and again costs a tenth of a command
+        gc.set_threshold(20_000)  # what is imported stays: looking through it costs a tenth of a short command
         for stream in (sys.stdout, sys.stderr):
             if stream is not None and hasattr(stream, "reconfigure"):
                 stream.reconfigure(errors="backslashreplace")

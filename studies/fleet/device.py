@@ -25,10 +25,7 @@ from thermal.profile import Profile
 
 Array = NDArray[np.float64]
 SCHEMA = "hrg.fleet-device/1"
-USUAL, APART = (
-    20.0,
-    5.0,
-)  # temperature (°C) at which devices are compared without a common card, and kelvin to either side for slopes
+USUAL, APART = 20.0, 5.0  # °C at which devices are compared without a common card, and kelvin to either side for slopes
 KNOWN, LITTLE = 0.5, 0.9
 """Standard deviation of a value, over that of its prior, below which its records tell it, and above which they say nothing."""
 

@@ -98,21 +98,16 @@ def reproduce_bell(seed: int = 0) -> BellTwin:
 class Claims:
     """What the printed coefficients imply for the printed results."""
 
-    bias_deviation: tuple[
-        float, float
-    ]  # Standard deviation (°/s) that (34), and (36) at 300 °/s, have over −45…55 °C; and the one that the printed before and after imply, √(before² − after²)
+    # standard deviations (°/s) of (34), and of (36) at 300 °/s, over −45…55 °C; and those that the printed before and after imply
+    bias_deviation: tuple[float, float]
     scale_deviation: tuple[float, float]
-    curvature_nonlinearity: float  # nonlinearity (1) that the quadratic term of (35) makes over ±360 °/s
+    curvature_nonlinearity: float  # that the quadratic term of (35) makes over ±360 °/s
     mapped: tuple[float, float]  # what (35), and (35) with (36) at 25 °C, make of the printed −361.4 °/s
-    noise_deviation: (
-        float  # standard deviation (°/s) of samples that are white noise of the printed random walk before the filter
-    )
+    noise_deviation: float  # (°/s) of samples that are white noise of the printed random walk before the filter
     averaging: tuple[
         tuple[float, float], ...
-    ]  # factor by which the FIR filter lowers the Allan deviation of white noise, read at τ
-    cutoff_for_printed: (
-        float  # cut-off (Hz) with which the order-50 filter lowers it at τ = 1 s by the printed ratio of random walks
-    )
+    ]  # τ (s), factor by which the FIR filter lowers white noise's Allan deviation
+    cutoff_for_printed: float  # Hz, with which the order-50 filter lowers it at τ = 1 s by the printed ratio
 
 
 def examine_claims() -> Claims:

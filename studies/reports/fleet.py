@@ -16,12 +16,7 @@ from studies.results import Chapter, Column, Drawing, Facts, Figure, Sentence, T
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-ACROSS, MOST, DATED, NAMED = (
-    2,
-    8,
-    4,
-    25,
-)  # charts side by side, in all, and over the date; devices whose names stand below a chart
+ACROSS, MOST, DATED, NAMED = 2, 8, 4, 25  # charts: side by side, in all, over the date; devices named below one
 METHOD = (
     "Each device is calibrated and diagnosed by itself. A value of the lot has a mean and a scatter over the devices (normal, restricted"
     " likelihood), beside the error of each device. A device is odd where the others predict its value with a chance below 1 %, every device"

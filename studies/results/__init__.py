@@ -26,9 +26,7 @@ class Column:
     key: Key  # of a row: a key, an attribute, several and places in a list ("split.slow_Hz"), or what makes it; absent: an empty cell
     heading: str  # what people read above it, with the unit
     unit: str = ""
-    form: str = (
-        ""  # such as ".4f" or "+.3g"; without one `digits` significant digits, no exponent where it can be avoided
-    )
+    form: str = ""  # such as ".4f" or "+.3g"; without one `digits` significant digits, without exponent where it can be
     digits: int = 4
     error: str = ""  # key of its standard error: the value to the second digit of the error, with ± and the error
     # keys of the ends of its interval, shown as "low … high" instead of the value, to the second digit of `error` or, with digits=0, of
