@@ -9,8 +9,8 @@ from functools import cache
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from compensation.bias import FREQUENCY, TEMPERATURE, BiasFit, BiasRun, average_run, rate_run
 from compensation.bias_selection import (
     HeldOutRows,
@@ -35,7 +35,6 @@ from studies.rest import TEMPERATURES, choose_column, require_rest
 from studies.stability import Stability, unbroken
 
 Over = Literal["auto", "frequency", "temperature"]
-Array = NDArray[np.float64]
 METHODS: tuple[Method, ...] = ("guarded", "paper")
 AVERAGING, ROWS = 100.0, 150  # s; rows that a run should leave
 FEWEST = 3  # averages over AVERAGING that a run has at least: stability is their standard deviation
@@ -45,16 +44,13 @@ FEWEST_FOR_ALLAN = 30  # samples below which an Allan deviation says nothing
 
 @dataclass(frozen=True)
 class Judged:
-    """One method's fit: stability (before, after) on the runs it was fitted to, and its held-out score, if any.
-
-    `path_scores`: held-out standard deviation of each model on the selection's path over that of a constant, if any.
-    """
+    """One method: stability (before, after) on the runs it was fitted to, and its held-out score, if any."""
 
     method: Method
     fit: BiasFit
     training: tuple[float, float]
     held_out: HeldOutRows | None
-    path_scores: tuple[float, ...]
+    path_scores: tuple[float, ...]  # held-out deviation of each model on the path over that of a constant, if any
 
     @property
     def training_gain(self) -> float:
@@ -64,23 +60,18 @@ class Judged:
 
 @dataclass(frozen=True)
 class BiasStudy:
-    """Everything about one calibration: runs, both methods, `model` of the chosen one, Allan before and after.
-
-    `column` is what the bias is a function of; `allan_step` (s) of the series behind the Allan deviations, which short
-    runs do not have (None); `no_held_out` why there is no held-out score; `opposite` the file of a run whose output has
-    the opposite sign to the others'.
-    """
+    """Everything about one calibration: runs, both methods, `model` of the chosen one, Allan before and after."""
 
     output: str
-    column: str
+    column: str  # what the bias is a function of
     runs: tuple[BiasRun, ...]
     judged: tuple[Judged, ...]
     model: Model
-    before: Stability | None
+    before: Stability | None  # None of short runs
     after: Stability | None
-    allan_step: float
-    no_held_out: str
-    opposite: str | None = None
+    allan_step: float  # s, of the series
+    no_held_out: str  # why there is no held-out score
+    opposite: str | None = None  # file of a run whose output has the opposite sign to the others'
 
     def by(self, method: Method) -> Judged:
         """Return what one method made of the runs."""

@@ -13,13 +13,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from compensation.ringdown.laws import Law, Rows, fit_law
 from studies.errors import InputError, naming
 from studies.files.columns import read_columns, read_header
 from studies.record import Record, check_plausible, write_record
 from studies.ringdown import POWERS, Decay
 
-Real = NDArray[np.float64]
 TEMPERATURE, AMPLITUDE = "housing_temperature_degC", "vibration_amplitude_V"
 RESPONSES = ("frequency_Hz", "inverse_q")
 COLUMNS = ("decay", "time_s", *RESPONSES, TEMPERATURE, "pressure_Pa", AMPLITUDE)
@@ -32,8 +32,8 @@ SMOOTHED = 8
 class Decays:
     """Readings under the names of a table's columns, NaN where nothing is known, with standard deviations of frequency and 1/Q (relative)."""
 
-    columns: Mapping[str, Real]
-    sd: Mapping[str, Real]
+    columns: Mapping[str, Array]
+    sd: Mapping[str, Array]
     start: float | None = None
     path: str = ""
 
@@ -64,7 +64,7 @@ def table_of(decays: Sequence[Decay]) -> Decays:
     if first is not None:
         decays = sorted(decays, key=lambda decay: decay.notes["start_s"])
 
-    def column(values: Sequence[float | None]) -> Real:
+    def column(values: Sequence[float | None]) -> Array:
         return np.array([np.nan if value is None else value for value in values], dtype=np.float64)
 
     columns = {
@@ -131,7 +131,7 @@ def write_decays(decays: Decays, path: str | Path) -> None:
     write_record(Record(kept, source="free decays, hrg fit ringdown", start=start), path)
 
 
-def _smooth(amplitude: Real, decay: NDArray[np.int64]) -> Real:
+def _smooth(amplitude: Array, decay: NDArray[np.int64]) -> Array:
     """Return the amplitudes of every long decay as a parabola of their logarithm, in which outliers count little."""
     found = amplitude.copy()
     for one in np.unique(decay):

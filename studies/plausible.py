@@ -3,8 +3,8 @@
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from shell.constants import zero_Celsius
 from studies.errors import InputError
 from studies.instrument.card import Instrument
@@ -12,7 +12,6 @@ from studies.law import check_slope_known, law_of
 from studies.record import Record, drop_repeats
 from studies.rest import TEMPERATURES
 
-Array = NDArray[np.float64]
 ANOTHER = 0.2  # relative: no tolerance of one design makes so much
 ALIKE = 0.03  # relative: what trimming, temperature and small errors of dimensions make of a frequency
 AT_REST = 1e-5  # relative: frequencies that vary by less need no temperature law

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from studies.errors import InputError, nearest
 from studies.files.columns import Columns, read_columns, read_header
 from studies.files.parquet import is_parquet, write_table
@@ -21,7 +21,6 @@ from studies.results import Drawing
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-Array = NDArray[np.float64]
 
 COLUMNS = {
     "time_s": "time since the start of the run",

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from compensation.bell import BellChain, apply_chain
 from compensation.bell_calibration import BellRun, fit_chain
 from compensation.decimation import average_blocks
@@ -19,7 +20,6 @@ from studies.models.kinds.scale import RAW
 from studies.record import Record
 from studies.rest import LARGEST_REST, MOST_ROWS, TEMPERATURES, choose_column, drop_spikes
 
-Real = NDArray[np.float64]
 DEG = float(np.pi / 180)
 STEPS = ("rough", "bias_compensated", "rate_compensated", "temperature_compensated", "filtered")
 SWEPT = 5.0  # span of temperature (K) from which a run counts as one over temperature
@@ -30,28 +30,20 @@ BLOCKS = 5
 
 @dataclass(frozen=True)
 class StepFigures:
-    """One step of the chain judged.
-
-    `nonlinearity` (1); standard deviations `at_rest` and `turning` (°/s); at rest `bias_instability` (°/h), the lowest
-    Allan deviation over 0.664, and the random walk (°/√h) read at 1 s and at 100 s; None where a run is too short.
-    """
+    """One step of the chain judged; None where a run is too short."""
 
     step: str
     nonlinearity: float | None
-    at_rest: float
-    turning: float
-    bias_instability: float | None
-    random_walk_1s: float | None
+    at_rest: float  # °/s, standard deviation
+    turning: float  # °/s, the same
+    bias_instability: float | None  # °/h at rest, the lowest Allan deviation over 0.664
+    random_walk_1s: float | None  # °/√h at rest, read at 1 s
     random_walk_100s: float | None
 
 
 @dataclass(frozen=True)
 class ScaleStudy:
-    """The chain, its runs, its figures on them, and rms error (°/s) before and after on blocks left out of the fit.
-
-    `averaged` tells that a run was long and the fit, and this error, are of its block averages; `rough_run` that the rough null and
-    scale have a run of their own.
-    """
+    """The chain, its runs, its figures on them, and rms error (°/s) before and after on blocks left out of the fit."""
 
     chain: BellChain
     runs: tuple[BellRun, BellRun, BellRun]
@@ -61,8 +53,8 @@ class ScaleStudy:
     figures: list[StepFigures]
     error_before: float
     error_held_out: float
-    averaged: bool
-    rough_run: bool = False
+    averaged: bool  # a run was long: the fit and this error are of its block averages
+    rough_run: bool = False  # the rough null and scale have a run of their own
     law: RateLaw | None = None
 
 
@@ -84,7 +76,7 @@ def judge_steps(chain: BellChain, rates: BellRun, rest: BellRun, turning: BellRu
     return figures
 
 
-def settled_rows(rate: Real, rows: int) -> NDArray[np.bool_]:
+def settled_rows(rate: Array, rows: int) -> NDArray[np.bool_]:
     """Mark the rows at which the applied rate has been the same for `rows` rows, or since the start of the run."""
     index = np.arange(len(rate))
     begin = np.maximum.accumulate(np.where(np.r_[False, np.diff(same_rate(rate)) != 0], index, 0))
@@ -216,7 +208,7 @@ def _cut(run: BellRun, block: int) -> tuple[BellRun, BellRun]:
     return rest, part
 
 
-def _read_allan(step: float, rate: Real) -> tuple[float | None, float | None, float | None]:
+def _read_allan(step: float, rate: Array) -> tuple[float | None, float | None, float | None]:
     if len(rate) * step < 10 * LONG:
         return None, None, None
     allan = allan_deviation(rate / DEG * 3600, step)

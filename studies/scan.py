@@ -6,8 +6,8 @@ from math import pi
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from shell.elastic import Elastic
 from shell.errors import ShellError
 from shell.imperfection import CoupledHarmonics, Imperfection, Pair, Split, find_split
@@ -19,7 +19,6 @@ from shell.scan.survey import Face, rigid_shapes, survey, survey_map
 from studies.errors import InputError
 from studies.files.clouds import FaceGrid, Unit, read_cloud
 
-Array = NDArray[np.float64]
 SIDES = {"inner": -1, "outer": 1}
 COVERAGE = 0.9
 DRAWS = 4000
@@ -36,18 +35,14 @@ class ScanInterval:
 
 @dataclass(frozen=True)
 class SplitOfScan:
-    """The split of one harmonic by the measured faces.
+    """The split of one harmonic by the measured faces."""
 
-    split : to first order, most probable. hertz, relative : with intervals. slow_axis : rad, with its interval, or None where
-    the split is not told from 0. error : standard error of either part of the relative split. whole : with all orders.
-    """
-
-    split: Split
+    split: Split  # to first order, most probable
     hertz: ScanInterval
     relative: ScanInterval
-    slow_axis: ScanInterval | None
-    error: float
-    whole: Split
+    slow_axis: ScanInterval | None  # rad; None where the split is not told from 0
+    error: float  # of either part of the relative split
+    whole: Split  # with all orders
 
 
 @dataclass(frozen=True)

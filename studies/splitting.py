@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from shell.elastic import Elastic
 from shell.electrodes import soften_at_gap
 from shell.imperfection import CoupledHarmonics, Imperfection, Pair, Split, find_split
@@ -16,21 +16,17 @@ from studies.instrument.card import Instrument
 from studies.instrument.tables.electrodes import CardElectrodes
 from studies.instrument.tables.imperfection import CardImperfection
 
-Array = NDArray[np.float64]
 PLACES = 65  # along the meridian, where waves are held against the wall
 
 
 @dataclass(frozen=True)
 class SplitPair:
-    """A pair of an instrument at a temperature, split by all that its card says.
-
-    known : the pair, if it has been made before. imperfection, measured, electrodes : the parts; they add.
-    """
+    """A pair of an instrument at a temperature, split by all that its card says, in parts that add."""
 
     instrument: "Instrument"
     mode: "Mode"
     temperature: float
-    known: Pair | None = None
+    known: Pair | None = None  # the pair, if it has been made before
 
     @cached_property
     def pair(self) -> Pair:

@@ -4,13 +4,11 @@ import itertools
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from compensation.decimation import average_blocks
 from compensation.spikes import find_spikes
 from compensation.stability import AllanDeviation, NoiseCoefficients, allan_deviation, fit_noise
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,8 @@ from math import ceil
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from compensation.decimation import average_groups
 from compensation.errors import CompensationError
 from compensation.lines import Line, find_line
@@ -23,7 +23,6 @@ from studies.rest import LEAST_SPIKE
 from studies.settled import LEAST, TEMPERATURES, Soak, find_holds, find_soaks
 from studies.stability import Stability, read_stability, unbroken
 
-Array = NDArray[np.float64]
 CONFIDENCE = 0.9
 FEWEST = 64  # values of a column that has a spectrum and an Allan deviation
 MOST = 20_000  # means that steps, lines and correlations are found in
@@ -77,10 +76,7 @@ class ColumnRange:
 
 @dataclass(frozen=True)
 class ColumnSurvey:
-    """What one column shows; `stability` and `density` are None where it is constant or short.
-
-    `white` is the Allan deviation at 1 s of the white noise that second differences show.
-    """
+    """What one column shows; `stability` and `density` are None where it is constant or short."""
 
     range: ColumnRange
     mean: float = np.nan
@@ -89,7 +85,7 @@ class ColumnSurvey:
     zeros: int = 0
     steps: tuple[Step, ...] = ()
     line: Line | None = None
-    white: float = 0.0
+    white: float = 0.0  # Allan deviation at 1 s of the white noise that second differences show
     stability: Stability | None = None
     density: Density | None = None
 
@@ -106,18 +102,14 @@ class ColumnSurvey:
 
 @dataclass(frozen=True)
 class Survey:
-    """What one record shows.
-
-    `settled`: soaks, or parts in which the temperature is held where there is no frequency (NaN) to judge them by. `correlations`: rows
-    `one`, `two`, and of their `values` and of their `changes` from one two-hundredth of the record to the next.
-    """
+    """What one record shows."""
 
     record: Record
     step: float
     even: bool
     columns: tuple[ColumnSurvey, ...]
-    settled: tuple[Soak, ...]
-    correlations: tuple[dict[str, str | float | None], ...]
+    settled: tuple[Soak, ...]  # soaks, or where the temperature is held where there is no frequency (NaN)
+    correlations: tuple[dict[str, str | float | None], ...]  # `one`, `two`, of their `values`, `changes`
 
 
 def survey_record(record: Record) -> Survey:

@@ -10,8 +10,8 @@ from math import hypot, pi
 from typing import Literal, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from shell.elastic import Elastic
 from shell.errors import ShellError
 from shell.groove import Groove, GrooveSplit, solve_groove
@@ -21,7 +21,6 @@ from shell.resonator import Resonator
 from shell.trimming import Sites, SplitWave, TrimPlan, plan_trim
 from studies.errors import InputError
 
-Array: TypeAlias = NDArray[np.float64]
 CutKind: TypeAlias = Literal["mass", "edge", "inner", "outer"]
 """Mass alone (teeth, lumps: hardly strained), or material with its strain energy off the edge of the rim or off a face."""
 
@@ -46,16 +45,12 @@ class Teeth:
 
 @dataclass(frozen=True)
 class PlannedCut:
-    """A groove as it is planned at one position, and what it does.
+    """A groove as it is planned at one position, and what it does."""
 
-    groove : of the mean mass. splits : by harmonic n. first : relative split per kg by the shape derivative, by n.
-    scatter : relative, of the masses of the cuts there.
-    """
-
-    groove: Groove
-    splits: Mapping[int, GrooveSplit]
-    first: Mapping[int, float]
-    scatter: float
+    groove: Groove  # of the mean mass
+    splits: Mapping[int, GrooveSplit]  # by harmonic n
+    first: Mapping[int, float]  # relative split per kg by the shape derivative, by n
+    scatter: float  # relative, of the masses of the cuts there
 
     @property
     def mass(self) -> float:

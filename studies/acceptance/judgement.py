@@ -35,10 +35,7 @@ Verdict = Literal["pass", "fail", "undecided", "no limit", "missing"]
 
 @dataclass(frozen=True)
 class JudgedQuantity:
-    """One quantity: what was measured, its limit, and the verdict.
-
-    `undecided`: the interval lies on both sides of the limit. `missing`: no record gives it.
-    """
+    """One quantity: what was measured (None: no record gives it), its limit, and the verdict."""
 
     quantity: TestedQuantity
     measured: Measured | None

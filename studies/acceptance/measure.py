@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from compensation.decimation import average_blocks
 from compensation.linearity import measure_linearity, same_rate
 from compensation.noise_regression import fit_coloured
@@ -21,7 +21,6 @@ from studies.record import Record
 from studies.ringdown import Decay
 from studies.stability import read_stability
 
-Real = NDArray[np.float64]
 BLOCK = 100.0  # averaging of the output over temperature (s)
 WARM_BLOCK = 10.0
 MOST_POINTS = 100_000
@@ -109,8 +108,8 @@ def _block_of(record: "Record") -> float:
 
 def measure_temperature(records: "Sequence[Record]", output: str) -> Found:
     """Bias over temperature and its rate, fitted together, what they leave, and the frequency's slope (12.8)."""
-    columns: dict[str, list[Real]] = {"output": [], "temperature": [], "slope": []}
-    frequencies: list[tuple[Real, Real]] = []
+    columns: dict[str, list[Array]] = {"output": [], "temperature": [], "slope": []}
+    frequencies: list[tuple[Array, Array]] = []
     runs, start = [], 0
     for record in records:
         column = temperature_column(record)

@@ -5,17 +5,14 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class TestedQuantity:
-    """One number of the test: its key in a file of limits, section of the standard, words, unit, and which side is good.
-
-    `needs` says what record gives it; of an `upper` limit the size of the value must stay below it, of a lower one above.
-    """
+    """One number of the test: its key in a file of limits, section of the standard, words, unit, and which side is good."""
 
     key: str
     section: str
     words: str
     unit: str
-    needs: str
-    upper: bool = True
+    needs: str  # what record gives it
+    upper: bool = True  # the size of the value must stay below the limit, else above
 
 
 WARM = "a record of the output from power-on, marked '# test: warm-up'"

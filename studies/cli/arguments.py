@@ -6,16 +6,14 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 from cyclopts import Parameter
-from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from shell.constants import zero_Celsius
 from studies.errors import InputError
 from studies.files.given import refuse_unsound
 
 if TYPE_CHECKING:
     from studies.instrument.card import Instrument
-
-Array = NDArray[np.float64]
 
 
 def numbers(good: Callable[[Any], bool], words: str, **more: Any) -> Parameter:

@@ -4,10 +4,11 @@ from typing import Any
 
 import numpy as np
 
+from compensation.arrays import Array
 from compensation.decimation import average_blocks
 from compensation.errors import CompensationError
 from studies import models
-from studies.cli.arguments import Array, EmitC
+from studies.cli.arguments import EmitC
 from studies.cli.output import answers, keep_model, say, tell_rows
 from studies.errors import InputError
 from studies.instrument.units import unit_of

@@ -7,7 +7,8 @@ distance from the last reading to the settled state of a hold that was extrapola
 
 from pathlib import Path
 
-from studies.cli.arguments import Array, SaveModel
+from compensation.arrays import Array
+from studies.cli.arguments import SaveModel
 from studies.cli.output import answers, keep_model, say
 from studies.errors import naming
 from studies.files.columns import read_header

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from studies.cli.arguments import Array
+from compensation.arrays import Array
 from studies.cli.output import answers, say
 from studies.errors import InputError, naming
 from studies.models import read_model

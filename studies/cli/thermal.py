@@ -11,8 +11,9 @@ from typing import Annotated, Any
 
 import numpy as np
 
+from compensation.arrays import Array
 from shell.constants import zero_Celsius
-from studies.cli.arguments import Array, Card, numbers
+from studies.cli.arguments import Card, numbers
 from studies.cli.output import answers
 from studies.instrument.card import load_card
 from studies.instrument.display import name_constant

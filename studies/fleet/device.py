@@ -5,8 +5,8 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from shell.constants import zero_Celsius
 from studies.diagnosis.verdict import NINETY
 from studies.effects.effect import UNITS
@@ -23,7 +23,6 @@ from studies.simulation.prediction import HEATED, Variations, predict
 from studies.workbench import infer_records
 from thermal.profile import Profile
 
-Array = NDArray[np.float64]
 SCHEMA = "hrg.fleet-device/1"
 USUAL, APART = 20.0, 5.0  # °C at which devices are compared without a common card, and kelvin to either side for slopes
 KNOWN, LITTLE = 0.5, 0.9

@@ -15,11 +15,10 @@ from functools import cached_property
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from studies.fleet.device import Measured
 
-Array = NDArray[np.float64]
 GRID = np.geomspace(1e-3, 3.0, 60)  # scatters that are tried, in parts of the range of the values
 CHANCE = 0.01  # chance, with all looks counted, below which a device or a batch is odd
 FEWEST = 4  # devices from which on values tell who is odd

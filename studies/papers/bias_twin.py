@@ -33,19 +33,15 @@ METHODS: tuple[Method, ...] = ("paper", "guarded")
 
 @dataclass(frozen=True)
 class TwinFit:
-    """One method, fitted to one or several runs of a gyro, and judged on a new cooling and a new warming run.
-
-    `training` is the bias stability (°/h) of the first cooling run before and after; `trace` that run as figure 6 shows it: time (s),
-    bias and what compensation leaves (°/h).
-    """
+    """One method, fitted to one or several runs of a gyro, and judged on a new cooling and a new warming run."""
 
     method: Method
     runs: int
     terms: tuple[str, ...]
-    training: tuple[float, float]
+    training: tuple[float, float]  # bias stability (°/h) of the first cooling run before and after
     cooling: HeldOutRows
     warming: HeldOutRows
-    trace: Trace = field(compare=False)
+    trace: Trace = field(compare=False)  # that run: time (s), bias, what is left (°/h)
 
     @property
     def training_gain(self) -> float:

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from importlib.resources import files
 
 import numpy as np
-from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from compensation.bell import BellChain, PolynomialCurve, invert_chain
 from compensation.bell_calibration import BellRun, fit_chain
 from compensation.fir import design_smoother
@@ -17,7 +17,6 @@ from compensation.linearity import measure_linearity
 from shell.constants import zero_Celsius
 from studies.scale import StepFigures, judge_steps
 
-Real = NDArray[np.float64]
 DEG = float(np.pi / 180)
 STEP = 0.1  # output step (s), printed
 RANDOM_WALK, WANDER = 2.7821, 20.0
@@ -40,7 +39,7 @@ def read_printed_chain() -> BellChain:
     lines = [line.split(",") for line in text.splitlines() if line and not line.startswith(("#", "quantity"))]
     row = {name: np.array([float(value) for value in values]) for name, *values in lines}
 
-    def curve(coefficients: Real, reference: float) -> PolynomialCurve:
+    def curve(coefficients: Array, reference: float) -> PolynomialCurve:
         return PolynomialCurve(coefficients, np.zeros((3, 3)), reference, -np.inf, np.inf)
 
     return BellChain(
@@ -61,7 +60,7 @@ def simulate_runs(generator: np.random.Generator, random_walk: float = RANDOM_WA
     sweep = (zero_Celsius + np.linspace(LOWEST, HIGHEST, round(SWEEP / STEP))).astype(np.float64)
     plateaus = np.repeat(np.arange(-360.0, 361.0, 40.0) * DEG, round(DWELL / STEP)).astype(np.float64)
 
-    def run(rate: Real, temperature: Real) -> BellRun:
+    def run(rate: Array, temperature: Array) -> BellRun:
         white = random_walk * 60 / np.sqrt(STEP) * generator.standard_normal(len(rate))
         wander = WANDER * np.sqrt(STEP / 3600) * np.cumsum(generator.standard_normal(len(rate)))
         noise = (white + wander) / 3600 * DEG / gyro.scale
@@ -133,7 +132,7 @@ def examine_claims() -> Claims:
     )
 
 
-def reduce_white(taps: Real, rows: int) -> float:
+def reduce_white(taps: Array, rows: int) -> float:
     """Return the factor by which a FIR filter lowers the Allan deviation of white noise over `rows` samples.
 
     The Allan variance is half the mean square of the difference of neighbouring means, a window (−1…−1, 1…1) on the

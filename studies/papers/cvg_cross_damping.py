@@ -8,15 +8,14 @@ from dataclasses import dataclass
 from importlib.resources import files
 
 import numpy as np
-from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from compensation.cross_damping import RestRun, evaluate_cross_damping, fit_cross_damping, simulate_bias
 from compensation.improvement import Change, compare_outputs
 from compensation.transfer import TransferFunction
 from shell.constants import zero_Celsius
 from studies.cross_damping import CrossDampingStudy, study_cross_damping
 
-Real = NDArray[np.float64]
 DEG_PER_H = np.pi / 180 / 3600
 CALIBRATION = 293.15
 FREQUENCY, QUALITY = 5000.0, 10_000.0  # a metal cylinder of a few centimetres (Hz, 1): assumed
@@ -32,14 +31,14 @@ NOISES = (0.05, 0.5, 5.0)
 PRINTED_IMPROVEMENT = 8.0
 
 
-def read_shape() -> Real:
+def read_shape() -> Array:
     """Return the printed coefficients of eq. (10), constant first."""
     text = (files("studies.papers") / "cvg_cross_damping.csv").read_text(encoding="utf-8")
     rows = [line.split(",") for line in text.splitlines() if line and line[0].isdigit()]
     return np.array([float(row[1]) for row in rows])
 
 
-def make_profile(soak_h: float = 1.0, slope_K_per_min: float = 1.0) -> tuple[Real, Real]:
+def make_profile(soak_h: float = 1.0, slope_K_per_min: float = 1.0) -> tuple[Array, Array]:
     """Return times (s) and chamber temperatures (K) of a cycle 20 → 60 → −40 → 20 °C with soaks.
 
     The paper's figure 1 is a picture only; this is a usual chamber cycle and not its copy.
@@ -72,20 +71,15 @@ def simulate_rest(
 
 @dataclass(frozen=True)
 class CrossDampingTwin:
-    """Calibration on one virtual run and its use on another.
-
-    `study` of the calibration; `second` a run with other soaks and other noise; `improvement` there; `spread` of it
-    over seeds (5 %, median, 95 %); `table` median improvement by lag (rows, `lags` in s) and white noise (columns,
-    `noises` in °/√h), on runs that were not fitted.
-    """
+    """Calibration on one virtual run and its use on another."""
 
     study: CrossDampingStudy
-    second: RestRun
-    improvement: Change
-    spread: tuple[float, float, float]
-    lags: tuple[float, ...]
-    noises: tuple[float, ...]
-    table: Real
+    second: RestRun  # with other soaks and other noise
+    improvement: Change  # there
+    spread: tuple[float, float, float]  # of it over seeds: 5 %, median, 95 %
+    lags: tuple[float, ...]  # s
+    noises: tuple[float, ...]  # °/√h
+    table: Array  # median improvement by lag (rows) and noise (columns), on runs that were not fitted
 
 
 def reproduce_cross_damping(seeds: int = 20) -> CrossDampingTwin:

@@ -9,15 +9,14 @@ measured output", as the paper says, only for steps below about 0.04 ms, so 0.02
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from compensation.demodulated import ErrorMap, map_integral_error, measure_rate, relate_rate_to_measured_rate
 from compensation.kalman import LinearModel, expect_mean_nis, model_gyro, noise_of_estimate, run_filter
 from compensation.sensitive_element import tune
 from compensation.spectral import Spectrum, high_pass_spectrum, rate_spectrum, white_spectrum
 from compensation.wiener import WienerFilter, design_wiener_filter, judge_filter, renormalise
 
-Real = NDArray[np.float64]
 K, ZETA, GAMMA, B = 2 * np.pi * 500.0, 0.025, 0.1, 2 * np.pi * 3.0
 SIGMA = float(np.sqrt(2 / B))
 STEP, KALMAN_STEP = 1e-3, 2e-5
@@ -30,12 +29,12 @@ STEPS = (1e-3, 5e-4, 2e-4, 1e-4, 5e-5)
 class Filtered:
     """A true rate, the gyro's output without and with noise, the filter's estimate, and the same without noise: rad/s over time (s)."""
 
-    time: Real
-    rate: Real
-    output: Real
-    noisy: Real
-    estimate: Real
-    clean_estimate: Real
+    time: Array
+    rate: Array
+    output: Array
+    noisy: Array
+    estimate: Array
+    clean_estimate: Array
 
     @property
     def noise_before(self) -> float:
@@ -80,24 +79,19 @@ class WienerCase:
 
 @dataclass(frozen=True)
 class FilterStudy:
-    """Figures 5–7: both Wiener cases, figure 5, and the Kalman run.
-
-    Figure 6 is the Kalman filter's estimate of the output, figure 7 of the rate, each against what it estimates;
-    `mean_nis` with its 95 % band; `by_step` the Kalman rate estimate for other sampling steps (s), and `settled_noise` (rad/s)
-    what the settled filter leaves of the noise in its estimates of output and rate, for the same steps.
-    """
+    """Figures 5–7: both Wiener cases, figure 5, and the Kalman run."""
 
     wiener: tuple[WienerCase, ...]
     figure5: Filtered
-    figure6: Filtered
-    figure7: Filtered
+    figure6: Filtered  # estimate of the output
+    figure7: Filtered  # estimate of the rate
     mean_nis: float
-    nis_band: tuple[float, float]
-    by_step: tuple[tuple[float, Filtered], ...]
-    settled_noise: tuple[tuple[float, float], ...]
+    nis_band: tuple[float, float]  # 95 %
+    by_step: tuple[tuple[float, Filtered], ...]  # the rate estimate for other sampling steps (s)
+    settled_noise: tuple[tuple[float, float], ...]  # rad/s, of output and rate by the settled filter
 
 
-def make_pulses(step: float) -> tuple[Real, Real]:
+def make_pulses(step: float) -> tuple[Array, Array]:
     """Return times (s) and square pulses of 1 rad/s, `PULSE` seconds on and off, edges one step long."""
     time = np.arange(0.0, LENGTH, step)
     return time, np.where(np.floor(time / PULSE) % 2 == 1, 1.0, 0.0)
@@ -153,7 +147,7 @@ def _filter_wiener(case: WienerCase, generator: np.random.Generator) -> Filtered
     return Filtered(time, rate, output, noisy, estimate, clean)
 
 
-def _filter_kalman(step: float, generator: np.random.Generator) -> tuple[Filtered, Filtered, Real]:
+def _filter_kalman(step: float, generator: np.random.Generator) -> tuple[Filtered, Filtered, Array]:
     """The estimates of output and rate, and the normalised innovations squared."""
     model = _kalman_model(step)
     time, rate = make_pulses(step)

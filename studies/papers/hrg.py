@@ -9,8 +9,8 @@ from importlib.resources import files
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from compensation.decimation import average_groups
 from compensation.frequency import FrequencyFit, OrderComparison, compare_orders, fit_frequency
 from shell.constants import zero_Celsius
@@ -21,26 +21,20 @@ from studies.instrument.card import Instrument
 from studies.law import law_of
 from studies.record import read_frequency_table
 
-Array = NDArray[np.float64]
 RESOLUTION = 0.01  # Hz, last printed digit of Table 1
 CARD = "hrg-30mm"
 
 
 @dataclass(frozen=True)
 class FrequencyStudy:
-    """A steady-state table, its fits of rising order, and the temperatures that they give back.
-
-    `temperature_degC` and `frequency` as measured; `fit` of the chosen order; `orders` all of them;
-    `calculated_degC` from the fit's inverse; `local_degC`, `local_slope_ppm`, `local_uncertainty_ppm` between
-    neighbouring points.
-    """
+    """A steady-state table, its fits of rising order, and the temperatures that they give back."""
 
     temperature_degC: Array
     frequency: Array
     fit: FrequencyFit
-    orders: OrderComparison
-    calculated_degC: Array
-    local_degC: Array
+    orders: OrderComparison  # all of them
+    calculated_degC: Array  # from the fit's inverse
+    local_degC: Array  # between neighbouring points, as the slopes
     local_slope_ppm: Array
     local_uncertainty_ppm: float
 
@@ -58,19 +52,14 @@ class FrequencyStudy:
 
 @dataclass(frozen=True)
 class PhysicsComparison:
-    """What the material's published laws predict for a card, beside the measured table.
-
-    `parts` (1/K) of the slope by the card's law, and its `uncertainty` (1/K), at the local temperatures and, last, at 20 °C;
-    `laws` (name, slope at 20 °C, its uncertainty in ppm/°C) of every published law; curvatures in ppm/°C², twice the
-    quadratic coefficient of ln f, of the law with its standard deviation.
-    """
+    """What the material's published laws predict for a card, beside the measured table."""
 
     instrument: "Instrument"
     temperature: Array
-    parts: "SlopeParts"
-    uncertainty: Array
-    laws: Sequence[tuple[str, float, float]]
-    curvature_measured: float
+    parts: "SlopeParts"  # 1/K, of the slope by the card's law, at the local temperatures and, last, at 20 °C
+    uncertainty: Array  # 1/K, of the slope
+    laws: Sequence[tuple[str, float, float]]  # name, slope at 20 °C and its uncertainty (ppm/°C) of every published law
+    curvature_measured: float  # ppm/°C², twice the quadratic coefficient of ln f
     curvature_law: float
     curvature_uncertainty: float
 

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from shell.constants import zero_Celsius
 from shell.law import FrequencyLaw
 from studies.instrument.card import Instrument
@@ -28,7 +28,6 @@ from thermal.radiative import simulate
 from thermal.resonator import shell_weights
 from thermal.settling import identify_conductance, step_remaining
 
-Array = NDArray[np.float64]
 ROOM_degC = 20.0
 STEPS_degC = (-10.0, 40.0)
 POINTS_degC = np.arange(-20.0, 41.0, 10.0)
@@ -60,18 +59,14 @@ class StepCurve:
 
 @dataclass(frozen=True)
 class SoakResult:
-    """What a soak of `hours` adds to the points of Table 1 in one network.
+    """What a soak of `hours` adds to the points of Table 1 in one network: to a quadratic through the seven points."""
 
-    `protocol`: every point "from room" temperature, or one after another "upwards" from a settled first one. `error` (Hz) is the frequency read minus the settled one; `slope` (ppm/°C at 20 °C) and `curvature` (ppm/°C², twice
-    the quadratic coefficient of ln f) are what it adds to a quadratic through the seven points.
-    """
-
-    protocol: str
+    protocol: str  # every point "from room" temperature, or one after another "upwards" from a settled first one
     network: str
     hours: float
-    error: Array
-    slope: float
-    curvature: float
+    error: Array  # Hz, read minus settled
+    slope: float  # ppm/°C at 20 °C
+    curvature: float  # ppm/°C², twice the quadratic coefficient of ln f
 
 
 @dataclass(frozen=True)

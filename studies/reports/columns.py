@@ -3,14 +3,13 @@
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from studies.instrument.display import display_name
 from studies.instrument.units import unit_of
 from studies.reports import style
 from studies.results import Drawing
 
-Array = NDArray[np.float64]
 Columns = Mapping[str, Array]
 FEW = 300  # rows that are drawn as points
 LONG = 10.0  # usual steps between two values that make a gap, whatever the rows between them hold

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.polynomial import Chebyshev
-from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from shell.constants import zero_Celsius
 from shell.family import Axis, Family, build_family
 from shell.interpolation import leja_points
@@ -32,7 +32,6 @@ from studies.sweeps.parameters import find_nominal, set_parameters
 if TYPE_CHECKING:
     from shell.resonator import Resonator
 
-Array = NDArray[np.float64]
 DIMENSIONS = ("thickness_mm", "radius_mm", "height_mm", "stem.radius_mm", "bottom_thickness_mm", "cylinder_height_mm")
 MOST_AXES = 3
 RANGES = (0.05, 0.02)  # of a dimension to both sides; the narrower where the wider takes too many solves

@@ -9,11 +9,11 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from compensation.arrays import Array
 from studies.results import Drawing
 
-Array = NDArray[np.float64]
 MOST = 100_000  # points of a figure beyond which it stays a picture
 DIGITS = 6  # digits of the axis's range to which values are kept
 
