@@ -1,4 +1,4 @@
-"""Which terms of HRG paper eq. (21) a bias model keeps, and what it is worth on data that it has not seen.
+"""Which terms of HRG paper eq. (21) a bias model keeps, and its worth on held-out data.
 
 Two ways of selecting stand side by side; the coefficients of the chosen terms are those of least squares in both:
 
@@ -45,7 +45,7 @@ class NoHeldOut(CompensationError):
 
 @dataclass(frozen=True)
 class HeldOutRows:
-    """What models are worth on rows that they have not seen: standard deviations of 100 s averages, pooled.
+    """What models are worth on held-out rows: standard deviations of 100 s averages, pooled.
 
     `before` without and `after` with compensation, both about the held-out piece's own mean; `coverage` the part of
     the rows that lies inside the range of the rest; `by_runs` whole runs were held out, else blocks; `terms` those
@@ -210,7 +210,7 @@ def score_path(runs: Sequence[BiasRun], selection: StepwiseSelection) -> tuple[f
 
 
 def score_runs(fit: BiasFit, runs: Sequence[BiasRun], *, extrapolate: bool = False) -> HeldOutRows:
-    """Apply a fitted model to runs that it has not seen; each run's own mean is taken out, nothing else.
+    """Apply a fitted model to held-out runs; each run's own mean is taken out, nothing else.
 
     Rows outside the range that the fit has seen are left out, unless `extrapolate`.
     """

@@ -1,4 +1,4 @@
-"""How much a compensation improves an output, on the data it was fitted to and on data it has not seen.
+"""How much a compensation improves an output, on the fitted and on held-out data.
 
 Every improvement is told twice: on the rows as they were recorded, where white noise may hide all else, and on averages
 over 100 s, where the slow error shows that a compensation is made for.
@@ -51,7 +51,7 @@ def compare_outputs(times: Sequence[Array], before: Sequence[Array], after: Sequ
 
 
 def hold_out(runs: Sequence[Run], compensate: Callable[[Sequence[Run], Run], Array]) -> list[Array]:
-    """Return the compensated output of each run, which the compensation has not seen."""
+    """Return the compensated output of each run, which was held out."""
     if len(runs) < 2:
         raise CompensationError("a held-out improvement needs two runs or more.")
     return [compensate([*runs[:i], *runs[i + 1 :]], run) for i, run in enumerate(runs)]

@@ -4,7 +4,7 @@ A free resonator of one material expands evenly, so by dimensions, for every the
 
     f(T) = √(E(T)/ρ(T)) Φ(ν(T)) / g(T),      g = exp ∫ α dT the growth of lengths since the reference temperature,
 
-and only Φ, a smooth function of one number, needs the solver. A base that expands otherwise (shell.mount) adds s ε(T) to ln f,
+and only Φ, a smooth function of one number, needs the solver. Thermal mismatch with the base (shell.mount) adds s ε(T) to ln f,
 s by the mode in its stress (shell.prestress). The slope has five parts (HRG paper eq. 15), and s ε' by the base,
 
     d ln f/dT = ½ E'/E + (∂ ln f/∂ν) ν' − ½ ρ'/ρ + (∂ ln f/∂ ln h) h'/h + (∂ ln f/∂ ln r) r'/r,
@@ -89,7 +89,7 @@ class FrequencyLaw:
     shape : ShapeFactor
     mode : the mode at the reference temperature: Bryan factor, energies, shape.
     prestress : what expansion does to it through stress.
-    mount : a base that expands otherwise than the resonator.
+    mount : a base with another expansion than the resonator.
     """
 
     material: Material
@@ -302,7 +302,7 @@ def build_law(
         single solve, and the law does not follow changes of Poisson's ratio.
     theory : "solid", "shell" or "rayleigh".
     harmonic : n.
-    mount : what the support holds on to, if it expands otherwise; for the solid theory and n >= 1.
+    mount : the base, if its expansion differs; for the solid theory and n >= 1.
     """
     if mount is not None:
         check_mount(resonator, theory, harmonic)
@@ -333,7 +333,7 @@ def build_law(
 
 
 def check_mount(resonator: Resonator, theory: Theory, harmonic: int) -> None:
-    """Refuse what a base that expands otherwise is not computed for."""
+    """Refuse cases for which thermal mismatch with the base is not computed."""
     if resonator.support == "free":
         raise ShellError("a free resonator is not joined to a base: give it a support, or leave the mount out.")
     if theory != "solid" or harmonic < 1:

@@ -1,4 +1,4 @@
-"""What the support holds on to: a base that expands otherwise than the resonator and stresses it."""
+"""Thermal mismatch with the base: it stresses the resonator."""
 
 from dataclasses import dataclass
 

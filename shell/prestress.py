@@ -1,4 +1,4 @@
-r"""What static stresses of revolution do to the frequency of a mode: uneven temperature, a base that expands otherwise, spin.
+r"""What static stresses of revolution do to the frequency of a mode: uneven temperature, thermal mismatch with the base, spin.
 
 A static field u_0 changes the energy of the mode u by its stresses σ (geometric stiffness K_σ) and by its shape,
 

@@ -1,4 +1,4 @@
-"""A cross-damping calibration as a study: the fit, what it improves, and what it improves on data it has not seen."""
+"""A cross-damping calibration as a study: the fit, what it improves, and its improvement on held-out data."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -25,7 +25,7 @@ class CrossDampingStudy:
 
     @property
     def is_useful(self) -> bool:
-        """Whether the compensation improves averages of data that the fit has not seen."""
+        """Whether the compensation improves averages of held-out data."""
         return self.held_out.averages.ratio > 1.0
 
     @property

@@ -72,7 +72,9 @@ class Decay:
     def remarks(self) -> tuple[str, ...]:
         """What is not as it should be, a sentence each."""
         one = self.phased or self.trace or self.spectrum
-        return () if one is None else one.remarks
+        said = () if one is None else one.remarks
+        lacking = "No reference frequency is given: frequencies are relative to it, and Q is unknown; add --frequency."
+        return (*said, lacking) if self.frequency is None and self.spectrum is None else said
 
     @property
     def estimates(self) -> "Mapping[str, Estimate]":

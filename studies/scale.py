@@ -185,7 +185,7 @@ def _thin(run: BellRun) -> BellRun:
 
 
 def _hold_out(runs: tuple[BellRun, BellRun, BellRun], rough: BellRun | None = None) -> tuple[float, float]:
-    """Rms error (°/s) of the rough and of the compensated rate on fifths of every run that the fit has not seen."""
+    """Rms error (°/s) of the rough and of the compensated rate on held-out fifths of every run."""
     before, after = [], []
     for block in range(BLOCKS):
         seen, unseen = zip(*(_cut(run, block) for run in runs), strict=True)

@@ -64,7 +64,7 @@ class LinearResponse:
 
 @dataclass(frozen=True)
 class HeldOutRun:
-    """How one run that the calibration has not seen is predicted: rms of block averages by response.
+    """How one held-out run is predicted: rms of block averages by response.
 
     Attributes
     ----------
@@ -227,7 +227,7 @@ def calibrate(
         progress("held-out run")
         held_out = predict_held_out(instrument, runs, tables, hold_out, exact, found)
     if profile:
-        progress("intervals")
+        progress("computing the intervals")
     estimates, kept = estimate(found, profile), keep_agreeing(found) if keep else found
     if kept is not found:
         estimates, found = put_back(estimates, kept), kept

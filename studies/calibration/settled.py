@@ -88,18 +88,18 @@ class SettledComparison:
             "." if slope is None else f", {slope.predicted:.1f} ± {slope.sd:.1f} ppm/°C."
         )
         second = (
-            f"The level differs by {level.measured - level.predicted:+.2f} Hz ({share:+.2g} %), {_apart(level.away)}"
+            f"Difference in level: {level.measured - level.predicted:+.2f} Hz ({share:+.2g} %), {_apart(level.away)}"
             + (
                 "."
                 if slope is None
-                else f"; the slope by {slope.measured - slope.predicted:+.1f} ppm/°C, {_apart(slope.away)}."
+                else f"; in slope: {slope.measured - slope.predicted:+.1f} ppm/°C, {_apart(slope.away)}."
             )
         )
         return (first, second, *self.bridges)
 
 
 def _apart(away: float) -> str:
-    return f"{abs(away):.1f} standard deviations" if abs(away) >= 0.05 else "so they agree"
+    return f"{abs(away):.1f} standard deviations" if abs(away) >= 0.05 else "well within the uncertainty"
 
 
 def compare_settled(problem: "CardProblem") -> tuple[SettledComparison, ...]:

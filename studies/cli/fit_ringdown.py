@@ -82,7 +82,7 @@ def fit_ringdown(
     card : str
         The resonator's card: an aliased frequency is recognised by it, and --save writes it with the values found.
     frequency : float
-        Carrier or reference frequency in Hz, in place of the file's comment.
+        Carrier or reference frequency in Hz, in place of the file's comment '# reference_frequency_Hz: …'.
     save : str
         Write the card with the split, its axis, 1/Q and the damping axis of the first decay.
     out : str

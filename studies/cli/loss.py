@@ -125,7 +125,7 @@ def _parts(
         shown = {"share": 100 * own / total, "half": 1 / (total - own / 2), "advice": _sentence(part.advice)}
         rows.append(entry | shown | {"without": rest if np.isfinite(rest) else "nothing left"})
     picked = sorted({0, at, len(degrees) - 1})
-    name = Column("name", "part")
+    name = Column("name", "contribution")
     interval = Column("inverse_q", "90 % interval", "1e-9", digits=2, scale=1e9, interval=(f"low.{at}", f"high.{at}"))
     values = [Column(f"inverse_q.{k}", f"1/Q at {degrees[k]:.0f} °C", "1e-9", ".3g", scale=1e9) for k in picked]
     damped = [] if around is None else rows_of({"T": degrees, **around})
@@ -139,9 +139,9 @@ def _parts(
         Chapter("Summary", [
             Facts(_facts(budget, stated, at, degrees[at])),
             *words,
-            Figure(lambda: _draw_bars(budget, at), f"Parts of 1/Q at {degrees[at]:g} °C with 90 % intervals."),
+            Figure(lambda: _draw_bars(budget, at), f"Contributions to 1/Q at {degrees[at]:g} °C with 90 % intervals."),
         ]),
-        Chapter(f"Parts at {degrees[at]:g} °C", [
+        Chapter(f"Contributions at {degrees[at]:g} °C", [
             Table("Share and gain", rows, [
                 name, Column("share", "share", "%", ".3g"), *values, interval, Column(f"slope_per_K.{at}", "slope", "%/°C", "+.2g", scale=100.0),
                 Column("half", "Q if halved", digits=3), Column("without", "Q without it", digits=3),
@@ -181,7 +181,7 @@ def _facts(budget: Budget, stated: StatedLoss | None, at: int, degrees: float) -
     gain = f"Q would be {plain(without)} without it" if np.isfinite(without) else "no other contribution is known"
     facts = [
         (f"Q at {degrees:g} °C", plain(1 / budget.inverse_q[at]), f"90 %: {plain(1 / high)} … {plain(1 / low)}"),
-        ("Largest part", budget.first.name, gain),
+        ("Largest contribution", budget.first.name, gain),
     ]
     if stated is not None:
         share, least, most = (100 * part for part in (stated.explained, stated.low, stated.high))

@@ -199,7 +199,7 @@ class Model(ModelKeys, frozen=True, kw_only=True):
         return self.validity[variable]
 
     def check_range(self, variable: str, values: "NDArray[np.float64]", extrapolate: bool) -> None:
-        """Refuse values of a variable that the fit has not seen, unless told to extrapolate.
+        """Refuse values of a variable outside the fitted range, unless told to extrapolate.
 
         Missing values (NaN) pass; they stay missing in the result.
 

@@ -1,6 +1,7 @@
 """hrg fit ringdown on files of a resonator whose values are known, and on files that are no ring-down."""
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -48,6 +49,12 @@ def test_a_lock_in_file_gives_split_axes_and_q_and_a_card_that_has_them(lock_in,
     assert split["split_Hz"] == pytest.approx(0.12, abs=1e-3)
     assert split["slow_axis_deg"] == pytest.approx(76.0, abs=0.5)
     assert "Axis of the upper mode".lower() in page.read_text().lower()
+    bare = Path(lock_in).with_name("bare.csv")
+    bare.write_text(
+        "".join(line for line in Path(lock_in).read_text().splitlines(True) if "reference_frequency_Hz" not in line)
+    )
+    assert main(["fit", "ringdown", str(bare)]) == 0
+    assert "No reference frequency is given: frequencies are relative to it" in capsys.readouterr().out
 
 
 @pytest.mark.slow

@@ -1,4 +1,4 @@
-"""`[mount]`: what the support holds on to, where it expands otherwise than the resonator."""
+"""`[mount]`: the base, where its expansion differs from that of the resonator."""
 
 from typing import TYPE_CHECKING, Annotated
 
