@@ -135,7 +135,9 @@ def study_bias(
             held_out = score_held_out(runs, name)
         except NoHeldOut as error:
             held_out, why = None, str(error)
-        judged.append(Judged(name, fit, _training(runs, fit), held_out, _score_path(runs, fit)))
+        spreads = np.array([[bias_stability(run), bias_stability(run, fit.left(run))] for run in runs])
+        before, after = np.sqrt(np.mean(spreads**2, axis=0)).tolist()  # on the fitted runs, root mean square over them
+        judged.append(Judged(name, fit, (before, after), held_out, _score_path(runs, fit)))
     fit = next(j.fit for j in judged if j.method == method)
     sources, made_by = tuple(map(source_of, records)), f"hrg-workbench, hrg fit bias --method {method}"
     model = save_bias(fit, runs[0], output, column, sources, made_by)
@@ -213,10 +215,3 @@ def _score_path(runs: Sequence[BiasRun], fit: BiasFit) -> tuple[float, ...]:
         return fit.held_out or (score_path(runs, fit.selection) if fit.selection else ())
     except CompensationError:  # nothing can be held out, which `no_held_out` tells
         return ()
-
-
-def _training(runs: Sequence[BiasRun], fit: BiasFit) -> tuple[float, float]:
-    """Bias stability before and after on the fitted runs, root mean square over the runs."""
-    before = [bias_stability(run) for run in runs]
-    after = [bias_stability(run, fit.left(run)) for run in runs]
-    return float(np.sqrt(np.mean(np.square(before)))), float(np.sqrt(np.mean(np.square(after))))

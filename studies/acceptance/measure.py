@@ -60,7 +60,9 @@ def measure_drift(records: "Sequence[Record]", output: str) -> tuple[Found, Alla
     """Bias, its repeatability, and the noise coefficients of the longest record (12.11)."""
     means: list[tuple[float, float]] = []
     for record in records:
-        blocks = average_blocks(record["time_s"], {"output": record[output]}, _block_of(record))
+        time = record["time_s"]  # a mean is of at least ten rows, and there are at most some thousands of them
+        width = max(10 * float(np.median(np.diff(time))), float(time[-1] - time[0]) / 2000)
+        blocks = average_blocks(time, {"output": record[output]}, width)
         y = blocks.columns["output"]
         with naming(record.path):
             fit = fit_coloured(np.ones((len(y), 1)), y, ["bias"], [slice(0, len(y))])
@@ -98,12 +100,6 @@ def _deviation(deviation: float, free: int, sources: Sequence[str]) -> Measured:
     """Return a standard deviation with the χ² interval of its degrees of freedom."""
     low, high = (float(scipy.special.chdtri(free, 0.5 - side * CONFIDENCE / 2)) for side in (1, -1))
     return Measured(deviation, deviation * math.sqrt(free / low), deviation * math.sqrt(free / high), tuple(sources))
-
-
-def _block_of(record: "Record") -> float:
-    """Block (s) of a mean: at least ten rows, and at most some thousands of blocks."""
-    time = record["time_s"]
-    return max(10 * float(np.median(np.diff(time))), float(time[-1] - time[0]) / 2000)
 
 
 def measure_temperature(records: "Sequence[Record]", output: str) -> Found:

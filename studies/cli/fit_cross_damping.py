@@ -75,7 +75,9 @@ def fit_cross_damping(
         raise InputError("name at least one record (CSV) of a gyro at rest.")
     records = records_of_one_gyro([read_record(path) for path in data], say)
     carrier = frequency if frequency is not None else _median(records, "frequency_Hz", "--frequency")
-    quality = quality if quality is not None else _quality(records)
+    if quality is None:
+        loss = _median(records, "inverse_q", "--quality")
+        quality = 1 / loss if loss else float("inf")
     if not (0 < carrier < 1e9 and 1 < quality < 1e12):
         wrong = f"--quality {quality:g}" if 0 < carrier < 1e9 else f"--frequency {carrier:g}"
         raise InputError(
@@ -177,12 +179,6 @@ def _summarise(study: CrossDampingStudy, data: RestData) -> dict[str, Any]:
 
 def _change(change: Change, unit: float) -> dict[str, float]:
     return {"before": change.before / unit, "after": change.after / unit, "improvement": change.ratio}
-
-
-def _quality(records: list[Record]) -> float:
-    """Quality factor from the median 1/Q of the records."""
-    loss = _median(records, "inverse_q", "--quality")
-    return 1 / loss if loss else float("inf")
 
 
 def _median(records: list[Record], column: str, option: str) -> float:

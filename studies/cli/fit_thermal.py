@@ -72,6 +72,10 @@ def fit_thermal(*data: str, card: str | None = None, lags: int | None = None, co
         e | dict(zip(("constant", "unit"), _name(name), strict=True)) | {"shown": "not determined" if e["value"] is None else e["value"]}
         for name, e in estimates.items()
     ]  # fmt: skip
+    combined = [
+        [f"{share:+.2f} × {(word := _name(key)[0])[:1].lower()}{word[1:]}" for key, share in one.parts.items()]
+        for one in found.undetermined
+    ]
     ends = Column("value", f"{100 * confidence:g} % interval", interval=("low", "high"), digits=0)
     note = f"Fitted to averages over {found.row_step:g} s; rms residual {rms:.2g} Hz."
     return Result(
@@ -85,7 +89,7 @@ def fit_thermal(*data: str, card: str | None = None, lags: int | None = None, co
                 ("Constant", Column("shown", "Value", within=("low", "high")), ends, "Unit"),
                 note,
             ),
-            *(Sentence(OPEN.format(_combine(one.parts)), "warning") for one in found.undetermined),
+            *(Sentence(OPEN.format(" ".join(words)), "warning") for words in combined),
             Sentence(MISFIT.format(rms / white), "warning") if rms > COLOURED * white else None,
             Figure(lambda: _draw(found), "Residual of the frequency, all runs in order."),
         ],
@@ -102,11 +106,6 @@ MISFIT = (
 def _name(key: str) -> tuple[str, str]:
     """Return the name and the unit of a constant."""
     return NAMES.get(key) or (key.replace("_", " ").capitalize(), "s" if key.startswith("time_constant") else "")
-
-
-def _combine(parts: dict[str, float]) -> str:
-    named = ((share, _name(key)[0]) for key, share in parts.items())
-    return " ".join(f"{share:+.2f} × {name[:1].lower()}{name[1:]}" for share, name in named)
 
 
 def _draw(found: Identification) -> Drawing:

@@ -16,15 +16,14 @@ from typing import Any
 
 import numpy as np
 
-from shell.modes import solve_modes
 from studies.cli.arguments import Quiet, Workers
 from studies.cli.output import answers
 from studies.design.answer import Answer
 from studies.design.run import CARD, TABLE, best_instrument
 from studies.design.run import optimise as find_best
-from studies.instrument.card import Instrument
 from studies.reports import style
 from studies.reports.digits import plain
+from studies.reports.scenes import show_mode
 from studies.results import Blocks, Chapter, Column, Drawing, Facts, Figure, Result, Table, row_of
 from studies.results.page import Block
 
@@ -142,7 +141,7 @@ def _parts(found: Answer, payload: dict[str, Any]) -> list[Any]:
                 Column("best", "best, full solve", digits=7),
             ], "Interpolated: from all other designs. Full solve: the design itself, solved again from its card with the same result."
                " Only the magnitude of a separation counts; its sign shows on which side the nearest mode lies."),
-            Figure(lambda: _draw_section(best_instrument(found)), "Section of the best design, at rest and at maximum displacement."),
+            Figure(lambda: show_mode(best_instrument(found)).mode.plot(), "Section of the best design, at rest and at maximum displacement."),
         ]),
         Chapter("About the best design", [Blocks(lambda: _live(found))]),
         Chapter("Constraints", [
@@ -216,8 +215,3 @@ def _draw_front(found: "Answer") -> Drawing:
             if (found.values[held, c] > 0).all() and np.ptp(np.log10(found.values[held, c])) > 1:
                 scale("log")
         return made
-
-
-def _draw_section(instrument: "Instrument") -> Drawing:
-    """The section with the swing of the mode n = 2."""
-    return solve_modes(*instrument.at(instrument.reference_temperature), 2)[0].plot()

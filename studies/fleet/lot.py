@@ -13,6 +13,7 @@ from studies.fleet.device import Answer, Standing, interval
 from studies.fleet.folder import Device
 from studies.fleet.population import FEWEST, Quantity
 from studies.instrument.display import display_name
+from studies.results import row_of
 
 DESIGN = 0.05  # relative distance of a frequency from the lot's, beyond which a device is of another design
 TOLD = 0.6  # part of the devices whose records must tell a value for it to be one of the lot
@@ -57,7 +58,9 @@ class Lot:
         for one in self.quantities:
             for name, chance in one.bad_batches.items():
                 inside = one.among([s for s in one.of if one.batches.get(s) == name])
-                out.setdefault(name, []).append(_far(one, inside.mean, chance))
+                of = one.name if " " in one.name else display_name(one.name)
+                apart = f"{of} is {inside.mean:.5g}, in the lot {one.population.mean:.5g} (chance {chance:.1g})"
+                out.setdefault(name, []).append(apart)
         for share in self.shares:
             if share.kind == "batch":
                 out.setdefault(share.batch, []).append(f"has {' or '.join(share.names)} in {share.response}")
@@ -84,38 +87,18 @@ class Lot:
         }
 
 
-def _far(one: Quantity, value: float, chance: float) -> str:
-    name = one.name if " " in one.name else display_name(one.name)
-    return f"{name} is {value:.5g}, in the lot {one.population.mean:.5g} (chance {chance:.1g})"
-
-
 def _cause(one: Share) -> dict[str, Any]:
-    return {
-        "effect": one.effect,
-        "response": one.response,
-        "equivalent": list(one.equivalent),
-        "kind": one.kind,
-        "batch": one.batch or None,
-        "having": list(one.having),
-        "lacking": list(one.lacking),
-        "odd": list(one.odd),
-        "evidence": one.evidence,
-        "coefficient": next(iter(one.sizes.values())).coefficient,
-        "sizes": {serial: interval(size.first, size.first_sd) for serial, size in one.sizes.items()},
-    }
+    row = row_of(one, "effect", "response", "equivalent", "kind", "having", "lacking", "odd", "evidence")
+    sizes = {serial: interval(size.first, size.first_sd) for serial, size in one.sizes.items()}
+    return row | {"batch": one.batch or None, "coefficient": next(iter(one.sizes.values())).coefficient, "sizes": sizes}
 
 
 def _value(one: Quantity) -> dict[str, Any]:
-    lot = one.population
     return {
-        "name": one.name,
-        "mean": lot.mean,
-        "mean_sd": lot.mean_sd,
-        "scatter": lot.scatter,
+        **row_of(one, "name", "odd", "bad_batches", mean="population.mean", mean_sd="population.mean_sd"),
+        "scatter": one.population.scatter,
         "devices": {serial: interval(own.value, own.sd) for serial, own in one.of.items()},
         "with_lot": {s: interval(own.value, own.sd) for s in one.of for own in [one.with_lot(s)]},
-        "odd": dict(one.odd),
-        "bad_batches": dict(one.bad_batches),
     }
 
 

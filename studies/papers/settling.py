@@ -103,7 +103,8 @@ def study_settling(instrument: "Instrument", hours: tuple[float, ...] = (4.0, 4.
     """Compute Figure 3 and the soak errors of Table 1 in the radiative and the linear network."""
     law = _law(instrument)
     weights = cell_weights(instrument, law)
-    networks = dict(zip(NETWORKS, _networks(instrument), strict=True))
+    whole = [build_network(instrument, radiation=radiation) for radiation in (True, False)]
+    networks = dict(zip(NETWORKS, (*whole, build_shell_and_stem(instrument)), strict=True))
     curves = [
         _curve(name, network, weights, law, target) for target in STEPS_degC for name, network in networks.items()
     ]
@@ -117,14 +118,6 @@ def study_settling(instrument: "Instrument", hours: tuple[float, ...] = (4.0, 4.
     settled = law.frequency(POINTS_degC + zero_Celsius)
     return SettlingStudy(
         tuple(curves), tuple(soaks), *_slope_and_curvature(T, f), *_slope_and_curvature(POINTS_degC, settled)
-    )
-
-
-def _networks(instrument: "Instrument") -> tuple[Network, Network, Network]:
-    return (
-        build_network(instrument, radiation=True),
-        build_network(instrument, radiation=False),
-        build_shell_and_stem(instrument),
     )
 
 

@@ -35,7 +35,8 @@ def draw_columns(columns: Columns) -> Drawing:
             drawn = x[rows], columns[name][rows]
             if timed:
                 gaps = find_gaps(columns["time_s"], columns[name]) / 3600
-                drawn = _broken(*drawn, gaps)
+                at = np.searchsorted(drawn[0], gaps[:, 0], side="right")  # the line is interrupted in gaps
+                drawn = np.insert(drawn[0], at, gaps[:, 0]), np.insert(drawn[1], at, np.nan)
                 spans = [(begin, end - begin) for begin, end in gaps]
                 shade = {"color": style.ORANGE, "alpha": 0.35, "linewidth": 0.8}
                 axis.broken_barh(spans, (0, 1), transform=axis.get_xaxis_transform(), **shade)
@@ -44,12 +45,6 @@ def draw_columns(columns: Columns) -> Drawing:
         axes[-1, 0].set_xlabel(label)
         made: Drawing = figure
     return made
-
-
-def _broken(x: Array, y: Array, gaps: Array) -> tuple[Array, Array]:
-    """Return a line that is interrupted where its column has gaps."""
-    at = np.searchsorted(x, gaps[:, 0], side="right")
-    return np.insert(x, at, gaps[:, 0]), np.insert(y, at, np.nan)
 
 
 def find_gaps(time: Array, values: Array) -> Array:

@@ -129,17 +129,13 @@ def _largest(slopes: tuple[BiasSlope, ...], sd: float) -> list[str]:
     if not slopes or slopes[0].effect == 0:
         return []
     first, share = slopes[0], (slopes[0].effect / sd) ** 2 if sd > 0 else 0.0
-    name, unit = f"{display_name(first.key)} ({first.key})", _unit(first.key)
+    name, unit = f"{display_name(first.key)} ({first.key})", unit_of(first.key)
+    unit = {"1": "", "°": "°"}.get(unit, f" {unit}")
     return [
         f"Largest contribution to the uncertainty of the bias: {name}. Its standard deviation of {first.sd:.3g}{unit} contributes"
         f" {first.effect:.3g} °/h, {100 * share:.0f} % of the variance. A constant bias can be calibrated out; drift of these"
         " values with age or temperature changes the bias in proportion to the slopes."
     ]
-
-
-def _unit(key: str) -> str:
-    unit = unit_of(key)
-    return "" if unit == "1" else unit if unit == "°" else f" {unit}"
 
 
 def _around(study: LoopStudy) -> Drawing:

@@ -169,13 +169,14 @@ def _short(parts: Reproduction) -> list[Part]:
     study, physics = parts.study, parts.physics
     better = study.next_fit
     assert better is not None
+    farthest = float(np.max(np.abs(study.calculated_degC - hrg.printed_table2()[0])))
     away = (physics.slope_ppm[-1] - float(study.fit.slope_ppm(20.0))) / physics.uncertainty_ppm[-1]
     away_curvature = abs(physics.curvature_measured - physics.curvature_law) / physics.curvature_uncertainty
     slopes = [value for _, value, _ in physics.laws]
     return [
         (
             "The two published coefficients of the cubic are reproduced to the last digit, and the temperatures of Table 2 to within"
-            f" {_farthest(study):.4f} K. At −10 °C the columns of the paper disagree: it gives −10.058 °C but an error of 0.0578 K"
+            f" {farthest:.4f} K. At −10 °C the columns of the paper disagree: it gives −10.058 °C but an error of 0.0578 K"
             f" (here {study.error_degC[1]:.4f} K). The paper concludes that higher orders have little effect; this is not reproduced."
             f" The residual sum of squares is {better.sum_of_squares:.1e} Hz² for a quartic and"
             f" {study.fit.sum_of_squares:.2e} Hz² for the cubic, and the quartic predicts omitted points"
@@ -195,11 +196,6 @@ def _short(parts: Reproduction) -> list[Part]:
             "note",
         ),
     ]
-
-
-def _farthest(study: FrequencyStudy) -> float:
-    """Return the largest distance of a calculated temperature of Table 2 from the printed one (K)."""
-    return float(np.max(np.abs(study.calculated_degC - hrg.printed_table2()[0])))
 
 
 def _table1(study: FrequencyStudy) -> list[Part]:

@@ -93,6 +93,11 @@ def run_chapters(survey: Survey, told: dict[str, Any], several: bool) -> list[Ch
         drawn = f" Of {count:,} rows the least and the largest of every {step} are drawn, and a part that is enlarged shows no more."
     noise = [column for column in survey.columns if column.stability is not None]
     dense = [column for column in survey.columns if column.density is not None]
+    made = {column.density.even for column in dense if column.density is not None}
+    how = {
+        frozenset({True}): "Welch's, of even rows",
+        frozenset({False}): "Lomb's, since rows are uneven or missing",
+    }.get(frozenset(made), "Welch's, and Lomb's of columns with missing rows")
     found: dict[str, Sequence[Part]] = {
         "over time": [
             Figure(lambda: draw_columns(survey.record.columns), f"All columns. Shaded: no values.{drawn}"),
@@ -107,7 +112,7 @@ def run_chapters(survey: Survey, told: dict[str, Any], several: bool) -> list[Ch
                 "Overlapping Allan deviation with its 90 % interval, and (dashed) white noise, flicker and random walk fitted together."),
             Table("Noise", told["columns"], NOISE, NOISE_NOTE),
         ] if noise else ["No column varies over enough rows for an Allan deviation."],
-        "spectra": [Figure(lambda: _draw_spectra(survey), _spectrum_words(survey))] if dense else [],
+        "spectra": [Figure(lambda: _draw_spectra(survey), f"Amplitude spectral density ({how}), mean and slope taken off.")] if dense else [],
         "correlation": [Table("Correlation between columns", told["correlations"], CORRELATIONS, CORRELATION_NOTE, "page", sortable=True)],
     }  # fmt: skip
     chapters = [Chapter((before + title) if before else title.capitalize(), parts) for title, parts in found.items()]
@@ -171,12 +176,6 @@ def _blank(axes: Any, count: int) -> None:
         axis.set_visible(False)
     if count % 2 and axes.size > 2:
         axes[-2, 1].set_xlabel(axes[-1, 0].get_xlabel())
-
-
-def _spectrum_words(survey: Survey) -> str:
-    made = [column.density.even for column in survey.columns if column.density is not None]
-    how = "Welch's, of even rows" if all(made) else "Lomb's, since rows are uneven or missing" if not any(made) else "Welch's, and Lomb's of columns with missing rows"  # fmt: skip
-    return f"Amplitude spectral density ({how}), mean and slope removed."
 
 
 def tell(survey: Survey) -> dict[str, Any]:

@@ -1,6 +1,6 @@
 """The page of a parametric study: what was asked, what came out, what matters, and where it comes from."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -205,7 +205,9 @@ def _provenance(results: Results) -> list[Part]:
     runs = [{**run, "run": count} for count, run in enumerate(results.store.runs, 1)]
     environments: dict[str, list[str]] = {}
     for run in runs:
-        environments.setdefault(_environment(run["provenance"]), []).append(str(run["run"]))
+        of = run["provenance"]
+        versions = ", ".join(f"{name} {text}" for name, text in of["packages"].items())
+        environments.setdefault(f"Python {of['python']}, {versions}; {of['platform']}", []).append(str(run["run"]))
     facts = {
         "study created": about["created_utc"],
         "physics version": identity["physics_version"],
@@ -222,11 +224,6 @@ def _provenance(results: Results) -> list[Part]:
         *(f"Run {', '.join(counts)}: {words}." for words, counts in environments.items()),
         Sentence(about["spec_text"], "source") if about["spec_text"] else None,
     ]
-
-
-def _environment(found: Mapping[str, Any]) -> str:
-    versions = ", ".join(f"{name} {text}" for name, text in found["packages"].items())
-    return f"Python {found['python']}, {versions}; {found['platform']}"
 
 
 def _range(parameter: StudyParameter) -> str:

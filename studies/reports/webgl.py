@@ -41,6 +41,8 @@ def view_modes(
     splits: "Sequence[Drawn | None]" = (),
 ) -> Embedded:  # fmt: skip
     """Return an interactive view of modes (solid or shell) of one resonator; `png` stands in where WebGL2 is missing, and on paper."""
+    import matplotlib as mpl
+
     size = resonator.size
     pairs = zip(modes, splits or [None] * len(modes), strict=True)
     described = [_describe(resonator, mode, size, split) for mode, split in pairs]
@@ -48,7 +50,7 @@ def view_modes(
     start, rim = resonator.at([0.0]), resonator.at([resonator.length])
     data = {
         "modes": described,
-        "map": _colour_map(),
+        "map": [[round(float(x), 4) for x in mpl.colormaps["cividis"](k / 15)[:3]] for k in range(16)],
         "middle": middle / size,
         "reach": reach / size,
         "opens_up": bool(rim.z[0] > start.z[0]),
@@ -131,9 +133,3 @@ def _bounds(resonator: "Resonator") -> tuple[float, float]:
     line = trace_outlines(resonator, resonator.size / 40)[0]
     middle = float(line.z.max() + line.z.min()) / 2
     return middle, float(np.hypot(line.r, line.z - middle).max())
-
-
-def _colour_map() -> list[list[float]]:
-    import matplotlib as mpl
-
-    return [[round(float(x), 4) for x in mpl.colormaps["cividis"](k / 15)[:3]] for k in range(16)]
