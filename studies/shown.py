@@ -12,9 +12,7 @@ if TYPE_CHECKING:
 class Shown:
     """Gives a class with a short `__repr__` and `to_frame` its look in a notebook, and its picture."""
 
-    drawn_by: ClassVar[str] = (
-        ""  # "module:function" of the picture, by name: results do not import the pages, which import them
-    )
+    drawn_by: ClassVar[str] = ""  # "module:function" of the picture: results do not import the pages, which import them
 
     def to_frame(self) -> "DataFrame":
         """Return what the result holds as a table."""

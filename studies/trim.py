@@ -218,9 +218,8 @@ def plan_for_card(
 
     def plan_with(gains: Mapping[int, Array], error: float) -> TrimPlan:
         scaled = replace(sites, gain={n: gain * w for n, w in gains.items()})
-        return plan_trim(
-            readings, scaled, goal=goal, removal_error=removal_error, gain_error=error, unbalance=unbalance
-        )
+        errors = {"removal_error": removal_error, "gain_error": error}
+        return plan_trim(readings, scaled, goal=goal, unbalance=unbalance, **errors)
 
     if teeth is not None or kind == "mass":
         return CardPlan(plan_with(sites.gain, gain_error), {})

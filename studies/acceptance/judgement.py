@@ -95,9 +95,8 @@ def judge(
     found: Found = measure_seal(records)
     allan = noise = band = None
     if "warm-up" in sorted_runs:
-        more, band = measure_warm_up(
-            sorted_runs["warm-up"][0], output, None if limits is None else limits.warm_up.band_deg_per_h
-        )
+        asked = None if limits is None else limits.warm_up.band_deg_per_h
+        more, band = measure_warm_up(sorted_runs["warm-up"][0], output, asked)
         found |= more
     if "temperature" in sorted_runs:
         found |= measure_temperature(sorted_runs["temperature"], output)

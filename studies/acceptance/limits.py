@@ -30,9 +30,8 @@ def _declare_quantities() -> Any:
         return Annotated[float, number(f"{q.words}; {'at most, in size' if q.upper else 'at least'}", above=0.0)] | None
 
     fields: list[Any] = [(q.key, declare(q), None) for q in QUANTITIES]
-    return msgspec.defstruct(
-        "QuantityLimits", fields, bases=(Keys,), namespace={"__post_init__": check}, frozen=True, kw_only=True
-    )
+    own: dict[str, Any] = {"bases": (Keys,), "namespace": {"__post_init__": check}}
+    return msgspec.defstruct("QuantityLimits", fields, **own, frozen=True, kw_only=True)
 
 
 QuantityLimits: Any = _declare_quantities()

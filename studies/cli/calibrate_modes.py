@@ -100,9 +100,8 @@ def unsaved(found: ModeCalibration) -> str:
 
 def _payload(found: ModeCalibration, save: str | None) -> dict[str, Any]:
     readings, fit = found.readings, found.fit
-    rows = zip(
-        readings.lines, fit.modes, readings.frequency, fit.residual, fit.noise, found.chance, found.rivals, strict=True
-    )
+    judged = (fit.residual, fit.noise, found.chance, found.rivals)
+    rows = zip(readings.lines, fit.modes, readings.frequency, *judged, strict=True)
     undecided = [line for line, chance in zip(readings.lines, found.chance, strict=True) if chance < 0.95]
     said = [f"{readings.path}, line {line}: the readings do not determine which mode this is." for line in undecided]
     return {

@@ -90,9 +90,8 @@ def fit_cross_damping(
     gathered = gather_rest(records, OUTPUTS)
     T = calibration_temperature + zero_Celsius
     with naming(", ".join(data)):
-        study = study_cross_damping(
-            gathered.runs, k=2 * math.pi * carrier, zeta=1 / (2 * quality), calibration_temperature=T, order=order
-        )
+        k, zeta = 2 * math.pi * carrier, 1 / (2 * quality)
+        study = study_cross_damping(gathered.runs, k=k, zeta=zeta, calibration_temperature=T, order=order)
     sources, made_by = tuple(map(source_of, records)), "hrg-workbench, hrg fit cross-damping"
     model = save_cross_damping(study.model, gathered.output, gathered.temperature_column, sources, made_by)
     keep_model(model, save)

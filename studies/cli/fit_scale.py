@@ -173,7 +173,5 @@ def _remarks(study: ScaleStudy) -> list[str]:
 
 def _spell_unit(unit: str) -> str:
     """Return a unit of a model file as people write it: °/s/K² for deg/s/degC^2."""
-    spelled = (
-        unit.replace("deg/s per counts", "°/s per count").replace("/degC", "/K").replace("deg", "°").removeprefix("1")
-    )
-    return re.sub(r"\^(\d+)", lambda power: raised(int(power[1])), re.sub("^/", "per ", spelled or ""))
+    spelled = unit.replace("deg/s per counts", "°/s per count").replace("/degC", "/K").replace("deg", "°")
+    return re.sub(r"\^(\d+)", lambda power: raised(int(power[1])), re.sub("^/", "per ", spelled.removeprefix("1")))

@@ -135,9 +135,8 @@ def _crystal(m: Mode, asked: Asked) -> Entry | None:
         if given is not None:
             raise
         return None  # of a stem or a clamp; the material's caveat says so
-    lines = row_of(
-        pair, "relative_split", "relative_error_estimate", antinode_along_100_Hz="along_100", other_Hz="along_110"
-    )
+    axes = {"antinode_along_100_Hz": "along_100", "other_Hz": "along_110"}
+    lines = row_of(pair, "relative_split", "relative_error_estimate", **axes)
     return lines | {"split_Hz": abs(pair.along_110 - pair.along_100)}
 
 

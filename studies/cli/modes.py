@@ -87,9 +87,8 @@ def modes(
     mean = float(sum(h for _, h in resonator.thickness) / len(resonator.thickness))
     entries = []
     for m, effects in zip(found, more, strict=True):
-        entry = row_of(
-            m, "harmonic", "index", "label", "bryan_factor", "relative_error_estimate", frequency_Hz="frequency"
-        )
+        names = ("harmonic", "index", "label", "bryan_factor", "relative_error_estimate")
+        entry = row_of(m, *names, frequency_Hz="frequency")
         if detailed:
             # of a wall that grows everywhere by the same part
             per_micrometre = float(m.frequency * m.sensitivities.thickness / mean * 1e-6)

@@ -114,9 +114,7 @@ def _parts(found: Answer, payload: dict[str, Any]) -> list[Any]:
         return f"{label[column]}{unit[column].replace(' ', ' (', 1) + ')' if unit[column] else ''}"
 
     goals = [(goal.column, found.place(goal.column)) for goal in found.task.keys.objective]
-    facts = [
-        (label[name], f"{plain(found.after[k])}{unit[name]}", f"before: {plain(found.before[k])}") for name, k in goals
-    ]
+    facts = [(label[n], f"{plain(found.after[k])}{unit[n]}", f"before: {plain(found.before[k])}") for n, k in goals]
     reasons = Counter(reason for _, reason in found.failures)
     several = len(goals) > 1
     price = "price, by fractions of the ranges" if several else f"price, {label[goals[0][0]]} per unit"

@@ -152,9 +152,8 @@ def _page(shown: Sequence[ModeScene]) -> bytes:
 
 
 def _row(one: ModeScene) -> dict[str, Any]:
-    row = row_of(
-        one, card="instrument.name", harmonic="mode.harmonic", index="mode.index", frequency_Hz="mode.frequency"
-    )
+    named = {"card": "instrument.name", "frequency_Hz": "mode.frequency"}
+    row = row_of(one, harmonic="mode.harmonic", index="mode.index", **named)
     return row | {"temperature_degC": one.temperature - zero_Celsius}
 
 

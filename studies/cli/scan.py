@@ -225,9 +225,8 @@ def _save(path: str, instrument: Instrument, found: Scan) -> None:
     for name in found.faces:
         x, theta, values = found.map_of(name, columns=72)
         lines = ["position," + ",".join(f"{angle:g}" for angle in np.rad2deg(theta))]
-        lines += [
-            f"{at:.9g}," + ",".join(f"{1e6 * cell:.7g}" for cell in row) for at, row in zip(x, values, strict=True)
-        ]
+        cells = (",".join(f"{1e6 * cell:.7g}" for cell in row) for row in values)
+        lines += [f"{at:.9g},{row}" for at, row in zip(x, cells, strict=True)]
         own = target.with_name(f"{target.stem}-{name}.csv")
         write_text(own, "\n".join(lines) + "\n")
         maps.append({"of": name, "file": str(own)})
@@ -255,9 +254,8 @@ def _draw_maps(scan: Scan) -> Drawing:
             x, theta, values = scan.map_of(name)
             shown = 1e6 * (values - values.mean(axis=1, keepdims=True))
             most = max(float(abs(shown).max()), 1e-6)
-            image = ax.pcolormesh(
-                np.rad2deg(theta), x, shown, cmap="RdBu_r", vmin=-most, vmax=most, shading="nearest", rasterized=True
-            )
+            look = {"cmap": "RdBu_r", "vmin": -most, "vmax": most, "shading": "nearest", "rasterized": True}
+            image = ax.pcolormesh(np.rad2deg(theta), x, shown, **look)
             made.colorbar(image, ax=ax, label="µm")
             ax.set(title={"wall": "wall thickness, mean of each circle removed", "offset": "middle surface"}.get(name, f"{name} face"),
                    xlabel="azimuth (°)", ylabel="position (1: rim)", xticks=range(0, 361, 45))  # fmt: skip

@@ -79,9 +79,8 @@ def tcf(
         Column("slope_ppm_per_degC", "slope", error="uncertainty_ppm_per_degC"),
     ]
     shown = sorted({0, len(T) // 2, len(T) - 1})
-    moved = [
-        Column(f"moves_slope_ppm_per_degC.{k}", f"at {points[k]['temperature_degC']:g} °C", form="+.2f") for k in shown
-    ]
+    at = [f"at {points[k]['temperature_degC']:g} °C" for k in shown]
+    moved = [Column(f"moves_slope_ppm_per_degC.{k}", words, form="+.2f") for k, words in zip(shown, at, strict=True)]
     uncertain = [one for one in moves if max(map(abs, one["moves_slope_ppm_per_degC"])) >= LEAST]
     return Result(
         payload,

@@ -194,9 +194,7 @@ def _parts(planned: CardPlan, payload: dict[str, Any]) -> list[Chapter]:
 
 def gains(planned: CardPlan) -> list[dict[str, float]]:
     """The change by each planned groove over that by the shape derivative, with its 90 % interval."""
-    found = [
-        (x, n, cut.gain(n), SURE * cut.error * abs(cut.gain(n))) for x, cut in planned.cuts.items() for n in cut.splits
-    ]
+    found = [(x, n, g := cut.gain(n), SURE * cut.error * abs(g)) for x, cut in planned.cuts.items() for n in cut.splits]
     return [{"position": x, "harmonic": n, "value": v, "low": v - reach, "high": v + reach} for x, n, v, reach in found]
 
 

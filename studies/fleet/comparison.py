@@ -69,9 +69,8 @@ def compare(response: str, scores: Scores, batches: Mapping[str, str] | None = N
     if kind == "few":  # one exception in many devices must be clearer than what a search of so many finds
         odd = [d for d in odd if scores[d][effect].score > CONSTANTS["margin"] + np.log(len(scores))]
     sizes = {d: scores[d][effect] for d in shown}
-    return Share(
-        effect, response, tuple(sorted(equal)), kind, tuple(shown), tuple(lacking), tuple(odd), 2.0 * lead, sizes, batch
-    )
+    devices = (tuple(shown), tuple(lacking), tuple(odd))
+    return Share(effect, response, tuple(sorted(equal)), kind, *devices, 2.0 * lead, sizes, batch)
 
 
 def _place(

@@ -97,13 +97,11 @@ def measure(found: Inferred, temperature: float) -> dict[str, Measured]:
     u, C = found.numbers.point[:count], C[:count, :count]
     card = problem.instrument_at(found.numbers.point)
     law, slopes, at = problem.law_at(card), priors.slopes(u), priors.at(u)
-    rows: dict[str, tuple[float, Array]] = {
-        value.name: (at[value.name], row) for value, row in zip(priors.values, slopes, strict=True)
-    }
+    each = zip(priors.values, slopes, strict=True)
+    rows: dict[str, tuple[float, Array]] = {value.name: (at[value.name], row) for value, row in each}
     varied = Variations(card, law, priors.names)
-    settled = {
-        T: _settled(varied, card, law, T, slopes) for T in (temperature - APART, temperature, temperature + APART)
-    }
+    at_three = (temperature - APART, temperature, temperature + APART)
+    settled = {T: _settled(varied, card, law, T, slopes) for T in at_three}
     (low, here, high), spot = settled.values(), f"at {temperature - zero_Celsius:g} °C"
     for name, words in (("frequency_Hz", "frequency"), ("bias_deg_per_h", "bias"), ("inverse_q", "1/Q")):
         if name not in problem.responses:

@@ -39,11 +39,9 @@ class Lot:
             for serial in share.odd:
                 out[serial].append(f"{words} {' or '.join(share.names)} in {share.response}")
         for one in self.quantities:
-            for serial, chance in one.odd.items():
+            for serial, p in one.odd.items():
                 own = one.of[serial].value
-                out[serial].append(
-                    f"{one.name} is {own:.5g}, in the lot {one.population.mean:.5g}; chance {chance:.1g}"
-                )
+                out[serial].append(f"{one.name} is {own:.5g}, in the lot {one.population.mean:.5g}; chance {p:.1g}")
         return out
 
     @property

@@ -173,9 +173,7 @@ def _trace_figure(twins: Twins) -> Figure:
         f"Figure 6 for the virtual gyro with the median improvement, cooled from 25 to −20 °C: (a) output and model, (b) compensated"
         f" output. Bias {before:.3g} → {after:.3g} °/h, a factor of {fit.training_gain:.2f}; in the paper {PAPER_BEFORE} → {PAPER_AFTER} °/h."
     )
-    return Figure(
-        lambda: _draw_trace(fit), caption, "Bias over time with the model, and the compensated bias below it."
-    )
+    return Figure(lambda: _draw_trace(fit), caption, "Bias over time with the model, and below it compensated.")
 
 
 def _draw_trace(fit: TwinFit) -> Drawing:

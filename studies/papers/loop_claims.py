@@ -121,9 +121,8 @@ def _resolution(seed: int) -> Claim:
     electronics = Electronics(noise=LoopNoise(pickoff=1e-5, adc_step=1e-5))
     time = 2.0 * np.arange(900)
     precession = np.radians(0.5) * np.where(time < 900, 1.0, -1.0)
-    run = simulate_whole_angle(
-        wave, electronics, Loops(), time, precession=precession, generator=np.random.default_rng(seed)
-    )
+    drawn = np.random.default_rng(seed)
+    run = simulate_whole_angle(wave, electronics, Loops(), time, precession=precession, generator=drawn)
     fit = fit_whole_angle(
         time, run.angle, run.rate, coupling=wave.coupling, decay=run.decay, quadrature=run.quadrature
     ).estimates["frequency_split"]

@@ -105,9 +105,7 @@ def study_settling(instrument: "Instrument", hours: tuple[float, ...] = (4.0, 4.
     weights = cell_weights(instrument, law)
     whole = [build_network(instrument, radiation=radiation) for radiation in (True, False)]
     networks = dict(zip(NETWORKS, (*whole, build_shell_and_stem(instrument)), strict=True))
-    curves = [
-        _curve(name, network, weights, law, target) for target in STEPS_degC for name, network in networks.items()
-    ]
+    curves = [_curve(name, one, weights, law, target) for target in STEPS_degC for name, one in networks.items()]
     soaks = [
         _soak(protocol, name, networks[name], weights, law, hour)
         for protocol in PROTOCOLS
@@ -116,9 +114,8 @@ def study_settling(instrument: "Instrument", hours: tuple[float, ...] = (4.0, 4.
     ]
     T, f = printed_table1()
     settled = law.frequency(POINTS_degC + zero_Celsius)
-    return SettlingStudy(
-        tuple(curves), tuple(soaks), *_slope_and_curvature(T, f), *_slope_and_curvature(POINTS_degC, settled)
-    )
+    own = _slope_and_curvature(POINTS_degC, settled)
+    return SettlingStudy(tuple(curves), tuple(soaks), *_slope_and_curvature(T, f), *own)
 
 
 def _curve(name: str, network: Network, weights: Array, law: FrequencyLaw, target_degC: float) -> StepCurve:

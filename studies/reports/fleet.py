@@ -27,9 +27,8 @@ METHOD = (
 
 def headline(lot: Lot) -> str:
     """Return what the lot has in common and who differs, in a few sentences."""
-    common = [
-        f"{' or '.join(one.names)} ({NAMES[one.response]})" for one in lot.shares if one.kind in ("all", "all but")
-    ]
+    shared = (one for one in lot.shares if one.kind in ("all", "all but"))
+    common = [f"{' or '.join(one.names)} ({NAMES[one.response]})" for one in shared]
     text = f"Common to the lot: {', '.join(common)}." if common else "The devices have no cause in common."
     for name, why in lot.bad_batches.items():
         text += f" Batch {name} differs: {_first(why)}."

@@ -117,9 +117,8 @@ def _summarise(parts: Reproduction) -> dict[str, Any]:
     fit, better = study.fit, study.next_fit
     assert better is not None
     fitted = {"sum_of_squares_Hz2": "sum_of_squares", "leave_one_out_Hz": "leave_one_out_rms"}
-    curvatures = {
-        f"{name}_ppm_per_degC2": name for name in ("curvature_measured", "curvature_law", "curvature_uncertainty")
-    }
+    names = ("curvature_measured", "curvature_law", "curvature_uncertainty")
+    curvatures = {f"{name}_ppm_per_degC2": name for name in names}
     return {
         "schema": "hrg.reproduce/1",
         "cubic": {

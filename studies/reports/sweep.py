@@ -101,9 +101,8 @@ def _asked(results: Results) -> list[Part]:
     words = f"Sampling: {METHODS[sampling.method]}"
     words += f", seed {sampling.seed}" if sampling.method in ("latin-hypercube", "sobol", "sensitivity") else ""
     full = results.about["identity"]["solver"] == "full"
-    solver = (
-        "every design solved in full" if full else "interpolated between full solves, with a stated interpolation error"
-    )
+    family = "interpolated between full solves, with a stated interpolation error"
+    solver = "every design solved in full" if full else family
     return [
         Table("Parameters", study.parameters, parameters),
         Table("Quantities", study.asked, quantities),

@@ -95,9 +95,8 @@ def _imperfect(
     }
     if drawn.imperfection is None or not drawn.exaggeration:
         return found
-    x, r, z = (
-        np.concatenate([getattr(line, name)[members] for line, members in runs]) for name in ("position", "r", "z")
-    )
+    places = ("position", "r", "z")
+    x, r, z = (np.concatenate([getattr(line, name)[at] for line, at in runs]) for name in places)
     waves = {
         m: wave
         for m, wave in find_departures(resonator, drawn.imperfection, x, r, z).items()

@@ -193,9 +193,8 @@ def _height(block: Block, answer: bool, phone: bool) -> float:
         case Cells(columns=columns, rows=rows, note=note):
             widest = (max((len(str(cell)) for cell in row), default=0) for row in rows)
             if not phone:
-                return (
-                    100 + 33 * sum(1 + wide // max(28.0, 110 / max(1, len(columns))) for wide in widest) + len(note) / 4
-                )
+                share = max(28.0, 110 / max(1, len(columns)))
+                return 100 + 33 * sum(1 + wide // share for wide in widest) + len(note) / 4
             headings = sum(map(len, columns)) + 3 * len(columns)
             stacked = (1 + (sum(len(str(cell)) for cell in row) + headings) / 46 for row in rows)
             return (
