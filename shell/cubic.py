@@ -83,7 +83,7 @@ def solve_cubic(resonator: Resonator, crystal: Cubic, harmonic: int = 2, toleran
     """The lowest pair of a harmonic n >= 2, not a multiple of 4, of a shell without stem, clamp or kink."""
     if harmonic < 2 or harmonic % 4 == 0:
         raise ShellError(
-            f"in a cubic crystal only pairs n >= 2 that do not couple with n = 0 are solved, not n = {harmonic}."
+            f"a cubic crystal is solved for pairs n >= 2 that do not couple with n = 0, not n = {harmonic}."
         )
     mean = crystal.isotropic
     (mode,) = solve_modes(resonator, mean, harmonic, tolerance=tolerance)
@@ -97,7 +97,7 @@ def solve_cubic(resonator: Resonator, crystal: Cubic, harmonic: int = 2, toleran
         raise ShellError("a cubic crystal is computed only for plain shells, without stem, clamp or kink.")
     if sum(system.constraint.shape[1] for system in systems) > LARGEST:
         raise ShellError(
-            f"harmonic {harmonic} of this shell has too many unknowns together with the harmonics that the crystal couples to it."
+            f"harmonic {harmonic} of this shell and those that the crystal couples to it have too many unknowns."
         )
     shift = 1e-2 * mean.G / mean.rho / resonator.size**2 if systems[0].rigid_motions else 0.0
     found, errors = [], []

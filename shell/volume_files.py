@@ -71,9 +71,7 @@ def _encode_msh(mesh: Volume) -> bytes:
 
 def _encode_inp(mesh: Volume) -> bytes:
     if mesh.hexahedra.shape[1] == 27:
-        raise ShellError(
-            "an .inp file has elements of 20 and 15 nodes: leave out the nodes at the centres of faces and elements."
-        )
+        raise ShellError("an .inp file has elements of 20 and 15 nodes: leave out the centres of faces and elements.")
     text = io.StringIO()
     text.write("** lengths in m\n*NODE, NSET=ALL\n")
     _write_nodes(text, mesh, ", ")

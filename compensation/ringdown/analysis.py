@@ -179,9 +179,7 @@ def _remark(
             f"The residual is not white noise: intervals are {left.widening:.3g} times as wide as the Cramér–Rao bound of white noise."
         )
     if left.early:
-        said.append(
-            "The first rows of the window still deviate from the fit: no part of this record is a plain free decay."
-        )
+        said.append("The first rows of the window do not fit: no part of this record is a plain free decay.")
     if left.widening > 3:
         said.append("Poor fit: take the values as indications.")
     return said
@@ -190,9 +188,7 @@ def _remark(
 def _undetermined(fit: DecayFit, estimates: Mapping[str, Estimate]) -> list[str]:
     said = []
     if fit.one_mode:
-        said.append(
-            "Only one mode is seen: the second one is not excited, or the split is not resolved. No axes can be given."
-        )
+        said.append("Only one mode is seen: the other is not excited, or the split is not resolved. No axes follow.")
     if "split_Hz" in estimates:
         split = estimates["split_Hz"]
         width = 1 / (np.pi * estimates["decay_time_s"].value)

@@ -94,7 +94,7 @@ def analyse_trace(time: ArrayLike, amplitude: ArrayLike, *, confidence: float = 
         said.append(f"The last {t[-1] - t[last - 1]:.4g} s are below {FLOOR:g} times the noise and are left out.")
     if x[-1] * -slope < 0.5:
         said.append(
-            "The amplitude falls by less than 40 % in the window: a deviation from an exponential would not be seen; record longer."
+            "The amplitude falls by less than 40 %: a decay that is not exponential is not seen; record longer."
         )
     return TraceDecay(
         -slope,

@@ -55,13 +55,7 @@ def is_container(path: str | Path) -> bool:
 
 @contextlib.contextmanager
 def plainly(path: str | Path) -> Iterator[None]:
-    """Turn whatever a library raises of a damaged file into one sentence, and keep its half-made objects quiet.
-
-    Raises
-    ------
-    InputError
-        The file cannot be read.
-    """
+    """Turn whatever a library raises of a damaged file into one sentence, and keep its half-made objects quiet."""
     quiet, sys.unraisablehook = sys.unraisablehook, lambda _: None
     try:
         yield
@@ -90,15 +84,7 @@ def open_channels(path: str | Path) -> Iterator[list[Channel]]:
 
 
 def read_channels(path: str | Path, files: contextlib.ExitStack) -> list[Channel]:
-    """Return all channels of a file, which `files` closes.
-
-    Raises
-    ------
-    InputError
-        No such file, a damaged one, or one without a channel of numbers.
-    MissingEnvironment
-        The library that reads it is not installed.
-    """
+    """Return all channels of a file, which `files` closes."""
     with opened(path) as file:
         if not file.read(1):
             raise InputError(f"{path}: the file is empty.")
@@ -189,13 +175,7 @@ class ChannelTable(RawTable):
 
 
 def read_channel_table(paths: Sequence[str | Path], file: FileMap) -> ChannelTable:
-    """Read the channels of one [[file]] of a map.
-
-    Raises
-    ------
-    InputError
-        A group or channel that is not there, or channels of several clocks.
-    """
+    """Read the channels of one [[file]] of a map."""
     wanted = [*file.time, *(column.source for column in file.columns)]
     parts, tables = [], []
     with contextlib.ExitStack() as files:

@@ -116,13 +116,7 @@ def _check_span(seconds: "Array", table: RawTable, file: "FileMap") -> None:
 def drop_repeated(
     table: RawTable, times: Times, file: "FileMap", repeated: "NDArray[np.bool_]"
 ) -> "tuple[Times, NDArray[np.intp]]":
-    """Return strictly increasing times and the rows that they belong to; rows without a time, and those `repeated`, are left out.
-
-    Raises
-    ------
-    InputError
-        Times go back, or repeat while the map's rule `repeated_times` is "error".
-    """
+    """Return strictly increasing times and the rows that they belong to; rows without a time, and those `repeated`, are left out."""
     import numpy as np
 
     rule = file.repeated_times

@@ -51,13 +51,7 @@ def drop_doubtful(column: ColumnMap, values: "Array") -> "tuple[Array, list[str]
 def find_repeats(
     table: RawTable, seconds: "Array", columns: "Mapping[tuple[str, str], Array]"
 ) -> "tuple[NDArray[np.bool_], list[str]]":
-    """Mark rows of a file that repeat rows of the files before it, and say so.
-
-    Raises
-    ------
-    InputError
-        Files overlap and their readings differ there.
-    """
+    """Mark rows of a file that repeat rows of the files before it, and say so."""
     repeated, notes = np.zeros(table.rows, dtype=bool), []
     edges: Sequence[int] = [0, *table.starts(), table.rows]
     for before, begin, end in zip(edges, edges[1:], edges[2:], strict=False):

@@ -35,13 +35,7 @@ class Draft:
 
 
 def draft_map(paths: Sequence[str]) -> Draft:
-    """Draft the map of one or more raw files.
-
-    Raises
-    ------
-    InputError
-        A file has no table of numbers that could be found.
-    """
+    """Draft the map of one or more raw files."""
     head = [
         "# A draft: compare every line with the file before relying on it; CHECK marks guesses.",
         f'schema = "{SCHEMA}"',
@@ -64,7 +58,7 @@ def draft_map(paths: Sequence[str]) -> Draft:
             elif len(group) > 1:
                 written.insert(
                     2,
-                    f"parts = {len(group)}    # CHECK: these are consecutive files: {', '.join(map(_comment, group))}",
+                    f"parts = {len(group)}    # CHECK: consecutive files: {', '.join(map(_comment, group))}",
                 )
             begun = begun or bool(found)
             files.append(written if found or look.group is None else [f"# {line}".rstrip() for line in written])

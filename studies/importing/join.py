@@ -51,11 +51,6 @@ def import_records(paths: Sequence[str], import_map: LoadedMap) -> dict[str, Rec
     """Read raw files, convert and join them into one record, or one for each axis ("" where there is only one).
 
     The comments of the record's header list every change; nothing is extrapolated, and nothing interpolated across gaps.
-
-    Raises
-    ------
-    InputError
-        A file does not fit its map, or the clocks cannot be placed against each other.
     """
     series = [read_series(own, file) for own, file in zip(share_out(paths, import_map), import_map.files, strict=True)]
     base = series[0]

@@ -42,13 +42,7 @@ class Look:
 
 
 def look_at(path: str) -> Look:
-    """Find encoding, separator, decimal sign, header and first row of a raw file.
-
-    Raises
-    ------
-    InputError
-        No rows of numbers were found.
-    """
+    """Find encoding, separator, decimal sign, header and first row of a raw file."""
     if is_container(path):
         with open_channels(path) as channels:
             return look_at_group(sort_groups(channels)[0])

@@ -143,7 +143,7 @@ class FileMap(Keys, frozen=True, kw_only=True):
     clock_rate_ppm: Annotated[float, number("by how much its clock runs fast", least=-1e5, most=1e5)] = 0.0
     repeated_times: Annotated[
         Literal["error", "first", "spread"],
-        says("first keeps one row, spread spaces the rows evenly up to the next time"),
+        says("first keeps one row, spread spaces them evenly up to the next time"),
     ] = "error"
     longest_gap: (
         Annotated[float, number("longer gaps are not interpolated; 10 steps unless given", above=0.0)] | None
@@ -251,13 +251,7 @@ class LoadedMap(ImportMap, frozen=True, kw_only=True):
 
 
 def load_map(path: str | Path) -> LoadedMap:
-    """Read a map.
-
-    Raises
-    ------
-    InputError
-        Unknown keys, units or columns, missing or impossible values: the message names the place and the mend.
-    """
+    """Read a map."""
     keys = msgspec.structs.asdict(read_file(path, ImportMap, SCHEMA))
     texts: Mapping[str, str] = {key: " ".join(keys[key].split()) for key in ("instrument", "source")}
     return LoadedMap(**{**keys, **texts}, path=str(path))

@@ -11,13 +11,7 @@ from studies.importing.tables import RawTable
 
 
 def read_parts(paths: Sequence[str | Path], file: FileMap) -> RawTable:
-    """Read raw files that continue one another as one table.
-
-    Raises
-    ------
-    InputError
-        Their columns differ.
-    """
+    """Read raw files that continue one another as one table."""
     if is_container(paths[0]):
         return read_channel_table(paths, file)
     import pandas as pd

@@ -79,15 +79,7 @@ class TextTable(RawTable):
 
 
 def read_raw(path: str | Path, file: "FileMap") -> TextTable:
-    """Read one raw file as its map describes it.
-
-    Raises
-    ------
-    InputError
-        The file cannot be read that way; the message names line, key and mend.
-    MissingEnvironment
-        An Excel workbook where openpyxl is not installed.
-    """
+    """Read one raw file as its map describes it."""
     import pandas as pd
 
     data = read_filled(path)

@@ -24,11 +24,6 @@ def place_in_zone(
     seconds : (N,) local time after the origin, s; NaN where a row has none.
     zone : name such as "Europe/Berlin".
     place : tells the file and line of a row.
-
-    Raises
-    ------
-    InputError
-        A stamp lies in the hour that the zone's clocks skip in spring.
     """
     import numpy as np
 

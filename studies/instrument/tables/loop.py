@@ -23,7 +23,7 @@ class Loop(Keys, frozen=True, kw_only=True):
     frequency_split_mHz: Annotated[
         float,
         number(
-            "Δω/2π that the quadrature loop compensates, in addition to [imperfection], [electrodes]",
+            "Δω/2π held by the quadrature loop, besides [imperfection], [electrodes]",
             least=0.0,
             relative_sd=1.0,
         ),
@@ -52,9 +52,7 @@ class Loop(Keys, frozen=True, kw_only=True):
     rate_range_deg_per_s: Annotated[float, number("largest rate that the force can balance", above=0.0)] = 100.0
     quadrature_control: Annotated[
         Literal["force", "stiffness"],
-        says(
-            "actuator that nulls quadrature; a force shares the range with the rate and leaks into it through phase errors"
-        ),
+        says("actuator of the quadrature; a force shares the range of the rate and leaks by phase errors"),
     ] = "force"
     quadrature_range_Hz: Annotated[float, number("largest split that the stiffness nulls", above=0.0)] = 1.0
     dac_bits: Annotated[int, number("over ± that range", least=2, most=32)] = 16

@@ -71,9 +71,7 @@ class ActivatedKeys(Keys, frozen=True, kw_only=True):
 
     height: Annotated[float, number("1/Q at the peak", least=0.0, relative_sd=0.5, example=1e-09)]
     energy_eV: Annotated[Positive, says("activation energy", example=0.5)]
-    peak_degC: Annotated[
-        float, number("temperature of the peak at the mode's frequency", above=-zero_Celsius, example=120.0)
-    ]
+    peak_degC: Annotated[float, number("of the peak, at the mode's frequency", above=-zero_Celsius, example=120.0)]
 
 
 class LossParts(Keys, frozen=True, kw_only=True):
@@ -115,7 +113,7 @@ class LossParts(Keys, frozen=True, kw_only=True):
     surface_anisotropy: (
         Annotated[
             float,
-            number("circumferential wave 2n of the surface loss", least=0.0, most=1.0, relative_sd=1.0, example=0.01),
+            number("wave 2n of the surface loss", least=0.0, most=1.0, relative_sd=1.0, example=0.01),
         ]
         | None
     ) = None

@@ -13,9 +13,7 @@ class SplitPerWave(ModeQuantity, frozen=True, kw_only=True, tag="split-per-wave"
     """Split by a wave of 1 µm: order 2n splits by itself, order n by its square, others only together."""
 
     theory: Annotated[Literal["solid", "shell"], says("solid (three-dimensional) or shell (Naghdi)")] = "solid"
-    of: Annotated[Literal["wall", "outer", "inner", "offset", "rim"], says("surface or property with the wave")] = (
-        "wall"
-    )
+    of: Annotated[Literal["wall", "outer", "inner", "offset", "rim"], says("surface with the wave")] = "wall"
     order: Annotated[int, number("crests around; 2n splits by itself", least=1, most=40)] = 4
 
     def list_columns(self) -> tuple[Column, ...]:
