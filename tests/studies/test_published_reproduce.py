@@ -1,18 +1,13 @@
 """Published values through the whole command: `hrg reproduce` writes the page, the tables and the contract's summary."""
 
 import json
-import subprocess
 
 import numpy as np
 import pytest
 
 from shell import render
 from studies.cli import main
-from studies.instrument.card import load_card
 from studies.papers import hrg
-from studies.reports.mode_picture import mode_blocks
-from studies.results import Chapter
-from studies.results.page import render_page
 
 pytestmark = pytest.mark.slow
 
@@ -69,12 +64,3 @@ def test_page_is_self_contained_and_shows_the_mode(folder):
     assert 'src="http' not in text
     assert "<link" not in text
     assert "data:image/png;base64" in text or render.REMEDY in text
-
-
-def test_without_opengl_the_blocks_say_how_to_get_the_picture(monkeypatch):
-    """VTK ends its process with a segmentation fault there; the child that does so is simulated."""
-    monkeypatch.setattr(render.subprocess, "run", lambda job, **options: subprocess.CompletedProcess(job, -11))
-    blocks = mode_blocks(load_card(hrg.CARD))
-    page = render_page("t", "l", [Chapter("c", blocks)])
-    assert "apt install libegl1" in page
-    assert "data:image/png" not in page

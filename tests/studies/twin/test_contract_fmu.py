@@ -17,6 +17,7 @@ from studies.twin.plan import plan_twin
 from tests.studies.twin.building import needs_compiler
 from thermal.profile import Profile
 
+COLUMNS = ["housing_temperature_degC", "resonator_temperature_degC", "frequency_Hz", "bias_deg_per_h", "inverse_q"]
 TIME, LEVEL = np.array([0.0, 600.0, 2400.0, 5400.0]), np.array([20.0, 20.0, 35.0, 35.0])
 
 
@@ -25,39 +26,14 @@ def simulate_fmpy(path, start):
     pytest.importorskip("lxml")
     slopes = np.append(np.diff(LEVEL) / np.diff(TIME), 0.0)
     rows = np.arange(0.0, TIME[-1] + 1, 1.0)
-    inputs = np.zeros(
-        rows.size,
-        dtype=[
-            ("time", float),
-            ("chamber_temperature_degC", float),
-            ("chamber_temperature_slope_K_per_s", float),
-            ("rate_deg_per_s", float),
-        ],
-    )
-    inputs["time"], inputs["chamber_temperature_degC"], inputs["rate_deg_per_s"] = (
-        rows,
-        np.interp(rows, TIME, LEVEL),
-        0.01,
-    )
-    inputs["chamber_temperature_slope_K_per_s"] = slopes[np.minimum(np.searchsorted(TIME, rows, side="right") - 1, 2)]
+    slope = slopes[np.minimum(np.searchsorted(TIME, rows, side="right") - 1, 2)]
+    given = {"chamber_temperature_degC": np.interp(rows, TIME, LEVEL), "chamber_temperature_slope_K_per_s": slope}
+    given = {"time": rows, **given, "rate_deg_per_s": np.full(rows.size, 0.01)}
+    inputs = np.rec.fromarrays([*given.values()], names=[*given])
     with zipfile.ZipFile(path) as archive:
         text = archive.read("modelDescription.xml").decode()
-    outputs = [
-        "housing_temperature_degC",
-        "resonator_temperature_degC",
-        "frequency_Hz",
-        "bias_deg_per_h",
-        "inverse_q",
-        "measured_rate_deg_per_s",
-    ]
-    options = {
-        "input": inputs,
-        "output": outputs,
-        "start_values": start,
-        "stop_time": TIME[-1],
-        "step_size": 1.0,
-        "output_interval": 1.0,
-    }
+    options = {"input": inputs, "output": [*COLUMNS, "measured_rate_deg_per_s"], "start_values": start}
+    options |= {"stop_time": TIME[-1], "step_size": 1.0, "output_interval": 1.0}
     return fmpy.simulate_fmu(str(path), validate=True, fmi_type="CoSimulation", **options), text
 
 
@@ -78,13 +54,7 @@ def test_limits_fmu_in_fmpy(version, tmp_path):
     run = simulate_run(instrument, drive, noise=False)
     expected = dict(run.prediction.columns) | {"housing_temperature_degC": run.prediction.housing - 273.15}
     assert found["time"].size == drive.time.size
-    for name in (
-        "housing_temperature_degC",
-        "resonator_temperature_degC",
-        "frequency_Hz",
-        "bias_deg_per_h",
-        "inverse_q",
-    ):
+    for name in COLUMNS:
         assert np.abs(found[name] - expected[name]).max() < 1e-9 * np.abs(expected[name]).max(), name
     assert 'unit="W/K"' in text
 

@@ -42,22 +42,11 @@ RAMPS = {
 }
 SHAPES = {
     # a shape in the middle of what is reached, where the middle of the bounds is not
-    "temperature_degC": 22.0,
-    "width_K": 2.0,
-    "half_width_K": 3.0,
-    "from_degC": 5.0,
-    "to_degC": 40.0,
-    "second_time_constant_s": 900.0,
-    "relaxation_time_s": 1500.0,
-    "period_s": 1234.5,
-    "onset_s": 1000.0,
-    "time_s": 4321.0,
-    "filling_s": 5000.0,
-    "pole_s": 40.0,
-    "axis_deg": 7.0,
-    "share_of_form": 0.2,
+    "temperature_degC": 22.0, "width_K": 2.0, "half_width_K": 3.0, "from_degC": 5.0, "to_degC": 40.0,
+    "second_time_constant_s": 900.0, "relaxation_time_s": 1500.0, "period_s": 1234.5, "onset_s": 1000.0,
+    "time_s": 4321.0, "filling_s": 5000.0, "pole_s": 40.0, "axis_deg": 7.0, "share_of_form": 0.2,
     "rotation_deg_per_10K": 3.0,
-}
+}  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -136,19 +125,10 @@ def test_limits_everything_at_once(folder):
     errors = {
         f"{side}_{key}": 0.01 for side in ("pickoff", "drive") for key in ("gain_ratio", "phase_deg", "skew_mrad")
     }
-    loop = {
-        **errors,
-        "frequency_split_mHz": 2.0,
-        "frequency_axis_deg": 7.0,
-        "misalignment_mrad": 0.3,
-        "drive_phase_difference_deg": 0.02,
-    }
-    bias = {
-        "offset_deg_per_h": 0.3,
-        "k1_deg_per_h_per_Hz": 0.1,
-        "k4_deg_per_h_s_per_Hz": 30.0,
-        "k9_deg_per_h_s2_per_Hz3": 5.0,
-    }
+    loop = errors | {"frequency_split_mHz": 2.0, "frequency_axis_deg": 7.0, "misalignment_mrad": 0.3}
+    loop |= {"drive_phase_difference_deg": 0.02}
+    bias = {"offset_deg_per_h": 0.3, "k1_deg_per_h_per_Hz": 0.1, "k4_deg_per_h_s_per_Hz": 30.0}
+    bias |= {"k9_deg_per_h_s2_per_Hz3": 5.0}
     profile = write_profile(folder / "ramps.csv", {k: v for k, v in RAMPS.items() if k != "quadrature_V"})
     for control, radiates in (("force", True), ("stiffness", False)):
         instrument = (
