@@ -98,17 +98,9 @@ def measure(seed: int, rate: float) -> dict[str, list[float]]:
         flush=True,
     )
     return {
-        "ratio": [*ratios],
-        "alone": [*alone],
-        "inside": inside,
-        "told": told,
-        "drawn": drawn,
-        "ahead": ahead,
-        "stated": stated,
-        "reached": [reached],
-        "ideal": [ideal],
-        "cpu": [spent],
-    }
+        "ratio": [*ratios], "alone": [*alone], "inside": inside, "told": told, "drawn": drawn, "ahead": ahead,
+        "stated": stated, "reached": [reached], "ideal": [ideal], "cpu": [spent],
+    }  # fmt: skip
 
 
 def residual_ratios(fit: CardFit, name: str, true: list[dict[str, Array]]) -> tuple[float, float]:

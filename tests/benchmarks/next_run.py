@@ -37,17 +37,11 @@ FIXED = (
     "soak -10 1h then ramp -10 40 0.14 then soak 40 1h",
 )
 HIDDEN = (
-    ("second-lag", "frequency_Hz"),
-    ("mounting-stress", "frequency_Hz"),
-    ("hysteresis", "frequency_Hz"),
-    ("radiation", "frequency_Hz"),
-    ("thermometer-scale", "frequency_Hz"),
-    ("activity-dip", "frequency_Hz"),
-    ("rate-bias", "bias_deg_per_h"),
-    ("cross-damping", "bias_deg_per_h"),
-    ("hysteresis", "bias_deg_per_h"),
+    ("second-lag", "frequency_Hz"), ("mounting-stress", "frequency_Hz"), ("hysteresis", "frequency_Hz"),
+    ("radiation", "frequency_Hz"), ("thermometer-scale", "frequency_Hz"), ("activity-dip", "frequency_Hz"),
+    ("rate-bias", "bias_deg_per_h"), ("cross-damping", "bias_deg_per_h"), ("hysteresis", "bias_deg_per_h"),
     ("loss-peak", "inverse_q"),
-)
+)  # fmt: skip
 TIMES = 2.0
 """Size of the hidden effect over the least that the plan of the fixed set can identify."""
 

@@ -13,18 +13,9 @@ from studies.cli import COMMANDS, main
 
 ROOT = Path(__file__).parents[2]
 PARTS = [
-    "linalg",
-    "sparse",
-    "special",
-    "fft",
-    "optimize",
-    "signal",
-    "stats",
-    "ndimage",
-    "integrate",
-    "interpolate",
+    "linalg", "sparse", "special", "fft", "optimize", "signal", "stats", "ndimage", "integrate", "interpolate",
     "spatial",
-]
+]  # fmt: skip
 HEAVY = ["pandas", "sympy", "matplotlib", "pyvista", "trimesh", "dask", "vtk", "jinja2", *(f"scipy.{p}" for p in PARTS)]
 
 

@@ -52,14 +52,8 @@ def test_every_key_of_the_card_makes_its_part(capsys, tmp_path):
     assert status == 0
     found = {part["name"]: part for part in json.loads(out)["parts"]}
     wanted = {
-        "thermoelastic",
-        "bulk",
-        "surface",
-        "film gold",
-        "film gold, heat",
-        "film chromium",
-        "film chromium, heat",
-    }
+        "thermoelastic", "bulk", "surface", "film gold", "film gold, heat", "film chromium", "film chromium, heat",
+    }  # fmt: skip
     assert set(found) == {*wanted, "gas", "mount", "activated"}
     assert found["gas"]["relative_sd"] == pytest.approx(np.hypot(0.1, 0.1))
     assert found["mount"]["inverse_q"] == pytest.approx([2e-9])

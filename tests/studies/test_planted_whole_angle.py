@@ -37,14 +37,10 @@ def test_card_values_are_found_again(tmp_path, capsys):
     assert found["schema"] == "hrg.fit-whole-angle/1"
     assert found["undetermined"] == []
     truth = {
-        "bias.damping_anisotropy": 0.03,
-        "loop.frequency_split_mHz": 5.0,
-        "loop.pickoff_gain_ratio": 0.008,
-        "loop.pickoff_phase_deg": 0.6,
-        "loss.inverse_q": 1e-6,
-        "bias.damping_axis_deg": 10.0,
+        "bias.damping_anisotropy": 0.03, "loop.frequency_split_mHz": 5.0, "loop.pickoff_gain_ratio": 0.008,
+        "loop.pickoff_phase_deg": 0.6, "loss.inverse_q": 1e-6, "bias.damping_axis_deg": 10.0,
         "loop.frequency_axis_deg": -6.0,
-    }
+    }  # fmt: skip
     for key, value in truth.items():
         assert found["estimates"][key]["value"] == pytest.approx(value, rel=0.02), key
         assert list(found["estimates"][key]) == ["value", "sd", "low", "high"]

@@ -11,11 +11,7 @@ def test_drift_mean_rate_and_verdicts():
     assert found.drift[0] == pytest.approx(2.592, rel=1e-3)
     assert found.mean_rate[0] == pytest.approx(14.816, rel=1e-3)
     assert [claim.verdict for claim in found.claims] == [
-        "met",
-        "not met",
-        "met conditionally",
-        "met",
-        "met conditionally",
-    ]
+        "met", "not met", "met conditionally", "met", "met conditionally",
+    ]  # fmt: skip
     # ε π Δf/(n k) = 0.065 deg/h at 60 mHz: 0.93 µrad
     assert "stable to 0.9 µrad" in found.claims[2].twin

@@ -102,13 +102,8 @@ def test_lags_in_series_and_their_radiated_share_are_found():
     T_r = integrate(network, {"housing": Profile(t, T_h)}, relative_tolerance=1e-9).node("shell", t)
     fit = identify_lags([record(np.random.default_rng(11), t, T_h, T_r, sensor=0.0)], FREE_LAW)
     assert sorted(fit.estimates) == [
-        "curvature",
-        "offset",
-        "radiated_share",
-        "slope",
-        "time_constant_1",
-        "time_constant_2",
-    ]
+        "curvature", "offset", "radiated_share", "slope", "time_constant_1", "time_constant_2",
+    ]  # fmt: skip
     for name, truth in (("time_constant_1", 1500.0), ("time_constant_2", 400.0), ("radiated_share", 0.4)):
         estimate = fit.estimates[name]
         assert (

@@ -344,14 +344,8 @@ def test_modules_of_the_working_directory_are_not_run_by_workers(tmp_path, monke
     (tmp_path / "bin").mkdir()
     (tmp_path / "bin" / "hrg.py").write_text("from studies.cli import run\n\nif __name__ == '__main__':\n    run()\n")
     words = [
-        sys.executable,
-        str(tmp_path / "bin" / "hrg.py"),
-        "study",
-        "run",
-        str(spec),
-        "--out",
-        str(tmp_path / "out"),
-    ]
+        sys.executable, str(tmp_path / "bin" / "hrg.py"), "study", "run", str(spec), "--out", str(tmp_path / "out"),
+    ]  # fmt: skip
     done = subprocess.run([*words, "--workers", "2"], capture_output=True, text=True, env=environment(), check=False)
     assert done.returncode == 0, done.stderr
     assert not (tmp_path / "was_run").exists()
