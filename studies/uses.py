@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from compensation.errors import CompensationError
-from studies.acceptance.quantities import QUANTITIES
+from studies.acceptance.limits import QUANTITIES
 from studies.acceptance.runs import sort_records
 from studies.bias import check_lengths, find_output, find_state
 from studies.errors import InputError
@@ -51,7 +51,7 @@ def find_uses(records: Sequence[Record]) -> tuple[Use, ...]:
     )
 
 
-def _missing(check: Callable[[Sequence[Record]], None], records: Sequence[Record]) -> str:
+def _missing(check: Callable[[Sequence[Record]], object], records: Sequence[Record]) -> str:
     try:
         check(records)
     except (InputError, CompensationError) as error:
@@ -99,10 +99,6 @@ def _whole_angle(records: Sequence[Record]) -> None:
         raise InputError("one run at a time; show a single record for its line.")
 
 
-def _campaign(records: Sequence[Record]) -> None:
-    make_ready(records)
-
-
 def _acceptance(records: Sequence[Record]) -> None:
     served, left = sort_records(records, OUTPUT)
     if not served:
@@ -120,14 +116,14 @@ def _check_span(records: Sequence[Record], least: float, purpose: str) -> None:
         )
 
 
-USES: tuple[tuple[str, str, str, Callable[[Sequence[Record]], None]], ...] = (
+USES: tuple[tuple[str, str, str, Callable[[Sequence[Record]], object]], ...] = (
     ("fit frequency", "f(T) and its inverse", "{runs} --save frequency.toml", _frequency),
     ("fit bias", "bias over frequency or temperature and their rates", "{runs} --save bias.toml", _bias),
     ("fit thermal", "thermal time constants", "{runs}", _thermal),
     ("fit cross-damping", "cross-damping bias over temperature", "{runs} --save cross-damping.toml", _cross_damping),
     ("fit scale", "bias and scale factor over rate and temperature", "{runs} --save scale.toml", _scale),
     ("fit whole-angle", "splits, axes and gains", "{runs} --card CARD.toml", _whole_angle),
-    ("calibrate", "values of a card", "CARD.toml {runs} --save CALIBRATED.toml", _campaign),
-    ("diagnose", "effects beyond the usual model", "{runs}", _campaign),
+    ("calibrate", "values of a card", "CARD.toml {runs} --save CALIBRATED.toml", make_ready),
+    ("diagnose", "effects beyond the usual model", "{runs}", make_ready),
     ("acceptance", "values against limits (IEEE 1431)", "CARD.toml {runs}", _acceptance),
 )

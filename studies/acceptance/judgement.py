@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from compensation.stability import AllanDeviation, NoiseCoefficients
-from studies.acceptance.limits import Limits
+from studies.acceptance.limits import ELSEWHERE, QUANTITIES, Limits, TestedQuantity
 from studies.acceptance.measure import (
     Found,
     Measured,
@@ -17,7 +17,6 @@ from studies.acceptance.measure import (
     measure_temperature,
     measure_warm_up,
 )
-from studies.acceptance.quantities import ELSEWHERE, QUANTITIES, TestedQuantity
 from studies.acceptance.runs import Test, sort_records
 from studies.acceptance.service import measure_life, measure_storage, measure_transfer
 from studies.record import Record

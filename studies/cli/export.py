@@ -1,14 +1,19 @@
-"""`hrg export`: a record for other programs.
+"""`hrg export`: a record for other programs: MATLAB, TDMS, MDF, HDF5, Parquet, with units and what the record's header says.
 
 With --json one object, schema `hrg.export/1`: `record`, `to`, `out`, `rows`, `columns`.
 """
 
+from collections.abc import Callable, Mapping
+from io import BytesIO
 from pathlib import Path
-from typing import Literal
+from typing import IO, Any, Literal
 
 from studies.cli.output import answers
 from studies.errors import InputError
-from studies.record import read_record
+from studies.files.writing import written_whole
+from studies.importing.formats import load_library
+from studies.instrument.units import unit_of
+from studies.record import Record, header_notes, read_record, write_record
 from studies.results import Result, Sentence
 
 ENDINGS = {"csv": (".csv",), "parquet": (".parquet",), "mat": (".mat",), "tdms": (".tdms",), "mf4": (".mf4",), "hdf5": (".h5", ".hdf5")}  # fmt: skip
@@ -30,9 +35,80 @@ def export(run: str, *, to: Literal["parquet", "mat", "tdms", "csv", "mf4", "hdf
     if Path(out).suffix.lower() not in ENDINGS[to]:
         raise InputError(f"--out {out}: give a name that ends in {ENDINGS[to][0]} for --to {to}.")
     record = read_record(run)
-    from studies.exporting import export_record
-
     export_record(record, to, out)
     payload = {"schema": "hrg.export/1", "record": run, "to": to, "out": out, "rows": len(record), "columns": list(record.columns)}  # fmt: skip
     said = f"{out}: {len(record):,} rows of {', '.join(record.columns)}."
     return Result(payload, "Export", parts=[Sentence(said)])
+
+
+GROUP = "record"
+
+
+def export_record(record: Record, kind: str, path: str) -> None:
+    """Write a record in another format, whole or not at all; MissingEnvironment where the library that writes it is not installed."""
+    if kind in ("csv", "parquet"):
+        write_record(record, path)
+        return
+    with written_whole(path) as file:
+        WRITERS[kind](record, file)
+
+
+def _unit(name: str) -> str:
+    return "s" if name == "time_s" else unit_of(name).removeprefix("1")
+
+
+def write_matlab(record: Record, file: IO[bytes]) -> None:
+    """A .mat file (version 5): a column vector for each column, and `notes`."""
+    from scipy.io import savemat
+
+    columns = {name: values[:, None] for name, values in record.columns.items()}
+    made = BytesIO()
+    savemat(made, {**columns, "notes": "\n".join(header_notes(record))}, do_compression=True, long_field_names=True)  # type: ignore[arg-type]
+    file.write(made.getvalue())
+
+
+def write_tdms(record: Record, file: IO[bytes]) -> None:
+    """A TDMS file: one group with a channel for each column."""
+    nptdms = load_library("nptdms", "--to tdms", "TDMS")
+    about = {"instrument": record.instrument, "source": record.source, "notes": "\n".join(header_notes(record))}
+    channels = [
+        nptdms.ChannelObject(GROUP, name, values, {"unit_string": _unit(name)})
+        for name, values in record.columns.items()
+    ]
+    with nptdms.TdmsWriter(file) as writer:
+        writer.write_segment([nptdms.RootObject(about), nptdms.GroupObject(GROUP), *channels])
+
+
+def write_hdf5(record: Record, file: IO[bytes]) -> None:
+    """An HDF5 file: a dataset for each column."""
+    h5py = load_library("h5py", "--to hdf5", "HDF5")
+    with h5py.File(file, "w") as out:
+        out.attrs["notes"] = "\n".join(header_notes(record))
+        for name, values in record.columns.items():
+            out.create_dataset(name, data=values, compression="gzip").attrs["unit"] = _unit(name)
+
+
+def write_mdf(record: Record, file: IO[bytes]) -> None:
+    """An MDF 4 file: one group, with the time as its master."""
+    asammdf = load_library("asammdf", "--to mf4", "MDF")
+    time = record["time_s"]
+    with asammdf.MDF(version="4.10") as out:
+        if record.start is not None:
+            out.start_time = record.start
+        signals: list[Any] = [
+            asammdf.Signal(values, time, name=name, unit=_unit(name))
+            for name, values in record.columns.items()
+            if name != "time_s"
+        ]
+        out.append(signals, comment="; ".join(header_notes(record)))
+        made = BytesIO()
+        out.save(made)
+        file.write(made.getvalue())
+
+
+WRITERS: Mapping[str, Callable[[Record, IO[bytes]], None]] = {
+    "mat": write_matlab,
+    "tdms": write_tdms,
+    "hdf5": write_hdf5,
+    "mf4": write_mdf,
+}

@@ -10,8 +10,18 @@ from studies.errors import UNUSABLE_INPUT, InputError
 from studies.papers.hrg import study_table
 from studies.reports import frequency, mode_picture
 from studies.reports import sweep_figures as figures
-from studies.reports.sweep_analysis import influence_parts, main_columns, number, search_parts, tolerance_parts
-from studies.reports.sweep_numbers import numbers_of, statistics_table, summarise, to_digits, yield_of
+from studies.reports.sweep_analysis import (
+    influence_parts,
+    main_columns,
+    number,
+    numbers_of,
+    search_parts,
+    statistics_table,
+    summarise,
+    to_digits,
+    tolerance_parts,
+    yield_of,
+)
 from studies.results import Blocks, Chapter, Column, Facts, Part, Result, Sentence, Table
 from studies.sweeps.definition import StudyParameter
 from studies.sweeps.design import nominal_design
