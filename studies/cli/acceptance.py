@@ -13,6 +13,7 @@ import numpy as np
 from studies.acceptance.judgement import Acceptance, JudgedQuantity, judge
 from studies.acceptance.limits import SCHEMA, Limits
 from studies.acceptance.measure import CONFIDENCE
+from studies.cli.arguments import Card, Records
 from studies.cli.output import answers, say
 from studies.errors import InputError
 from studies.instrument.card import load_card
@@ -44,7 +45,7 @@ RECORDS = (
 
 
 @answers("hrg.acceptance/1")
-def acceptance(card: str, *runs: str, limits: str | None = None, output: str = "bias_deg_per_h") -> Result:
+def acceptance(card: Card, *runs: Records, limits: str | None = None, output: str = "bias_deg_per_h") -> Result:
     """Judge a gyro by its records: warm-up, temperature, scale factor, drift with Allan deviation, run-down, transfer function.
 
     Each record serves the test that its columns show: rest over temperature, rest for an hour or more, several applied rates, a swept
@@ -54,10 +55,6 @@ def acceptance(card: str, *runs: str, limits: str | None = None, output: str = "
 
     Parameters
     ----------
-    card : str
-        Path of a card, or the name of one that ships: the gyro under test.
-    runs : str
-        The records (CSV).
     limits : str
         Limits (TOML, schema hrg.limits/1): a table [limits] with keys such as bias_deg_per_h; hrg keys limits lists them.
     output : str

@@ -36,8 +36,13 @@ FRACTION = numbers(lambda one: 0 < one < 1, "between 0 and 1")
 CARD = "Path of a card, or the name of one that ships (hrg cards)."
 REFERENCE = "Temperature in °C; the card's reference temperature unless given."
 Card = Annotated[str, Parameter(help=CARD)]
+Records = Annotated[str, Parameter(help="The records (CSV).")]
+Run = Annotated[str, Parameter(help="The record (CSV).")]
+Out = Annotated[str, Parameter(help="File to write.")]
 Temperature = Annotated[float | None, Parameter(help=REFERENCE, show_default=False)]
 Theory = Annotated[Literal["solid", "shell"], Parameter(help="solid (three-dimensional) or shell (Naghdi).")]
+ANY_THEORY = "solid (three-dimensional), shell (Naghdi) or rayleigh (closed form, hemisphere of constant thickness)."
+AnyTheory = Annotated[Literal["solid", "shell", "rayleigh"], Parameter(help=ANY_THEORY)]
 Harmonic = Annotated[int, Parameter(help="Circumferential harmonic n.")]
 Seed = Annotated[int, WHOLE, Parameter(help="Seed of the random numbers.")]
 FromDegC = Annotated[float, Parameter(name="--from", help="Lowest temperature in °C.")]

@@ -15,7 +15,7 @@ import numpy as np
 from shell.constants import zero_Celsius
 from shell.electrodes import reach, trim_voltages
 from shell.modes import solve_modes
-from studies.cli.arguments import COUNT, POSITIVE, Temperature, open_card
+from studies.cli.arguments import COUNT, POSITIVE, Card, Harmonic, Temperature, open_card
 from studies.cli.output import answers
 from studies.errors import InputError, naming
 from studies.instrument.tables.electrodes import ElectrodeKeys
@@ -25,9 +25,9 @@ from studies.splitting import SplitPair
 
 @answers("hrg.electrodes/1")
 def electrodes(
-    card: str,
+    card: Card,
     *,
-    harmonic: Annotated[int, COUNT] = 2,
+    harmonic: Annotated[Harmonic, COUNT] = 2,
     split: float | None = None,
     axis: float | None = None,
     limit: Annotated[float, POSITIVE] = 100.0,
@@ -37,10 +37,6 @@ def electrodes(
 
     Parameters
     ----------
-    card : str
-        Path of a card with a table [electrodes].
-    harmonic : int
-        Harmonic n of the pair.
     split : float
         Split in Hz to be nulled; by default that of the card.
     axis : float

@@ -8,6 +8,7 @@ from io import BytesIO
 from pathlib import Path
 from typing import IO, Any, Literal
 
+from studies.cli.arguments import Out, Run
 from studies.cli.output import answers
 from studies.errors import InputError
 from studies.files.writing import written_whole
@@ -20,17 +21,13 @@ ENDINGS = {"csv": (".csv",), "parquet": (".parquet",), "mat": (".mat",), "tdms":
 
 
 @answers("hrg.export/1", page=False)
-def export(run: str, *, to: Literal["parquet", "mat", "tdms", "csv", "mf4", "hdf5"], out: str) -> Result:
+def export(run: Run, *, to: Literal["parquet", "mat", "tdms", "csv", "mf4", "hdf5"], out: Out) -> Result:
     """Write a record for other programs; 'hrg import' reads all of these formats back to the last digit.
 
     Parameters
     ----------
-    run : str
-        The record (CSV or Parquet).
     to : str
         Format: Parquet, MATLAB (.mat, version 5), TDMS, CSV, MDF 4 or HDF5. Units and notes of the record go with it.
-    out : str
-        File to write.
     """
     if Path(out).suffix.lower() not in ENDINGS[to]:
         raise InputError(f"--out {out}: give a name that ends in {ENDINGS[to][0]} for --to {to}.")

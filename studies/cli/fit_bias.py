@@ -10,7 +10,7 @@ unit·√s, B in unit, K in unit/√s; null for runs too short for it.
 from typing import Any, Literal
 
 from studies.bias import BiasStudy, Judged, study_bias
-from studies.cli.arguments import EmitC, SaveModel
+from studies.cli.arguments import EmitC, Records, SaveModel
 from studies.cli.output import answers, keep_model, say
 from studies.errors import InputError
 from studies.models.kinds.bias import name_term
@@ -22,7 +22,7 @@ from studies.stability import Stability
 
 @answers("hrg.fit-bias/1")
 def fit_bias(
-    *data: str,
+    *data: Records,
     method: Literal["guarded", "paper"] = "guarded",
     average: float | None = None,
     window: float | None = None,
@@ -40,8 +40,6 @@ def fit_bias(
 
     Parameters
     ----------
-    data : str
-        One or more records (CSV).
     method : str
         Selection whose model is saved.
     average : float

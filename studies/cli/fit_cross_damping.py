@@ -7,7 +7,7 @@ import numpy as np
 
 from compensation.improvement import Change
 from shell.constants import zero_Celsius
-from studies.cli.arguments import SaveModel
+from studies.cli.arguments import Records, SaveModel
 from studies.cli.output import answers, keep_model, say
 from studies.cross_damping import CrossDampingStudy, study_cross_damping
 from studies.errors import InputError, naming
@@ -46,7 +46,7 @@ HELD_OUT = "Before: standard deviation; after: rms. Held out: each run, or each 
 
 @answers("hrg.fit-cross-damping/1")
 def fit_cross_damping(
-    *data: str,
+    *data: Records,
     frequency: float | None = None,
     quality: float | None = None,
     order: int = 3,
@@ -60,8 +60,6 @@ def fit_cross_damping(
 
     Parameters
     ----------
-    data : str
-        One or more records (CSV).
     frequency : float
         Natural frequency in Hz; by default the median of frequency_Hz in the records.
     quality : float

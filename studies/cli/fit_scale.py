@@ -5,7 +5,7 @@ import re
 from typing import Any
 
 from compensation.rate_law import SURE, RateLaw
-from studies.cli.arguments import SaveModel
+from studies.cli.arguments import Records, SaveModel
 from studies.cli.output import answers, keep_model
 from studies.errors import InputError
 from studies.models import source_of
@@ -46,7 +46,7 @@ NOTE = (
 
 @answers("hrg.fit-scale/1")
 def fit_scale(
-    *data: str, cutoff: float = 1.0, order: int = 50, no_filter: bool = False, save: SaveModel = None
+    *data: Records, cutoff: float = 1.0, order: int = 50, no_filter: bool = False, save: SaveModel = None
 ) -> Result:
     """Fit null, bias over temperature, and scale over rate and over temperature (BVG paper, equations 32 to 36).
 
@@ -57,8 +57,6 @@ def fit_scale(
 
     Parameters
     ----------
-    data : str
-        The records (CSV).
     cutoff : float
         Cut-off frequency of the FIR filter in Hz; below half the output rate.
     order : int

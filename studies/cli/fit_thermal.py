@@ -7,7 +7,7 @@ With --json one object, schema `hrg.fit-thermal/1`: `data`, `confidence`, `estim
 
 from studies.calibration.lags.identification import Identification
 from studies.calibration.lags.records import fit_thermal_constants
-from studies.cli.arguments import Confidence
+from studies.cli.arguments import Confidence, Records
 from studies.cli.output import answers, say
 from studies.cli.telling import Told
 from studies.errors import InputError
@@ -27,7 +27,9 @@ COLOURED = 3.0  # residual over its white part, above which the chain of lags is
 
 
 @answers("hrg.fit-thermal/1")
-def fit_thermal(*data: str, card: str | None = None, lags: int | None = None, confidence: Confidence = 0.9) -> Result:
+def fit_thermal(
+    *data: Records, card: str | None = None, lags: int | None = None, confidence: Confidence = 0.9
+) -> Result:
     """Find the time constants with which the resonator follows its housing, with intervals, and what the records do not determine.
 
     The records need time_s, frequency_Hz and housing_temperature_degC (or chamber_temperature_degC). The model is a series of
@@ -36,8 +38,6 @@ def fit_thermal(*data: str, card: str | None = None, lags: int | None = None, co
 
     Parameters
     ----------
-    data : str
-        One or more records (CSV) with steps, ramps or cycles of temperature.
     card : str
         A card whose law gives the curvature of frequency over temperature; without it the curvature is fitted.
     lags : int

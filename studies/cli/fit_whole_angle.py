@@ -10,7 +10,7 @@ import numpy as np
 
 from compensation.wave_fit import WaveFit
 from compensation.wave_fit import fit_whole_angle as fit
-from studies.cli.arguments import Confidence
+from studies.cli.arguments import Confidence, Run
 from studies.cli.output import answers, keep_card, say
 from studies.errors import InputError, naming
 from studies.instrument.card import Instrument, load_card
@@ -39,7 +39,7 @@ NO_SCALE = "note: quadrature_V is not used because its scale is unknown; give --
 
 @answers("hrg.fit-whole-angle/1")
 def fit_whole_angle(
-    run: str,
+    run: Run,
     *,
     card: str | None = None,
     bryan_factor: float | None = None,
@@ -56,8 +56,6 @@ def fit_whole_angle(
 
     Parameters
     ----------
-    run : str
-        The record (CSV).
     card : str
         Its card: gives the Bryan factor, the scale of quadrature_V and the gains of the drives.
     bryan_factor : float

@@ -12,7 +12,7 @@ from shell.imperfection.surface import depart_points
 from shell.inertia import weigh
 from shell.volume import build_volume
 from shell.volume_files import VolumeKind, encode_volume
-from studies.cli.arguments import Card, Temperature, open_card
+from studies.cli.arguments import Card, Out, Temperature, open_card
 from studies.cli.output import answers
 from studies.errors import InputError, naming
 from studies.files.writing import written_whole
@@ -26,7 +26,7 @@ KINDS = (".vtu", ".msh", ".inp")
 def mesh(
     card: Card,
     *,
-    out: str,
+    out: Out,
     layers: int = 2,
     around: int = 48,
     spacing_mm: Annotated[float | None, Parameter(show_default=False)] = None,
@@ -43,8 +43,6 @@ def mesh(
 
     Parameters
     ----------
-    out : str
-        File to write.
     layers : int
         Elements through the thickness.
     around : int

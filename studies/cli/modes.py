@@ -18,7 +18,7 @@ import numpy as np
 
 from shell.constants import zero_Celsius
 from shell.modes import solve_modes
-from studies.cli.arguments import COUNT, FRACTION, MANY, WHOLE, Card, Temperature, open_card
+from studies.cli.arguments import COUNT, FRACTION, MANY, WHOLE, AnyTheory, Card, Temperature, open_card
 from studies.cli.mode_effects import MODE, Asked, describe_effects, effect_tables
 from studies.cli.output import answers
 from studies.errors import naming
@@ -51,7 +51,7 @@ def modes(
     harmonic: Annotated[tuple[int, ...], MANY, WHOLE] = (2,),
     count: Annotated[int, COUNT] = 1,
     temperature: Temperature = None,
-    theory: Literal["solid", "shell", "rayleigh"] = "solid",
+    theory: AnyTheory = "solid",
     tolerance: Annotated[float, FRACTION] = 1e-5,
     sensitivities: bool = False,
     spin: float | None = None,
@@ -65,8 +65,6 @@ def modes(
         One or more circumferential harmonics n, for example --harmonic 0 1 2 3.
     count : int
         Number of modes of each harmonic.
-    theory : str
-        solid (three-dimensional), shell (Naghdi) or rayleigh (closed form, hemisphere of constant thickness).
     tolerance : float
         Largest relative discretization error of the frequency.
     sensitivities : bool

@@ -10,7 +10,7 @@ from cyclopts import Parameter
 from shell.constants import zero_Celsius
 from shell.mesh import encode_animation, encode_mesh
 from shell.scene import EXAGGERATION
-from studies.cli.arguments import MANY, WHOLE, Theory
+from studies.cli.arguments import MANY, WHOLE, Out, Theory
 from studies.cli.output import answers
 from studies.errors import InputError, MissingEnvironment
 from studies.files.writing import written_whole
@@ -35,7 +35,7 @@ COLUMNS = (
 @answers("hrg.render/1")
 def render(
     *card: str,
-    out: str,
+    out: Out,
     harmonic: Annotated[tuple[int, ...], MANY, HIDDEN] = (2,),
     index: Annotated[int, WHOLE] = 0,
     temperature: Annotated[tuple[float, ...], MANY, HIDDEN] = (),
@@ -58,8 +58,6 @@ def render(
     ----------
     card : str
         Cards by path, or the names of ones that ship (hrg cards).
-    out : str
-        File to write.
     harmonic : tuple[int, ...]
         Circumferential harmonic n, 2 unless given; several only for .html, which lets you choose among them.
     index : int

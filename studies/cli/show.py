@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from studies.cli.arguments import Records
 from studies.cli.output import answers, say
 from studies.errors import InputError
 from studies.instrument.display import display_name
@@ -23,16 +24,11 @@ MANY = 100_000  # rows, of which the reading is told
 
 
 @answers("hrg.show/1")
-def show(*runs: str) -> Result:
+def show(*runs: Records) -> Result:
     """Look at records: range and faults of every column, steps, settled parts, spectra, noise, and what they can be used for.
 
     Needs no card and fits no model of the gyro. The page has every column over time and over temperature, spectra and Allan
     deviations; its figures show values under the pointer and can be enlarged.
-
-    Parameters
-    ----------
-    runs : str
-        Records of one gyro (CSV).
     """
     if not runs:
         raise InputError("no record given: hrg show RUN.csv [RUN.csv ...].")

@@ -11,7 +11,7 @@ from typing import Annotated, Literal
 import numpy as np
 
 from studies.calibration.ahead import spread_of_prediction
-from studies.cli.arguments import POSITIVE, Card, Seed, Theory
+from studies.cli.arguments import POSITIVE, Card, Out, Seed, Theory
 from studies.cli.output import answers, say, tell_rows
 from studies.instrument.card import load_card
 from studies.record import write_record
@@ -25,7 +25,7 @@ def simulate(
     card: Card,
     profile: str,
     *,
-    out: str,
+    out: Out,
     row: Annotated[float, POSITIVE] = 1.0,
     seed: Seed = 0,
     noiseless: bool = False,
@@ -50,8 +50,6 @@ def simulate(
         "ramp FROM TO RATE", "staircase FROM TO STEP HOLD", "cycle START FIRST SECOND RATE HOLD COUNT", joined by "then";
         for example "step 20 -10 5h then ramp -10 40 1". Or a record: its housing column, else its chamber column, is
         imposed on its own rows. The gyro starts settled at the first temperature.
-    out : str
-        The record to write.
     row : float
         Time between rows in s; a record has its own rows.
     noiseless : bool

@@ -1,13 +1,13 @@
 """`hrg tcf`: frequency against temperature and its parts."""
 
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from shell.constants import zero_Celsius
 from shell.law import FrequencyLaw
-from studies.cli.arguments import Card, FromDegC, Harmonic, Step, ToDegC, lay_temperatures
+from studies.cli.arguments import AnyTheory, Card, FromDegC, Harmonic, Step, ToDegC, lay_temperatures
 from studies.cli.output import answers
 from studies.errors import InputError
 from studies.instrument.card import load_card
@@ -33,15 +33,13 @@ def tcf(
     to_degC: ToDegC = 40.0,
     step: Step = 10.0,
     harmonic: Harmonic = 2,
-    theory: Literal["solid", "shell", "rayleigh"] = "solid",
+    theory: AnyTheory = "solid",
     measured: str | None = None,
 ) -> Result:
     """Show the frequency over temperature, its slope in ppm/°C, and the contributions of E, ν, ρ, h, r and the [mount].
 
     Parameters
     ----------
-    theory : str
-        solid (three-dimensional), shell (Naghdi) or rayleigh (closed form).
     measured : str
         A steady-state table (temperature_degC,frequency_Hz) to compare by its local slopes; for the card hrg-30mm,
         Table 1 of the HRG paper unless another is given.
