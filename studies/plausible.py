@@ -29,10 +29,7 @@ def check_card_frequency(instrument: "Instrument", frequency: Array, path: str) 
         check_slope_known(instrument)
     read, own = float(np.median(known)), _frequency(instrument)
     away = abs(float(np.log(max(read, 1e-9) / own)))
-    if away <= ALIKE:
-        return
-    spread = _spread(instrument, own)
-    if away <= SPREADS * spread:
+    if away <= ALIKE or away <= SPREADS * (spread := _spread(instrument, own)):
         return
     T = instrument.reference_temperature - zero_Celsius
     ask = (
@@ -80,13 +77,10 @@ def records_of_one_gyro(records: "Sequence[Record]", say: Callable[[str], None])
 def check_model_frequency(frequency: Array, lowest: float, highest: float, path: str, model: str) -> None:
     """Ask whether a record is of the gyro that a frequency model was fitted to."""
     known = frequency[np.isfinite(frequency)]
-    if not known.size:
-        return
-    read = float(np.median(known))
-    if ((known >= lowest * (1 - SAME_GYRO)) & (known <= highest * (1 + SAME_GYRO))).any():
+    if not known.size or ((known >= lowest * (1 - SAME_GYRO)) & (known <= highest * (1 + SAME_GYRO))).any():
         return
     raise InputError(
-        f"{path}: frequency_Hz is near {read:.5g} Hz, but {model} was fitted to a gyro of {lowest:.5g} to {highest:.5g} Hz:"
+        f"{path}: frequency_Hz is near {np.median(known):.5g} Hz, but {model} was fitted to a gyro of {lowest:.5g} to {highest:.5g} Hz:"
         " is this a record of that gyro? If it is, fit a model to its own records (hrg fit frequency)."
     )
 

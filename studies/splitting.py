@@ -37,14 +37,14 @@ class SplitPair:
     def imperfection(self) -> Split:
         """By the fields and masses of [imperfection], to first order."""
         with naming(f"{self.instrument.path} [imperfection]"):
-            return find_split(self.pair, self._fields) if self._fields is not None else self._nothing
+            return find_split(self.pair, self._fields) if self._fields is not None else self._sum()
 
     @cached_property
     def measured(self) -> Split:
         """By [imperfection.split]: it keeps its share of f over temperature."""
         card: CardImperfection = self.instrument.part("imperfection")
         if card.split is None or card.split.harmonic != self.mode.harmonic:
-            return self._nothing
+            return self._sum()
         n = self.mode.harmonic
         wave = -card.split.hertz / self.mode.frequency * np.exp(2j * n * card.split.slow_axis)
         return Split(n, self.mode.frequency, 0.0, complex(wave))
@@ -54,16 +54,14 @@ class SplitPair:
         """By the voltages of [electrodes]."""
         card: CardElectrodes = self.instrument.part("electrodes")
         if not card.are_charged:
-            return self._nothing
+            return self._sum()
         with naming(f"{self.instrument.path} [electrodes]"):
             return card.on(self.pair, self.temperature).soften()
 
     @property
     def split(self) -> Split:
         """All of it, to first order."""
-        parts = (self.imperfection, self.measured, self.electrodes)
-        shift, wave = sum(p.shift for p in parts), sum(p.wave for p in parts)
-        return Split(self.mode.harmonic, self.mode.frequency, float(shift), complex(wave))
+        return self._sum(self.imperfection, self.measured, self.electrodes)
 
     def of_every_order(self) -> Split:
         """The same with the fields and masses acting in every order, harmonics n ± m taking part."""
@@ -72,9 +70,7 @@ class SplitPair:
         _, elastic = self.instrument.at(self.temperature)
         with naming(f"{self.instrument.path} [imperfection]"):
             own = _coupled(self.mode, elastic).solve(self._fields)
-        rest = (self.measured, self.electrodes)
-        shift, wave = own.shift + sum(p.shift for p in rest), own.wave + sum(p.wave for p in rest)
-        return Split(self.mode.harmonic, self.mode.frequency, float(shift), complex(wave))
+        return self._sum(own, self.measured, self.electrodes)
 
     @property
     def _fields(self) -> "Imperfection | None":
@@ -83,9 +79,9 @@ class SplitPair:
             _check_wall(self.instrument, card.fields)
         return card.fields
 
-    @property
-    def _nothing(self) -> Split:
-        return Split(self.mode.harmonic, self.mode.frequency, 0.0, 0j)
+    def _sum(self, *parts: Split) -> Split:
+        shift, wave = sum(p.shift for p in parts), sum(p.wave for p in parts)
+        return Split(self.mode.harmonic, self.mode.frequency, float(shift), complex(wave))
 
 
 def _check_wall(instrument: "Instrument", fields: "Imperfection") -> None:

@@ -1,7 +1,8 @@
 """Arguments that several commands share: what they are, and within which limits."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from math import inf
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
@@ -63,6 +64,16 @@ def open_card(card: str, temperature: float | None) -> "tuple[Instrument, float]
 
     instrument = load_card(card)
     return instrument, instrument.reference_temperature if temperature is None else temperature + zero_Celsius
+
+
+def ending_of(out: str, kinds: Sequence[str]) -> str:
+    """Return the ending of --out, which chooses the kind of file."""
+    kind = Path(out).suffix.lower()
+    if kind not in kinds:
+        raise InputError(f"--out {out}: the ending must be one of {', '.join(kinds)}.")
+    if Path(out).is_dir():
+        raise InputError(f"--out {out}: is a folder; give the name of a file.")
+    return kind
 
 
 def lay_temperatures(from_degC: float, to_degC: float, step: float) -> Array:

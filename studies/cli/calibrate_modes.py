@@ -110,10 +110,9 @@ def _payload(found: ModeCalibration, save: str | None) -> dict[str, Any]:
         "table": readings.path,
         "values": [row_of(one, *VALUE) for one in found.estimates],
         "modes": [
-            {
+            row_of(mode, "harmonic", "index")
+            | {
                 "line": line,
-                "harmonic": mode.harmonic,
-                "index": mode.index,
                 "frequency_Hz": float(f),
                 "predicted_Hz": float(f * np.exp(-left)),
                 "residual_ppm": 1e6 * float(left),

@@ -23,7 +23,7 @@ from studies.importing.mapping import LoadedMap, load_map
 from studies.record import write_record
 from studies.reports.columns import draw_columns
 from studies.reports.survey import COLUMNS
-from studies.results import Chapter, Column, Figure, Result, Sentence, Table, rows_of
+from studies.results import Chapter, Column, Figure, Result, Sentence, Table, row_of, rows_of
 from studies.survey import find_range
 
 Columns = Mapping[str, NDArray[np.float64]]
@@ -76,7 +76,7 @@ def _draft(raw: tuple[str, ...], path: str) -> Result:
     write_text(path, draft.text)
     mapped, left = (", ".join(names) or "none" for names in (draft.mapped, draft.left_over))
     return Result(
-        {"schema": "hrg.import-draft/1", "map": path, "mapped": draft.mapped, "left_over": draft.left_over},
+        {"schema": "hrg.import-draft/1", "map": path, **row_of(draft, "mapped", "left_over")},
         "Draft of a map",
         "What was recognized in the raw files.",
         [
@@ -113,15 +113,14 @@ def _import_table(raw: tuple[str, ...], import_map: LoadedMap, out: str) -> Resu
 
 def _show(records: Mapping[str, Columns], notes: Sequence[str], start: str | None, more: dict[str, Any]) -> Result:
     out, columns = next(iter(records.items()))
-    payload = {
+    missing = {name: {"missing": int(np.isnan(v).sum())} for name, v in columns.items()}
+    payload: dict[str, Any] = {
         "schema": "hrg.import/1",
         "start": start,
         "record": out,
         "rows": len(next(iter(columns.values()))),
-        "columns": {name: {"missing": int(np.isnan(v).sum())} for name, v in columns.items()},
-        "notes": list(notes),
-        **more,
     }
+    payload |= {"columns": missing, "notes": notes, **more}
     chapters = []
     for name, found in records.items():
         ranges = [find_range(key, values, found.get("time_s")).as_row() for key, values in found.items()]

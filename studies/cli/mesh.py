@@ -1,8 +1,6 @@
 """`hrg mesh`: the solid as a quadratic mesh for another finite-element program."""
 
-import os
 from dataclasses import replace
-from pathlib import Path
 from typing import Annotated, cast
 
 from cyclopts import Parameter
@@ -12,7 +10,7 @@ from shell.imperfection.surface import depart_points
 from shell.inertia import weigh
 from shell.volume import build_volume
 from shell.volume_files import VolumeKind, encode_volume
-from studies.cli.arguments import Card, Out, Temperature, open_card
+from studies.cli.arguments import Card, Out, Temperature, ending_of, open_card
 from studies.cli.output import answers
 from studies.errors import InputError, naming
 from studies.files.writing import written_whole
@@ -52,11 +50,7 @@ def mesh(
     complete : bool
         Add nodes at the centres of faces and elements: 27 and 18 for each element instead of 20 and 15.
     """
-    kind = Path(out).suffix.lower()
-    if kind not in KINDS:
-        raise InputError(f"--out {out}: the ending must be one of {', '.join(KINDS)}.")
-    if os.path.isdir(out):
-        raise InputError(f"--out {out}: is a folder; give the name of a file.")
+    kind = ending_of(out, KINDS)
     if complete and kind == ".inp":
         raise InputError("--complete: an .inp file has elements of 20 and 15 nodes only; leave it out, or take .msh.")
     instrument, T = open_card(card, temperature)

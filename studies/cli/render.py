@@ -1,8 +1,6 @@
 """`hrg render`: a mode shape as picture, animation, interactive page or mesh."""
 
-import os
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from cyclopts import Parameter
@@ -10,7 +8,7 @@ from cyclopts import Parameter
 from shell.constants import zero_Celsius
 from shell.mesh import encode_animation, encode_mesh
 from shell.scene import EXAGGERATION
-from studies.cli.arguments import MANY, WHOLE, Out, Theory
+from studies.cli.arguments import MANY, WHOLE, Out, Theory, ending_of
 from studies.cli.output import answers
 from studies.errors import InputError, MissingEnvironment
 from studies.files.writing import written_whole
@@ -75,15 +73,11 @@ def render(
     """
     from studies.reports.mode_picture import view_blocks
 
-    kind = Path(out).suffix.lower()
-    if kind not in KINDS:
-        raise InputError(f"--out {out}: the ending must be one of {', '.join(KINDS)}.")
+    kind = ending_of(out, KINDS)
     if len(harmonic) > 1 and kind != ".html":
         raise InputError("several harmonics go together only in an .html page; make one file for each.")
     if colour == "temperature" and field is None:
         raise InputError("--colour temperature needs --field FIELD.csv (position,temperature_degC along the meridian).")
-    if os.path.isdir(out):
-        raise InputError(f"--out {out}: is a folder; give the name of a file.")
     along = read_field(field) if field is not None else None
     shown = _solve(card, harmonic, index, temperature, theory, kind)
     if kind in (".png", ".webp", ".gif"):

@@ -65,7 +65,7 @@ def thermal(
     names = [*shown, "shell", "rim"]
     energy = check_energy(network, {"chamber": chamber}, transient)
     influence = _influence(network, T0)
-    temperatures = {name: T[:, k] for k, name in enumerate(names)}
+    temperatures = dict(zip(names, T.T, strict=True))
     housed = {"time_s": time, "chamber_temperature_degC": chamber.at(time) - zero_Celsius}
     payload = {
         "schema": "hrg.thermal/1",

@@ -13,7 +13,7 @@ from studies.instrument.units import unit_of
 from studies.reports import style
 from studies.reports.columns import column_title, draw_columns
 from studies.rest import TEMPERATURES
-from studies.results import Chapter, Column, Drawing, Figure, Part, Sentence, Table
+from studies.results import Chapter, Column, Drawing, Figure, Part, Sentence, Table, row_of
 from studies.survey import CONFIDENCE, Survey, average_evenly
 from studies.uses import Use
 
@@ -203,15 +203,12 @@ def tell(survey: Survey) -> dict[str, Any]:
         if column.line is not None:
             row["line"] = {"period_s": column.line.period, "rms": column.line.rms}
         columns.append(row)
-    steps = [
-        {"column": column.name, "time_s": step.time, "size": step.size}
-        for column in survey.columns
-        for step in column.steps
-    ]
+    steps = [{"column": c.name, "time_s": step.time, "size": step.size} for c in survey.columns for step in c.steps]
+    names = {"start_s": "start", "end_s": "end"}
     settled = [
-        {"start_s": s.start, "end_s": s.end, "temperature_degC": s.temperature_degC, "frequency_Hz": known(s.frequency_Hz), "left_K": known(s.left_K)}
+        {key: known(value) for key, value in row_of(s, "temperature_degC", "frequency_Hz", "left_K", **names).items()}
         for s in survey.settled
-    ]  # fmt: skip
+    ]
     correlations = sorted(survey.correlations, key=lambda row: -abs(float(row["changes"] or 0.0)))
     return {
         "path": record.path, "instrument": record.instrument, "start": record.start.isoformat() if record.start else None,
