@@ -19,9 +19,9 @@ def find_spikes(values: Array, least: float = 0.0, step: float = 0.0) -> NDArray
     What the neighbours say is the median of (y_{i−k} + y_{i+k})/2, k = 1, 2, 3, which follows any straight trend; at the
     ends of the series that of 2 y_{i+k} − y_{i+2k}, looking inwards, whose distance counts half. The distance from it must
     exceed 6 times 1.4826 times the median distance of the whole series, be the largest within two rows, and exceed 4 times
-    the distance that is usual next to it without this reading, so that bends, gaps and jumps are no spikes. Spikes that are
-    found are left out, and the rest is searched again: one does not hide another beside it. Missing readings, NaN, are not
-    marked, nor is anything in fewer than seven.
+    the distance that is usual (at the ends: largest) next to it without this reading, so that bends, gaps and jumps are no
+    spikes. Spikes that are found are left out, and the rest is searched again: one does not hide another beside it. Missing
+    readings, NaN, are not marked, nor is anything in fewer than seven.
 
     `least`: part of the series' span, spikes left out of it, by which a spike must stand out too: a smooth column has no
     noise to measure a spike by. `step`: what the readings were rounded to, where the values do not show it any more: half of
@@ -110,8 +110,11 @@ def _stand_out(values: Array, least: float) -> NDArray[np.bool_]:
         without = left.copy()
         without[candidates] = np.nan
         around = np.pad(_distance(without), REACH, mode="reflect")
-        nearby = _median([np.fmax(_shifted(around, -k), _shifted(around, k)) for k in (1, 2, 3)])[candidates]
-        found = candidates[distance[candidates] > ALONE * nearby]
+        beside = [np.fmax(_shifted(around, -k), _shifted(around, k)) for k in (1, 2, 3)]
+        nearby = _median(beside)
+        ends = [*range(REACH), *range(-REACH, 0)]  # a run may begin with a bend, which is no spike
+        nearby[ends] = np.fmax.reduce(beside)[ends]
+        found = candidates[distance[candidates] > ALONE * nearby[candidates]]
         if not found.size:
             return np.isnan(left)
         left[found] = np.nan

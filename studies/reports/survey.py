@@ -90,7 +90,7 @@ def run_chapters(survey: Survey, told: dict[str, Any], several: bool) -> list[Ch
     count = len(survey.record)
     drawn, step = "", 2 * count // style.MOST_POINTS
     if count > style.MOST_POINTS:
-        drawn = f" Of {count:,} rows the least and the largest of every {step} are drawn, and a part that is enlarged shows no more."
+        drawn = f" Of {count:,} rows the least and the largest of every {step} are drawn; enlarging shows no more."
     noise = [column for column in survey.columns if column.stability is not None]
     dense = [column for column in survey.columns if column.density is not None]
     made = {column.density.even for column in dense if column.density is not None}
@@ -112,7 +112,7 @@ def run_chapters(survey: Survey, told: dict[str, Any], several: bool) -> list[Ch
                 "Overlapping Allan deviation with its 90 % interval, and (dashed) white noise, flicker and random walk fitted together."),
             Table("Noise", told["columns"], NOISE, NOISE_NOTE),
         ] if noise else ["No column varies over enough rows for an Allan deviation."],
-        "spectra": [Figure(lambda: _draw_spectra(survey), f"Amplitude spectral density ({how}), mean and slope taken off.")] if dense else [],
+        "spectra": [Figure(lambda: _draw_spectra(survey), f"Amplitude spectral density ({how}), mean and slope removed.")] if dense else [],
         "correlation": [Table("Correlation between columns", told["correlations"], CORRELATIONS, CORRELATION_NOTE, "page", sortable=True)],
     }  # fmt: skip
     chapters = [Chapter((before + title) if before else title.capitalize(), parts) for title, parts in found.items()]

@@ -10,6 +10,7 @@ SHAPES = {
     "slow wave": np.sin(ROWS / 50.0),
     "fast wave": np.sin(ROWS / 5.0),
     "cooling": np.exp(-ROWS / 40.0),
+    "bend at the start": np.exp(-ROWS / 100.0) + 0.05 * np.exp(-ROWS / 2.0),
     "step": np.where(ROWS < 300.0, 0.0, 1.0),
     "kink": np.maximum(ROWS - 300.0, 0.0),
     "parabola": ROWS**2,
