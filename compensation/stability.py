@@ -103,10 +103,12 @@ def allan_deviation(
         spaced = np.unique(np.round(2.0 ** (np.arange(count + 1) / points_per_octave)).astype(int))
         factors = spaced[spaced <= longest].tolist()
     x = np.concatenate([[0.0], np.cumsum(y - y.mean())]) * step
-    second = (x[2 * m :] - 2 * x[m:-m] + x[: -2 * m] for m in factors)
-    deviation = np.array(
-        [math.sqrt(float(d @ d) / (2 * d.size)) / (m * step) for m, d in zip(factors, second, strict=True)]
-    )
+
+    def overlapping(m: int) -> float:
+        second = x[2 * m :] - 2 * x[m:-m] + x[: -2 * m]
+        return math.sqrt(float(second @ second) / (2 * second.size)) / (m * step)
+
+    deviation = np.array([overlapping(m) for m in factors])
     tau = np.asarray(factors, dtype=np.float64) * step
     noise = _identify(tau, deviation)
     edf = np.array([equivalent_freedom(kind, x.size, m) for kind, m in zip(noise, factors, strict=True)])

@@ -192,7 +192,7 @@ class Electrodes:
                     continue
                 for at, weight in zip((low + high) / 2 + (high - low) / 2 * x, weights, strict=True):
                     here = cut(resonator, solution.system, float(at), np.array([side]))
-                    half = here.place.thickness / 2
+                    half = here.section.thickness[0] / 2
                     # per unit of η and of position the volume of the cut is A ρ h/2 ds
                     area = here.table.volume[0, 0, 0] / float(half[0]) * resonator.length * weight * (high - low) / 2
                     rows.append((float(at), float(area), side * float(here.displacements(solution.unknowns)[2, 0])))

@@ -37,8 +37,8 @@ def _motion(mode: Mode) -> tuple[Array, Array]:
         except ShellError:
             continue
         u, v, w = here.displacements(mode.solution.unknowns)[:, 0]
-        t_r, t_z = float(here.place.tangent_r[0]), float(here.place.tangent_z[0])
-        moved[:, k], radius[k] = (t_r * u - t_z * w, v, t_z * u + t_r * w), float(here.place.r[0])
+        t_r, t_z = float(here.section.tangent_r[0, 0]), float(here.section.tangent_z[0, 0])
+        moved[:, k], radius[k] = (t_r * u - t_z * w, v, t_z * u + t_r * w), float(here.section.r[0, 0])
     return moved, radius
 
 

@@ -224,12 +224,12 @@ def _jets(section: Section, through: Orders, points: Array) -> tuple[list[Array]
     total, start = sum(through) + 3, 0
     drift = slope / h * points[:, None, None]
     found: tuple[list[Array], list[Array], list[Array]] = ([], [], [])
+    basis = legendre(max(through), points)
     for order in through:
-        basis = legendre(order, points)
         value, d_eta, d_xi = (np.zeros((len(points), 2, total)) for _ in range(3))
         columns = slice(start, start := start + order + 1)
-        value[:, 0, columns] = d_xi[:, 1, columns] = basis.values
-        d_eta[:, 0, columns] = basis.slopes
+        value[:, 0, columns] = d_xi[:, 1, columns] = basis.values[:, : order + 1]
+        d_eta[:, 0, columns] = basis.slopes[:, : order + 1]
         for kind, one in zip(found, (value, d_xi / ds - drift * d_eta, 2 / h * d_eta), strict=True):
             kind.append(one)
     return found

@@ -10,7 +10,7 @@ from shell.assembly import sections
 from shell.errors import ShellError, mm
 from shell.kernel import Section, StrainTable, shell_table
 from shell.quadrature import Array, nodal
-from shell.resonator import MeridianPoints, Resonator
+from shell.resonator import Resonator
 from shell.system import ShellGroup, System
 
 
@@ -21,8 +21,7 @@ class CrossSection:
     group: int  # group, element: numbers of the group and of the element in it
     element: int
     along: Array  # values and ξ-derivatives of the functions along the element, (2, functions)
-    place: MeridianPoints  # place, section: the middle surface
-    section: Section
+    section: Section  # the middle surface
     # at the heights that were asked for; its volumes are those of a slice of unit arc length and unit η
     table: StrainTable
 
@@ -83,11 +82,10 @@ def cut(resonator: Resonator, system: System, position: float, heights: Array) -
         element = int(np.clip(np.searchsorted(breaks, s, side="right") - 1, 0, len(breaks) - 2))
         one, two = breaks[element], breaks[element + 1]
         xi = np.array([np.clip((2 * s - one - two) / (two - one), -1.0, 1.0)])
-        place = resonator.at([s], group.place.chain.segments[element])
         along = nodal(group.table.along.shape[2] - 1, xi)
         section = sections(resonator, group.place.chain.element(element), xi, np.array([2 / (two - one)]))
         table = shell_table(section, system.n, system.level.through, (heights, np.ones(len(heights))), along)
-        return CrossSection(number, element, np.stack([along.values[0], along.slopes[0]]), place, section, table)
+        return CrossSection(number, element, np.stack([along.values[0], along.slopes[0]]), section, table)
     raise ShellError(
         f"the position {position:g} ({mm(s)} along the meridian) lies in a solid root, corner or clamp, where no mass can be "
         "placed: choose one on the shell, 1 for the rim."
