@@ -31,7 +31,7 @@ def mesh(
     complete: bool = False,
     temperature: Temperature = None,
 ) -> Result:
-    """Mesh the solid for a finite-element program: shell, roots, fillets, corners and stem, node on node.
+    """Mesh the solid for a finite-element program: shell, roots, fillets, corners and stem, with matching nodes.
 
     The elements are quadratic hexahedra, and wedges on the axis; all nodes lie on the true surfaces. The extension of
     --out selects the format: .vtu for VTK and ParaView, .msh for Gmsh (2.2), .inp for Abaqus and CalculiX. Lengths are in m.
