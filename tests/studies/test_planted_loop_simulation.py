@@ -28,7 +28,7 @@ def simulated(tmp_path, card_lines, words=None):
 def test_commands_move_the_drives(tmp_path, capsys):
     lines = '\n[[effect]]\nname = "electrostatic-softening"\nsoftening_Hz_per_V2 = 1e-6\n'
     _, record = simulated(tmp_path, lines)
-    assert "adds nothing" not in capsys.readouterr().err
+    assert "does not act" not in capsys.readouterr().err
     t, f = record["time_s"], record["frequency_Hz"]
     # −k V²: 100 V at 1e-6 Hz/V²
     assert f[t == 1000][0] - f[t == 300][0] == pytest.approx(-0.01, abs=1e-6)
