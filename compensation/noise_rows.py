@@ -23,10 +23,12 @@ from compensation.errors import CompensationError
 from compensation.noise import SLOW_TIMES, Noise, flicker, random_walk
 
 Array = NDArray[np.float64]
+COARSE = 150
+"""Most rows of a run from which noise is estimated in a model with many unknowns."""
 LEAST, MOST = -7.0, 5.0  # ln of the rms of slow noise within a run over that of a row's white noise
 KINDS = ("white", "flicker", "walk", "offset")
 USUAL, SPREAD = -1.0, 3.0  # their weak prior, which keeps a level that the rows say nothing about from running away
-STATED_SPREAD = 1.5  # the same about ln of a level that is stated: a factor of 3
+STATED_SPREAD = 0.7  # the same about ln of a level that is stated: a factor of 2
 
 
 @dataclass(frozen=True)
@@ -77,10 +79,40 @@ class NoiseRows:
             found[key][2].append(run)
         return tuple((F, W, tuple(runs)) for F, W, runs in found.values())
 
+    @cached_property
+    def _starts(self) -> tuple[tuple[NDArray[np.intp], ...], "NoiseRows"]:
+        """Rows at which the coarse rows of each run begin, and these: weighted means of neighbours."""
+        every = [-(-len(t) // COARSE) for t in self.times]
+        starts = tuple(np.arange(0, len(t), k) for t, k in zip(self.times, every, strict=True))
+        rows = zip(self.times, self.spans, self.stretch, starts, strict=True)
+        spans = tuple(np.add.reduceat(w, at) for w, at in zip(self.spans, starts, strict=True))
+        means = [(np.add.reduceat(w * t, at), np.add.reduceat(w * s, at)) for t, w, s, at in rows]
+        times, stretch = zip(*[(t / w, s / w) for (t, s), w in zip(means, spans, strict=True)], strict=True)
+        return starts, NoiseRows(tuple(times), spans, tuple(stretch))
+
+    @property
+    def coarse(self) -> "NoiseRows":
+        """At most `COARSE` rows a run: what is slow in a run is in these, for a small part of the work."""
+        return self._starts[1]
+
+    def means(self, columns: Array) -> Array:
+        """Return stacked columns, (M,) or (M, p), in the coarse rows."""
+        starts, coarse = self._starts
+        places = np.concatenate([own.start + at for own, at in zip(self.slices, starts, strict=True)])
+        weights = np.concatenate(self.spans).reshape(-1, *[1] * (columns.ndim - 1))
+        total = np.concatenate(coarse.spans).reshape(-1, *[1] * (columns.ndim - 1))
+        return np.asarray(np.add.reduceat(weights * columns, places, axis=0) / total)
+
     @property
     def span(self) -> float:
         """Span of a usual row, s."""
         return float(np.median(np.concatenate(self.spans)))
+
+    def slow_share(self, noise: Noise) -> float:
+        """Return the rms of slow noise within a usual run over the white noise of a row."""
+        unit = _units(self)
+        slow = np.hypot(noise.flicker / unit["flicker"], noise.walk / unit["walk"] / 6**0.5)
+        return float(slow / max(noise.white / self.span**0.5, 1e-300))
 
     def covariance(self, run: int, noise: Noise) -> Array:
         """Covariance of the rows of one run."""
@@ -204,33 +236,21 @@ def estimate_noise(
     spread = float(np.median(np.abs(step))) / 0.954 if step.size else 0.0
     spread = max(spread, 1e-14 * float(np.abs(target).max()), 1e-300)
     free = [kind for kind in KINDS[1:] if kind in kinds and (kind != "offset" or len(rows.times) > 1)]
-    root = float(np.sqrt(rows.span))
-    seconds = max(max(float(np.ptp(t)) for t in rows.times), 1e-6)
-    unit = {
-        "flicker": SLOW_TIMES**-0.5,
-        "walk": seconds**-0.5,
-        "offset": 1.0,
-    }  # of a level whose rms in a run is about 1
+    root, unit = float(np.sqrt(rows.span)), _units(rows)
 
     def levels(x: Array) -> Noise:
         white = float(spread * np.exp(x[0]))
         slow = {kind: white * unit[kind] * float(np.exp(one)) for kind, one in zip(free, x[1:], strict=True)}
         return Noise(white * root, **slow)
 
-    said = {kind: getattr(stated, kind) for kind in free if stated is not None and getattr(stated, kind) > 0}
-
     def objective(x: Array) -> tuple[float, Array]:
         noise = levels(x)
         total, by_level = rows.deviance(rest, X, lam, noise, -free_part)
         slopes = np.array([sum(by_level.values()), *(by_level[kind] for kind in free)])
-        for k, kind in enumerate(free, 1):
-            if kind in said:
-                surprise, spread = float(np.log(getattr(noise, kind) / said[kind])) / STATED_SPREAD, STATED_SPREAD
-                slopes[0] += 2 * surprise / spread
-            else:
-                surprise, spread = (float(x[k]) - USUAL) / SPREAD, SPREAD
+        for k, (surprise, spread, absolute) in enumerate(_surprises(rows, noise, free, stated), 1):
             total += surprise**2
             slopes[k] += 2 * surprise / spread
+            slopes[0] += 2 * surprise / spread * absolute
         return total, slopes
 
     first = np.array([-0.3, *[USUAL] * len(free)])
@@ -244,3 +264,29 @@ def estimate_noise(
         objective, first, jac=True, method="L-BFGS-B", bounds=bounds, options={"ftol": 1e-7}
     )
     return levels(found.x)
+
+
+def log_prior(rows: NoiseRows, noise: Noise, stated: Noise | None = None) -> float:
+    """Return the log of the weak prior of the slow levels that are there."""
+    free = [kind for kind in KINDS[1:] if getattr(noise, kind) > 0]
+    return -0.5 * sum(surprise**2 for surprise, _, _ in _surprises(rows, noise, free, stated))
+
+
+def _units(rows: NoiseRows) -> dict[str, float]:
+    """Slow levels whose rms in a run is about 1."""
+    seconds = max(max(float(np.ptp(t)) for t in rows.times), 1e-6)
+    return {"flicker": SLOW_TIMES**-0.5, "walk": seconds**-0.5, "offset": 1.0}
+
+
+def _surprises(
+    rows: NoiseRows, noise: Noise, kinds: Sequence[str], stated: Noise | None
+) -> list[tuple[float, float, bool]]:
+    """Return by how many standard deviations each level departs from its prior, that deviation, and whether it is that of a stated level."""
+    white, unit, found = noise.white / float(np.sqrt(rows.span)), _units(rows), []
+    for kind in kinds:
+        level, said = getattr(noise, kind), 0.0 if stated is None else getattr(stated, kind)
+        if said > 0:
+            found.append((float(np.log(level / said)) / STATED_SPREAD, STATED_SPREAD, True))
+        else:
+            found.append(((float(np.log(level / unit[kind] / white)) - USUAL) / SPREAD, SPREAD, False))
+    return found

@@ -42,6 +42,7 @@ KEPT = 0.75  # of its promise, beyond which a step may be longer
 LEAST_DAMPING, MOST_DAMPING, HALVINGS = -12.0, 24.0, 14  # ln of what is added to the prior's precision
 LEAST_FALL = 0.1  # of the objective, over what the step promises
 UNSEEN = 0.1  # of the noise of one row: a column whose whole length is less tells nothing
+LASTING = ("frequency_Hz", "inverse_q")  # responses without an offset of turn-on
 LONGEST_STEP = 3.0  # prior standard deviations, of any coordinate in one step
 
 
@@ -164,6 +165,7 @@ def estimate_levels(
     slopes: Mapping[str, Array],
     noise: Mapping[str, Noise],
     names: Sequence[str],
+    known: Array | None = None,
 ) -> dict[str, Noise]:
     """Return the noise of highest marginal likelihood of some responses, each given the others'.
 
@@ -175,20 +177,22 @@ def estimate_levels(
     ----------
     target, slopes : response -> (M,) and (M, p), about the prior mean of the unknowns
     names : responses whose noise is estimated
+    known : (q, p + 1), what else says something of the unknowns: rows of white noise of variance 1 and their target
     """
     found = dict(noise)
     for name in names:
         count = slopes[name].shape[1]
         told = [other for other in problem.responses if other != name and other in found]
         white = [rows[n].whiten(np.column_stack([slopes[n], target[n]]), found[n]) for n in told]
+        white += [] if known is None else [known]
         triangle = np.linalg.qr(np.vstack([np.eye(count, count + 1), *white])).R[:count]
         R, move = triangle[:, :-1], scipy.linalg.solve_triangular(triangle[:, :-1], triangle[:, -1])
-        J = slopes[name]
+        J, left = rows[name].means(slopes[name]), rows[name].means(target[name])
         # Rotated coordinates of unit prior are of unit prior again; those that the rows do not see are left out.
         U, S, _ = np.linalg.svd(scipy.linalg.solve_triangular(R, J.T, trans="T").T, full_matrices=False)
-        left = target[name] - J @ move
+        left = left - J @ move
         seen = S > UNSEEN * float(np.median(np.abs(np.diff(left - U @ (U.T @ left)))))
-        found[name] = _levels(problem, rows[name], name, left, U[:, seen] * S[seen], found.get(name))
+        found[name] = _levels(problem, rows[name].coarse, name, left, U[:, seen] * S[seen], found.get(name))
     return found
 
 
@@ -200,7 +204,7 @@ def _levels(
     columns: Array | None = None,
     near: Noise | None = None,
 ) -> Noise:
-    kinds = ("white",) if name == SETTLED else KINDS
+    kinds = ("white",) if name == SETTLED else KINDS[:-1] if name in LASTING else KINDS
     precision = None if columns is None else np.ones(columns.shape[1])
     stated = None if columns is None else stated_noise(problem.instrument.noise, name)
     noise = estimate_noise(rows, target, columns, precision, kinds, near, stated)
@@ -317,7 +321,7 @@ def _advance(
     before = objective(problem, state, noise, rows)
     for _ in range(TRIALS):
         move, damping = linear.step(radius)
-        length, promised = float(np.abs(move).max()), linear.fall(move)
+        length, promised = float(np.abs(move).max(initial=0.0)), max(linear.fall(move), 1e-300)
         reached = _reach(problem, state.point + move)
         kept = -np.inf if reached is None else (before - objective(problem, reached, noise, rows)) / promised
         bent = np.zeros_like(move)

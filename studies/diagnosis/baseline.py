@@ -11,7 +11,7 @@ and resonator is part of it.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import ClassVar, Protocol
+from typing import Protocol
 
 import numpy as np
 
@@ -93,9 +93,7 @@ class Tangent:
 
 
 class Baseline(Protocol):
-    """A law with uncertain values; `from_card` where these are a card's."""
-
-    from_card: ClassVar[bool]
+    """A law with uncertain values."""
 
     @property
     def lagged(self) -> bool:
@@ -112,9 +110,6 @@ class Baseline(Protocol):
 
     def released(self) -> "Baseline":
         """Return the baseline with nothing held."""
-
-    def stated(self) -> "Baseline | None":
-        """Return the baseline at the values of its card, where it is far from there; else None."""
 
     def elsewhere(self, near: float = 0.0) -> Sequence["Baseline"]:
         """Return the baseline at other points, everywhere or so many e-folds away: an effect may imitate its own values."""
@@ -146,7 +141,6 @@ class Lagged:
     the offsets of runs lie apart, in the response's unit, 0 where nothing is known of it.
     """
 
-    from_card: ClassVar[bool] = False
     response: Response
     states: tuple[States, ...]
     group: int
@@ -254,9 +248,6 @@ class Lagged:
         """Let the delay go."""
         return replace(self, delay=None)
 
-    def stated(self) -> None:
-        """No card states its values."""
-
     def elsewhere(self, near: float = 0.0) -> list["Lagged"]:
         """Return it with other lags: without an effect of the rate, none at all may seem the best."""
         lags = self.tau * np.exp([-near, near]) if near else LAGS
@@ -303,7 +294,6 @@ class Followed:
         As of `Campaign`; none where it is empty.
     """
 
-    from_card: ClassVar[bool] = False
     response: Response
     states: tuple[States, ...]
     group: int
@@ -388,9 +378,6 @@ class Followed:
     def released(self) -> "Followed":
         """Let delay and part go."""
         return replace(self, delay=None, part_held=False)
-
-    def stated(self) -> None:
-        """No card states its values."""
 
     def elsewhere(self, near: float = 0.0) -> tuple[()]:
         """Its temperature is given."""

@@ -56,7 +56,7 @@ def check_device(records: Sequence[Record], tables: Sequence[dict[str, FloatArra
     levels = [
         (float(np.nanmedian(table["inverse_q"])), record.path)
         for record, table in zip(records, tables, strict=True)
-        if "inverse_q" in table
+        if "inverse_q" in table and np.isfinite(table["inverse_q"]).any()
     ]
     if levels and max(levels)[0] > MOST_LOSS * min(levels)[0]:
         raise InputError(

@@ -135,11 +135,6 @@ def begin(
     return fit(problem, first.moved(), (), 2)
 
 
-def again(plain: Fit) -> Callable[[float], Baseline]:
-    """Return what makes a baseline where a fit left it, with what it has solved: on a few rows less it is nearly there."""
-    return lambda noise: plain.moved().released()
-
-
 def row_noise(campaign: Campaign, column: str) -> float:
     """Return the white noise of one row of the record, from second differences."""
     return white_rms(*(run.row_responses[column] for run in campaign.runs))

@@ -2,11 +2,9 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import TYPE_CHECKING, ClassVar, cast
 
 import numpy as np
-import scipy
 
 from compensation.noise import white_rms
 from shell.constants import zero_Celsius
@@ -17,18 +15,15 @@ from studies.diagnosis.causes import name_causes, vote
 from studies.diagnosis.checks import FEWEST_BINS
 from studies.diagnosis.constants import CONSTANTS
 from studies.diagnosis.held_out import Score, score_both
-from studies.diagnosis.inquiry import Inquiry, Thermometer, again, begin, inquire, read_thermometer
+from studies.diagnosis.inquiry import Inquiry, Thermometer, begin, inquire, read_thermometer
 from studies.diagnosis.lack_of_fit import doubt_of
 from studies.diagnosis.model import Fit
 from studies.diagnosis.planning.advice import suggest_next
 from studies.diagnosis.response import RESPONSES
 from studies.diagnosis.seen import SeenResponse
-from studies.diagnosis.simulated import FAR, Simulated, shifts_of, simulate_baseline
-from studies.diagnosis.stated import as_shipped, with_loss_carried, without_rate_terms
-from studies.diagnosis.verdict import Cause, Interval, ResponseResult, Shift, Verdict, doubted, overall
+from studies.diagnosis.verdict import Cause, ResponseResult, Verdict, doubted, overall
 from studies.effects import Effect
 from studies.planning.chamber import Chamber
-from studies.plausible import check_card_frequency
 from studies.shown import Shown
 
 ASKED = ("frequency_Hz", "inverse_q", "bias_deg_per_h")
@@ -47,8 +42,6 @@ Progress = Callable[[str], None]
 
 if TYPE_CHECKING:
     from pandas import DataFrame
-
-    from studies.instrument.card import Instrument
 
 
 @dataclass(frozen=True, repr=False)
@@ -118,7 +111,6 @@ def investigate(
     advise: bool = True,
     progress: Progress | None = None,
     chamber: Chamber | None = None,
-    card: "Instrument | None" = None,
 ) -> Diagnosis:
     """Find what the baseline leaves, name it, and measure what the extension is worth.
 
@@ -135,15 +127,8 @@ def investigate(
         Is told in a few words what comes next.
     chamber : Chamber, optional
         What the next run may ask of the chamber.
-    card : Instrument, optional
-        Its own simulation is then the baseline of the frequency.
     """
-    tell, measured = progress or (lambda words: None), campaign
-    if card is not None:
-        for seen in campaign.runs:
-            if "frequency_Hz" in seen.responses:
-                check_card_frequency(card, seen.responses["frequency_Hz"], seen.label)
-        campaign = measured = replace(campaign, turn_on=card.noise.bias_turn_on_deg_per_h)
+    tell = progress or (lambda words: None)
     inquiries: dict[str, Inquiry] = {}
     thermometer: Thermometer | None = None
     for column in (c for c in ASKED if c in campaign.responses):
@@ -151,34 +136,19 @@ def investigate(
         if rows < FEWEST_BINS + 2 * len(campaign.runs):
             continue
         tell(f"{RESPONSES[column].word}: baseline, then all effects")
-        simulated = card is not None and RESPONSES[column].thermometer
-        make = partial(simulate_baseline, campaign, card) if simulated and card is not None else None
-        if column == "bias_deg_per_h":
-            clock = next(
-                (i.final.baseline for i in inquiries.values() if isinstance(i.final.baseline, Simulated)), None
-            )
-            campaign = campaign if clock is None else without_rate_terms(campaign, clock)
-            if clock is not None and "inverse_q" in inquiries:
-                campaign = with_loss_carried(campaign, clock, inquiries["inverse_q"].final)
-        plain = begin(campaign, column, thermometer, make)
+        plain = begin(campaign, column, thermometer)
         cleaned = campaign.without_spikes(column, held_out.residuals(plain, campaign))
         if cleaned is not campaign:
-            campaign, plain = cleaned, begin(cleaned, column, thermometer, make and again(plain))
-        found_here = inquire(campaign, plain, effects, score_held_out)
-        if found_here.final.terms and RESPONSES[column].own_offset and campaign.turn_on:
-            campaign, found_here = _doubt_turn_on(campaign, column, thermometer, found_here, effects, score_held_out)
-        inquiries[column] = found_here
+            campaign, plain = cleaned, begin(cleaned, column, thermometer)
+        inquiries[column] = inquire(campaign, plain, effects, score_held_out)
         if RESPONSES[column].thermometer:
             thermometer = read_thermometer(campaign, inquiries[column].final)
     inquiries = {column: inquiries[column] for column in RESPONSES if column in inquiries}
     inquiries = vote(campaign, inquiries, effects, score_held_out)
     tell("held-out residuals")
-    shifts = tuple(shift for inquiry in inquiries.values() for shift in shifts_of(inquiry.final))
-    causes = (*wrong_values(shifts), *name_causes(campaign, inquiries))
-    causes = tuple(sorted(causes, key=lambda cause: -cause.evidence))
-    shipped = _shipped(measured, inquiries)
+    causes = tuple(sorted(name_causes(campaign, inquiries), key=lambda cause: -cause.evidence))
     results = {
-        column: _result(campaign, inquiries[column], causes, score_held_out, shipped.get(column))
+        column: _result(campaign, inquiries[column], causes, score_held_out)
         if column in inquiries
         else _too_little("too few values")
         for column in campaign.responses
@@ -192,45 +162,12 @@ def investigate(
         results[column] = _too_little(reason)
     verdict = overall([result.verdict for result in results.values()])
     named = tuple(cause for cause in doubted(causes) if cause.probability >= CONSTANTS["member"])
-    found = Verdict(verdict, named, results, None, campaign.said, calibration=shifts)
+    found = Verdict(verdict, named, results, None, campaign.said)
     if advise:
         tell("next run")
         text, run = suggest_next(campaign, found, inquiries, chamber)
         found = replace(found, next_experiment=text, next_run=run)
     return Diagnosis(found, campaign, inquiries)
-
-
-def _doubt_turn_on(
-    campaign: Campaign,
-    column: str,
-    thermometer: Thermometer | None,
-    inquiry: Inquiry,
-    effects: Sequence[Effect] | None,
-    score_held_out: bool,
-) -> tuple[Campaign, Inquiry]:
-    """Ask whether one turn-on beyond what the card states is all that was named of a response.
-
-    What changes a bias from run to run, ageing or a jump, does not come back. A run whose level leaves both neighbours far beyond
-    the stated deviation has had another turn-on, if with levels of their own the runs need no cause.
-    """
-    if len(campaign.records) < len(campaign.runs):
-        return campaign, inquiry
-    free = replace(campaign, turn_on=0.0)
-    plain = begin(free, column, thermometer)
-    order = np.argsort([run.states.campaign_time[0] for run in campaign.runs])
-    steps = np.diff(np.array(_run_shifts(plain))[order])
-    furthest = np.maximum(np.minimum(steps[:-1], -steps[1:]), np.minimum(-steps[:-1], steps[1:]))
-    if furthest.max(initial=0.0) < CONSTANTS["turned_back"] * campaign.turn_on:
-        return campaign, inquiry
-    without = inquire(free, plain, effects, score_held_out)
-    if without.final.terms:
-        return campaign, inquiry
-    path = campaign.runs[order[int(np.argmax(furthest)) + 1]].label
-    note = (
-        f"{path}: its bias lies {furthest.max():.2g} °/h from the runs before and after it, but the card states"
-        f" {campaign.turn_on:.2g} °/h from turn-on to turn-on; each run was therefore given its own offset."
-    )
-    return replace(free, notes=(*free.notes, note)), without
 
 
 def _too_brief(campaign: Campaign, inquiries: Mapping[str, Inquiry]) -> str:
@@ -240,13 +177,6 @@ def _too_brief(campaign: Campaign, inquiries: Mapping[str, Inquiry]) -> str:
         return ""
     reading = cast("Reading", lags[0])
     span = sum(float(np.ptp(run.time)) for run in campaign.runs)
-    if reading.from_card:
-        change = float(np.ptp(np.concatenate([view.seen.resonator for view in reading.views()])))
-        return (
-            f"too short to judge: the resonator's temperature changes by {change:.2g} K only"
-            if change < NARROW_RANGE
-            else ""
-        )
     if span >= FEWEST_LAGS * reading.tau:
         return ""
     return (
@@ -258,34 +188,7 @@ def _too_little(reason: str) -> ResponseResult:
     return ResponseResult("not-identifiable", None, (None, None), None, "none", remark=reason)
 
 
-def _shipped(campaign: Campaign, inquiries: Mapping[str, Inquiry]) -> dict[str, float]:
-    for inquiry in inquiries.values():
-        if isinstance(inquiry.plain.baseline, Simulated):
-            own = inquiry.plain.baseline
-            return as_shipped(campaign, replace(own, z=(0.0,) * len(own.z), initial=tuple({} for _ in own.initial)))
-    return {}
-
-
-def wrong_values(shifts: Sequence[Shift]) -> list[Cause]:
-    """Return the card's values that the data move by more than two of their standard deviations."""
-    return [
-        Cause(
-            shift.parameter,
-            "frequency_Hz",
-            float(scipy.special.erf(abs(shift.shift_sd) / np.sqrt(2.0))),
-            (),
-            {shift.parameter: Interval(shift.value, min(shift.low, shift.high), max(shift.low, shift.high))},
-            shift.shift_sd**2,
-            kind="value",
-        )
-        for shift in shifts
-        if abs(shift.shift_sd) > FAR
-    ]
-
-
-def _result(
-    campaign: Campaign, inquiry: Inquiry, causes: Sequence[Cause], score_held_out: bool, shipped: float | None
-) -> ResponseResult:
+def _result(campaign: Campaign, inquiry: Inquiry, causes: Sequence[Cause], score_held_out: bool) -> ResponseResult:
     plain, final, left = inquiry.plain, inquiry.final, inquiry.leftover
 
     extended = None
@@ -339,7 +242,6 @@ def _result(
         "; ".join(remarks),
         white=white,
         wander=final.wander,
-        shipped=shipped,
         run_shifts=tuple(_run_shifts(final)),
     )
 

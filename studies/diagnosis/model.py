@@ -272,7 +272,7 @@ def _once(
     sized: bool,
 ) -> Fit:
     tangent = baseline.tangent()
-    linear = replace(linearise(problem, tangent, terms), widest=1.0 if baseline.from_card else np.inf)
+    linear = linearise(problem, tangent, terms)
     return Fit(
         problem, baseline, tuple(terms), tangent, linear, solve(linear, 0 if sized else len(terms), scales, kinds)
     )

@@ -9,7 +9,6 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from studies.diagnosis.baseline import Baseline
 from studies.diagnosis.constants import CONSTANTS
 from studies.diagnosis.model import Fit, fit, from_elsewhere
 from studies.diagnosis.scan import Bank, Seen, build_bank, scan
@@ -82,7 +81,7 @@ def search(plain: Fit, bank: Bank) -> Selection:
     start = Hypothesis(plain)
     now, nearest = start, -np.inf
     while len(now.fit.terms) < MOST_CAUSES:
-        tried = contenders(now, bank) + (from_the_card(now, bank) if now is start else [])
+        tried = contenders(now, bank)
         best = max(tried, key=lambda h: h.score, default=None)
         nearest = best.score - start.score if best and now is start else nearest
         if best is None or best.score - now.score < needed(start, now):
@@ -122,19 +121,7 @@ def needed(start: Hypothesis, now: Hypothesis) -> float:
     return CONSTANTS["margin"] + CONSTANTS["further"] * max(now.score - start.score, 0.0)
 
 
-def from_the_card(plain: Hypothesis, bank: Bank) -> list[Hypothesis]:
-    """Return the models with one effect about the card's values, where without it they have gone far: to do what the effect does."""
-    stated = plain.fit.moved().stated()
-    if stated is None:
-        return []
-    base = fit(plain.fit.problem, stated)
-    effects = list({term.name: term.effect for term in bank.terms}.values())
-    return contenders(Hypothesis(base), build_bank(base, effects), about=stated)
-
-
-def contenders(
-    base: Hypothesis, bank: Bank, but: Sequence[str] = (), about: Baseline | None = None
-) -> list[Hypothesis]:
+def contenders(base: Hypothesis, bank: Bank, but: Sequence[str] = ()) -> list[Hypothesis]:
     """Return the models with one effect more whose scans are near enough to the best, each with its shape polished."""
     taken = {term.name for term in base.fit.terms}
     seen = [s for s in scan(base.fit, bank) if s.term.name not in {*but, *taken}]
@@ -143,22 +130,19 @@ def contenders(
     most = max(seen[0].gain, 0.0)
     unsure = _astray(base.fit)
     near = [s for s in seen if s.gain > (most * NARROW - NEAR if s.narrow or unsure else max(0.5 * most - NEAR, 0.0))]
-    return [polish(base, s, about) for s in near[:CONTENDERS]]
+    return [polish(base, s) for s in near[:CONTENDERS]]
 
 
-def polish(base: Hypothesis, seen: Seen, about: Baseline | None = None) -> Hypothesis:
+def polish(base: Hypothesis, seen: Seen) -> Hypothesis:
     """Add an effect and move its shape to where the evidence is largest; forms of one effect are compared where each is best."""
     price = CONSTANTS["log_prior_effect"] + seen.choice
-    # where a card's values have gone to do what an effect does, it is strong or it is not
-    sizes = (0.1,) if about is None else (0.1, 1.0)
-    about = base.fit.moved() if about is None else about
+    about = base.fit.moved()
     forms = []
     tops = [seen.term] if seen.other is None else [seen.term, seen.other]
     for term in (near for top in tops for near in nearer(base.fit, top)):
-        for size in sizes:
-            scales = np.append(base.fit.solved.scales, size)
-            model = fit(base.fit.problem, about, (*base.fit.terms, term), 2, scales)
-            forms.append(refine(from_elsewhere(model) if _astray(model) else model, len(model.terms) - 1))
+        scales = np.append(base.fit.solved.scales, 0.1)
+        model = fit(base.fit.problem, about, (*base.fit.terms, term), 2, scales)
+        forms.append(refine(from_elsewhere(model) if _astray(model) else model, len(model.terms) - 1))
     return Hypothesis(max(forms, key=lambda f: f.log_evidence), (*base.price, price))
 
 

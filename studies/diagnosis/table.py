@@ -20,7 +20,17 @@ from studies.diagnosis.constants import CONSTANTS
 from studies.diagnosis.table_forms import Candidate, best_by_words, rms, span_alike, weigh_forms
 from studies.diagnosis.table_noise import TableBaseline, make_scale
 from studies.diagnosis.table_words import MORE, bends_beyond_a_cubic, next_table, table_sentences
-from studies.diagnosis.verdict import NINETY, Cause, Interval, ResponseResult, Shift, Verdict, doubted, weigh
+from studies.diagnosis.verdict import (
+    NINETY,
+    Cause,
+    Interval,
+    ResponseResult,
+    Shift,
+    Verdict,
+    doubted,
+    weigh,
+    wrong_values,
+)
 from studies.effects import library
 from studies.effects.states import FloatArray
 from studies.instrument.display import display_name
@@ -203,8 +213,6 @@ def _study(
     base: TableBaseline, fits: _Fits, sentences: list[str], shifts: tuple[Shift, ...], found: "Calibration | None"
 ) -> TableDiagnosis:
     """Weigh the steady form of every effect beside a baseline."""
-    from studies.diagnosis.investigate import wrong_values
-
     T, f, left, rounding = fits.temperature, fits.frequency, fits.left, fits.rounding
     details = {} if found is None else {"settled": found.settled[0].as_dict()}
     shipped = None if found is None else fits.law_rms

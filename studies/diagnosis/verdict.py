@@ -5,6 +5,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import scipy
 
 from studies.diagnosis.constants import CONSTANTS
 from studies.effects import find_effect
@@ -19,6 +20,8 @@ VERDICTS = ("unexplained", "not-identifiable", "explained", "adequate")
 
 NINETY = 1.645
 """Standard deviations on either side that hold 90 % of a normal distribution."""
+FAR = 2.0
+"""Prior standard deviations beyond which a value of the card is wrong."""
 
 
 @dataclass(frozen=True)
@@ -252,6 +255,23 @@ def weigh(
     inside = sum(w for w, name in zip(weight, names, strict=True) if name in members)
     probability = float(inside / (weight.sum() * (1.0 + strange) + chance))
     return tuple(members), probability
+
+
+def wrong_values(shifts: Sequence[Shift]) -> list[Cause]:
+    """Return the card's values that the data move by more than two of their standard deviations."""
+    return [
+        Cause(
+            shift.parameter,
+            "frequency_Hz",
+            float(scipy.special.erf(abs(shift.shift_sd) / np.sqrt(2.0))),
+            (),
+            {shift.parameter: Interval(shift.value, shift.low, shift.high)},
+            shift.shift_sd**2,
+            kind="value",
+        )
+        for shift in shifts
+        if abs(shift.shift_sd) > FAR
+    ]
 
 
 def same_cause(one: Cause, two: Cause) -> bool:

@@ -4,7 +4,7 @@ The card is calibrated without effects first. Where effects are found its values
 unknowns together, and the search begins again there: values that had gone far to do what an effect does come back.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -12,21 +12,22 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from compensation.noise import white_rms
+from compensation.noise import Noise, white_rms
 from shell.constants import zero_Celsius
 from studies.calibration.fit import CardFit, fit, residual_noise
-from studies.calibration.observed import RESPONSES, observe
+from studies.calibration.observed import HOUSING, RESPONSES, observe
 from studies.calibration.priors import gather_priors
 from studies.calibration.problem import CardProblem, wide_law
 from studies.diagnosis.constants import CONSTANTS
 from studies.diagnosis.seen import SeenResponse
 from studies.inference.held_out import Kept, Model, Rows
+from studies.inference.housing import set_housing_apart
 from studies.inference.inferred import Inferred
 from studies.inference.lack_of_fit import generic_bank, look
-from studies.inference.model import Background, Linear
+from studies.inference.model import Background, Linear, Term
 from studies.inference.records import Campaign
 from studies.inference.relinearise import relinearise
-from studies.inference.search import Hypothesis, Outcome, Search
+from studies.inference.search import Hypothesis, Outcome, Search, Shapes
 from studies.inference.sharp import RESOLVED, fast_line, longest_resolved
 from studies.inference.signatures import Signatures
 from studies.inference.verdict import judge
@@ -44,10 +45,10 @@ Array = NDArray[np.float64]
 Report = Callable[[str], None]
 BLOCKS, BLOCKS_OF_RUN = 800, (100, 400)
 """Block averages of a campaign, and fewest and most of a run."""
-AGAIN = 4
+AGAIN = 3
 """Most linearisations after the first."""
-SAME = 0.3
-"""Prior standard deviations by which values may move in a linearisation that is taken as it is."""
+STRAYED = 1.0
+"""Error of −2 ln L up to which a linearisation is taken as it is."""
 FAR = 2.0
 """The same, beyond which the search begins from the card's own values too."""
 STRAIGHT = 1.0
@@ -141,10 +142,15 @@ class Inference(Inferred, Shown):
         )  # fmt: skip
 
 
-def build_problem(card: "Instrument", records: Sequence[Record]) -> CardProblem:
-    """Return the problem of a card's values and the starts of runs, driven by the measured temperature."""
+def build_problem(card: "Instrument", records: Sequence[Record], housing: bool = True) -> CardProblem:
+    """Return the problem of a card's values and the starts of runs, driven by the measured temperature; a card explains its `housing` too."""
+    named = (*RESPONSES, HOUSING) if housing and card.polynomial is None else RESPONSES
     runs = tuple(
-        replace(run, outer=None, responses={name: own for name, own in run.responses.items() if name in RESPONSES})
+        replace(
+            run,
+            outer=run.outer if HOUSING in named else None,
+            responses={name: own for name, own in run.responses.items() if name in named},
+        )
         for run in observe(records, blocks=blocks_of(records))
     )
     return CardProblem(card, gather_priors(card), runs, wide_law(card, runs))
@@ -165,19 +171,19 @@ def blocks_of(records: Sequence[Record]) -> int:
 
 def infer(card: "Instrument", campaign: Campaign, progress: Report = lambda _: None) -> Inference:
     """Find what records say of a card and of effects that it lacks."""
-    problem = build_problem(card, campaign.records)
     progress("calibration without effects")
-    found = fit(problem, progress=progress)
-    search, outcome = _from(problem, found, progress)
+    found, told = set_housing_apart(fit(build_problem(card, campaign.records), progress=progress))
+    problem = found.problem
+    search, outcome = _from(found, told, progress)
     values = len(problem.priors.values)
     if card.polynomial is None and np.abs(problem.priors.standard(found.point[:values])).max(initial=0.0) > FAR:
         # values may have gone far to do what an effect does: look from the card as shipped too
         progress("again from the card's own values")
         state = problem.evaluate(np.zeros(problem.count))
         noise = residual_noise(problem, problem.rows, state)
-        there = _from(problem, replace(found, state=state, noise=noise, rows=problem.rows), progress)
-        search, outcome = max((there, (search, outcome)), key=_on_all_rows)
-    plain = Model(Linear.of(found), Signatures.at(problem, found.point), (), outcome.plain.noise)
+        there = _from(replace(found, state=state, noise=noise, rows=problem.rows), told, progress)
+        search, outcome = max((there, (search, outcome)), key=lambda found: _on_all_rows(found[0], found[1].final))
+    plain = Model(Linear.of(found, told), Signatures.at(problem, found.point), (), outcome.plain.noise)
     shipped = plain.residuals(Kept(np.zeros(problem.count), ()))
     calibrated = plain.residuals(Kept(found.point, ()))
     bank = generic_bank(search)
@@ -193,18 +199,17 @@ def infer(card: "Instrument", campaign: Campaign, progress: Report = lambda _: N
     return Inference(card, found, search, outcome, left, shipped, calibrated, rows, held, tuple(unknown), campaign)
 
 
-def _on_all_rows(found: tuple[Search, Outcome]) -> float:
-    """Log posterior of a final model, no row taken for an outlier."""
-    search, final = found[0], found[1].final
+def _on_all_rows(search: Search, final: Hypothesis) -> float:
+    """Log posterior of a model, no row taken for an outlier."""
     linear = replace(search.linear, rows=search.linear.problem.rows)
     return Background(linear, final.terms, final.noise).evidence + sum(term.price for term in final.terms)
 
 
-def _from(problem: CardProblem, start: CardFit, progress: Report) -> tuple[Search, Outcome]:
+def _from(start: CardFit, told: Array | None, progress: Report) -> tuple[Search, Outcome]:
     """Search with the values linearised at a start, and again where they are most probable beside the effects."""
     progress("all effects in all shapes")
-    point = start.point
-    search = Search(Linear.of(start), Signatures.at(problem, point), start.noise, progress=progress)
+    problem, point = start.problem, start.point
+    search = Search(Linear.of(start, told), Signatures.at(problem, point), start.noise, progress=progress)
 
     def moved(final: Hypothesis) -> float:
         model = Model(search.linear, search.signatures, final.terms, final.noise)
@@ -213,22 +218,48 @@ def _from(problem: CardProblem, start: CardFit, progress: Report) -> tuple[Searc
     def near(final: Hypothesis) -> bool:
         return moved(final) < STRAIGHT
 
-    outcome = search.run(near=near)
-    for left in range(AGAIN, 0, -1):
-        final = outcome.final
-        if moved(final) < SAME:
-            break
-        progress("linearised anew beside the effects")
-        linear, signatures, reached = relinearise(
-            start, search.linear, search.signatures, point, final.terms, final.noise
-        )
-        if np.array_equal(reached, point) and left < AGAIN:
-            break
-        point = reached
-        bank = search.bank if signatures.away(search.signatures) < SAME_PATH else None
-        search = Search(linear, signatures, outcome.plain.noise, bank, progress)
-        outcome = search.run(final, (lambda _: True) if left == 1 else near)
-    return search, outcome
+    def holds(final: Hypothesis) -> bool:
+        """Whether the straight lines are those of the simulation where they end."""
+        linear = search.linear
+        model = Model(linear, search.signatures, final.terms, final.noise)
+        there = model.kept(model.mean()).point
+        state = problem.evaluate(there, slopes=False)
+        apart = {n: linear.target[n] - linear.slope[n] @ there - state.residual[n] for n in linear.responses}
+        return STRAYED > sum(np.sum(linear.rows[n].whiten(own, final.noise[n]) ** 2) for n, own in apart.items())
+
+    def linearise(
+        terms: Sequence[Term], noise: Mapping[str, Noise], bank: Sequence[Shapes] | None = None
+    ) -> tuple[Search, Array, tuple[Term, ...]]:
+        linear, signatures, there, own = relinearise(start, search.linear, search.signatures, point, terms, noise)
+        if bank is None and signatures.away(search.signatures) < SAME_PATH:
+            bank = search.bank
+        return Search(linear, signatures, noise, bank, progress), there, own
+
+    def straightened(plain: Hypothesis, final: Hypothesis) -> tuple[Hypothesis, Hypothesis]:
+        nonlocal search, point
+        for left in range(AGAIN, 0, -1):
+            if holds(final) or not (final.terms or left == AGAIN):
+                break
+            progress("linearised anew beside the effects")
+            search, point, terms = linearise(final.terms, final.noise)
+            plain, final = search.grow(terms, (lambda _: True) if left == 1 else near)
+        return plain, final
+
+    plain, final = straightened(*search.grow(near=near))
+    if problem.instrument.polynomial is None:
+        return search, search.compare(plain, final)
+    tried = []
+    for terms, noise in search.suspects(final):
+        there, at, own = linearise(terms, noise, [])
+        grown = there.grow(own, lambda _: False, noise)[1]
+        tried.append((_on_all_rows(there, grown), there, at, grown))
+    best = max(tried, key=lambda one: one[0], default=None)
+    if best is not None and best[0] > _on_all_rows(search, final) + STRAYED:
+        progress("another valley")
+        _, there, point, grown = best
+        search = Search(there.linear, there.signatures, grown.noise, None, progress)
+        plain, final = straightened(*search.grow(grown.terms, near, grown.noise))
+    return search, search.compare(plain, final)
 
 
 def _confirmed(

@@ -77,7 +77,7 @@ class Model:
     def __init__(
         self, linear: Linear, signatures: Signatures, terms: Sequence[Term], noise: Mapping[str, Noise]
     ) -> None:
-        self.linear, self.signatures, self.terms, self.noise = linear, signatures, tuple(terms), noise
+        self.linear, self.signatures, self.terms, self.noise = linear.bent(terms), signatures, tuple(terms), noise
         self.problem = linear.problem
 
     def kept(self, mean: Array) -> Kept:
@@ -107,7 +107,7 @@ class Model:
             for name in part.responses:
                 own = np.asarray(record[name], dtype=float)
                 good = np.isfinite(own) & ~find_spikes(own)
-                rest = own[good] - np.interp(rows[good], drive.time, columns[name])
+                rest = own[good] - on_rows(rows[good], drive.time, columns[name])
                 if name == OWN_OFFSET:  # from turn-on to turn-on
                     rest = rest - rest.mean()
                 found[name][0].append(rows[good] - rows[0])
@@ -222,6 +222,15 @@ class Model:
                     inside = ~_outside(t, block, 0.0)
                     parts[name].append((rest[inside], self._near(name, k, t, known)[inside]))
         return {name: Unseen.of(own) for name, own in parts.items()}
+
+
+def on_rows(rows: Array, time: Array, values: Array) -> Array:
+    """Return values at the rows of a record; beyond the ends, which lie within groups of rows, on a straight line."""
+    if len(time) < 2:
+        return np.interp(rows, time, values)
+    first, last = (values[1] - values[0]) / (time[1] - time[0]), (values[-1] - values[-2]) / (time[-1] - time[-2])
+    beyond = first * np.minimum(rows - time[0], 0.0) + last * np.maximum(rows - time[-1], 0.0)
+    return np.asarray(np.interp(rows, time, values) + beyond)
 
 
 def _outside(time: Array, block: int, gap: float) -> Mask:

@@ -9,7 +9,7 @@ and what one more effect adds to it follows from its own small Gram matrix besid
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -17,14 +17,15 @@ import scipy
 from numpy.typing import NDArray
 
 from compensation.noise import Noise
-from compensation.noise_rows import NoiseRows, Whitener
-from studies.calibration.fit import CardFit, estimate_levels
+from compensation.noise_rows import NoiseRows, Whitener, log_prior
+from studies.calibration.fit import CardFit, estimate_levels, stated_noise
 from studies.calibration.problem import CardProblem
 from studies.effects import Effect
 
 Array = NDArray[np.float64]
 SCALES = 10.0 ** np.arange(-4.0, 0.51, 0.5)
 """Sizes of an effect over that of strong cases, every one as likely."""
+TOLD = "told"
 PRICE = -4.0
 """Log prior of one effect of some thirty against nothing."""
 
@@ -41,6 +42,8 @@ class Term:
     unit : array (k,), prior standard deviations in a strong case
     scale : of SCALES
     price : log prior of the effect and of the choice of shape and scale
+    brought : log posterior that it brought when it was found
+    bend : response -> (M, p + 1), how its columns at its size go with the card's coordinates, and these where they were taken
     """
 
     effect: Effect
@@ -51,6 +54,8 @@ class Term:
     unit: Array
     scale: float = 1.0
     price: float = PRICE
+    brought: float = 0.0
+    bend: Mapping[str, Array] = field(default_factory=dict)
 
     @property
     def key(self) -> tuple[str, str]:
@@ -73,19 +78,21 @@ class Linear:
     rows : response -> NoiseRows
     target : response -> (M,), what the card leaves, about u = 0
     slope : response -> (M, p)
+    told : (q, p + 1) or None, what else says something of the coordinates: rows of white noise of variance 1 and their target
     """
 
     problem: CardProblem
     rows: Mapping[str, NoiseRows]
     target: Mapping[str, Array]
     slope: Mapping[str, Array]
+    told: Array | None = None
 
     @classmethod
-    def of(cls, fit: CardFit) -> "Linear":
+    def of(cls, fit: CardFit, told: Array | None = None) -> "Linear":
         """Linearise at the most probable point."""
         state = fit.state
         target = {n: state.residual[n] + state.slope[n] @ state.point for n in fit.problem.responses}
-        return cls(fit.problem, fit.rows, target, state.slope)
+        return cls(fit.problem, fit.rows, target, state.slope, told)
 
     @property
     def responses(self) -> tuple[str, ...]:
@@ -96,6 +103,20 @@ class Linear:
     def count(self) -> int:
         """Number of the card's coordinates, starts included."""
         return self.problem.count
+
+    def bent(self, terms: Sequence[Term]) -> "Linear":
+        """Return it beside terms whose columns go with the coordinates."""
+        bends = [term.bend for term in terms if term.bend]
+        if not bends:
+            return self
+        more = {name: np.sum([bend[name] for bend in bends if name in bend], axis=0) for name in set().union(*bends)}
+        slope = {name: own + more[name][:, :-1] if name in more else own for name, own in self.slope.items()}
+        target = {name: own + more[name][:, -1] if name in more else own for name, own in self.target.items()}
+        return replace(self, slope=slope, target=target)
+
+    def stated(self, name: str) -> Noise | None:
+        """Return what the card states of the slow noise of a response."""
+        return stated_noise(self.problem.instrument.noise, name)
 
     def columns(self, terms: Sequence[Term], name: str) -> Array:
         """Return J and the columns of terms in units of their priors for one response."""
@@ -122,7 +143,16 @@ class Linear:
             whitener = rows.whitener(noise[name])
             white = whitener(both)
             X[name], r[name], total = white[:, :-1], white[:, -1], total + whitener.log_determinant
+        if (told := self.told_beside(terms)) is not None:
+            X[TOLD], r[TOLD] = told[:, :-1], told[:, -1]
         return X, r, total
+
+    def told_beside(self, terms: Sequence[Term]) -> Array | None:
+        """Return the rows of what is told beside terms, of which nothing is."""
+        if self.told is None:
+            return None
+        nothing = np.zeros((len(self.told), sum(len(term.unit) for term in terms)))
+        return np.hstack([self.told[:, :-1], nothing, self.told[:, -1:]])
 
 
 @dataclass(frozen=True)
@@ -134,9 +164,13 @@ class Background:
     noise: Mapping[str, Noise]
 
     @cached_property
+    def _bent(self) -> Linear:
+        return self.linear.bent(self.terms)
+
+    @cached_property
     def _solved(self) -> tuple[dict[str, Array], dict[str, Array], float, Array]:
         """Rows of the orthonormal base and what it leaves, by response; log likelihood; triangle R of [X; 1]."""
-        X, r, determinant = self.linear.whitened(self.terms, self.noise)
+        X, r, determinant = self._bent.whitened(self.terms, self.noise)
         p = next(iter(X.values())).shape[1]
         Q, R = np.linalg.qr(np.vstack([*X.values(), np.eye(p)]))
         target = np.concatenate([*r.values(), np.zeros(p)])
@@ -154,17 +188,19 @@ class Background:
 
     @property
     def evidence(self) -> float:
-        """Log marginal likelihood, all linear unknowns integrated out."""
-        return self._solved[2]
+        """Log marginal likelihood, all linear unknowns integrated out, and log prior of the noise."""
+        return self._solved[2] + sum(
+            log_prior(self.linear.rows[name], level, self.linear.stated(name)) for name, level in self.noise.items()
+        )
 
-    def gains(self, columns: Mapping[str, Array], units: Array, positive: Array) -> Array:
+    def gains(self, columns: Mapping[str, Array], units: Array, effect: Effect) -> Array:
         """Return what effects add to the evidence at each of SCALES, (S, H).
 
         Parameters
         ----------
         columns : response -> (M, H, k)
         units : array (H, k)
-        positive : array (H,), those that cannot go against their first column; of the wrong sign they add nothing: −∞
+        effect : one that cannot go against its first column, or beyond the most of it, adds nothing there: −∞
         """
         values, ways, along = self.against(
             columns, units, {name: rest[:, None] for name, rest in self._solved[1].items()}
@@ -174,8 +210,8 @@ class Background:
         gain = -0.5 * np.log1p(size * values).sum(-1) + 0.5 * (size * along**2 / (1 + size * values)).sum(-1)
         best = SCALES[np.argmax(gain, axis=0)][:, None] ** 2
         coefficient = np.einsum("hij,hj->hi", ways, best * along / (1 + best * values))
-        against = positive & (coefficient[:, 0] < 0)
-        gain[:, against] = -np.inf
+        first = coefficient[:, 0] * units[:, 0]
+        gain[:, (np.abs(first) > effect.coefficients[0].most) | ((first < 0) & effect.positive)] = -np.inf
         return np.asarray(gain)
 
     def against(
@@ -215,16 +251,19 @@ class Background:
 
     def with_term(self, term: Term) -> tuple[Term, float]:
         """Return a term at its likeliest scale, and the log evidence that it adds, its scales averaged."""
-        gain = self.gains(
-            {n: X[:, None, :] for n, X in term.columns.items()}, term.unit[None], np.array([term.effect.positive])
-        )[:, 0]
+        beside = replace(self, linear=self.linear.bent([term])) if term.bend else self
+        gain = (
+            beside.evidence
+            - self.evidence
+            + beside.gains({n: X[:, None, :] for n, X in term.columns.items()}, term.unit[None], term.effect)[:, 0]
+        )
         total = float(scipy.special.logsumexp(gain) - np.log(len(gain)))
         return replace(term, scale=float(SCALES[int(np.argmax(gain))])), total
 
     @cached_property
     def posterior(self) -> tuple[Array, Array]:
         """Mean and covariance of all coordinates: the card's and starts, then coefficients in units of their priors."""
-        X, r, _ = self.linear.whitened(self.terms, self.noise)
+        X, r, _ = self._bent.whitened(self.terms, self.noise)
         return solve_posterior(np.vstack(list(X.values())), np.concatenate(list(r.values())))
 
     def coefficients(self, k: int) -> tuple[Array, Array]:
@@ -237,7 +276,7 @@ class Background:
 
     def residual(self, name: str) -> Array:
         """Return what the most probable model leaves of a response."""
-        return np.asarray(self.linear.target[name] - self.linear.columns(self.terms, name) @ self.posterior[0])
+        return np.asarray(self._bent.target[name] - self._bent.columns(self.terms, name) @ self.posterior[0])
 
 
 def solve_posterior(X: Array, r: Array) -> tuple[Array, Array]:
@@ -252,5 +291,7 @@ def estimate_noise_of(
     linear: Linear, terms: Sequence[Term], noise: Mapping[str, Noise], names: Sequence[str] = ()
 ) -> dict[str, Noise]:
     """Return the levels of highest marginal likelihood of each response (or those named), given what the others say."""
+    linear = linear.bent(terms)
     slopes = {name: linear.columns(terms, name) for name in linear.responses}
-    return estimate_levels(linear.problem, linear.rows, linear.target, slopes, noise, names or linear.responses)
+    told = linear.told_beside(terms)
+    return estimate_levels(linear.problem, linear.rows, linear.target, slopes, noise, names or linear.responses, told)

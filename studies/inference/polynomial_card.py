@@ -22,15 +22,15 @@ if TYPE_CHECKING:
     from studies.instrument.card import Instrument
 
 Array = NDArray[np.float64]
-LAGS = np.geomspace(30.0, 3e4, 10)
+LAGS = np.geomspace(30.0, 3e4, 40)
 """Lags, s, among which one is looked for."""
 OF_RUN = 0.5
 """Part of the longest run up to which a response that is no thermometer shows a lag."""
-WIDE, BENT = 10.0, 3.0
+WIDE, BENT = 10.0, {"frequency_Hz": 0.7, "bias_deg_per_h": 3.0, "inverse_q": 3.0}
 """Standard deviations of level and slope, and of each bend, over the covered range, in parts of what the response varies by."""
 USUAL_LAG, USUAL_SPREAD = 1500.0, 1.5
 """Median (s) and standard deviation of the logarithm of lags of such resonators, for a record that shows none."""
-START, STEEP, MISFIT = 10.0, 3.0, 0.05
+START, STEEP, MISFIT = 10.0, 3.0, 0.02
 """How far the resonator may be from its housing at a start (K); the slope of the first fit over the covered range, and what it leaves, in parts of what the response varies by."""
 ROWS = 120
 """Block averages of a run that the first fit looks at."""
@@ -85,13 +85,13 @@ def polynomial_card(records: Sequence[Record], name: str = "") -> "Instrument":
             slope = max(abs(own[0]), 0.1 * spread / reach)
             law["f0_Hz"] = {"value": level, "sd": WIDE * spread + 1e-4 * level}
             law["a1_per_K"] = {"value": own[0] / level, "sd": min(WIDE * spread / reach / level, 5e-3)}
-            law["a2_per_K2"] = {"value": own[1] / level, "sd": BENT * spread / reach**2 / level}
+            law["a2_per_K2"] = {"value": own[1] / level, "sd": BENT[column] * spread / reach**2 / level}
             content["noise"]["frequency_white_Hz"] = _white(runs, column)
         elif column == "inverse_q":
             content["loss"] = {
                 "inverse_q": {"value": level, "sd": WIDE * spread},
                 "slope_per_K": {"value": own[0] / level, "sd": WIDE * spread / reach / level},
-                "curvature_per_K2": {"value": own[1] / level, "sd": BENT * spread / reach**2 / level},
+                "curvature_per_K2": {"value": own[1] / level, "sd": BENT[column] * spread / reach**2 / level},
             }
             content["noise"]["inverse_q_white"] = _white(runs, column) / level
         else:
@@ -99,8 +99,8 @@ def polynomial_card(records: Sequence[Record], name: str = "") -> "Instrument":
             content["bias"] |= {
                 "offset_deg_per_h": {"value": level, "sd": WIDE * spread},
                 "k1_deg_per_h_per_Hz": {"value": own[0] / slope, "sd": WIDE * spread / changes},
-                "k2_deg_per_h_per_Hz2": {"value": 0.0, "sd": BENT * spread / changes**2},
-                "k3_deg_per_h_per_Hz3": {"value": 0.0, "sd": BENT * spread / changes**3},
+                "k2_deg_per_h_per_Hz2": {"value": 0.0, "sd": BENT[column] * spread / changes**2},
+                "k3_deg_per_h_per_Hz3": {"value": 0.0, "sd": BENT[column] * spread / changes**3},
             }
             content["noise"] |= {
                 "bias_white_deg_per_rt_h": _white(runs, column) / 60.0,
@@ -139,7 +139,7 @@ def _fit(runs: Sequence[ObservedRun], column: str, tau: float, x0: float) -> tup
     reach = max(*(0.5 * float(np.ptp(run.inner.profile.value)) for run in runs), 1e-2)
     powers = range(1, POWERS[column] + 1)
     columns = [np.ones_like(x), *(x**power for power in powers), *starts.T]
-    prior = [np.inf, STEEP * spread / reach, *(BENT * spread / reach**power for power in powers if power > 1)]
+    prior = [np.inf, STEEP * spread / reach, *(BENT[column] * spread / reach**power for power in powers if power > 1)]
     prior += [START * spread / reach] * starts.shape[1]
     if column == "bias_deg_per_h":
         columns += list((starts[:, 1:] > 0).astype(float).T)

@@ -18,17 +18,19 @@ from studies.inference.signatures import Signatures
 
 Array = NDArray[np.float64]
 MOST_SHAPES = 400
-"""Of an effect, of many more shapes evenly chosen ones."""
+"""Of an effect; of many more shapes every so manieth of those that differ in what a fit moves."""
 FEW, LEADING, WIDTH = 40, 0.4, 4
 """Of effects with more shapes than FEW only the leading columns are scanned: those with a prior of at least this part of the widest."""
 LESS = (0.1, 0.01)
 """Of the slow noise of a response: what an effect has been taken for until it is named."""
 MOST_TERMS, CONTENDERS = 4, 5
 MARGIN, FURTHER = 4.0, 0.06
-"""Log posterior that a cause must bring, and part of what is explained already that a further one must bring besides."""
+"""Log posterior that a cause must bring, and part of what others explain of the same response that it must bring besides."""
 NEAR = 0.35, 15.0
 """Part of the best scan, less so much, down to which contenders are refitted."""
-HOPELESS = -3.0
+HOPELESS, FINITE = -3.0, 1e3
+SUSPICIOUS, SUSPECTS = 3.0, 2
+"""Slow noise within a run over that of a row, from which on effects are tried with values of their own, and how many."""
 Report = Callable[[str], None]
 
 
@@ -99,9 +101,7 @@ class Search:
         found = []
         for effect, response in effects:
             grid = [tuple(shape) for shape in effect.grid(self.signatures.span, response)]
-            chosen = grid
-            if len(grid) > MOST_SHAPES:
-                chosen = [grid[k] for k in np.linspace(0, len(grid) - 1, MOST_SHAPES).astype(int)]
+            chosen = _chosen(effect, grid)
             groups: dict[tuple[int, ...], list[tuple[tuple[float, ...], dict[str, Array]]]] = {}
             first = _leading(effect, len(grid))
             for shape in chosen:
@@ -142,8 +142,9 @@ class Search:
                 units = np.broadcast_to(
                     self.unit(own.effect, own.response, own.members), (len(own.shapes), len(own.members))
                 )
-                positive = np.full(len(own.shapes), own.effect.positive)
-                gain = scipy.special.logsumexp(beside.gains(own.columns, units, positive), axis=0) - np.log(10) + behind
+                gain = (
+                    scipy.special.logsumexp(beside.gains(own.columns, units, own.effect), axis=0) - np.log(10) + behind
+                )
                 best = found.setdefault((own.effect.name, own.response), {})
                 for k, shape in enumerate(own.shapes):
                     if np.isfinite(gain[k]) and (shape not in best or gain[k] > best[shape][0]):
@@ -155,7 +156,7 @@ class Search:
             gains = np.array([value[0] for value in shapes.values()])
             top, own, k, noise = max(shapes.values(), key=lambda value: value[0])
             # chosen shapes stand for the whole grid
-            total = float(scipy.special.logsumexp(gains) - np.log(min(own.count, MOST_SHAPES)))
+            total = float(scipy.special.logsumexp(gains) - np.log(len(gains)))
             term = self.term(own.effect, own.response, own.shapes[k], PRICE + min(total - top, 0.0))
             out.append(Seen(total, top, term, noise))
         return sorted(out, key=lambda seen: -seen.gain)
@@ -169,19 +170,35 @@ class Search:
         last, gain = beside.with_term(terms[-1])
         return Hypothesis((*terms[:-1], last), noise, beside.evidence + gain)
 
-    def polish(self, beside: Background, term: Term) -> Term:
-        """Move the free parameters of a shape, one after another, to where the evidence is largest between the next shapes of the grid."""
-        effect = term.effect
+    def polish(self, beside: Background, term: Term, anew: bool = True) -> Term:
+        """Move a shape to where the evidence is largest: among those that it stands for, then between the next ones.
+
+        Not `anew`, only the latter: after values of the card have moved.
+        """
+        effect, span = term.effect, self.signatures.span
+        grid = [tuple(shape) for shape in effect.grid(span, term.response)]
+        around = _passed(effect, grid, term.shape) if len(grid) > MOST_SHAPES else []
         if effect.near is not None:
-            shapes = [tuple(shape) for shape in effect.near(self.signatures.span, term.response, term.shape)]
-            tried = [self._moved(term, shape) for shape in shapes[:: max(1, len(shapes) // 60)]]
-            return max([term, *tried], key=lambda one: beside.with_term(one)[1])
-        grid = np.array(list(effect.grid(self.signatures.span, term.response)))
-        best = beside.with_term(term)[1]
+            grid = [tuple(shape) for shape in effect.near(span, term.response, term.shape)]
+            around = grid[:: -(-len(grid) // MOST_SHAPES)]
+        best: dict[tuple[float, ...], tuple[float, Term]] = {}
+        for one in [term, *(self._moved(term, shape) for shape in around if anew)]:
+            series, gain = _steady(effect, one.shape), beside.with_term(one)[1]
+            if series not in best or gain > best[series][0]:
+                best[series] = (gain, one)
+        tried = [self._between_shapes(beside, one, gain, grid) for gain, one in best.values()]
+        return max(tried, key=lambda found: found[0])[1]
+
+    def _between_shapes(
+        self, beside: Background, term: Term, best: float, grid: Sequence[tuple[float, ...]]
+    ) -> tuple[float, Term]:
+        """Move the free parameters of a shape, one after another, between the next shapes of its series."""
+        effect = term.effect
+        series = np.array([shape for shape in grid if _steady(effect, shape) == _steady(effect, term.shape)] or grid)
         for k, parameter in enumerate(effect.shape):
             if not parameter.moves(term.shape[k]):
                 continue
-            low, high = self._between(grid[:, k], term.shape[k], parameter)
+            low, high = self._between(series[:, k], term.shape[k], parameter)
             if high <= low:
                 continue
             logarithmic = parameter.logarithmic and low > 0
@@ -193,14 +210,17 @@ class Search:
 
             ends = (np.log(low), np.log(high)) if logarithmic else (low, high)
             lowest = scipy.optimize.minimize_scalar(
-                lambda x, at=at: -beside.with_term(at(x))[1], bounds=ends, method="bounded", options={"maxiter": 10}
+                lambda x, at=at, least=best - FINITE: -max(beside.with_term(at(x))[1], least),
+                bounds=ends,
+                method="bounded",
+                options={"maxiter": 10},
             )
             if -lowest.fun > best:
                 best, term = float(-lowest.fun), at(lowest.x)
-        return term
+        return best, term
 
     def _moved(self, term: Term, shape: tuple[float, ...]) -> Term:
-        return replace(self.term(term.effect, term.response, shape, term.price), scale=term.scale)
+        return replace(self.term(term.effect, term.response, shape, term.price), scale=term.scale, bend=term.bend)
 
     def _between(self, grid: Array, at: float, parameter: Parameter) -> tuple[float, float]:
         """Return the neighbours of a value in a grid, within the bounds of its parameter."""
@@ -231,35 +251,61 @@ class Search:
                 found.append(self.settle((*now.terms, term), noise, acts))
         return sorted(found, key=lambda h: -h.score)
 
-    def run(self, before: Hypothesis | None = None, near: Callable[[Hypothesis], bool] = lambda _: True) -> Outcome:
-        """Grow the model from nothing, or from what was found in another linearisation, as long as it is `near` this one."""
-        estimated = estimate_noise_of(self.linear, (), self.noise)
-        plain = now = Hypothesis((), estimated, Background(self.linear, (), estimated).evidence)
-        if before is not None:
-            for term in before.terms:
-                beside = Background(self.linear, now.terms, before.noise)
-                now = self.settle((*now.terms, self.polish(beside, self._moved(term, term.shape))), before.noise)
-            now = self._without_idle(now, plain)
-        beside_nothing: list[Hypothesis] = []
-        for _ in range(MOST_TERMS - len(now.terms)):
-            if now.terms and not near(now):
+    def grow(
+        self,
+        before: Sequence[Term] = (),
+        near: Callable[[Hypothesis], bool] = lambda _: True,
+        noise: Mapping[str, Noise] | None = None,
+    ) -> tuple[Hypothesis, Hypothesis]:
+        """Return the model without effects and the one that grew from it, or from terms of another linearisation, as long as it is `near` this one."""
+        own = estimate_noise_of(self.linear, (), self.noise)
+        plain = now = Hypothesis((), own, Background(self.linear, (), own).evidence)
+        for term in before:
+            beside = Background(self.linear, now.terms, noise or now.noise)
+            here = self.polish(beside, self._moved(term, term.shape), anew=False)
+            now = _credited(self.settle((*now.terms, here), noise or now.noise), now)
+        now = self._without_idle(now, plain)
+        for _ in range(MOST_TERMS):  # a term may leave when another one comes
+            if len(now.terms) == MOST_TERMS or not self.bank or (now.terms and not near(now)):
                 break
             tried = self.contenders(now)
-            beside_nothing = tried if not now.terms else beside_nothing
-            if not tried or tried[0].score - now.score < _needed(plain, now):
+            if not tried or tried[0].score - now.score < _needed(tried[0].terms[-1], now.terms):
                 break
             self.progress(f"{tried[0].terms[-1].effect.name} explains {tried[0].score - now.score:.0f} of log evidence")
-            now = self._without_idle(self.settle(tried[0].terms, tried[0].noise), plain)
+            now = self._without_idle(_credited(self.settle(tried[0].terms, tried[0].noise), now), plain)
+        return plain, now
+
+    def compare(self, plain: Hypothesis, final: Hypothesis) -> Outcome:
+        """Return a model with what could stand in the place of each of its terms."""
         rivals, without = [], []
-        for k, term in enumerate(now.terms):
-            others = (*now.terms[:k], *now.terms[k + 1 :])
-            base = self.settle(others, now.noise) if others else plain
-            own = beside_nothing if not others and beside_nothing else self.contenders(base)
-            same = replace(now, terms=(*others, term))
-            known = [h for h in own if h.terms[-1].key != term.key]
+        for k, term in enumerate(final.terms):
+            others = (*final.terms[:k], *final.terms[k + 1 :])
+            base = self.settle(others, final.noise) if others else plain
+            same = replace(final, terms=(*others, term))
+            known = [h for h in self.contenders(base) if h.terms[-1].key != term.key]
             rivals.append(tuple(sorted([same, *known], key=lambda h: -h.score)))
             without.append(base)
-        return Outcome(plain, now, tuple(rivals), tuple(without))
+        return Outcome(plain, final, tuple(rivals), tuple(without))
+
+    def suspects(self, now: Hypothesis) -> list[tuple[tuple[Term, ...], Mapping[str, Noise]]]:
+        """Return what may be behind slow noise far above the white noise of rows: nothing but less noise, and effects that then gain most."""
+        found: list[tuple[tuple[Term, ...], Mapping[str, Noise]]] = []
+        for name, noise in self._quieter(now, LESS[:1]):
+            if self.linear.rows[name].slow_share(now.noise[name]) < SUSPICIOUS:
+                continue
+            beside, tried = Background(self.linear, now.terms, noise), []
+            for own in self.bank:
+                if own.response == name and (own.effect.name, name) not in {term.key for term in now.terms}:
+                    units = np.broadcast_to(
+                        self.unit(own.effect, name, own.members), (len(own.shapes), len(own.members))
+                    )
+                    gain = beside.gains(own.columns, units, own.effect).max(axis=0)
+                    tried.append((float(gain.max()), own, int(np.argmax(gain))))
+            best: dict[str, tuple[Term, ...]] = {}
+            for _, own, k in sorted(tried, key=lambda one: -one[0]):
+                best.setdefault(own.effect.name, (*now.terms, self.term(own.effect, name, own.shapes[k])))
+            found += [(terms, noise) for terms in (now.terms, *list(best.values())[:SUSPECTS])]
+        return found
 
     def _quieter(self, now: Hypothesis, parts: Sequence[float]) -> list[tuple[str, dict[str, Noise]]]:
         """Return noises with less that is slow in one response, and no more white noise than neighbouring rows scatter."""
@@ -278,9 +324,35 @@ class Search:
         for k in range(len(now.terms)):
             others = (*now.terms[:k], *now.terms[k + 1 :])
             fewer = self.settle(others, now.noise) if others else plain
-            if now.score - fewer.score < _needed(plain, fewer):
+            if now.score - fewer.score < _needed(now.terms[k], others):
                 return self._without_idle(fewer, plain)
         return now
+
+
+def _series(effect: Effect, grid: Sequence[tuple[float, ...]]) -> list[list[tuple[float, ...]]]:
+    """Return the shapes of a grid in series of equal steady parameters, each in its order."""
+    found: dict[tuple[float, ...], list[tuple[float, ...]]] = {}
+    for shape in grid:
+        found.setdefault(_steady(effect, shape), []).append(shape)
+    return list(found.values())
+
+
+def _steady(effect: Effect, shape: tuple[float, ...]) -> tuple[float, ...]:
+    return tuple(value for value, parameter in zip(shape, effect.shape, strict=True) if parameter.steady)
+
+
+def _chosen(effect: Effect, grid: list[tuple[float, ...]]) -> list[tuple[float, ...]]:
+    every = -(-len(grid) // MOST_SHAPES)
+    return [shape for series in _series(effect, grid) for shape in series[every // 2 :: every]]
+
+
+def _passed(effect: Effect, grid: list[tuple[float, ...]], at: tuple[float, ...]) -> list[tuple[float, ...]]:
+    """Return the shapes about a chosen one that were passed over."""
+    every = -(-len(grid) // MOST_SHAPES)
+    series = next(own for own in _series(effect, grid) if _steady(effect, own[0]) == _steady(effect, at))
+    shapes = np.array(series)
+    place = int(np.argmin((np.abs(shapes - at) / np.maximum(np.ptp(shapes, axis=0), 1e-300)).sum(axis=1)))
+    return series[max(place - every, 0) : place + every + 1]
 
 
 def _near(gain: float, best: float) -> bool:
@@ -288,8 +360,14 @@ def _near(gain: float, best: float) -> bool:
     return gain > max(part * best - less, HOPELESS)
 
 
-def _needed(plain: Hypothesis, now: Hypothesis) -> float:
-    return MARGIN + FURTHER * max(now.score - plain.score, 0.0)
+def _needed(term: Term, others: Sequence[Term]) -> float:
+    return MARGIN + FURTHER * sum(other.brought for other in others if other.response == term.response)
+
+
+def _credited(now: Hypothesis, before: Hypothesis) -> Hypothesis:
+    """Return a model whose last term knows what it brought."""
+    last = replace(now.terms[-1], brought=max(now.score - before.score, 0.0))
+    return replace(now, terms=(*now.terms[:-1], last))
 
 
 def _leading(effect: Effect, shapes: int) -> list[int]:

@@ -16,6 +16,7 @@ from studies.calibration.priors import from_standard
 from studies.diagnosis.constants import CONSTANTS
 from studies.diagnosis.response import RESPONSES
 from studies.diagnosis.verdict import (
+    FAR,
     NINETY,
     Cause,
     Interval,
@@ -26,6 +27,7 @@ from studies.diagnosis.verdict import (
     overall,
     same_cause,
     weigh,
+    wrong_values,
 )
 from studies.effects import find_effect, library
 from studies.inference.clock import settle
@@ -37,8 +39,6 @@ from studies.inference.sharp import longest_resolved
 from studies.inference.signatures import Signatures
 
 Array = NDArray[np.float64]
-FAR = 2.0
-"""Prior standard deviations beyond which a value of the card is wrong."""
 FEWEST_LAGS = 3.0
 """Time constants that the records must cover before they confirm a law whose lag is free."""
 BRIEF, MINUTES = 300.0, 5.0
@@ -56,7 +56,7 @@ STEP, WORTH = 0.03, 0.5
 def judge(found: Inferred) -> Verdict:
     """Return the verdict."""
     shifts = find_shifts(found) if found.card.polynomial is None else []
-    physics = _merged([_cause(found, k) for k in range(len(found.final.terms))])
+    physics = _merged([*(_cause(found, k) for k in range(len(found.final.terms))), *_delay_cause(found)])
     causes = tuple(sorted((*wrong_values(shifts), *physics), key=lambda cause: -cause.evidence))
     results = {name: _result(found, name, causes) for name in found.search.linear.responses}
     results |= skipped_results(found.campaign)
@@ -91,23 +91,6 @@ def find_shifts(found: Inferred) -> list[Shift]:
         if sd < SILENT or abs(own) > FAR:
             out.append(Shift(value.name, value.value, at[value.name], min(low, high), max(low, high), float(own)))
     return out
-
-
-def wrong_values(shifts: Sequence[Shift]) -> list[Cause]:
-    """Return the card's values that the data move by more than two of their standard deviations."""
-    return [
-        Cause(
-            shift.parameter,
-            "frequency_Hz",
-            float(scipy.special.erf(abs(shift.shift_sd) / np.sqrt(2.0))),
-            (),
-            {shift.parameter: Interval(shift.value, shift.low, shift.high)},
-            shift.shift_sd**2,
-            kind="value",
-        )
-        for shift in shifts
-        if abs(shift.shift_sd) > FAR
-    ]
 
 
 def _merged(causes: Sequence[Cause]) -> list[Cause]:
@@ -249,7 +232,7 @@ def _judge(
             " distinguish slow noise from a cause that acts slowly"
         )
     apart = _apart(found, name)
-    if terms:
+    if terms or mine:
         return ("not-identifiable" if any(cause.equivalent for cause in mine) else "explained"), apart
     if values:
         return "explained", ""
@@ -271,6 +254,24 @@ def _judge(
             f"too short to judge: the resonator's temperature changes by {np.ptp(resonator):.2g} K only",
         )
     return ("not-identifiable", doubt_of(left.input, left.evidence)) if left.doubtful else ("adequate", "")
+
+
+def _delay_cause(found: Inferred) -> list[Cause]:
+    """Return a delay that a polynomial law has taken, as the causes that look like one, when it is more than sensors and clocks have."""
+    priors, name = found.search.linear.problem.priors, found.search.linear.responses[0]
+    if DELAY not in priors.names or name != "frequency_Hz":
+        return []
+    k = priors.names.index(DELAY)
+    z, sd = float(found.background.posterior[0][k]), float(np.sqrt(found.background.posterior[1][k, k]))
+    if abs(z) < SURE_DELAY:
+        return []
+    names = ["rate-frequency", "second-lag", "thermometer-lag"][:: -1 if z < 0 else 1]
+    delay = (
+        {"sensor_time_constant_s": Interval.about(-z * priors.values[k].sd, sd * priors.values[k].sd)} if z < 0 else {}
+    )
+    return [
+        Cause(names[0], name, float(scipy.special.erf(abs(z) / np.sqrt(2.0))), tuple(sorted(names[1:])), delay, z**2)
+    ]
 
 
 def _delayed(found: Inferred, name: str) -> str:
@@ -329,7 +330,8 @@ def _slow(found: Inferred, name: str) -> float:
         rest = found.background.residual(name)
         apart = max(1, round(BRIEF / level.span))
         changes = np.concatenate([rest[own][apart:] - rest[own][:-apart] for own in level.slices])
-        brief = float(np.hypot(white_rms(*rows.residual), np.sqrt(np.mean(changes**2) / 2.0)))
+        change = float(np.mean(changes**2)) if len(changes) else 0.0
+        brief = float(np.hypot(white_rms(*rows.residual), np.sqrt(change / 2.0)))
         return rows.rms / max(MINUTES * brief, 1e-300)
     stated = stated_noise(found.card.noise, name) or Noise(0.0)
     slow = noise_rms(found.fit, name, replace(stated, white=0.0, offset=0.0))

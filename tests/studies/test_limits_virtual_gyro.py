@@ -202,7 +202,7 @@ def test_an_effect_whose_drive_stays_is_named(card, law):
         run(card, law, "soak 20 1h", noise=False).record["frequency_Hz"]
     )
     assert made.warnings == (
-        "the effect 'electrostatic-softening' has no effect in this run, which does not have its drive (voltage_squared).",
+        "the effect 'electrostatic-softening' does not act in this run, which lacks its drive (voltage_squared).",
     )
 
 

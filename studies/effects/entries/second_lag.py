@@ -25,7 +25,7 @@ EFFECT = Effect(
     source="two-node thermal network; Bacher and Madsen, Energy and Buildings 43 (2011) 1511",
     isolate="equal steps up and down at two mean temperatures, with a soak longer than five of the slow constant",
     sensor="a thermometer on the base or stem: a second lag would show there, a stress would not",
-    coefficients=(Coefficient("weight", (1.0, 0.2, 0.2)),),
+    coefficients=(Coefficient("weight", (1.0, 0.2, 0.2), most=1.0),),
     columns=columns,
     grid=grid,
     sizes={"frequency_Hz": 0.5},

@@ -6,25 +6,21 @@ coefficients off any grid, scaled to its SNR in 120 s means after a least-square
 
 import tempfile
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from compensation.noise import Noise
-from studies.diagnosis.campaign import load_campaign
-from studies.diagnosis.evidence import SCALES
-from studies.diagnosis.inquiry import begin, read_thermometer
-from studies.diagnosis.problem import span_of
-from studies.diagnosis.simulated import simulate_baseline
 from studies.effects import library
 from studies.errors import InputError
+from studies.inference.diagnosis import build_problem
+from studies.inference.model import SCALES, Background, Linear
+from studies.inference.signatures import Signatures
 from studies.instrument.card import Instrument, load_card
 from studies.simulation.chamber import load_drive
 from studies.simulation.drive import drive_by_profile, rows_of
 from studies.simulation.noise import bias_noise, frequency_noise
 from studies.simulation.virtual_gyro import simulate_run
-from tests.benchmarks.diagnosis.ceiling import above
 from thermal.profile import Profile
 
 CARDS = ("hrg-30mm", "cvg-25mm", "bvg-bell", "hrg-30mm-loops")
@@ -165,7 +161,8 @@ def make_case(seed):
     clean = run(card, drives, seed, False)
     noisy = run(card, drives, seed)
     noise = left(clean, [n[response] - c[response] for n, c in zip(noisy, clean, strict=True)], response)
-    shape, values = draw_effect(rng, name, response, span_of(load_campaign(noisy), 1000.0))
+    problem = build_problem(card, noisy, housing=False)
+    shape, values = draw_effect(rng, name, response, Signatures.at(problem, np.zeros(problem.count)).span)
     level = abs(float(np.median(clean[0][response]))) if response != "bias_deg_per_h" and not effect.thermal else 1.0
     values = values * effect.sizes[response] * level * 0.03
 
@@ -187,17 +184,19 @@ def make_case(seed):
 def ceiling(seed):
     """Return the mean log likelihood ratio of a detector that knows form and noise, but the card's values no better than the card."""
     made = make_case(seed)
-    campaign = load_campaign(run(made.card, made.drives, seed))
-    plain = begin(campaign, "frequency_Hz", None, partial(simulate_baseline, campaign, made.card))
-    if made.response != "frequency_Hz":
-        plain = begin(campaign, made.response, read_thermometer(campaign, plain))
-    levels = noise_of(made.card, made.response, made.drives)
-    silent, rows, noise = run(made.device, made.drives, seed, False), [], []
-    for own, mask in zip(campaign.runs, plain.problem.present, strict=True):
-        rows.append(own.steps.means(silent[own.record][made.response]))
-        noise.append(covariance(levels, own, mask, plain.problem.noise.rows))
-    found = above(campaign, plain, rows, noise, levels.white**2 * RATE / plain.problem.noise.rows)
-    return found.known
+    problem = build_problem(made.card, run(made.card, made.drives, seed), housing=False)
+    state = problem.evaluate(np.zeros(problem.count))
+    linear = Linear(problem, problem.rows, state.residual, state.slope)
+    there, bare = (run(card, made.drives, seed, False) for card in (made.device, made.card))
+    signals = {name: [] for name in problem.responses}
+    for part in problem.parts:
+        time, one, two = there[part.run]["time_s"], there[part.run], bare[part.run]
+        for name in part.responses:
+            on_rows = np.interp(part.drive.time, time, one[name] - two[name])
+            signals[name].append(problem.runs[part.run].responses[name].average(on_rows))
+    noise = {name: noise_of(made.card, name, made.drives) for name in problem.responses}
+    stacked = {name: np.concatenate(own)[:, None] for name, own in signals.items()}
+    return float(Background(linear, (), noise).left_of(stacked)[1][0]) / 2
 
 
 def noise_of(card, response, drives):
@@ -206,10 +205,3 @@ def noise_of(card, response, drives):
         return (bias_noise if response == "bias_deg_per_h" else frequency_noise)(card.noise)
     quiet, noisy = (run(card, drives[:1], 0, noise)[0][response] for noise in (False, True))
     return Noise(white=float(np.std(noisy - quiet)) / np.sqrt(RATE))
-
-
-def covariance(levels, own, mask, rows):
-    """Covariance of the means of a run's rows over the steps of its grid, of white noise, flicker and a walk."""
-    step = float(own.time[1] - own.time[0])
-    white = np.eye(int(mask.sum())) * levels.white**2 * RATE / rows
-    return white + replace(levels, white=0.0).covariance(own.time[mask], step)

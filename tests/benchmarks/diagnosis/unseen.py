@@ -10,14 +10,13 @@ from datetime import UTC, datetime, timedelta
 import numpy as np
 
 from studies.calibration.ahead import spread_of_prediction
-from studies.diagnosis.campaign import load_campaign
-from studies.diagnosis.extension import extend
-from studies.diagnosis.investigate import investigate
 from studies.effects import find_effect, library
+from studies.inference.extension import extend
 from studies.instrument.card import load_card
 from studies.simulation.chamber import load_profile
 from studies.simulation.drive import COMMANDS, drive_by_profile, rows_of
 from studies.simulation.virtual_gyro import simulate_run
+from studies.workbench import diagnose_records
 
 CARD = "hrg-30mm"
 PROFILES = ("cycle 20 -15 40 0.5 30min 1", "step 20 -10 3h then ramp -10 30 1 then soak 30 2h")
@@ -233,15 +232,14 @@ def hide(*cases, times=TIMES, seed=0, moved=(), stated=None):
 def recover(*cases, times=TIMES, seed=0, moved=(), stated=None):
     """Hide effects, each in a response of its own, diagnose, save, and predict a new run from its chamber alone."""
     hidden = hide(*cases, times=times, seed=seed, moved=moved, stated=stated)
-    card = hidden.card
-    diagnosis = investigate(load_campaign(hidden.records, card.reference_temperature - 273.15), card=card, advise=False)
-    saved = extend(card, diagnosis, hidden.records).instrument
+    diagnosis = diagnose_records(hidden.records, hidden.card)
+    saved = extend(diagnosis).instrument
     names = tuple(dict.fromkeys(n for cause in diagnosis.verdict.causes for n in cause.names))
     return Recovery(
         names,
         all(name in names for name, _ in cases),
         diagnosis.verdict.verdict,
-        hidden.left(card),
+        hidden.left(hidden.card),
         hidden.left(saved),
         hidden.stated(saved),
         saved,

@@ -1,33 +1,36 @@
 """The joint model of all responses: its evidence is that of a dense Gaussian, and its columns are what a card with the effect predicts."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from compensation.noise import Noise
 from studies.inference.diagnosis import build_problem
+from studies.inference.held_out import Kept, Model
 from studies.inference.model import SCALES, Background, Linear
 from studies.inference.search import Search
 from studies.inference.signatures import Signatures
 from studies.instrument.card import load_card
-from studies.simulation.chamber import load_profile
 from studies.simulation.prediction import predict
 from studies.simulation.virtual_gyro import simulate_run
+from tests.benchmarks.diagnosis.unseen import COMMANDED, run_drive
 
 CARD = "hrg-30mm"
 
 
 @pytest.fixture(scope="module")
 def search():
-    """A linearised campaign of two short runs at the card's own values."""
+    """A linearised campaign of two short runs at the card's own values, whose commands step within the means of rows."""
     card = load_card(CARD)
     words = (
         "soak 20 10min then ramp 20 40 1.5 then soak 40 30min",
         "soak 20 10min then ramp 20 0 1.5 then soak 0 30min",
     )
-    records = [simulate_run(card, load_profile(w), 1.0 / 60.0, k).record for k, w in enumerate(words)]
-    problem = build_problem(card, [replace(one, path=f"run{k}.csv") for k, one in enumerate(records)])
+    drives = [run_drive(w, 0.0, COMMANDED, k) for k, w in enumerate(words)]
+    records = [simulate_run(card, drive, seed=k).record for k, drive in enumerate(drives)]
+    problem = build_problem(card, [replace(one, path=f"run{k}.csv") for k, one in enumerate(records)], housing=False)
     state = problem.evaluate(np.zeros(problem.count))
     linear = Linear(problem, problem.rows, state.residual, state.slope)
     noise = {"frequency_Hz": Noise(3e-3, 1e-3, 1e-6), "bias_deg_per_h": Noise(1.0, 0.05), "inverse_q": Noise(2e-9)}
@@ -53,7 +56,7 @@ def test_evidence_of_a_term_is_that_of_a_dense_gaussian(search):
     grid = effect.grid(search.signatures.span, "frequency_Hz")
     term = replace(search.term(effect, "frequency_Hz", tuple(grid[0])), scale=float(SCALES[5]))
     beside = Background(linear, (), noise)
-    gain = beside.gains({n: X[:, None, :] for n, X in term.columns.items()}, term.unit[None], np.array([False]))[5, 0]
+    gain = beside.gains({n: X[:, None, :] for n, X in term.columns.items()}, term.unit[None], term.effect)[5, 0]
 
     def exact(terms):
         # correlated units of very different size: scaled to unit variance first
@@ -68,7 +71,17 @@ def test_evidence_of_a_term_is_that_of_a_dense_gaussian(search):
 
 @pytest.mark.parametrize(
     ("name", "response", "size"),
-    [("second-lag", "frequency_Hz", 1e-3), ("curvature", "frequency_Hz", 1e-3), ("leak", "inverse_q", 1e-10)],
+    [
+        ("second-lag", "frequency_Hz", 1e-3),
+        ("curvature", "frequency_Hz", 1e-3),
+        ("leak", "inverse_q", 1e-10),
+        ("electrostatic-softening", "frequency_Hz", 1e-6),
+        ("amplitude-frequency", "frequency_Hz", 1e-3),
+        ("self-heating", "frequency_Hz", 1e-3),
+        ("quadrature-leakage", "bias_deg_per_h", 1e-2),
+        ("axis-rotation", "bias_deg_per_h", 1e-2),
+        ("cross-damping", "bias_deg_per_h", 1e-2),
+    ],
 )
 def test_columns_of_an_effect_are_what_a_card_that_has_it_predicts(search, name, response, size):
     """One member of the effect, small, in the card: the prediction changes by its column, in every response."""
@@ -91,3 +104,33 @@ def test_columns_of_an_effect_are_what_a_card_that_has_it_predicts(search, name,
             changes.append(problem.runs[part.run].responses[found].average(two - one))
         change, column = np.concatenate(changes), own[:, 0] * size
         assert np.abs(change - column).max() <= 0.02 * np.abs(change).max() + 1e-300
+
+
+def test_rows_held_out_are_those_of_a_refit_to_the_other_records(search):
+    """The values from the first record alone, the start of the second from its own rows beside free offsets; then the simulation, which is no straight line."""
+    linear, noise, values = search.linear, search.noise, len(search.linear.problem.priors.values)
+    own = [values + i for i, (part, _, _) in enumerate(linear.problem.starts) if part == 1]
+    mean = np.zeros(linear.count)
+    for run, open_ in ((0, [k for k in range(linear.count) if k not in own]), (1, own)):
+        rows, targets = [np.eye(len(open_))], [np.zeros(len(open_))]
+        for name in linear.responses:
+            level, at = linear.rows[name], linear.rows[name].slices[run]
+            offset = 0.0 if run == 0 else 1e3 * noise[name].white / level.span**0.5
+            L = np.linalg.cholesky(level.covariance(run, replace(noise[name], offset=offset)))
+            rows.append(np.linalg.solve(L, linear.slope[name][at][:, open_]))
+            targets.append(np.linalg.solve(L, (linear.target[name] - linear.slope[name] @ mean)[at]))
+        mean[open_] = np.linalg.lstsq(np.vstack(rows), np.concatenate(targets), rcond=None)[0]
+    model = Model(linear, search.signatures, (), noise)
+    refitted, unseen = model.residuals(Kept(mean, ())), model.held_out(by_record=True)
+    whole = model.residuals(model.kept(model.mean()))["frequency_Hz"].residual[1]
+    assert np.abs(whole).max() < 0.2 * np.abs(refitted["frequency_Hz"].residual[1]).min()
+    for name in linear.responses:
+        rest = refitted[name].residual[1]
+        assert unseen[name].residual[-len(rest) :] == pytest.approx(rest, abs=0.1 * np.sqrt(np.mean(rest**2))), name
+
+
+def test_a_block_whose_gaps_leave_no_row_for_the_fit_is_not_held_out(search):
+    paths, span = search.signatures.paths, replace(search.signatures.span, tau=1e6)
+    model = Model(search.linear, SimpleNamespace(span=span, paths=paths), (), search.noise)
+    unseen = model.held_out(by_record=False)
+    assert {one.beside(one) for one in unseen.values()} == {(None, None)}

@@ -60,7 +60,7 @@ def found():
     """What a diagnosis hands on of one monotone run, its values at the card's and its noise as stated."""
     card = load_card("hrg-30mm")
     records = simulate_plan(card, [WORDS])
-    problem = build_problem(card, records)
+    problem = build_problem(card, records, housing=False)
     state = problem.evaluate(np.zeros(problem.count))
     linear, noise = Linear(problem, problem.rows, state.residual, state.slope), stated_noises(card, records)
     search = Search(linear, Signatures.at(problem, state.point), noise, bank=[])

@@ -29,7 +29,7 @@ def hidden():
     """A few effects hidden in one short planned run, and the search that would look for them."""
     card = load_card("hrg-30mm")
     records = simulate_plan(card, [WORDS])
-    problem = build_problem(card, records)
+    problem = build_problem(card, records, housing=False)
     state = problem.evaluate(np.zeros(problem.count))
     zero = {name: np.zeros_like(own) for name, own in state.residual.items()}
     linear, noise = Linear(problem, problem.rows, zero, state.slope), stated_noises(card, records)

@@ -1,0 +1,55 @@
+"""What the chamber says of a card: the housing that it drives, as rows that know the card's values beside all other responses.
+
+A housing that was measured drives frequency, bias and 1/Q; how it follows the chamber holds conductances, capacities and the lag of its
+sensor. The starts of that path concern nobody else: with the triangle of [J_start J_values r; 1 0 0] they are integrated out.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studies.calibration.fit import CardFit
+from studies.calibration.observed import HOUSING, RESPONSES
+from studies.calibration.problem import State
+
+Array = NDArray[np.float64]
+
+
+def set_housing_apart(found: CardFit) -> tuple[CardFit, Array | None]:
+    """Return the calibration of the other responses, and what the housing's rows tell of its coordinates, (q, p + 1); None without a chamber."""
+    whole = found.problem
+    runs = tuple(
+        replace(run, outer=None, responses={n: own for n, own in run.responses.items() if n in RESPONSES})
+        for run in whole.runs
+    )
+    problem = replace(whole, runs=runs)
+    if HOUSING not in whole.responses:
+        return replace(found, problem=problem), None
+    count = len(whole.priors.values)
+    at = {
+        (whole.parts[k].run, name): count + i
+        for i, (k, name, _) in enumerate(whole.starts)
+        if whole.parts[k].name == "inner"
+    }
+    places = [*range(count), *(at[problem.parts[k].run, name] for k, name, _ in problem.starts)]
+    others = np.setdiff1d(np.arange(whole.count), places)
+    state = found.state
+    J, r = state.slope[HOUSING], state.residual[HOUSING] + state.slope[HOUSING] @ state.point
+    white = found.rows[HOUSING].whiten(np.column_stack([J[:, others], J[:, :count], r]), found.noise[HOUSING])
+    triangle = np.linalg.qr(np.vstack([np.eye(len(others), white.shape[1]), white])).R
+    own = triangle[len(others) : len(others) + count, len(others) :]
+    told = np.column_stack([own[:, :count], np.zeros((len(own), len(places) - count)), own[:, -1]])
+    names = problem.responses
+    inner = State(
+        state.point[places], {n: state.residual[n] for n in names}, {n: state.slope[n][:, places] for n in names}
+    )
+    kept = replace(
+        found,
+        problem=problem,
+        state=inner,
+        noise={n: found.noise[n] for n in names},
+        rows={n: found.rows[n] for n in names},
+        covariance=found.covariance[np.ix_(places, places)],
+    )
+    return kept, told
