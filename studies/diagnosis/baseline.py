@@ -37,8 +37,6 @@ PART = 1.0
 """Standard deviation of the part by which a response follows the temperature (1) and not the frequency (0), or the other way."""
 PARTS = (-0.5, 1.5)
 """Between which it lies: what would need more is something else."""
-CARRIED = float(np.e)
-"""Standard deviation of what 1/Q carries into the bias over what the card says: its anisotropy is known to a factor of e."""
 FARTHEST = 2.5
 """Standard deviations beyond which a delay is no delay of sensors: the baseline holds it there."""
 BENT = 3.0
@@ -137,8 +135,7 @@ class Lagged:
     """A polynomial over a resonator that follows the housing through one lag.
 
     `tau`, `slope`, `bend` and `warmer` are where it is linearised: lag, s; slope, unit/K, and curvature over slope, 1/K, of
-    the law; what initial state, delay and effects add to the lagged temperature, K on the fine grid. `turn_on` is how far
-    the offsets of runs lie apart, in the response's unit, 0 where nothing is known of it.
+    the law; what initial state, delay and effects add to the lagged temperature, K on the fine grid.
     """
 
     response: Response
@@ -151,7 +148,6 @@ class Lagged:
     delay: float | None = None
     bends: tuple[float, ...] = ()
     starts: tuple[float, ...] = ()
-    turn_on: float = 0.0
 
     @property
     def lagged(self) -> bool:
@@ -181,7 +177,7 @@ class Lagged:
             seen = view.seen
             x = seen.excess
             static = [x / 10.0, (x**2 + seen.spread) / 1e2, (x**3 + 3.0 * x * seen.spread) / 1e3][:powers]
-            level, own = levels(self.response, self.turn_on, k, self.states, x.size)
+            level = levels(self.response, k, self.states, x.size)
             start = np.zeros((x.size, runs))
             start[:, k] = view.coarse.fading * view.steep
             delay = -(view.coarse.housing - view.coarse.resonator) / self.tau * view.steep
@@ -192,20 +188,17 @@ class Lagged:
             if self.delay is not None:
                 shift[-1] = shift[-1] - self.delay * delay
                 delay = np.zeros_like(delay)
-            columns.append(
-                np.concatenate([level, np.stack(static, 1), own, start, delay[:, None], slower[:, None]], axis=1)
-            )
-        flat, tied = level_names(self.response, self.turn_on, self.states)
+            columns.append(np.concatenate([level, np.stack(static, 1), start, delay[:, None], slower[:, None]], axis=1))
+        flat = level_names(self.response, self.states)
         names = (
             *flat,
             *("slope", "quadratic", "cubic")[:powers],
-            *tied,
             *(f"start@{k}" for k in range(runs)),
             "delay",
             "log lag",
         )
         bends = self.bends or (np.inf,) * (powers - 1)
-        deviations = [*bends, *[self.turn_on] * len(tied), *[START] * runs, DELAY, LAG_STEP]
+        deviations = [*bends, *[START] * runs, DELAY, LAG_STEP]
         prior = np.array([np.inf] * (len(flat) + 1) + deviations)
         return Tangent(shift, columns, prior, names, views)
 
@@ -288,10 +281,6 @@ class Followed:
         Coefficients of the second and higher powers, per (10 K)ᵖ: the whole of the law may come late.
     part : float
         By which it follows `instead`, 0 to 1 but for errors, where it is linearised or, with `part_held`, left.
-    turn_on : float
-        As of `Lagged`.
-    carried : tuple of (n, m) arrays
-        As of `Campaign`; none where it is empty.
     """
 
     response: Response
@@ -307,8 +296,6 @@ class Followed:
     curve: tuple[float, ...] = ()
     part: float = 0.0
     part_held: bool = False
-    turn_on: float = 0.0
-    carried: tuple[FloatArray, ...] = ()
 
     @property
     def lagged(self) -> bool:
@@ -318,13 +305,12 @@ class Followed:
     def tangent(self) -> Tangent:
         """Columns of the polynomial, the missed parts, and a delay against the thermometer."""
         powers, missed = self.response.powers, self.missed[0].shape[1]
-        carried = self.carried[0].shape[1] if self.carried else 0
         shift, columns, views = [], [], []
         for k, own in enumerate(self.states):
             coarse = own.averaged(self.group)
             beyond = self.instead[k] - self.reading[k]
             u = self.reading[k] + self.part * beyond
-            level, tied = levels(self.response, self.turn_on, k, self.states, u.size)
+            level = levels(self.response, k, self.states, u.size)
             v = coarse.spread
             static = [u / 10.0, (u**2 + v) / 1e2, (u**3 + 3.0 * u * v) / 1e3][:powers]
             along = np.full(u.size, self.slope) + sum(
@@ -337,25 +323,21 @@ class Followed:
                 shift[-1] = shift[-1] - self.delay * late
                 late = np.zeros_like(late)
             besides = self.missed[k] * (along / self.slope if self.slope else np.ones(u.size))[:, None]
-            besides = np.concatenate([besides, self.carried[k]], axis=1) if carried else besides
             ends = np.stack([bend, late], axis=1)
-            columns.append(np.concatenate([level, np.stack(static, 1), besides, tied, ends], axis=1))
+            columns.append(np.concatenate([level, np.stack(static, 1), besides, ends], axis=1))
             steep = np.full(u.size, self.slope)
             views.append(View(own, coarse, own, coarse, steep))
-        flat, named = level_names(self.response, self.turn_on, self.states)
+        flat = level_names(self.response, self.states)
         names = (
             *flat,
             *("slope", "quadratic", "cubic")[:powers],
             *(f"missed {m}" for m in range(missed)),
-            *(f"missed loss {m}" for m in range(carried)),
-            *named,
             "part",
             "delay",
         )
         size = max(abs(self.slope), 1e-300)
         bends = self.bends or (np.inf,) * (powers - 1)
-        deviations = [*bends, *[1.5 * size] * missed, *[CARRIED] * carried]
-        deviations += [*[self.turn_on] * len(named), PART, FOLLOWED_DELAY]
+        deviations = [*bends, *[1.5 * size] * missed, PART, FOLLOWED_DELAY]
         prior = np.array([np.inf] * (len(flat) + 1) + deviations)
         return Tangent(shift, columns, prior, names, views)
 
@@ -386,17 +368,13 @@ class Followed:
     def alone(self, states: States) -> "Followed":
         """Return the same law for one further run whose states already hold the thermometer's temperature."""
         nothing = np.zeros(states.time.size // self.group)
-        missed, carried = (
-            tuple(np.zeros((nothing.size, part.shape[1])) for part in own[:1]) for own in (self.missed, self.carried)
-        )
         return replace(
             self,
             states=(states,),
             reading=(nothing,),
             whole=(np.zeros(states.time.size),),
             instead=(nothing,),
-            missed=missed,
-            carried=carried,
+            missed=tuple(np.zeros((nothing.size, part.shape[1])) for part in self.missed[:1]),
         )
 
 
@@ -406,22 +384,17 @@ def first_stretches(states: Sequence[States]) -> list[int]:
     return [records.index(record) for record in records]
 
 
-def level_names(
-    response: Response, turn_on: float, states: Sequence[States]
-) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return the names of the levels without a prior, and of a record's own offsets with one."""
-    own = tuple(f"offset@{k}" for k in dict.fromkeys(first_stretches(states))) if response.own_offset else ()
-    return (("level",), own) if turn_on or not own else (own, ())
+def level_names(response: Response, states: Sequence[States]) -> tuple[str, ...]:
+    """Return the names of the level, or of each record's own."""
+    return tuple(f"offset@{k}" for k in dict.fromkeys(first_stretches(states))) if response.own_offset else ("level",)
 
 
-def levels(
-    response: Response, turn_on: float, run: int, states: Sequence[States], size: int
-) -> tuple[FloatArray, FloatArray]:
+def levels(response: Response, run: int, states: Sequence[States], size: int) -> FloatArray:
     """Return the columns of one run that `level_names` names."""
-    flat, tied = level_names(response, turn_on, states)
+    if not response.own_offset:
+        return np.ones((size, 1))
     firsts = first_stretches(states)
-    own = np.tile(np.array(list(dict.fromkeys(firsts))) == firsts[run], (size, 1)).astype(float)
-    return (own if "level" not in flat else np.ones((size, 1))), own[:, : len(tied)]
+    return np.tile(np.array(list(dict.fromkeys(firsts))) == firsts[run], (size, 1)).astype(float)
 
 
 def bends_of(values: FloatArray, reading: FloatArray, powers: int) -> tuple[float, ...]:

@@ -74,9 +74,7 @@ class Campaign:
     """All runs of one gyro on one grid.
 
     `step` is that of the coarse grid and `sampling` that of the rows, s; `temperature_noise` that of one reading of the driving
-    temperature, K; `turn_on` the standard deviation of a run's own offset of the bias as a card states it, °/h, 0 where nothing is
-    said of it; `carried` what effects on 1/Q do to the bias by what a card says, °/h, one (n, m) array a run on the coarse grid,
-    empty where there are none.
+    temperature, K.
     """
 
     runs: tuple[Run, ...]
@@ -91,8 +89,6 @@ class Campaign:
     skipped: dict[str, str] = field(default_factory=dict)
     outliers: int = 0
     temperature_noise: float = 0.0
-    turn_on: float = 0.0
-    carried: tuple[FloatArray, ...] = ()
 
     @property
     def clock_known(self) -> bool:

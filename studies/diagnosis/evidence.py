@@ -41,9 +41,6 @@ class Linear:
     noise : NoiseModels
     sigma : float
         White noise of a row of the grid, for the scale of the priors.
-    widest : float
-        Most that a prior may count in the white noise that a noise model leaves, over what it counts in `sigma`. With 1 it narrows
-        where little white noise is left: beside much wander, a card's values would take what an effect does.
     """
 
     target: FloatArray
@@ -52,7 +49,6 @@ class Linear:
     owner: "np.ndarray"
     noise: NoiseModels
     sigma: float
-    widest: float = np.inf
 
     @property
     def flat(self) -> int:
@@ -127,8 +123,7 @@ class Grams:
         self.units = np.ones(self.constant.shape)
         for _ in range(2 if scales.size or model.flat < p else 0):
             rest = self.factor(self.grams, scales, self.units)[..., p, p]
-            units = model.sigma * np.sqrt(max(model.target.size - model.flat, 1)) / np.maximum(rest, 1e-150)
-            self.units = np.minimum(units, model.widest)
+            self.units = model.sigma * np.sqrt(max(model.target.size - model.flat, 1)) / np.maximum(rest, 1e-150)
 
     def scaling(self, scales: FloatArray, units: FloatArray) -> FloatArray:
         """Return the factor of every column, and 1 for the target, (..., p + 1)."""
@@ -212,8 +207,7 @@ def _beside_nothing(
     """Solve without the columns that no row shows: their coefficients are what they were before, 0 ± prior."""
     seen = replace(model, columns=model.columns[:, live], prior=model.prior[live], owner=model.owner[live])
     found = solve(seen, terms, scales, kinds)
-    unit = min(1.0, model.widest * float(np.sqrt(found.variance)) / model.sigma)
-    unseen = model.sizes(found.scales) * np.where(live, 0.0, model.prior) * unit
+    unseen = model.sizes(found.scales) * np.where(live, 0.0, model.prior)
     covariance = np.diag(unseen**2)
     covariance[np.ix_(live, live)] = found.covariance
     coefficients = np.zeros(model.owner.size)

@@ -176,7 +176,6 @@ def fine(baseline: Baseline, campaign: Campaign) -> Baseline:
             reading=baseline.whole,
             instead=tuple(_finer(campaign, baseline.instead)),
             missed=tuple(_finer(campaign, baseline.missed)),
-            carried=tuple(_finer(campaign, baseline.carried)) if baseline.carried else (),
         )
     return replace(baseline, group=1)  # type: ignore[type-var]
 

@@ -88,17 +88,13 @@ def begin(
     campaign: Campaign,
     column: str,
     thermometer: Thermometer | None,
-    make: Callable[[float], Baseline] | None = None,
 ) -> Fit:
     """Return the fitted baseline of one response."""
     response = RESPONSES[column]
     problem = pose(campaign, column, 1000.0)
     states = tuple(run.states for run in campaign.runs)
-    turn_on = campaign.turn_on if response.own_offset else 0.0
     baseline: Baseline
-    if make is not None:
-        baseline = make(problem.sigma)
-    elif thermometer is None or response.thermometer:
+    if thermometer is None or response.thermometer:
         baseline = Lagged(
             response,
             states,
@@ -106,7 +102,6 @@ def begin(
             1000.0,
             _slope(problem, housing := [s.averaged(campaign.group).excess for s in states]),
             bends=bends_of(problem.values, problem.stack(housing), response.powers),
-            turn_on=turn_on,
         )
     else:
         reading, whole = thermometer.reads(response)
@@ -120,8 +115,6 @@ def begin(
             thermometer.missed,
             _slope(problem, reading),
             bends=bends_of(problem.values, problem.stack(list(reading)), response.powers),
-            turn_on=turn_on,
-            carried=campaign.carried if response.own_offset else (),
         )
     first = settle(problem, baseline)
     tau = float(getattr(first.baseline, "tau", states[0].tau if thermometer is None else thermometer.states[0].tau))

@@ -18,13 +18,13 @@ from studies.inference.signatures import Signatures
 
 Array = NDArray[np.float64]
 MOST_SHAPES = 400
-"""Of an effect; of many more shapes every so manieth of those that differ in what a fit moves."""
+"""Of an effect; of a larger grid every second, third, … of the shapes that differ only in what a fit moves."""
 FEW, LEADING, WIDTH = 40, 0.4, 4
 """Of effects with more shapes than FEW only the leading columns are scanned: those with a prior of at least this part of the widest."""
 LESS = (0.1, 0.01)
 """Of the slow noise of a response: what an effect has been taken for until it is named."""
 MOST_TERMS, CONTENDERS = 4, 5
-MARGIN, FURTHER = 4.0, 0.06
+MARGIN, FURTHER = 5.0, 0.06
 """Log posterior that a cause must bring, and part of what others explain of the same response that it must bring besides."""
 NEAR = 0.35, 15.0
 """Part of the best scan, less so much, down to which contenders are refitted."""

@@ -56,7 +56,7 @@ from tests.stranger.__main__ import make_one
 
 ASK = "import sys; from studies.cli import main; sys.exit(main(sys.argv[1:]))"
 DCXO = (
-    '# no meaning found for the column "column 3"',
+    '# unknown column: "column 3"',
     '[[file.column]]\nfrom = "column 3"\nto = "frequency_Hz"\nunit = "ppm"\nnominal_Hz = 25e6\n',
 )
 BURSTS = (("scale = 1.0 ", "scale = 0.00390625 "), ("offset = 0.0 ", "offset = -231.0 "))

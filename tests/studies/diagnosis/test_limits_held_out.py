@@ -10,8 +10,7 @@ from studies.diagnosis.noise import NoiseModels
 from studies.record import Record
 
 
-@pytest.mark.parametrize("widest", [np.inf, 1.0])
-def test_a_column_that_no_row_shows_is_as_unknown_as_one_that_hardly_shows(widest):
+def test_a_column_that_no_row_shows_is_as_unknown_as_one_that_hardly_shows():
     rng = np.random.default_rng(5)
     t = np.arange(400) * 60.0
     y, level = 3.0 + 1e-3 * rng.standard_normal(t.size), np.ones((t.size, 1))
@@ -20,28 +19,11 @@ def test_a_column_that_no_row_shows_is_as_unknown_as_one_that_hardly_shows(wides
     def deviation(size):
         column = size * np.sin(t / 900.0)[:, None]
         prior, owner = np.array([np.inf, 0.2]), np.array([-1, 0])
-        model = Linear(
-            y, np.concatenate([level, column], axis=1), prior, owner, NoiseModels.of([t], 1.0, 144.0), 0.05, widest
-        )
+        model = Linear(y, np.concatenate([level, column], axis=1), prior, owner, NoiseModels.of([t], 1.0, 144.0), 0.05)
         return np.sqrt(solve(model, 0, np.array([0.5])).covariance[1, 1])
 
     assert deviation(0.0) == pytest.approx(deviation(1e-9), rel=1e-6)
-    if widest > 1.0:
-        assert deviation(0.0) == pytest.approx(0.1, rel=1e-6)
-
-
-@pytest.mark.parametrize("sigma", [1e-4, 1e-2])
-def test_a_value_of_a_card_is_never_less_known_than_stated(sigma):
-    """The priors' scale is told in the noise of a first fit; what a later one leaves may be a hundred times that."""
-    rng = np.random.default_rng(5)
-    t = np.arange(400) * 60.0
-    columns = np.stack([np.ones(t.size), 1e-4 * np.sin(t / 900.0)], axis=1)
-    y, prior = 3.0 + 1e-2 * rng.standard_normal(t.size), np.array([np.inf, 1.0])
-    solved = solve(
-        Linear(y, columns, prior, np.array([-1, -1]), NoiseModels.of([t], 1.0, 144.0), sigma, 1.0), 0, np.empty(0)
-    )
-    assert np.sqrt(solved.covariance[1, 1]) == pytest.approx(1.0, rel=0.1)
-    assert abs(solved.coefficients[1]) < 0.5
+    assert deviation(0.0) == pytest.approx(0.1, rel=1e-6)
 
 
 @pytest.mark.slow

@@ -93,7 +93,7 @@ def test_a_voltmeter_in_an_air_bath_gets_no_false_name():
 @pytest.mark.slow
 def test_the_thermometer_of_a_crystal_is_slower_than_the_crystal(tmp_path):
     """Known: by 100 to 130 s, of a crystal at 25 MHz. To the frequency it is as if a gradient shifted it: one set."""
-    column = '# no meaning found for the column "column 3"'
+    column = '# unknown column: "column 3"'
     named = '[[file.column]]\nfrom = "column 3"\nto = "frequency_Hz"\nunit = "ppm"\nnominal_Hz = 25e6\n'
     verdict = diagnose(bring_in("dcxo_gps.txt", tmp_path, (column, named)))
     cause = verdict.causes[0]
