@@ -24,8 +24,8 @@ FEW, LEADING, WIDTH = 40, 0.4, 4
 LESS = (0.1, 0.01)
 """Of the slow noise of a response: what an effect has been taken for until it is named."""
 MOST_TERMS, CONTENDERS = 4, 5
-MARGIN, FURTHER = 5.0, 0.06
-"""Log posterior that a cause must bring, and part of what others explain of the same response that it must bring besides."""
+MARGIN, UNSTATED, FURTHER = 4.0, 1.0, 0.06
+"""Log posterior that a cause must bring, and more where no card states the noise; part of what others explain of its response that it must bring besides."""
 NEAR = 0.35, 15.0
 """Part of the best scan, less so much, down to which contenders are refitted."""
 HOPELESS, FINITE = -3.0, 1e3
@@ -269,11 +269,16 @@ class Search:
             if len(now.terms) == MOST_TERMS or not self.bank or (now.terms and not near(now)):
                 break
             tried = self.contenders(now)
-            if not tried or tried[0].score - now.score < _needed(tried[0].terms[-1], now.terms):
+            if not tried or tried[0].score - now.score < self.needed(tried[0].terms[-1], now.terms):
                 break
             self.progress(f"{tried[0].terms[-1].effect.name} explains {tried[0].score - now.score:.0f} of log evidence")
             now = self._without_idle(_credited(self.settle(tried[0].terms, tried[0].noise), now), plain)
         return plain, now
+
+    def needed(self, term: Term, others: Sequence[Term]) -> float:
+        """Return the log posterior that a cause must bring beside others."""
+        margin = MARGIN if self.linear.problem.instrument.polynomial is None else MARGIN + UNSTATED
+        return margin + FURTHER * sum(other.brought for other in others if other.response == term.response)
 
     def compare(self, plain: Hypothesis, final: Hypothesis) -> Outcome:
         """Return a model with what could stand in the place of each of its terms."""
@@ -324,7 +329,7 @@ class Search:
         for k in range(len(now.terms)):
             others = (*now.terms[:k], *now.terms[k + 1 :])
             fewer = self.settle(others, now.noise) if others else plain
-            if now.score - fewer.score < _needed(now.terms[k], others):
+            if now.score - fewer.score < self.needed(now.terms[k], others):
                 return self._without_idle(fewer, plain)
         return now
 
@@ -358,10 +363,6 @@ def _passed(effect: Effect, grid: list[tuple[float, ...]], at: tuple[float, ...]
 def _near(gain: float, best: float) -> bool:
     part, less = NEAR
     return gain > max(part * best - less, HOPELESS)
-
-
-def _needed(term: Term, others: Sequence[Term]) -> float:
-    return MARGIN + FURTHER * sum(other.brought for other in others if other.response == term.response)
 
 
 def _credited(now: Hypothesis, before: Hypothesis) -> Hypothesis:
