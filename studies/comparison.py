@@ -7,16 +7,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from shell.constants import zero_Celsius
-from shell.modes import solve_modes
-from shell.separation import nearest_mode
 from studies.errors import InputError, naming
-from studies.instrument.card import Instrument
 from studies.law import law_of
 from studies.shown import Shown
-from studies.simulation.heat_path import behind_housing, build_network, slowest_lag
 
 if TYPE_CHECKING:
     from pandas import DataFrame
+
+    from studies.instrument.card import Instrument
 
 HARMONICS = (0, 1, 2, 3)
 DRIVE = 2
@@ -72,6 +70,10 @@ def compare(instruments: "Sequence[Instrument]") -> Comparison:
 
 
 def _figures(instrument: "Instrument") -> Iterator[Figure]:
+    from shell.modes import solve_modes
+    from shell.separation import nearest_mode
+    from studies.simulation.heat_path import behind_housing, build_network, slowest_lag
+
     T0, nothing = instrument.reference_temperature, float("nan")
     with naming(instrument.path):
         lowest = {n: solve_modes(*instrument.at(T0), n)[0] for n in HARMONICS}

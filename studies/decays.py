@@ -9,16 +9,19 @@ import datetime
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from compensation.arrays import Array
-from compensation.ringdown.laws import Law, Rows, fit_law
 from studies.errors import InputError, naming
 from studies.files.columns import read_columns, read_header
 from studies.record import Record, check_plausible, write_record
 from studies.ringdown import POWERS, Decay
+
+if TYPE_CHECKING:
+    from compensation.ringdown.laws import Law
 
 TEMPERATURE, AMPLITUDE = "housing_temperature_degC", "vibration_amplitude_V"
 RESPONSES = ("frequency_Hz", "inverse_q")
@@ -85,6 +88,8 @@ def _sd(decay: Decay, name: str) -> float:
 
 def fit_laws(decays: Decays) -> "dict[str, Law]":
     """Fit the laws of ln f and of 1/Q, `fitted` in their own units; none where there are fewer than four readings or nothing varies."""
+    from compensation.ringdown.laws import Rows, fit_law
+
     found = {}
     for name in RESPONSES:
         value = decays.columns.get(name)

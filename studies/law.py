@@ -2,14 +2,14 @@
 
 from dataclasses import replace
 from math import inf
-from typing import cast
+from typing import TYPE_CHECKING, cast
 
-from shell.errors import ShellError
-from shell.law import FrequencyLaw, build_law, check_mount
-from shell.levels import Theory
-from shell.materials import read_materials
 from studies.errors import InputError, naming
-from studies.instrument.card import Instrument
+
+if TYPE_CHECKING:
+    from shell.law import FrequencyLaw
+    from shell.levels import Theory
+    from studies.instrument.card import Instrument
 
 SLOPE_KEYS = {"youngs_modulus": "log_slope_per_K", "shear_modulus": "log_slope_per_K", "expansion": "value"}
 
@@ -24,6 +24,8 @@ def law_of(
     """Build the frequency law of an instrument between two temperatures (K), within its material's range: over all of it unless given."""
     if instrument.polynomial is not None:
         return cast("FrequencyLaw", instrument.polynomial.between(lowest, highest))
+    from shell.law import build_law, check_mount
+
     T0, material, mount = instrument.reference_temperature, instrument.material, instrument.part("mount")
     if mount is not None:
         with naming(f"{instrument.path} [mount]"):
@@ -44,6 +46,8 @@ def unknown_slope(instrument: "Instrument") -> str:
     missing = () if instrument.polynomial is not None else instrument.material.constant
     if not missing:
         return ""
+    from shell.materials import read_materials
+
     named = {"youngs_modulus": "Young's modulus", "shear_modulus": "shear modulus", "expansion": "expansion"}
     said = "no source states" if instrument.material.name in read_materials() else "the card does not say"
     keys = {name: f"[material.deviation.{name}] {key} (1/K)" for name, key in SLOPE_KEYS.items()}
@@ -65,6 +69,8 @@ def moved_law(law: "FrequencyLaw", instrument: "Instrument") -> "FrequencyLaw":
     """Return the law of an instrument whose material or mount has moved; solved anew where Poisson's ratio has left the law's."""
     if instrument.polynomial is not None:
         return law_of(instrument, law.lowest, law.highest)
+    from shell.errors import ShellError
+
     try:
         return replace(law.with_material(instrument.material), mount=instrument.part("mount"))
     except ShellError:

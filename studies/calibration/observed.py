@@ -101,6 +101,11 @@ class ObservedRun:
     responses: Mapping[str, BlockMeans]
     kinks: Mapping[int, float] = field(default_factory=dict)
 
+    def explaining(self, names: Sequence[str]) -> "ObservedRun":
+        """Return it with some responses alone; without the housing among them the chamber drives nothing."""
+        kept = {name: own for name, own in self.responses.items() if name in names}
+        return replace(self, outer=self.outer if HOUSING in names else None, responses=kept)
+
 
 @dataclass(frozen=True)
 class SettledTable:

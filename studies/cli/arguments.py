@@ -5,15 +5,14 @@ from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-import numpy as np
 from cyclopts import Parameter
 
-from compensation.arrays import Array
 from shell.constants import zero_Celsius
 from studies.errors import InputError
 from studies.files.given import refuse_unsound
 
 if TYPE_CHECKING:
+    from compensation.arrays import Array
     from studies.instrument.card import Instrument
 
 
@@ -76,8 +75,10 @@ def ending_of(out: str, kinds: Sequence[str]) -> str:
     return kind
 
 
-def lay_temperatures(from_degC: float, to_degC: float, step: float) -> Array:
+def lay_temperatures(from_degC: float, to_degC: float, step: float) -> "Array":
     """Return the temperatures (K) of --from, --to and --step."""
+    import numpy as np
+
     asked = f"--from {from_degC:g} --to {to_degC:g} --step {step:g}"
     if not step > 0 or not to_degC >= from_degC:
         raise InputError(f"{asked}: the step must be positive and --to not below --from.")

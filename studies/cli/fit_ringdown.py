@@ -9,11 +9,10 @@ With --json one object, schema `hrg.fit-ringdown/2`: `decays` (a list: `data`, `
 
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from compensation.ringdown.laws import Law, Term
 from studies.cli.arguments import Harmonic
 from studies.cli.output import answers, keep_card, say
 from studies.decays import Decays, fit_laws, is_table, read_table, table_of, write_decays
@@ -23,6 +22,9 @@ from studies.law import law_of
 from studies.reports import style
 from studies.results import Chapter, Column, Drawing, Figure, Part, Result, Sentence, Table, row_of
 from studies.ringdown import Decay, read_decay, with_decay
+
+if TYPE_CHECKING:
+    from compensation.ringdown.laws import Law, Term
 
 QUANTITIES = {
     "frequency_1_Hz": "frequency of the upper mode (Hz)",

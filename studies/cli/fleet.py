@@ -9,12 +9,7 @@ from studies.cli.output import answers, dump_json, say
 from studies.cli.telling import Told
 from studies.errors import InputError
 from studies.files.writing import write_text
-from studies.fleet.folder import read_lot
-from studies.fleet.run import run_lot
-from studies.instrument.card import load_card
-from studies.reports import fleet as parts
 from studies.results import Result
-from studies.results.page import render_result
 
 
 @answers("hrg.fleet/2", page=False)
@@ -35,6 +30,12 @@ def fleet(folder: str, *, out: str, card: str | None = None, workers: Annotated[
     workers : int
         Devices processed at the same time.
     """
+    from studies.fleet.folder import read_lot
+    from studies.fleet.run import run_lot
+    from studies.instrument.card import load_card
+    from studies.reports import fleet as parts
+    from studies.results.page import render_result
+
     if Path(out).resolve().is_relative_to(Path(folder).resolve()):
         raise InputError(f"--out {out}: give a folder outside {folder}, where every folder is a device.")
     if card is not None:

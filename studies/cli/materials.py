@@ -1,27 +1,23 @@
 """`hrg materials`: the published laws of the materials, and how they compare in one geometry."""
 
 from math import isnan, nan
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from shell.constants import zero_Celsius
-from shell.damping.budget import surface_cause, thermoelastic_cause
-from shell.damping.faces import Vibration
-from shell.damping.heat import Heat
-from shell.damping.sources import known_losses
 from shell.errors import ShellError
-from shell.law import build_law
 from shell.materials import Material, Prior, read_materials, spell
-from shell.modes import solve_modes
 from shell.property import PROPERTIES
-from shell.resonator import Resonator
 from studies.cli.arguments import Card, Harmonic
 from studies.cli.output import answers
 from studies.errors import InputError, naming, nearest
 from studies.instrument.card import load_card
 from studies.reports.digits import plain, to_error
 from studies.results import Column, Result, Table, row_of, rows_of
+
+if TYPE_CHECKING:
+    from shell.resonator import Resonator
 
 
 @answers("hrg.materials-list/1; hrg.materials-compared/1 with --compare")
@@ -167,6 +163,13 @@ def compare_materials(resonator: "Resonator", temperature: float, harmonic: int 
 
 
 def _figures(resonator: "Resonator", material: "Material", T: float, harmonic: int) -> dict[str, Any]:
+    from shell.damping.budget import surface_cause, thermoelastic_cause
+    from shell.damping.faces import Vibration
+    from shell.damping.heat import Heat
+    from shell.damping.sources import known_losses
+    from shell.law import build_law
+    from shell.modes import solve_modes
+
     remarks = list(material.caveats)
     if absent := material.lacks:
         remarks.append(f"no source states its {', '.join(one.replace('_', ' ') for one in absent)}")

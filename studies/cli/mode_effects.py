@@ -5,23 +5,21 @@ Each function returns what is under its key of a mode in the JSON, or None where
 
 from dataclasses import dataclass
 from math import degrees, isfinite, pi, radians
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from shell.cubic import solve_cubic
-from shell.duffing import amplitude_shift
 from shell.elastic import Elastic
 from shell.errors import ShellError
-from shell.imperfection import Split
 from shell.law import check_mount
 from shell.modes import Mode
 from shell.prestress import Prestress
-from shell.spin import spin_shift
 from studies.errors import InputError, naming
 from studies.instrument.card import Instrument
 from studies.instrument.imperfect import is_imperfect
 from studies.loss.films import film_shifts
 from studies.results import Column, Table, row_of
-from studies.splitting import SplitPair
+
+if TYPE_CHECKING:
+    from shell.imperfection import Split
 
 MICROMETRE = 1e-6
 Entry = dict[str, Any]
@@ -64,6 +62,8 @@ def _split(m: Mode, asked: Asked) -> Entry | None:
     """What the card's imperfection and electrodes make of a pair."""
     if m.theory == "rayleigh" or m.harmonic < 1 or not is_imperfect(asked.instrument):
         return None
+    from studies.splitting import SplitPair
+
     whole = SplitPair(asked.instrument, m, asked.T)
     slow, fast = whole.split.frequencies
 
@@ -79,6 +79,8 @@ def _spin(m: Mode, asked: Asked) -> Entry | None:
     """What a spin makes of a pair, in the frame of the resonator: two waves with f + shift ± g Ω/2π, g = n K of Bryan's factor K."""
     if asked.spin is None or m.theory != "solid" or m.harmonic < 2 or m.index:
         return None
+    from shell.spin import spin_shift
+
     shift, omega = spin_shift(m, asked.elastic), radians(asked.spin)
     mean = m.frequency * (1 + shift.total * omega**2)
     apart = m.harmonic * abs(m.bryan_factor * omega) / (2 * pi)
@@ -91,6 +93,8 @@ def _amplitude(m: Mode, asked: Asked) -> Entry | None:
     """The shift in ppb by the largest displacement that was asked."""
     if asked.amplitude is None or m.theory != "solid" or m.harmonic < 2:
         return None
+    from shell.duffing import amplitude_shift
+
     shift, square = amplitude_shift(m), (asked.amplitude * MICROMETRE) ** 2
     ppb = 1e9 * square
     parts = row_of(shift, shift_ppb=("total", ppb), static_ppb=("static", ppb), inertial_ppb=("inertial", ppb))
@@ -128,6 +132,8 @@ def _crystal(m: Mode, asked: Asked) -> Entry | None:
     crystal = given or material.cubic(asked.T)
     if crystal is None or m.theory != "solid" or m.harmonic < 2 or m.harmonic % 4 == 0 or m.index:
         return None
+    from shell.cubic import solve_cubic
+
     assert m.resonator is not None
     try:
         pair = solve_cubic(m.resonator, crystal, m.harmonic, asked.tolerance)

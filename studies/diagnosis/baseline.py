@@ -1,9 +1,8 @@
 """What counts as the simulation before any effect: a law with uncertain values, linearised where it is.
 
-The engine asks a baseline for columns with priors, for the states that effects see, and for a new point after a fit; it
-does not know whether they come from a generic law or from a card's own simulation.
+The engine asks a baseline for columns with priors, for the states that effects see, and for a new point after a fit.
 
-Without a card: f₀ + a₁ x + a₂ x² over a resonator that follows the housing through one free lag from an unknown initial state,
+f₀ + a₁ x + a₂ x² over a resonator that follows the housing through one free lag from an unknown initial state,
 x = T_r − T₀; bias a cubic in the change of frequency (of temperature, where no frequency is measured) with an offset per
 run; 1/Q a quadratic in temperature. No sensor reads at once and no resonator is one lump: a delay of 0 ± 10 s between sensor
 and resonator is part of it.

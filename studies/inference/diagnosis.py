@@ -145,14 +145,7 @@ class Inference(Inferred, Shown):
 def build_problem(card: "Instrument", records: Sequence[Record], housing: bool = True) -> CardProblem:
     """Return the problem of a card's values and the starts of runs, driven by the measured temperature; a card explains its `housing` too."""
     named = (*RESPONSES, HOUSING) if housing and card.polynomial is None else RESPONSES
-    runs = tuple(
-        replace(
-            run,
-            outer=run.outer if HOUSING in named else None,
-            responses={name: own for name, own in run.responses.items() if name in named},
-        )
-        for run in observe(records, blocks=blocks_of(records))
-    )
+    runs = tuple(run.explaining(named) for run in observe(records, blocks=blocks_of(records)))
     return CardProblem(card, gather_priors(card), runs, wide_law(card, runs))
 
 
@@ -211,18 +204,17 @@ def _from(start: CardFit, told: Array | None, progress: Report) -> tuple[Search,
     problem, point = start.problem, start.point
     search = Search(Linear.of(start, told), Signatures.at(problem, point), start.noise, progress=progress)
 
-    def moved(final: Hypothesis) -> float:
+    def reached(final: Hypothesis) -> Array:
+        """Most probable values and starts beside the effects."""
         model = Model(search.linear, search.signatures, final.terms, final.noise)
-        return float(np.abs(model.kept(model.mean()).point - point).max(initial=0.0))
+        return model.kept(model.mean()).point
 
     def near(final: Hypothesis) -> bool:
-        return moved(final) < STRAIGHT
+        return bool(np.abs(reached(final) - point).max(initial=0.0) < STRAIGHT)
 
     def holds(final: Hypothesis) -> bool:
         """Whether the straight lines are those of the simulation where they end."""
-        linear = search.linear
-        model = Model(linear, search.signatures, final.terms, final.noise)
-        there = model.kept(model.mean()).point
+        linear, there = search.linear, reached(final)
         state = problem.evaluate(there, slopes=False)
         apart = {n: linear.target[n] - linear.slope[n] @ there - state.residual[n] for n in linear.responses}
         return STRAYED > sum(np.sum(linear.rows[n].whiten(own, final.noise[n]) ** 2) for n, own in apart.items())

@@ -19,11 +19,7 @@ Array = NDArray[np.float64]
 def set_housing_apart(found: CardFit) -> tuple[CardFit, Array | None]:
     """Return the calibration of the other responses, and what the housing's rows tell of its coordinates, (q, p + 1); None without a chamber."""
     whole = found.problem
-    runs = tuple(
-        replace(run, outer=None, responses={n: own for n, own in run.responses.items() if n in RESPONSES})
-        for run in whole.runs
-    )
-    problem = replace(whole, runs=runs)
+    problem = replace(whole, runs=tuple(run.explaining(RESPONSES) for run in whole.runs))
     if HOUSING not in whole.responses:
         return replace(found, problem=problem), None
     count = len(whole.priors.values)

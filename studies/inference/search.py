@@ -126,6 +126,11 @@ class Search:
         columns = {name: own[:, members] for name, own in self.signatures.columns(effect, shape, response).items()}
         return Term(effect, response, shape, columns, members, self.unit(effect, response, members), 1.0, price)
 
+    def gains(self, beside: Background, own: Shapes) -> Array:
+        """Return what an effect adds to the evidence beside a model, for each of SCALES and of its shapes."""
+        units = np.broadcast_to(self.unit(own.effect, own.response, own.members), (len(own.shapes), len(own.members)))
+        return beside.gains(own.columns, units, own.effect)
+
     def scan(self, now: Hypothesis, bank: Sequence[Shapes] | None = None, less: Sequence[float] = LESS) -> list[Seen]:
         """Return what every effect adds to a model, the strongest first, with its noise and with less slow noise of a response."""
         bank = self.bank if bank is None else bank
@@ -139,12 +144,7 @@ class Search:
             for own in open_:
                 if name and name != own.response:
                     continue
-                units = np.broadcast_to(
-                    self.unit(own.effect, own.response, own.members), (len(own.shapes), len(own.members))
-                )
-                gain = (
-                    scipy.special.logsumexp(beside.gains(own.columns, units, own.effect), axis=0) - np.log(10) + behind
-                )
+                gain = scipy.special.logsumexp(self.gains(beside, own), axis=0) - np.log(10) + behind
                 best = found.setdefault((own.effect.name, own.response), {})
                 for k, shape in enumerate(own.shapes):
                     if np.isfinite(gain[k]) and (shape not in best or gain[k] > best[shape][0]):
@@ -301,10 +301,7 @@ class Search:
             beside, tried = Background(self.linear, now.terms, noise), []
             for own in self.bank:
                 if own.response == name and (own.effect.name, name) not in {term.key for term in now.terms}:
-                    units = np.broadcast_to(
-                        self.unit(own.effect, name, own.members), (len(own.shapes), len(own.members))
-                    )
-                    gain = beside.gains(own.columns, units, own.effect).max(axis=0)
+                    gain = self.gains(beside, own).max(axis=0)
                     tried.append((float(gain.max()), own, int(np.argmax(gain))))
             best: dict[str, tuple[Term, ...]] = {}
             for _, own, k in sorted(tried, key=lambda one: -one[0]):

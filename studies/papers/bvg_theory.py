@@ -1,17 +1,16 @@
 """The BVG paper's theory of the bell, (16)–(22), in numbers beside the shell solver, and its reading of the rate, (23)–(30)."""
 
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from compensation.loop import BellResonator, read_rate_from_drive, read_rate_from_loop, scale_of_rebalance
-from compensation.motion import demodulate
 from compensation.piezo import COUNT, DRIVE_Q, PiezoRing
-from shell.curves import Arc
-from shell.modes import solve_modes
-from shell.wall_stress import find_wall_stress
 from studies.instrument.card import load_card
 from studies.results import Chapter, Column, Table
+
+if TYPE_CHECKING:
+    from compensation.loop import BellResonator
 
 CARD = "bvg-bell"
 D31_PZT5A = -1.71e-10  # C/N, of PZT-5A (data sheets of makers); the paper names the ceramic and no constant
@@ -47,6 +46,7 @@ def compare_bell_theory(card: str = CARD) -> BellTheory:
         rayleigh_functions_without_factor,
         two_pattern_model,
     )
+    from shell.modes import solve_modes
 
     instrument = load_card(card)
     resonator = instrument.resonator
@@ -88,6 +88,9 @@ class LoopReading:
 def read_planted_rate(planted: float = 2.0) -> LoopReading:
     """Integrate (23) with a coupling c₁ and read a rate (rad/s) back by (24)–(26) for amplitudes, by (27)–(29) and by (30)."""
     from scipy.integrate import solve_ivp
+
+    from compensation.loop import read_rate_from_drive, read_rate_from_loop, scale_of_rebalance
+    from compensation.motion import demodulate
 
     bell, ring, share = _bell_with_elements()
     omega = bell.omega
@@ -140,6 +143,11 @@ def read_planted_rate(planted: float = 2.0) -> LoopReading:
 
 def _bell_with_elements() -> "tuple[BellResonator, PiezoRing, float]":
     """The card's bell as (23) with a coupling c₁, the elements on its cylinder, and σ_φφ over the sum of the stresses there."""
+    from compensation.loop import BellResonator
+    from shell.curves import Arc
+    from shell.modes import solve_modes
+    from shell.wall_stress import find_wall_stress
+
     instrument = load_card(CARD)
     body = instrument.resonator
     (mode,) = solve_modes(body, instrument.material.elastic(instrument.reference_temperature))
