@@ -175,6 +175,7 @@ def serve() -> None:
 
     function, parent = sys.argv[1:3]
     die_with_parent(int(parent))
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # an interrupt is the parent's to tell
     _limit_memory()
     answers = os.fdopen(os.dup(1), "wb", buffering=0)
     os.dup2(2, 1)  # what the function prints must not mix with the answers
@@ -188,7 +189,10 @@ def serve() -> None:
         asked = json.loads(line)
         number = asked.pop("request")
         answer = _answer(function, call, build_instrument, asked)
-        answers.write(json.dumps({**answer, "request": number}).encode() + b"\n")
+        try:
+            answers.write(json.dumps({**answer, "request": number}).encode() + b"\n")
+        except BrokenPipeError:  # the parent was interrupted and no longer reads
+            return
 
 
 def _limit_memory() -> None:

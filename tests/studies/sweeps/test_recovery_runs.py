@@ -16,7 +16,9 @@ import pytest
 
 from studies.cli import main
 from studies.errors import InputError
+from studies.instrument.card import load_card
 from studies.sweeps.block import Batch, Cases, Remark
+from studies.sweeps.child import Child
 from studies.sweeps.export import export_results
 from studies.sweeps.opening import claim_store
 from studies.sweeps.results import open_results
@@ -384,3 +386,18 @@ def test_an_answer_to_another_request_and_too_much_memory_fail_their_case(tmp_pa
         found = json.loads(done.stdout)
         assert found["failed"] == 2, done.stdout
         assert said in found["reasons"][0]["reason"]
+
+
+def test_an_interrupt_ends_the_process_of_a_function_in_silence(tmp_path, capfd):
+    """Ctrl-C reaches it too, and nobody may read its last answer."""
+    body = "import time\ndef nap(instrument, parameters):\n    time.sleep(0.3)\n    return 1\n"
+    (tmp_path / "functions.py").write_text(body)
+    child = Child(f"{tmp_path / 'functions.py'}:nap")
+    instrument = load_card("free-dome")
+    request = {"content": instrument.content, "path": instrument.path, "parameters": {}, "request": 1}
+    child.process.stdin.write(json.dumps(request).encode() + b"\n")
+    child.process.send_signal(signal.SIGINT)
+    child.process.stdout.close()
+    assert child.process.wait(60) == 0
+    child.kill()
+    assert capfd.readouterr().err == ""
