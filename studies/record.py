@@ -88,6 +88,14 @@ class Record:
         span = f" over {(time[-1] - time[0]) / 3600:.3g} h" if time is not None and len(time) > 1 else ""
         return f"Record({self.path or self.instrument or 'in memory'!s}, {len(self)} rows{span}: {', '.join(self.columns)})"
 
+    @property
+    def notes(self) -> list[str]:
+        """What the header says of the record, a line each."""
+        said = {"instrument": _one_line(self.instrument), "source": _one_line(self.source)}
+        said |= {"start": self.start.isoformat() if self.start else ""}
+        said |= {f"resolution {name}": repr(value) for name, value in self.resolution.items()}
+        return [*self.comments, *(f"{name}: {words}" for name, words in said.items() if words)]
+
     def to_frame(self) -> "DataFrame":
         """Return the columns as a table; what the header says is in its `attrs`."""
         import pandas as pd
@@ -193,7 +201,7 @@ def read_profile(path: str | Path) -> Columns:
 
 def write_record(record: Record, path: str | Path, progress: Callable[[int], None] | None = None) -> None:
     """Write one run, whole or not at all, as CSV or (by the end of its name) Parquet; `progress` is told the rows written so far."""
-    notes = header_notes(record)
+    notes = record.notes
     with written_whole(path) as file:
         if is_parquet(path):
             write_table(file, record.columns, notes, path)
@@ -205,15 +213,6 @@ def write_record(record: Record, path: str | Path, progress: Callable[[int], Non
             file.write(("\n".join(lines) + "\n").encode())
             if progress is not None:
                 progress(begin + len(part))
-
-
-def header_notes(record: Record) -> list[str]:
-    """Return what the header of a record says of it, a line each."""
-    notes = list(record.comments)
-    notes += [f"instrument: {_one_line(record.instrument)}"] if record.instrument else []
-    notes += [f"source: {_one_line(record.source)}"] if record.source else []
-    notes += [f"start: {record.start.isoformat()}"] if record.start else []
-    return [*notes, *(f"resolution {name}: {value!r}" for name, value in record.resolution.items())]
 
 
 def check_plausible(columns: Mapping[str, Array], where: Callable[[int], str]) -> None:

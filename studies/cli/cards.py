@@ -5,9 +5,10 @@ from math import exp
 from typing import Any
 
 from studies.cli.output import answers
-from studies.instrument.card import load_card, shipped_cards
+from studies.instrument.card import SCHEMA, load_card, shipped_cards
 from studies.instrument.display import display_name
-from studies.results import Column, Facts, Result, Table, row_of
+from studies.results import Column, Facts, Result, Table
+from studies.schema.reader import read_toml
 
 WIDE = 0.3  # standard deviation of a logarithm from which on a factor is shown
 LEAD = "The instrument cards that ship with the package."
@@ -28,10 +29,11 @@ def cards(card: str = "") -> Result:
     """
     if card:
         return _show_values(card)
-    found = map(load_card, shipped_cards().values())
+    found = ((path, read_toml(path, SCHEMA)) for path in shipped_cards().values())
     entries = [
-        {"shape": one.keys("resonator").shape} | row_of(one, "name", "note", "path", material="material.name")
-        for one in found
+        {"name": card["name"], "shape": card["resonator"]["shape"], "material": card["material"]["name"]}
+        | {"note": card["note"], "path": str(path)}
+        for path, card in found
     ]
     columns = ("name", "shape", "material", Column("note", "what is published, what is illustrative"))
     return Result({"schema": "hrg.cards/1", "cards": entries}, "Cards", LEAD, [Table("Cards", entries, columns)])

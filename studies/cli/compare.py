@@ -7,9 +7,7 @@ its values, null where a card has none).
 from math import isfinite
 
 from studies.cli.output import answers
-from studies.comparison import compare as compare_designs
 from studies.errors import InputError
-from studies.instrument.card import load_card
 from studies.results import Column, Result, Table, row_of
 
 
@@ -24,6 +22,9 @@ def compare(*card: str) -> Result:
     """
     if len(card) < 2:
         raise InputError("name two cards or more: hrg compare A.toml B.toml.")
+    from studies.comparison import compare as compare_designs
+    from studies.instrument.card import load_card
+
     found = compare_designs([load_card(one) for one in card])
     figures = [
         row_of(row[0], "name", "unit")

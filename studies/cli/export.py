@@ -6,16 +6,18 @@ With --json one object, schema `hrg.export/1`: `record`, `to`, `out`, `rows`, `c
 from collections.abc import Callable, Mapping
 from io import BytesIO
 from pathlib import Path
-from typing import IO, Any, Literal
+from typing import IO, TYPE_CHECKING, Any, Literal
 
 from studies.cli.arguments import Out, Run
 from studies.cli.output import answers
 from studies.errors import InputError
+from studies.files.reading import load_library
 from studies.files.writing import written_whole
-from studies.importing.formats import load_library
 from studies.instrument.units import unit_of
-from studies.record import Record, header_notes, read_record, write_record
 from studies.results import Result, Sentence
+
+if TYPE_CHECKING:
+    from studies.record import Record
 
 ENDINGS = {"csv": (".csv",), "parquet": (".parquet",), "mat": (".mat",), "tdms": (".tdms",), "mf4": (".mf4",), "hdf5": (".h5", ".hdf5")}  # fmt: skip
 
@@ -31,6 +33,8 @@ def export(run: Run, *, to: Literal["parquet", "mat", "tdms", "csv", "mf4", "hdf
     """
     if Path(out).suffix.lower() not in ENDINGS[to]:
         raise InputError(f"--out {out}: give a name that ends in {ENDINGS[to][0]} for --to {to}.")
+    from studies.record import read_record
+
     record = read_record(run)
     export_record(record, to, out)
     payload = {"schema": "hrg.export/1", "record": run, "to": to, "out": out, "rows": len(record), "columns": list(record.columns)}  # fmt: skip
@@ -41,8 +45,10 @@ def export(run: Run, *, to: Literal["parquet", "mat", "tdms", "csv", "mf4", "hdf
 GROUP = "record"
 
 
-def export_record(record: Record, kind: str, path: str) -> None:
+def export_record(record: "Record", kind: str, path: str) -> None:
     """Write a record in another format, whole or not at all; MissingEnvironment where the library that writes it is not installed."""
+    from studies.record import write_record
+
     if kind in ("csv", "parquet"):
         write_record(record, path)
         return
@@ -54,20 +60,20 @@ def _unit(name: str) -> str:
     return "s" if name == "time_s" else unit_of(name).removeprefix("1")
 
 
-def write_matlab(record: Record, file: IO[bytes]) -> None:
+def write_matlab(record: "Record", file: IO[bytes]) -> None:
     """A .mat file (version 5): a column vector for each column, and `notes`."""
     from scipy.io import savemat
 
     columns = {name: values[:, None] for name, values in record.columns.items()}
     made = BytesIO()
-    savemat(made, {**columns, "notes": "\n".join(header_notes(record))}, do_compression=True, long_field_names=True)  # type: ignore[arg-type]
+    savemat(made, {**columns, "notes": "\n".join(record.notes)}, do_compression=True, long_field_names=True)  # type: ignore[arg-type]
     file.write(made.getvalue())
 
 
-def write_tdms(record: Record, file: IO[bytes]) -> None:
+def write_tdms(record: "Record", file: IO[bytes]) -> None:
     """A TDMS file: one group with a channel for each column."""
     nptdms = load_library("nptdms", "--to tdms", "TDMS")
-    about = {"instrument": record.instrument, "source": record.source, "notes": "\n".join(header_notes(record))}
+    about = {"instrument": record.instrument, "source": record.source, "notes": "\n".join(record.notes)}
     channels = [
         nptdms.ChannelObject(GROUP, name, values, {"unit_string": _unit(name)})
         for name, values in record.columns.items()
@@ -76,16 +82,16 @@ def write_tdms(record: Record, file: IO[bytes]) -> None:
         writer.write_segment([nptdms.RootObject(about), nptdms.GroupObject(GROUP), *channels])
 
 
-def write_hdf5(record: Record, file: IO[bytes]) -> None:
+def write_hdf5(record: "Record", file: IO[bytes]) -> None:
     """An HDF5 file: a dataset for each column."""
     h5py = load_library("h5py", "--to hdf5", "HDF5")
     with h5py.File(file, "w") as out:
-        out.attrs["notes"] = "\n".join(header_notes(record))
+        out.attrs["notes"] = "\n".join(record.notes)
         for name, values in record.columns.items():
             out.create_dataset(name, data=values, compression="gzip").attrs["unit"] = _unit(name)
 
 
-def write_mdf(record: Record, file: IO[bytes]) -> None:
+def write_mdf(record: "Record", file: IO[bytes]) -> None:
     """An MDF 4 file: one group, with the time as its master."""
     asammdf = load_library("asammdf", "--to mf4", "MDF")
     time = record["time_s"]
@@ -97,13 +103,13 @@ def write_mdf(record: Record, file: IO[bytes]) -> None:
             for name, values in record.columns.items()
             if name != "time_s"
         ]
-        out.append(signals, comment="; ".join(header_notes(record)))
+        out.append(signals, comment="; ".join(record.notes))
         made = BytesIO()
         out.save(made)
         file.write(made.getvalue())
 
 
-WRITERS: Mapping[str, Callable[[Record, IO[bytes]], None]] = {
+WRITERS: Mapping[str, Callable[["Record", IO[bytes]], None]] = {
     "mat": write_matlab,
     "tdms": write_tdms,
     "hdf5": write_hdf5,

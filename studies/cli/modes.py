@@ -12,7 +12,7 @@ a crystal, the lowest pairs of n = 2, 3, 5, 6, 7, 9 … have `crystal`: `antinod
 
 from collections.abc import Sequence
 from dataclasses import asdict
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 
@@ -28,7 +28,9 @@ from studies.reports.digits import to_numerical_error
 from studies.reports.mode_picture import THEORIES
 from studies.reports.scenes import live_chapter, show_mode
 from studies.results import Blocks, Column, Result, Sentence, Table, Where, row_of
-from studies.results.page import Block
+
+if TYPE_CHECKING:
+    from studies.results.page import Block
 
 FAR = 0.1  # relative difference of the first order from all orders from which on a split is doubted
 COLUMNS = (
@@ -115,7 +117,7 @@ def modes(
     )
 
 
-def _view(instrument: Instrument, harmonics: list[int], T: float, theory: str) -> Sequence[Block]:
+def _view(instrument: Instrument, harmonics: list[int], T: float, theory: str) -> "Sequence[Block]":
     """The lowest modes, to be turned."""
     from studies.reports.mode_picture import view_blocks
 

@@ -6,19 +6,17 @@ With --json one object, schema `hrg.show/1`: `records`, each with `path`, `rows`
 """
 
 from pathlib import Path
-
-import numpy as np
+from typing import TYPE_CHECKING
 
 from studies.cli.arguments import Records
 from studies.cli.output import answers, say
 from studies.errors import InputError
 from studies.instrument.display import display_name
-from studies.record import read_record
-from studies.reports import survey as parts
 from studies.reports.digits import plain
 from studies.results import Facts, Result, Sentence, row_of
-from studies.survey import Survey, survey_record
-from studies.uses import find_uses
+
+if TYPE_CHECKING:
+    from studies.survey import Survey
 
 MANY = 100_000  # rows, of which the reading is told
 
@@ -30,6 +28,11 @@ def show(*runs: Records) -> Result:
     Needs no card and fits no model of the gyro. The page has every column over time and over temperature, spectra and Allan
     deviations; its figures show values under the pointer and can be enlarged.
     """
+    from studies.record import read_record
+    from studies.reports import survey as parts
+    from studies.survey import survey_record
+    from studies.uses import find_uses
+
     if not runs:
         raise InputError("no record given: hrg show RUN.csv [RUN.csv ...].")
     records = [read_record(path) for path in runs]
@@ -59,18 +62,18 @@ def show(*runs: Records) -> Result:
     )  # fmt: skip
 
 
-def _facts(survey: Survey) -> list[tuple[str, str, str]]:
-    record, span = survey.record, float(np.ptp(survey.record["time_s"]))
+def _facts(survey: "Survey") -> list[tuple[str, str, str]]:
+    record, time = survey.record, survey.record["time_s"]
     even = "regular" if survey.even else "irregular or with gaps"
     about = " ".join(filter(None, (record.instrument, record.start.isoformat() if record.start else "")))
     return [
         (record.path, f"{len(record):,} rows", about),
-        ("Duration", f"{plain(span / 3600, 4)} h", ""),
+        ("Duration", f"{plain((time[-1] - time[0]) / 3600, 4)} h", ""),
         ("Usual step", f"{plain(survey.step, 4)} s", even),
     ]
 
 
-def _warnings(surveys: list[Survey]) -> list[Sentence]:
+def _warnings(surveys: "list[Survey]") -> list[Sentence]:
     """Say which readings look wrong, and how to leave them out."""
     found = [
         f"{survey.record.path}, {display_name(column.name)}: {words}: {count}"

@@ -1,14 +1,13 @@
 """Tables of numbers as Parquet files (the extra `formats`): columns by name, comment lines in the metadata of the schema."""
 
 import hashlib
-import importlib
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
-from studies.errors import InputError, MissingEnvironment
-from studies.files.reading import PORTION, opened
+from studies.errors import InputError
+from studies.files.reading import PORTION, load_library, opened
 
 if TYPE_CHECKING:
     import numpy as np
@@ -60,13 +59,13 @@ def read_table(path: str | Path) -> "tuple[dict[str, NDArray[np.float64]], str]"
 
 def write_table(file: IO[bytes], columns: "Table", comments: Sequence[str], path: str | Path) -> None:
     """Write columns of numbers and comment lines."""
-    arrow, parquet = _library("pyarrow", path), _library("pyarrow.parquet", path)
+    arrow, parquet = load_library("pyarrow", path, "Parquet"), load_library("pyarrow.parquet", path, "Parquet")
     table = arrow.table(dict(columns)).replace_schema_metadata({COMMENTS: json.dumps(list(comments)).encode()})
     parquet.write_table(table, file, compression="zstd")
 
 
 def _open(path: str | Path) -> Any:
-    library = _library("pyarrow.parquet", path)
+    library = load_library("pyarrow.parquet", path, "Parquet")
     try:
         return library.ParquetFile(str(path))
     except Exception as error:  # pyarrow has many kinds
@@ -76,10 +75,3 @@ def _open(path: str | Path) -> Any:
 def _damaged(path: str | Path, error: Exception) -> InputError:
     said = " ".join(str(error).split())[:60]
     return InputError(f"{path}: is not a Parquet file, or is damaged or cut off ({said}); write it again.")
-
-
-def _library(name: str, path: str | Path) -> Any:
-    try:
-        return importlib.import_module(name)
-    except ImportError:
-        raise MissingEnvironment(f"{path}: Parquet needs pyarrow: pip install 'hrg-workbench[formats]'.") from None

@@ -1,12 +1,14 @@
 """Files that a user names: read with one sentence where that fails, and found by bare name where they ship."""
 
+import importlib
+import logging
 import stat
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import IO
+from typing import IO, Any
 
-from studies.errors import InputError, nearest
+from studies.errors import InputError, MissingEnvironment, nearest
 
 MOST_BYTES = 2 * 1024**3
 """A record at 200 Hz over a month is smaller; a table of numbers takes about as much in memory."""
@@ -59,6 +61,18 @@ def check_file(path: str | Path, most: int = MOST_BYTES) -> Path:
         raise InputError(f"{path}: cannot be read ({error.strerror}).") from error
     except ValueError as error:
         raise InputError(f"{str(path)!r}: cannot be the name of a file ({error}).") from error
+
+
+def load_library(name: str, path: str | Path, kind: str) -> Any:
+    """Return a library of the extra `formats`, which is wanted for a file of some kind."""
+    own = name.partition(".")[0]
+    try:
+        library = importlib.import_module(name)
+    except ImportError:
+        raise MissingEnvironment(f"{path}: {kind} needs {own}: pip install 'hrg-workbench[formats]'.") from None
+    for logger in [one for one in logging.root.manager.loggerDict if one.partition(".")[0] == own]:
+        logging.getLogger(logger).setLevel(logging.CRITICAL)  # what is wrong is told once, in a sentence
+    return library
 
 
 def list_shipped(folder: Path) -> dict[str, Path]:

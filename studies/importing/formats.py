@@ -1,8 +1,6 @@
 """How each format gives its channels: TDMS (npTDMS), MDF (asammdf), HDF5 and MATLAB 7.3 (h5py), MATLAB to 7.2 (scipy), Parquet (pyarrow)."""
 
 import datetime
-import importlib
-import logging
 import subprocess
 import sys
 from collections.abc import Callable, Iterator, Mapping
@@ -15,8 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from studies.errors import InputError, MissingEnvironment
-from studies.files.reading import opened
+from studies.errors import InputError
+from studies.files.reading import load_library, opened
 
 Array = NDArray[np.float64]
 KINDS = {
@@ -70,17 +68,6 @@ class Channel:
     read: Callable[[int], Array] = field(default=lambda _: np.empty(0), repr=False)
     clock: Clock | None = None
     refused: str = ""
-
-
-def load_library(name: str, path: str | Path, kind: str) -> Any:
-    """Return a library of the extra `formats`."""
-    try:
-        library = importlib.import_module(name)
-    except ImportError:
-        raise MissingEnvironment(f"{path}: {kind} needs {name}: pip install 'hrg-workbench[formats]'.") from None
-    for logger in [own for own in logging.root.manager.loggerDict if own.partition(".")[0] == name.partition(".")[0]]:
-        logging.getLogger(logger).setLevel(logging.CRITICAL)  # what is wrong is told once, in a sentence
-    return library
 
 
 def read_tdms(path: str, files: ExitStack) -> Iterator[Channel]:

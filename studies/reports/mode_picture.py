@@ -2,12 +2,15 @@
 
 from collections.abc import Sequence
 from math import degrees
+from typing import TYPE_CHECKING
 
 from shell.constants import zero_Celsius
 from studies.instrument.card import Instrument
 from studies.reports.scenes import ModeScene, show_mode
 from studies.results import Sentence
-from studies.results.page import Block
+
+if TYPE_CHECKING:
+    from studies.results.page import Block
 
 THEORIES = {
     "solid": "three-dimensional elasticity",
@@ -16,12 +19,12 @@ THEORIES = {
 }
 
 
-def mode_blocks(instrument: "Instrument", harmonics: Sequence[int] = (2, 3)) -> list[Block]:
+def mode_blocks(instrument: "Instrument", harmonics: Sequence[int] = (2, 3)) -> "list[Block]":
     """Return the interactive view of the lowest mode of each harmonic, with the picture of the first one behind it."""
     return view_blocks([show_mode(instrument, n) for n in harmonics])
 
 
-def view_blocks(shown: "Sequence[ModeScene]", remark: str = "") -> list[Block]:
+def view_blocks(shown: "Sequence[ModeScene]", remark: str = "") -> "list[Block]":
     """Return the interactive view of modes of one instrument at one temperature."""
     from shell.render import NoOpenGL, render_png
     from studies.reports.webgl import Drawn, view_modes
