@@ -20,11 +20,12 @@ from shell.eigen import Factor
 from shell.elastic import Elastic
 from shell.errors import ShellError
 from shell.finite import solved_as_solid
+from shell.loads import along_r, radii
 from shell.modes import Mode
 from shell.prestress import mean_answer, neighbour, operators
-from shell.quadrature import Array, gauss
+from shell.quadrature import Array
 from shell.solution import Solution, radial, total
-from shell.system import Group, ShellGroup, System
+from shell.system import Group, System
 
 STEPS = 60  # of the iterations for rigid motions and for the other modes
 DONE = 1e-8
@@ -51,7 +52,7 @@ def spin_shift(mode: Mode, elastic: Elastic) -> SpinShift:
         raise ShellError("the second-order effect of spin is computed for the lowest mode of a harmonic from 2 up.")
     system, mass, eigenvalue = solution.system, total(solution.kinetic), solution.eigenvalue
     rest = neighbour(mode, 0)
-    pull = [_pull(group, elastic.rho * _radially(group, _radii(group, system))) for group in rest.groups]
+    pull = [_pull(group, elastic.rho * along_r(group, radii(group, system))) for group in rest.groups]
     stiffening = 4 * float(mean_answer(mode)[0].vector @ rest.gather(pull)) / mass
     around = [(radial(group, d), d[:, :, 1]) for group, d in zip(system.groups, solution.displacement, strict=True)]
     softening = sum(
@@ -60,7 +61,7 @@ def spin_shift(mode: Mode, elastic: Elastic) -> SpinShift:
     )
     forces = []
     for group, (r, t) in zip(system.groups, around, strict=True):
-        force = _radially(group, elastic.rho * t)
+        force = along_r(group, elastic.rho * t)
         force[:, :, 1] = elastic.rho * r
         forces.append(_pull(group, force))
     load = system.gather(forces)
@@ -91,23 +92,3 @@ def _pull(group: Group, force: Array) -> Array:
     """Loads of forces per volume on the functions of a group."""
     elements, stations, points = group.table.volume.shape
     return -group.table.loads(np.zeros((elements, stations, 6, points)), force)
-
-
-def _radii(group: Group, system: System) -> Array:
-    """Distance of the points from the axis, (elements, stations, points)."""
-    if not isinstance(group, ShellGroup):
-        return group.table.radius[:, None]
-    section = group.place.section
-    eta = gauss(max(system.level.through) + 2)[0]
-    return np.asarray(section.r[..., None] - section.tangent_z[..., None] * section.thickness[..., None] * eta / 2)
-
-
-def _radially(group: Group, amount: Array) -> Array:
-    """A vector field along r, in the axes of a group: (elements, stations, 3, points)."""
-    field = np.zeros((*amount.shape[:2], 3, amount.shape[2]))
-    if isinstance(group, ShellGroup):
-        section = group.place.section
-        field[:, :, 0], field[:, :, 2] = section.tangent_r[..., None] * amount, -section.tangent_z[..., None] * amount
-    else:
-        field[:, :, 0] = amount
-    return field

@@ -51,7 +51,7 @@ def run(
         [[parameter]]: name (a key of the card such as resonator.thickness_mm, or temperature_degC, or user.NAME for your own
         function) with tolerance, or low and high, or values; nominal, count, distribution = uniform, normal (with
         standard_deviation), triangular or log-uniform. [[quantity]]: name = bryan-factor, compensation-residual, frequency,
-        loop-drift, loss, mass, mode-separation, python, q, split, split-per-wave, tcf or thermal-time-constants, with harmonic, index, theory, temperature_degC, label and its own keys.
+        loads, loop-drift, loss, mass, mode-separation, python, q, split, split-per-wave, tcf or thermal-time-constants, with harmonic, index, theory, temperature_degC, label and its own keys.
         [[requirement]]: column with within (of target), or low, high. [[search]]: kind = worst-case with column,
         inversion with vary and targets, or tolerance with share (the tolerances with which that share of designs meets the requirements). Example: hrg study new spec.toml.
     out : str

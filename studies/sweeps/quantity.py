@@ -14,7 +14,8 @@ if TYPE_CHECKING:
 
 SUFFIXES = {
     "Hz": "_Hz", "ppm/°C": "_ppm_per_degC", "°C": "_degC", "s": "_s", "°": "_deg", "g": "_g", "mm": "_mm",
-    "°/h": "_deg_per_h", "°/√h": "_deg_per_rt_h", "Hz/µm": "_Hz_per_um", "1": "",
+    "°/h": "_deg_per_h", "°/√h": "_deg_per_rt_h", "Hz/µm": "_Hz_per_um", "ppb/g": "_ppb_per_g", "µrad/g": "_urad_per_g",
+    "MPa": "_MPa", "1": "",
 }  # fmt: skip
 
 

@@ -1,4 +1,4 @@
-"""Prestress by a base that expands, and Duffing's coefficient, by NGSolve: an independent oracle for shell.prestress, shell.duffing.
+"""Prestress by a base that expands, and Duffing's coefficient, by NGSolve: an independent oracle for shell.prestress, loads, duffing.
 
 Prestress: the axisymmetric equilibrium is solved by Newton's method with the base stretched by ±ε, Green's strain whole; the
 mode is one of the tangent stiffness there, and its frequency is differenced. Amplitude: the forces of a mode of finite
@@ -15,6 +15,7 @@ import numpy as np
 
 from shell.duffing import amplitude_shift
 from shell.elastic import Elastic
+from shell.loads import Loads
 from shell.meridian import cylinder, hemisphere
 from shell.modes import solve_modes
 from shell.prestress import Prestress
@@ -181,9 +182,12 @@ def grown(E, growth):
 
 
 def slope_by_difference(
-    mesh, elastic: Elastic, n: int, near: float, order: int, uneven: bool, strain: float = 1e-6
+    mesh, elastic: Elastic, n: int, near: float, order: int, uneven: bool, strain: float = 1e-6, axial: float = 0.0
 ) -> float:
-    """D ln f of equilibria at ± strain: by that of the base, or by the growth strain cos² of the polar angle of the body."""
+    """D ln f of equilibria at ± strain: by that of the base, or by the growth strain cos² of the polar angle of the body.
+
+    With `axial` (m/s²) instead by ± that acceleration of the base along z.
+    """
     waves = Waves(mesh, elastic, order)
     ng, found = waves.ng, []
     for s in (strain, -strain):
@@ -197,7 +201,9 @@ def slope_by_difference(
         if "clamp" not in waves.mesh.GetBoundaries():  # a spring so soft that it only holds a free body in its place
             residual += waves.over_section(1e-9 * (2 * pi * near) ** 2 * elastic.rho * (u[0] * v[0] + u[2] * v[2]))
         held = ng.GridFunction(space)
-        if not uneven:
+        if axial:
+            residual += waves.over_section(elastic.rho * axial * s / strain * v[2])
+        elif not uneven:
             held.components[0].Set(s * ng.x, definedon=waves.mesh.Boundaries("clamp"))
             held.components[2].Set(s * ng.y, definedon=waves.mesh.Boundaries("clamp"))
         for _ in range(5):
@@ -206,7 +212,7 @@ def slope_by_difference(
             residual.Apply(held.vec, r)
             held.vec.data -= residual.mat.Inverse(space.FreeDofs(), inverse="umfpack") * r
         found.append(lowest(waves, n, near, waves.gradient(held.components, 0), growth)[0])
-    return (found[0] - found[1]) / (found[0] + found[1]) / (2 * strain)
+    return (found[0] - found[1]) / (found[0] + found[1]) / (2 * (axial or strain))
 
 
 def amplitude_by_azimuths(mesh, elastic: Elastic, n: int, near: float, order: int) -> tuple[float, float]:
@@ -281,9 +287,12 @@ def main() -> None:
         resonator, outline, clamped, corners = CASES[name]
         (mode,) = solve_modes(resonator, SILICA, 2, tolerance=1e-6)
         ours, prestress = amplitude_shift(mode).total, Prestress(mode)
+        loaded = Loads(mode, SILICA).shift("axial") if clamped else 0.0
         angle = mode.along.position * pi / 2
         field = float(prestress.shares @ np.cos(angle) ** 2)
-        print(f"{name}: f {mode.frequency:.5f} Hz, per m² {ours:.6e}, base {prestress.by_base:.7f}, field {field:.7f}")
+        print(
+            f"{name}: f {mode.frequency:.5f} Hz, per m² {ours:.6e}, base {prestress.by_base:.7f}, field {field:.7f}, axial {loaded:.6e}"
+        )
         for order, size in ((4, 0.8e-3), (5, 0.8e-3)):
             start = time.process_time()
             mesh = refined(section(outline, clamped, size, corners), corners, 8)
@@ -291,9 +300,11 @@ def main() -> None:
             theirs, f = amplitude_by_azimuths(mesh, SILICA, 2, near, order)
             base = slope_by_difference(mesh, SILICA, 2, near, order, False) if clamped else 0.0
             field = slope_by_difference(mesh, SILICA, 2, near, order, True) if "cup" not in name else 0.0
+            loaded = slope_by_difference(mesh, SILICA, 2, near, order, False, axial=1e4) if clamped else 0.0
             spent = time.process_time() - start
             print(
-                f"   NGSolve order {order}: f {f:.5f} Hz, per m² {theirs:.6e}, base {base:.7f}, field {field:.7f}, {spent:.0f} s"
+                f"   NGSolve order {order}: f {f:.5f} Hz, per m² {theirs:.6e}, base {base:.7f}, field {field:.7f}, "
+                f"axial {loaded:.6e}, {spent:.0f} s"
             )
 
 

@@ -41,10 +41,13 @@ def section(outline: list[Piece], clamped: list[int], maxh: float, corners: list
     return OCCGeometry(face, dim=2).GenerateMesh(maxh=maxh, grading=0.3)
 
 
-def modes(mesh, elastic, n: int, count: int, order: int, near: float, refine: list[Spot] = (), levels: int = 0):
+def modes(
+    mesh, elastic, n: int, count: int, order: int, near: float, refine: list[Spot] = (), levels: int = 0, moved=None
+):
     """The `count` frequencies (Hz) above the rigid motions nearest to `near`, of polynomials of one order.
 
     `refine` : re-entrant corners towards which the mesh is refined geometrically `levels` times.
+    `moved` : displacement (r, z) that shapes the mesh, an expression of r and z of NGSolve.
     """
     import ngsolve as ng
     from scipy.sparse import csr_matrix
@@ -58,6 +61,10 @@ def modes(mesh, elastic, n: int, count: int, order: int, near: float, refine: li
             mesh.SetRefinementFlag(ng.ElementId(element), touches)
         mesh.Refine()
     mesh.Curve(order)
+    if moved is not None:
+        shape = ng.GridFunction(ng.VectorH1(mesh, order=order))
+        shape.Set(ng.CF(moved))
+        mesh.SetDeformation(shape)
     held = [
         ("clamp|axis", "clamp|axis", "clamp|axis"),
         ("clamp", "clamp", "clamp|axis"),

@@ -291,3 +291,22 @@ def test_a_saved_card_takes_its_maps_along(tmp_path):
     (tmp_path / "deeper").mkdir()
     save_card(instrument, tmp_path / "deeper" / "card.toml")
     assert is_imperfect(load_card(tmp_path / "deeper" / "card.toml"))
+
+
+def test_an_acceleration_across_even_electrodes_makes_no_bias():
+    """A wave of order 1 in the gap makes the wave 4 of the springs only beside one of order 3 or 5, and then in proportion to it."""
+    from studies.loads import bias_by_tilt, loads_of
+
+    card = load_card("hrg-30mm-loops")
+    T, electrodes = card.reference_temperature, {"gap_um": 50.0, "count": 16, "voltage_V": 100.0}
+    loads = loads_of(card, T)
+    assert bias_by_tilt(card, loads, T) is None
+
+    def found(percent):
+        waves = [{"order": 3, "amplitude_percent": percent, "azimuth_deg": 5.0}]
+        charged = card.with_table("electrodes", {**electrodes, "gap_wave": waves})
+        return bias_by_tilt(charged, loads, T)
+
+    none, one, two = (found(percent).deg_per_h_per_g for percent in (0.0, 0.5, 1.0))
+    assert none < 1e-6 * one
+    assert two == pytest.approx(2 * one, rel=1e-3)

@@ -1,0 +1,295 @@
+r"""Static loads on a held resonator: acceleration, spin, the pressure around it, warmth; what they displace, stress, and do to a mode.
+
+Loads and their answers are waves 0 and 1 around the axis, in the frame of the base, to first order:
+
+    K u = ∫ f · ψ dV - ∫ p tr e(ψ) dV + ∫ 3 K β tr e(ψ) dV,      σ = C (e(u) - β),
+
+f = -ρ a by an acceleration a of the base, ρ Ω² r by spin, p the pressure of what surrounds the body, β = ∫ α dT. A wave 0 changes the
+mode (shell.prestress); pressure turns with the surface besides, which adds ∫ p [(tr H)² - tr H²] dV, H = ∇u of the mode. A wave
+1 couples a pair only with the harmonics n ± 1, so that an acceleration across the axis has no effect of the first order on f.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from math import cos, pi, sin
+from typing import Literal
+
+import numpy as np
+
+from shell.cells import CellTable, Reference, tabulate_cells
+from shell.elastic import Elastic
+from shell.errors import ShellError
+from shell.finite import displacement_gradients, solved_as_solid, tensor
+from shell.inertia import MassProperties, weigh
+from shell.kernel import StrainTable, shell_table
+from shell.modes import Mode
+from shell.prestress import expansion_shares, mean_answer, neighbour, settle
+from shell.quadrature import Array, Basis, gauss
+from shell.solution import COSINE, SINE, Solution, total
+from shell.system import Group, ShellGroup, System
+
+Kind = Literal["axial", "lateral", "spin", "pressure", "cooling"]
+WAVES: dict[Kind, int] = {"axial": 0, "lateral": 1, "spin": 0, "pressure": 0, "cooling": 0}
+AZIMUTHS = np.linspace(0.0, pi, 13)
+ACROSS = np.linspace(-1.0, 1.0, 9) * (1 - 1e-9)  # of a cell; its edges, but not the axis, where φ/r is 0/0
+
+
+@dataclass(frozen=True)
+class Peak:
+    """Largest stress: `tension` the largest principal one, `mises` after von Mises, Pa; each in its part (wall, root or stem)."""
+
+    tension: float
+    mises: float
+    part: str
+    tension_part: str
+
+    @property
+    def worst(self) -> float:
+        """What a strength is to be compared with, the larger of both, Pa."""
+        return max(self.tension, self.mises)
+
+
+@dataclass(frozen=True)
+class Sag:
+    """How the rim (the end of the meridian that is not held) moves under a load, m, and how it tilts, rad."""
+
+    axial: float
+    lateral: float
+    tilt: float
+
+
+@dataclass(frozen=True, eq=False)
+class Loads:
+    """Answers of one resonator to unit loads, and what they do to one of its modes.
+
+    Units: 1 m/s² of the base along +z (`axial`) and towards the azimuth 0 (`lateral`), 1 rad²/s² (`spin`), 1 Pa (`pressure`), and
+    shrinking by 1 at the free end, evenly less along the meridian, 0 at the base (`cooling`).
+    """
+
+    mode: Mode
+    elastic: Elastic
+
+    def __post_init__(self) -> None:
+        solved_as_solid(self.mode)
+        if self.mode.resonator is None or self.mode.resonator.support == "free":
+            raise ShellError("a free resonator is held against no load: give it a support.")
+
+    @cached_property
+    def answers(self) -> dict[Kind, Solution]:
+        """Static answer to each unit load."""
+        return {kind: settle(system, self.mode, self.force(kind, system)) for kind, system in self._systems.items()}
+
+    def shift(self, kind: Kind) -> float:
+        """δ ln f of the mode by a unit load, in the frame of the base; of spin the stress alone (shell.spin has all of it)."""
+        solution = solved_as_solid(self.mode)
+        if WAVES[kind] or self.mode.harmonic < 1:
+            return 0.0
+        if kind == "cooling":
+            return -float(expansion_shares(self.mode) @ self.away(self.mode.along.position))
+        work = 4 * float(self._answer.vector @ self.force(kind, self._systems[kind]))
+        if kind == "pressure":
+            for group, q in zip(solution.system.groups, solution.unknowns, strict=True):
+                H = displacement_gradients(solution.system, group, q)
+                turned = np.einsum("esiip->esp", H) ** 2 - np.einsum("esijp,esjip->esp", H, H)
+                work += float(np.sum(turned * group.table.volume))
+        return work / (2 * solution.eigenvalue * total(solution.kinetic))
+
+    def force(self, kind: Kind, system: System) -> Array:
+        """Load vector of a unit load."""
+        rho, bulk = self.elastic.rho, self.elastic.E / (3 * (1 - 2 * self.elastic.nu))
+        found = []
+        for group in system.groups:
+            shape = group.table.volume.shape
+            stress, force = np.zeros((*shape[:2], 6, shape[2])), np.zeros((*shape[:2], 3, shape[2]))
+            if kind == "pressure":
+                stress[:, :, :3] = 1.0
+            elif kind == "cooling":
+                stress[:, :, :3] = 3 * bulk * self.away(group.table.position)[..., None, None]
+            elif kind == "spin":
+                force = along_r(group, rho * radii(group, system))
+            elif kind == "axial":
+                force = _along_z(group, np.full(shape, -rho))
+            else:
+                force = along_r(group, np.full(shape, -rho))
+                force[:, :, 1] = rho
+            found.append(-group.table.loads(stress, force))
+        return system.gather(found)
+
+    def peak(self, amounts: dict[Kind, float]) -> Peak:
+        """Largest stresses of the parts that are `counted` under so many units of each load at once."""
+        stresses = [self._stress(kind, amount) for kind, amount in amounts.items() if amount]
+        tension, mises = (0.0, "wall"), (0.0, "wall")
+        for k, part in enumerate(self._parts):
+            if not set(part) & set(self.counted):
+                continue
+            for theta in AZIMUTHS if amounts.get("lateral") else (0.0,):
+                here: Array = np.zeros(1)
+                for wave, of in stresses:
+                    turned = of[k].copy()
+                    turned[:, :, COSINE] *= cos(wave * theta)
+                    turned[:, :, SINE] *= sin(wave * theta) if wave else 1.0
+                    here = here + turned
+                if here.ndim == 1:
+                    continue
+                square = tensor(here).transpose(0, 1, 4, 2, 3)
+                one, two, three = np.linalg.eigvalsh(square).T
+                bent = np.sqrt(((one - two) ** 2 + (two - three) ** 2 + (three - one) ** 2) / 2).T
+                for name in sorted(set(part) & set(self.counted)):
+                    chosen = np.array([p == name for p in part])
+                    tension = max(tension, (float(three.T[chosen].max()), name))
+                    mises = max(mises, (float(bent[chosen].max()), name))
+        return Peak(tension[0], mises[0], mises[1], tension[1])
+
+    def sag(self, amounts: dict[Kind, float]) -> Sag:
+        """Displacement of the rim's middle surface under loads, and its tilt, the slope of its axial displacement."""
+        axial = lateral = tilt = 0.0
+        for kind, amount in amounts.items():
+            solution = self.answers[kind]
+            d, edge = self._rim(solution)
+            u, w = d[0] * amount, d[2] * amount
+            along_axis, outwards = edge.tangent_z * u + edge.tangent_r * w, edge.tangent_r * u - edge.tangent_z * w
+            if WAVES[kind]:
+                lateral, tilt = lateral + outwards, tilt + along_axis / edge.r
+            else:
+                axial += along_axis
+        return Sag(float(axial), float(lateral), float(tilt))
+
+    def gap(self, kind: Kind, first: float, last: float) -> float:
+        """Mean displacement of the wall along its normal between two positions, m per unit, at azimuth 0."""
+        solution, sums = self.answers[kind], np.zeros(2)
+        for group, d in zip(solution.system.groups, solution.displacement, strict=True):
+            if isinstance(group, ShellGroup):
+                inside = (group.table.position >= first) & (group.table.position <= last)
+                weight = group.table.volume * inside[..., None]
+                sums += np.sum(weight * d[:, :, 2]), np.sum(weight)
+        if not sums[1]:
+            raise ShellError(f"no part of the wall lies between the positions {first:g} and {last:g}.")
+        return float(sums[0] / sums[1])
+
+    def away(self, position: Array) -> Array:
+        """0 at the base and in the solid part that it holds, 1 at the free end, even along the meridian between."""
+        assert self.mode.resonator is not None
+        solids = [g.table.position[0, 0] for g in self._systems["axial"].groups if not isinstance(g, ShellGroup)]
+        far, ends = position, solids
+        if self.mode.resonator.support == "clamped-rim":
+            far, ends = 1 - position, [1 - one for one in solids]
+        base = min(ends, default=0.0)
+        return np.asarray(np.maximum(far - base, 0.0) / (1 - base))
+
+    @property
+    def counted(self) -> tuple[str, ...]:
+        """Parts whose stresses count: at sharp corners and rigid clamps a linear elastic stress is not finite."""
+        stem = self.mode.resonator.stem if self.mode.resonator else None
+        return ("wall", "root") if stem and stem.fillet else ("wall",)
+
+    @cached_property
+    def mass(self) -> MassProperties:
+        """Of the whole body."""
+        assert self.mode.resonator is not None
+        return weigh(self.mode.resonator, self.elastic.rho)
+
+    def beam(self, axial: float, lateral: float) -> float:
+        """Stress at the clamped end of a single stem as of a beam, N/A + M r/I with the weight of all; 0 without such a stem."""
+        stem = self.mode.resonator.stem if self.mode.resonator else None
+        if stem is None or len(stem.roots) != 1:
+            return 0.0
+        a, arm = stem.radius, abs(self.mass.center - stem.roots[0][1])
+        return self.mass.mass * (abs(axial) / (pi * a**2) + abs(lateral) * arm * 4 / (pi * a**3))
+
+    @cached_property
+    def _systems(self) -> dict[Kind, System]:
+        waves = {wave: neighbour(self.mode, wave) for wave in (0, 1)}
+        return {kind: waves[wave] for kind, wave in WAVES.items()}
+
+    @cached_property
+    def _answer(self) -> Solution:
+        return mean_answer(self.mode)[0]
+
+    @cached_property
+    def _tables(self) -> dict[int, list[StrainTable | CellTable]]:
+        """Strains where stresses are largest: at the faces of the wall, over whole cells."""
+        found: dict[int, list[StrainTable | CellTable]] = {}
+        for kind, wave in WAVES.items():
+            found.setdefault(wave, [_edges(group, self._systems[kind]) for group in self._systems[kind].groups])
+        return found
+
+    @cached_property
+    def _parts(self) -> list[list[str]]:
+        groups = self._systems["axial"].groups
+        return [
+            ["wall"] * len(g.unknowns) if isinstance(g, ShellGroup) else list(map(str, g.place.mesh.parts))
+            for g in groups
+        ]
+
+    def _stress(self, kind: Kind, amount: float) -> tuple[int, list[Array]]:
+        solution, found = self.answers[kind], []
+        for table, c, q in zip(self._tables[WAVES[kind]], solution.constants, solution.unknowns, strict=True):
+            stress = c.stress(table, table.strains(q))
+            if kind == "cooling":
+                lam, G = c.lame
+                stress[:, :, :3] += ((3 * lam + 2 * G) * self.away(table.position))[..., None, None]
+            found.append(amount * stress)
+        return WAVES[kind], found
+
+    def _rim(self, solution: Solution) -> tuple[Array, "_Edge"]:
+        """The free end of the wall: displacement (3,) of its middle surface nearest to the end, along its axes."""
+        assert self.mode.resonator is not None
+        at_start = self.mode.resonator.support == "clamped-rim"
+        best: tuple[float, Array, _Edge] | None = None
+        for group, d in zip(solution.system.groups, solution.displacement, strict=True):
+            if not isinstance(group, ShellGroup):
+                continue
+            position = group.table.position if at_start else 1 - group.table.position
+            e, s = np.unravel_index(int(np.argmin(position)), position.shape)
+            if best is None or position[e, s] < best[0]:
+                section, weight = group.place.section, group.table.volume[e, s]
+                edge = _Edge(*(float(x[e, s]) for x in (section.r, section.tangent_r, section.tangent_z)))
+                best = float(position[e, s]), d[e, s] @ weight / weight.sum(), edge
+        assert best is not None
+        return best[1:]
+
+
+@dataclass(frozen=True)
+class _Edge:
+    r: float
+    tangent_r: float
+    tangent_z: float
+
+
+def radii(group: Group, system: System) -> Array:
+    """Distance of the points from the axis, (elements, stations, points)."""
+    if not isinstance(group, ShellGroup):
+        return group.table.radius[:, None]
+    section = group.place.section
+    eta = gauss(max(system.level.through) + 2)[0]
+    return np.asarray(section.r[..., None] - section.tangent_z[..., None] * section.thickness[..., None] * eta / 2)
+
+
+def along_r(group: Group, amount: Array) -> Array:
+    """A vector field along r, in the axes of a group: (elements, stations, 3, points)."""
+    field = np.zeros((*amount.shape[:2], 3, amount.shape[2]))
+    if isinstance(group, ShellGroup):
+        section = group.place.section
+        field[:, :, 0], field[:, :, 2] = section.tangent_r[..., None] * amount, -section.tangent_z[..., None] * amount
+    else:
+        field[:, :, 0] = amount
+    return field
+
+
+def _along_z(group: Group, amount: Array) -> Array:
+    field = np.zeros((*amount.shape[:2], 3, amount.shape[2]))
+    if isinstance(group, ShellGroup):
+        section = group.place.section
+        field[:, :, 0], field[:, :, 2] = section.tangent_z[..., None] * amount, section.tangent_r[..., None] * amount
+    else:
+        field[:, :, 2] = amount
+    return field
+
+
+def _edges(group: Group, system: System) -> StrainTable | CellTable:
+    if isinstance(group, ShellGroup):
+        faces = np.array([-1.0, 1.0]), np.ones(2)
+        return shell_table(group.place.section, system.n, system.level.through, faces, Basis(*group.table.along))
+    mesh, degree = group.place.mesh, group.place.mesh.grid.shape[2] - 1
+    place = Reference.at(ACROSS, ACROSS, np.ones((len(ACROSS),) * 2), degree, degree)
+    return tabulate_cells(mesh.grid, place, system.n, float(group.table.position[0, 0]))

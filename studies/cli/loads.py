@@ -1,0 +1,233 @@
+"""`hrg loads`: what acceleration, rotation, pressure and an uneven temperature do to a held resonator.
+
+With --json one object, schema `hrg.loads/1`: `card`, `temperature_degC`, `harmonic`, `frequency_Hz`; `loads`, a row of each load that was asked, and
+of all together (`load`, `amount`, `unit`, `shift_ppm`, `tension_MPa`, `mises_MPa`, `part`, `rim_axial_um`, `rim_lateral_um`, `rim_tilt_urad`);
+`stem_MPa` (null without a single stem) and `safety` (null without --strength); `per_g` with `axial_ppb`, `rim_axial_nm`, `rim_lateral_nm`,
+`tilt_urad`; `bias` (null without [loop] and charged [electrodes]) with `deg_per_h_per_g`, `azimuth_deg`, `gap_nm_per_g`;
+`amplitude`, over `temperature_degC`: `shift_Hz_per_um2` and its relative `change_ppm_per_degC` (Duffing's coefficient).
+"""
+
+from math import radians
+from typing import Annotated, Any
+
+import numpy as np
+
+from shell.constants import zero_Celsius
+from shell.duffing import amplitude_shift
+from shell.loads import Kind, Loads
+from shell.modes import solve_modes
+from shell.spin import spin_shift
+from studies.cli.arguments import (
+    POSITIVE,
+    Card,
+    FromDegC,
+    Harmonic,
+    Step,
+    Temperature,
+    ToDegC,
+    lay_temperatures,
+    open_card,
+)
+from studies.cli.output import answers
+from studies.errors import InputError, naming
+from studies.instrument.card import Instrument
+from studies.loads import STANDARD_GRAVITY, bias_by_tilt, shift_per_kelvin
+from studies.results import Column, Facts, Result, Table, row_of
+
+ABROAD = (
+    "Shift of the mean frequency of the pair, in the frame of the resonator. An acceleration across the axis shifts it only in second order."
+    " Stresses: the largest tension and that after von Mises, in the wall{root}; at sharp corners and at the clamp a linear elastic"
+    " stress is not finite, so they are not counted: see the stem below."
+)
+COLUMNS = (
+    Column("load", "load"),
+    Column("amount", "amount", form=".6g"),
+    Column("unit", "unit"),
+    Column("shift_ppm", "shift of f", "ppm", "+.4g"),
+    Column("tension_MPa", "largest tension", "MPa", digits=3),
+    Column("mises_MPa", "von Mises", "MPa", digits=3),
+    Column("part", "where"),
+    Column("rim_axial_um", "rim along the axis", "µm", "+.3g"),
+    Column("rim_lateral_um", "rim across", "µm", "+.3g"),
+    Column("rim_tilt_urad", "tilt of the rim", "µrad", "+.3g"),
+)
+
+
+@answers("hrg.loads/1")
+def loads(
+    card: Card,
+    *,
+    along: float = 1.0,
+    across: float = 1.0,
+    rotation: float = 0.0,
+    pressure: float = 0.0,
+    gradient: float = 0.0,
+    strength: Annotated[float | None, POSITIVE] = None,
+    harmonic: Harmonic = 2,
+    temperature: Temperature = None,
+    from_degC: FromDegC = -20.0,
+    to_degC: ToDegC = 40.0,
+    step: Step = 30.0,
+) -> Result:
+    """Show frequency shift, stress and displacement of a held resonator under loads, its sensitivity to 1 g, and Duffing's coefficient.
+
+    Parameters
+    ----------
+    along : float
+        Acceleration of the base along the axis, from the rim of a dome to its pole, in g; 1 g is a gyro that stands upright.
+    across : float
+        Acceleration of the base across the axis in g.
+    rotation : float
+        Rate of rotation about the axis in °/s.
+    pressure : float
+        Pressure of the gas around the resonator in kPa.
+    gradient : float
+        Temperature of the base less that of the free end in °C, falling evenly along the meridian.
+    strength : float
+        Strength in MPa that the largest stress is compared with.
+    """
+    instrument, T = open_card(card, temperature)
+    if harmonic < 2:
+        raise InputError(f"--harmonic {harmonic}: the effects of loads are computed for n = 2 and above.")
+    resonator, elastic = instrument.at(T)
+    with naming(instrument.path):
+        (mode,) = solve_modes(resonator, elastic, harmonic)
+        found = Loads(mode, elastic)
+        amounts: dict[str, tuple[Kind, float, str, float, float]] = {
+            # load: kind, amount, unit, units of the solver in it, δ ln f
+            "acceleration along the axis": ("axial", along, "g", STANDARD_GRAVITY * along, found.shift("axial")),
+            "acceleration across the axis": ("lateral", across, "g", STANDARD_GRAVITY * across, 0.0),
+            "rotation": (
+                "spin",
+                rotation,
+                "°/s",
+                radians(rotation) ** 2,
+                spin_shift(mode, elastic).total if rotation else 0.0,
+            ),
+            "pressure": ("pressure", pressure, "kPa", 1e3 * pressure, found.shift("pressure") if pressure else 0.0),
+            "temperature of the base": ("cooling", gradient, "°C", *_warmth(instrument, found, T, gradient)),
+        }
+        given = {name: one for name, one in amounts.items() if one[1]}
+        if not given:
+            raise InputError("no load is given; --along 1 is an acceleration of 1 g along the axis.")
+        rows = [
+            {"load": name, "amount": amount, "unit": unit} | _under(found, {kind: units}, units * shift)
+            for name, (kind, amount, unit, units, shift) in given.items()
+        ]
+        every: dict[Kind, float] = {kind: units for kind, _, _, units, _ in given.values()}
+        whole = _under(found, every, sum(units * shift for *_, units, shift in given.values()))
+        if len(rows) > 1:
+            rows.append({"load": "all together", "amount": None, "unit": ""} | whole)
+        stem = found.beam(STANDARD_GRAVITY * along, STANDARD_GRAVITY * across)
+        tilted, nonlinear = (
+            bias_by_tilt(instrument, found, T),
+            _amplitudes(instrument, harmonic, lay_temperatures(from_degC, to_degC, step)),
+        )
+    bias = row_of(tilted, "deg_per_h_per_g", "azimuth_deg", gap_nm_per_g=("gap", 1e9)) if tilted else None
+    worst = max(whole["tension_MPa"], whole["mises_MPa"], 1e-6 * stem)
+    safety = None if strength is None else strength / worst
+    g = STANDARD_GRAVITY
+    (upright, aside) = found.sag({"axial": g}), found.sag({"lateral": g})
+    per_g = {
+        "axial_ppb": 1e9 * g * found.shift("axial"),
+        "rim_axial_nm": 1e9 * upright.axial,
+        "rim_lateral_nm": 1e9 * aside.lateral,
+        "tilt_urad": 1e6 * aside.tilt,
+    }
+    payload = {
+        "schema": "hrg.loads/1",
+        "card": instrument.name,
+        "temperature_degC": T - zero_Celsius,
+        "harmonic": harmonic,
+        "frequency_Hz": mode.frequency,
+        "loads": rows,
+        "stem_MPa": 1e-6 * stem or None,
+        "safety": safety,
+        "per_g": per_g,
+        "bias": bias,
+        "amplitude": nonlinear,
+    }
+    beam = (
+        f"The stem as a beam has {1e-6 * stem:.3g} MPa at its clamped end, by its axial force and its bending moment under these"
+        " accelerations."
+    )
+    return Result(
+        payload,
+        f"Loads on {instrument.name}",
+        f"Mode n = {harmonic} at {mode.frequency:.2f} Hz and {T - zero_Celsius:g} °C, to first order in each load.",
+        [
+            Facts(_facts(worst, strength, safety, per_g)),
+            Table("Loads", rows, COLUMNS, ABROAD.format(root=" and at the root" if "root" in found.counted else "")),
+            beam if stem else None,
+            _bias_words(instrument, bias),
+            Table("Coefficient of the amplitude (Duffing)", nonlinear, AMPLITUDE, NONLINEAR),
+        ],
+    )  # fmt: skip
+
+
+AMPLITUDE = (
+    Column("temperature_degC", "T", "°C", ".1f"),
+    Column("shift_Hz_per_um2", "shift per square of the largest displacement", "Hz/µm²", "+.5g"),
+    Column("change_ppm_per_degC", "relative change from the first row", "ppm/°C", "+.3g"),
+)
+NONLINEAR = "Geometry alone, of a standing wave; hrg modes --amplitude shows its parts."
+
+
+def _warmth(instrument: Instrument, found: Loads, T: float, gradient: float) -> tuple[float, float]:
+    """Units of `cooling` in a difference of temperature, and δ ln f per unit."""
+    if not gradient:
+        return 0.0, 0.0
+    alpha = float(instrument.material.value("expansion", T))
+    return alpha * gradient, shift_per_kelvin(instrument, found, T) / alpha
+
+
+def _under(found: Loads, amounts: dict[Kind, float], shift: float) -> dict[str, Any]:
+    peak, sag = found.peak(amounts), found.sag(amounts)
+    return {
+        "shift_ppm": 1e6 * shift,
+        "tension_MPa": 1e-6 * peak.tension,
+        "mises_MPa": 1e-6 * peak.mises,
+        "part": peak.part,
+        **row_of(sag, rim_axial_um=("axial", 1e6), rim_lateral_um=("lateral", 1e6), rim_tilt_urad=("tilt", 1e6)),
+    }
+
+
+def _amplitudes(instrument: Instrument, harmonic: int, temperatures: "np.ndarray[Any, Any]") -> list[dict[str, float]]:
+    """Duffing's coefficient over temperature."""
+    rows: list[dict[str, float]] = []
+    for T in instrument.material.check(temperatures):
+        (mode,) = solve_modes(*instrument.at(float(T)), harmonic)
+        value = amplitude_shift(mode).total * mode.frequency * 1e-12
+        change = 0.0
+        if rows:
+            first = rows[0]
+            change = 1e6 * (value / first["shift_Hz_per_um2"] - 1) / (T - zero_Celsius - first["temperature_degC"])
+        rows.append(
+            {"temperature_degC": float(T - zero_Celsius), "shift_Hz_per_um2": value, "change_ppm_per_degC": change}
+        )
+    return rows
+
+
+def _facts(
+    worst: float, strength: float | None, safety: float | None, per_g: dict[str, float]
+) -> list[tuple[str, str, str]]:
+    margin = "no --strength given" if safety is None else f"safety {safety:.3g} of a strength of {strength:g} MPa"
+    return [
+        ("Largest stress", f"{worst:.3g} MPa", margin),
+        ("Frequency per g along the axis", f"{per_g['axial_ppb']:+.3g} ppb", ""),
+        (
+            "Tilt of the rim per g across",
+            f"{abs(per_g['tilt_urad']):.3g} µrad",
+            f"shift {abs(per_g['rim_lateral_nm']):.3g} nm",
+        ),
+    ]
+
+
+def _bias_words(instrument: Instrument, bias: dict[str, float] | None) -> str:
+    if bias is None:
+        missing = "[loop] and charged [electrodes]" if instrument.loop is None else "charged [electrodes]"
+        return f"The bias per g needs {missing} in the card."
+    return (
+        f"Bias by an acceleration across the axis: {bias['deg_per_h_per_g']:.3g} °/h per g, largest towards {bias['azimuth_deg']:.0f}°. The wall shifts"
+        f" by {abs(bias['gap_nm_per_g']):.3g} nm per g within the electrodes; with unequal voltages or waves of the gap this splits the pair."
+    )
