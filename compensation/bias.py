@@ -130,13 +130,12 @@ def prepare_run(
 ) -> BiasRun:
     """Decimate one run and add the rate of its frequency or temperature.
 
-    Parameters
-    ----------
-    width : length of the blocks that are averaged, s; never less than the sampling interval.
-    window : length of the window over which the rate is taken, s.
-    causal : the rate uses past samples only, as firmware must, and lags by window/2.
-    variable : FREQUENCY or TEMPERATURE.
-    memory : lag and play behind which the temperature acts.
+    Args:
+        width: length of the blocks that are averaged, s; never less than the sampling interval.
+        window: length of the window over which the rate is taken, s.
+        causal: the rate uses past samples only, as firmware must, and lags by window/2.
+        variable: FREQUENCY or TEMPERATURE.
+        memory: lag and play behind which the temperature acts.
     """
     blocks = average_run(time, state, bias, width, variable)
     lagged = follow_lag(blocks.time, blocks.columns[variable.name], memory.lag)

@@ -23,18 +23,11 @@ FASTEST = 2.5  # rows to a period: what is faster may be folded, and the law of 
 
 @dataclass(frozen=True)
 class Line:
-    """A line.
+    """A line."""
 
-    Attributes
-    ----------
-    period : in s.
-    evidence : minus the log of the probability that noise has one as strong among all that were looked at.
-    rms : its size in the series where it is the largest.
-    """
-
-    period: float
-    evidence: float
-    rms: float
+    period: float  # in s
+    evidence: float  # minus the log of the probability that noise has one as strong among all that were looked at
+    rms: float  # its size in the series where it is the largest
 
 
 def find_line(

@@ -123,16 +123,11 @@ def estimate_theta(X: Array, y: Array, runs: Runs, caution: float = 0.0) -> floa
 def fit_coloured(X: Array, y: Array, names: Sequence[str], runs: Runs, theta: float | None = None) -> ColouredFit:
     """Fit y = X b by generalised least squares under white noise plus a random walk.
 
-    Parameters
-    ----------
-    X : array, shape (m, k)
-        One column per coefficient, the constants among them.
-    y : array, shape (m,)
-    names : sequence of k names
-    runs : sequence of slices
-        The rows of each run; within one the rows are equally spaced in time.
-    theta : float, optional
-        The noise, if it is known; else it is estimated with these columns.
+    Args:
+        X: array, shape (m, k): One column per coefficient, the constants among them.
+        y: array, shape (m,)
+        runs: The rows of each run; within one the rows are equally spaced in time.
+        theta: The noise, if it is known; else it is estimated with these columns.
     """
     theta = estimate_theta(X, y, runs) if theta is None else theta
     fit = fit_linear(whiten(X, theta, runs), whiten(y, theta, runs), names, constant=False)
@@ -166,12 +161,10 @@ def correlated_covariance(fit: LinearFit, time: Array | None = None) -> Array:
     93 % with a plain random walk added, and in 70 to 90 % with one so weak that 600 rows do not show it: repeat a
     calibration to know how much a bias wanders from run to run.
 
-    Parameters
-    ----------
-    fit : LinearFit
-        Its rows in order of time.
-    time : array (N,), optional
-        Times of the rows, to find gaps and where a next run starts; without it the rows are evenly spaced.
+    Args:
+        fit: Its rows in order of time.
+        time: array (N,): Times of the rows, to find gaps and where a next run starts; without it the rows are evenly
+            spaced.
     """
     y = fit.fitted + fit.residuals
     if np.linalg.norm(fit.residuals) <= ROUNDING * np.linalg.norm(y):

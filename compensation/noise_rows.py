@@ -41,13 +41,7 @@ class NoiseRows:
 
     @classmethod
     def of(cls, times: Sequence[Array], spans: Sequence[Array] | None = None) -> "NoiseRows":
-        """Make rows from times (s) and what each is the mean over (s): a usual step of its run unless given.
-
-        Raises
-        ------
-        CompensationError
-            No rows, or times that do not increase.
-        """
+        """Make rows from times (s) and what each is the mean over (s): a usual step of its run unless given."""
         if not times or any(len(t) == 0 for t in times):
             raise CompensationError("correlated noise needs rows in every run.")
         if any((np.diff(t) <= 0).any() for t in times):
@@ -204,24 +198,17 @@ def estimate_noise(
 ) -> Noise:
     """Estimate the levels of the noise by its marginal likelihood.
 
-    Parameters
-    ----------
-    rows : NoiseRows
-    target : array (M,), residuals of all runs
-    columns : array (M, p), optional
-        What else is unknown, with coefficients of prior mean 0.
-    precision : array (p,), optional
-        Of that prior; 0, no prior, unless given.
-    kinds : of "white" (always), "flicker", "walk", "offset"
-        What the noise may consist of; one run has no offset, since none is known from another.
-    near : Noise, optional
-        Levels from which the search begins: those of residuals that were much the same.
-    stated : Noise, optional
-        What is said of the slow levels beforehand, to a factor of 3; of a level of 0 nothing is.
+    Args:
+        target: array (M,), residuals of all runs
+        columns: array (M, p): What else is unknown, with coefficients of prior mean 0.
+        precision: array (p,): Of that prior; 0, no prior, unless given.
+        kinds: of "white" (always), "flicker", "walk", "offset": What the noise may consist of; one run has no offset,
+            since none is known from another.
+        near: Levels from which the search begins: those of residuals that were much the same.
+        stated: What is said of the slow levels beforehand, to a factor of 3; of a level of 0 nothing is.
 
-    Returns
-    -------
-    Noise
+    Returns:
+        Noise
     """
     X = np.zeros((rows.count, 0)) if columns is None else columns
     size = np.linalg.norm(X, axis=0)

@@ -21,24 +21,17 @@ PHYSICAL = ("omega", "tau", "damping_split", "damping_axis", "frequency_split", 
 
 @dataclass(frozen=True)
 class StandingWave:
-    """The n-th harmonic of a shell as a gyro; every value a number, or one per row of a run.
+    """The n-th harmonic of a shell as a gyro; every value a number, or one per row of a run."""
 
-    Attributes
-    ----------
-    omega : rad/s, mean angular frequency of the two patterns.
-    tau : s, decay time of the amplitude, 2 Q/ω.
-    damping_split : 1/s, Δ(1/τ) = 1/τ₁ − 1/τ₂, of the axis `damping_axis` (rad) that is damped most.
-    frequency_split : rad/s, Δω = ω₁ − ω₂, of the axis `frequency_axis` (rad) of the higher frequency.
-    harmonic, bryan_factor
-        n and k: a rate Ω turns the wave with k Ω against the shell.
-    """
-
-    omega: float | Array
-    tau: float | Array
+    omega: float | Array  # rad/s, mean angular frequency of the two patterns
+    tau: float | Array  # s, decay time of the amplitude, 2 Q/ω
+    # 1/s, Δ(1/τ) = 1/τ₁ − 1/τ₂, of the axis `damping_axis` (rad) that is damped most.
     damping_split: float | Array = 0.0
     damping_axis: float | Array = 0.0
+    # rad/s, Δω = ω₁ − ω₂, of the axis `frequency_axis` (rad) of the higher frequency.
     frequency_split: float | Array = 0.0
     frequency_axis: float | Array = 0.0
+    # harmonic, bryan_factor: n and k: a rate Ω turns the wave with k Ω against the shell.
     harmonic: int = 2
     bryan_factor: float = 0.277
 

@@ -35,22 +35,13 @@ class Solid:
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """Cells of a solid part with numbered corners and edges.
+    """Cells of a solid part with numbered corners and edges."""
 
-    Attributes
-    ----------
-    grid : r and z at the (p + 1)² Lobatto points, (2, cells, ξ, η).
-    vertices : (cells, 4) numbers, order (ξ, η) = (-1, -1), (1, -1), (-1, 1), (1, 1).
-    edges : (cells, 4) numbers, the sides η = -1, η = 1 (along ξ), ξ = -1, ξ = 1 (along η).
-    reversed_ : (cells, 4), whether the cell runs along the edge against its own direction.
-    points : vertex coordinates; `pairs` : the two vertices of each edge, in its direction, (edges, 2).
-    """
-
-    grid: Array
-    vertices: Index
-    edges: Index
-    reversed_: NDArray[np.bool_]
-    points: Array
+    grid: Array  # r and z at the (p + 1)² Lobatto points, (2, cells, ξ, η)
+    vertices: Index  # (cells, 4) numbers, order (ξ, η) = (-1, -1), (1, -1), (-1, 1), (1, 1)
+    edges: Index  # (cells, 4) numbers, the sides η = -1, η = 1 (along ξ), ξ = -1, ξ = 1 (along η)
+    reversed_: NDArray[np.bool_]  # (cells, 4), whether the cell runs along the edge against its own direction
+    points: Array  # vertex coordinates; `pairs` : the two vertices of each edge, in its direction, (edges, 2)
     pairs: Index
     parts: tuple[Part, ...]
 

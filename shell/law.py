@@ -78,30 +78,20 @@ def slope_parts(
 
 @dataclass(frozen=True, eq=False)
 class FrequencyLaw:
-    """Frequency of the lowest mode of one harmonic over temperature.
+    """Frequency of the lowest mode of one harmonic over temperature."""
 
-    Attributes
-    ----------
-    material : its laws give E, ν, ρ and the growth of lengths.
-    reference_temperature : K, dimensions hold here.
-    lowest, highest : K, where the law holds.
-    theory, harmonic : of the shell solver; n.
-    shape : ShapeFactor
-    mode : the mode at the reference temperature: Bryan factor, energies, shape.
-    prestress : what expansion does to it through stress.
-    mount : a base with another expansion than the resonator.
-    """
-
-    material: Material
-    reference_temperature: float
+    material: Material  # its laws give E, ν, ρ and the growth of lengths
+    reference_temperature: float  # K, dimensions hold here
+    # lowest, highest: K, where the law holds.
     lowest: float
     highest: float
+    # theory, harmonic: of the shell solver; n.
     theory: Theory
     harmonic: int
     shape: ShapeFactor
-    mode: Mode
-    prestress: Prestress
-    mount: Mount | None = None
+    mode: Mode  # the mode at the reference temperature: Bryan factor, energies, shape
+    prestress: Prestress  # what expansion does to it through stress
+    mount: Mount | None = None  # a base with another expansion than the resonator
 
     def frequency(self, temperature: ArrayLike, *, extrapolate: bool = False) -> Array:
         """Frequency (Hz) at even temperatures of the resonator (K).
@@ -295,14 +285,13 @@ def build_law(
 ) -> FrequencyLaw:
     """Solve the mode at a few Poisson's ratios and build its frequency law.
 
-    Parameters
-    ----------
-    resonator : with its dimensions at the reference temperature (K).
-    lowest, highest : K, wanted range; it ends where the material's does. Where both are one temperature, there is a
-        single solve, and the law does not follow changes of Poisson's ratio.
-    theory : "solid", "shell" or "rayleigh".
-    harmonic : n.
-    mount : the base, if its expansion differs; for the solid theory and n >= 1.
+    Args:
+        resonator: with its dimensions at the reference temperature (K).
+        lowest, highest: K, wanted range; it ends where the material's does. Where both are one temperature, there is a
+            single solve, and the law does not follow changes of Poisson's ratio.
+        theory: "solid", "shell" or "rayleigh".
+        harmonic: n.
+        mount: the base, if its expansion differs; for the solid theory and n >= 1.
     """
     if mount is not None:
         check_mount(resonator, theory, harmonic)

@@ -48,28 +48,20 @@ class Prior:
 
 @dataclass(frozen=True)
 class Material:
-    """One law of one material: properties over a range of temperature, and where they come from.
-
-    Attributes
-    ----------
-    lowest, highest : K, range of the law.
-    reference : K, temperature about which the deviations of the law and their prior count.
-    constant : properties given at one temperature only: nobody says how they change with it.
-    crystal : whose mean over all directions the elastic properties are.
-    unchecked : what could not be compared with an open source, of `CHECKABLE`.
-    """
+    """One law of one material: properties over a range of temperature, and where they come from."""
 
     name: str
     law: str
+    # lowest, highest: K, range of the law.
     lowest: float
     highest: float
     properties: Mapping[str, Property]
     source: str = ""
     note: str = ""
-    reference: float = ROOM
-    constant: tuple[str, ...] = ()
-    crystal: Crystal | None = None
-    unchecked: tuple[str, ...] = ()
+    reference: float = ROOM  # K, temperature about which the deviations of the law and their prior count
+    constant: tuple[str, ...] = ()  # properties given at one temperature only: nobody says how they change with it
+    crystal: Crystal | None = None  # whose mean over all directions the elastic properties are
+    unchecked: tuple[str, ...] = ()  # what could not be compared with an open source, of `CHECKABLE`
 
     @property
     def caveats(self) -> tuple[str, ...]:

@@ -24,14 +24,13 @@ def hemisphere(
 ) -> Resonator:
     """A spherical dome between two polar angles.
 
-    Parameters
-    ----------
-    radius : of the middle surface, m.
-    thickness : h in m, or [(position, h), ...] along the arc.
-    rim_angle : polar angle where the meridian ends, rad; π closes the sphere.
-    pole_angle : polar angle where it starts, rad; above 0 the pole is open.
-    support : "free", "clamped-pole", "clamped-rim" or "stem".
-    stem : the solid stem of support "stem".
+    Args:
+        radius: of the middle surface, m.
+        thickness: h in m, or [(position, h), ...] along the arc.
+        rim_angle: polar angle where the meridian ends, rad; π closes the sphere.
+        pole_angle: polar angle where it starts, rad; above 0 the pole is open.
+        support: "free", "clamped-pole", "clamped-rim" or "stem".
+        stem: the solid stem of support "stem".
     """
     _require_positive(radius=radius)
     if not 0 <= pole_angle < rim_angle <= pi + 1e-12:
@@ -48,13 +47,12 @@ def cylinder(
 ) -> Resonator:
     """A tube, open or with a flat bottom that meets the wall in a square corner.
 
-    Parameters
-    ----------
-    radius : of the wall's middle surface, m.
-    thickness : of the wall, m, or [(position, h), ...] with position 0 at the foot of the wall and 1 at the rim.
-    height : from the lower face of the bottom (z = 0) to the rim, m.
-    bottom_thickness : of the bottom plate, m; None for an open tube.
-    clamp_radius : the lower face is held within this radius, m; 0: free.
+    Args:
+        radius: of the wall's middle surface, m.
+        thickness: of the wall, m, or [(position, h), ...] with position 0 at the foot of the wall and 1 at the rim.
+        height: from the lower face of the bottom (z = 0) to the rim, m.
+        bottom_thickness: of the bottom plate, m; None for an open tube.
+        clamp_radius: the lower face is held within this radius, m; 0: free.
     """
     _require_positive(radius=radius, height=height)
     wall = _profile(thickness)
@@ -94,13 +92,12 @@ def bell(
 
     x² + z² = R²;  x = R for -L <= z < 0;  x²/R² - (R_b² - R²)(z + L)²/(R² S²) = 1 below, to the mouth x = R_b.
 
-    Parameters
-    ----------
-    radius : R, m.
-    thickness : h in m, or [(position, h), ...].
-    cylinder_height, hyperbola_height : L and S, m.
-    mouth_radius : R_b >= R, m.
-    support, stem : as for `hemisphere`.
+    Args:
+        radius: R, m.
+        thickness: h in m, or [(position, h), ...].
+        cylinder_height, hyperbola_height: L and S, m.
+        mouth_radius: R_b >= R, m.
+        support, stem: as for `hemisphere`.
     """
     _require_positive(radius=radius, cylinder_height=cylinder_height, hyperbola_height=hyperbola_height)
     if not mouth_radius >= radius:

@@ -37,28 +37,19 @@ class TheoryRangeWarning(UserWarning):
 
 @dataclass(frozen=True)
 class Mode:
-    """A mode of vibration.
+    """A mode of vibration."""
 
-    Attributes
-    ----------
-    harmonic : n, the number of waves around.
-    index : 0 for the lowest mode of its harmonic.
-    frequency : Hz.
-    theory : "solid", "shell" or "rayleigh".
-    relative_error_estimate : of the frequency against the exact solution *of this theory*; for "rayleigh" against shell
-        theory, since Rayleigh's solution violates the edge conditions.
-    bryan_factor : precession of the standing wave per angle of rotation; 0 for n = 0, which has no pattern to turn.
-    label : "torsion" or "axial" for n = 0, else empty.
-    solution : the eigenvector and its energies (None for "rayleigh").
-    """
-
-    harmonic: int
-    index: int
-    frequency: float
-    theory: Theory
+    harmonic: int  # n, the number of waves around
+    index: int  # 0 for the lowest mode of its harmonic
+    frequency: float  # Hz
+    theory: Theory  # "solid", "shell" or "rayleigh"
+    # of the frequency against the exact solution *of this theory*; for "rayleigh" against shell theory, since
+    # Rayleigh's solution violates the edge conditions.
     relative_error_estimate: float
+    # precession of the standing wave per angle of rotation; 0 for n = 0, which has no pattern to turn.
     bryan_factor: float
-    label: str = ""
+    label: str = ""  # "torsion" or "axial" for n = 0, else empty
+    # the eigenvector and its energies (None for "rayleigh").
     solution: Solution | None = field(default=None, repr=False, compare=False)
     resonator: Resonator | None = field(default=None, repr=False, compare=False)
 
@@ -140,19 +131,16 @@ def solve_modes(
     The polynomial orders rise until what the next functions of every element would still change lies within `tolerance`;
     that is the error estimate (see shell.surplus), to which thin shells add what double precision loses (shell.refinement).
 
-    Parameters
-    ----------
-    resonator : meridian, thickness, support.
-    elastic : E, ν, ρ, constant or varying along the meridian.
-    harmonic : n >= 0.
-    count : number of modes.
-    theory : "solid" (three-dimensional), "shell" (Naghdi) or "rayleigh" (inextensional hemisphere, closed form).
-    tolerance : wanted relative error of the frequency.
+    Args:
+        resonator: meridian, thickness, support.
+        elastic: E, ν, ρ, constant or varying along the meridian.
+        harmonic: n >= 0.
+        count: number of modes.
+        theory: "solid" (three-dimensional), "shell" (Naghdi) or "rayleigh" (inextensional hemisphere, closed form).
+        tolerance: wanted relative error of the frequency.
 
-    Warns
-    -----
-    TheoryRangeWarning
-        Where the theory is outside its range, or the tolerance is out of reach.
+    Warns:
+        TheoryRangeWarning: Where the theory is outside its range, or the tolerance is out of reach.
     """
     _check_arguments(harmonic, count, theory, tolerance)
     ratio = max(value for _, value in resonator.thickness) / resonator.size

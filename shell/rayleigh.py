@@ -53,12 +53,11 @@ def rayleigh_frequency(
     It measures the shear modulus, E/(1+ν) = 2G. With an open pole (phi_1 > 0) a second inextensional mode
     tan⁻ⁿ(φ/2) exists that this formula leaves out.
 
-    Parameters
-    ----------
-    n : circumferential harmonic, at least 2.
-    E, nu, rho : array_like, Young's modulus (Pa), Poisson ratio (1), density (kg/m³).
-    h, R : array_like, thickness and radius of the middle surface (m). All five broadcast together.
-    phi_1, phi_2 : polar angles (rad) where the shell starts and ends, 0 ≤ phi_1 < phi_2 < π.
+    Args:
+        n: circumferential harmonic, at least 2.
+        E, nu, rho: array_like, Young's modulus (Pa), Poisson ratio (1), density (kg/m³).
+        h, R: array_like, thickness and radius of the middle surface (m). All five broadcast together.
+        phi_1, phi_2: polar angles (rad) where the shell starts and ends, 0 ≤ phi_1 < phi_2 < π.
     """
     E, nu, rho, h, R = (np.asarray(value, dtype=float) for value in (E, nu, rho, h, R))
     for name, value in {"Young's modulus": E, "density": rho, "thickness": h, "radius": R}.items():

@@ -24,12 +24,11 @@ LONGEST_STEM = 100.0  # stem lengths over its radius that are meshed as a solid
 class Stem:
     """A solid cylinder on the axis, joined to the dome at the pole.
 
-    Parameters
-    ----------
-    radius : stem radius, m.
-    ends : height z of the clamped end, m; for side "both" the pair (inner, outer).
-    fillet : radius of the root fillet, m; 0 for a sharp corner.
-    side : "inner", "outer" or "both".
+    Args:
+        radius: stem radius, m.
+        ends: height z of the clamped end, m; for side "both" the pair (inner, outer).
+        fillet: radius of the root fillet, m; 0 for a sharp corner.
+        side: "inner", "outer" or "both".
     """
 
     radius: float
@@ -98,13 +97,12 @@ class MeridianPoints:
 class Resonator:
     """A shell of revolution: middle-surface meridian, thickness along it, support.
 
-    Parameters
-    ----------
-    segments : smooth curves, each starting where the one before ends.
-    thickness : (position, h) pairs, position in 0 ... 1 of the arc length, h in m, linear between them.
-    support : what is held; a clamp holds the edge through its thickness.
-    stem : only with support "stem".
-    clamp_radius : with support "clamped-face", the lower face is held within this radius, m.
+    Args:
+        segments: smooth curves, each starting where the one before ends.
+        thickness: (position, h) pairs, position in 0 ... 1 of the arc length, h in m, linear between them.
+        support: what is held; a clamp holds the edge through its thickness.
+        stem: only with support "stem".
+        clamp_radius: with support "clamped-face", the lower face is held within this radius, m.
     """
 
     segments: tuple[Curve, ...]

@@ -54,23 +54,16 @@ class Contact:
 
 @dataclass(frozen=True)
 class Frame:
-    """What a root's patches hang on, the same at every level.
-
-    Attributes
-    ----------
-    collar : arc length where the shell begins; `widest` : that of the outermost contact.
-    corners : for each contact, the arc length of O.
-    radii : bounds of the columns of the stem, from its side to the axis.
-    above : for each contact, η of the face opposite (0: the middle surface) and its arc lengths at the inner radii.
-    cuts : arc lengths between O and X on the opposite face at which the cells of a fillet end; two stems share them.
-    """
+    """What a root's patches hang on, the same at every level."""
 
     contacts: tuple[Contact, ...]
     widest: float
-    collar: float
-    corners: tuple[float, ...]
-    radii: tuple[float, ...]
+    collar: float  # arc length where the shell begins; `widest` : that of the outermost contact
+    corners: tuple[float, ...]  # for each contact, the arc length of O
+    radii: tuple[float, ...]  # bounds of the columns of the stem, from its side to the axis
+    # for each contact, η of the face opposite (0: the middle surface) and its arc lengths at the inner radii.
     above: tuple[tuple[float, tuple[float, ...]], ...]
+    # arc lengths between O and X on the opposite face at which the cells of a fillet end; two stems share them.
     cuts: tuple[float, ...]
 
 

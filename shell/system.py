@@ -297,16 +297,12 @@ class ToFree:
 
 @dataclass(frozen=True, eq=False)
 class Inertia:
-    """The mass of all elements: M x = Pᵀ m P x.
+    """The mass of all elements: M x = Pᵀ m P x."""
 
-    Attributes
-    ----------
-    choice : P, from the free unknowns to those of the elements; `starts` : its first rows of the second group and on.
-    blocks : m of the elements of every group, (elements, functions, functions), the same for each component of a solid.
-    """
-
+    # P, from the free unknowns to those of the elements; `starts` : its first rows of the second group and on.
     choice: "scipy.sparse.csr_matrix"
     starts: Index
+    # m of the elements of every group, (elements, functions, functions), the same for each component of a solid.
     blocks: tuple[Array, ...]
 
     def __matmul__(self, x: Array) -> Array:

@@ -90,12 +90,12 @@ def study_bias(
 ) -> BiasStudy:
     """Fit the bias model to records of a gyro at rest while its temperature changes.
 
-    Parameters
-    ----------
-    method : whose terms `model` takes; both are computed.
-    width, window : averaging before the fit and window of the rate, s; 100 s, less for runs of less than 200 such rows, and three times that.
-    causal : the rate uses past samples only.
-    over : what the bias is a function of; "auto" takes the frequency where every record has it.
+    Args:
+        method: whose terms `model` takes; both are computed.
+        width, window: averaging before the fit and window of the rate, s; 100 s, less for runs of less than 200 such
+            rows, and three times that.
+        causal: the rate uses past samples only.
+        over: what the bias is a function of; "auto" takes the frequency where every record has it.
     """
     records = records_of_one_gyro(records, progress)
     check_lengths(records)

@@ -107,10 +107,10 @@ def scan_faces(
 ) -> Scan:
     """Read, align and fit the faces, and find the splits of harmonics n.
 
-    Parameters
-    ----------
-    frames : "own" aligns each face by itself, so that its first wave holds no rigid motion; "common" keeps them as they lie to each other.
-    highest : wave around up to which the faces are fitted, at least twice the highest harmonic.
+    Args:
+        frames: "own" aligns each face by itself, so that its first wave holds no rigid motion; "common" keeps them as
+            they lie to each other.
+        highest: wave around up to which the faces are fitted, at least twice the highest harmonic.
     """
     if 2 * max(harmonics) > highest:
         needed = f"the split of n = {max(harmonics)} needs harmonic {2 * max(harmonics)} of the faces"

@@ -38,44 +38,27 @@ TEMPERATURES = ("housing_temperature_degC", "chamber_temperature_degC")
 
 @dataclass(frozen=True)
 class Soak:
-    """One settled part, or the settled state that the end of a hold is extrapolated to.
+    """One settled part, or the settled state that the end of a hold is extrapolated to."""
 
-    Attributes
-    ----------
-    path : of its record
-    start, end : float, s
-    temperature_degC, frequency_Hz : float, means, or the extrapolated state
-    error_Hz : float, of the frequency: its scatter, and what is left to settle
-    left_K : float, largest estimate of what is left to settle; of an extrapolated state its error
-    time_constant : float, s, by which that is judged
-    extrapolated_K : float, from the last reading to the state; 0 of a settled part
-    """
-
-    path: str
+    path: str  # of its record
+    # start, end: float, s
     start: float
     end: float
+    # temperature_degC, frequency_Hz: float, means, or the extrapolated state
     temperature_degC: float
     frequency_Hz: float
-    error_Hz: float
-    left_K: float
-    time_constant: float
-    extrapolated_K: float = 0.0
+    error_Hz: float  # float, of the frequency: its scatter, and what is left to settle
+    left_K: float  # float, largest estimate of what is left to settle; of an extrapolated state its error
+    time_constant: float  # float, s, by which that is judged
+    extrapolated_K: float = 0.0  # float, from the last reading to the state; 0 of a settled part
 
 
 def find_soaks(records: Sequence[Record], time_constant: float = 3000.0, tolerance: float = 0.05) -> tuple[Soak, ...]:
     """Find the settled parts of records.
 
-    Parameters
-    ----------
-    time_constant : float, s
-        Slowest of the gyro; what the records show takes its place where that is longer.
-    tolerance : float, K
-        What may be left of a change.
-
-    Raises
-    ------
-    InputError
-        A record without frequency or temperature; a time constant or tolerance that is not positive.
+    Args:
+        time_constant: Slowest of the gyro; what the records show takes its place where that is longer.
+        tolerance: What may be left of a change.
     """
     if not (time_constant > 0 and tolerance > 0):
         raise InputError("a time constant and a tolerance must be positive.")
@@ -87,13 +70,7 @@ def find_soaks(records: Sequence[Record], time_constant: float = 3000.0, toleran
 
 
 def settled_table(soaks: Sequence[Soak], where: str, advice: str = "") -> tuple[Array, Array, float]:
-    """Return temperatures (°C) and frequencies (Hz) of soaks, and the step (Hz) of readings that are as uncertain as theirs.
-
-    Raises
-    ------
-    InputError
-        Fewer than two temperatures that are half a kelvin apart; `advice` says what to do.
-    """
+    """Return temperatures (°C) and frequencies (Hz) of soaks, and the step (Hz) of readings that are as uncertain as theirs."""
     T, f = np.array([s.temperature_degC for s in soaks]), np.array([s.frequency_Hz for s in soaks])
     if np.count_nonzero(np.diff(np.sort(T)) > 0.5) < 1:
         raise InputError(

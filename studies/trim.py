@@ -186,12 +186,12 @@ def plan_for_card(
 ) -> CardPlan:
     """A plan for splits measured on a card's resonator.
 
-    Parameters
-    ----------
-    resonator, elastic : of the card at the temperature.
-    measured : (harmonic, split in Hz, azimuth of the slow axis in rad, reading error in Hz), one for each harmonic.
-    goal : Hz. heights : positions of the cuts. tool, teeth : what is cut. removal_error, gain_error, unbalance : see `plan_trim`.
-    gain : effect of the last round over its prediction, of either sign, which scales what a cut is taken to do.
+    Args:
+        resonator, elastic: of the card at the temperature.
+        measured: (harmonic, split in Hz, azimuth of the slow axis in rad, reading error in Hz), one for each harmonic.
+        goal: Hz. heights : positions of the cuts. tool, teeth : what is cut. removal_error, gain_error, unbalance : see
+            `plan_trim`.
+        gain: effect of the last round over its prediction, of either sign, which scales what a cut is taken to do.
     """
     if not 0 < goal < np.inf:
         raise InputError(f"--goal {goal:g}: must be a positive split in Hz.")

@@ -30,22 +30,13 @@ Progress = Callable[[str], None]
 def simulate(card: Card, profile: str, *, row: float = 1.0, seed: int = 0, noise: bool = True) -> Record:
     """Return the record of a virtual run: `hrg simulate`.
 
-    Parameters
-    ----------
-    card : Instrument, path, or name of a card that ships
-    profile : str
-        A chamber profile in words ("step 20 -10 5h"), a profile file, or a record whose housing column drives the run.
-    row : float
-        Time between rows (s).
-    seed : int
-        Of the noise.
-    noise : bool
-        False records what is true.
-
-    Raises
-    ------
-    InputError
-        An unusable card or profile.
+    Args:
+        card: Instrument, path, or name of a card that ships
+        profile: A chamber profile in words ("step 20 -10 5h"), a profile file, or a record whose housing column drives
+            the run.
+        row: Time between rows (s).
+        seed: Of the noise.
+        noise: False records what is true.
     """
     from studies.simulation.chamber import load_drive
     from studies.simulation.virtual_gyro import simulate_run
@@ -65,21 +56,13 @@ def calibrate(
 ) -> "Calibration":
     """Return the most probable values of a card, given data of one device: `hrg calibrate`.
 
-    Parameters
-    ----------
-    card : Instrument, path, or name of a card that ships
-    data : records or their paths, and paths of steady-state tables
-    hold_out : int, optional
-        Number of the record, from 1, that a second calibration without it predicts; the last of several unless given.
-    exact : names
-        Values of the card that stay fixed.
-    progress : callable, optional
-        Is told in a few words what comes next.
-
-    Raises
-    ------
-    InputError, ThermalError, ShellError
-        Data or a card that cannot be used.
+    Args:
+        card: Instrument, path, or name of a card that ships
+        data: records or their paths, and paths of steady-state tables
+        hold_out: Number of the record, from 1, that a second calibration without it predicts; the last of several
+            unless given.
+        exact: Values of the card that stay fixed.
+        progress: Is told in a few words what comes next.
     """
     from studies.calibration.calibrate import calibrate as find_values
     from studies.calibration.observed import read_settled
@@ -99,16 +82,9 @@ def calibrate(
 def diagnose(*runs: Run, card: Card | None = None) -> "Diagnosis | Inference | Unjudged | TableDiagnosis":
     """Return what a campaign shows and the simulation lacks, with its causes: `hrg diagnose`; `.verdict` is the outcome.
 
-    Parameters
-    ----------
-    runs : records of one gyro or their paths, or the path of one steady-state table
-    card : Instrument, path, or name of a card that ships, optional
-        Its own simulation is the baseline.
-
-    Raises
-    ------
-    InputError
-        Records that cannot be used together.
+    Args:
+        runs: records of one gyro or their paths, or the path of one steady-state table
+        card: Its own simulation is the baseline.
     """
     from studies.diagnosis.table import diagnose_table
 

@@ -26,17 +26,8 @@ def spread_of_prediction(
     of a calibrated one. What the card says of the bias from turn-on to turn-on is part of it. No calibration predicts a run
     more closely than this, beside the noise of that run.
 
-    Parameters
-    ----------
-    instrument : Instrument
-    drive : Drive
-    law : FrequencyLaw, optional
-        One that was built before for this instrument.
-
-    Raises
-    ------
-    InputError, ThermalError, ShellError
-        As `predict`.
+    Args:
+        law: One that was built before for this instrument.
     """
     priors = gather_priors(instrument)
     found = predict(instrument, drive, priors.names, law)

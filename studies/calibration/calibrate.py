@@ -45,72 +45,49 @@ class LinearResponse:
 
     measured − predicted = columns · δ + noise, δ the move of the coordinates from the calibrated point, with prior mean
     `prior_mean` and standard deviation `prior_sd`.
-
-    Attributes
-    ----------
-    time, residual : per run, arrays (N,)
-    columns : per run, arrays (N, p)
-    names : p; the card's values, then the departures at the start of each run
-    prior_mean, prior_sd : arrays (p,)
     """
 
+    # time, residual: per run, arrays (N,)
     time: tuple[Array, ...]
     residual: tuple[Array, ...]
-    columns: tuple[Array, ...]
-    names: tuple[str, ...]
+    columns: tuple[Array, ...]  # per run, arrays (N, p)
+    names: tuple[str, ...]  # p; the card's values, then the departures at the start of each run
+    # prior_mean, prior_sd: arrays (p,)
     prior_mean: Array
     prior_sd: Array
 
 
 @dataclass(frozen=True)
 class HeldOutRun:
-    """How one held-out run is predicted: rms of block averages by response.
+    """How one held-out run is predicted: rms of block averages by response."""
 
-    Attributes
-    ----------
-    path : of its record
-    chamber, housing : response -> (as shipped, calibrated); from the chamber alone nothing is refitted, from the housing the
-        run's own offset and initial state
-    stated : response -> rms standard deviation from the chamber that the calibrated values' own uncertainty leaves, and how
-        the campaign's runs began, turned on and their chambers' clocks ran
-    noise : response -> rms
-    """
-
-    path: str
+    path: str  # of its record
+    # chamber, housing: response -> (as shipped, calibrated); from the chamber alone nothing is refitted, from the
+    # housing the run's own offset and initial state
     chamber: Mapping[str, tuple[float, float]]
     housing: Mapping[str, tuple[float, float]]
+    # response -> rms standard deviation from the chamber that the calibrated values' own uncertainty leaves, and how
+    # the campaign's runs began, turned on and their chambers' clocks ran
     stated: Mapping[str, float]
-    noise: Mapping[str, float]
+    noise: Mapping[str, float]  # response -> rms
 
 
 @dataclass(frozen=True, repr=False)
 class Calibration(Shown):
-    """A card and what records say of it.
-
-    Attributes
-    ----------
-    card, instrument : Instrument
-        As shipped; with the most probable values, their posterior widths and correlations.
-    fit : Fit
-    estimates : of every uncertain value
-    groups : names of values that the data cannot separate
-    ladder : response -> Rung
-    held_out : HeldOut, where it was asked for
-    warnings : in sentences
-    settled : level and slope of every table beside the card as shipped
-    """
+    """A card and what records say of it."""
 
     drawn_by = "studies.reports.calibration:residual_figure"
 
+    # card, instrument: As shipped; with the most probable values, their posterior widths and correlations.
     card: "Instrument"
     instrument: "Instrument"
     fit: CardFit
-    estimates: tuple[Estimate, ...]
-    groups: tuple[tuple[str, ...], ...]
-    ladder: Mapping[str, Rung]
-    held_out: HeldOutRun | None
-    warnings: tuple[str, ...]
-    settled: tuple[SettledComparison, ...] = ()
+    estimates: tuple[Estimate, ...]  # of every uncertain value
+    groups: tuple[tuple[str, ...], ...]  # names of values that the data cannot separate
+    ladder: Mapping[str, Rung]  # response -> Rung
+    held_out: HeldOutRun | None  # HeldOut, where it was asked for
+    warnings: tuple[str, ...]  # in sentences
+    settled: tuple[SettledComparison, ...] = ()  # level and slope of every table beside the card as shipped
 
     def __repr__(self) -> str:
         told = sum(one.told_by == "data" for one in self.estimates)
@@ -173,27 +150,14 @@ def calibrate(
 ) -> Calibration:
     """Find the most probable values of a card, given its uncertainties and records of the device.
 
-    Parameters
-    ----------
-    instrument : Instrument
-    records : sequence of Record
-        Runs of one device.
-    tables : sequence of SettledTable
-        Steady-state tables of the same device.
-    hold_out : int, optional
-        Place of a record that a second calibration, without it, predicts.
-    exact : names
-        Values of the card that are not to move.
-    keep : bool
-        Whether values with which the data agree stay as the card has them (`keep_agreeing`); not beside an effect that a diagnosis
-        has found, where the device is not the card's.
-    profile : bool
-        Whether intervals follow the likelihood where it is bent.
-
-    Raises
-    ------
-    InputError, ThermalError, ShellError
-        Records or a card that cannot be used.
+    Args:
+        records: Runs of one device.
+        tables: Steady-state tables of the same device.
+        hold_out: Place of a record that a second calibration, without it, predicts.
+        exact: Values of the card that are not to move.
+        keep: Whether values with which the data agree stay as the card has them (`keep_agreeing`); not beside an effect
+            that a diagnosis has found, where the device is not the card's.
+        profile: Whether intervals follow the likelihood where it is bent.
     """
     if not records and not tables:
         raise InputError("no data given; calibration needs a record or a steady-state table.")

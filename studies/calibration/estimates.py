@@ -26,30 +26,21 @@ INSEPARABLE = 0.9  # correlation, of two values that share what is known of them
 
 @dataclass(frozen=True)
 class Estimate:
-    """One value of the card.
+    """One value of the card."""
 
-    Attributes
-    ----------
-    parameter, unit : name of the key, and its unit
-    card, value, low, high : what the card said, the most probable value, and its 90 % interval
-    sd : posterior standard deviation, as a card states it
-    shift_sd : how far it moved, in prior standard deviations
-    width : posterior over prior standard deviation
-    bound : "low" or "high" where the value has reached a hard bound
-    interval : "profile" where the interval follows the likelihood's curvature
-    """
-
+    # parameter, unit: name of the key, and its unit
     parameter: str
     unit: str
+    # card, value, low, high: what the card said, the most probable value, and its 90 % interval
     card: float
     value: float
     low: float
     high: float
-    sd: float
-    shift_sd: float
-    width: float
-    bound: str | None
-    interval: str
+    sd: float  # posterior standard deviation, as a card states it
+    shift_sd: float  # how far it moved, in prior standard deviations
+    width: float  # posterior over prior standard deviation
+    bound: str | None  # "low" or "high" where the value has reached a hard bound
+    interval: str  # "profile" where the interval follows the likelihood's curvature
 
     @property
     def told_by(self) -> str:

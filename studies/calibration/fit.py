@@ -48,27 +48,17 @@ LONGEST_STEP = 3.0  # prior standard deviations, of any coordinate in one step
 
 @dataclass(frozen=True)
 class CardFit:
-    """The most probable point.
-
-    Attributes
-    ----------
-    problem : Problem
-    state : State, at the point
-    noise, rows : by response: levels, and rows with the variances of outliers enlarged
-    covariance : array (p, p), (JᵀJ + 1)⁻¹
-    outliers : by response, how many blocks stand out
-    steps : how many were taken
-    converged : whether the last one was small
-    """
+    """The most probable point."""
 
     problem: CardProblem
-    state: State
+    state: State  # state, at the point
+    # noise, rows: by response: levels, and rows with the variances of outliers enlarged
     noise: Mapping[str, Noise]
     rows: Mapping[str, NoiseRows]
-    covariance: Array
-    outliers: Mapping[str, int]
-    steps: int
-    converged: bool
+    covariance: Array  # array (p, p), (JᵀJ + 1)⁻¹
+    outliers: Mapping[str, int]  # by response, how many blocks stand out
+    steps: int  # how many were taken
+    converged: bool  # whether the last one was small
 
     @property
     def point(self) -> Array:
@@ -77,13 +67,7 @@ class CardFit:
 
 
 def fit(problem: CardProblem, start: Array | None = None, progress: Progress = lambda _: None) -> CardFit:
-    """Find the most probable point.
-
-    Raises
-    ------
-    InputError, ShellError, ThermalError
-        Predictions that are impossible at the card's own values.
-    """
+    """Find the most probable point."""
     state = problem.evaluate(np.zeros(problem.count) if start is None else start)
     rows = dict(problem.rows)
     noise: dict[str, Noise] = {}
@@ -173,11 +157,10 @@ def estimate_levels(
     hold. What the model cannot follow is left to the slow noise (the discrepancy of Kennedy & O'Hagan 2001, J. R. Stat. Soc. B
     63, 425).
 
-    Parameters
-    ----------
-    target, slopes : response -> (M,) and (M, p), about the prior mean of the unknowns
-    names : responses whose noise is estimated
-    known : (q, p + 1), what else says something of the unknowns: rows of white noise of variance 1 and their target
+    Args:
+        target, slopes: response -> (M,) and (M, p), about the prior mean of the unknowns
+        names: responses whose noise is estimated
+        known: (q, p + 1), what else says something of the unknowns: rows of white noise of variance 1 and their target
     """
     found = dict(noise)
     for name in names:

@@ -35,14 +35,7 @@ LIKE = 10.0
 
 
 def check_readings(instrument: "Instrument", records: "Sequence[Record]", law: "FrequencyLaw | None" = None) -> None:
-    """Refuse records whose frequency follows the temperatures only if these are read otherwise, and a bias in °/s.
-
-    Raises
-    ------
-    InputError
-        The card leaves most of the frequency's changes, and little of them with the temperatures in °F or with the opposite sign;
-        or a bias scatters 3600 times less than the card states.
-    """
+    """Refuse records whose frequency follows the temperatures only if these are read otherwise, and a bias in °/s."""
     for record in records:
         _check_unit(instrument, record)
         names = [name for name in COLUMN.values() if name in record]

@@ -45,25 +45,16 @@ LEAST_SCATTER = 1e-5  # of a frequency, where nothing else tells
 
 @dataclass(frozen=True)
 class BlockMeans:
-    """Means of one column over blocks of rows.
+    """Means of one column over blocks of rows."""
 
-    Attributes
-    ----------
-    rows : of the run's predicted rows, those with a value that is no spike
-    edges : where each block begins in `rows`
-    counts : array, values in each block
-    time, value : arrays, means
-    spikes : number of values left out
-    step : usual time from one predicted row to the next, s
-    """
-
-    rows: Rows
-    edges: Rows
-    counts: Array
+    rows: Rows  # of the run's predicted rows, those with a value that is no spike
+    edges: Rows  # where each block begins in `rows`
+    counts: Array  # array, values in each block
+    # time, value: arrays, means
     time: Array
     value: Array
-    spikes: int
-    step: float
+    spikes: int  # number of values left out
+    step: float  # usual time from one predicted row to the next, s
 
     def average(self, column: Array) -> Array:
         """Means of a predicted column over the same values, along the first axis."""
@@ -78,27 +69,15 @@ class BlockMeans:
 
 @dataclass(frozen=True)
 class ObservedRun:
-    """One run.
+    """One run."""
 
-    Attributes
-    ----------
-    record : Record
-        As read.
-    inner : Drive
-        Drives frequency, bias and 1/Q: by the measured housing, else by the chamber.
-    outer : Drive or None
-        Where both are measured: the chamber, which drives the housing.
-    responses : mapping
-        Blocks of every response that was measured, the housing among them where it has an outer drive.
-    kinks : mapping
-        Rows of the measured housing's profile before which its chamber jumped or a hole is, and how far (K) the housing may have been
-        from the straight line midway between them.
-    """
-
-    record: Record
-    inner: Drive
-    outer: Drive | None
+    record: Record  # as read
+    inner: Drive  # drives frequency, bias and 1/Q: by the measured housing, else by the chamber
+    outer: Drive | None  # where both are measured: the chamber, which drives the housing
+    # Blocks of every response that was measured, the housing among them where it has an outer drive.
     responses: Mapping[str, BlockMeans]
+    # Rows of the measured housing's profile before which its chamber jumped or a hole is, and how far (K) the housing
+    # may have been from the straight line midway between them.
     kinks: Mapping[int, float] = field(default_factory=dict)
 
     def explaining(self, names: Sequence[str]) -> "ObservedRun":
@@ -159,17 +138,10 @@ def observe(
 ) -> tuple[ObservedRun, ...]:
     """Make runs ready.
 
-    Parameters
-    ----------
-    responses : names of the columns that are predicted
-    turning : whether they are of a whole-angle wave, each row's the mean to the next
-
-    blocks : of a run that are compared, at most
-
-    Raises
-    ------
-    InputError
-        A run without a drive or without a response, or too short.
+    Args:
+        responses: names of the columns that are predicted
+        turning: whether they are of a whole-angle wave, each row's the mean to the next
+        blocks: of a run that are compared, at most
     """
     starts, _ = place_in_time(records)
     return tuple(

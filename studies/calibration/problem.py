@@ -43,17 +43,11 @@ class Part:
 
 @dataclass(frozen=True)
 class State:
-    """Residuals and derivatives of every response at one point, stacked over the runs that have it.
+    """Residuals and derivatives of every response at one point, stacked over the runs that have it."""
 
-    Attributes
-    ----------
-    point : array (p,), independent coordinates
-    residual : response -> array (M,), measured minus predicted
-    slope : response -> array (M, p) by the coordinates; empty when not asked for
-    """
-
-    point: Array
-    residual: Mapping[str, Array]
+    point: Array  # array (p,), independent coordinates
+    residual: Mapping[str, Array]  # response -> array (M,), measured minus predicted
+    # response -> array (M, p) by the coordinates; empty when not asked for
     slope: Mapping[str, Array] = field(default_factory=dict)
 
 

@@ -50,24 +50,16 @@ class Compared:
 
 @dataclass(frozen=True)
 class SettledComparison:
-    """A table beside a card.
-
-    Attributes
-    ----------
-    path, card : str
-    temperature_degC : float
-    level_Hz, slope_ppm_per_degC : Compared
-        The slope is None of a table with one temperature, or where the card's material has no temperature law.
-    bridges : tuple of str
-        What would take up the difference of the level alone.
-    """
+    """A table beside a card."""
 
     path: str
     card: str
     temperature_degC: float
+    # level_Hz, slope_ppm_per_degC: The slope is None of a table with one temperature, or where the card's material has
+    # no temperature law.
     level_Hz: Compared
     slope_ppm_per_degC: Compared | None
-    bridges: tuple[str, ...] = ()
+    bridges: tuple[str, ...] = ()  # what would take up the difference of the level alone
 
     def as_dict(self) -> dict[str, Any]:
         """Return the numbers, with the distances in standard deviations."""
@@ -103,13 +95,7 @@ def _apart(away: float) -> str:
 
 
 def compare_settled(problem: "CardProblem") -> tuple[SettledComparison, ...]:
-    """Set every table beside the card as shipped.
-
-    Raises
-    ------
-    InputError
-        A slope further than 6 standard deviations from the card's, or further than 3 where another reading of the temperatures agrees.
-    """
+    """Set every table beside the card as shipped."""
     if not problem.tables:
         return ()
     state = problem.evaluate(np.zeros(problem.count))

@@ -34,26 +34,19 @@ FIVE, NINETY_FIVE = 5.0, 95.0
 
 @dataclass(frozen=True)
 class Bend:
-    """What the curve adds to each value, in prior standard deviations: to both ends of its 90 % interval, and to its spread.
+    """What the curve adds to each value, in prior standard deviations: to both ends of its 90 % interval, and to its spread."""
 
-    Attributes
-    ----------
-    low, high : arrays (n,)
-    sd : array (n,), of the posterior, the curve included
-    """
-
+    # low, high: arrays (n,)
     low: Array
     high: Array
-    sd: Array
+    sd: Array  # array (n,), of the posterior, the curve included
 
 
 def find_bend(fit: CardFit, J: Array) -> Bend:
     """Follow what is left unknown to both sides.
 
-    Parameters
-    ----------
-    J : array (M, p)
-        Slopes in rows whose noise is white.
+    Args:
+        J: array (M, p): Slopes in rows whose noise is white.
     """
     ways, curves, rest = _follow(fit, J)
     generator = np.random.default_rng(0)
@@ -109,20 +102,13 @@ def follow(fit: CardFit, J: Array, row: Array, point: Array, enough: float) -> t
 
     Gauss–Newton steps with the slopes of the fit, where they do not suffice with those of each point.
 
-    Parameters
-    ----------
-    J : array (M, p)
-        Slopes at the fit in rows whose noise is white.
-    row : array (p,)
-        What is held: row · point.
-    point : array (p,)
-    enough : float
-        Rise of the objective above the fit's at which the bottom is near.
+    Args:
+        J: array (M, p): Slopes at the fit in rows whose noise is white.
+        row: array (p,): What is held: row · point.
+        enough: Rise of the objective above the fit's at which the bottom is near.
 
-    Returns
-    -------
-    point, rise
-        The lowest point; the rise is infinite where the bottom is not found.
+    Returns:
+        point, rise: The lowest point; the rise is infinite where the bottom is not found.
     """
     problem = fit.problem
     least = objective(problem, fit.state, fit.noise, fit.rows)

@@ -84,11 +84,10 @@ class WavePrior:
     def posterior(self, information: Array, mean: Array) -> WavePosterior:
         """Length and axis, from the data's information on (x, y) and the mean that it has beside the unit prior.
 
-        Parameters
-        ----------
-        information : array (2, 2)
-        mean : array (2,)
-            Solves (information + 1) mean = pull, so that ln of the data's likelihood is pull·u − ½ uᵀ information u.
+        Args:
+            information: array (2, 2)
+            mean: array (2,): Solves (information + 1) mean = pull, so that ln of the data's likelihood is pull·u − ½ uᵀ
+                information u.
         """
         pull = (information + np.eye(2)) @ mean
         strength, ways = np.linalg.eigh(information)

@@ -53,12 +53,10 @@ def acceptance(card: Card, *runs: Records, limits: str | None = None, output: st
     angle-storage) above the header overrides this; warm-up and angle storage need it. Every value has a 90 % interval; a limit is
     judged only if the whole interval lies on one side of it.
 
-    Parameters
-    ----------
-    limits : str
-        Limits (TOML, schema hrg.limits/1): a table [limits] with keys such as bias_deg_per_h; hrg keys limits lists them.
-    output : str
-        Column with the zero-rate output to judge, such as compensated_bias_deg_per_h.
+    Args:
+        limits: Limits (TOML, schema hrg.limits/1): a table [limits] with keys such as bias_deg_per_h; hrg keys limits
+            lists them.
+        output: Column with the zero-rate output to judge, such as compensated_bias_deg_per_h.
     """
     instrument = load_card(card)
     if not runs:

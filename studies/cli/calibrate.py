@@ -39,18 +39,16 @@ def calibrate(
     runs are estimated together with them. The measured housing temperature drives frequency, bias and 1/Q; without it the chamber
     does. With both, the housing temperature is fitted too.
 
-    Parameters
-    ----------
-    data : str
-        Records (CSV) of one device, and steady-state tables (temperature_degC,frequency_Hz); or one table of modes
-        (harmonic,frequency_Hz, and if known index, sd_Hz, temperature_degC; harmonic may be empty), which calibrates elastic values and dimensions.
-    save : str
-        Write the calibrated card: most probable values with their posterior widths. Not saved, with exit status 2, if the fit
-        did not converge, determined no value, or moved one by more than 6 of the card's standard deviations.
-    hold_out : int
-        Number of the record, from 1, to predict by a second calibration without it; 0: the last, if there are several.
-    exact : str
-        A value to keep fixed, such as thermal.film_emissivity; may be given more than once.
+    Args:
+        data: Records (CSV) of one device, and steady-state tables (temperature_degC,frequency_Hz); or one table of
+            modes (harmonic,frequency_Hz, and if known index, sd_Hz, temperature_degC; harmonic may be empty), which
+            calibrates elastic values and dimensions.
+        save: Write the calibrated card: most probable values with their posterior widths. Not saved, with exit status
+            2, if the fit did not converge, determined no value, or moved one by more than 6 of the card's standard
+            deviations.
+        hold_out: Number of the record, from 1, to predict by a second calibration without it; 0: the last, if there are
+            several.
+        exact: A value to keep fixed, such as thermal.film_emissivity; may be given more than once.
     """
     if not data:
         raise InputError("no data given; name at least one record (CSV) or steady-state table.")

@@ -22,10 +22,8 @@ def cards(card: str = "") -> Result:
     { value = ..., low = ..., high = ... } with hard bounds; sd = 0 makes it exact. Other numbers have the uncertainty
     documented for their key.
 
-    Parameters
-    ----------
-    card : str
-        Path of a card, or the name of one that ships: show its mass, moments of inertia and uncertain values.
+    Args:
+        card: Path of a card, or the name of one that ships: show its mass, moments of inertia and uncertain values.
     """
     if card:
         return _show_values(card)

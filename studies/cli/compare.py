@@ -15,10 +15,8 @@ from studies.results import Column, Result, Table, row_of
 def compare(*card: str) -> Result:
     """Show designs side by side: where their cards differ, and the effects on modes, TCF and settling.
 
-    Parameters
-    ----------
-    card : str
-        Two or more cards: paths, or names of those that ship (hrg cards).
+    Args:
+        card: Two or more cards: paths, or names of those that ship (hrg cards).
     """
     if len(card) < 2:
         raise InputError("name two cards or more: hrg compare A.toml B.toml.")

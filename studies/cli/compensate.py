@@ -47,16 +47,12 @@ def compensate(
     resonator or the chamber. If the record has no thermometer, the resonator's temperature is found from the frequency and
     added instead, as hrg temperature does.
 
-    Parameters
-    ----------
-    model : str
-        A model file (TOML) written with --save.
-    run : str
-        The record (CSV) to compensate.
-    out : str
-        Write the record with the added columns.
-    extrapolate : bool
-        Apply the model outside its fitted range too; in a record without a thermometer, leave those rows empty.
+    Args:
+        model: A model file (TOML) written with --save.
+        run: The record (CSV) to compensate.
+        out: Write the record with the added columns.
+        extrapolate: Apply the model outside its fitted range too; in a record without a thermometer, leave those rows
+            empty.
     """
     loaded = models.read_model(model)
     if (run is None) != (out is None):

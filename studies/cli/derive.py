@@ -54,25 +54,17 @@ def derive(
     closed forms for one harmonic and one polar range. With --dynamics, it derives the motion of the standing wave instead:
     amplitude, quadrature, precession and phase of the two-dimensional oscillator.
 
-    Parameters
-    ----------
-    dynamics : bool
-        Derive the averaged dynamics of the vibration (Lynch's form; the CVG paper's equations 7 to 25), its transfer functions and poles, and its optimal filters (35, 36).
-    bell : bool
-        Derive the theory of the bell (BVG paper, equations 1 to 22), beside the published equations, and compare its frequency with the
-        solver on the card bvg-bell; about 20 seconds.
-    latex : bool
-        Print a LaTeX fragment (amsmath) instead.
-    code : {'python', 'c'}, optional
-        Print the frequency, Bryan factor and derivatives as self-contained code instead.
-    harmonic : int
-        Circumferential harmonic n of the closed forms and of the code, at least 2.
-    pole_angle_deg : float
-        Polar angle where the shell starts; above 0 the pole is open.
-    rim_angle_deg : float
-        Polar angle where the shell ends.
-    out : str
-        Write the text, LaTeX or code to this file instead of the terminal.
+    Args:
+        dynamics: Derive the averaged dynamics of the vibration (Lynch's form; the CVG paper's equations 7 to 25), its
+            transfer functions and poles, and its optimal filters (35, 36).
+        bell: Derive the theory of the bell (BVG paper, equations 1 to 22), beside the published equations, and compare
+            its frequency with the solver on the card bvg-bell; about 20 seconds.
+        latex: Print a LaTeX fragment (amsmath) instead.
+        code: Print the frequency, Bryan factor and derivatives as self-contained code instead.
+        harmonic: Circumferential harmonic n of the closed forms and of the code, at least 2.
+        pole_angle_deg: Polar angle where the shell starts; above 0 the pole is open.
+        rim_angle_deg: Polar angle where the shell ends.
+        out: Write the text, LaTeX or code to this file instead of the terminal.
     """
     if out is not None:
         same = derive.__wrapped__  # type: ignore[attr-defined]

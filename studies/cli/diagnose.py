@@ -33,26 +33,22 @@ def diagnose(
 
     Give the records of one gyro (several runs are better than one), or a steady-state table.
 
-    Parameters
-    ----------
-    runs : str
-        Records (CSV with time_s), or one table with temperature_degC,frequency_Hz.
-    card : str
-        The gyro's card. The records are compared with its simulation, calibrated within the card's uncertainties.
-    save : str
-        Save the extended model as a card (TOML): the card with what was found. Without --card it is a polynomial law ([law]) beside which the records are diagnosed anew, so that causes may differ from those without --save. Not saved, with exit status 2, if its calibration does not converge.
-    plan : list[str]
-        Chamber profiles of a planned campaign, as text or as files, one for each run: predict which effects the campaign can
-        identify with the gyro of --card, and how small they may be. Further profiles may follow without --plan.
-    next_ : bool
-        Propose the next run: the profile that separates what is still confused, or else sharpens what was found, per hour of chamber.
-    chamber : str
-        Limits of the chamber, such as "rate 3 range -40 85" (K/min, °C), for --plan and for the next run.
-    device : list[str]
-        A device of a fleet and its records, such as A=a1.csv,a2.csv; repeat it for each device of the same design. Shows what the
-        devices have in common and which one differs.
-    fleet : str
-        The same as a file (TOML): a table [devices] with lines such as A = ["a1.csv", "a2.csv"], beside the records.
+    Args:
+        runs: Records (CSV with time_s), or one table with temperature_degC,frequency_Hz.
+        card: The gyro's card. The records are compared with its simulation, calibrated within the card's uncertainties.
+        save: Save the extended model as a card (TOML): the card with what was found. Without --card it is a polynomial
+            law ([law]) beside which the records are diagnosed anew, so that causes may differ from those without
+            --save. Not saved, with exit status 2, if its calibration does not converge.
+        plan: Chamber profiles of a planned campaign, as text or as files, one for each run: predict which effects the
+            campaign can identify with the gyro of --card, and how small they may be. Further profiles may follow
+            without --plan.
+        next_: Propose the next run: the profile that separates what is still confused, or else sharpens what was found,
+            per hour of chamber.
+        chamber: Limits of the chamber, such as "rate 3 range -40 85" (K/min, °C), for --plan and for the next run.
+        device: A device of a fleet and its records, such as A=a1.csv,a2.csv; repeat it for each device of the same
+            design. Shows what the devices have in common and which one differs.
+        fleet: The same as a file (TOML): a table [devices] with lines such as A = ["a1.csv", "a2.csv"], beside the
+            records.
     """
     limits = None if chamber is None else parse_chamber(chamber)
     if plan:

@@ -12,10 +12,8 @@ from studies.results import Column, Result, Sentence, Table, row_of
 def effects(name: str = "") -> Result:
     """List the physical effects that a diagnosis can name and an `[[effect]]` table of a card can have.
 
-    Parameters
-    ----------
-    name : str
-        Show one effect: parameters, units, bounds, drives, source, isolating experiment.
+    Args:
+        name: Show one effect: parameters, units, bounds, drives, source, isolating experiment.
     """
     chosen = [find_effect(name)] if name else list(library().values())
     entries = [describe(effect) for effect in chosen]

@@ -35,14 +35,10 @@ def electrodes(
 ) -> Result:
     """Show the effects of the card's table [electrodes] on a mode pair: softening, split, coefficients, pull-in, trim voltages.
 
-    Parameters
-    ----------
-    split : float
-        Split in Hz to be nulled; by default that of the card.
-    axis : float
-        Azimuth in degrees of an antinode of its slower mode.
-    limit : float
-        Largest trim voltage in V.
+    Args:
+        split: Split in Hz to be nulled; by default that of the card.
+        axis: Azimuth in degrees of an antinode of its slower mode.
+        limit: Largest trim voltage in V.
     """
     if (split is None) != (axis is None):
         raise InputError("a split that is to be nulled needs both --split (Hz) and --axis (degrees).")

@@ -38,18 +38,12 @@ def fit_bias(
     they improve the fit. Terms are selected in two ways, shown side by side: as in the paper, and guarded against autocorrelated
     noise. Give several runs, cooling and warming, so that whole runs can be held out.
 
-    Parameters
-    ----------
-    method : str
-        Selection whose model is saved.
-    average : float
-        Seconds averaged into one row before the fit; by default 100, or less for a short run.
-    window : float
-        Seconds over which the rate is taken; by default three times the average.
-    causal : bool
-        Take the rate from past samples only, as firmware must; it then lags by half the window.
-    over : str
-        Variable of the fit; auto is the frequency if every record has it, else a temperature.
+    Args:
+        method: Selection whose model is saved.
+        average: Seconds averaged into one row before the fit; by default 100, or less for a short run.
+        window: Seconds over which the rate is taken; by default three times the average.
+        causal: Take the rate from past samples only, as firmware must; it then lags by half the window.
+        over: Variable of the fit; auto is the frequency if every record has it, else a temperature.
     """
     if not data:
         raise InputError("name at least one record (CSV) of a gyro at rest while its temperature changes.")

@@ -58,16 +58,11 @@ def fit_cross_damping(
     The records are of a gyro at rest: time_s, a temperature, and bias_deg_per_h or measured_rate_deg_per_s. The output depends
     only on the product of cross-damping and frequency, so the coefficients are only as accurate as the given frequency.
 
-    Parameters
-    ----------
-    frequency : float
-        Natural frequency in Hz; by default the median of frequency_Hz in the records.
-    quality : float
-        Quality factor Q, which gives the relative damping 1/(2Q); by default from inverse_q in the records.
-    order : int
-        Highest power of the temperature; the paper uses 3.
-    calibration_temperature : float
-        Temperature in °C about which the polynomial is expanded.
+    Args:
+        frequency: Natural frequency in Hz; by default the median of frequency_Hz in the records.
+        quality: Quality factor Q, which gives the relative damping 1/(2Q); by default from inverse_q in the records.
+        order: Highest power of the temperature; the paper uses 3.
+        calibration_temperature: Temperature in °C about which the polynomial is expanded.
     """
     if not data:
         raise InputError("name at least one record (CSV) of a gyro at rest.")

@@ -46,24 +46,17 @@ def fit_frequency(
 ) -> Result:
     """Fit a polynomial to frequency over temperature and invert it (HRG paper, equations 16 to 18, Table 2).
 
-    Parameters
-    ----------
-    table : str
-        A CSV file with the columns temperature_degC,frequency_Hz, or a record. The settled parts (soaks) of a record become
-        the points of the fit; a hold that ends shortly before it settles is extrapolated along its exponential.
-    more : str
-        More records of the same gyro.
-    time_constant : float
-        Slowest time constant of the gyro in s, used to judge whether a record has settled; hrg fit thermal measures it. If the
-        records show a longer one, that one is used.
-    left : float
-        A soak counts as settled when the temperature is within this of its final value, in K.
-    order : int
-        Order of the polynomial; the paper uses 3.
-    reference_temperature : float
-        Temperature T0 in °C about which the polynomial is expanded.
-    resolution : float
-        Resolution of the frequency readings in Hz; by default the last digit in the file.
+    Args:
+        table: A CSV file with the columns temperature_degC,frequency_Hz, or a record. The settled parts (soaks) of a
+            record become the points of the fit; a hold that ends shortly before it settles is extrapolated along its
+            exponential.
+        more: More records of the same gyro.
+        time_constant: Slowest time constant of the gyro in s, used to judge whether a record has settled; hrg fit
+            thermal measures it. If the records show a longer one, that one is used.
+        left: A soak counts as settled when the temperature is within this of its final value, in K.
+        order: Order of the polynomial; the paper uses 3.
+        reference_temperature: Temperature T0 in °C about which the polynomial is expanded.
+        resolution: Resolution of the frequency readings in Hz; by default the last digit in the file.
     """
     T, f, step, source, soaks = _read_points((table, *more), time_constant, left)
     with naming(table):

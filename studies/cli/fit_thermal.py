@@ -36,12 +36,9 @@ def fit_thermal(
     lags with heat exchange by conduction and radiation. The initial temperatures of each run are fitted, and the noise may
     drift. The intervals hold only for a gyro that fits this model; a residual well above the white noise shows a misfit.
 
-    Parameters
-    ----------
-    card : str
-        A card whose law gives the curvature of frequency over temperature; without it the curvature is fitted.
-    lags : int
-        Number of lags; by default as many as the records support.
+    Args:
+        card: A card whose law gives the curvature of frequency over temperature; without it the curvature is fitted.
+        lags: Number of lags; by default as many as the records support.
     """
     if not data:
         raise InputError("name at least one record (CSV) with a step, a ramp or a cycle of temperature.")

@@ -54,16 +54,11 @@ def fit_whole_angle(
     rate was applied. Precess the wave in both directions: one direction does not determine the gain ratio. The phase error is
     that of the whole path; the gain ratio of the drives is taken from the card.
 
-    Parameters
-    ----------
-    card : str
-        Its card: gives the Bryan factor, the scale of quadrature_V and the gains of the drives.
-    bryan_factor : float
-        Bryan factor, used instead of the card's.
-    quadrature_volts_per_hertz : float
-        Scale of quadrature_V; without it and without a card, that column is not used.
-    save : str
-        Write the card with the estimates and their uncertainties.
+    Args:
+        card: Its card: gives the Bryan factor, the scale of quadrature_V and the gains of the drives.
+        bryan_factor: Bryan factor, used instead of the card's.
+        quadrature_volts_per_hertz: Scale of quadrature_V; without it and without a card, that column is not used.
+        save: Write the card with the estimates and their uncertainties.
     """
     instrument = load_card(card) if card else None
     if save is not None and instrument is None:

@@ -18,17 +18,13 @@ def fleet(folder: str, *, out: str, card: str | None = None, workers: Annotated[
 
     Run it again to go on, or after adding devices: only new or changed devices are computed.
 
-    Parameters
-    ----------
-    folder : str
-        Folder of the lot: a folder for each device, named by its serial number, with the device's records (CSV) and, if it has its own,
-        its card (TOML). A file lot.csv with the columns serial, date, batch may stand beside them.
-    out : str
-        Folder for the answers: lot.html, lot.json, and a page and an answer for each device in devices/.
-    card : str
-        The card of the design. Without it each device gets a polynomial card from its records.
-    workers : int
-        Devices processed at the same time.
+    Args:
+        folder: Folder of the lot: a folder for each device, named by its serial number, with the device's records (CSV)
+            and, if it has its own, its card (TOML). A file lot.csv with the columns serial, date, batch may stand
+            beside them.
+        out: Folder for the answers: lot.html, lot.json, and a page and an answer for each device in devices/.
+        card: The card of the design. Without it each device gets a polynomial card from its records.
+        workers: Devices processed at the same time.
     """
     from studies.fleet.folder import read_lot
     from studies.fleet.run import run_lot

@@ -49,16 +49,12 @@ def import_(
     are brought onto the times of the first group (mean, nearest, linear or previous). Spikes, stuck readings and dropouts to 0 are
     counted and left as they are, unless the map says drop. An --out that ends in .parquet is a Parquet file.
 
-    Parameters
-    ----------
-    raw : str
-        Raw files: text with any separator, Excel workbooks, TDMS, MDF, HDF5, MATLAB or Parquet files; in the order of the map's [[file]] tables.
-    map_ : str
-        The map (schema hrg.map/1): columns, units, signs, clocks, resampling.
-    out : str
-        The record to write (.csv or .parquet).
-    draft : str
-        Draft a map from the files instead; an existing file is not overwritten.
+    Args:
+        raw: Raw files: text with any separator, Excel workbooks, TDMS, MDF, HDF5, MATLAB or Parquet files; in the order
+            of the map's [[file]] tables.
+        map_: The map (schema hrg.map/1): columns, units, signs, clocks, resampling.
+        out: The record to write (.csv or .parquet).
+        draft: Draft a map from the files instead; an existing file is not overwritten.
     """
     if not raw:
         raise InputError("no raw file given: 'hrg import RAW --draft MAP.toml' drafts a map from it.")

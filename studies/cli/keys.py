@@ -17,12 +17,10 @@ COLUMNS = ("key", "unit", Column("shown", "default"), "bounds", Column("uncertai
 def keys(kind: str = "card", *, table: str = "") -> Result:
     """List the keys of a file with their units, defaults, bounds and meaning.
 
-    Parameters
-    ----------
-    kind : str
-        card, study, design (of hrg optimise), map (of hrg import), model (of hrg fit and hrg compensate) or limits (of hrg acceptance).
-    table : str
-        Only the keys of this table and the tables in it, such as thermal or loss.film.
+    Args:
+        kind: card, study, design (of hrg optimise), map (of hrg import), model (of hrg fit and hrg compensate) or
+            limits (of hrg acceptance).
+        table: Only the keys of this table and the tables in it, such as thermal or loss.film.
     """
     if kind not in KINDS:
         raise InputError(f"there are no keys of '{kind}'{nearest(kind, KINDS)}")

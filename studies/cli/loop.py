@@ -53,24 +53,16 @@ def loop(
     unstable loop is rejected, with the margin. The run contains only what the loops do: bias offset, bias polynomial and
     [[effect]] tables are applied by hrg simulate, which treats the loops as settled.
 
-    Parameters
-    ----------
-    rate : float
-        Applied rate in °/s, within the range of the actuators.
-    out : str
-        Simulate a run and write it as a record.
-    state_space : str
-        Write the wave and the closed loops as A, B, C, D, and each loop's transfer function: a .json or a .mat file.
-    hours : float
-        Length of the run; 1 unless --hours or --profile is given.
-    row : float
-        Time between rows of the run in s; 1 unless given.
-    profile : str
-        Chamber profile of the run, as for hrg simulate; frequency and loss follow the temperature.
-    both_ways : bool
-        Reverse the self-precession halfway through the run (whole-angle cards only).
-    noiseless : bool
-        Run without noise.
+    Args:
+        rate: Applied rate in °/s, within the range of the actuators.
+        out: Simulate a run and write it as a record.
+        state_space: Write the wave and the closed loops as A, B, C, D, and each loop's transfer function: a .json or a
+            .mat file.
+        hours: Length of the run; 1 unless --hours or --profile is given.
+        row: Time between rows of the run in s; 1 unless given.
+        profile: Chamber profile of the run, as for hrg simulate; frequency and loss follow the temperature.
+        both_ways: Reverse the self-precession halfway through the run (whole-angle cards only).
+        noiseless: Run without noise.
     """
     instrument, T = open_card(card, temperature)
     keys = require_loop(instrument)

@@ -50,10 +50,8 @@ def loss(
     Thermoelastic, bulk and surface losses follow from geometry and material. Films, gas, activated losses, imbalance and
     mount loss are set in the card's table [loss], in [[loss.film]] and [[loss.activated]].
 
-    Parameters
-    ----------
-    anchor : bool
-        Compute the anchor loss of a stem (a second or two).
+    Args:
+        anchor: Compute the anchor loss of a stem (a second or two).
     """
     temperatures = lay_temperatures(from_degC, to_degC, step)
     instrument = load_card(card)

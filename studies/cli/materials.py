@@ -24,12 +24,10 @@ if TYPE_CHECKING:
 def materials(name: str = "", *, compare: bool = False, card: Card = "", harmonic: Harmonic = 2) -> Result:
     """List the materials and their published laws, or compare them in one geometry.
 
-    Parameters
-    ----------
-    name : str
-        Show one material's laws with their properties, sources and ranges.
-    compare : bool
-        Compare all laws in the geometry of --card (free-dome unless given): frequency, TCF, thermoelastic Q, and the surface loss worth reaching.
+    Args:
+        name: Show one material's laws with their properties, sources and ranges.
+        compare: Compare all laws in the geometry of --card (free-dome unless given): frequency, TCF, thermoelastic Q,
+            and the surface loss worth reaching.
     """
     if card and not compare:
         raise InputError(f"--card {card}: it belongs to --compare; add that.")

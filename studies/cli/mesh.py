@@ -39,16 +39,11 @@ def mesh(
     and rim in the card's [imperfection], but not its masses and material variations. With the default mesh of free-dome, CalculiX
     gives n = 2 0.5 % too high; with --around 72 --spacing-mm 1.5, 0.2 %.
 
-    Parameters
-    ----------
-    layers : int
-        Elements through the thickness.
-    around : int
-        Elements around the axis.
-    spacing_mm : float
-        Longest element along the meridian; a sixth of the radius unless given.
-    complete : bool
-        Add nodes at the centres of faces and elements: 27 and 18 for each element instead of 20 and 15.
+    Args:
+        layers: Elements through the thickness.
+        around: Elements around the axis.
+        spacing_mm: Longest element along the meridian; a sixth of the radius unless given.
+        complete: Add nodes at the centres of faces and elements: 27 and 18 for each element instead of 20 and 15.
     """
     kind = ending_of(out, KINDS)
     if complete and kind == ".inp":

@@ -61,20 +61,15 @@ def modes(
 ) -> Result:
     """Compute the lowest modes of a resonator: frequency, Bryan factor, energies, sensitivities.
 
-    Parameters
-    ----------
-    harmonic : tuple[int, ...]
-        One or more circumferential harmonics n, for example --harmonic 0 1 2 3.
-    count : int
-        Number of modes of each harmonic.
-    tolerance : float
-        Largest relative discretization error of the frequency.
-    sensitivities : bool
-        Show the sensitivities of each frequency to E, ν, ρ, thickness and radius, and where its energy is.
-    spin : float
-        Rate of rotation about the axis in °/s: frequencies of the two travelling waves, with second-order effects.
-    amplitude : float
-        Largest displacement in µm: shift of the frequency by geometric nonlinearity.
+    Args:
+        harmonic: One or more circumferential harmonics n, for example --harmonic 0 1 2 3.
+        count: Number of modes of each harmonic.
+        tolerance: Largest relative discretization error of the frequency.
+        sensitivities: Show the sensitivities of each frequency to E, ν, ρ, thickness and radius, and where its energy
+            is.
+        spin: Rate of rotation about the axis in °/s: frequencies of the two travelling waves, with second-order
+            effects.
+        amplitude: Largest displacement in µm: shift of the frequency by geometric nonlinearity.
     """
     instrument, T = open_card(card, temperature)
     detailed = theory != "rayleigh"

@@ -27,14 +27,10 @@ from studies.sweeps.spec import shipped_specs
 def card(path: str, *, like: str = "hrg-30mm", name: str | None = None) -> int:
     """Write a card template: a copy of a built-in card, with all other optional tables as comments.
 
-    Parameters
-    ----------
-    path : str
-        The card (TOML) to write; an existing file is not overwritten.
-    like : str
-        A built-in card (see hrg cards), or the path of a card, to copy.
-    name : str
-        Name of the instrument; default: the name of the file.
+    Args:
+        path: The card (TOML) to write; an existing file is not overwritten.
+        like: A built-in card (see hrg cards), or the path of a card, to copy.
+        name: Name of the instrument; default: the name of the file.
     """
     _refuse_existing(path)
     model = load_card(like)
@@ -56,12 +52,9 @@ OtherCard = Annotated[str | None, OTHER]
 def study(path: str, *, like: str = "dimension-tolerance", card_: OtherCard = None) -> int:
     """Write a template for the spec of a study.
 
-    Parameters
-    ----------
-    path : str
-        The spec (TOML) to write; an existing file is not overwritten.
-    like : str
-        A built-in study: frequency-over-temperature, dimension-tolerance, dimension-influence, split-tolerance.
+    Args:
+        path: The spec (TOML) to write; an existing file is not overwritten.
+        like: A built-in study: frequency-over-temperature, dimension-tolerance, dimension-influence, split-tolerance.
     """
     _copy(path, find_shipped(like, shipped_specs(), "study"), card_, StudyKeys, "study")
     say(f"{path}: written as a copy of {like}. Edit it, then run: hrg study run {path} --dry-run")
@@ -71,12 +64,9 @@ def study(path: str, *, like: str = "dimension-tolerance", card_: OtherCard = No
 def design(path: str, *, like: str = "dome-8khz", card_: OtherCard = None) -> int:
     """Write a template of a task for hrg optimise.
 
-    Parameters
-    ----------
-    path : str
-        The task (TOML) to write; an existing file is not overwritten.
-    like : str
-        A worked design: dome-8khz, light-cylinder, robust-dome.
+    Args:
+        path: The task (TOML) to write; an existing file is not overwritten.
+        like: A worked design: dome-8khz, light-cylinder, robust-dome.
     """
     _copy(path, find_shipped(like, shipped_tasks(), "design"), card_, DesignKeys, "design")
     say(f"{path}: written as a copy of {like}. Edit it, then run: hrg optimise {path} --out FOLDER")

@@ -35,13 +35,10 @@ def optimise(design: str, *, out: str, workers: Workers = None, quiet: Quiet = F
     Run again with the same folder to resume: finished designs are never computed again, and objectives, limits and bounds
     may change between runs.
 
-    Parameters
-    ----------
-    design : str
-        A TOML file with schema = "hrg.design/1", or the name of a worked design: dome-8khz, light-cylinder, robust-dome.
-        hrg design new FILE writes one to start from; hrg keys design lists its keys.
-    out : str
-        Folder for the best design as a card (best.toml), all designs (evaluations.csv) and the store.
+    Args:
+        design: A TOML file with schema = "hrg.design/1", or the name of a worked design: dome-8khz, light-cylinder,
+            robust-dome. hrg design new FILE writes one to start from; hrg keys design lists its keys.
+        out: Folder for the best design as a card (best.toml), all designs (evaluations.csv) and the store.
     """
     try:
         found = find_best(design, out, workers=workers, show_progress=not quiet)

@@ -52,24 +52,16 @@ def render(
     Several cards, or one card at several temperatures, stand side by side in pictures and animations on one scale.
     A PNG, WebP or GIF needs OpenGL; without it the exit status is 3 and the message says what to install.
 
-    Parameters
-    ----------
-    card : str
-        Cards by path, or the names of ones that ship (hrg cards).
-    harmonic : tuple[int, ...]
-        Circumferential harmonic n, 2 unless given; several only for .html, which lets you choose among them.
-    index : int
-        0 for the lowest mode of its harmonic.
-    temperature : tuple[float, ...]
-        Temperature of the resonator in °C; the card's reference temperature unless given.
-    colour : str
-        What the colour shows: displacement, strain-energy density, or a temperature field.
-    field : str
-        Table with position (0 ... 1 along the meridian) and temperature_degC, for --colour temperature.
-    view : str
-        oblique into the open end, along the axis, or from the side.
-    swing_mm : float
-        Displacement at the antinode in mesh files; unless given, .stl and .ply are undeformed and .glb swings visibly.
+    Args:
+        card: Cards by path, or the names of ones that ship (hrg cards).
+        harmonic: Circumferential harmonic n, 2 unless given; several only for .html, which lets you choose among them.
+        index: 0 for the lowest mode of its harmonic.
+        temperature: Temperature of the resonator in °C; the card's reference temperature unless given.
+        colour: What the colour shows: displacement, strain-energy density, or a temperature field.
+        field: Table with position (0 ... 1 along the meridian) and temperature_degC, for --colour temperature.
+        view: oblique into the open end, along the axis, or from the side.
+        swing_mm: Displacement at the antinode in mesh files; unless given, .stl and .ply are undeformed and .glb swings
+            visibly.
     """
     from studies.reports.mode_picture import view_blocks
 

@@ -26,10 +26,8 @@ def reproduce(*, out: str = "report") -> Result:
 
     Writes report.html, summary.json, table1.csv and table2.csv.
 
-    Parameters
-    ----------
-    out : str
-        Folder for the files; created if it does not exist.
+    Args:
+        out: Folder for the files; created if it does not exist.
     """
     folder = check_folder(out)
     parts = _reproduce()

@@ -84,24 +84,15 @@ def scan(
     the face in µm, positive away from the material. Faces are aligned with the card's resonator; gaps and outliers are
     allowed. Eccentricity of the two spheres is part of the wall only if both share one frame (--frames common).
 
-    Parameters
-    ----------
-    inner : str
-        Points of the inner face; none if only the outer face was measured.
-    outer : str
-        Points of the outer face; none if only the inner face was measured.
-    unit : str
-        Unit of the points.
-    frames : str
-        own: each face has its own coordinate frame. common: both share one frame, and eccentricity counts.
-    harmonic : tuple[int, ...]
-        Harmonics n of the splits.
-    highest : int
-        Highest circumferential harmonic of the fit, at least twice the highest n.
-    map_file : str
-        Write a CSV file: position, azimuth, and deviations of faces, wall and middle surface.
-    save : str
-        Write a card with the fitted faces as its imperfection; the tables are written beside it.
+    Args:
+        inner: Points of the inner face; none if only the outer face was measured.
+        outer: Points of the outer face; none if only the inner face was measured.
+        unit: Unit of the points.
+        frames: own: each face has its own coordinate frame. common: both share one frame, and eccentricity counts.
+        harmonic: Harmonics n of the splits.
+        highest: Highest circumferential harmonic of the fit, at least twice the highest n.
+        map_file: Write a CSV file: position, azimuth, and deviations of faces, wall and middle surface.
+        save: Write a card with the fitted faces as its imperfection; the tables are written beside it.
     """
     files = {name: path for name, path in (("inner", inner), ("outer", outer)) if path != NONE}
     if not files:

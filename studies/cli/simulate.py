@@ -41,23 +41,18 @@ def simulate(
     The gyro is described by the card's optional tables [thermal], [loss], [bias], [loop], [noise] and [[effect]]; all keys have
     defaults (hrg keys card).
 
-    Parameters
-    ----------
-    profile : str
-        A CSV file (time_s,chamber_temperature_degC, linear between its rows; drive_amplitude_V, electrode_bias_V,
-        quadrature_V or pattern_angle_deg beside them command the drives, rate_deg_per_s is applied), or words in quotes with temperatures in °C,
-        durations as 5h, 30min or 90s, and rates in K/min: "soak T DURATION", "step FROM TO DURATION",
-        "ramp FROM TO RATE", "staircase FROM TO STEP HOLD", "cycle START FIRST SECOND RATE HOLD COUNT", joined by "then";
-        for example "step 20 -10 5h then ramp -10 40 1". Or a record: its housing column, else its chamber column, is
-        imposed on its own rows. The gyro starts settled at the first temperature.
-    row : float
-        Time between rows in s; a record has its own rows.
-    noiseless : bool
-        Leave out noise, sensor lag and rounding.
-    boundary : str
-        Column of a record that is imposed: chamber or housing.
-    spread : bool
-        Show the standard deviation of every column due to the uncertainties of the card, without noise.
+    Args:
+        profile: A CSV file (time_s,chamber_temperature_degC, linear between its rows; drive_amplitude_V,
+            electrode_bias_V, quadrature_V or pattern_angle_deg beside them command the drives, rate_deg_per_s is
+            applied), or words in quotes with temperatures in °C, durations as 5h, 30min or 90s, and rates in K/min:
+            "soak T DURATION", "step FROM TO DURATION", "ramp FROM TO RATE", "staircase FROM TO STEP HOLD", "cycle START
+            FIRST SECOND RATE HOLD COUNT", joined by "then"; for example "step 20 -10 5h then ramp -10 40 1". Or a
+            record: its housing column, else its chamber column, is imposed on its own rows. The gyro starts settled at
+            the first temperature.
+        row: Time between rows in s; a record has its own rows.
+        noiseless: Leave out noise, sensor lag and rounding.
+        boundary: Column of a record that is imposed: chamber or housing.
+        spread: Show the standard deviation of every column due to the uncertainties of the card, without noise.
     """
     instrument = load_card(card)
     run = simulate_run(instrument, load_drive(profile, boundary, 1 / row), 1 / row, seed, not noiseless, theory)

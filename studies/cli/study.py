@@ -42,31 +42,27 @@ def run(
 
     Exit status 4: the study is finished but some cases failed; the results give the reasons.
 
-    Parameters
-    ----------
-    spec : str
-        Path of a spec, or the name of a built-in one: frequency-over-temperature, dimension-tolerance, dimension-influence,
-        split-tolerance. A spec is a TOML file. At its top: schema = "hrg.study/1", name, card (a built-in one, or a path relative to the spec).
-        [sampling]: method = grid, list, latin-hypercube, sobol, sensitivity or one-at-a-time; cases, seed, batch, solver.
-        [[parameter]]: name (a key of the card such as resonator.thickness_mm, or temperature_degC, or user.NAME for your own
-        function) with tolerance, or low and high, or values; nominal, count, distribution = uniform, normal (with
-        standard_deviation), triangular or log-uniform. [[quantity]]: name = bryan-factor, compensation-residual, frequency,
-        loads, loop-drift, loss, mass, mode-separation, python, q, split, split-per-wave, tcf or thermal-time-constants, with harmonic, index, theory, temperature_degC, label and its own keys.
-        [[requirement]]: column with within (of target), or low, high. [[search]]: kind = worst-case with column,
-        inversion with vary and targets, or tolerance with share (the tolerances with which that share of designs meets the requirements). Example: hrg study new spec.toml.
-    out : str
-        Folder for the results; required except with --dry-run. Run again with the same folder to resume.
-    scheduler : str
-        Address of a Dask scheduler (tcp://HOST:8786) whose workers compute the study. Use only one that you trust: the scheduler
-        and its workers can run code on this machine. A public address needs tls:// and certificates in Dask's configuration.
-    card : str
-        Card to use instead of the one in the spec.
-    allow_python : bool
-        Allow the Python functions named in the spec to run. Read them first.
-    retry_failed : bool
-        Compute failed cases again; cases whose worker was lost are always repeated.
-    dry_run : bool
-        Estimate the number of cases, time and memory; save nothing.
+    Args:
+        spec: Path of a spec, or the name of a built-in one: frequency-over-temperature, dimension-tolerance,
+            dimension-influence, split-tolerance. A spec is a TOML file. At its top: schema = "hrg.study/1", name, card
+            (a built-in one, or a path relative to the spec). [sampling]: method = grid, list, latin-hypercube, sobol,
+            sensitivity or one-at-a-time; cases, seed, batch, solver. [[parameter]]: name (a key of the card such as
+            resonator.thickness_mm, or temperature_degC, or user.NAME for your own function) with tolerance, or low and
+            high, or values; nominal, count, distribution = uniform, normal (with standard_deviation), triangular or
+            log-uniform. [[quantity]]: name = bryan-factor, compensation-residual, frequency, loads, loop-drift, loss,
+            mass, mode-separation, python, q, split, split-per-wave, tcf or thermal-time-constants, with harmonic,
+            index, theory, temperature_degC, label and its own keys. [[requirement]]: column with within (of target), or
+            low, high. [[search]]: kind = worst-case with column, inversion with vary and targets, or tolerance with
+            share (the tolerances with which that share of designs meets the requirements). Example: hrg study new
+            spec.toml.
+        out: Folder for the results; required except with --dry-run. Run again with the same folder to resume.
+        scheduler: Address of a Dask scheduler (tcp://HOST:8786) whose workers compute the study. Use only one that you
+            trust: the scheduler and its workers can run code on this machine. A public address needs tls:// and
+            certificates in Dask's configuration.
+        card: Card to use instead of the one in the spec.
+        allow_python: Allow the Python functions named in the spec to run. Read them first.
+        retry_failed: Compute failed cases again; cases whose worker was lost are always repeated.
+        dry_run: Estimate the number of cases, time and memory; save nothing.
     """
     if workers is not None and scheduler is not None:
         raise InputError("--workers and --scheduler cannot be combined: give one of them.")
@@ -117,10 +113,8 @@ def status(folder: Folder) -> Result:
 def report(folder: Folder, *, out: Annotated[str | None, Parameter(name=("--report", "--out"))] = None) -> Result:
     """Write a self-contained HTML page: definition, results, figures, sensitivities, yield and provenance.
 
-    Parameters
-    ----------
-    out : str
-        The page; default: report.html in the folder.
+    Args:
+        out: The page; default: report.html in the folder.
     """
     results = open_results(folder)
     page = Path(out) if out else Path(folder) / "report.html"
@@ -136,10 +130,8 @@ def report(folder: Folder, *, out: Annotated[str | None, Parameter(name=("--repo
 def export(folder: Folder, *, out: str | None = None) -> Result:
     """Write the results as CSV, and the unit of every column to a JSON file.
 
-    Parameters
-    ----------
-    out : str
-        The CSV file; default: results.csv in the folder.
+    Args:
+        out: The CSV file; default: results.csv in the folder.
     """
     results = open_results(folder)
     path = Path(out) if out else Path(folder) / "results.csv"

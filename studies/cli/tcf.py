@@ -38,11 +38,9 @@ def tcf(
 ) -> Result:
     """Show the frequency over temperature, its slope in ppm/°C, and the contributions of E, ν, ρ, h, r and the [mount].
 
-    Parameters
-    ----------
-    measured : str
-        A steady-state table (temperature_degC,frequency_Hz) to compare by its local slopes; for the card hrg-30mm,
-        Table 1 of the HRG paper unless another is given.
+    Args:
+        measured: A steady-state table (temperature_degC,frequency_Hz) to compare by its local slopes; for the card
+            hrg-30mm, Table 1 of the HRG paper unless another is given.
     """
     if harmonic > MOST_HARMONIC and theory != "rayleigh":
         raise InputError(

@@ -26,14 +26,10 @@ def temperature(model: str, run: str, /, *, out: str | None = None) -> Result:
     No thermometer is needed: the resonator serves as one. The record is written again with a column
     resonator_temperature_degC, over which 'hrg fit bias --over temperature' can compensate other outputs.
 
-    Parameters
-    ----------
-    model : str
-        A frequency model (TOML) that 'hrg fit frequency --save' wrote.
-    run : str
-        A record (CSV) with frequency_Hz.
-    out : str
-        Write the record with the temperature.
+    Args:
+        model: A frequency model (TOML) that 'hrg fit frequency --save' wrote.
+        run: A record (CSV) with frequency_Hz.
+        out: Write the record with the temperature.
     """
     loaded = read_model(model)
     if loaded.kind != "frequency":

@@ -38,15 +38,13 @@ def thermal(
 
     The heat path is the card's table [thermal] with its defaults (hrg keys card).
 
-    Parameters
-    ----------
-    profile : str
-        A CSV file (time_s,chamber_temperature_degC, linear between its rows), or words in quotes with temperatures in °C,
-        durations as 5h, 30min or 90s, and rates in K/min: "soak T DURATION", "step FROM TO DURATION",
-        "ramp FROM TO RATE", "staircase FROM TO STEP HOLD", "cycle START FIRST SECOND RATE HOLD COUNT", joined by "then";
-        for example "step 20 -10 5h then ramp -10 40 1". The gyro starts settled at its first temperature.
-    rows : int
-        Rows of the table, evenly spaced in time.
+    Args:
+        profile: A CSV file (time_s,chamber_temperature_degC, linear between its rows), or words in quotes with
+            temperatures in °C, durations as 5h, 30min or 90s, and rates in K/min: "soak T DURATION", "step FROM TO
+            DURATION", "ramp FROM TO RATE", "staircase FROM TO STEP HOLD", "cycle START FIRST SECOND RATE HOLD COUNT",
+            joined by "then"; for example "step 20 -10 5h then ramp -10 40 1". The gyro starts settled at its first
+            temperature.
+        rows: Rows of the table, evenly spaced in time.
     """
     instrument = load_card(card)
     chamber = load_profile(profile)

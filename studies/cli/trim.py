@@ -80,46 +80,30 @@ def trim(
     can cancel or reverse its effect; the plan solves this for the planned depth. Wide, shallow cuts and teeth are the most
     predictable. An edge cut ends along the normal of the wall; ground flat, parallel to the rim, it changes the split 4 to 6 % less.
 
-    Parameters
-    ----------
-    split : tuple[float, ...]
-        Measured splits in Hz, one for each --harmonic; by default that of the card, as hrg fit ringdown --save writes it.
-    axis : tuple[float, ...]
-        Azimuth in degrees of an antinode of the slower mode, one for each split.
-    harmonic : tuple[int, ...]
-        Harmonic n of each split.
-    reading_error : float
-        Standard error of the splits in Hz.
-    scan : str
-        Output of hrg scan --json, instead of --split and --axis: the splits of --harmonic and their intervals.
-    goal : float
-        Largest acceptable split in Hz.
-    cut : str
-        mass (unstrained mass, such as teeth or lumps), edge (off the rim, through the wall), inner or outer (off that face).
-    position : tuple[float, ...]
-        Permitted positions of cuts along the meridian, 0 ... 1 (rim).
-    width_mm : float
-        Width of a cut along the circumference.
-    length_mm : float
-        Length of a cut along the meridian.
-    depth_limit : float
-        Largest depth of a cut, as a fraction of the wall.
-    teeth : int
-        Number of teeth at the rim; cuts are then made on teeth only.
-    tooth_azimuth : float
-        Azimuth of the first tooth in degrees.
-    tooth_limit_ug : float
-        Largest mass to remove from a tooth.
-    unbalance : tuple[str, ...]
-        Known mass imbalance to correct, by harmonic, such as 1:120@35 (k = 1, 120 µg at 35°); other harmonics are preserved.
-    removal_error : float
-        Relative standard error of the mass of each cut.
-    gain_error : float
-        Relative standard error common to all cuts.
-    gain : float
-        Measured over predicted change of the split in the last round; negative if the split changed in the opposite direction.
-    out : str
-        Write the cuts as CSV, for the machine.
+    Args:
+        split: Measured splits in Hz, one for each --harmonic; by default that of the card, as hrg fit ringdown --save
+            writes it.
+        axis: Azimuth in degrees of an antinode of the slower mode, one for each split.
+        harmonic: Harmonic n of each split.
+        reading_error: Standard error of the splits in Hz.
+        scan: Output of hrg scan --json, instead of --split and --axis: the splits of --harmonic and their intervals.
+        goal: Largest acceptable split in Hz.
+        cut: mass (unstrained mass, such as teeth or lumps), edge (off the rim, through the wall), inner or outer (off
+            that face).
+        position: Permitted positions of cuts along the meridian, 0 ... 1 (rim).
+        width_mm: Width of a cut along the circumference.
+        length_mm: Length of a cut along the meridian.
+        depth_limit: Largest depth of a cut, as a fraction of the wall.
+        teeth: Number of teeth at the rim; cuts are then made on teeth only.
+        tooth_azimuth: Azimuth of the first tooth in degrees.
+        tooth_limit_ug: Largest mass to remove from a tooth.
+        unbalance: Known mass imbalance to correct, by harmonic, such as 1:120@35 (k = 1, 120 µg at 35°); other
+            harmonics are preserved.
+        removal_error: Relative standard error of the mass of each cut.
+        gain_error: Relative standard error common to all cuts.
+        gain: Measured over predicted change of the split in the last round; negative if the split changed in the
+            opposite direction.
+        out: Write the cuts as CSV, for the machine.
     """
     instrument, T = open_card(card, temperature)
     if scan is not None:

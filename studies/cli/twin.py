@@ -40,16 +40,13 @@ def twin(
     numbers are the same to 1e-9. Noise has the levels of [noise]: white, flicker as a sum of first-order processes, random walk.
     Parameters are named as in the card; shape, material laws and the number of cells are fixed when the twin is written.
 
-    Parameters
-    ----------
-    fmu : str
-        The FMU to write, with its sources; it holds a binary for 64-bit Linux if a C compiler is found (the variable CC, cc or gcc).
-    c : str
-        A folder for the C sources, created if it does not exist. main.c runs a profile (CSV) and writes a record: cc -std=c11 -O2 *.c -lm -o twin
-    fmi : str
-        Version of the FMU.
-    boundary : str
-        Input temperature: that of the chamber, or of the housing.
+    Args:
+        fmu: The FMU to write, with its sources; it holds a binary for 64-bit Linux if a C compiler is found (the
+            variable CC, cc or gcc).
+        c: A folder for the C sources, created if it does not exist. main.c runs a profile (CSV) and writes a record: cc
+            -std=c11 -O2 *.c -lm -o twin
+        fmi: Version of the FMU.
+        boundary: Input temperature: that of the chamber, or of the housing.
     """
     if fmu is None and c is None:
         raise InputError("nothing to do: give --fmu FILE.fmu, --c FOLDER, or both.")

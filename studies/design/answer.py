@@ -43,31 +43,26 @@ class Limit:
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """What a task was answered.
-
-    Attributes
-    ----------
-    start, best : (parameters,) values; before, after : their columns; foretold : the interpolant's numbers for the best one.
-    verified : the columns of the best design, solved once more from its card.
-    front : (designs, parameters) and front_values, from the best in the first objective on; single rows where one is asked.
-    history : (designs, 2) largest excess and objective of every design in the order in which it was computed.
-    evaluations, failures : how many designs were computed; the reasons of those that could not be.
-    """
+    """What a task was answered."""
 
     task: Task
+    # start, best: (parameters,) values; before, after : their columns; foretold : the interpolant's numbers for the
+    # best one.
     start: Array
     before: Array
     best: Array
     after: Array
     foretold: Array
-    verified: Array
+    verified: Array  # the columns of the best design, solved once more from its card
     limits: tuple[Limit, ...]
     spreads: tuple[Spread, ...]
+    # (designs, parameters) and front_values, from the best in the first objective on; single rows where one is asked.
     front: Array
     front_values: Array
-    history: Array
+    history: Array  # (designs, 2) largest excess and objective of every design in the order in which it was computed
     designs: Array
     values: Array
+    # evaluations, failures: how many designs were computed; the reasons of those that could not be.
     evaluations: int
     failures: tuple[tuple[Array, str], ...] = field(default=())
 
@@ -81,13 +76,7 @@ class Answer:
 
 
 def answer(task: Task, explorer: Explorer, plan: WorkPlan) -> Answer:
-    """Search, verify, and say what it costs.
-
-    Raises
-    ------
-    InputError
-        The first design has no value, or no design keeps all limits: which ones, and by how much at the nearest.
-    """
+    """Search, verify, and say what it costs."""
     search = Search(task, explorer)
     count = len(task.keys.objective)
     ends = [search.best(search.single(i)) for i in range(count)]

@@ -53,19 +53,14 @@ class Scalar:
 
 @dataclass(frozen=True, eq=False)
 class Goals:
-    """The objectives and constraints of a task over its columns.
-
-    Attributes
-    ----------
-    logarithmic : (columns,) of bool. spread, raw_spread : (columns,) of the columns as they count, and in their units.
-    nominal : (columns,) values of the first design, from which a `within` without a target counts.
-    """
+    """The objectives and constraints of a task over its columns."""
 
     task: Task
+    # (columns,) of bool. spread, raw_spread : (columns,) of the columns as they count, and in their units.
     logarithmic: NDArray[np.bool_]
     spread: Array
     raw_spread: Array
-    nominal: Array
+    nominal: Array  # (columns,) values of the first design, from which a `within` without a target counts
 
     def count(self, values: Array) -> Array:
         """Return values (…, columns) as they count: some by their logarithm."""
@@ -192,9 +187,8 @@ def step(
 ) -> tuple[Array, float, float]:
     """Minimise t on the interpolant from a start within a box, by SLSQP; where no design keeps the limits, the largest excess.
 
-    Returns
-    -------
-    x, the largest excess (in spreads), and t there.
+    Returns:
+        x, the largest excess (in spreads), and t there.
     """
     columns = np.array([one.column for one in pieces])
     slope, offset = (np.array([getattr(one, name) for one in pieces]) for name in ("slope", "offset"))

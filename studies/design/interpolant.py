@@ -17,14 +17,9 @@ APART = 1e-9  # designs nearer than this are one
 
 @dataclass(frozen=True, eq=False)
 class Interpolant:
-    """Columns over the unit box.
+    """Columns over the unit box."""
 
-    Attributes
-    ----------
-    centres : (m, p). weights : (m, columns). tail : (1 + p, columns).
-    """
-
-    centres: Array
+    centres: Array  # (m, p). weights : (m, columns). tail : (1 + p, columns)
     weights: Array
     tail: Array
 

@@ -29,17 +29,10 @@ def optimise(
 ) -> Answer:
     """Find the best design of a task, or resume where an earlier run stopped.
 
-    Parameters
-    ----------
-    source : path of a task, or the name of one that ships.
-    out : folder for the store, the best design as a card and the table of all designs; without it nothing is kept.
-    workers : processes; one for every core unless given. More than one need the guard `if __name__ == "__main__":`.
-    show_progress : bool
-
-    Raises
-    ------
-    InputError
-        An unusable task; constraints that no design keeps; a folder with the designs of another task.
+    Args:
+        source: path of a task, or the name of one that ships.
+        out: folder for the store, the best design as a card and the table of all designs; without it nothing is kept.
+        workers: processes; one for every core unless given. More than one need the guard `if __name__ == "__main__":`.
     """
     task = read_task(source)
     study = task.study

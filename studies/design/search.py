@@ -33,13 +33,7 @@ MOST_CORNERS = 256  # of the grid of steps about a design
 
 
 class Search:
-    """The designs seen so far and what becomes of them.
-
-    Attributes
-    ----------
-    x : (m, parameters) designs that have values, in parts of the ranges. values : (m, columns).
-    seen : every design looked at, in order, with its values or None.
-    """
+    """The designs seen so far and what becomes of them."""
 
     def __init__(self, task: Task, explorer: Explorer) -> None:
         self.task, self.explorer = task, explorer
@@ -48,9 +42,9 @@ class Search:
         self.steps = np.array([one.step or 0.0 for one in task.keys.parameter])
         self.start = (task.start - self.low) / self.width
         self.rng = np.random.default_rng(task.keys.search.seed)
-        self.x = np.empty((0, len(self.low)))
+        self.x = np.empty((0, len(self.low)))  # designs that have values, in parts of the ranges
         self.values = np.empty((0, len(task.columns)))
-        self.seen: dict[bytes, Array | None] = {}
+        self.seen: dict[bytes, Array | None] = {}  # every design looked at, in order, with its values
         self.failures: list[tuple[Array, str]] = []
         self._draw_first()
         self.goals: Goals = lay_goals(task, self.values, self.values[0])

@@ -26,21 +26,14 @@ NEIGHBOURS: dict[str, Any] = {"name": "mode-separation", "distances": True, "eac
 
 @dataclass(frozen=True)
 class Task:
-    """A checked task.
+    """A checked task."""
 
-    Attributes
-    ----------
-    keys : as written.
-    study : its parameters are the free ones, then those that have a tolerance only; its quantities all that is asked.
-    free : how many of the parameters are free.
-    start : the first design, array (parameters,).
-    """
-
-    keys: DesignKeys
+    keys: DesignKeys  # as written
     name: str
+    # its parameters are the free ones, then those that have a tolerance only; its quantities all that is asked.
     study: Study
-    free: int
-    start: Array
+    free: int  # how many of the parameters are free
+    start: Array  # the first design, array (parameters,)
 
     @property
     def columns(self) -> list[str]:
@@ -63,13 +56,7 @@ class Task:
 
 
 def read_task(source: str | Path) -> Task:
-    """Read a task from a TOML file, or by the name of one that ships.
-
-    Raises
-    ------
-    InputError
-        An unknown key, parameter or column (the nearest is named), a value of the wrong type or out of range.
-    """
+    """Read a task from a TOML file, or by the name of one that ships."""
     path = find_shipped(source, shipped_tasks(), "design")
     content, where = read_toml(path, SCHEMA), str(path)
     keys = read_keys(content, DesignKeys, where)

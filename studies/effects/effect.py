@@ -85,82 +85,56 @@ class Span:
 
 @dataclass(frozen=True)
 class Effect:
-    """One physical effect: a family of signatures with a prior on their size.
+    """One physical effect: a family of signatures with a prior on their size."""
 
-    Attributes
-    ----------
-    name, summary, source, isolate, sensor : str
-        Contract name; what happens; where the form comes from; the experiment that would isolate it; the sensor or
-        column that would tell it from its kin, with what that costs ("" where none does).
-    coefficients : tuple of Coefficient
-        One column each, or as many as its `spread` has members.
-    columns : callable (states, shape, response) -> (N, k) array
-        Signature of a unit of each coefficient: a change of resonator temperature in K when the effect `acts_on` the
-        temperature (frequency, bias and 1/Q then follow by themselves), else a change of the response in its own unit.
-    grid : callable (span, response) -> list of shapes
-        Shapes to look at, fine enough for a scan; all equally likely beforehand.
-    near : callable (span, response, shape) -> list of shapes, optional
-        Where the grid is coarser than what records tell apart: the shapes that one of it stands for.
-    sizes : mapping from response to number
-        How large the first coefficient is in strong cases that sources show; smaller sizes are likely as well, down to a
-        ten thousandth, every decade as much. Frequency and 1/Q count in parts of their level. Its keys are the responses
-        on which the effect acts directly.
-    shape : tuple of Parameter
-        Parameters that enter nonlinearly.
-    acts_on : str
-        "temperature" or "response".
-    needs : tuple of str
-        Drives (fields of `States`) that must be measured and must vary.
-    equivalents : mapping from response to names
-        Effects that no record of that response alone can tell from this one, whatever their evidence.
-    judge : str
-        A column of the record that settles whether it is this effect or its equivalent, where it is there.
-    positive : bool
-        Whether it cannot go against its first column.
-    event : bool
-        Whether other runs know nothing of it, so that no held-out run can confirm it.
-    by_clock : bool
-        Whether time alone drives it, so that no programme of temperatures and drives shows it better than another.
-    once : bool
-        Whether it happens once in a gyro's life rather than in every run, so that a saved card does not repeat it.
-    memory : str
-        The shape parameter that is the time constant with which fades what it had at the start of a run: of what came before
-        a record nobody knows. "" where it has none.
-    fine : bool
-        Whether its columns need the fine grid (lags of fast drives, narrow curves) before they are averaged.
-    sees_heat : bool
-        Whether an effect on the temperature depends on what the others have made of it.
-    steady : callable (temperature - reference, shape) -> (N, k) array, optional
-        What is left of it in a steady state, for tables, with `steady_grid` (low, high) -> shapes, both in K.
-    steady_words : str
-        What such a form means, in words.
-    """
-
+    # name, summary, source, isolate, sensor: Contract name; what happens; where the form comes from; the experiment
+    # that would isolate it; the sensor or column that would tell it from its kin, with what that costs ("" where none
+    # does).
     name: str
     summary: str
     source: str
     isolate: str
-    coefficients: tuple[Coefficient, ...]
+    coefficients: tuple[Coefficient, ...]  # one column each, or as many as its `spread` has members
+    # callable (states, shape, response) -> (N, k) array: Signature of a unit of each coefficient: a change of resonator
+    # temperature in K when the effect `acts_on` the temperature (frequency, bias and 1/Q then follow by themselves),
+    # else a change of the response in its own unit.
     columns: Callable[[States, Shape, str], FloatArray]
+    # callable (span, response) -> list of shapes: Shapes to look at, fine enough for a scan; all equally likely
+    # beforehand.
     grid: Callable[[Span, str], Sequence[tuple[float, ...]]]
+    # mapping from response to number: How large the first coefficient is in strong cases that sources show; smaller
+    # sizes are likely as well, down to a ten thousandth, every decade as much. Frequency and 1/Q count in parts of
+    # their level. Its keys are the responses on which the effect acts directly.
     sizes: Mapping[str, float]
     sensor: str = ""
-    shape: tuple[Parameter, ...] = ()
-    acts_on: str = "response"
-    needs: tuple[str, ...] = ()
+    shape: tuple[Parameter, ...] = ()  # parameters that enter nonlinearly
+    acts_on: str = "response"  # "temperature" or "response"
+    needs: tuple[str, ...] = ()  # drives (fields of `States`) that must be measured and must vary
+    # mapping from response to names: Effects that no record of that response alone can tell from this one, whatever
+    # their evidence.
     equivalents: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    # A column of the record that settles whether it is this effect or its equivalent, where it is there.
     judge: str = ""
-    positive: bool = False
-    event: bool = False
+    positive: bool = False  # whether it cannot go against its first column
+    event: bool = False  # whether other runs know nothing of it, so that no held-out run can confirm it
+    # Whether time alone drives it, so that no programme of temperatures and drives shows it better than another.
     by_clock: bool = False
+    # Whether it happens once in a gyro's life rather than in every run, so that a saved card does not repeat it.
     once: bool = False
+    # The shape parameter that is the time constant with which fades what it had at the start of a run: of what came
+    # before a record nobody knows. "" where it has none.
     memory: str = ""
+    # Whether its columns need the fine grid (lags of fast drives, narrow curves) before they are averaged.
     fine: bool = False
-    sees_heat: bool = False
+    sees_heat: bool = False  # whether an effect on the temperature depends on what the others have made of it
+    # callable (span, response, shape) -> list of shapes: Where the grid is coarser than what records tell apart: the
+    # shapes that one of it stands for.
     near: Callable[[Span, str, Shape], Sequence[tuple[float, ...]]] | None = None
+    # callable (temperature - reference, shape) -> (N, k) array: What is left of it in a steady state, for tables, with
+    # `steady_grid` (low, high) -> shapes, both in K.
     steady: Callable[[FloatArray, Shape], FloatArray] | None = None
     steady_grid: Callable[[float, float], Sequence[tuple[float, ...]]] | None = None
-    steady_words: str = ""
+    steady_words: str = ""  # what such a form means, in words
 
     @property
     def responses(self) -> tuple[str, ...]:
@@ -204,13 +178,7 @@ def library() -> dict[str, Effect]:
 
 
 def find_effect(name: str) -> Effect:
-    """Return the effect called `name`.
-
-    Raises
-    ------
-    InputError
-        If the library has no such effect; the message names the nearest.
-    """
+    """Return the effect called `name`."""
     try:
         return library()[name]
     except KeyError:
@@ -218,13 +186,7 @@ def find_effect(name: str) -> Effect:
 
 
 def check_effect(name: str, parameters: Mapping[str, Numbers], response: str) -> tuple[list[float], FloatArray]:
-    """Return the shape and one value a column of an effect from the numbers of a card.
-
-    Raises
-    ------
-    InputError
-        If a parameter is unknown, missing, out of its bounds or of the wrong length, or the effect does not act there.
-    """
+    """Return the shape and one value a column of an effect from the numbers of a card."""
     effect = find_effect(name)
     if response not in effect.responses:
         raise InputError(f"effect '{name}' does not act on {response}{nearest(response, effect.responses)}")
@@ -260,29 +222,16 @@ def apply_effect(
 ) -> tuple[str, FloatArray]:
     """Run one effect forward.
 
-    Parameters
-    ----------
-    name : str
-        Contract name of the effect.
-    parameters : mapping
-        Shape parameters and coefficients by name, as a diagnosis saves them; absent coefficients are zero.
-    states : States
-        The run, on an even time grid.
-    response : str, optional
-        The response to change; the effect's first one unless given.
+    Args:
+        name: Contract name of the effect.
+        parameters: Shape parameters and coefficients by name, as a diagnosis saves them; absent coefficients are zero.
+        states: The run, on an even time grid.
+        response: The response to change; the effect's first one unless given.
 
-    Returns
-    -------
-    target : str
-        "resonator_temperature" or the response.
-    change : (N,) array
-        What must be added to the target, K or the response's unit. Zero where the effect's drive (amplitude, voltage,
-        quadrature, azimuth) is not part of the run: it then stays where it was calibrated.
-
-    Raises
-    ------
-    InputError
-        As `check_effect`.
+    Returns:
+        target: "resonator_temperature" or the response.
+        change: (N,) array: What must be added to the target, K or the response's unit. Zero where the effect's drive
+            (amplitude, voltage, quadrature, azimuth) is not part of the run: it then stays where it was calibrated.
     """
     effect = find_effect(name)
     response = effect.responses[0] if response is None else response
@@ -296,17 +245,12 @@ def apply_effect(
 def apply_effects(entries: Sequence[tuple[str, str, Mapping[str, Numbers]]], states: States) -> dict[str, FloatArray]:
     """Run several effects forward, those on the temperature first: the others see the temperature that they leave.
 
-    Parameters
-    ----------
-    entries : sequence of (name, response, parameters)
-        As `[[effect]]` tables give them.
-    states : States
-        The run, on an even time grid.
+    Args:
+        entries: sequence of (name, response, parameters): As `[[effect]]` tables give them.
+        states: The run, on an even time grid.
 
-    Returns
-    -------
-    changes : dict
-        What must be added to "resonator_temperature" (K) and to each response.
+    Returns:
+        changes: What must be added to "resonator_temperature" (K) and to each response.
     """
     changes: dict[str, FloatArray] = {}
     warmed = states

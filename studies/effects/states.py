@@ -14,56 +14,34 @@ FloatArray = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class States:
-    """The drives and the thermal state of one run on an even time grid.
+    """The drives and the thermal state of one run on an even time grid."""
 
-    Attributes
-    ----------
-    run : int
-        Number of the run in its campaign, from 0.
-    time : (N,) array
-        Seconds since the start of the run, evenly spaced.
-    campaign_time : (N,) array
-        Seconds since the start of the first run.
-    housing : (N,) array
-        Temperature that drives the resonator (housing sensor, else chamber), K.
-    resonator : (N,) array
-        Temperature of the resonator, K: the housing's through one lag `tau`, unless something better is known.
-    tau : float
-        Time constant of that lag, s.
-    reference : float
-        Temperature from which polynomials count, K.
-    amplitude_squared, voltage_squared, quadrature, pattern_angle : (N,) array or None
-        Square of the drive amplitude and of the electrode bias, V²; quadrature control, V; azimuth, rad.
-    spread : (N,) array or 0
-        Variance of the resonator temperature within each sample of an averaged grid, K²: the mean of x² is x̄² + spread.
-    fading : (N,) array or 0
-        What is left of an initial offset of the resonator, e^(−t/τ), once there is a lag.
-    before : (K,) array or None
-        Temperatures at which the resonator turned in the runs before, K: all that a loop may remember of them.
-    known_rate : (N,) array or None
-        Rate of the resonator temperature, K/s, where a simulation knows it.
-    rows : int
-        Readings at even moments of which a sample is the mean.
-    record : int
-        Number of the record of which the run is an unbroken stretch; −1 where it is one by itself.
-    """
-
-    run: int
-    time: FloatArray
-    campaign_time: FloatArray
-    housing: FloatArray
+    run: int  # number of the run in its campaign, from 0
+    time: FloatArray  # (N,) array: Seconds since the start of the run, evenly spaced
+    campaign_time: FloatArray  # (N,) array: Seconds since the start of the first run
+    housing: FloatArray  # (N,) array: Temperature that drives the resonator (housing sensor, else chamber), K
+    # (N,) array: Temperature of the resonator, K: the housing's through one lag `tau`, unless something better is
+    # known.
     resonator: FloatArray
-    tau: float
-    reference: float
+    tau: float  # time constant of that lag, s
+    reference: float  # temperature from which polynomials count, K
+    # amplitude_squared, voltage_squared, quadrature, pattern_angle: (N,) array or None: Square of the drive amplitude
+    # and of the electrode bias, V²; quadrature control, V; azimuth, rad.
     amplitude_squared: FloatArray | None = None
     voltage_squared: FloatArray | None = None
     quadrature: FloatArray | None = None
     pattern_angle: FloatArray | None = None
+    # (N,) array or 0: Variance of the resonator temperature within each sample of an averaged grid, K²: the mean of x²
+    # is x̄² + spread.
     spread: FloatArray | float = 0.0
+    # (N,) array or 0: What is left of an initial offset of the resonator, e^(−t/τ), once there is a lag.
     fading: FloatArray | float = 0.0
+    # (K,) array or None: Temperatures at which the resonator turned in the runs before, K: all that a loop may remember
+    # of them.
     before: FloatArray | None = None
-    rows: int = 1
-    record: int = -1
+    rows: int = 1  # readings at even moments of which a sample is the mean
+    record: int = -1  # number of the record of which the run is an unbroken stretch; −1 where it is one by itself
+    # (N,) array or None: Rate of the resonator temperature, K/s, where a simulation knows it.
     known_rate: FloatArray | None = None
 
     @property
@@ -138,12 +116,9 @@ def lag(drive: FloatArray, step: float, tau: float) -> FloatArray:
 
     Exact for a drive that is linear between its samples (first-order hold).
 
-    Parameters
-    ----------
-    drive : (N,) or (N, m) array
-        Input on an even grid, or several side by side.
-    step, tau : float
-        Time step and time constant, s.
+    Args:
+        drive: (N,) or (N, m) array: Input on an even grid, or several side by side.
+        step, tau: Time step and time constant, s.
     """
     ratio = step / tau
     decay = np.exp(-ratio)
@@ -158,18 +133,13 @@ def play(drive: FloatArray, radius: float | Sequence[float], start: float = 0.0)
     p_k = min(u_k + r, max(u_k − r, p_{k−1})), with p_0 = u_0 + start · r. While u rises that is max(u_k − r, p before),
     while it falls min(u_k + r, p before), so that each branch is done at once.
 
-    Parameters
-    ----------
-    drive : (N,) array
-        Input.
-    radius : float or (R,) sequence
-        Half width of the loop, in the unit of the drive.
-    start : float
-        Where in its band the operator starts, −1 … 1.
+    Args:
+        drive: (N,) array: Input.
+        radius: float or (R,) sequence: Half width of the loop, in the unit of the drive.
+        start: Where in its band the operator starts, −1 … 1.
 
-    Returns
-    -------
-    output : (N,) or (N, R) array
+    Returns:
+        output: (N,) or (N, R) array
     """
     radii = np.atleast_1d(np.asarray(radius, dtype=float))
     out = np.empty((drive.size, radii.size))

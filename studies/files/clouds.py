@@ -35,11 +35,6 @@ def read_cloud(path: str | Path, unit: Unit = "mm") -> "Array | FaceGrid":
     Text files have x, y, z in the first three columns, apart by blanks, commas, semicolons or tabs; lines that start with #
     are comments. A table begins with the line `position,0,5,10,…` (azimuths in degrees) and has one line per position (0 ... 1 of the
     meridian) with the departures of the face in µm, positive out of the material, empty where there is none.
-
-    Raises
-    ------
-    InputError
-        There is no such file, or a line of it is not numbers.
     """
     file = check_file(path)
     if file.suffix.lower() in MESHES:

@@ -81,21 +81,11 @@ def read_columns(
 ) -> Columns:
     """Read a table of numbers.
 
-    Parameters
-    ----------
-    path : str or Path
-        The file.
-    known : collection of str
-        Column names that may appear.
-    required : collection of str
-        Column names that must appear.
-    prefixes : collection of str
-        Beginnings of further names that may appear.
-
-    Raises
-    ------
-    InputError
-        Anything that is not such a table: the message names file, line or column, and the mend.
+    Args:
+        path: The file.
+        known: collection of str: Column names that may appear.
+        required: collection of str: Column names that must appear.
+        prefixes: collection of str: Beginnings of further names that may appear.
     """
     if is_parquet(path):
         comments, header = read_comments_and_names(path)

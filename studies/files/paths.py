@@ -36,13 +36,7 @@ _written: set[str] | None = None  # while a command runs; from Python a file may
 
 @contextmanager
 def guarded(arguments: Mapping[str, Any]) -> Iterator[list[Path]]:
-    """Keep what a command reads from being overwritten by what it writes, while it runs; gives what it reads.
-
-    Raises
-    ------
-    InputError
-        An output is a file that is read too, two outputs are one file, or the folder of an output does not exist.
-    """
+    """Keep what a command reads from being overwritten by what it writes, while it runs; gives what it reads."""
     outputs = {name: value for name, value in arguments.items() if name in OUTPUTS and isinstance(value, str)}
     words = [word for name, value in arguments.items() if name not in OUTPUTS for word in _words(value)]
     global _written
@@ -71,13 +65,7 @@ def guarded(arguments: Mapping[str, Any]) -> Iterator[list[Path]]:
 
 
 def claim(path: Path) -> None:
-    """Refuse to write a file that the running command reads, or has written already under another name.
-
-    Raises
-    ------
-    InputError
-        It is one of them.
-    """
+    """Refuse to write a file that the running command reads, or has written already under another name."""
     if _written is None:
         return
     _spare_read(path, str(path))

@@ -25,13 +25,7 @@ def read_bytes(path: str | Path, most: int = MOST_BYTES, first: int = -1) -> byt
 
 @contextmanager
 def opened(path: str | Path, most: int = MOST_BYTES) -> Iterator[IO[bytes]]:
-    """Open a regular file of at most so many bytes for reading.
-
-    Raises
-    ------
-    InputError
-        There is no such file, it is a folder, a device or a pipe, it is too large, or it cannot be read.
-    """
+    """Open a regular file of at most so many bytes for reading."""
     try:
         with check_file(path, most).open("rb") as file:
             yield file
@@ -81,13 +75,7 @@ def list_shipped(folder: Path) -> dict[str, Path]:
 
 
 def find_shipped(name: str | Path, shipped: dict[str, Path], kind: str) -> Path:
-    """Return the path of a TOML file that is given by path, or by the bare name of one that ships.
-
-    Raises
-    ------
-    InputError
-        None of that name ships; `kind` says what was looked for.
-    """
+    """Return the path of a TOML file that is given by path, or by the bare name of one that ships."""
     path = Path(name)
     if path.suffix == ".toml" or path.exists() or len(path.parts) > 1:
         return path

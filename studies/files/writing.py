@@ -19,15 +19,8 @@ def written_whole(path: str | Path) -> Iterator[IO[bytes]]:
 
     A link is followed; what is no regular file, such as /dev/null or a pipe, is written into and stays what it is.
 
-    Parameters
-    ----------
-    path : str or Path
-        Where the file shall appear, in a folder that exists: a mistyped one is not made.
-
-    Raises
-    ------
-    InputError
-        There is no such folder, it cannot be written, the disk is full, or the running command reads this file; nothing is left behind.
+    Args:
+        path: Where the file shall appear, in a folder that exists: a mistyped one is not made.
     """
     temporary: Path | None = None
     try:

@@ -79,12 +79,9 @@ class Meaning:
 def find_meanings(hints: Mapping[str, str], taken: Sequence[str] = ()) -> dict[str, Meaning]:
     """Return the meaning of every column for which one is found.
 
-    Parameters
-    ----------
-    hints : mapping
-        Name of a column to what is known of it: its name and its unit.
-    taken : sequence of str
-        Columns of the record that other files fill.
+    Args:
+        hints: Name of a column to what is known of it: its name and its unit.
+        taken: Columns of the record that other files fill.
     """
     axes = _find_axes(hints)
     bids = [

@@ -38,12 +38,9 @@ class Offset:
 def estimate_offset(t1: Array, y1: Array, t2: Array, y2: Array, same_unit: bool = False) -> Offset | None:
     """Return what must be added to the times t2 so that y2 follows y1; None where the two share too little.
 
-    Parameters
-    ----------
-    t1, y1, t2, y2 : arrays
-        Two series with times (s) by their own clocks; NaN marks missing values.
-    same_unit : bool
-        Whether both show one quantity in one unit.
+    Args:
+        t1, y1, t2, y2: Two series with times (s) by their own clocks; NaN marks missing values.
+        same_unit: Whether both show one quantity in one unit.
     """
     t1, y1, t2, y2 = *_known(t1, y1), *_known(t2, y2)
     if min(t1.size, t2.size) < 20 or np.ptp(y1) == 0 or np.ptp(y2) == 0:

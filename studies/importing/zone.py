@@ -18,12 +18,11 @@ def place_in_zone(
 ) -> "tuple[datetime.datetime, Array, int]":
     """Return the origin with its offset from UTC, true seconds after it, and how many rows lie in an hour that comes twice.
 
-    Parameters
-    ----------
-    origin : local time without a zone.
-    seconds : (N,) local time after the origin, s; NaN where a row has none.
-    zone : name such as "Europe/Berlin".
-    place : tells the file and line of a row.
+    Args:
+        origin: local time without a zone.
+        seconds: (N,) local time after the origin, s; NaN where a row has none.
+        zone: name such as "Europe/Berlin".
+        place: tells the file and line of a row.
     """
     import numpy as np
 

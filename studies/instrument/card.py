@@ -53,27 +53,16 @@ class Head(Keys, frozen=True, kw_only=True):
 
 @dataclass(frozen=True)
 class Instrument:
-    """One instrument: the typed parts of its card.
-
-    Attributes
-    ----------
-    name, note : str
-    reference_temperature : float, K
-        Dimensions and given material values hold here.
-    tables : mapping from table to `ReadTable`
-        What every table says; `part` and the properties below pick from it.
-    content : mapping
-        The card as written, in the units of its keys: for saving, hashing, and names of parameters only.
-    path : str
-        The file it came from.
-    """
+    """One instrument: the typed parts of its card."""
 
     name: str
-    reference_temperature: float
+    reference_temperature: float  # dimensions and given material values hold here
+    # mapping from table to `ReadTable`: What every table says; `part` and the properties below pick from it.
     tables: Mapping[str, ReadTable] = field(repr=False)
     note: str = field(default="", repr=False)
+    # The card as written, in the units of its keys: for saving, hashing, and names of parameters only.
     content: Mapping[str, Any] = field(default_factory=dict, repr=False, compare=False)
-    path: str = field(default="", compare=False)
+    path: str = field(default="", compare=False)  # the file it came from
 
     def part(self, table: str, name: str = "") -> Any:
         """Return what a table of the card has become; `name` tells the parts of one table apart."""
@@ -138,13 +127,7 @@ class Instrument:
 
     @cached_property
     def heat_path(self) -> "HeatPath":
-        """The heat path from the chamber to the cells of the shell, SI units; built once.
-
-        Raises
-        ------
-        InputError
-            No source states the material's conductivity or heat capacity, and `[thermal]` does not give it.
-        """
+        """The heat path from the chamber to the cells of the shell, SI units; built once."""
         from studies.instrument.heat_path import build_heat_path
 
         where = f"{self.path} [thermal]"
@@ -195,16 +178,10 @@ class Instrument:
     def with_values(self, values: Mapping[str, Any]) -> "Instrument":
         """Return a new instrument with other values at dotted keys of the card.
 
-        Parameters
-        ----------
-        values : mapping from dotted key to value
-            In the card's units: {"thermal.mount_conductance_W_per_K": 0.012}. A plain number leaves the uncertainty beside it as
-            it is; a mapping such as {"value": 0.012, "sd": 0.001} replaces both. Text and lists replace text and lists.
-
-        Raises
-        ------
-        InputError
-            A key that the card cannot have, or a value that it does not allow.
+        Args:
+            values: mapping from dotted key to value: In the card's units: {"thermal.mount_conductance_W_per_K": 0.012}.
+                A plain number leaves the uncertainty beside it as it is; a mapping such as {"value": 0.012, "sd":
+                0.001} replaces both. Text and lists replace text and lists.
         """
         content: Mapping[str, Any] = self.content
         for name, value in values.items():
@@ -224,13 +201,7 @@ class Instrument:
 
 
 def load_card(card: str | Path) -> Instrument:
-    """Load a card by path, or by the bare name of one that ships with the package.
-
-    Raises
-    ------
-    InputError
-        No such card; anywhere in it an unknown key, a value of the wrong type or out of its range.
-    """
+    """Load a card by path, or by the bare name of one that ships with the package."""
     path = find_shipped(card, shipped_cards(), "card")
     return build_instrument(read_toml(path, SCHEMA), str(path))
 

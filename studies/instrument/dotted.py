@@ -7,13 +7,7 @@ from studies.instrument.uncertain import is_spread
 
 
 def look_up(content: Mapping[str, Any], name: str) -> Any:
-    """Return what stands at a dotted name; of a number with its uncertainty, the number.
-
-    Raises
-    ------
-    LookupError, ValueError, TypeError
-        When nothing stands there.
-    """
+    """Return what stands at a dotted name; of a number with its uncertainty, the number."""
     found: Any = content
     for word in name.split("."):
         found = found[int(word)] if isinstance(found, list) else found[word]
@@ -26,13 +20,7 @@ def plain_number(value: Any) -> Any:
 
 
 def replaced(content: Any, path: list[str], value: Any) -> Any:
-    """Return the content with another value at a path; a plain number keeps the uncertainty that stands beside it.
-
-    Raises
-    ------
-    LookupError, ValueError, TypeError
-        When the path leads through something that is neither table nor list.
-    """
+    """Return the content with another value at a path; a plain number keeps the uncertainty that stands beside it."""
     if not path:
         if is_spread(content) and not isinstance(value, Mapping):
             exact = {"relative_sd": 0.0} if value == 0 and "relative_sd" in content else {}  # a part of 0 is 0

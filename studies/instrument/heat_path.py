@@ -29,15 +29,9 @@ def build_heat_path(
 ) -> "HeatPath":
     """Build the heat path.
 
-    Parameters
-    ----------
-    reference : reference temperature, K.
-    where : "file [thermal]", for messages.
-
-    Raises
-    ------
-    InputError
-        A stem or meridian that cannot be, or a material whose conductivity or heat capacity no source states.
+    Args:
+        reference: reference temperature, K.
+        where: "file [thermal]", for messages.
     """
     from thermal.resonator import HeatPath
 

@@ -30,32 +30,18 @@ def _as_it_is(keys: Any, place: CardPlace) -> Any:
 
 @dataclass(frozen=True)
 class CardTable:
-    """A table of the card, or some keys of one, and the part of the instrument that it becomes.
+    """A table of the card, or some keys of one, and the part of the instrument that it becomes."""
 
-    Attributes
-    ----------
-    table : str
-        Its name in the card; several entries may share a table and own different keys of it.
-    keys : type
-        Class of its keys (`studies.schema.keys.Keys`), or a union of classes that a tag tells apart.
-    part : str
-        Name of what it becomes in `Instrument.parts`; that of the table unless given.
-    build : callable (keys, place) -> part
-        The part in SI units; the keys themselves where they are the part.
-    required : bool
-        Whether every card must have it.
-    optional : bool
-        The documented uncertainties hold only where the card has the table: without it there is no such thing.
-    keys_of : callable (raw, where) -> type
-        Only for an array of tables ([[effect]]), whose members differ: the class for one of them.
-    """
-
-    table: str
-    keys: Any = None
-    part: str = ""
+    table: str  # its name in the card; several entries may share a table and own different keys of it
+    keys: Any = None  # class of its keys (`studies.schema.keys.Keys`), or a union of classes that a tag tells apart
+    part: str = ""  # name of what it becomes in `Instrument.parts`; that of the table unless given
+    # callable (keys, place) -> part: The part in SI units; the keys themselves where they are the part.
     build: Callable[[Any, CardPlace], Any] = _as_it_is
-    required: bool = False
+    required: bool = False  # whether every card must have it
+    # The documented uncertainties hold only where the card has the table: without it there is no such thing.
     optional: bool = False
+    # callable (raw, where) -> type: Only for an array of tables ([[effect]]), whose members differ: the class for one
+    # of them.
     keys_of: Callable[[Mapping[str, Any], str], Any] | None = None
 
     @property
@@ -90,13 +76,7 @@ def card_tables() -> Mapping[str, tuple[CardTable, ...]]:
 
 
 def read_table(name: str, raw: Any, place: CardPlace) -> ReadTable:
-    """Read one table of a card; an absent one has its defaults.
-
-    Raises
-    ------
-    InputError
-        A key is unknown, missing, of the wrong type or out of its bounds.
-    """
+    """Read one table of a card; an absent one has its defaults."""
     entries = card_tables()[name]
     if raw is not None:
         return _read_given(name, raw, place)

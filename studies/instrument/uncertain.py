@@ -66,24 +66,15 @@ SPREAD_KEYS = Spread.__struct_fields__
 
 @dataclass(frozen=True)
 class UncertainValue:
-    """A number of a card that is not known exactly, in the card's own unit.
+    """A number of a card that is not known exactly, in the card's own unit."""
 
-    Attributes
-    ----------
-    name : str
-        The card's key, dotted: "thermal.mount_conductance_W_per_K", "effect.0.weight".
-    value, sd, low, high : float
-        Most probable value, standard deviation and hard bounds, in the unit of the key.
-    logarithmic : bool
-        The logarithm is normal, with the standard deviation sd/value; else the number itself is.
-    unit : str
-    """
-
-    name: str
+    name: str  # the card's key, dotted: "thermal.mount_conductance_W_per_K", "effect.0.weight"
+    # value, sd, low, high: Most probable value, standard deviation and hard bounds, in the unit of the key.
     value: float
     sd: float
     low: float = -math.inf
     high: float = math.inf
+    # The logarithm is normal, with the standard deviation sd/value; else the number itself is.
     logarithmic: bool = False
     unit: str = "1"
 
@@ -107,15 +98,13 @@ def is_spread(raw: Any) -> bool:
 def read_uncertain(raw: Any, keys: Any, where: str, name: str) -> "tuple[Any, list[UncertainValue], set[str]]":
     """Read a table of a card into its class.
 
-    Returns
-    -------
-    table
-    uncertain : those of its numbers that are not exact, as the card states or as their keys document.
-    stated : names of the numbers whose uncertainty the card states.
+    Returns:
+        table
+        uncertain: those of its numbers that are not exact, as the card states or as their keys document.
+        stated: names of the numbers whose uncertainty the card states.
 
-    Parameters
-    ----------
-    name : of the table, with the place in an array of tables: "thermal", "effect.0".
+    Args:
+        name: of the table, with the place in an array of tables: "thermal", "effect.0".
     """
     stated: dict[Path, UncertainValue] = {}
 

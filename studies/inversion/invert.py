@@ -54,40 +54,28 @@ class NextMode:
 
 @dataclass(frozen=True, eq=False)
 class ModeCalibration:
-    """A card and what its modes say of it.
+    """A card and what its modes say of it."""
 
-    Attributes
-    ----------
-    card, instrument : as given; with the values found.
-    fit : of the likeliest assignment.
-    groups : names of values that share what is known of one that the modes do not tell, as the modulus does of the density.
-    chance : of each reading's assignment; `rivals` are the other modes that it may be, (harmonic, index, chance).
-    misfit : squared, over what is expected.
-    """
-
+    # card, instrument: as given; with the values found.
     card: "Instrument"
     instrument: "Instrument"
     readings: ModeReadings
-    fit: ModeFit
+    fit: ModeFit  # of the likeliest assignment
     estimates: tuple[Estimate, ...]
+    # names of values that share what is known of one that the modes do not tell, as the modulus does of the density.
     groups: tuple[tuple[str, ...], ...]
+    # of each reading's assignment; `rivals` are the other modes that it may be, (harmonic, index, chance).
     chance: tuple[float, ...]
     rivals: tuple[tuple[tuple[int, int, float], ...], ...]
     next_modes: tuple[NextMode, ...]
-    misfit: float
+    misfit: float  # squared, over what is expected
     warnings: tuple[str, ...]
 
 
 def invert(
     instrument: "Instrument", readings: ModeReadings, exact: Sequence[str] = (), progress: Progress = lambda _: None
 ) -> ModeCalibration:
-    """Find the card's uncertain dimensions and elastic values from the frequencies of its modes.
-
-    Raises
-    ------
-    InputError
-        Nothing in the card is uncertain, or no assignment explains the readings within the card's tolerances.
-    """
+    """Find the card's uncertain dimensions and elastic values from the frequencies of its modes."""
     priors = _priors(instrument, exact)
     T = np.where(np.isnan(readings.temperature), instrument.reference_temperature, readings.temperature)
     relative = readings.sd / readings.frequency

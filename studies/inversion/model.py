@@ -33,17 +33,12 @@ class Which:
 
 @dataclass(frozen=True, eq=False)
 class ModeModel:
-    """Predictions of modes of one card.
+    """Predictions of modes of one card."""
 
-    Attributes
-    ----------
-    instrument, priors : the card, and what is uncertain of it.
-    tolerance : relative error that a solve may have.
-    """
-
+    # instrument, priors: the card, and what is uncertain of it.
     instrument: "Instrument"
     priors: Priors
-    tolerance: float
+    tolerance: float  # relative error that a solve may have
     _solved: dict[tuple[float, ...], "tuple[Mode, ...]"] = field(default_factory=dict)
 
     def predict(self, modes: Sequence[Which], u: Array) -> tuple[Array, Array]:

@@ -18,25 +18,17 @@ HIGHEST = 20
 
 @dataclass(frozen=True, eq=False)
 class ModeReadings:
-    """Measured frequencies of modes of one resonator: the mean of a pair counts as one.
-
-    Attributes
-    ----------
-    harmonic, index : NaN where not known.
-    frequency, sd : Hz
-    temperature : K, NaN for the card's reference temperature.
-    lines : of the file.
-    assumed : whether the standard deviations are `USUAL`.
-    """
+    """Measured frequencies of modes of one resonator: the mean of a pair counts as one."""
 
     path: str
+    # harmonic, index: NaN where not known.
     harmonic: Array
     index: Array
     frequency: Array
     sd: Array
-    temperature: Array
-    lines: tuple[int, ...]
-    assumed: bool
+    temperature: Array  # K, NaN for the card's reference temperature
+    lines: tuple[int, ...]  # of the file
+    assumed: bool  # whether the standard deviations are `USUAL`
 
     def __len__(self) -> int:
         return len(self.frequency)
@@ -49,13 +41,7 @@ def is_mode_table(path: str) -> bool:
 
 
 def read_modes(path: str) -> ModeReadings:
-    """Read a table of modes.
-
-    Raises
-    ------
-    InputError
-        A frequency is missing, a harmonic is no whole number from 0, a mode stands there twice.
-    """
+    """Read a table of modes."""
     table = read_columns(path, COLUMNS, required=("harmonic", "frequency_Hz"))
     count = len(table.values["frequency_Hz"])
     n, k, f, sd, T = (table.values.get(name, np.full(count, np.nan)) for name in COLUMNS)

@@ -43,13 +43,7 @@ def film_numbers(keys: "FilmKeys", names: Iterable[str]) -> dict[str, Any]:
 
 
 def film_shifts(instrument: "Instrument", mode: "Mode") -> tuple[FilmShift, ...]:
-    """Return what every film of the card does to a mode, to first order in its thickness.
-
-    Raises
-    ------
-    ShellError
-        A film is too thick for that.
-    """
+    """Return what every film of the card does to a mode, to first order in its thickness."""
     from shell.damping.film import film_shift
 
     found = []
@@ -69,13 +63,7 @@ def film_losses(
     name: str,
     spread: Mapping[str, float],
 ) -> "tuple[list[LossCause], list[Ripple]]":
-    """Return a film's causes of loss, and how they vary around.
-
-    Raises
-    ------
-    InputError
-        No source states a number of the film; or it is too thick.
-    """
+    """Return a film's causes of loss, and how they vary around."""
     from shell.damping.anisotropy import Ripple, film_weight
     from shell.damping.budget import film_causes
     from shell.damping.film import check_film, thickness_power

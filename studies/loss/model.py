@@ -28,21 +28,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class LossModel:
-    """The causes of loss of one mode of an instrument.
+    """The causes of loss of one mode of an instrument."""
 
-    Attributes
-    ----------
-    vibration : the solved mode.
-    causes : what loses energy, with uncertainty and source.
-    left_out : sentences on what the budget does not have, and what would bring it in.
-    ripples : how parts vary around the axis.
-    bryan_factor, frequency : of the mode, Hz at the reference temperature.
-    """
-
-    vibration: "Vibration"
-    causes: "tuple[LossCause, ...]"
-    left_out: tuple[str, ...]
-    ripples: "tuple[Ripple, ...]"
+    vibration: "Vibration"  # the solved mode
+    causes: "tuple[LossCause, ...]"  # what loses energy, with uncertainty and source
+    left_out: tuple[str, ...]  # sentences on what the budget does not have, and what would bring it in
+    ripples: "tuple[Ripple, ...]"  # how parts vary around the axis
+    # bryan_factor, frequency: of the mode, Hz at the reference temperature.
     bryan_factor: float
     frequency: float
 
@@ -69,14 +61,8 @@ def loss_model(
 ) -> LossModel:
     """Solve the lowest mode of a harmonic and gather its causes of loss.
 
-    Parameters
-    ----------
-    anchor : compute what a stem sends into its base (a second or two); else it is left out and said so.
-
-    Raises
-    ------
-    InputError, ShellError
-        Unusable parts in the card; the mode cannot be solved.
+    Args:
+        anchor: compute what a stem sends into its base (a second or two); else it is left out and said so.
     """
     from shell.damping.faces import Vibration
 

@@ -46,14 +46,7 @@ def source_of(record: Record) -> ModelSource:
 
 
 def compensate(model: Model, record: Record, *, extrapolate: bool = False) -> Record:
-    """Return the record with the model's `compensated_…` columns added.
-
-    Raises
-    ------
-    InputError
-        A kind that is not known, a column that the record lacks or already has, or values that the fit
-        has not seen (unless `extrapolate`).
-    """
+    """Return the record with the model's `compensated_…` columns added."""
     try:
         columns = _module(model).compensate(model, record, extrapolate=extrapolate)
     except (InputError, CompensationError) as error:

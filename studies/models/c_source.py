@@ -30,13 +30,9 @@ def _one_comment(text: str) -> str:
 def self_test(rows: Sequence[Sequence[float]], meaning: str, step: str) -> str:
     """Return a `main` under HRG_SELF_TEST that compares the code with a table of what Python computes.
 
-    Parameters
-    ----------
-    rows : sequence of rows, the expected value last; NaN where none is expected
-    meaning : str
-        Of the columns.
-    step : str
-        C statements that set `found` and `expected` from `row`, a pointer to one row.
+    Args:
+        meaning: Of the columns.
+        step: C statements that set `found` and `expected` from `row`, a pointer to one row.
     """
     width = len(rows[0])
     table = ",\n".join("    {" + ", ".join("NAN" if x != x else repr(float(x)) for x in row) + "}" for row in rows)

@@ -127,13 +127,7 @@ class Model(ModelKeys, frozen=True, kw_only=True):
         return self.path or "model"
 
     def part(self, name: str) -> ModelPart:
-        """Return the part of that name.
-
-        Raises
-        ------
-        InputError
-            The model has no such part.
-        """
+        """Return the part of that name."""
         for part in self.parts:
             if part.name == name:
                 return part
@@ -148,13 +142,7 @@ class Model(ModelKeys, frozen=True, kw_only=True):
         return column
 
     def number(self, key: str, *, above: float | None = None, least: float | None = None) -> float:
-        """Return a setting that must be a finite number within its bounds.
-
-        Raises
-        ------
-        InputError
-            The setting is missing or something else.
-        """
+        """Return a setting that must be a finite number within its bounds."""
         where = f"{self.where} [settings]"
         if key not in self.settings:
             raise InputError(f"{where}: the key '{key}' is missing; add it.")
@@ -162,13 +150,7 @@ class Model(ModelKeys, frozen=True, kw_only=True):
         return float(read_keys(self.settings[key], kind, f"{where}: {key}"))
 
     def check_inputs(self, record: "Record", *columns: str, outputs: Collection[str]) -> None:
-        """Refuse a column that this kind cannot compensate, and a record that lacks a column that it needs.
-
-        Raises
-        ------
-        InputError
-            `compensates` is none of the outputs, or a column is missing.
-        """
+        """Refuse a column that this kind cannot compensate, and a record that lacks a column that it needs."""
         self.check_output(outputs)
         for name in (self.compensates, *columns):
             if name not in record:
@@ -187,13 +169,7 @@ class Model(ModelKeys, frozen=True, kw_only=True):
             raise InputError(f"{self.where} [[part]] {part.name}: the coefficients must be {names}, in this order.")
 
     def range_of(self, variable: str) -> tuple[float, float]:
-        """Return the lowest and highest value of a variable that the fit has seen.
-
-        Raises
-        ------
-        InputError
-            The model does not say.
-        """
+        """Return the lowest and highest value of a variable that the fit has seen."""
         if variable not in self.validity:
             raise InputError(f"{self.where} [validity]: the range of '{variable}' is missing; add it.")
         return self.validity[variable]
@@ -202,11 +178,6 @@ class Model(ModelKeys, frozen=True, kw_only=True):
         """Refuse values of a variable outside the fitted range, unless told to extrapolate.
 
         Missing values (NaN) pass; they stay missing in the result.
-
-        Raises
-        ------
-        InputError
-            Values outside `validity[variable]`, or no such range in the model.
         """
         import numpy as np
 
@@ -246,13 +217,7 @@ def make_part(
 
 
 def write_model(model: Model, path: str | Path) -> None:
-    """Save a model, whole or not at all.
-
-    Raises
-    ------
-    InputError
-        The file cannot be written.
-    """
+    """Save a model, whole or not at all."""
     write_text(path, format_model(model))
 
 
@@ -280,13 +245,7 @@ def format_model(model: Model) -> str:
 
 
 def read_model(path: str | Path) -> Model:
-    """Read a model's file.
-
-    Raises
-    ------
-    InputError
-        Not such a file: the message names the key and the mend.
-    """
+    """Read a model's file."""
     from studies.instrument.card import shipped_cards
 
     if not Path(path).exists() and str(path) in shipped_cards():

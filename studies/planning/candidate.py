@@ -38,22 +38,14 @@ COARSE, MARGIN = 480, 30.0
 
 @dataclass(frozen=True)
 class Candidate:
-    """One possible run.
-
-    Attributes
-    ----------
-    programme : Programme
-    signatures : of this run alone
-    slopes : array (M, p), by the card's values and then by the starts of this run, in rows of white noise of variance 1
-    whiteners : response -> Whitener
-    values : number of the card's values
-    """
+    """One possible run."""
 
     programme: Programme
-    signatures: Signatures
+    signatures: Signatures  # of this run alone
+    # array (M, p), by the card's values and then by the starts of this run, in rows of white noise of variance 1
     slopes: Array
-    whiteners: dict[str, Whitener]
-    values: int
+    whiteners: dict[str, Whitener]  # response -> Whitener
+    values: int  # number of the card's values
 
     def columns(self, term: Term) -> Array:
         """Return the columns of a term in white rows, in units of their priors."""

@@ -22,13 +22,7 @@ class Chamber:
 
 
 def parse_chamber(words: str) -> Chamber:
-    """Read "rate 3 range -40 85": K/min and °C, either part may be left out.
-
-    Raises
-    ------
-    InputError
-        If the words say something else.
-    """
+    """Read "rate 3 range -40 85": K/min and °C, either part may be left out."""
     parts, rate, low, high = words.split(), USUAL_RATE, None, None
     try:
         while parts:

@@ -34,21 +34,13 @@ CASES = 12
 
 @dataclass(frozen=True)
 class Hidden:
-    """One effect in several shapes, at the size of strong cases.
-
-    Attributes
-    ----------
-    effect, response
-    signal : response -> (M, B)
-    unit : what its definite coefficient is then, in its own unit
-    name : of that coefficient
-    """
+    """One effect in several shapes, at the size of strong cases."""
 
     effect: Effect
     response: str
-    signal: Mapping[str, Array]
-    unit: float
-    name: str
+    signal: Mapping[str, Array]  # response -> (M, B)
+    unit: float  # what its definite coefficient is then, in its own unit
+    name: str  # of that coefficient
 
     @property
     def key(self) -> Key:
@@ -63,21 +55,16 @@ class Hidden:
 
 @dataclass(frozen=True)
 class Chances:
-    """Answers to one hidden effect by size (A,) in strong cases and by shape.
-
-    Attributes
-    ----------
-    size : array (A,)
-    named, alone, nothing : array (A, B)
-        Chance that the answer holds the effect, alone or in a set; that it is the effect alone; that nothing is named.
-    beside, instead : effect -> array (A, B)
-        Chance that it stands in a set with another, and that the other is named in its place.
-    """
+    """Answers to one hidden effect by size (A,) in strong cases and by shape."""
 
     size: Array
+    # named, alone, nothing: array (A, B): Chance that the answer holds the effect, alone or in a set; that it is the
+    # effect alone; that nothing is named.
     named: Array
     alone: Array
     nothing: Array
+    # beside, instead: effect -> array (A, B): Chance that it stands in a set with another, and that the other is named
+    # in its place.
     beside: Mapping[str, Array]
     instead: Mapping[str, Array]
 

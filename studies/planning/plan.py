@@ -45,21 +45,14 @@ WHITE = {
 
 @dataclass(frozen=True)
 class Prospect:
-    """What would be said of one hidden effect.
-
-    Attributes
-    ----------
-    hidden : Hidden
-    chances : Chances
-    snr : array (B,)
-        Of a strong case: rms of what the calibrated card cannot absorb over rms of the noise of one row after the same projection.
-    survives : part of the rms of the effect that the calibrated card cannot absorb
-    """
+    """What would be said of one hidden effect."""
 
     hidden: Hidden
     chances: Chances
+    # array (B,): Of a strong case: rms of what the calibrated card cannot absorb over rms of the noise of one row after
+    # the same projection.
     snr: Array
-    survives: float
+    survives: float  # part of the rms of the effect that the calibrated card cannot absorb
 
     def at(self, curves: Array, snr: float) -> float | None:
         """Return a chance at one SNR, the mean over shapes; None where that is larger than any source shows."""
@@ -112,22 +105,13 @@ class Prospect:
 
 @dataclass(frozen=True)
 class Plan:
-    """What a planned campaign could tell apart.
+    """What a planned campaign could tell apart."""
 
-    Attributes
-    ----------
-    card : name of the card whose simulation went through the profiles
-    hours : float
-    noise : response -> rms of one row of `ROW` after the calibrated card has been taken out
-    prospects : of the effects that the campaign excites, the smallest visible ones first
-    invisible : effect -> why it cannot show
-    """
-
-    card: str
+    card: str  # name of the card whose simulation went through the profiles
     hours: float
-    noise: Mapping[str, float]
-    prospects: tuple[Prospect, ...]
-    invisible: Mapping[str, str]
+    noise: Mapping[str, float]  # response -> rms of one row of `ROW` after the calibrated card has been taken out
+    prospects: tuple[Prospect, ...]  # of the effects that the campaign excites, the smallest visible ones first
+    invisible: Mapping[str, str]  # effect -> why it cannot show
 
     @property
     def sensors(self) -> dict[str, list[str]]:
@@ -161,13 +145,7 @@ def plan_campaign(
     chamber: Chamber | None = None,
     progress: Callable[[str], None] = lambda words: None,
 ) -> Plan:
-    """Predict what a campaign of the given chamber profiles, in words or as files, could tell apart.
-
-    Raises
-    ------
-    InputError
-        A profile beyond the chamber; a card that states no white noise of a response.
-    """
+    """Predict what a campaign of the given chamber profiles, in words or as files, could tell apart."""
     if chamber is not None:
         profiles = [limited(words, chamber.rate) for words in profiles]
         for words in profiles:

@@ -48,24 +48,14 @@ class Steps:
 
 @dataclass(frozen=True)
 class Programme:
-    """One possible run.
+    """One possible run."""
 
-    Attributes
-    ----------
-    kind : "repeat", or the name in the family
-    profile : in words, as `hrg simulate` takes them, or "repeat of FILE"
-    chamber : Profile, K
-    steady : column -> value of the drives that stand still
-    drives : column -> Steps
-    repeats : the recorded run that it is once more
-    """
-
-    kind: str
-    profile: str
-    chamber: Profile
-    steady: Mapping[str, float] = field(default_factory=dict)
-    drives: Mapping[str, Steps] = field(default_factory=dict)
-    repeats: ObservedRun | None = None
+    kind: str  # "repeat", or the name in the family
+    profile: str  # in words, as `hrg simulate` takes them, or "repeat of FILE"
+    chamber: Profile  # Profile, K
+    steady: Mapping[str, float] = field(default_factory=dict)  # column -> value of the drives that stand still
+    drives: Mapping[str, Steps] = field(default_factory=dict)  # column -> Steps
+    repeats: ObservedRun | None = None  # the recorded run that it is once more
 
     @property
     def hours(self) -> float:
@@ -84,28 +74,21 @@ class Programme:
 
 @dataclass(frozen=True)
 class NextRun:
-    """One suggested run.
+    """One suggested run."""
 
-    Attributes
-    ----------
-    profile : in words, as `hrg simulate` takes them, or "repeat of FILE"
-    drives : column -> Steps
-    hours : chamber time
-    time_h, temperature_degC : arrays, the profile, for pictures
-    expected_evidence, repeat_evidence : what would separate the two after this run, and after the best repeat of a recorded run
-    separates : the two, "nothing" for a cause against none; None for a run that looks again or sharpens
-    narrows : width of the interval of the causes after this run over today's
-    """
-
-    profile: str
-    drives: Mapping[str, Steps]
-    hours: float
+    profile: str  # in words, as `hrg simulate` takes them, or "repeat of FILE"
+    drives: Mapping[str, Steps]  # column -> Steps
+    hours: float  # chamber time
+    # time_h, temperature_degC: arrays, the profile, for pictures
     time_h: Array
     temperature_degC: Array
+    # expected_evidence, repeat_evidence: what would separate the two after this run, and after the best repeat of a
+    # recorded run
     expected_evidence: float | None = None
     repeat_evidence: float | None = None
+    # the two, "nothing" for a cause against none; None for a run that looks again or sharpens
     separates: tuple[str, str] | None = None
-    narrows: float | None = None
+    narrows: float | None = None  # width of the interval of the causes after this run over today's
 
     @classmethod
     def of(cls, programme: Programme, **told: Any) -> "NextRun":

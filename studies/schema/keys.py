@@ -27,12 +27,11 @@ def number(
 ) -> msgspec.Meta:
     """Annotate a number with its meaning, its bounds, and the uncertainty that it has where a card states none.
 
-    Parameters
-    ----------
-    above, least, below, most : bounds, in the unit of the key.
-    sd, relative_sd : standard deviation of the default and of any plain number in the card, in the unit of the key or as a
-        part of the value; without either a plain number is taken as exact.
-    example : what stands in the forms for a key without a default.
+    Args:
+        above, least, below, most: bounds, in the unit of the key.
+        sd, relative_sd: standard deviation of the default and of any plain number in the card, in the unit of the key
+            or as a part of the value; without either a plain number is taken as exact.
+        example: what stands in the forms for a key without a default.
     """
     prior = {key: value for key, value in (("sd", sd), ("relative_sd", relative_sd)) if value is not None}
     ends: Any = {"gt": above, "ge": least, "lt": below, "le": most}

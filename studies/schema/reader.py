@@ -28,13 +28,7 @@ def read_file(path: str | FilePath, keys: type[T], schema: str) -> T:
 
 
 def read_toml(path: str | FilePath, schema: str | None = None) -> dict[str, Any]:
-    """Read a TOML file and check its `schema` key.
-
-    Raises
-    ------
-    InputError
-        No such file, not UTF-8, a syntax error (with its line), or another schema.
-    """
+    """Read a TOML file and check its `schema` key."""
     data = read_bytes(path, MOST_BYTES)
     text = ""
     try:
@@ -80,16 +74,10 @@ def _spell_syntax(text: str, error: str) -> str:
 def read_keys(raw: Any, keys: type[T], where: str, numbers: Numbers | None = None) -> T:
     """Read a table into its class.
 
-    Parameters
-    ----------
-    where : "file [table]", for messages.
-    numbers : callable (raw, path, type, place) -> raw
-        Sees what stands for a number before it is checked, such as a number with its uncertainty.
-
-    Raises
-    ------
-    InputError
-        An unknown or missing key, a value of the wrong type or out of its bounds.
+    Args:
+        where: "file [table]", for messages.
+        numbers: callable (raw, path, type, place) -> raw: Sees what stands for a number before it is checked, such as a
+            number with its uncertainty.
     """
     declared: Any = keys
     found: T = _Reader(where, numbers).read(describe(declared), raw, ())

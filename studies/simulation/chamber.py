@@ -34,10 +34,8 @@ def load_profile(text: str) -> "Profile":
 def load_schedule(text: str) -> "tuple[Profile, Mapping[str, NDArray[np.float64]]]":
     """Read a profile and the commands beside it: drive_amplitude_V, electrode_bias_V, quadrature_V, pattern_angle_deg, rate_deg_per_s.
 
-    Returns
-    -------
-    Profile, mapping
-        The chamber (K), and each command at the times of the profile, linear between; none for words.
+    Returns:
+        Profile, mapping: The chamber (K), and each command at the times of the profile, linear between; none for words.
     """
     import numpy as np
 
@@ -63,17 +61,9 @@ def load_schedule(text: str) -> "tuple[Profile, Mapping[str, NDArray[np.float64]
 def load_drive(text: str, boundary: "Boundary | None" = None, rate: float = 1.0) -> "Profile | Drive":
     """Read what drives a run: a profile, with commands or without, or a record, of which a measured column is imposed.
 
-    Parameters
-    ----------
-    boundary : "chamber" or "housing", optional
-        Column of a record; the housing's where there is one.
-    rate : float
-        Rows per second of a profile with commands.
-
-    Raises
-    ------
-    InputError
-        A record without that column; a boundary for what is no record.
+    Args:
+        boundary: "chamber" or "housing", optional: Column of a record; the housing's where there is one.
+        rate: Rows per second of a profile with commands.
     """
     from studies.files.columns import read_header
     from studies.record import PROFILE_COLUMNS, read_record

@@ -39,43 +39,25 @@ STEEP = 20.0  # times the usual change near it: a set point that jumps, rather t
 
 @dataclass(frozen=True)
 class Drive:
-    """Everything that a prediction is told of one run.
+    """Everything that a prediction is told of one run."""
 
-    Attributes
-    ----------
-    time : array (N,), s
-        Rows that are wanted, increasing, any sampling.
-    boundary : "chamber" or "housing"
-        What is imposed: the chamber, or the housing as its sensor reads it, lag included.
-    profile : Profile, K
-        Temperature of the boundary over all the rows.
-    initial : mapping
-        How far (K) the "housing", the "base", the "stem" and the "resonator" depart at the start from having settled at the
-        first value, and the reading of the housing's "sensor" from the housing.
-    commands : mapping
-        Amplitude and voltage squared (V²), quadrature (V), pattern angle (rad) at the rows; what is absent does not move.
-    shift : float, s
-        How much later than its profile says the boundary changes: the clock of a chamber.
-    start : float, s
-        Since the start of the first run of the campaign.
-    rate : array (N,), rad/s, or None
-        That is applied, at the rows.
-    jumps : mapping
-        How much later (s) single jumps of the profile are, in their order from 0: between which two rows they were is all that is known.
-    kinks : mapping
-        How far (K) the profile departs from the straight line midway between the row before and row k, by k: what a measured housing
-        did between two rows when its chamber jumped.
-    """
-
-    time: Array
+    time: Array  # array (N,), s: Rows that are wanted, increasing, any sampling
+    # "chamber" or "housing": What is imposed: the chamber, or the housing as its sensor reads it, lag included.
     boundary: Boundary
-    profile: Profile
+    profile: Profile  # temperature of the boundary over all the rows
+    # How far (K) the "housing", the "base", the "stem" and the "resonator" depart at the start from having settled at
+    # the first value, and the reading of the housing's "sensor" from the housing.
     initial: Mapping[str, float] = field(default_factory=dict)
+    # Amplitude and voltage squared (V²), quadrature (V), pattern angle (rad) at the rows; what is absent does not move.
     commands: Mapping[str, Array] = field(default_factory=dict)
-    shift: float = 0.0
-    start: float = 0.0
-    rate: Array | None = None
+    shift: float = 0.0  # how much later than its profile says the boundary changes: the clock of a chamber
+    start: float = 0.0  # since the start of the first run of the campaign
+    rate: Array | None = None  # array (N,), rad/s, or None: That is applied, at the rows
+    # How much later (s) single jumps of the profile are, in their order from 0: between which two rows they were is all
+    # that is known.
     jumps: Mapping[int, float] = field(default_factory=dict)
+    # How far (K) the profile departs from the straight line midway between the row before and row k, by k: what a
+    # measured housing did between two rows when its chamber jumped.
     kinks: Mapping[int, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -148,12 +130,9 @@ def drive_by_profile(profile: Profile, time: Array) -> Drive:
 def drive_by_schedule(profile: Profile, columns: Mapping[str, Array], rate: float) -> Drive:
     """Impose a chamber profile, and commands beside it, linear between its times.
 
-    Parameters
-    ----------
-    columns : mapping
-        Any of the commands' columns of a record and the applied rate, at the times of the profile.
-    rate : float
-        Rows per second.
+    Args:
+        columns: Any of the commands' columns of a record and the applied rate, at the times of the profile.
+        rate: Rows per second.
     """
     time = rows_of(profile, rate)
     commands = {
@@ -183,11 +162,6 @@ def drive_by_record(record: Record, boundary: Boundary | None = None, time: Arra
     """Impose a measured column: the housing's unless it is absent or the chamber's is asked for.
 
     Gaps of the column are bridged by straight lines; of very many rows, means are taken.
-
-    Raises
-    ------
-    InputError
-        The column is absent, or has fewer than two values.
     """
     if boundary is None:
         boundary = "chamber" if COLUMN["housing"] not in record and COLUMN["chamber"] in record else "housing"

@@ -24,12 +24,9 @@ LEAST_LAG = 1e-3  # s
 def build_network(instrument: "Instrument", radiation: bool | None = None, boundary: str = "chamber") -> Network:
     """Build the whole heat path, from the boundary "chamber" to the cells of the shell, or what is behind the "housing".
 
-    Parameters
-    ----------
-    instrument : Instrument
-    radiation : bool, optional
-        False linearises at the reference temperature; what the card says when absent.
-    boundary : "chamber" or "housing"
+    Args:
+        radiation: False linearises at the reference temperature; what the card says when absent.
+        boundary: "chamber" or "housing"
     """
     if instrument.polynomial is not None:
         network = one_lag(instrument.polynomial.lag, instrument.polynomial.chamber_lag)

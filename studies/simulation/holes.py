@@ -17,13 +17,10 @@ LEAST = 0.02  # K, departure of a temperature that was steady on both sides
 def bridge_holes(profile: Profile) -> tuple[Profile, dict[int, float]]:
     """Put rows into the holes of a measured profile.
 
-    Returns
-    -------
-    profile : Profile
-        With `PARTS − 1` rows more in each hole, on the straight line across it.
-    departures : dict
-        How far (K, standard deviation) it may have been from that line midway before row k, by k: half of the change across the hole,
-        and half of what changed over as long before and after it.
+    Returns:
+        profile: With `PARTS − 1` rows more in each hole, on the straight line across it.
+        departures: How far (K, standard deviation) it may have been from that line midway before row k, by k: half of
+            the change across the hole, and half of what changed over as long before and after it.
     """
     t, T = profile.time, profile.value
     h = np.diff(t)

@@ -197,24 +197,16 @@ def settled_columns(
 ) -> dict[str, Array]:
     """Return what the settled loops of a card record, without the offset and polynomial of `[bias]`.
 
-    Parameters
-    ----------
-    frequency, inverse_q : arrays (N,), Hz and 1
-        Of the resonator.
-    pattern_angle : array (N,), optional
-        Azimuth (rad), through which a whole-angle wave has turned. Unless given, that of `[bias]`, from which it turns
-        over the time.
-    damping : array (N,), optional
-        Of the parts of a loss budget; see `wave_of`.
-    time : array (N,), optional, s
-        Of the rows; a whole-angle wave turns only with it.
-    rate : float or array (N,)
-        Rate (rad/s); `bias_deg_per_h` is what is indicated, with it.
+    Args:
+        frequency, inverse_q: arrays (N,), Hz and 1: Of the resonator.
+        pattern_angle: array (N,): Azimuth (rad), through which a whole-angle wave has turned. Unless given, that of
+            `[bias]`, from which it turns over the time.
+        damping: array (N,): Of the parts of a loss budget; see `wave_of`.
+        time: array (N,), optional, s: Of the rows; a whole-angle wave turns only with it.
+        rate: float or array (N,): Rate (rad/s); `bias_deg_per_h` is what is indicated, with it.
 
-    Returns
-    -------
-    dict
-        `frequency_Hz`, `bias_deg_per_h`, `inverse_q`, `quadrature_V`, `pattern_angle_deg`.
+    Returns:
+        dict: `frequency_Hz`, `bias_deg_per_h`, `inverse_q`, `quadrature_V`, `pattern_angle_deg`.
     """
     loop, start = require_loop(instrument), float(np.radians(instrument.bias.pattern_angle_deg))
     angle = np.broadcast_to(np.asarray(start if pattern_angle is None else pattern_angle), np.shape(frequency))
@@ -258,16 +250,12 @@ def run_loops(
 ) -> LoopRun:
     """Run the card's loops over even rows (s), its resonator's frequency (Hz) and loss numbers or rows.
 
-    Parameters
-    ----------
-    rate : float or array (N,)
-        Rate (rad/s).
-    pattern_angle : float or array (N,), optional
-        Azimuth (rad), at the start in whole-angle mode; that of `[bias]` unless given.
-    both_ways : bool
-        Whether the self-precession turns back after half of the rows.
-    damping : array (N,), optional
-        Of the parts of a loss budget; see `wave_of`.
+    Args:
+        rate: float or array (N,): Rate (rad/s).
+        pattern_angle: float or array (N,): Azimuth (rad), at the start in whole-angle mode; that of `[bias]` unless
+            given.
+        both_ways: Whether the self-precession turns back after half of the rows.
+        damping: array (N,): Of the parts of a loss budget; see `wave_of`.
     """
     loop = require_loop(instrument)
     angle = np.radians(instrument.bias.pattern_angle_deg) if pattern_angle is None else np.asarray(pattern_angle)

@@ -113,13 +113,7 @@ class LoopStudy:
 def study_loops(
     instrument: "Instrument", frequency: float, inverse_q: float, bryan_factor: float, rate: float = 0.0
 ) -> LoopStudy:
-    """Return margins, bias by source, noise by source, start and range of a card's loops, the range under a rate (rad/s).
-
-    Raises
-    ------
-    InputError
-        The card has no `[loop]`, a loop is unstable, or the loops need more than the actuators give.
-    """
+    """Return margins, bias by source, noise by source, start and range of a card's loops, the range under a rate (rad/s)."""
     loop = require_loop(instrument)
     wave = wave_of(instrument, frequency, inverse_q, bryan_factor)
     electronics, loops = electronics_of(loop, wave, instrument.reference_temperature), loops_of(loop)

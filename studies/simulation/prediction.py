@@ -46,32 +46,18 @@ GAP = 3.0  # usual distances of rows, across which nothing is known of a curve
 
 @dataclass(frozen=True)
 class Prediction:
-    """A record without noise.
-
-    Attributes
-    ----------
-    drive : Drive
-    columns : mapping
-        `housing_temperature_degC` (as its sensor reads it), `resonator_temperature_degC`, `frequency_Hz`,
-        `bias_deg_per_h`, `inverse_q`: arrays (N,).
-    derivatives : mapping
-        Of each value that was asked for, by name: the derivative of every column by it, in the unit of its key.
-    housing : array (N,), K
-        The housing itself.
-    law : FrequencyLaw
-    network : Network
-    temperatures : Temperatures
-        What the gyro reads its columns at.
-    damping : DampingLaw or None
-    """
+    """A record without noise."""
 
     drive: Drive
+    # `housing_temperature_degC` (as its sensor reads it), `resonator_temperature_degC`, `frequency_Hz`,
+    # `bias_deg_per_h`, `inverse_q`: arrays (N,).
     columns: Mapping[str, Array]
+    # Of each value that was asked for, by name: the derivative of every column by it, in the unit of its key.
     derivatives: Mapping[str, Mapping[str, Array]]
-    housing: Array
+    housing: Array  # array (N,), K: The housing itself
     law: "FrequencyLaw"
     network: Network
-    temperatures: Temperatures
+    temperatures: Temperatures  # what the gyro reads its columns at
     damping: DampingLaw | None
 
 
@@ -84,22 +70,12 @@ def predict(
 ) -> Prediction:
     """Predict the record of a run.
 
-    Parameters
-    ----------
-    instrument : Instrument
-    drive : Drive
-    derivatives : names, or `Variations` of this instrument that several runs share
-        Keys of the card ("thermal.mount_conductance_W_per_K"), "initial.base" (K) and whatever else of the drive may depart,
-        "shift" (s), "jump.0" (s) and the other jumps of its profile, "kink.7" (K) before its row 7.
-    law : FrequencyLaw, optional
-        One that was built before for this instrument and a range that is wide enough.
-    longest : float, s, optional
-        Between the knots of what radiation adds; the error goes with its fourth power.
-
-    Raises
-    ------
-    InputError, ThermalError, ShellError
-        An unusable table or effect, or temperatures that leave the range of the material.
+    Args:
+        derivatives: names, or `Variations` of this instrument that several runs share Keys of the card
+            ("thermal.mount_conductance_W_per_K"), "initial.base" (K) and whatever else of the drive may depart, "shift"
+            (s), "jump.0" (s) and the other jumps of its profile, "kink.7" (K) before its row 7.
+        law: One that was built before for this instrument and a range that is wide enough.
+        longest: Between the knots of what radiation adds; the error goes with its fourth power.
     """
     if law is None:
         law = law_for(instrument, drive)

@@ -89,19 +89,11 @@ def read_out(
 ) -> dict[str, Array]:
     """Columns of the record, without noise: °C, Hz, deg/h, 1; of a card with loops also what their quadrature control says.
 
-    Parameters
-    ----------
-    tau : float
-        Slowest time constant (s) of the resonator behind its housing, for the effects.
-    damping : DampingLaw, optional
-        1/Q and its anisotropy from the parts in the card; else `[loss]`'s polynomial and `[bias]`'s anisotropy.
-    more_loss : float
-        Added to 1/Q, as an effect on it would be.
-
-    Raises
-    ------
-    InputError
-        A loss that becomes negative.
+    Args:
+        tau: Slowest time constant (s) of the resonator behind its housing, for the effects.
+        damping: 1/Q and its anisotropy from the parts in the card; else `[loss]`'s polynomial and `[bias]`'s
+            anisotropy.
+        more_loss: Added to 1/Q, as an effect on it would be.
     """
     reference = instrument.reference_temperature
     housing, resonator, *uneven = found.value.T

@@ -103,13 +103,7 @@ def transfer(loops: Loops, name: str, decay: float) -> dict[str, dict[str, Array
 
 
 def write_state_space(study: "LoopStudy", path: str) -> None:
-    """Write the systems to a .json or a .mat file, whole or not at all.
-
-    Raises
-    ------
-    InputError
-        Another ending, or a file that cannot be written.
-    """
+    """Write the systems to a .json or a .mat file, whole or not at all."""
     from scipy.io import savemat
 
     from studies.cli.output import dump_json

@@ -66,27 +66,14 @@ def simulate_run(
 ) -> VirtualRun:
     """Run a virtual gyro.
 
-    Parameters
-    ----------
-    instrument : Instrument
-        With optional tables `[thermal]`, `[loss]`, `[bias]`, `[noise]` and `[[effect]]`.
-    driven : Profile or Drive
-        Chamber temperature (K), the gyro has settled at its first value; or a drive, which brings its own rows.
-    rate : float
-        Rows per second of a profile; of a drive, for its noise.
-    seed : int
-        Of the noise.
-    noise : bool
-        False records what is true, without noise, sensor lag or rounding.
-    theory : str
-        Of the shell: "solid" or "shell".
-    law : FrequencyLaw, optional
-        One that was built before for the same instrument.
-
-    Raises
-    ------
-    InputError, ThermalError, ShellError
-        An unusable table or effect, an unstable loop; a boundary that leaves the range of the material.
+    Args:
+        instrument: With optional tables `[thermal]`, `[loss]`, `[bias]`, `[noise]` and `[[effect]]`.
+        driven: Chamber temperature (K), the gyro has settled at its first value; or a drive, which brings its own rows.
+        rate: Rows per second of a profile; of a drive, for its noise.
+        seed: Of the noise.
+        noise: False records what is true, without noise, sensor lag or rounding.
+        theory: Of the shell: "solid" or "shell".
+        law: One that was built before for the same instrument.
     """
     drive = driven if isinstance(driven, Drive) else drive_by_profile(driven, rows_of(driven, rate))
     if isinstance(driven, Drive):

@@ -50,26 +50,22 @@ def run_study(
     >>> table.attrs["units"]["frequency_n2_Hz"]                     # doctest: +SKIP
     'Hz'
 
-    Parameters
-    ----------
-    source : path, name or mapping, the spec (`studies.sweeps.spec`).
-    out : folder of the store; without it the results live in memory only.
-    card : another card than the spec's.
-    workers : processes on this machine; one for every core unless given. With 1 everything is computed in this process.
-        In a script, more than one need the guard `if __name__ == "__main__":`.
-    scheduler : str, optional
-        Address of a Dask scheduler, instead of processes here; it and its workers can run code here (`studies.sweeps.cluster`).
-    allow_python : run the user functions that the spec names.
-    retry_failed : bool
-        Compute the cases again that failed in an earlier run. Those whose worker was lost are always tried again.
-    show_progress : show progress on standard error.
+    Args:
+        source: path, name or mapping, the spec (`studies.sweeps.spec`).
+        out: folder of the store; without it the results live in memory only.
+        card: another card than the spec's.
+        workers: processes on this machine; one for every core unless given. With 1 everything is computed in this
+            process. In a script, more than one need the guard `if __name__ == "__main__":`.
+        scheduler: Address of a Dask scheduler, instead of processes here; it and its workers can run code here
+            (`studies.sweeps.cluster`).
+        allow_python: run the user functions that the spec names.
+        retry_failed: Compute the cases again that failed in an earlier run. Those whose worker was lost are always
+            tried again.
+        show_progress: show progress on standard error.
 
-    Raises
-    ------
-    InputError
-        An unusable spec, another study's store, a damaged store, a second runner.
-    MissingEnvironment
-        The disk is full or cannot be written, the scheduler cannot be reached or was lost.
+    Raises:
+        InputError: An unusable spec, another study's store, a damaged store, a second runner.
+        MissingEnvironment: The disk is full or cannot be written, the scheduler cannot be reached or was lost.
     """
     study = read_study(source, card)
     sources = check_functions(study, allow_python)

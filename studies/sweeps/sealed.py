@@ -28,17 +28,11 @@ class Sealed(NamedTuple):
 
 
 class SealedFile:
-    """An open file of sealed blocks, unbuffered.
-
-    Attributes
-    ----------
-    end : where the next block goes.
-    damaged : list of (int, int), stretches that `scan` could not read, from and to.
-    """
+    """An open file of sealed blocks, unbuffered."""
 
     def __init__(self, file: IO[bytes]) -> None:
         self.file = file
-        self.end = 0
+        self.end = 0  # where the next block goes
         self.damaged: list[tuple[int, int]] = []
         self.synced = time.monotonic()
 

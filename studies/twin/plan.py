@@ -57,28 +57,17 @@ class EffectRow:
 
 @dataclass(frozen=True)
 class Plan:
-    """Numbers of one card that the C code runs on.
-
-    Attributes
-    ----------
-    boundary : "chamber" or "housing"
-    parameters : mapping from key of the card to number; keys that begin with "." are no keys of a card
-    network : Network
-        Of unit constants, so that its links and capacities are the factors of the parameters.
-    rows : array (5, nodes)
-        Resonator's mean temperature and what is uneven in it.
-    constants : mapping from macro to number
-    splines : mapping of "law", "heat_capacity", "loss" and the two parts of "wave"
-    """
+    """Numbers of one card that the C code runs on."""
 
     instrument: "Instrument"
-    boundary: "Boundary"
+    boundary: "Boundary"  # "chamber" or "housing"
+    # mapping from key of the card to number; keys that begin with "." are no keys of a card
     parameters: dict[str, float]
-    network: "Network"
-    rows: Array
+    network: "Network"  # of unit constants, so that its links and capacities are the factors of the parameters
+    rows: Array  # array (5, nodes): Resonator's mean temperature and what is uneven in it
     uneven: Array
-    constants: dict[str, float]
-    splines: dict[str, Spline]
+    constants: dict[str, float]  # mapping from macro to number
+    splines: dict[str, Spline]  # mapping of "law", "heat_capacity", "loss" and the two parts of "wave"
     effects: tuple[EffectRow, ...]
 
     @property
@@ -98,13 +87,7 @@ class Plan:
 
 
 def plan_twin(instrument: "Instrument", boundary: "Boundary" = "chamber", theory: "Theory" = "solid") -> Plan:
-    """Return what the C code needs of a card.
-
-    Raises
-    ------
-    InputError
-        A card of which a part cannot be carried: which, and what to do.
-    """
+    """Return what the C code needs of a card."""
     from studies.law import law_of
 
     _refuse(instrument)

@@ -95,15 +95,10 @@ class LagSeries:
     τ_j dT_j/dt = (1 − ρ + ρ g_j)(T_{j−1} − T_j), g_j = (T_{j−1} + T_j)(T_{j−1}² + T_j²)/(4 T₀³), T_0 = T_h, T_r the last:
     the exchange σ a (T_{j−1}⁴ − T_j⁴) makes the share ρ of the conductance at T₀. Constants: "time_constant_1" … (s, at
     T₀) and "radiated_share", the same for all.
-
-    Attributes
-    ----------
-    constants : the time constants, then the share
-    reference_temperature : T₀, K
     """
 
-    constants: tuple[Constant, ...]
-    reference_temperature: float
+    constants: tuple[Constant, ...]  # the time constants, then the share
+    reference_temperature: float  # T₀, K
 
     @property
     def states(self) -> int:

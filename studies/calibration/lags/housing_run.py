@@ -16,18 +16,11 @@ LEAST_ROWS = 30
 
 @dataclass(frozen=True)
 class HousingRun:
-    """Columns of a run as measured; not-a-number marks a missing value.
+    """Columns of a run as measured; not-a-number marks a missing value."""
 
-    Attributes
-    ----------
-    time : array (N,), s, increasing
-    frequency : array (N,), Hz
-    housing_temperature : array (N,), K
-    """
-
-    time: Array
-    frequency: Array
-    housing_temperature: Array
+    time: Array  # array (N,), s, increasing
+    frequency: Array  # array (N,), Hz
+    housing_temperature: Array  # array (N,), K
 
     def __post_init__(self) -> None:
         columns = [np.asarray(c, dtype=float) for c in (self.time, self.frequency, self.housing_temperature)]
@@ -49,24 +42,17 @@ class HousingRun:
 
 @dataclass(frozen=True)
 class EvenRun:
-    """A run averaged onto even rows.
+    """A run averaged onto even rows."""
 
-    Attributes
-    ----------
-    time, housing_temperature : arrays (M,), s and K, even and without holes
-    rows : array (K,), the rows at which the frequency is known
-    frequency_time, frequency : arrays (K,), mean time (s) and mean (Hz) of the samples of these rows
-    breaks : array, places in `rows` at which a new stretch begins after a hole
-    warnings : what was missing
-    """
-
+    # time, housing_temperature: arrays (M,), s and K, even and without holes
     time: Array
     housing_temperature: Array
-    rows: Rows
+    rows: Rows  # array (K,), the rows at which the frequency is known
+    # frequency_time, frequency: arrays (K,), mean time (s) and mean (Hz) of the samples of these rows
     frequency_time: Array
     frequency: Array
-    breaks: Rows
-    warnings: tuple[str, ...]
+    breaks: Rows  # array, places in `rows` at which a new stretch begins after a hole
+    warnings: tuple[str, ...]  # what was missing
 
 
 def row_step(runs: Sequence[HousingRun], most: int) -> float:

@@ -28,15 +28,10 @@ EVIDENCE = 10.0  # how far the information criterion must fall before something 
 
 @dataclass(frozen=True)
 class FrequencyPolynomial:
-    """Coefficients of f(T) about a reference temperature (K); None is unknown and fitted.
+    """Coefficients of f(T) about a reference temperature (K); None is unknown and fitted."""
 
-    Attributes
-    ----------
-    reference_temperature : float, K
-    slope, curvature, cubic : float or None, Hz/K, Hz/K², Hz/K³
-    """
-
-    reference_temperature: float
+    reference_temperature: float  # K
+    # slope, curvature, cubic: float or None, Hz/K, Hz/K², Hz/K³
     slope: float | None
     curvature: float | None = 0.0
     cubic: float | None = 0.0
@@ -68,30 +63,18 @@ class Direction:
 
 @dataclass(frozen=True)
 class Identification:
-    """What a record says about the thermal constants.
+    """What a record says about the thermal constants."""
 
-    Attributes
-    ----------
-    estimates : by name: the follower's constants, the free ones of "slope", "curvature", "cubic", and "offset" (f₀)
-    confidence : of the intervals
-    undetermined : directions that the record leaves open
-    departures : per run, the initial temperatures' distance (K) from the steady ones
-    noise : of the averaged rows (Hz)
-    residual : array, Hz, all runs in order
-    criterion : Bayesian information criterion, to compare followers on the same record
-    row_step : distance (s) of the averaged rows
-    warnings : what was missing in the record
-    """
-
+    # by name: the follower's constants, the free ones of "slope", "curvature", "cubic", and "offset" (f₀)
     estimates: dict[str, LagEstimate]
-    confidence: float
-    undetermined: tuple[Direction, ...]
-    departures: tuple[Array, ...]
-    noise: Wander
-    residual: Array
-    criterion: float
-    row_step: float
-    warnings: tuple[str, ...]
+    confidence: float  # of the intervals
+    undetermined: tuple[Direction, ...]  # directions that the record leaves open
+    departures: tuple[Array, ...]  # per run, the initial temperatures' distance (K) from the steady ones
+    noise: Wander  # of the averaged rows (Hz)
+    residual: Array  # Hz, all runs in order
+    criterion: float  # Bayesian information criterion, to compare followers on the same record
+    row_step: float  # distance (s) of the averaged rows
+    warnings: tuple[str, ...]  # what was missing in the record
     problem: LagProblem = field(repr=False)
     solution: LagSolution = field(repr=False)
 
@@ -99,13 +82,7 @@ class Identification:
 def identify(
     runs: Sequence[HousingRun], follower: Follower, law: FrequencyPolynomial, confidence: float = 0.9
 ) -> Identification:
-    """Fit the follower's constants and the unknown coefficients of the law to one run or several.
-
-    Raises
-    ------
-    ThermalError
-        For a record that is constant within its noise, or too short.
-    """
+    """Fit the follower's constants and the unknown coefficients of the law to one run or several."""
     if not runs:
         raise ThermalError("no run given; name at least one record.")
     if not 0 < confidence < 1:
@@ -149,13 +126,10 @@ def identify_lags(
 ) -> Identification:
     """Identify as many lags as the record supports, each further one paid for by the information criterion.
 
-    Parameters
-    ----------
-    make : callable
-        From starting time constants (s) and the bounds `shortest` and `longest` to a follower: `make_series` for lags in
-        series with radiation, `make_lags` for lags side by side.
-    progress : callable
-        Told in words what comes next.
+    Args:
+        make: From starting time constants (s) and the bounds `shortest` and `longest` to a follower: `make_series` for
+            lags in series with radiation, `make_lags` for lags side by side.
+        progress: Told in words what comes next.
     """
     best: Identification | None = None
     for count in range(1, most + 1):

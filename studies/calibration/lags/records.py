@@ -29,24 +29,13 @@ def fit_thermal_constants(
 ) -> Identification:
     """Identify the lags of the resonator behind its housing, each run with an initial state of its own.
 
-    Parameters
-    ----------
-    records : sequence of Record
-        Runs with `frequency_Hz` and the temperature of the housing, else of the chamber.
-    instrument : Instrument, optional
-        Gives curvature and cubic of the frequency over temperature; without it the curvature is fitted and the
-        cubic is zero. The slope is always fitted.
-    lags : int, optional
-        Number of lags; as many as the record supports, up to three, when absent.
-    confidence : float
-        Of the intervals.
-    progress : callable
-        Told in words what comes next.
-
-    Raises
-    ------
-    InputError
-        A record without the columns, or from which nothing can be identified.
+    Args:
+        records: Runs with `frequency_Hz` and the temperature of the housing, else of the chamber.
+        instrument: Gives curvature and cubic of the frequency over temperature; without it the curvature is fitted and
+            the cubic is zero. The slope is always fitted.
+        lags: Number of lags; as many as the record supports, up to three, when absent.
+        confidence: Of the intervals.
+        progress: Told in words what comes next.
     """
     if lags is not None and not 1 <= lags <= 5:
         raise InputError(f"--lags {lags}: the number of lags lies between 1 and 5.")

@@ -65,14 +65,12 @@ class Bias(Keys, frozen=True, kw_only=True):
 
         B = Δ(1/τ) sin 2n(θ − θ_τ) / (2 n k) (averaged equations of Lynch 1995), 1/τ = π f/Q, plus Σ k fⁱ ḟʲ.
 
-        Parameters
-        ----------
-        change, rate : arrays (N,), Hz and Hz/s
-        frequency, inverse_q : arrays (N,), Hz and 1
-        pattern_angle : array (N,), rad
-            Where the azimuth is commanded; that of the card unless given.
-        wave : array (N,), optional
-            Δ(1/Q) exp(2inθ_τ) of the parts of a loss budget, in place of the anisotropy and axis of this table.
+        Args:
+            change, rate: arrays (N,), Hz and Hz/s
+            frequency, inverse_q: arrays (N,), Hz and 1
+            pattern_angle: array (N,), rad: Where the azimuth is commanded; that of the card unless given.
+            wave: array (N,): Δ(1/Q) exp(2inθ_τ) of the parts of a loss budget, in place of the anisotropy and axis of
+                this table.
         """
         theta = np.radians(self.pattern_angle_deg) if pattern_angle is None else pattern_angle
         if wave is None:

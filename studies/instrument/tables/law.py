@@ -42,19 +42,13 @@ class LawKeys(Keys, frozen=True, kw_only=True):
 
 @dataclass(frozen=True)
 class PolynomialLaw:
-    """Frequency law of `[law]`, with what a simulation asks of `shell.law.FrequencyLaw`.
+    """Frequency law of `[law]`, with what a simulation asks of `shell.law.FrequencyLaw`."""
 
-    Attributes
-    ----------
-    f0 : float, Hz
-    coefficients : of x, x², x³, 1/Kⁿ
-    reference_temperature, lowest, highest : float, K
-    lag, chamber_lag, delay : float, s
-    """
-
-    f0: float
-    coefficients: tuple[float, float, float]
+    f0: float  # Hz
+    coefficients: tuple[float, float, float]  # of x, x², x³, 1/Kⁿ
+    # reference_temperature, lowest, highest: K
     reference_temperature: float
+    # lag, chamber_lag, delay: float, s
     lag: float
     chamber_lag: float
     delay: float = 0.0
@@ -68,13 +62,7 @@ class PolynomialLaw:
         return np.asarray(np.exp(self.logarithm(temperature, extrapolate=extrapolate)))
 
     def logarithm(self, temperature: ArrayLike, *, extrapolate: bool = False) -> Array:
-        """Return ln f, f in Hz.
-
-        Raises
-        ------
-        ShellError
-            A temperature at which the polynomial has no positive frequency.
-        """
+        """Return ln f, f in Hz."""
         x = np.asarray(temperature, dtype=float) - self.reference_temperature
         a1, a2, a3 = self.coefficients
         change = x * (a1 + x * (a2 + x * a3))

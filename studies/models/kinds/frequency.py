@@ -71,15 +71,8 @@ def evaluate(model: Model, temperature_degC: Array) -> Array:
 def find_temperature(model: Model, frequency: Array, path: str = "record", *, spare: bool = False) -> Array:
     """Return the temperature (°C) whose frequency this is, HRG paper Table 2; NaN where no frequency is given.
 
-    Parameters
-    ----------
-    spare : bool
-        Leave frequencies outside the model's range without a temperature.
-
-    Raises
-    ------
-    InputError
-        The curve turns round within the model's range, or a frequency lies outside it, or there is none.
+    Args:
+        spare: Leave frequencies outside the model's range without a temperature.
     """
     from compensation.frequency import invert
 
