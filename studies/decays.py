@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from compensation.arrays import Array
 from studies.errors import InputError, naming
 from studies.files.columns import read_columns, read_header
+from studies.files.reading import read_bytes
 from studies.record import Record, check_plausible, write_record
 from studies.ringdown import POWERS, Decay
 
@@ -43,9 +44,8 @@ class Decays:
 
 def is_table(path: str | Path) -> bool:
     """Return whether a file is a table of decays."""
-    with open(path, "rb") as file:
-        if file.read(1) == b"%":
-            return False
+    if read_bytes(path, first=1) == b"%":
+        return False
     header = set(read_header(path))
     return bool(header & set(RESPONSES)) and not header & set(POWERS)
 

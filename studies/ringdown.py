@@ -31,6 +31,7 @@ from compensation.ringdown.spectrum import SpectrumFit, fit_spectrum
 from compensation.ringdown.trace import TraceDecay, analyse_trace
 from studies.errors import InputError, naming
 from studies.files.columns import Columns, read_columns, read_header
+from studies.files.reading import read_bytes
 from studies.instrument.card import Instrument
 
 PARTS = ("cos", "sin")
@@ -183,20 +184,14 @@ def read_decay(
 
 def is_decay(path: str | Path) -> bool:
     """Return whether a file is a decay or a spectrum by its columns, and not a record."""
-    with open(path, "rb") as file:
-        if file.read(1) == b"%":
-            return True
+    if read_bytes(path, first=1) == b"%":
+        return True
     return bool(set(read_header(path)) & (set(KNOWN) - {"time_s", "frequency_Hz"}))
 
 
 def _read(path: str | Path) -> tuple[Columns, dict[str, float]]:
     """Return the table and the numbers of its comments; traces with % comments have two columns and no header."""
-    try:
-        with open(path, encoding="utf-8", errors="replace") as file:
-            foreign = file.read(1) == "%"
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror}).") from None
-    if foreign:
+    if read_bytes(path, first=1) == b"%":
         return _read_trace(path)
     header = set(read_header(path))
     spectrum = "frequency_Hz" in header and bool(header & set(POWERS))

@@ -3,6 +3,8 @@
 import re
 from typing import Any
 
+from studies.errors import InputError
+
 LARGEST = 1e15
 """Nothing that an instrument has, in any unit of its keys, is as large; powers of what is larger overflow."""
 ACTING = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]")
@@ -15,10 +17,10 @@ def is_sound(value: Any) -> bool:
 
 
 def refuse_unsound(_: Any, value: Any) -> None:
-    """Check one argument of a command, whatever it is, as a validator of cyclopts; ValueError says what it must be."""
+    """Check one argument of a command, whatever it is, as a validator of cyclopts."""
     for one in value if isinstance(value, list | tuple) else (value,):
         if not is_sound(one):
-            raise ValueError(f"It must be a finite number below {LARGEST:g} in size.")
+            raise InputError(f"{one:g}: must be a finite number below {LARGEST:g} in size.")
 
 
 def printable(text: str) -> str:

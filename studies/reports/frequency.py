@@ -26,7 +26,7 @@ def facts(study: FrequencyStudy) -> Facts:
     fit = study.fit
     middle = float(np.mean(fit.temperature_range_degC))
     return Facts([
-        (f"Slope at {middle:.3g} °C", f"{float(fit.slope_ppm(middle)):.2f} ppm/°C", "middle of the range"),
+        (f"Slope at {round(middle, 1) + 0.0:g} °C", f"{float(fit.slope_ppm(middle)):.2f} ppm/°C", "middle of the range"),
         ("Largest temperature error", f"{np.abs(study.error_degC).max():.3f} K", "temperature from frequency"),
         ("Leave-one-out error", f"{fit.leave_one_out_rms:.4f} Hz", "rms of points left out of the fit"),
         ("Order supported by the data", name_order(study.orders.recommended), "F-test at the 5 % level"),
