@@ -8,12 +8,14 @@ import sys
 import time
 from contextlib import contextmanager, nullcontext
 from dataclasses import replace
+from types import SimpleNamespace
 
 import pytest
 
 from studies.errors import InputError, MissingEnvironment
 from studies.reports.sweep import study_result
 from studies.results.page import render_result
+from studies.sweeps.export import export_results
 from studies.sweeps.progress import Lines
 from studies.sweeps.run import run_study
 from tests.studies.sweeps.processes import environment, rows_of, spec_of, words_of
@@ -39,6 +41,17 @@ def test_table_carries_units(results):
     ]  # fmt: skip
     assert table.attrs["units"]["frequency_n2_Hz"] == "Hz"
     assert len(table) == 8
+
+
+def test_no_cell_of_an_export_is_a_formula(tmp_path):
+    import pandas as pd
+
+    frame = pd.DataFrame({"=1+1": [-1.0], "remark": ["@SUM(A1)"]})
+    study = SimpleNamespace(name="one")
+    export_results(
+        SimpleNamespace(header=list(frame), frames=lambda: [frame], study=study, units={}), tmp_path / "t.csv"
+    )
+    assert (tmp_path / "t.csv").read_text() == "'=1+1,remark\n-1.0,'@SUM(A1)\n"
 
 
 def test_values_are_those_of_the_solver(results):
