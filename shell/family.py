@@ -173,7 +173,7 @@ def build_family(
         if errors[0] > AMPLIFIED * solve.jumps or left <= 0:
             break  # where it is not for the jumps, finer solves would be no smoother
     raise ShellError(
-        f"{count} full solves hold the frequency to {reached:.1g} within these ranges, not to {tolerance:.1g}: narrow the"
+        f"{count} full solves interpolate the frequency only to {reached:.2g} within these ranges; {tolerance:.2g} is asked: narrow the"
         " ranges, allow a larger error, or solve each design in full."
     )
 

@@ -188,7 +188,9 @@ def _remark(
 def _undetermined(fit: DecayFit, estimates: Mapping[str, Estimate]) -> list[str]:
     said = []
     if fit.one_mode:
-        said.append("Only one mode is seen: the other is not excited, or the split is not resolved. No axes follow.")
+        said.append(
+            "Only one mode is seen: the other is not excited, or the split is not resolved. The axes are not known."
+        )
     if "split_Hz" in estimates:
         split = estimates["split_Hz"]
         width = 1 / (np.pi * estimates["decay_time_s"].value)

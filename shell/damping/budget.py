@@ -185,7 +185,7 @@ def film_causes(
 
     found = [
         LossCause(
-            f"film {name}",
+            f"{name} film",
             internal,
             float(np.hypot(*relative)),
             source,
@@ -200,7 +200,7 @@ def film_causes(
 
         sd = float(np.hypot(relative[0], 0.2))  # films differ from the bulk whose constants they are given
         found.append(
-            LossCause(f"film {name}, heat", thermoelastic, sd, source, "a thinner film, or a metal with less expansion")
+            LossCause(f"{name} film, heat", thermoelastic, sd, source, "a thinner film, or a metal with less expansion")
         )
     return found
 

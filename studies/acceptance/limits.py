@@ -49,13 +49,13 @@ QUANTITIES = tuple(
         ("bias_deg_per_h", "12.11", "bias", "deg/h", REST),
         ("bias_repeatability_deg_per_h", "12.11", "run-to-run bias repeatability, standard deviation", "deg/h", REPEATED),
         ("angle_random_walk_deg_per_rt_h", "12.11", "angle random walk", "deg/√h", REST),
-        ("bias_instability_deg_per_h", "12.11", "bias instability, minimum of the Allan deviation over 0.664", "deg/h", REST),
+        ("bias_instability_deg_per_h", "12.11", "bias instability, minimum of the Allan deviation divided by 0.664", "deg/h", REST),
         ("rate_random_walk_deg_per_h_per_rt_h", "12.11", "rate random walk", "deg/h/√h", REST),
         ("angle_storage_error_deg", "12.13", "angle storage error after a power interruption", "deg", STORED),
         ("run_down_time_s", "12.14", "run-down time to 1/e of the amplitude", "s", RUN_DOWN, False),
         ("quality_factor", "12.14", "Q from the run-down", "", RUN_DOWN + ", and its frequency_Hz", False),
         ("bandwidth_Hz", "12.15", "bandwidth (−3 dB)", "Hz", SHAKEN, False),
-        ("delay_ms", "12.15", "output delay within half the bandwidth", "ms", SHAKEN),
+        ("delay_ms", "12.15", "output delay, up to half the bandwidth", "ms", SHAKEN),
         ("bias_trend_deg_per_h_per_year", "12.18", "bias drift over the records", "deg/h/year", LIFE),
     )
 )  # fmt: skip

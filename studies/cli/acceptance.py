@@ -161,7 +161,7 @@ def _drift(found: Acceptance) -> list[Figure | Sentence]:
     reach = f" from {plain(float(allan.tau[first]))} s on (angle noise dominates below)" if first else ""
     words = (
         f"Misfit {noise.misfit:.2g}{reach}; a value near 1 means that angle random walk, bias instability (minimum of the Allan"
-        " deviation over 0.664) and rate random walk explain the curve."
+        " deviation divided by 0.664) and rate random walk explain the curve."
     )
 
     def draw() -> Drawing:

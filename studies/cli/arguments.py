@@ -33,7 +33,7 @@ WHOLE = numbers(lambda one: one >= 0, "0 or above")
 POSITIVE = numbers(lambda one: 0 < one < inf, "positive")
 FRACTION = numbers(lambda one: 0 < one < 1, "between 0 and 1")
 
-CARD = "Path of a card, or the name of one that ships (hrg cards)."
+CARD = "Path of a card, or the name of a built-in one (hrg cards)."
 REFERENCE = "Temperature in °C; the card's reference temperature unless given."
 Card = Annotated[str, Parameter(help=CARD)]
 Records = Annotated[str, Parameter(help="The records (CSV).")]

@@ -30,7 +30,7 @@ MODES = (
     Column("predicted_Hz", "calibrated", "Hz", digits=9),
     Column("residual_ppm", "residual", "ppm", "+.2g"),
     Column("sd_ppm", "noise", "ppm", ".2g"),
-    Column("chance", "chance", "%", ".3g", scale=100.0),
+    Column("chance", "probability", "%", ".3g", scale=100.0),
     Column("others", "or n, index (%)"),
 )
 NEXT = (
@@ -38,13 +38,13 @@ NEXT = (
     Column("harmonic", "n"),
     "index",
     Column("frequency_Hz", "near", "Hz", digits=6),
-    Column("sd", "± now", form=".2g"),
-    Column("sd_then", "± then", form=".2g"),
+    Column("sd", "now ±", form=".2g"),
+    Column("sd_then", "then ±", form=".2g"),
 )
 UNTOUCHED = 0.9995
 WIDTHS = "Shift: change in prior standard deviations. Width: posterior over prior standard deviation; the modes determine a value up to 0.5."
 READ = (
-    "Noise: of the reading and of the solver. Chance: probability that the reading is of this mode. The modes are those of the bare"
+    "Noise: of the reading and of the solver. Probability: that the reading is of this mode. The modes are those of the bare"
     " resonator (of a pair, the mean), without electrodes, films or mount."
 )
 TIED = "Only a combination is determined: {}. Weigh the resonator, or measure one of these directly."

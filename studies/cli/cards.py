@@ -23,7 +23,7 @@ def cards(card: str = "") -> Result:
     documented for their key.
 
     Args:
-        card: Path of a card, or the name of one that ships: show its mass, moments of inertia and uncertain values.
+        card: Path of a card, or the name of a built-in one: show its mass, moments of inertia and uncertain values.
     """
     if card:
         return _show_values(card)

@@ -94,7 +94,7 @@ def _parts(payload: dict[str, Any], split: float, resolved: bool, keys: Electrod
     quantities = (
         ("softening by the card's voltages", payload["softening_ppm"], "ppm"),
         ("split by the card's voltages", *((1e3 * payload["split_Hz"], "mHz") if resolved else ("none", ""))),
-        ("sensitivity to all voltages", payload["per_volt_ppm"], "ppm/V"),
+        ("sensitivity to a change of all voltages", payload["per_volt_ppm"], "ppm/V"),
         ("sensitivity to temperature, through the gap", payload["per_kelvin_ppm"], "ppm/K"),
         ("pull-in safety factor of the voltages", "unlimited" if isinf(factor) else factor, ""),
         (f"largest split nulled by up to {limit:g} V, any axis", 1e3 * payload["reach_Hz"], "mHz"),

@@ -140,9 +140,9 @@ def _parts(
             Figure(lambda: _draw_bars(budget, at), f"Contributions to 1/Q at {degrees[at]:g} °C with 90 % intervals."),
         ]),
         Chapter(f"Contributions at {degrees[at]:g} °C", [
-            Table("Share and gain", rows, [
+            Table("Contributions", rows, [
                 name, Column("share", "share", "%", ".3g"), *values, interval, Column(f"slope_per_K.{at}", "slope", "%/°C", "+.2g", scale=100.0),
-                Column("half", "Q if halved", digits=3), Column("without", "Q without it", digits=3),
+                Column("half", "Q if it is halved", digits=3), Column("without", "Q without it", digits=3),
             ], "Largest first; all columns except 1/Q are at the temperature above."),
             Table("Remedies and sources", rows, [
                 name, Column("relative_sd", "standard uncertainty", "%", ".0f", scale=100.0), Column("advice", "remedy"), Column("source", "source"),

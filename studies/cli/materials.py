@@ -170,7 +170,7 @@ def _figures(resonator: "Resonator", material: "Material", T: float, harmonic: i
 
     remarks = list(material.caveats)
     if absent := material.lacks:
-        remarks.append(f"no source states its {', '.join(one.replace('_', ' ') for one in absent)}")
+        remarks.append(f"{material.name}: no source states its {spell(absent)}.")
     found: dict[str, Any] = {"remarks": remarks}
     try:
         elastic = material.elastic(T)
@@ -195,7 +195,9 @@ def _figures(resonator: "Resonator", material: "Material", T: float, harmonic: i
         alpha, k, c = (float(material.value(name, T)) for name in HEAT)
         sd = dict(zip(material.prior.names, material.prior.sd, strict=True)).get("expansion.value", 0.0)
         if abs(alpha) <= sd:
-            remarks.append(f"expansion 0 within {1e9 * sd:.2g}e-9 1/K: no thermoelastic Q follows")
+            remarks.append(
+                f"{material.name}: its expansion is 0 within {1e9 * sd:.2g}e-9 1/K, so its thermoelastic Q is not known."
+            )
             return found
         heat = Heat(alpha, float(material.value("density", T)) * c, k)
         cause = thermoelastic_cause(vibration, lambda _: heat, (0.0, 0.0, 0.0), "")

@@ -141,8 +141,8 @@ def _parts(found: Answer, payload: dict[str, Any]) -> list[Any]:
         Chapter("About the best design", [Blocks(lambda: _live(found))]),
         Chapter("Constraints", [
             Table("Cost of the limits", payload["constraints"], [
-                Column(lambda row: named(row["column"]), "quantity"), Column("kind", "limit is"), Column("limit", "limit", digits=7), Column("value", "value", digits=7),
-                Column("room", "room", digits=3), Column(lambda row: row["margin"] or None, "margin for tolerances", digits=3), Column("price", price, digits=3),
+                Column(lambda row: named(row["column"]), "quantity"), Column("kind", "bound"), Column("limit", "limit", digits=7), Column("value", "value", digits=7),
+                Column("room", "distance to the limit", digits=3), Column(lambda row: row["margin"] or None, "margin for tolerances", digits=3), Column("price", price, digits=3),
             ], "Price: gain of the objective per unit by which the limit is relaxed, to first order and before rounding; empty where the limit"
                " is not active."),
         ]),
@@ -158,7 +158,7 @@ def _parts(found: Answer, payload: dict[str, Any]) -> list[Any]:
             ], "Worst case and standard deviation to first order; full solves: the extremes among the worst corners and designs drawn from the tolerances."),
         ]),
         Chapter("Search", [
-            Figure(lambda: _draw_history(found), "Objective and excess over the limits of the designs, in the order in which they were computed."),
+            Figure(lambda: _draw_history(found), "Objective, and violation of the limits, of each design in the order in which they were computed."),
             Table("Designs that could not be computed", [{"reason": reason, "designs": count} for reason, count in reasons.most_common(8)],
                 ("designs", "reason"), where="page"),
         ]),

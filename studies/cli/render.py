@@ -46,21 +46,21 @@ def render(
     """Show a mode shape: the real solid, its nodes (red) and antinodes (black dots), the undeformed shape in grey.
 
     The extension of --out selects the format: .png a picture, .webp or .gif a looping animation, .html an interactive page that works
-    offline, .glb a mesh in which the mode swings, .stl or .ply the solid for slicers, in mm.
-    A card with an imperfection shows the slower mode of the split pair on its axis, the shell's departures exaggerated in
-    pictures and true in .stl and .ply; lines across the rim are the axes of the slower (blue) and the faster mode (orange).
+    offline, .glb an animated mesh, .stl or .ply the solid for slicers, in mm.
+    A card with an imperfection shows the slower mode of the split pair on its axis, its imperfections exaggerated in
+    pictures and to scale in .stl and .ply; lines across the rim are the axes of the slower (blue) and the faster mode (orange).
     Several cards, or one card at several temperatures, stand side by side in pictures and animations on one scale.
     A PNG, WebP or GIF needs OpenGL; without it the exit status is 3 and the message says what to install.
 
     Args:
-        card: Cards by path, or the names of ones that ship (hrg cards).
+        card: Cards by path, or the names of built-in ones (hrg cards).
         harmonic: Circumferential harmonic n, 2 unless given; several only for .html, which lets you choose among them.
         index: 0 for the lowest mode of its harmonic.
         temperature: Temperature of the resonator in °C; the card's reference temperature unless given.
         colour: What the colour shows: displacement, strain-energy density, or a temperature field.
         field: Table with position (0 ... 1 along the meridian) and temperature_degC, for --colour temperature.
         view: oblique into the open end, along the axis, or from the side.
-        swing_mm: Displacement at the antinode in mesh files; unless given, .stl and .ply are undeformed and .glb swings
+        swing_mm: Displacement at the antinode in mesh files; unless given, .stl and .ply are undeformed and .glb moves
             visibly.
     """
     from studies.reports.mode_picture import view_blocks
@@ -99,7 +99,7 @@ def _solve(
 ) -> list[ModeScene]:  # fmt: skip
     """Solve every mode that is to be shown: cards × temperatures × harmonics."""
     if not cards:
-        raise InputError("a card is missing: give its path or the name of one that ships ('hrg cards').")
+        raise InputError("a card is missing: give its path or the name of a built-in one ('hrg cards').")
     count = len(cards) * max(len(temperatures), 1)
     most = MOST if kind in (".png", ".webp", ".gif") else 1
     if count > most:

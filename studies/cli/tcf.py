@@ -75,7 +75,7 @@ def tcf(
         Column("slope_ppm_per_degC", "slope", error="uncertainty_ppm_per_degC"),
     ]
     shown = sorted({0, len(T) // 2, len(T) - 1})
-    at = [f"at {points[k]['temperature_degC']:g} °C" for k in shown]
+    at = [f"at {points[k]['temperature_degC']:g} °C".replace("-", "−") for k in shown]
     moved = [Column(f"moves_slope_ppm_per_degC.{k}", words, form="+.2f") for k, words in zip(shown, at, strict=True)]
     uncertain = [one for one in moves if max(map(abs, one["moves_slope_ppm_per_degC"])) >= LEAST]
     return Result(

@@ -64,7 +64,7 @@ def temperature(model: str, run: str, /, *, out: str | None = None) -> Result:
                 ("Uncertainty of the curve", f"± {sd:.2g} K", "one standard deviation of the fitted f(T)"),
             ]),
             differs,
-            f"{empty} rows have no frequency and remain empty." if empty else "",
+            f"Rows without a frequency, left empty: {empty}." if empty else "",
             doubt,
             Figure(lambda: _figure(record, found), "Temperature of the resonator over time."),
             Sentence(NOTE, "note", "page"),

@@ -27,7 +27,12 @@ from studies.reports.style import BLUE, GREEN, VERMILION, figure
 from studies.results import Chapter, Column, Drawing, Facts, Figure, Result, Sentence, Table, row_of
 from studies.trim import SURE, CardPlan, Teeth, Tool, other_cuts, plan_for_card
 
-KINDS = {"mass": "unstrained mass", "edge": "off the rim", "inner": "off the inner face", "outer": "off the outer face"}
+KINDS = {
+    "mass": "unstrained mass",
+    "edge": "from the rim edge",
+    "inner": "from the inner face",
+    "outer": "from the outer face",
+}
 CUTS = (
     Column("number", "cut"),
     Column("azimuth_deg", "azimuth", "°", ".2f"),
@@ -75,8 +80,8 @@ def trim(
 ) -> Result:
     """Plan the cuts that null measured splits with the least mass, preserve the balance, and do not overshoot.
 
-    Make the cuts, measure, and plan the next round from the new splits. The effect of a cut depends on its place: off the edge
-    or a face it also removes strain energy; a tooth carries almost none. A narrow, deep groove relieves stress beside it, which
+    Make the cuts, measure, and plan the next round from the new splits. The effect of a cut depends on its place: at the edge
+    or on a face it also removes strain energy; a tooth carries almost none. A narrow, deep groove relieves stress beside it, which
     can cancel or reverse its effect; the plan solves this for the planned depth. Wide, shallow cuts and teeth are the most
     predictable. An edge cut ends along the normal of the wall; ground flat, parallel to the rim, it changes the split 4 to 6 % less.
 

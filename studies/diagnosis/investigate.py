@@ -219,7 +219,7 @@ def _result(campaign: Campaign, inquiry: Inquiry, causes: Sequence[Cause], score
         rest = "the other runs" if len(campaign.records) > 1 else "the rest of the record"
         share_known = f"{100 * reached.foretold:.0f} % of the rows"
         remarks.append(
-            f"no held-out residual: {'no row' if reached.foretold < 0.005 else 'only ' + share_known} can be predicted from {rest}"
+            f"no held-out residual, since {'no row' if reached.foretold < 0.005 else 'only ' + share_known} can be predicted from {rest}"
             if reached.held_out_rms is None
             else f"held-out residuals cover {share_known}; the others cannot be predicted from {rest}"
         )

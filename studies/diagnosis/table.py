@@ -283,7 +283,7 @@ def _study(
             ending = "no cause reaches the evidence needed" if shaped else "no cause is named"
             sentences.append(
                 f"The remaining residual of {base_rms:.3g} Hz rms is {times}; {ending}: the best candidate, {ranked[0].words}, has"
-                f" {short:.1f} of {-2.0 * prior:.0f}."
+                f" evidence {short:.1f}; a cause needs {-2.0 * prior:.0f}."
             )
         left_over = "structure" if wanders or shaped else "none"
         result = ResponseResult(

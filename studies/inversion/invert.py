@@ -157,7 +157,7 @@ def _fit_likely(
         for a, b, t in zip(n, k, T, strict=True)
     ]
     g, _ = model.predict(every, start)
-    progress(f"{len(every)} modes up to {highest:.4g} Hz may be those of the readings")
+    progress(f"{len(every)} modes up to {highest:.4g} Hz are candidates for the readings")
     J = model.derivatives(every, start)
     bent = CURVED * np.einsum("ij,ij->i", J, J)
     noise = np.array([np.hypot(s, bent[a].max() if a else 0.0) for s, a in zip(relative, allowed, strict=True)])

@@ -244,10 +244,10 @@ def _anchor(
         loss, wave = found.inverse_q(*rim), found.wave(*rim)
         # the squares of the masses count
         sd = 2 * max(spread.get(f"loss.{key}", 0.0) for key in ("unbalance_mg", "third_unbalance_mg"))
-        causes.append(constant_cause("unbalance", loss, sd, source, MOUNT_ADVICE))
+        causes.append(constant_cause("imbalance", loss, sd, source, MOUNT_ADVICE))
         if wave:
             # between a pattern that loses twice the mean and one that loses nothing at most
-            ripples.append(Ripple("unbalance", min(abs(wave) / (2 * loss), 1.0), cmath.phase(wave) / 4, 2.0))
+            ripples.append(Ripple("imbalance", min(abs(wave) / (2 * loss), 1.0), cmath.phase(wave) / 4, 2.0))
     return causes, ripples
 
 

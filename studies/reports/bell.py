@@ -67,7 +67,7 @@ def steps_table(steps: Sequence[Payload], title: str) -> Table:
         " σ can then grow when only the bias is compensated, until the scale over temperature is, too."
     )
     if any(step["bias_instability"] is not None for step in steps):
-        note += " Bias instability: minimum of the Allan deviation over 0.664. A filter lowers the random walk at 1 s, not at 100 s."
+        note += " Bias instability: minimum of the Allan deviation divided by 0.664. A filter lowers the random walk at 1 s, not at 100 s."
     return Table(title, rows, STEP_COLUMNS, note)
 
 

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from shell.constants import zero_Celsius
+from shell.materials import spell
 from studies.calibration.calibrate import Calibration
 from studies.calibration.observed import HOUSING, QUADRATURE, SETTLED, WORDS
 from studies.instrument.display import display_name
@@ -110,7 +111,7 @@ def calibration_parts(found: Calibration, payload: Mapping[str, Any]) -> list[Ch
         Chapter("Values", [
             Table(title, touched, (*VALUES, KEY), WIDTHS, "page", sortable=True),
             Table(title, touched, VALUES, WIDTHS + unchanged, "terminal"),
-            *(f"The data determine only a combination of {', '.join(map(display_name, group))}." for group in found.groups),
+            *(f"The data determine only a combination of {spell([display_name(name) for name in group])}." for group in found.groups),
             Figure(lambda: _draw_shifts(found), "Shifts of the values that the data determine at least in part, with 90 % intervals; shaded: 90 % of the prior."),
             Table("Values that the data do not depend on", rest, (*VALUES[:3], KEY), "", "page", sortable=True),
         ]),

@@ -91,11 +91,16 @@ def reason(verdict: Verdict) -> str:
     return _sentence(verdict).split(": ", 1)[-1].rstrip(".")
 
 
+def spoken(response: str) -> str:
+    """Return a response as it stands within a sentence: the frequency, the bias, 1/Q."""
+    return NAMES[response] if "/" in NAMES[response] else f"the {NAMES[response]}"
+
+
 def name_cause(cause: Cause) -> str:
     """Return a cause, or its set, with response and probability."""
     *others, last = cause.names
     names = f"one of {', '.join(others)} and {last}" if len(others) > 1 else " or ".join([*others, last])
-    return f"{names} in the {NAMES[cause.response]} (probability {cause.probability:.2f})"
+    return f"{names} in {spoken(cause.response)} (probability {cause.probability:.2f})"
 
 
 def spell_parameter(name: str) -> tuple[str, float]:
@@ -189,7 +194,7 @@ def diagnosis_parts(diagnosis: "Diagnosis | Inference | Unjudged") -> list[Chapt
             cause_table(verdict), response_table(verdict), *remarks(verdict),
             *(Sentence(f"{cause.effect}: {_summary(cause)}", where="page") for cause in physics),
         ]),
-        *(Chapter(f"Residual of the {NAMES[name]}", list(_alternatives(diagnosis, name))) for name in diagnosis.shown_responses),
+        *(Chapter(f"Residual of {spoken(name)}", list(_alternatives(diagnosis, name))) for name in diagnosis.shown_responses),
         Chapter("Method", [Sentence((WITH_CARD if diagnosis.with_card else WITHOUT_CARD) + METHOD, where="page")]),
     ]  # fmt: skip
 
@@ -198,14 +203,14 @@ def _residual(diagnosis: "Diagnosis | Inference | Unjudged") -> Iterator[Part]:
     main, run = _main_response(diagnosis.verdict), diagnosis.verdict.next_run
     if main is not None and main in diagnosis.shown_responses:
         when = " before and after the named causes are added" if diagnosis.seen(main).named else ""
-        yield Figure(lambda: pictures.before_and_after(diagnosis, main), f"Residual of the {NAMES[main]}{when}.")
+        yield Figure(lambda: pictures.before_and_after(diagnosis, main), f"Residual of {spoken(main)}{when}.")
     if run is not None:
         yield Figure(lambda: pictures.next_run_picture(run), f"Suggested next run: {run.profile}.")
 
 
 def _alternatives(diagnosis: "Diagnosis | Inference | Unjudged", response: str) -> Iterator[Part]:
     seen = diagnosis.seen(response)
-    caption = f"Baseline residual of the {NAMES[response]} (averages over {seen.step:.0f} s) against its inputs."
+    caption = f"Baseline residual of {spoken(response)} (averages over {seen.step:.0f} s) against its inputs."
     yield Figure(lambda: pictures.residual_views(diagnosis, response), caption)
     for rivals in seen.alternatives:
         rows = [{"name": name, "evidence": evidence} for name, evidence in rivals]
@@ -224,16 +229,16 @@ def _summary(cause: Cause) -> str:
 def _facts(verdict: Verdict) -> list[tuple[str, str, str]]:
     facts = [("Verdict", verdict.verdict.replace("-", " "), reason(verdict))]
     for cause in verdict.causes[:3]:
-        size = f"{shown(cause.response, cause.peak)} peak to peak in the {NAMES[cause.response]}"
+        size = f"{shown(cause.response, cause.peak)} peak to peak in {spoken(cause.response)}"
         facts.append(("Cause", " or ".join(cause.names), f"{size}; probability {cause.probability:.2f}"))
     main = _main_response(verdict)
     if main is not None:
         result = verdict.responses[main]
         if result.gain is not None:
             facts.append(
-                ("Gain", f"{plain(result.gain)} times", f"smaller residual of the {NAMES[main]} on held-out rows")
+                ("Gain", f"{plain(result.gain)} times", f"smaller residual of {spoken(main)} on held-out rows")
             )
-        facts.append(("Noise", shown(main, result.noise), f"rms of the {NAMES[main]} that no model removes"))
+        facts.append(("Noise", shown(main, result.noise), f"rms of {spoken(main)} that no model removes"))
     return facts  # fmt: skip
 
 

@@ -15,8 +15,8 @@ CANDIDATES = (
 )
 
 EVIDENCE = (
-    "Evidence: twice the logarithm of how much likelier the readings are with the candidate than without it, averaged over its size."
-    f" {-2.0 * CONSTANTS['log_prior_effect']:.0f} names a cause."
+    "Evidence: twice the logarithm of the Bayes factor: how much more probable the readings are with the candidate, averaged over its size."
+    f" A cause is named from {-2.0 * CONSTANTS['log_prior_effect']:.0f}."
 )
 
 
@@ -42,7 +42,7 @@ def law_facts(found: TableDiagnosis) -> list[tuple[str, str, str]]:
     """Return the residual of the law, or the measured level and slope beside those of the card, to the digits of its uncertainty."""
     compared = found.verdict.details.get("settled")
     if compared is None:
-        return [("Default law", f"{plain(1e3 * found.law_rms)} mHz", "rms residual with the curvature of the law")]
+        return [("Residual, default law", f"{plain(1e3 * found.law_rms)} mHz", "rms, with the curvature of the law")]
     facts = []
     for name, key, unit in (("Level", "level_Hz", "Hz"), ("Slope", "slope_ppm_per_degC", "ppm/°C")):
         if (one := compared[key]) is not None:

@@ -18,10 +18,10 @@ if TYPE_CHECKING:
 
 ACROSS, MOST, DATED, NAMED = 2, 8, 4, 25  # charts: side by side, in all, over the date; devices named below one
 METHOD = (
-    "Each device is calibrated and diagnosed by itself. A value of the lot has a mean and a scatter over the devices (normal, restricted"
-    " likelihood), beside the error of each device. A device is odd where the others predict its value with a chance below 1 %, every device"
-    " and value that was looked at counted; a batch likewise, and all but its farthest device too. The evidence for each cause is summed over"
-    " the devices that show it; a device lacks a cause only where its records could show it."
+    "Each device is calibrated and diagnosed separately. The mean of a value and its scatter over the devices (normal, restricted"
+    " likelihood) allow for the error of each device. A device is odd if a value so far from the others has a probability below 1 %, with"
+    " allowance for the number of devices and values examined; a batch likewise, also without its most extreme device. The evidence for each cause is summed over"
+    " the devices that show it; a device counts as free of a cause only if its records could show it."
 )
 
 
@@ -117,7 +117,7 @@ def fleet_parts(lot: Lot, page: Callable[[str], str] | None = None) -> list[Chap
         Chapter("The lot", [
             Sentence(headline(lot), where="terminal"), Facts(facts, "page"),
             Table("Causes", lot.shares, SHARES, "Sizes: smallest and largest of the coefficient."),
-            Table("Values", ordered, VALUES, "Mean and scatter of the devices that are like each other."),
+            Table("Values", ordered, VALUES, "Mean and scatter of the devices that agree with each other."),
             Table("Devices without an answer", failed, (Column("serial", "device"), "why")),
         ]),
         Chapter("Control charts", charts),

@@ -13,15 +13,15 @@ from studies.results import Chapter, Column, Drawing, Facts, Figure, Sentence, T
 
 SNR_WORDS = (
     "SNR: rms of the part of the effect that the calibrated card cannot absorb, over the rms noise of one row of the record."
-    " With many rows an effect far below the noise of one row can be identified. A cell is empty where no source shows an effect so large."
+    " With many rows an effect far below the noise of one row can be identified. A cell is empty where the effect would be larger than any published one."
 )
 METHOD = (
-    "The card's own simulation goes through the planned runs. Each effect of the library is hidden in them in several shapes, beside"
-    " everything that is uncertain of the card and of the starts of the runs, in the noise that the card states. For each hypothesis the"
+    "The card is simulated through the planned runs. Each effect of the library is added in several shapes, together with all"
+    " uncertainties of the card and of the initial states, in the noise that the card states. For each hypothesis the"
     " expected log odds and their scatter follow from Gram matrices; sets and margins are those of the diagnosis. Answers that need a"
     " comparison with rows left out of the fit, and unknown causes, are not predicted."
 )
-SENSORS = (Column("sensor", "sensor"), Column("count", "sets"), Column("pairs", "effects distinguished"))
+SENSORS = (Column("sensor", "sensor"), Column("count", "pairs"), Column("pairs", "effects distinguished"))
 
 
 def headline(plan: Plan) -> str:
@@ -31,7 +31,7 @@ def headline(plan: Plan) -> str:
     counts = ", ".join(f"{count} of {len(rows)} at SNR {snr:g}" for count, snr in zip(sure, SNRS, strict=True))
     text = f"Effects identified in at least 90 % of cases: {counts}. SNR 1 is {_noise(plan)}."
     if never := [shown(one) for one, row in zip(plan.prospects, rows, strict=True) if row["least"] is None]:
-        text += f" Not at any size that sources show: {', '.join(never)}."
+        text += f" Not identified at any published size: {', '.join(never)}."
     for reason in dict.fromkeys(plan.invisible.values()):
         text += f" Not testable ({reason}): {', '.join(n for n, why in plan.invisible.items() if why == reason)}."
     return text
@@ -60,12 +60,12 @@ def plan_table(plan: Plan) -> Table:
         Column("least.snr", "smallest SNR identified", digits=2),
         Column(_size, "smallest size identified"),
         *(Column(_at(snr), f"at SNR {snr:g}", "%", ".0f", scale=100.0) for snr in SNRS),
-        Column("least_alone.snr", "smallest SNR alone", digits=2),
-        Column(_listed("as_set_with"), "as a set with, at the smallest size"),
+        Column("least_alone.snr", "smallest SNR identified alone", digits=2),
+        Column(_listed("as_set_with"), "in one set with, at the smallest size"),
         Column(lambda row: row.get("why") or _listed("instead")(row), "named instead, at half that size"),
-        Column("survives_baseline", "not absorbed by the card", "%", ".0f", scale=100.0),
+        Column("survives_baseline", "share that the card cannot absorb", "%", ".0f", scale=100.0),
     )
-    note = f"Identified: the answer is the effect, or a set that contains it; smallest: from which on in {100 * SURE:.0f} % of cases. "
+    note = f"Identified: the answer is the effect, or a set that contains it. Smallest: identified in {100 * SURE:.0f} % of cases. "
     return Table("Effects that this campaign can identify", rows, columns, note + SNR_WORDS)
 
 
@@ -87,13 +87,13 @@ def plan_parts(plan: Plan, profiles: Sequence[str]) -> list[Chapter]:
     ]
     runs = [{"run": k, "chamber": words} for k, words in enumerate(profiles, 1)]
     sensors = [{"sensor": name, "count": len(pairs), "pairs": ", ".join(pairs)} for name, pairs in plan.sensors.items()]
-    note = "Sets at the smallest size. A sensor costs no chamber time; the most useful is listed first."
+    note = "Pairs that are confused at the smallest identified size. A sensor costs no chamber time; the most useful is listed first."
     return [
         Chapter("In short", [
             Sentence(headline(plan), where="terminal"),
             Facts(facts, "page"),
             Table("Planned runs", runs, (Column("run", "run"), Column("chamber", "chamber")), where="page"),
-            Figure(lambda: _draw(plan), "Chance (%) that each effect is identified, by its SNR; grey: larger than any source shows."),
+            Figure(lambda: _draw(plan), "Probability (%) that each effect is identified, by its SNR; grey: larger than any published effect."),
         ]),
         Chapter("All effects", [
             plan_table(plan),

@@ -95,9 +95,9 @@ def run_chapters(survey: Survey, told: dict[str, Any], several: bool) -> list[Ch
     dense = [column for column in survey.columns if column.density is not None]
     made = {column.density.even for column in dense if column.density is not None}
     how = {
-        frozenset({True}): "Welch's, of even rows",
-        frozenset({False}): "Lomb's, since rows are uneven or missing",
-    }.get(frozenset(made), "Welch's, and Lomb's of columns with missing rows")
+        frozenset({True}): "Welch's method",
+        frozenset({False}): "Lomb's method, since rows are unevenly spaced or missing",
+    }.get(frozenset(made), "Welch's method; Lomb's for columns with missing rows")
     found: dict[str, Sequence[Part]] = {
         "over time": [
             Figure(lambda: draw_columns(survey.record.columns), f"All columns. Shaded: no values.{drawn}"),

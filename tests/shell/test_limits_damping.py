@@ -117,7 +117,7 @@ def test_surface_and_film_on_a_thin_bent_wall() -> None:
         vibration, [surface_cause(1e-12, 0.0, ""), *film_causes("own", film, None, (0.0, 0.0), "")], 293.15
     )
     by_name = {part.name: float(part.inverse_q[0]) for part in budget.parts}
-    assert by_name["film own"] == pytest.approx(1e-3 * 6 * 50e-9 / h, rel=2e-2)
+    assert by_name["own film"] == pytest.approx(1e-3 * 6 * 50e-9 / h, rel=2e-2)
     assert by_name["surface"] == pytest.approx(1e-12 * 6 / h, rel=3e-2)
 
 

@@ -58,7 +58,7 @@ def test_against_the_integral_around_the_axis() -> None:
                 total += face.integrate(energy) * float(np.mean(density * weight)) * 2
         found.append(GOLD.loss * GOLD.thickness * total / vibration.strain_energy)
     budget = loss_budget(vibration, film_causes("gold", GOLD, None, (0, 0), ""), 293.15)
-    ripple = Ripple("film gold", amplitude, angle, film_weight(GOLD, vibration.faces))
+    ripple = Ripple("gold film", amplitude, angle, film_weight(GOLD, vibration.faces))
     split, axis = describe_wave(damping_wave(budget, [ripple], n), n)
     q = float(budget.inverse_q[0])
     expected = [q + split[0] / 2 * np.cos(2 * n * (a - axis[0])) for a in np.radians([17.0, 30.0, 62.0])]
@@ -69,9 +69,9 @@ def test_against_the_integral_around_the_axis() -> None:
 def test_two_ripples_add_as_vectors() -> None:
     vibration = _dome(0.9e-3)
     budget = loss_budget(vibration, film_causes("gold", GOLD, None, (0, 0), ""), 293.15)
-    one = Ripple("film gold", 0.01, 0.0, 1.0)
-    across = Ripple("film gold", 0.01, pi / 8, 1.0)
-    against = Ripple("film gold", 0.01, pi / 4, 1.0)
+    one = Ripple("gold film", 0.01, 0.0, 1.0)
+    across = Ripple("gold film", 0.01, pi / 8, 1.0)
+    against = Ripple("gold film", 0.01, pi / 4, 1.0)
     q = float(budget.inverse_q[0])
     assert abs(damping_wave(budget, [one, against], 2)[0]) < 1e-12 * q
     split, axis = describe_wave(damping_wave(budget, [one, across], 2), 2)

@@ -77,5 +77,5 @@ EFFECT = Effect(
     ),
     steady=steady,
     steady_grid=lambda low, high: [(part * (high - low),) for part in (0.01, 0.05, 0.15, 0.4)],
-    steady_words="hysteresis: the direction of approach, in the order of the rows",
+    steady_words="hysteresis, from the order of the rows",
 )

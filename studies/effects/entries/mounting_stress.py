@@ -34,7 +34,7 @@ def steady(x: FloatArray, shape: Shape) -> FloatArray:
 
 EFFECT = Effect(
     name="mounting-stress",
-    summary="thermal mismatch strains the mount and relaxes slowly; frequency shifts that are not temperature",
+    summary="thermal mismatch strains the mount and relaxes slowly; the frequency shifts at constant temperature",
     source="viscoelastic bond (Maxwell element) under thermal mismatch strain",
     isolate="soak for days after a large step and watch f against an independent thermometer on the resonator",
     sensor="a thermometer on the base or stem: a second lag would show there, a stress would not",

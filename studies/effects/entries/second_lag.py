@@ -23,7 +23,7 @@ EFFECT = Effect(
     name="second-lag",
     summary="a second thermal time constant: part of the heat takes another path to the resonator",
     source="two-node thermal network; Bacher and Madsen, Energy and Buildings 43 (2011) 1511",
-    isolate="equal steps up and down at two mean temperatures, with a soak longer than five of the slow constant",
+    isolate="equal steps up and down at two mean temperatures, with a soak longer than five times the slow time constant",
     sensor="a thermometer on the base or stem: a second lag would show there, a stress would not",
     coefficients=(Coefficient("weight", (1.0, 0.2, 0.2), most=1.0),),
     columns=columns,

@@ -37,7 +37,7 @@ EFFECT = Effect(
     name="thermometer-scale",
     summary="the housing or chamber thermometer has a nonlinear scale error",
     source="interpolation error of a resistance thermometer, second and third order",
-    isolate="repeat in another chamber or with a second thermometer; fast against slow ramps tell it from a curvature of f",
+    isolate="repeat in another chamber or with a second thermometer; fast and slow ramps distinguish it from a curvature of f",
     sensor="a second thermometer on the housing",
     coefficients=(
         Coefficient("quadratic_K_per_10K2"),
@@ -49,10 +49,10 @@ EFFECT = Effect(
     columns=columns,
     grid=grid,
     sizes={"frequency_Hz": 0.3},
-    shape=(Parameter("from_run", 0.0, 1e4, "run from which the sensor reads so, from 0", False, True),),
+    shape=(Parameter("from_run", 0.0, 1e4, "first run with this error, counted from 0", False, True),),
     acts_on="temperature",
     fine=True,
     steady=steady,
     steady_grid=lambda low, high: [(3.0,), (4.0,)],
-    steady_words="thermometer, error up to order {0:.0f}",
+    steady_words="thermometer error up to order {0:.0f}",
 )

@@ -5,7 +5,7 @@ from studies.sweeps.quantity import Column, Number, OvertoneQuantity
 
 
 class Frequency(OvertoneQuantity, frozen=True, kw_only=True, tag="frequency"):
-    """Frequency of a mode; without the stress of a [mount], which is in `tcf`."""
+    """Frequency of a mode, without the stress from the [mount], which tcf includes."""
 
     def list_columns(self) -> tuple[Column, ...]:
         """Return the column of the frequency."""

@@ -19,7 +19,7 @@ PARTS = {
     "films": "films",
     "activated": "activated losses",
 }
-MOUNT = ("mount", "anchor", "unbalance")
+MOUNT = ("mount", "anchor", "imbalance")
 
 
 class Loss(ModeQuantity, frozen=True, kw_only=True, tag="loss"):
