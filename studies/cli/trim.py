@@ -93,7 +93,7 @@ def trim(
         reading_error: Standard error of the splits in Hz.
         scan: Output of hrg scan --json, instead of --split and --axis: the splits of --harmonic and their intervals.
         goal: Largest acceptable split in Hz.
-        cut: mass (unstrained mass, such as teeth or lumps), edge (off the rim, through the wall), inner or outer (off
+        cut: mass (unstrained mass, such as teeth or lumps), edge (from the rim edge, through the wall), inner or outer (from
             that face).
         position: Permitted positions of cuts along the meridian, 0 ... 1 (rim).
         width_mm: Width of a cut along the circumference.

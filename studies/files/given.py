@@ -3,8 +3,6 @@
 import re
 from typing import Any
 
-from studies.errors import InputError
-
 LARGEST = 1e15
 """Nothing that an instrument has, in any unit of its keys, is as large; powers of what is larger overflow."""
 ACTING = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]")
@@ -20,6 +18,8 @@ def refuse_unsound(_: Any, value: Any) -> None:
     """Check one argument of a command, whatever it is, as a validator of cyclopts."""
     for one in value if isinstance(value, list | tuple) else (value,):
         if not is_sound(one):
+            from studies.errors import InputError  # which needs packages whose names the command line checks first
+
             raise InputError(f"{one:g}: must be a finite number below {LARGEST:g} in size.")
 
 
