@@ -102,7 +102,7 @@ class Child:
     def lose(self) -> NoReturn:
         """Say how the process ended: by itself, or stopped from outside."""
         with contextlib.suppress(subprocess.TimeoutExpired):
-            self.process.wait(1.0)  # the pipe closes a moment before the end is known
+            self.process.wait(10.0)  # the pipe closes a moment before the end is known
         stopped = -(self.process.returncode or 0)
         if stopped in STOPPED:
             self.kill()

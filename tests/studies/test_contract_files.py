@@ -4,6 +4,7 @@ import os
 import subprocess
 import sys
 import threading
+import time
 
 import pytest
 
@@ -116,7 +117,8 @@ def test_a_request_to_end_counts_as_ctrl_c(tmp_path):
     process = subprocess.Popen([sys.executable, "-c", code, *words], stderr=subprocess.PIPE, text=True, env=environment)
     while not (tmp_path / "out" / "study.store").exists():
         assert process.poll() is None, process.stderr.read()
-    threading.Event().wait(1.0)
+        time.sleep(0.05)
+    time.sleep(0.3)
     process.terminate()
     _, said = process.communicate(timeout=600)
     assert process.returncode == 130, said

@@ -15,8 +15,10 @@ def ishigami(instrument, parameters):
     return math.sin(x1) + 7 * math.sin(x2) ** 2 + 0.1 * x3**4 * math.sin(x1)
 
 def slow(instrument, parameters):
-    time.sleep(0.01)
-    with open(os.environ["HRG_TEST_LOG"], "a") as log:
+    while float(os.environ.get("HRG_TEST_UNTIL", "1")) < parameters["user.x"] != 0.5:  # which is the nominal design
+        time.sleep(0.1)
+    time.sleep(0.01 if "HRG_TEST_UNTIL" in os.environ else 0.0)
+    with open(os.environ.get("HRG_TEST_LOG", os.devnull), "a") as log:
         log.write(f"{parameters['user.x']!r}\\n")
     return math.sin(parameters["user.x"])
 

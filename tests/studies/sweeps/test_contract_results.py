@@ -1,6 +1,7 @@
 """Contract of results: the same with any workers, on a cluster, in any order; tables with units; a self-contained page."""
 
 import gc
+import json
 import shutil
 import socket
 import subprocess
@@ -8,6 +9,7 @@ import sys
 import time
 from contextlib import contextmanager, nullcontext
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -116,21 +118,23 @@ def free_port() -> int:
         return int(probe.getsockname()[1])
 
 
-def answers(address: str) -> bool:
-    host, _, port = address.removeprefix("tcp://").rpartition(":")
-    with socket.socket() as probe:
-        return probe.connect_ex((host, int(port))) == 0
-
-
 @contextmanager
-def started(*commands: list[str]):
-    """Run `dask` commands as processes, the first of them a scheduler."""
-    quiet = {"DASK_DISTRIBUTED__LOGGING__DISTRIBUTED": "error"}
+def started(file: Path, protocol: str = "tcp", *given: str):
+    """Run a scheduler of Dask and two workers as processes; the scheduler writes its address to a file."""
+    common = ["--scheduler-file", str(file), "--no-dashboard", *given]
+    commands = (
+        ["scheduler", "--host", f"{protocol}://127.0.0.1", "--port", "0", *common],
+        ["worker", "--nworkers", "2", "--nthreads", "1", *common],
+    )
+    quiet = {"DASK_DISTRIBUTED__LOGGING__DISTRIBUTED": "error", "HRG_TEST_UNTIL": "0.02"}
     processes = [
         subprocess.Popen([sys.executable, "-m", "dask", *words], env=environment(**quiet), stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
         for words in commands
     ]  # fmt: skip
-    yield processes
+    until = time.monotonic() + 120
+    while not file.exists() and time.monotonic() < until:
+        time.sleep(0.1)
+    yield json.loads(file.read_text())["address"], *processes
     for process in reversed(processes):
         process.terminate()
     for process in processes:
@@ -142,23 +146,31 @@ def started(*commands: list[str]):
 
 
 @pytest.fixture
-def cluster():
+def cluster(tmp_path, monkeypatch):
     pytest.importorskip("distributed", reason="the extra 'cluster' (dask[distributed]) is not installed")
-    address = f"tcp://127.0.0.1:{free_port()}"
-    scheduler = ["scheduler", "--host", "127.0.0.1", "--port", address.rpartition(":")[2], "--no-dashboard"]
-    with started(scheduler, ["worker", address, "--nworkers", "2", "--nthreads", "1", "--no-dashboard"]) as processes:
-        until = time.monotonic() + 120
-        while not answers(address) and time.monotonic() < until:
-            time.sleep(0.2)
-        yield address, *processes
+    monkeypatch.setattr("studies.sweeps.cluster.PATIENCE", 120.0)
+    with started(tmp_path / "scheduler.json") as processes:
+        yield processes
 
 
-def started_slowly(folder, address, cases):
-    """A study of many slow cases on a cluster, as a process of its own, when its first results are in the store."""
-    spec, slow = folder / "study.toml", f'method = "latin-hypercube"\ncases = {cases}\nbatch = 4'
-    spec.write_text(spec_of("slow", slow, 'name = "user.x"\nlow = 0\nhigh = 1'))
+BRIEF = """
+import studies.sweeps.cluster as module
+check, module.PATIENCE = module.Cluster.check, 120.0
+def brief(self):
+    module.PATIENCE = 2.0  # once there are workers
+    check(self)
+module.Cluster.check = brief
+"""
+
+
+def started_slowly(folder, address):
+    """A study of slow cases that does not end, on a cluster, as a process of its own, when its first results are in the store."""
+    spec = folder / "study.toml"
+    spec.write_text(
+        spec_of("slow", 'method = "grid"\nbatch = 4', 'name = "user.x"\nlow = 0\nhigh = 1\ncount = 3000')
+    )
     words = words_of("study", "run", str(spec), "--out", str(folder / "out"), "--scheduler", address, "--allow-python")
-    words[2] = f"import studies.sweeps.cluster as cluster; cluster.PATIENCE = 5.0; {words[2]}"
+    words[2] = BRIEF + words[2]
     run = subprocess.Popen(words, stderr=subprocess.PIPE, text=True, env=environment(HRG_TEST_LOG=str(folder / "log")))
     until = time.monotonic() + 600
     while run.poll() is None and time.monotonic() < until and not rows_of(folder / "out"):
@@ -171,7 +183,7 @@ def test_two_dask_workers_give_the_same_bits_and_a_lost_scheduler_is_resumable(c
     address, scheduler, _ = cluster
     again = run_study(SPEC, scheduler=address)
     assert again.values.tobytes() == results.values.tobytes()
-    run = started_slowly(tmp_path, address, 3000)
+    run = started_slowly(tmp_path, address)
     scheduler.kill()
     _, said = run.communicate(timeout=600)
     assert run.returncode == 3, said
@@ -198,9 +210,9 @@ def test_a_public_scheduler_needs_encryption(address, public):
 @pytest.mark.slow
 def test_the_end_of_the_last_worker_is_said_and_the_study_is_resumable(cluster, tmp_path, functions):
     address, _, worker = cluster
-    run = started_slowly(tmp_path, address, 30000)
+    run = started_slowly(tmp_path, address)
     worker.terminate()
-    _, said = run.communicate(timeout=120)
+    _, said = run.communicate(timeout=600)
     assert run.returncode == 3, said
     assert "the last worker has ended" in said
     assert "no worker is left" in said
@@ -216,10 +228,9 @@ def test_a_cluster_with_certificates(tmp_path, results, monkeypatch):
     key, cert = tmp_path / "key.pem", tmp_path / "cert.pem"
     ask = f"openssl req -x509 -newkey rsa:2048 -nodes -days 2 -subj /CN=localhost -addext subjectAltName=IP:127.0.0.1 -keyout {key} -out {cert}"
     subprocess.run(ask.split(), check=True, capture_output=True)
-    address = f"tls://127.0.0.1:{free_port()}"
+    monkeypatch.setattr("studies.sweeps.cluster.PATIENCE", 120.0)
     given = ["--tls-ca-file", str(cert), "--tls-cert", str(cert), "--tls-key", str(key)]
-    scheduler = ["scheduler", "--host", "tls://127.0.0.1", "--port", address.rpartition(":")[2], "--no-dashboard"]
-    with started([*scheduler, *given], ["worker", address, "--nthreads", "1", "--no-dashboard", *given]):
+    with started(tmp_path / "scheduler.json", "tls", *given) as (address, *_):
         with pytest.raises(MissingEnvironment, match=r"distributed\.comm\.tls"):
             run_study(SPEC, scheduler=address)
         import dask

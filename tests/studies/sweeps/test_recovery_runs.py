@@ -36,8 +36,9 @@ quantity = [{ name = "frequency", theory = "rayleigh" }]
 
 
 def write_slow(folder: Path, cases: int) -> Path:
+    """Designs from 0 to 1 in order; the function waits at the first beyond $HRG_TEST_UNTIL, so that no run ends before it is ended."""
     spec = folder / "slow.toml"
-    spec.write_text(spec_of("slow", f'method = "latin-hypercube"\ncases = {cases}\nseed = 7\nbatch = 4', X))
+    spec.write_text(spec_of("slow", 'method = "grid"\nbatch = 4', f"{X}\ncount = {cases}"))
     return spec
 
 
@@ -72,15 +73,17 @@ def alive(pids: set[int]) -> set[int]:
 
 @pytest.mark.slow
 def test_many_kills_lose_nothing_kept_and_leave_no_process(tmp_path, functions, start, hrg):
-    slow, log = write_slow(tmp_path, 240), tmp_path / "log"
+    # a kill loses at most the tasks that were out: two for each of two workers, of at most four batches of four cases
+    cases, out = 400, 4 * 16
+    slow, log = write_slow(tmp_path, cases), tmp_path / "log"
     log.touch()
     command = ["study", "run", slow, "--out", tmp_path / "out", "--workers", 2, "--allow-python"]
     rng = np.random.default_rng(11)
     kept: dict[int, bytes] = {}
     kills = 0
     while kills < 3:
-        process = start(*command, HRG_TEST_LOG=str(log))
         goal = len(kept) + int(rng.integers(1, 30))
+        process = start(*command, HRG_TEST_LOG=str(log), HRG_TEST_UNTIL=str((goal + out) / cases))
         wait_for(
             lambda process=process, goal=goal: len(rows_of(tmp_path / "out")) >= goal or process.poll() is not None
         )
@@ -90,20 +93,19 @@ def test_many_kills_lose_nothing_kept_and_leave_no_process(tmp_path, functions, 
         process.send_signal(signal.SIGKILL)
         process.wait()
         kills += 1
-        wait_for(lambda family=family: not alive(family), 10)
+        wait_for(lambda family=family: not alive(family))
         now = {place: numbers for place, _, numbers in rows_of(tmp_path / "out")}
         assert kept.items() <= now.items(), "a kept case was lost or changed"
         kept = now
-    assert 0 < len(kept) < 240
+    assert 0 < len(kept) < cases
     before = Counter(log.read_text().split())
     done = hrg(*command, HRG_TEST_LOG=log)
     assert done.returncode == 0, done.stderr
     after = Counter(log.read_text().split())
     # what was in the store when the last run began is not computed again
-    assert len(rows_of(tmp_path / "out")) == 240
-    assert sum((after - before).values()) == 240 - len(kept) + 1  # and the nominal design
-    # each kill lost at most the tasks that were out: two for each of two workers, of at most four batches of four cases
-    assert sum(after.values()) - 241 <= kills * 4 * 16
+    assert len(rows_of(tmp_path / "out")) == cases
+    assert sum((after - before).values()) == cases - len(kept) + 1  # and the nominal design
+    assert sum(after.values()) - cases - 1 <= kills * out
     whole = hrg("study", "run", slow, "--out", tmp_path / "whole", "--workers", 1, "--allow-python", HRG_TEST_LOG=log)
     assert whole.returncode == 0, whole.stderr
     for folder in ("out", "whole"):
@@ -114,9 +116,9 @@ def test_many_kills_lose_nothing_kept_and_leave_no_process(tmp_path, functions, 
 
 @pytest.mark.slow
 def test_second_runner_is_refused_and_interrupt_is_resumable(tmp_path, functions, start, hrg):
-    slow, log = write_slow(tmp_path, 20000), tmp_path / "log"
+    slow, log = write_slow(tmp_path, 400), tmp_path / "log"
     command = ["study", "run", slow, "--out", tmp_path / "out", "--workers", 2, "--allow-python"]
-    first = start(*command, HRG_TEST_LOG=str(log))
+    first = start(*command, HRG_TEST_LOG=str(log), HRG_TEST_UNTIL="0.5")
     wait_for(lambda: len(rows_of(tmp_path / "out")) > 3)
     second = hrg(*command, HRG_TEST_LOG=log)
     assert second.returncode == 2
@@ -132,7 +134,7 @@ def test_second_runner_is_refused_and_interrupt_is_resumable(tmp_path, functions
     wait_for(lambda: not alive(family))
     state = json.loads(hrg("study", "status", tmp_path / "out", "--json").stdout)
     assert state["state"] == "unfinished"
-    assert 0 < state["done"] < 20000
+    assert 0 < state["done"] < 400
 
 
 @pytest.mark.slow
