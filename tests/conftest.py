@@ -1,13 +1,37 @@
-"""What holds for every test: one thread for linear algebra, since the solver's matrices are small, and a heap that is swept once."""
+"""What holds for every test: one thread for linear algebra, a heap that is swept once, figures of pages that are only sketched."""
 
 import gc
 import os
 
+import pytest
+
 for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
-    os.environ.setdefault(name, "1")
+    os.environ.setdefault(name, "1")  # the solver's matrices are small
 
 
 def pytest_collection_finish() -> None:
     """All modules and tests are loaded for good: later sweeps of the collector leave them out."""
     gc.collect()
     gc.freeze()
+
+
+@pytest.fixture(scope="session", autouse=True)
+def whole_figures():
+    """Figures of pages are drawn once, without layout, file and curves: what cannot be drawn fails so too, at a quarter of the time."""
+    from studies.results import page
+
+    def sketch(figure, caption, alt):
+        figure.set_layout_engine("none")
+        figure.draw_without_rendering()
+        return page.Picture("data:image/svg+xml;base64,", caption, alt)
+
+    whole = page.draw
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(page, "draw", sketch)
+        yield whole
+
+
+@pytest.fixture
+def drawn(monkeypatch, whole_figures):
+    """Pages with their figures whole, where these are the subject."""
+    monkeypatch.setattr("studies.results.page.draw", whole_figures)

@@ -62,10 +62,10 @@ def misses(found, truth):
 
 @pytest.mark.slow
 def test_two_channels_reach_the_bound_and_their_intervals_hold():
-    """7 kHz, Q = 1e7, split 15 to 25 mHz: within 1.3 of the Cramér–Rao bound, and 90 % intervals hold 86 to 94 %."""
+    """7 kHz, Q = 1e7, split 15 to 25 mHz: within 1.3 of the Cramér–Rao bound, and 90 % intervals hold 84 to 96 %."""
     random = np.random.default_rng(20)
     scores, held, split, q, axis = [], [], [], [], []
-    for _ in range(40):
+    for _ in range(20):
         gyro = draw_gyro(random)
         found = analyse_decay(from_lock_in(TIME, ring(gyro, random), CARRIER))
         truth = truth_of(gyro)
@@ -76,8 +76,8 @@ def test_two_channels_reach_the_bound_and_their_intervals_hold():
         q.append(found.estimates["inverse_q"].value / truth["inverse_q"] - 1)
         axis.append(z["frequency_axis_deg"] * found.estimates["frequency_axis_deg"].sd)
     assert np.all(np.sqrt(np.mean(np.square(scores), axis=0)) < 1.3)
-    # 320 statements, of which some are about one thing: the binomial band of half as many
-    assert 0.86 <= np.mean(held) <= 0.94
+    # 160 statements, of which some are about one thing: the binomial band of half as many
+    assert 0.84 <= np.mean(held) <= 0.96
     assert np.max(np.abs(split)) < 1e-4
     assert np.max(np.abs(q)) < 0.01
     assert np.max(np.abs(axis)) < 1.0
@@ -134,13 +134,13 @@ def test_one_channel_tells_two_modes_but_no_axes():
 @pytest.mark.slow
 def test_an_isotropic_resonator_has_no_axis_and_says_so():
     gyro, squares = Gyro(CARRIER, CARRIER, 1e7, 1e7, 0.3, 0.3), 0.0
-    for seed in range(8):
+    for seed in range(4):
         found = analyse_decay(from_lock_in(TIME, ring(gyro, np.random.default_rng(seed), sd=0.05), CARRIER))
         assert any("not resolved" in remark for remark in found.remarks)
         assert "frequency_axis_deg" not in found.estimates
         loss = found.estimates["inverse_q"]
         squares += ((loss.value - 1e-7) / loss.sd) ** 2
-    assert 1.65 < squares < 20.1  # 98 % of χ² with 8 degrees of freedom
+    assert 0.29 < squares < 13.3  # 98 % of χ² with 4 degrees of freedom
 
 
 def _harden(gyro, random):
@@ -171,15 +171,12 @@ def _drift(gyro, random):
 @pytest.mark.parametrize("spoil", [_harden, _hold, _hum, _drift])
 def test_what_is_no_plain_decay_is_named_and_its_intervals_hold(spoil):
     random = np.random.default_rng(7)
-    unsaid = 0
-    for _ in range(2):
-        gyro = draw_gyro(random)
-        found = analyse_decay(from_lock_in(TIME, spoil(gyro, random), CARRIER))
-        truth = {name: value for name, value in truth_of(gyro).items() if not name.startswith("frequency_")}
-        z, _ = misses(found, truth)
-        assert found.remarks
-        unsaid += max(map(abs, z.values())) > 4
-    assert unsaid == 0
+    gyro = draw_gyro(random)
+    found = analyse_decay(from_lock_in(TIME, spoil(gyro, random), CARRIER))
+    truth = {name: value for name, value in truth_of(gyro).items() if not name.startswith("frequency_")}
+    z, _ = misses(found, truth)
+    assert found.remarks
+    assert max(map(abs, z.values())) < 4
 
 
 def test_refused():

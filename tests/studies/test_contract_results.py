@@ -105,7 +105,7 @@ def test_a_command_gets_its_options_and_its_status(tmp_path, capsys):
     assert (tmp_path / "p.html").exists()
 
 
-def test_a_figure_is_embedded():
+def test_a_figure_is_embedded(drawn):
     from studies.reports import style
 
     def draw():
@@ -113,7 +113,7 @@ def test_a_figure_is_embedded():
             axis.plot([0, 1], [0, 1])
             return made
 
-    assert "data:image/svg+xml;base64" in render_result(Result({}, "T", "l", [Figure(draw, "A line.")]))
+    assert "data:image/svg+xml;base64,PD94" in render_result(Result({}, "T", "l", [Figure(draw, "A line.")]))
 
 
 @pytest.mark.parametrize("name", sorted(set(COMMANDS) - set(WITHOUT_REPORT)))
