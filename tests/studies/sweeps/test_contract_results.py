@@ -166,9 +166,7 @@ module.Cluster.check = brief
 def started_slowly(folder, address):
     """A study of slow cases that does not end, on a cluster, as a process of its own, when its first results are in the store."""
     spec = folder / "study.toml"
-    spec.write_text(
-        spec_of("slow", 'method = "grid"\nbatch = 4', 'name = "user.x"\nlow = 0\nhigh = 1\ncount = 3000')
-    )
+    spec.write_text(spec_of("slow", 'method = "grid"\nbatch = 4', 'name = "user.x"\nlow = 0\nhigh = 1\ncount = 3000'))
     words = words_of("study", "run", str(spec), "--out", str(folder / "out"), "--scheduler", address, "--allow-python")
     words[2] = BRIEF + words[2]
     run = subprocess.Popen(words, stderr=subprocess.PIPE, text=True, env=environment(HRG_TEST_LOG=str(folder / "log")))
