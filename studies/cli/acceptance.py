@@ -77,7 +77,6 @@ def acceptance(card: Card, *runs: Records, limits: str | None = None, output: st
             say(f"warning: {limits} limits {line['key']}, but no record gives it; it needs {line['needs']}.")
     elsewhere = [{"section": s, "test": test, "needs": needs} for s, test, needs in found.elsewhere]
     payload = {
-        "schema": "hrg.acceptance/1",
         "card": instrument.name,
         **row_of(found, "verdict", records="used", warm_up_band_deg_per_h="band"),
         "confidence": CONFIDENCE,

@@ -97,7 +97,6 @@ def _payload(found: Calibration, data: list[str], save: str | None) -> dict[str,
         for name in held.noise
     }  # fmt: skip
     return {
-        "schema": "hrg.calibration/1",
         "card": found.card.name,
         "records": data,
         "values": [row_of(one, *parts.VALUE) for one in found.estimates],

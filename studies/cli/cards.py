@@ -34,7 +34,7 @@ def cards(card: str = "") -> Result:
         for path, card in found
     ]
     columns = ("name", "shape", "material", Column("note", "what is published, what is illustrative"))
-    return Result({"schema": "hrg.cards/1", "cards": entries}, "Cards", LEAD, [Table("Cards", entries, columns)])
+    return Result({"cards": entries}, "Cards", LEAD, [Table("Cards", entries, columns)])
 
 
 def _spread(row: dict[str, Any]) -> str:

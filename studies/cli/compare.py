@@ -29,7 +29,7 @@ def compare(*card: str) -> Result:
         | {"values": [one.value for one in row], "uncertainties": [one.uncertainty for one in row]}
         for row in found.figures
     ]
-    payload = {"schema": "hrg.compare/1", "cards": found.names, "figures": figures, "differing": found.differing}
+    payload = {"cards": found.names, "figures": figures, "differing": found.differing}
     names = [f"{name} ({k})" if found.names.count(name) > 1 else name for k, name in enumerate(found.names, 1)]
     note = "±: one standard deviation from the published values of the material, common to designs of one material."
     known = [row | {"values": [v if isfinite(v) else "not known" for v in row["values"]]} for row in figures]

@@ -80,7 +80,6 @@ def compensate(
                 parts.append(f"{empty} {stay} empty: the frequency is missing, or outside the fitted range.")
             parts.append(Figure(lambda: _draw(record, result, RESONATOR), "Temperature of the resonator."))
     payload: dict[str, Any] = {
-        "schema": "hrg.compensate/1",
         "model": model,
         "kind": loaded.kind,
         "run": run,

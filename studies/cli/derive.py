@@ -106,7 +106,6 @@ def derive(
                 " to nothing; take a wider cap."
             )
     payload: dict[str, Any] = {
-        "schema": "hrg.derive/1",
         "harmonic": case.harmonic,
         "pole_angle_deg": pole_angle_deg,
         "rim_angle_deg": rim_angle_deg,

@@ -51,7 +51,7 @@ def doctor() -> Result:
     described = [dict(zip(("name", "ok", "found", "remedy"), check, strict=True)) for check in checks]
     rows = [{**check, "state": "ok" if check["ok"] else "missing"} for check in described]
     return Result(
-        {"schema": "hrg.doctor/1", "healthy": healthy, "checks": described},
+        {"healthy": healthy, "checks": described},
         "Environment",
         "Versions, OpenGL and optional parts.",
         [Table("Environment", rows, (Column("name", "part"), "state", "found", "remedy"))],

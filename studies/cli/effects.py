@@ -17,7 +17,7 @@ def effects(name: str = "") -> Result:
     """
     chosen = [find_effect(name)] if name else list(library().values())
     entries = [describe(effect) for effect in chosen]
-    payload = {"schema": "hrg.effects/1", "effects": entries}
+    payload = {"effects": entries}
     if not name:
         rows = [{**entry, "acts": _words(effect)} for entry, effect in zip(entries, chosen, strict=True)]
         columns = ("name", Column("acts", "acts on"), Column("summary", "description"))

@@ -66,7 +66,6 @@ def electrodes(
         "voltages_V": trim.voltages, "left_Hz": abs(trim.left) * mode.frequency, "shift_ppm": 1e6 * trim.shift
     }  # fmt: skip
     payload: dict[str, Any] = {
-        "schema": "hrg.electrodes/1",
         "card": instrument.name,
         "temperature_degC": T - zero_Celsius,
         "harmonic": harmonic,

@@ -36,7 +36,7 @@ def export(run: Run, *, to: Literal["parquet", "mat", "tdms", "csv", "mf4", "hdf
 
     record = read_record(run)
     export_record(record, to, out)
-    payload = {"schema": "hrg.export/1", "record": run, "to": to, "out": out, "rows": len(record), "columns": list(record.columns)}  # fmt: skip
+    payload = {"record": run, "to": to, "out": out, "rows": len(record), "columns": list(record.columns)}  # fmt: skip
     said = f"{out}: {len(record):,} rows of {', '.join(record.columns)}."
     return Result(payload, "Export", parts=[Sentence(said)])
 

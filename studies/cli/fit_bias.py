@@ -77,7 +77,6 @@ def fit_bias(
 def _payload(study: BiasStudy, method: str, data: tuple[str, ...]) -> dict[str, Any]:
     allan = {"step_s": study.allan_step, "before": _spectrum(study.before), "after": _spectrum(study.after)}
     return {
-        "schema": "hrg.fit-bias/1",
         "data": data,
         **row_of(study, "output", over="column", opposite_sign="opposite"),
         **row_of(study.runs[0], lag_s="memory.lag", play_half_width_degC="memory.play", rate_lag_s="lag"),

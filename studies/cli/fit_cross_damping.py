@@ -96,7 +96,7 @@ def fit_cross_damping(
     left = f"{gathered.left_out} rows with an empty cell or an outlier were left out." if gathered.left_out else ""
     averaged = f"Long records were averaged over {gathered.block_s:g} s before the fit." if gathered.block_s else ""
     return Result(
-        {"schema": "hrg.fit-cross-damping/1", "records": list(data), **summary},
+        {"records": list(data), **summary},
         "Cross-damping over temperature",
         f"Zero-rate output of {', '.join(data)}, fitted with a cross-damping of order {order} in temperature.",
         [

@@ -66,7 +66,6 @@ def fit_frequency(
     rows = [row_of(soak, *SHOWN, record="path", start_s="start", end_s="end") for soak in soaks]
     slowest = max((soak.time_constant for soak in soaks), default=0.0)
     payload = {
-        "schema": "hrg.fit-frequency/1",
         "table": table,
         **row_of(
             fit, "order", "reference_temperature_degC", "coefficients", "standard_errors", resolution_Hz="resolution"

@@ -120,7 +120,6 @@ def fit_ringdown(
     rows = [_row(decay) for decay in decays]
     return Result(
         {
-            "schema": "hrg.fit-ringdown/2",
             "decays": rows,
             "laws": {name: _law_row(name, law) for name, law in laws.items()},
             "saved": save,

@@ -83,7 +83,6 @@ def fit_scale(
     }
     steps = [dataclasses.asdict(figures) for figures in study.figures]
     payload: dict[str, Any] = {
-        "schema": "hrg.fit-scale/1",
         "records": list(data),
         **row_of(
             study, "output", temperature="temperature_column", rows_left_out="left_out", filter_delay_s="chain.delay"

@@ -58,7 +58,6 @@ def fit_thermal(
         for name, e in found.estimates.items()
     }
     payload = {
-        "schema": "hrg.fit-thermal/1",
         "data": data,
         **row_of(found, "confidence", "warnings", row_step_s="row_step", initial_departure_K="departures"),
         "estimates": estimates,

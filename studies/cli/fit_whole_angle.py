@@ -75,7 +75,7 @@ def fit_whole_angle(
     estimates = _in_card_units(found, frequency)
     if save is not None and instrument is not None:
         keep_card(_with_estimates(instrument, estimates), save)
-    payload = {"schema": "hrg.fit-whole-angle/1", "data": run, "confidence": confidence, "saved": save}
+    payload = {"data": run, "confidence": confidence, "saved": save}
     payload |= {"estimates": estimates, "undetermined": found.undetermined}
     rows = [{"quantity": NAMES[key][0], "unit": NAMES[key][1], "key": key} | e for key, e in estimates.items()]
     columns = (

@@ -111,7 +111,6 @@ def _show(records: Mapping[str, Columns], notes: Sequence[str], start: str | Non
     out, columns = next(iter(records.items()))
     missing = {name: {"missing": int(np.isnan(v).sum())} for name, v in columns.items()}
     payload: dict[str, Any] = {
-        "schema": "hrg.import/1",
         "start": start,
         "record": out,
         "rows": len(next(iter(columns.values()))),

@@ -35,7 +35,7 @@ def keys(kind: str = "card", *, table: str = "") -> Result:
         tables.setdefault(heading, []).append(row | {"shown": default, "uncertainty": spell_uncertainty(row)})
     shown = [Table(heading, found, COLUMNS) for heading, found in tables.items()]
     lead = "A plain number in a card is as uncertain as its key says here."
-    return Result({"schema": "hrg.keys/1", "kind": kind, "keys": rows}, f"Keys of a {kind}", lead, shown)
+    return Result({"kind": kind, "keys": rows}, f"Keys of a {kind}", lead, shown)
 
 
 KINDS = {

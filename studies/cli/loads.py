@@ -135,7 +135,6 @@ def loads(
         "tilt_urad": 1e6 * aside.tilt,
     }
     payload = {
-        "schema": "hrg.loads/1",
         "card": instrument.name,
         "temperature_degC": T - zero_Celsius,
         "harmonic": harmonic,

@@ -87,7 +87,6 @@ def loop(
         run = _run(study, T, out, hours or 1.0, row or 1.0, rate, profile, both_ways, drawn)
         say(f"record: {out}, {len(run)} rows")
     payload = {
-        "schema": "hrg.loop/1",
         "card": instrument.name,
         "mode": keys.mode,
         "temperature_degC": T - zero_Celsius,

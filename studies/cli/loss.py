@@ -60,7 +60,6 @@ def loss(
     budget = model.budget(T)
     around, stated = damping_around(model, budget), stated_loss(instrument, model)
     payload = {
-        "schema": "hrg.loss/1",
         "card": instrument.name,
         **_describe(model, budget, theory),
         "anisotropy": around

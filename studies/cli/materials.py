@@ -44,7 +44,7 @@ def materials(name: str = "", *, compare: bool = False, card: Card = "", harmoni
     span = Column("range_degC", "range", "°C", "g", interval=("range_degC.0", "range_degC.1"))
     columns = ("name", "law", span, Column("lacks", "not stated"), Column("unchecked", "not checked"), "source")
     return Result(
-        {"schema": "hrg.materials-list/1", "materials": entries},
+        {"materials": entries},
         "Materials",
         "Materials and their published laws over temperature.",
         [

@@ -63,7 +63,6 @@ def mesh(
         file.write(data)
     exact = weigh(resonator, elastic.rho)
     payload = {
-        "schema": "hrg.mesh/1",
         "card": instrument.name,
         "temperature_degC": T - zero_Celsius,
         "file": out,

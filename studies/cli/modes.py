@@ -98,7 +98,7 @@ def modes(
     head = {"card": instrument.name, "temperature_degC": T - zero_Celsius, "theory": theory}
     name = f"{instrument.name} at {T - zero_Celsius:g} °C, {THEORIES[theory]}"
     return Result(
-        {"schema": "hrg.modes/1", **head, "modes": entries},
+        {**head, "modes": entries},
         f"Modes of {instrument.name}",
         f"Natural frequencies and Bryan factors at {T - zero_Celsius:g} °C, {THEORIES[theory]}.",
         [

@@ -47,7 +47,6 @@ def optimise(design: str, *, out: str, workers: Workers = None, quiet: Quiet = F
             f"interrupted; finished designs are kept in {out}. Run the same command again to resume."
         ) from None
     payload: dict[str, Any] = {
-        "schema": "hrg.optimise/1",
         **row_of(found, "evaluations", design="task.name", card="task.study.instrument.name"),
         "failed": len(found.failures),
         "parameters": _parameters(found),

@@ -4,6 +4,7 @@ import functools
 import inspect
 import json as json_module
 import math
+import re
 import sys
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -25,11 +26,12 @@ if TYPE_CHECKING:
 def answers(schema: str, page: bool = True) -> Callable[[Callable[..., Result]], Callable[..., int]]:
     """Make a command of a function that returns a `Result`: give it --json and --report, and keep its inputs from its outputs.
 
-    Without `page` there is no --report: the command writes a page of its own, or computes nothing.
+    Its JSON object begins with the first of `schema`, unless it states another. Without `page` there is no --report: the command writes a page of its own, or computes nothing.
     """
     flag = Annotated[bool, Parameter(help=f"Print one JSON object (schema {schema}) instead of text.")]
     html = Annotated[str | None, Parameter(help="Write a page (HTML).")]
     added: dict[str, tuple[Any, Any]] = {**({"report": (html, None)} if page else {}), "json": (flag, False)}
+    usual = {"schema": re.split("[;,]", schema)[0]}
     keyword = inspect.Parameter.KEYWORD_ONLY
 
     def give(command: Callable[..., Result]) -> Callable[..., int]:
@@ -42,6 +44,7 @@ def answers(schema: str, page: bool = True) -> Callable[[Callable[..., Result]],
                 raise InputError(f"--report {report}: a report is an HTML page; give a name that ends in .html.")
             with guarded({**own.bind(*arguments, **options).arguments, "report": report}) as read:
                 result = command(*arguments, **options)
+                result = replace(result, payload=usual | result.payload)
                 if caveats := caveats_of(read):
                     parts = [*result.parts, *(Sentence(text, "note") for text in caveats)]
                     result = replace(result, payload=result.payload | {"caveats": caveats}, parts=parts)

@@ -82,7 +82,7 @@ def render(
         file.write(data)
     modes = [_row(one) for one in shown]
     return Result(
-        {"schema": "hrg.render/1", "file": out, "bytes": len(data), "modes": modes},
+        {"file": out, "bytes": len(data), "modes": modes},
         f"Mode shapes of {', '.join(dict.fromkeys(one.instrument.name for one in shown))}",
         f"The modes of {out}.",
         [

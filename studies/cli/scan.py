@@ -197,7 +197,6 @@ def _payload(found: Scan, name: str, temperature: float, files: dict[str, str]) 
         for w in found.waves
     ]
     return {
-        "schema": "hrg.scan/1",
         "card": name,
         "temperature_degC": temperature,
         "faces": faces,

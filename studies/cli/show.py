@@ -44,7 +44,6 @@ def show(*runs: Records) -> Result:
     told = [parts.tell(survey) for survey in surveys]
     uses, pairs = find_uses(records), list(zip(surveys, told, strict=True))
     payload = {
-        "schema": "hrg.show/1",
         "records": told,
         "uses": [row_of(use, "command", "line", "missing") | {"ready": not use.missing} for use in uses],
     }

@@ -66,7 +66,6 @@ def simulate(
         found = spread_of_prediction(instrument, run.prediction.drive, run.law)
         known = {name: float(np.sqrt(np.mean(values**2))) for name, values in found.items() if name in run.record}
     summary = {
-        "schema": "hrg.simulate/1",
         "card": instrument.name,
         "out": out,
         "rows": rows,

@@ -136,7 +136,7 @@ def export(folder: Folder, *, out: str | None = None) -> Result:
     results = open_results(folder)
     path = Path(out) if out else Path(folder) / "results.csv"
     units = export_results(results, path)
-    payload = {"schema": "hrg.study-export/1", "table": str(path), "units_file": str(units), "rows": len(results)}
+    payload = {"table": str(path), "units_file": str(units), "rows": len(results)}
     payload |= row_of(results, "done", cases="total", columns="units")
     _say_unfinished(results)
     return Result(payload, "Export", "", [f"{_done(results)} cases: {path}; units: {units}"])

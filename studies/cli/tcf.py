@@ -54,7 +54,6 @@ def tcf(
     points, moves = _points(law, T), _moves(law, T)
     local = _measured_slopes(instrument.name, measured)
     payload = {
-        "schema": "hrg.tcf/1",
         "card": instrument.name,
         "theory": theory,
         "harmonic": harmonic,

@@ -54,7 +54,7 @@ def temperature(model: str, run: str, /, *, out: str | None = None) -> Result:
         write_record(record.with_columns({"resonator_temperature_degC": found}), out)
         say(f"record: {out}")
     return Result(
-        {"schema": "hrg.temperature/1", "model": model, "run": run, "out": out, **facts},
+        {"model": model, "run": run, "out": out, **facts},
         "Resonator temperature from its frequency",
         f"The resonator's temperature in {run}, read from its frequency with {model}.",
         [

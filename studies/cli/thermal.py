@@ -66,7 +66,6 @@ def thermal(
     temperatures = dict(zip(names, T.T, strict=True))
     housed = {"time_s": time, "chamber_temperature_degC": chamber.at(time) - zero_Celsius}
     payload = {
-        "schema": "hrg.thermal/1",
         "card": instrument.name,
         "radiation": not network.is_linear,
         "time_constants_s": whole.time_constants,

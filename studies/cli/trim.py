@@ -126,7 +126,6 @@ def trim(
     plan = planned.plan
     others = other_cuts(resonator, elastic, measured[0][0], cut)
     payload: dict[str, Any] = {
-        "schema": "hrg.trim/1",
         "card": instrument.name,
         "temperature_degC": T - zero_Celsius,
         "goal_Hz": goal,

@@ -69,7 +69,6 @@ def twin(
     inputs = [{"name": name, "unit": symbol(name), "start": start} for name, start in input_starts(plan).items()]
     outputs = [{"name": name, "unit": symbol(name)} for name in outputs_of(plan)]
     payload = {
-        "schema": "hrg.twin/1",
         "card": plan.instrument.name,
         **{"boundary": boundary, "fmu": fmu, "c": c, "fmi": fmi if fmu is not None else None, "compiled": compiled},
         **{"bytes": size, "inputs": inputs, "outputs": outputs, "parameters": parameters},
