@@ -1,11 +1,11 @@
 from .errors import InputError
 from .instrument.card import Instrument, load_card, save_card
-from .law import law_of
 from .loss.model import LossModel, loss_model
 from .models import ModelSource, compensate, emit_c, read_model, write_model
 from .models.kinds.frequency import save_frequency
 from .record import Record, read_record, write_record
-from .splitting import reference_split
+from .resonator.law import law_of
+from .resonator.splitting import reference_split
 from .sweeps.run import run_study
 from .sweeps.tolerance import find_yield
 from .workbench import calibrate, compare, diagnose, simulate

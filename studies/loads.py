@@ -7,8 +7,8 @@ import numpy as np
 
 from shell.loads import Loads
 from studies.instrument.card import Instrument
-from studies.law import law_of
 from studies.loss.damping_law import settled_loss
+from studies.resonator.law import law_of
 from studies.simulation.loop import settled_columns
 
 STANDARD_GRAVITY = 9.80665  # m/s²

@@ -15,12 +15,12 @@ from studies.record import Record, read_record
 
 if TYPE_CHECKING:
     from studies.calibration.calibrate import Calibration
-    from studies.comparison import Comparison
     from studies.diagnosis.investigate import Diagnosis
     from studies.diagnosis.table import TableDiagnosis
     from studies.inference.diagnosis import Inference
     from studies.inference.unjudged import Unjudged
     from studies.planning.chamber import Chamber
+    from studies.resonator.comparison import Comparison
 
 Card = Instrument | str | Path
 Run = Record | str | Path
@@ -46,7 +46,7 @@ def simulate(card: Card, profile: str, *, row: float = 1.0, seed: int = 0, noise
 
 def compare(*cards: Card) -> "Comparison":
     """Return designs side by side: `hrg compare`."""
-    from studies.comparison import compare as compare_designs
+    from studies.resonator.comparison import compare as compare_designs
 
     return compare_designs([open_card(card) for card in _flat(cards)])
 
@@ -131,7 +131,7 @@ def infer_records(
     from studies.inference.records import driving, make_ready
     from studies.inference.unjudged import Unjudged
     from studies.planning.next_run import suggest
-    from studies.plausible import check_card_frequency
+    from studies.record.plausible import check_card_frequency
 
     campaign = make_ready(records)
     if not campaign.records:

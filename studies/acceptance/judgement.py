@@ -19,8 +19,8 @@ from studies.acceptance.measure import (
 )
 from studies.acceptance.runs import Test, sort_records
 from studies.acceptance.service import measure_life, measure_storage, measure_transfer
+from studies.fits.ringdown import Decay
 from studies.record import Record
-from studies.ringdown import Decay
 
 FIRST: "dict[Test, Callable[[Record], Found]]" = {
     # tests that take the first record that serves them

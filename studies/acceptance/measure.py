@@ -17,9 +17,9 @@ from compensation.stability import AllanDeviation, NoiseCoefficients
 from compensation.start_up import fit_run_down
 from studies.acceptance.runs import temperature_column
 from studies.errors import InputError, naming
+from studies.fits.ringdown import Decay
 from studies.record import Record
-from studies.ringdown import Decay
-from studies.stability import read_stability
+from studies.record.stability import read_stability
 
 BLOCK = 100.0  # averaging of the output over temperature (s)
 WARM_BLOCK = 10.0

@@ -7,7 +7,7 @@ import numpy as np
 
 from studies.errors import InputError, nearest
 from studies.record import Record
-from studies.rest import LARGEST_REST, TEMPERATURES
+from studies.record.rest import LARGEST_REST, TEMPERATURES
 
 Test = Literal["warm-up", "temperature", "scale-factor", "drift", "run-down", "transfer", "angle-storage"]
 SPAN = 5.0  # span of temperature (K) from which a run at rest is one over temperature

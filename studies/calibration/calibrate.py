@@ -23,9 +23,9 @@ from studies.calibration.remarks import warn
 from studies.calibration.settled import SettledComparison, compare_settled
 from studies.errors import InputError
 from studies.instrument.display import display_name
-from studies.plausible import check_card_frequency, check_one_gyro
 from studies.record import Record, drop_repeats
-from studies.shown import Shown
+from studies.record.plausible import check_card_frequency, check_one_gyro
+from studies.results.shown import Shown
 from studies.simulation.drive import COLUMN
 
 if TYPE_CHECKING:

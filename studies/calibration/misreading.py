@@ -10,7 +10,7 @@ from shell.errors import ShellError
 from studies.calibration.ahead import BIAS
 from studies.calibration.settled import READ_AS
 from studies.errors import InputError
-from studies.law import law_of
+from studies.resonator.law import law_of
 from studies.simulation.drive import COLUMN, drive_by_record
 from studies.simulation.noise import bias_noise
 from studies.simulation.prediction import predict

@@ -17,7 +17,7 @@ from compensation.noise_rows import NoiseRows
 from studies.calibration.observed import HOUSING, QUADRATURE, RESPONSES, SETTLED, ObservedRun, SettledTable
 from studies.calibration.priors import Priors
 from studies.calibration.start import start_spread
-from studies.law import law_of, moved_law
+from studies.resonator.law import law_of, moved_law
 from studies.simulation.drive import Drive
 from studies.simulation.prediction import Prediction, Variations, predict
 

@@ -16,12 +16,12 @@ from studies.acceptance.measure import CONFIDENCE
 from studies.cli.arguments import Card, Records
 from studies.cli.output import answers, say
 from studies.errors import InputError
+from studies.fits.ringdown import is_decay, read_decay
 from studies.instrument.card import load_card
 from studies.record import read_record
 from studies.reports import style
 from studies.reports.digits import plain
 from studies.results import Chapter, Column, Drawing, Facts, Figure, Part, Result, Sentence, Table, row_of
-from studies.ringdown import is_decay, read_decay
 from studies.schema.reader import read_file
 
 VERDICTS = {"pass": "all limits met", "fail": "a limit is not met", "incomplete": "not all limits could be judged"}

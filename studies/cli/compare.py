@@ -20,8 +20,8 @@ def compare(*card: str) -> Result:
     """
     if len(card) < 2:
         raise InputError("name two cards or more: hrg compare A.toml B.toml.")
-    from studies.comparison import compare as compare_designs
     from studies.instrument.card import load_card
+    from studies.resonator.comparison import compare as compare_designs
 
     found = compare_designs([load_card(one) for one in card])
     figures = [

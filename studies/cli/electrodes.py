@@ -19,8 +19,8 @@ from studies.cli.arguments import COUNT, POSITIVE, Card, Harmonic, Temperature, 
 from studies.cli.output import answers
 from studies.errors import InputError, naming
 from studies.instrument.tables.electrodes import ElectrodeKeys
+from studies.resonator.splitting import SplitPair
 from studies.results import Column, Part, Result, Sentence, Table, row_of
-from studies.splitting import SplitPair
 
 
 @answers("hrg.electrodes/1")

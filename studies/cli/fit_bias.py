@@ -9,15 +9,15 @@ unit·√s, B in unit, K in unit/√s; null for runs too short for it.
 
 from typing import Any, Literal
 
-from studies.bias import BiasStudy, Judged, study_bias
 from studies.cli.arguments import EmitC, Records, SaveModel
 from studies.cli.output import answers, keep_model, say
 from studies.errors import InputError
+from studies.fits.bias import BiasStudy, Judged, study_bias
 from studies.models.kinds.bias import name_term
 from studies.record import read_record
+from studies.record.stability import Stability
 from studies.reports import bias as parts
 from studies.results import Chapter, Result, Sentence, row_of
-from studies.stability import Stability
 
 
 @answers("hrg.fit-bias/1")

@@ -9,16 +9,16 @@ from compensation.improvement import Change
 from shell.constants import zero_Celsius
 from studies.cli.arguments import Records, SaveModel
 from studies.cli.output import answers, keep_model, say
-from studies.cross_damping import CrossDampingStudy, study_cross_damping
 from studies.errors import InputError, naming
+from studies.fits.cross_damping import CrossDampingStudy, study_cross_damping
 from studies.models import source_of
 from studies.models.kinds.cross_damping import OUTPUTS, save_cross_damping
-from studies.plausible import records_of_one_gyro
 from studies.record import Record, read_record
+from studies.record.plausible import records_of_one_gyro
+from studies.record.rest import RestData, gather_rest
 from studies.reports import style
 from studies.reports.cross_damping import SOURCES, draw_runs
 from studies.reports.digits import lowered, raised
-from studies.rest import RestData, gather_rest
 from studies.results import Chapter, Column, Drawing, Facts, Figure, Result, Sentence, Table, row_of
 
 LABELS = {

@@ -15,11 +15,11 @@ from studies.files.columns import read_header
 from studies.models import ModelSource
 from studies.models.kinds.frequency import save_frequency
 from studies.papers.hrg import study_table
-from studies.plausible import records_of_one_gyro
 from studies.record import read_frequency_table, read_record, reading_resolution
+from studies.record.plausible import records_of_one_gyro
+from studies.record.settled import Soak, advise_hold, find_soaks, settled_table
 from studies.reports import frequency as parts
 from studies.results import Chapter, Column, Result, Table, row_of
-from studies.settled import Soak, advise_hold, find_soaks, settled_table
 
 SHOWN = ("temperature_degC", "frequency_Hz", "error_Hz", "left_K", "extrapolated_K")
 SOAKS = (

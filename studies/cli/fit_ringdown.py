@@ -15,13 +15,13 @@ import numpy as np
 
 from studies.cli.arguments import Harmonic
 from studies.cli.output import answers, keep_card, say
-from studies.decays import Decays, fit_laws, is_table, read_table, table_of, write_decays
 from studies.errors import InputError
+from studies.fits.ringdown import Decay, read_decay, with_decay
 from studies.instrument.card import load_card
-from studies.law import law_of
+from studies.record.decays import Decays, fit_laws, is_table, read_table, table_of, write_decays
 from studies.reports import style
+from studies.resonator.law import law_of
 from studies.results import Chapter, Column, Drawing, Figure, Part, Result, Sentence, Table, row_of
-from studies.ringdown import Decay, read_decay, with_decay
 
 if TYPE_CHECKING:
     from compensation.ringdown.laws import Law, Term

@@ -8,13 +8,13 @@ from compensation.rate_law import SURE, RateLaw
 from studies.cli.arguments import Records, SaveModel
 from studies.cli.output import answers, keep_model
 from studies.errors import InputError
+from studies.fits.scale import ScaleStudy, study_scale
 from studies.models import source_of
 from studies.models.kinds.scale import save_scale
 from studies.record import read_record
 from studies.reports.bell import ERRORS, SOURCES, draw_steps, steps_table
 from studies.reports.digits import raised
 from studies.results import Chapter, Column, Facts, Figure, Result, Table, row_of
-from studies.scale import ScaleStudy, study_scale
 
 STEPS = {
     "rough": "null and scale (33)",

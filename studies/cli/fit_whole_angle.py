@@ -15,8 +15,8 @@ from studies.cli.output import answers, keep_card, say
 from studies.errors import InputError, naming
 from studies.instrument.card import Instrument, load_card
 from studies.instrument.tables.loop import Loop
-from studies.law import law_of
 from studies.record import read_record
+from studies.resonator.law import law_of
 from studies.results import Column, Result, Sentence, Table
 
 KEYS = {

@@ -21,10 +21,10 @@ from studies.importing.draft import draft_map
 from studies.importing.join import import_records, import_table
 from studies.importing.mapping import LoadedMap, load_map
 from studies.record import write_record
+from studies.record.survey import find_range
 from studies.reports.columns import draw_columns
 from studies.reports.survey import COLUMNS
 from studies.results import Chapter, Column, Figure, Result, Sentence, Table, row_of, rows_of
-from studies.survey import find_range
 
 Columns = Mapping[str, NDArray[np.float64]]
 

@@ -19,10 +19,10 @@ from shell.constants import zero_Celsius
 from studies.cli.arguments import POSITIVE, Card, Seed, Temperature, open_card
 from studies.cli.output import answers, say
 from studies.errors import InputError
-from studies.law import law_of
 from studies.loss.damping_law import damping_law, settled_loss
 from studies.record import Record, write_record
 from studies.reports.loop import describe, loop_parts
+from studies.resonator.law import law_of
 from studies.results import Result, row_of
 from studies.simulation.chamber import load_profile
 from studies.simulation.drive import MOST_ROWS

@@ -14,8 +14,8 @@ from studies.cli.arguments import Card, Out, Temperature, ending_of, open_card
 from studies.cli.output import answers
 from studies.errors import InputError, naming
 from studies.files.writing import written_whole
+from studies.resonator.splitting import solved_pair
 from studies.results import Result, row_of
-from studies.splitting import solved_pair
 
 KINDS = (".vtu", ".msh", ".inp")
 

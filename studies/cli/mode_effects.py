@@ -62,7 +62,7 @@ def _split(m: Mode, asked: Asked) -> Entry | None:
     """What the card's imperfection and electrodes make of a pair."""
     if m.theory == "rayleigh" or m.harmonic < 1 or not is_imperfect(asked.instrument):
         return None
-    from studies.splitting import SplitPair
+    from studies.resonator.splitting import SplitPair
 
     whole = SplitPair(asked.instrument, m, asked.T)
     slow, fast = whole.split.frequencies

@@ -23,10 +23,10 @@ from studies.cli.mode_effects import MODE, Asked, describe_effects, effect_table
 from studies.cli.output import answers
 from studies.errors import naming
 from studies.instrument.card import Instrument
-from studies.law import law_of
 from studies.reports.digits import to_numerical_error
 from studies.reports.mode_picture import THEORIES
 from studies.reports.scenes import live_chapter, show_mode
+from studies.resonator.law import law_of
 from studies.results import Blocks, Column, Result, Sentence, Table, Where, row_of
 
 if TYPE_CHECKING:

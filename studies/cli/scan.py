@@ -21,8 +21,8 @@ from studies.files.writing import write_text
 from studies.instrument.card import Instrument, save_card
 from studies.reports.digits import plain, to_interval
 from studies.reports.style import BLUE, ORANGE, figure
+from studies.resonator.scan import Scan, ScanInterval, scan_faces
 from studies.results import Chapter, Column, Drawing, Facts, Figure, Result, Sentence, Table, row_of
-from studies.scan import Scan, ScanInterval, scan_faces
 
 NONE = "none"
 

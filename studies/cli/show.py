@@ -16,7 +16,7 @@ from studies.reports.digits import plain
 from studies.results import Facts, Result, Sentence, row_of
 
 if TYPE_CHECKING:
-    from studies.survey import Survey
+    from studies.record.survey import Survey
 
 MANY = 100_000  # rows, of which the reading is told
 
@@ -29,9 +29,9 @@ def show(*runs: Records) -> Result:
     deviations; its figures show values under the pointer and can be enlarged.
     """
     from studies.record import read_record
+    from studies.record.survey import survey_record
+    from studies.record.uses import find_uses
     from studies.reports import survey as parts
-    from studies.survey import survey_record
-    from studies.uses import find_uses
 
     if not runs:
         raise InputError("no record given: hrg show RUN.csv [RUN.csv ...].")

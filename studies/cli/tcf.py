@@ -12,11 +12,11 @@ from studies.cli.output import answers
 from studies.errors import InputError
 from studies.instrument.card import load_card
 from studies.instrument.display import display_name
-from studies.law import check_slope_known, law_of
 from studies.papers import hrg
 from studies.record import read_frequency_table
 from studies.reports import style
 from studies.reports.scenes import live_chapter
+from studies.resonator.law import check_slope_known, law_of
 from studies.results import Column, Drawing, Figure, Result, Table, rows_of
 
 MOST_HARMONIC = 50  # a law of a higher one takes minutes

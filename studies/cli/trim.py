@@ -24,8 +24,8 @@ from studies.errors import naming
 from studies.files.writing import write_text
 from studies.reports.digits import plain, to_error
 from studies.reports.style import BLUE, GREEN, VERMILION, figure
+from studies.resonator.trim import SURE, CardPlan, Teeth, Tool, other_cuts, plan_for_card
 from studies.results import Chapter, Column, Drawing, Facts, Figure, Result, Sentence, Table, row_of
-from studies.trim import SURE, CardPlan, Teeth, Tool, other_cuts, plan_for_card
 
 KINDS = {
     "mass": "unstrained mass",

@@ -17,7 +17,7 @@ from studies.effects.states import FloatArray, States, average
 from studies.errors import InputError
 from studies.inference.sharp import RESOLVED, fast_line
 from studies.record import Record, drop_repeats, place_in_time
-from studies.rest import LEAST_SPIKE
+from studies.record.rest import LEAST_SPIKE
 
 TEMPERATURES = ("housing_temperature_degC", "chamber_temperature_degC", "resonator_temperature_degC")
 COMMANDS = ("drive_amplitude_V", "electrode_bias_V", "quadrature_V", "pattern_angle_deg")

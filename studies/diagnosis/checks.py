@@ -6,8 +6,8 @@ import numpy as np
 
 from studies.effects.states import FloatArray
 from studies.errors import InputError
-from studies.plausible import check_one_gyro
 from studies.record import Record
+from studies.record.plausible import check_one_gyro
 
 FEWEST_BINS = 24
 """Values from which on the noise of a response can be told."""

@@ -24,7 +24,7 @@ from studies.diagnosis.seen import SeenResponse
 from studies.diagnosis.verdict import Cause, ResponseResult, Verdict, doubted, overall
 from studies.effects import Effect
 from studies.planning.chamber import Chamber
-from studies.shown import Shown
+from studies.results.shown import Shown
 
 ASKED = ("frequency_Hz", "inverse_q", "bias_deg_per_h")
 """The bias last: it follows the temperature, and 1/Q through the anisotropy of damping."""

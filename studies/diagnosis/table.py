@@ -34,7 +34,7 @@ from studies.diagnosis.verdict import (
 from studies.effects import library
 from studies.effects.states import FloatArray
 from studies.instrument.display import display_name
-from studies.shown import Shown
+from studies.results.shown import Shown
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -120,7 +120,7 @@ def diagnose_table(path: str, card: "Instrument | str | None" = None) -> TableDi
         With a card: a table whose level or slope is further than six standard deviations from it.
     """
     from studies.instrument.card import load_card
-    from studies.law import law_of
+    from studies.resonator.law import law_of
 
     table = read_settled(path)
     instrument = load_card(card or DEFAULT_LAW) if card is None or isinstance(card, str) else card

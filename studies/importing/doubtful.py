@@ -13,7 +13,7 @@ from studies.errors import InputError
 from studies.importing.mapping import ColumnMap
 from studies.importing.tables import RawTable
 from studies.record import COMMANDED
-from studies.rest import LEAST_SPIKE
+from studies.record.rest import LEAST_SPIKE
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

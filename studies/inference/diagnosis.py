@@ -32,7 +32,7 @@ from studies.inference.sharp import RESOLVED, fast_line, longest_resolved
 from studies.inference.signatures import Signatures
 from studies.inference.verdict import judge
 from studies.record import Record
-from studies.shown import Shown
+from studies.results.shown import Shown
 
 if TYPE_CHECKING:
     from pandas import DataFrame

@@ -11,7 +11,7 @@ from studies.calibration.observed import LEAST_ROWS, RESPONSES
 from studies.diagnosis.checks import FEWEST_BINS, check_device, check_units
 from studies.errors import InputError
 from studies.record import Record, drop_repeats, place_in_time
-from studies.rest import LEAST_SPIKE
+from studies.record.rest import LEAST_SPIKE
 from studies.simulation.drive import COMMAND_COLUMNS, RATE
 
 Array = NDArray[np.float64]

@@ -8,7 +8,7 @@ from studies.diagnosis.seen import SeenResponse
 from studies.diagnosis.verdict import Verdict, overall
 from studies.inference.records import Campaign
 from studies.inference.verdict import skipped_results
-from studies.shown import Shown
+from studies.results.shown import Shown
 
 if TYPE_CHECKING:
     from pandas import DataFrame

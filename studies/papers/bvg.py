@@ -15,7 +15,7 @@ from compensation.bell_calibration import BellRun, fit_chain
 from compensation.fir import design_smoother
 from compensation.linearity import measure_linearity
 from shell.constants import zero_Celsius
-from studies.scale import StepFigures, judge_steps
+from studies.fits.scale import StepFigures, judge_steps
 
 DEG = float(np.pi / 180)
 STEP = 0.1  # output step (s), printed

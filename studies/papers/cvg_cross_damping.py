@@ -14,7 +14,7 @@ from compensation.cross_damping import RestRun, evaluate_cross_damping, fit_cros
 from compensation.improvement import Change, compare_outputs
 from compensation.transfer import TransferFunction
 from shell.constants import zero_Celsius
-from studies.cross_damping import CrossDampingStudy, study_cross_damping
+from studies.fits.cross_damping import CrossDampingStudy, study_cross_damping
 
 DEG_PER_H = np.pi / 180 / 3600
 CALIBRATION = 293.15

@@ -18,8 +18,8 @@ from shell.law import SlopeParts, build_law
 from shell.materials import read_materials
 from studies.files.columns import read_columns
 from studies.instrument.card import Instrument
-from studies.law import law_of
 from studies.record import read_frequency_table
+from studies.resonator.law import law_of
 
 RESOLUTION = 0.01  # Hz, last printed digit of Table 1
 CARD = "hrg-30mm"

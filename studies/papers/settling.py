@@ -16,9 +16,9 @@ from compensation.arrays import Array
 from shell.constants import zero_Celsius
 from shell.law import FrequencyLaw
 from studies.instrument.card import Instrument
-from studies.law import law_of
 from studies.papers.hrg import printed_table1
 from studies.reports import style
+from studies.resonator.law import law_of
 from studies.results import Chapter, Column, Drawing, Figure, Sentence, Table
 from studies.simulation.heat_path import build_network, build_shell_and_stem
 from studies.simulation.response import cell_weights

@@ -20,8 +20,8 @@ from studies.inference.inferred import Inferred
 from studies.inference.model import Background, Term
 from studies.inference.search import Hypothesis
 from studies.inference.signatures import Signatures, trace
-from studies.law import law_of
 from studies.planning.programme import Programme
+from studies.resonator.law import law_of
 from studies.simulation.drive import COMMANDS, drive_by_schedule
 from studies.simulation.virtual_gyro import simulate_run
 

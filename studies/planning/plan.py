@@ -197,7 +197,7 @@ def _least_snr(one: Prospect) -> float:
 
 def simulate_plan(card: "Instrument", profiles: Sequence[str]) -> list[Record]:
     """Return the records of planned runs: the card's own simulation, with its noise."""
-    from studies.law import law_of
+    from studies.resonator.law import law_of
     from studies.simulation.chamber import load_schedule
     from studies.simulation.drive import drive_by_schedule
     from studies.simulation.prediction import MARGIN

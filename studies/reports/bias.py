@@ -9,7 +9,7 @@ from compensation.bias import SELECTED_BY_THE_PAPER, TERMS, Variable
 from compensation.bias_selection import AVERAGING
 from compensation.memory import Memory
 from compensation.noise import FLAT
-from studies.bias import BiasStudy, Judged
+from studies.fits.bias import BiasStudy, Judged
 from studies.models.file import widen
 from studies.models.kinds.bias import OUTPUTS
 from studies.reports import style

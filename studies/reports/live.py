@@ -22,7 +22,7 @@ from shell.levels import Theory
 from shell.separation import nearest_mode
 from studies.errors import UNUSABLE_INPUT
 from studies.instrument.card import Instrument
-from studies.law import unknown_slope
+from studies.resonator.law import unknown_slope
 from studies.results import Sentence, row_of
 from studies.results.page import Block, Embedded, fill_template
 from studies.sweeps.case import Case

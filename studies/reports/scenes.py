@@ -133,7 +133,7 @@ def _show_split(
 ) -> ModeScene:
     """The slower mode of the pair on its own axis, the shell with its departures exaggerated."""
     from shell.imperfection.surface import depart_surface, turn_surface
-    from studies.splitting import SplitPair
+    from studies.resonator.splitting import SplitPair
 
     split = SplitPair(instrument, mode, T).split
     scene = ModeScene(instrument, T, resonator, mode, turn_surface(surface, split.slow_axis), split)

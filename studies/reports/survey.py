@@ -10,12 +10,12 @@ import numpy as np
 from compensation.noise import FLAT
 from studies.instrument.display import display_name
 from studies.instrument.units import unit_of
+from studies.record.rest import TEMPERATURES
+from studies.record.survey import CONFIDENCE, Survey, average_evenly
+from studies.record.uses import Use
 from studies.reports import style
 from studies.reports.columns import column_title, draw_columns
-from studies.rest import TEMPERATURES
 from studies.results import Chapter, Column, Drawing, Figure, Part, Sentence, Table, row_of
-from studies.survey import CONFIDENCE, Survey, average_evenly
-from studies.uses import Use
 
 
 def _count(key: str, unit: str = "") -> Column:

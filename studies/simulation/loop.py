@@ -15,7 +15,7 @@ from compensation.wave import StandingWave
 from compensation.whole_angle import WITHOUT_RATE, simulate_whole_angle
 from studies.errors import InputError, naming
 from studies.instrument.imperfect import is_imperfect
-from studies.splitting import reference_split
+from studies.resonator.splitting import reference_split
 
 if TYPE_CHECKING:
     from studies.instrument.card import Instrument

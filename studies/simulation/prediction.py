@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from shell.constants import zero_Celsius
 from studies.errors import InputError
 from studies.instrument.dotted import look_up
-from studies.law import law_of, moved_law
 from studies.loss.damping_law import DampingLaw, damping_law
+from studies.resonator.law import law_of, moved_law
 from studies.simulation.drive import COLUMN, Drive
 from studies.simulation.heat_path import SENSOR, build_network, departures, slowest_lag, with_sensor
 from studies.simulation.response import Temperatures, check_loss, observed_rows, read_out

@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 
 from shell.constants import zero_Celsius
 from studies.errors import InputError, naming
+from studies.resonator.splitting import mean_shift
 from studies.simulation.drive import Drive
 from studies.simulation.heat_path import SENSOR
 from studies.simulation.loop import DEG_PER_H, settled_columns
-from studies.splitting import mean_shift
 from thermal.meridian import cell_names, energy_weights
 
 if TYPE_CHECKING:

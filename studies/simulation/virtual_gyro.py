@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from compensation.noise import Noise
 from shell.constants import zero_Celsius
 from studies.instrument.tables.noise import SILENT
-from studies.law import unknown_slope
 from studies.record import Record
+from studies.resonator.law import unknown_slope
 from studies.simulation.chamber import check_profile
 from studies.simulation.drive import COLUMN, COMMANDS, RATE, Drive, drive_by_profile, rows_of
 from studies.simulation.loop import find_range_use, require_range, require_stable_loops, wave_of

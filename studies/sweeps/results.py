@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studies.instrument.card import build_instrument
-from studies.shown import Shown
+from studies.results.shown import Shown
 from studies.sweeps.block import Array, decode
 from studies.sweeps.definition import Study
 from studies.sweeps.design import coding, nominal_row

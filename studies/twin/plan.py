@@ -88,7 +88,7 @@ class Plan:
 
 def plan_twin(instrument: "Instrument", boundary: "Boundary" = "chamber", theory: "Theory" = "solid") -> Plan:
     """Return what the C code needs of a card."""
-    from studies.law import law_of
+    from studies.resonator.law import law_of
 
     _refuse(instrument)
     law = law_of(instrument, theory=theory)
@@ -207,7 +207,7 @@ def _place_effects(instrument: "Instrument", parameters: dict[str, float]) -> It
 
 def _constants(instrument: "Instrument", law: "FrequencyLaw", boundary: "Boundary") -> dict[str, float]:
     """Numbers that are no keys of the card: the solver's, and those of imperfection and electrodes."""
-    from studies.splitting import mean_shift, reference_split
+    from studies.resonator.splitting import mean_shift, reference_split
 
     T0 = instrument.reference_temperature
     keys = instrument.part("electrodes").keys if instrument.part("electrodes").are_charged else None

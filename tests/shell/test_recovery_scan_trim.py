@@ -13,8 +13,8 @@ from shell.scan.alignment import align
 from shell.scan.projection import Projector
 from shell.scan.survey import rigid_shapes, survey
 from shell.trimming import SplitWave, plan_trim
-from studies.scan import polar_intervals
-from studies.trim import Teeth, rim_sites, tooth_sites
+from studies.resonator.scan import polar_intervals
+from studies.resonator.trim import Teeth, rim_sites, tooth_sites
 from tests.shell.scans import dome_points
 
 SILICA = Elastic(72.7e9, 0.17, 2203.0)

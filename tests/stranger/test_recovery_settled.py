@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from studies.record import Record
-from studies.settled import advise_hold, find_soaks
+from studies.record.settled import advise_hold, find_soaks
 
 LEVELS = (20.0, -30.0, -10.0, 10.0, 30.0, 50.0)
 

@@ -312,7 +312,7 @@ def test_two_gyros_are_not_fitted_together(calibrated, tmp_path, capsys):
 
 def test_every_run_is_drawn():
     """Four runs are four pairs of pictures."""
-    from studies.bias import study_bias
+    from studies.fits.bias import study_bias
     from studies.reports.bias import runs_figure
 
     study = study_bias([make_record(k, cooling=k % 2 == 0) for k in range(4)])

@@ -10,8 +10,8 @@ from studies.errors import InputError
 from studies.instrument.card import load_card
 from studies.models import compensate
 from studies.models.kinds.frequency import find_temperature, save_frequency
-from studies.plausible import check_card_frequency
 from studies.record import Record
+from studies.record.plausible import check_card_frequency
 from studies.simulation.chamber import load_profile
 from studies.simulation.virtual_gyro import simulate_run
 from studies.workbench import diagnose_records

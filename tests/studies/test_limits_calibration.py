@@ -18,8 +18,8 @@ from studies.calibration.start import MOST_SPREAD, start_spread
 from studies.instrument.card import load_card
 from studies.instrument.tables.noise import NoiseKeys
 from studies.instrument.uncertain import UncertainValue
-from studies.law import law_of
 from studies.record import Record
+from studies.resonator.law import law_of
 from studies.simulation.chamber import load_profile
 from studies.simulation.drive import Drive, drive_by_profile, rows_of
 from studies.simulation.heat_path import build_network, slowest_lag

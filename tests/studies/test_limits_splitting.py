@@ -15,10 +15,10 @@ from studies.errors import InputError
 from studies.instrument.card import load_card, save_card
 from studies.instrument.imperfect import is_imperfect
 from studies.reports.scenes import show_mode
+from studies.resonator.splitting import SplitPair, mean_shift
 from studies.simulation.drive import drive_by_profile
 from studies.simulation.loop import wave_of
 from studies.simulation.prediction import predict
-from studies.splitting import SplitPair, mean_shift
 from studies.sweeps.case import Case
 from studies.sweeps.quantities.split import Split
 from thermal.profile import Profile

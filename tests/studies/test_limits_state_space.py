@@ -9,7 +9,7 @@ from scipy.signal import dlsim
 
 from studies.cli import main
 from studies.instrument.card import load_card
-from studies.law import law_of
+from studies.resonator.law import law_of
 from studies.simulation.loop_study import study_loops
 from studies.simulation.state_space import state_space
 

@@ -14,8 +14,8 @@ from studies.instrument.card import load_card, shipped_cards
 from studies.instrument.tables.bias import Bias
 from studies.instrument.tables.loss import Loss
 from studies.instrument.tables.noise import NoiseKeys
-from studies.law import law_of
 from studies.record import read_record, write_record
+from studies.resonator.law import law_of
 from studies.simulation.chamber import load_profile
 from studies.simulation.drive import drive_by_profile, rows_of
 from studies.simulation.heat_path import build_network, build_shell_and_stem, slowest_lag

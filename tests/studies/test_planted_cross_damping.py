@@ -8,8 +8,8 @@ import pytest
 
 from compensation.cross_damping import RestRun
 from studies.cli import main
-from studies.cross_damping import study_cross_damping
 from studies.errors import InputError
+from studies.fits.cross_damping import study_cross_damping
 from studies.models import compensate, emit_c, read_model
 from studies.papers.cvg_cross_damping import (
     DEG_PER_H,

@@ -14,13 +14,13 @@ from compensation.bell_calibration import BellRun, fit_chain
 from compensation.rate_law import fit_rate_law
 from studies.cli import main
 from studies.errors import InputError
+from studies.fits.scale import settled_rows
 from studies.models import compensate, emit_c, read_model
 from studies.models.kinds.scale import load_scale
 from studies.papers.bvg import DEG, examine_claims, read_printed_chain, reduce_white, reproduce_bell, simulate_runs
 from studies.record import read_record
 from studies.reports.bell import bell_chapters
 from studies.results.page import make_blocks
-from studies.scale import settled_rows
 from tests.compiled import compile_c
 
 STRIDE = 20

@@ -14,9 +14,9 @@ from compensation.noise import Noise
 from compensation.spikes import STUCK, find_dropouts, find_stuck
 from studies.cli import main
 from studies.record import Record, write_record
+from studies.record.survey import find_density, find_steps, survey_column, survey_record
 from studies.reports import style
 from studies.results.page import draw
-from studies.survey import find_density, find_steps, survey_column, survey_record
 
 INPUTS = Path(__file__).parents[1] / "golden" / "inputs"
 T = np.arange(4000.0)

@@ -10,7 +10,7 @@ from studies.cli import main
 from studies.errors import InputError
 from studies.instrument.card import load_card
 from studies.record import Record, write_record
-from studies.settled import find_soaks
+from studies.record.settled import find_soaks
 from studies.simulation.chamber import load_profile
 from studies.simulation.heat_path import build_network
 from studies.simulation.virtual_gyro import simulate_run

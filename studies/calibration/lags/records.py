@@ -12,7 +12,7 @@ from studies.calibration.lags.housing_run import HousingRun
 from studies.calibration.lags.identification import FrequencyPolynomial, Identification, identify, identify_lags
 from studies.errors import InputError, naming
 from studies.record import Record
-from studies.rest import LEAST_SPIKE
+from studies.record.rest import LEAST_SPIKE
 
 if TYPE_CHECKING:
     from studies.instrument.card import Instrument
@@ -70,7 +70,7 @@ def _law(runs: Sequence[HousingRun], instrument: "Instrument | None") -> Frequen
     middle = (low + high) / 2
     if instrument is None:
         return FrequencyPolynomial(middle, slope=None, curvature=None)
-    from studies.law import law_of
+    from studies.resonator.law import law_of
 
     law = law_of(instrument, low - 10, high + 10)
     T = np.linspace(law.lowest, law.highest, 61)

@@ -15,7 +15,7 @@ from studies.errors import InputError
 from studies.models.c_source import head, polynomial, self_test
 from studies.models.file import Model, ModelPart, ModelSource, make_part, widen
 from studies.record import COMPENSATED, Record
-from studies.rest import celsius_range
+from studies.record.rest import celsius_range
 
 if TYPE_CHECKING:
     from compensation.cross_damping import CrossDampingModel

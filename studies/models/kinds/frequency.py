@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from studies.errors import InputError, naming
 from studies.models.c_source import head, polynomial, self_test
 from studies.models.file import Model, ModelSource, make_part, widen
-from studies.plausible import check_model_frequency
 from studies.record import COMPENSATED, RESONATOR, Record
-from studies.rest import TEMPERATURES
+from studies.record.plausible import check_model_frequency
+from studies.record.rest import TEMPERATURES
 
 if TYPE_CHECKING:
     from compensation.frequency import FrequencyFit

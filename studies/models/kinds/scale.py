@@ -17,7 +17,7 @@ from studies.errors import InputError
 from studies.models.c_source import head, polynomial
 from studies.models.file import Model, ModelPart, ModelSource, make_part, widen
 from studies.record import COMPENSATED, Record
-from studies.rest import celsius_range, drop_spikes
+from studies.record.rest import celsius_range, drop_spikes
 
 if TYPE_CHECKING:
     from compensation.bell import BellChain, PolynomialCurve

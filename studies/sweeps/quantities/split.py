@@ -25,7 +25,7 @@ class Split(ModeQuantity, frozen=True, kw_only=True, tag="split"):
 
     def evaluate(self, case: Case) -> tuple[Number, ...]:
         """Return both."""
-        from studies.splitting import SplitPair
+        from studies.resonator.splitting import SplitPair
 
         T = case.temperature(self.temperature_degC)
         whole = SplitPair(case.instrument, case.mode(self.harmonic, 0, self.theory, T), T)

@@ -23,7 +23,7 @@ class SplitPerWave(ModeQuantity, frozen=True, kw_only=True, tag="split-per-wave"
 
     def evaluate(self, case: Case) -> tuple[Number, ...]:
         """Return the split of the design with this wave and no other imperfection."""
-        from studies.splitting import SplitPair
+        from studies.resonator.splitting import SplitPair
 
         T = case.temperature(self.temperature_degC)
         wave = {"of": self.of, "order": self.order, "amplitude_um": AMPLITUDE}

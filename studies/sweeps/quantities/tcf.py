@@ -1,6 +1,6 @@
 """The temperature coefficient of frequency, d ln f/dT, and its parts from E, ν, ρ, h and r (HRG paper eq. 15)."""
 
-from studies.law import check_slope_known, law_of
+from studies.resonator.law import check_slope_known, law_of
 from studies.sweeps.case import Case
 from studies.sweeps.quantity import Column, ModeQuantity, Number
 

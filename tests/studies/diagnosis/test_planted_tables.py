@@ -6,7 +6,7 @@ import pytest
 from studies.diagnosis.table import diagnose_table, study_steady_table
 from studies.errors import InputError
 from studies.instrument.card import load_card
-from studies.law import law_of
+from studies.resonator.law import law_of
 from tests.studies.diagnosis.naming import check_clean, check_first
 
 WIDEST = 3

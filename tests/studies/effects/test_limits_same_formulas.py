@@ -7,10 +7,10 @@ from compensation.cross_damping import evaluate_cross_damping, relate_cross_damp
 from studies.effects import States, apply_effect
 from studies.instrument.card import load_card
 from studies.loss.damping_law import damping_law
+from studies.resonator.splitting import reference_split
 from studies.simulation.drive import Drive
 from studies.simulation.prediction import law_for, predict
 from studies.simulation.response import Temperatures, read_out
-from studies.splitting import reference_split
 from thermal.profile import Profile
 
 TIME = np.arange(0.0, 7200.0, 60.0)

@@ -18,7 +18,7 @@ from shell.constants import zero_Celsius
 from studies.errors import InputError, naming
 from studies.models.kinds.scale import RAW
 from studies.record import Record
-from studies.rest import LARGEST_REST, MOST_ROWS, TEMPERATURES, choose_column, drop_spikes
+from studies.record.rest import LARGEST_REST, MOST_ROWS, TEMPERATURES, choose_column, drop_spikes
 
 DEG = float(np.pi / 180)
 STEPS = ("rough", "bias_compensated", "rate_compensated", "temperature_compensated", "filtered")

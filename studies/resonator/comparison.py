@@ -8,8 +8,8 @@ import numpy as np
 
 from shell.constants import zero_Celsius
 from studies.errors import InputError, naming
-from studies.law import law_of
-from studies.shown import Shown
+from studies.resonator.law import law_of
+from studies.results.shown import Shown
 
 if TYPE_CHECKING:
     from pandas import DataFrame

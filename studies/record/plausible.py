@@ -8,9 +8,9 @@ from compensation.arrays import Array
 from shell.constants import zero_Celsius
 from studies.errors import InputError
 from studies.instrument.card import Instrument
-from studies.law import check_slope_known, law_of
 from studies.record import Record, drop_repeats
-from studies.rest import TEMPERATURES
+from studies.record.rest import TEMPERATURES
+from studies.resonator.law import check_slope_known, law_of
 
 ANOTHER = 0.2  # relative: no tolerance of one design makes so much
 ALIKE = 0.03  # relative: what trimming, temperature and small errors of dimensions make of a frequency

@@ -29,10 +29,10 @@ from compensation.stability import allan_deviation, fit_noise
 from studies.errors import InputError, naming
 from studies.models import Model, compensate, source_of
 from studies.models.kinds.bias import OUTPUTS, save_bias
-from studies.plausible import records_of_one_gyro
 from studies.record import COMPENSATED, Record
-from studies.rest import TEMPERATURES, choose_column, require_rest
-from studies.stability import Stability, unbroken
+from studies.record.plausible import records_of_one_gyro
+from studies.record.rest import TEMPERATURES, choose_column, require_rest
+from studies.record.stability import Stability, unbroken
 
 Over = Literal["auto", "frequency", "temperature"]
 METHODS: tuple[Method, ...] = ("guarded", "paper")

@@ -18,8 +18,8 @@ from compensation.arrays import Array
 from studies.errors import InputError, naming
 from studies.files.columns import read_columns, read_header
 from studies.files.reading import read_bytes
+from studies.fits.ringdown import POWERS, Decay
 from studies.record import Record, check_plausible, write_record
-from studies.ringdown import POWERS, Decay
 
 if TYPE_CHECKING:
     from compensation.ringdown.laws import Law

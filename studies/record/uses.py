@@ -12,14 +12,14 @@ import numpy as np
 from compensation.errors import CompensationError
 from studies.acceptance.limits import QUANTITIES
 from studies.acceptance.runs import sort_records
-from studies.bias import check_lengths, find_output, find_state
 from studies.errors import InputError
+from studies.fits.bias import check_lengths, find_output, find_state
 from studies.inference.records import make_ready
 from studies.models.kinds.bias import OUTPUTS
 from studies.models.kinds.scale import RAW
 from studies.record import Record
-from studies.rest import TEMPERATURES, choose_column, gather_rest
-from studies.settled import advise_hold, find_soaks, settled_table
+from studies.record.rest import TEMPERATURES, choose_column, gather_rest
+from studies.record.settled import advise_hold, find_soaks, settled_table
 
 OUTPUT = "bias_deg_per_h"  # that an acceptance test judges unless another is named
 LEAST_SPAN = 1.0  # K, of a temperature that changes

@@ -1,0 +1,1 @@
+"""Fits of models to records: what each `hrg fit` command computes."""

@@ -1,0 +1,1 @@
+"""Resonators of instruments: frequency over temperature, splits, scans, trimming, comparison."""
