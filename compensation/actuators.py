@@ -1,4 +1,4 @@
-"""Actuators of a gyro: the largest forces and stiffness that its electrodes give, and the part of them that loops use.
+"""Actuators of a gyro: the largest forces and stiffness that its electrodes give, and the part that the loops use.
 
 All limits are over 2ω and the commanded amplitude (1/s), as the loops' commands are. One pair of electrodes pushes across the
 wave for rate and quadrature, a quarter cycle apart, so that √(rate² + quadrature²) counts. Quadrature may instead be nulled by a
@@ -91,7 +91,7 @@ UNLIMITED = Actuators()  # forces without limits, for quadrature too
 
 
 def require_range(use: RangeUse, context: str) -> None:
-    """Raise when settled loops would need more than the actuators give."""
+    """Raise if settled loops would exceed the limits of the actuators."""
     if use.worst > 1:
         raise CompensationError(
             f"{context}: the loops need {100 * use.worst:.0f} % of the actuators' range (rate {100 * float(np.max(use.rate)):.3g} %,"

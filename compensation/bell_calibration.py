@@ -36,7 +36,7 @@ class BellRun:
 
 
 def fit_rough(run: BellRun) -> tuple[float, float, Array]:
-    """Fit null N₁ (counts) and scale S₁ (rad/s per count), with covariance, to a run at rest and turning: eq. (33).
+    """Fit null N₁ (counts) and scale S₁ (rad/s per count), with covariance, to a run at rest and then at one rate: eq. (33).
 
     The output is regressed on the rate, whose values are exact; the paper's two plateaus give the line through both means.
     """

@@ -1,4 +1,4 @@
-"""Bias of the gyro as a function of its own frequency and of how fast that changes, HRG paper eqs. (19)–(22).
+"""Bias of the gyro as a function of its own frequency and of its rate of change, HRG paper eqs. (19)–(22).
 
 B = B₀ + k₁ f + k₂ f² + k₃ f³ + k₄ ḟ + k₅ ḟ² + k₆ ḟ³ + k₇ f ḟ + k₈ f² ḟ + k₉ f ḟ², f the *change* of frequency (Hz),
 ḟ its rate (Hz/s), B in the unit of the bias column. Which terms are taken is decided in `compensation.bias_selection`.
@@ -247,7 +247,7 @@ def fit_terms(
     selection: StepwiseSelection | None = None,
     scores: tuple[float, ...] = (),
 ) -> BiasFit:
-    """Fit the given terms by least squares, with errors for independent rows and for remembering ones.
+    """Fit the given terms by least squares, with errors for independent and for correlated rows.
 
     `theta` of the noise is estimated with these terms unless it is given.
     """

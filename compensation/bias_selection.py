@@ -1,4 +1,4 @@
-"""Which terms of HRG paper eq. (21) a bias model keeps, and its worth on held-out data.
+"""Selection of terms of HRG paper eq. (21) for a bias model, and its error on held-out data.
 
 Two ways of selecting stand side by side; the coefficients of the chosen terms are those of least squares in both:
 
@@ -45,7 +45,7 @@ class NoHeldOut(CompensationError):
 
 @dataclass(frozen=True)
 class HeldOutRows:
-    """What models are worth on held-out rows: standard deviations of 100 s averages, pooled.
+    """Errors of models on held-out rows: standard deviations of 100 s averages, pooled.
 
     `before` without and `after` with compensation, both about the held-out piece's own mean; `coverage` the part of
     the rows that lies inside the range of the rest; `by_runs` whole runs were held out, else blocks; `terms` those

@@ -1,4 +1,4 @@
-"""The four loops of a shell gyro, their gains from the bandwidth wanted, and how far they are from instability.
+"""The four loops of a shell gyro, their gains from the bandwidths, and their stability margins.
 
 GA holds the amplitude, GF the phase (the frequency of the numerically controlled oscillator), GR the rate force that
 keeps the node at rest, GQ the quadrature (BVG paper, section 3.2 and figure 8). Each is sampled: the demodulated signal
@@ -109,7 +109,7 @@ def find_margins(loops: Loops, decay: float, names: tuple[str, ...] = Loops.NAME
 
 
 def require_stable(loops: Loops, decay: float, names: tuple[str, ...] = Loops.NAMES) -> tuple[Margin, ...]:
-    """Return the margins, or raise naming the unstable loop, its margins and the bandwidth that would do."""
+    """Return the margins, or raise naming the unstable loop, its margins and a bandwidth that is stable."""
     margins = find_margins(loops, decay, names)
     for margin in margins:
         if not margin.stable:

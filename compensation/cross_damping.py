@@ -68,7 +68,7 @@ def evaluate_cross_damping(coefficients: ArrayLike, shift: ArrayLike) -> Array:
 
 @dataclass(frozen=True)
 class CrossDampingModel:
-    """ζ₁₂(T) of one gyro and what turns it into rate: eqs. (9), (10)."""
+    """ζ₁₂(T) of one gyro, and its conversion to rate: eqs. (9), (10)."""
 
     coefficients: Array  # array (n + 1,), ζᵢ (K⁻ⁱ), constant first
     covariance: Array  # array (n + 1, n + 1), covariance of the coefficients
@@ -120,7 +120,7 @@ def simulate_bias(time: ArrayLike, cross_damping: ArrayLike, k: float, zeta: flo
 
 @dataclass(frozen=True)
 class RestRun:
-    """One run of a gyro that does not turn: time (s), output (rad/s), temperature (K); arrays (N,)."""
+    """One run of a gyro at rest: time (s), output (rad/s), temperature (K); arrays (N,)."""
 
     time: Array
     rate: Array

@@ -1,4 +1,4 @@
-"""What stands between the wave and its numbers: gains, phases and angles of the electrodes, delay, steps and noise.
+"""Electronics between the wave and the loops: gains, phases and angles of the electrodes, delay, steps and noise.
 
 A channel pair maps the plane of the two patterns: G = R(n β) [1 + ½ [[δ + iη, κ], [κ, −δ − iη]]] e^{iφ}, with δ and η the
 relative differences of gain and phase between the channels along cos nθ and sin nθ, κ how far the axes are from being

@@ -153,7 +153,7 @@ def settle(model: LinearModel) -> tuple[Array, Array, Array]:
 
 
 def noise_of_estimate(model: LinearModel) -> Array:
-    """Return the covariance of what the settled filter leaves of the measurement noise, the truth being still.
+    """Return the covariance of the settled filter's estimate due to measurement noise, for a constant true state.
 
     With the settled gain K the error of the estimate obeys e⁺ = (1 − K C) F e + K v, so N = A N Aᵀ + K R Kᵀ, A = (1 − K C) F.
     """

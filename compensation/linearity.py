@@ -13,7 +13,7 @@ PLATEAU = 1e-3  # part of the largest applied rate within which two rates are th
 
 
 def same_rate(rate: ArrayLike) -> Array:
-    """Return the applied rates rounded to a thousandth of the largest, so that a rate table's jitter is one rate."""
+    """Return the applied rates rounded to a thousandth of the largest, so that jitter of a rate table does not split a rate."""
     x = np.asarray(rate, dtype=float)
     grain = PLATEAU * float(np.max(np.abs(x), initial=0.0)) or 1.0
     return np.asarray(np.round(x / grain) * grain, dtype=float)

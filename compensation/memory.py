@@ -1,4 +1,4 @@
-"""What a temperature leaves behind in a gyro that is not where its thermometer is: a lag, and a play.
+"""Memory of a gyro for its temperature: a lag behind the thermometer, and a play (hysteresis).
 
 Lag: τ ẏ + y = x, exact for an x that is linear between its samples. Play (backlash): y follows x at a distance of no more
 than w, yₖ = min(max(yₖ₋₁, xₖ − w), xₖ + w); the elementary hysteresis of Prandtl and Ishlinskii. Both have settled on the

@@ -1,4 +1,4 @@
-"""Least squares when the errors remember: white noise and a random walk, estimated from the same rows.
+"""Least squares with correlated errors: white noise and a random walk, estimated from the same rows.
 
 Rows that are means over equal steps have differences of white noise and a walk that remember one step: 1 + θ² on the diagonal of their
 covariance and −θ beside it, in units of the innovations, with θ = 1 for white noise and √3 − 2 for a walk alone. In levels of

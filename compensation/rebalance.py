@@ -32,7 +32,7 @@ ALIKE = 0.01
 
 @dataclass(frozen=True)
 class LoopRun:
-    """What the loops say, one value a row, each the mean over the row.
+    """Output of the loops, one value for each row, the mean over the row.
 
     `time` (s), `rate` (rad/s, indicated), `quadrature` (1/s, the force over 2ω and amplitude that holds the quadrature:
     ½ Δω sin 2n(θ − θ_ω); a stiffness κ counts alike), `decay` (1/s, the amplitude's drive, so 1/τ), `omega` (rad/s), `angle` (rad,
@@ -111,7 +111,7 @@ def simulate_rebalance(
 def settle_rebalance(
     wave: StandingWave, electronics: Electronics, rate: ArrayLike = 0.0, angle: ArrayLike = 0.0, turn: ArrayLike = 0.0
 ) -> LoopRun:
-    """Return what settled loops say, without noise, for any number of rows at once: exact in the electronics' errors.
+    """Return the output of settled loops, without noise, for any number of rows at once: exact in the electronics' errors.
 
     Integral control shows the pick-offs their command, C_p (P, S) = (1, 0) = C_p m; amplitude a, rate r, quadrature q and ν,
     how far the oscillator is from the mean frequency, are what that takes:
@@ -143,7 +143,7 @@ def settle_rebalance(
 
 
 def leak_quadrature(quadrature: ArrayLike, phase: ArrayLike, coupling: float = 1.0) -> Array:
-    """Rate (rad/s) that the quadrature's force shows in the rate's channel, ε q/(n k); the loop indicates its negative."""
+    """Rate error (rad/s) by which the quadrature force leaks into the rate channel, ε q/(n k); the loop indicates its negative."""
     return np.asarray(np.asarray(quadrature) * np.asarray(phase) / coupling)
 
 

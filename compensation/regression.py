@@ -1,4 +1,4 @@
-"""Linear least squares with everything that a calibration has to state beside its coefficients.
+"""Linear least squares with the statistics that a calibration states beside its coefficients.
 
 y = X b + ε, HRG paper eqs. (19), (20). Columns are shifted by their mean and scaled to unit length, the
 system is solved by Householder QR with column pivoting, and refined with

@@ -1,4 +1,4 @@
-"""Checks of sampled columns, so that no function here computes with a hole, a NaN or time that runs back."""
+"""Checks of sampled columns for missing values, NaN and time that does not increase."""
 
 from typing import Any
 

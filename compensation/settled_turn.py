@@ -1,4 +1,4 @@
-"""A wave that turns freely while its loops stay settled: whole angle over hours, without the loops' samples.
+"""Whole-angle wave over hours with settled loops, without simulating their samples.
 
 The measured azimuth θ obeys
 
@@ -36,7 +36,7 @@ def turn_settled(
     precession: ArrayLike = 0.0,
     angle: float = 0.0,
 ) -> LoopRun:
-    """Return what settled loops say of a wave that turns, without noise.
+    """Return the output of settled loops for a precessing wave, without noise.
 
     `rate` and `precession`, the commanded turn against the shell (rad/s), are linear between rows; `angle` is the true
     one at the start. Of the run `angle` is measured, unwrapped, and `rate` what is not commanded of the turn over k.
@@ -62,7 +62,7 @@ def read_turning(
     precession: ArrayLike | None = None,
     time: Array | None = None,
 ) -> LoopRun:
-    """Return what settled loops say of a wave that turns through measured azimuths, array (N,), rad.
+    """Return the output of settled loops for a wave at measured azimuths, array (N,), rad.
 
     Unless `precession` is given, it is what turns the wave through these azimuths over the `time`.
     """

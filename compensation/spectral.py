@@ -93,7 +93,7 @@ def factorise(even: ArrayLike) -> Array:
 
 
 def separate(numerator: Array, stable: Array, antistable: Array) -> Array:
-    """Return t of numerator / (stable · antistable) = t / stable + (what has only antistable poles).
+    """Return t of numerator / (stable · antistable) = t / stable + (a part with antistable poles only).
 
     t includes the constant part, so it has as many coefficients as `stable` (Wiener–Hopf separation of eq. (34)).
     """

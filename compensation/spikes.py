@@ -1,4 +1,4 @@
-"""Spikes: readings that their neighbours contradict."""
+"""Spikes: readings that disagree with their neighbours."""
 
 import numpy as np
 import scipy

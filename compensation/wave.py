@@ -1,4 +1,4 @@
-"""The standing wave of a shell between its two patterns: decay, detuning, precession, and what they do to a rate.
+"""The standing wave of a shell between its two patterns: decay, detuning, precession, and the rate errors that they cause.
 
     (Ẋ, Ẏ) = M (X, Y) + u,   M = n k Ω J − 1/τ − ½ Δ(1/τ) S(n θ_τ) + ½ i Δω S(n θ_ω),   S(α) = [[cos 2α, sin 2α], [sin 2α, −cos 2α]]
 
@@ -110,17 +110,17 @@ class StandingWave:
 
 
 def see_across(angle: ArrayLike, axis: ArrayLike, harmonic: int = 2) -> Array:
-    """Sin 2n(θ − θ_axis): what a wave at the azimuth θ (rad) meets of a split across itself, as rate or quadrature."""
+    """Sin 2n(θ − θ_axis): the effect of a split on the rate or quadrature of a wave at the azimuth θ (rad)."""
     return np.asarray(np.sin(2 * harmonic * (np.asarray(angle, dtype=float) - np.asarray(axis, dtype=float))))
 
 
 def see_along(angle: ArrayLike, axis: ArrayLike, harmonic: int = 2) -> Array:
-    """Cos 2n(θ − θ_axis): what it meets of a split along itself, as decay or frequency."""
+    """Cos 2n(θ − θ_axis): its effect on the decay or frequency of the wave."""
     return np.asarray(np.cos(2 * harmonic * (np.asarray(angle, dtype=float) - np.asarray(axis, dtype=float))))
 
 
 def feign_rate(across: ArrayLike, harmonic: int, bryan_factor: float) -> Array:
-    """Rate (rad/s) that a damping split across the wave, Δ(1/τ) sin 2n(θ − θ_τ) (1/s), feigns: its part 1/(2 n k)."""
+    """Rate (rad/s) error due to a damping split Δ(1/τ) sin 2n(θ − θ_τ) (1/s): 1/(2 n k) of it."""
     return np.asarray(across) / (2 * harmonic * bryan_factor)
 
 

@@ -1,4 +1,4 @@
-"""What a whole-angle run tells of its resonator and its electronics: damping and frequency splits with their axes, gains.
+"""Identification from a whole-angle run: damping and frequency splits with their axes, gains of the electronics.
 
 With x = 2 n θ of the turning wave, and to first order (`whole_angle`):
 
@@ -43,7 +43,7 @@ class WaveEstimate:
 
 @dataclass(frozen=True)
 class WaveFit:
-    """Estimates by name, and what could not be told, in sentences.
+    """Estimates by name, and sentences on what could not be determined.
 
     Names: `decay` 1/τ (1/s), `damping_split` Δ(1/τ) (1/s), `damping_axis` (rad), `frequency_split` (rad/s),
     `frequency_axis` (rad), `gain_ratio` δ, `skew` κ (rad), `phase_error` ε (rad), `rate` (rad/s, what is left of the rate).

@@ -1,4 +1,4 @@
-"""Whole angle: the wave turns freely, or at a commanded rate (self-precession), and its azimuth is the output.
+"""Whole angle: the wave precesses freely, or at a commanded rate (self-precession), and its azimuth is the output.
 
     ψ̇ = n k Ω + ½ Δ(1/τ) sin 2(ψ − ψ_τ) + Δω s cos 2(ψ − ψ_ω) + Re u/a,     ψ = n θ,
 
@@ -117,7 +117,7 @@ def simulate_whole_angle(
 
 
 def close_without_rate(wave: StandingWave, electronics: Electronics, loops: Loops) -> ClosedLoop:
-    """Return the loops of amplitude, phase and quadrature closed in the frame of a turning wave, errors of the electronics left out."""
+    """Return the loops of amplitude, phase and quadrature closed in the frame of a precessing wave, without errors of the electronics."""
     decay = float(np.mean(1 / np.asarray(wave.tau)))
     ideal = np.eye(2, dtype=complex)
     return ClosedLoop(np.asarray(-decay * ideal, dtype=complex), ideal, ideal, loops, electronics, turning=True)

@@ -134,7 +134,7 @@ def rayleigh_functions_without_factor(resonator: Resonator, pieces: Sequence[Pie
 
 
 def inextensional_functions(resonator: Resonator, pieces: Sequence[Piece]) -> list[Amplitudes]:
-    """Return the pattern n = 2 that really satisfies (17), (18) along this meridian, regular at the pole (m).
+    """Return the pattern n = 2 that satisfies (17), (18) along this meridian, regular at the pole (m).
 
     u′ = −κ w and v′ = (n u + v cos φ)/r with w = −(n v + u cos φ)/sin φ, integrated from the pole, where
     u = v ∝ sⁿ⁺¹; on a hemisphere this is HRG paper eq. (10).

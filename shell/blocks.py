@@ -93,7 +93,7 @@ class Support:
 
 
 def find_boundary(mesh: Mesh, solid: Solid, ties: tuple[Tie, ...]) -> Support:
-    """Where the vertices of a solid part lie."""
+    """Classify the vertices of a solid part: on the axis, held, tied or free."""
     size = float(np.ptp(mesh.points, axis=1).max())
     held = np.array([solid.held(float(r), float(z)) for r, z in mesh.points.T])
     heights = []  # η in [-1, 1] of points on each cross-section, NaN elsewhere

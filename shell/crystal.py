@@ -1,4 +1,4 @@
-r"""Crystals for a solver of isotropic bodies: the mean of all directions, and how far from it a crystal is.
+r"""Crystals for an isotropic solver: the mean over all directions, and its bounds.
 
 Equal strain in all directions gives Voigt's moduli from the stiffness C, equal stress Reuss's from the compliance S = C⁻¹:
 
@@ -129,11 +129,11 @@ def bounds_of(C: Array) -> tuple[tuple[float, float], tuple[float, float]]:
 
 
 def engineering(K: float, G: float) -> tuple[float, float]:
-    """E and ν of bulk and shear modulus."""
+    """E and ν from bulk and shear modulus."""
     return 9 * K * G / (3 * K + G), (3 * K - 2 * G) / (6 * K + 2 * G)
 
 
 def hill(C: Array) -> tuple[float, float]:
-    """E and ν of Hill's mean."""
+    """E and ν of the Voigt-Reuss-Hill mean."""
     (K_V, G_V), (K_R, G_R) = bounds_of(C)
     return engineering((K_V + K_R) / 2, (G_V + G_R) / 2)

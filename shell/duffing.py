@@ -1,4 +1,4 @@
-r"""A mode at large amplitude: how its frequency follows the square of the amplitude, by geometry (Duffing's coefficient).
+r"""A mode at large amplitude: geometric shift of its frequency with the square of the amplitude (Duffing's coefficient).
 
 With Green's strain the motion u = a φ cos ωt drives fields of the second order, of the waves 0 and 2n, constant and at 2ω,
 
@@ -44,7 +44,7 @@ class AmplitudeShift:
 
 
 def amplitude_shift(mode: Mode) -> AmplitudeShift:
-    """How the frequency of a standing wave follows its amplitude squared; warns of a mode of 0 or 2n near twice it."""
+    """Shift of the frequency of a standing wave with its squared amplitude; warns of a mode of 0 or 2n near twice the frequency."""
     solution = solved_as_solid(mode)
     if mode.harmonic < 2:
         raise ShellError("the effect of the amplitude is computed for harmonics from 2 up.")

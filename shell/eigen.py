@@ -138,7 +138,7 @@ class Factor:
 
 
 class Mass(Protocol):
-    """Whatever multiplies several columns by the mass matrix."""
+    """Anything that multiplies columns by the mass matrix."""
 
     def __matmul__(self, x: Array) -> Array: ...
 
@@ -167,7 +167,7 @@ class Pairs:
 
 
 class Iteration:
-    """Krylov subspaces of K⁻¹ M: block Lanczos, every block set apart from all before.
+    """Krylov subspaces of K⁻¹ M: block Lanczos with full orthogonalisation.
 
     Inverse iteration gains the ratio of two eigenvalues at a step; the best combination of its steps gains about
     exp(4 √(gap)) for the same work, which is what neighbouring modes of a thin shell ask for.

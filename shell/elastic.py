@@ -1,4 +1,4 @@
-"""Isotropic elastic constants at one temperature, constant or along the meridian: what the mechanics needs to know of a material."""
+"""Isotropic elastic constants at one temperature, constant or varying along the meridian."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

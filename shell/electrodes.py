@@ -1,4 +1,4 @@
-r"""Electrodes over a face of the shell: what their voltage does to a harmonic pair.
+r"""Electrodes over a face of the shell: electrostatic softening and split of a harmonic pair.
 
 An electrode at a gap g pulls with the energy -½ ε₀ V²/(g - w) per area, w the displacement of the face towards it. Its second
 derivative is a spring of negative stiffness, -ε₀ V²/g³ per area, which lowers the pair and, by its wave 2n, splits it:
@@ -234,7 +234,7 @@ def trim_voltages(electrodes: Electrodes, wave: complex, limit: float) -> Trim:
 
 
 def reach(electrodes: Electrodes, limit: float) -> float:
-    """The largest relative split that voltages up to a limit (V) null whatever its axis.
+    """The largest relative split that voltages up to a limit (V) can null at any axis.
 
     Splits that can be made are the sums of x_j z_j, 0 <= x_j <= V², a polygon around 0; this is its inscribed circle.
     """

@@ -1,4 +1,4 @@
-r"""Displacements that are not small: the quadratic part of Green's strain, for a wave around the axis.
+r"""Finite displacements: the quadratic part of Green's strain, for a wave around the axis.
 
 With E_ij = ½ (u_i,j + u_j,i + u_k,i u_k,j) = e + ½ q and the energy ½ ∫ E : C : E dV, three fields meet in
 

@@ -79,7 +79,7 @@ class Rest:
 
 @lru_cache(maxsize=64)
 def fit_profile(resonator: Resonator) -> tuple[Resonator, Rest | None]:
-    """The resonator that is solved, and what its thickness leaves out; few knots stay as they are."""
+    """Fit the thickness by polynomials; return the resonator to solve and the remaining deviation. A few knots are kept as they are."""
     position, value = np.array(resonator.thickness).T
     if type(resonator) is not Resonator or len(position) - 2 <= FEW:
         return resonator, None

@@ -43,7 +43,7 @@ def _motion(mode: Mode) -> tuple[Array, Array]:
 
 
 def likeness(one: Mode, other: Mode) -> float:
-    """MAC of two modes of one harmonic, 0 (other shapes) ... 1 (one shape)."""
+    """MAC of two modes of one harmonic, 0 (different shapes) ... 1 (same shape)."""
     (a, r_a), (b, r_b) = _motion(one), _motion(other)
     known = np.isfinite(r_a) & np.isfinite(r_b)
     a, b, w = a[:, known], b[:, known], np.sqrt(r_a[known] * r_b[known])
@@ -51,7 +51,7 @@ def likeness(one: Mode, other: Mode) -> float:
 
 
 def follow(solve: Callable[[float, int], Sequence[Mode]], known: Mode) -> Mode:
-    """The mode at the end of a way that has the shape of `known` at its start.
+    """Follow the mode `known` from one design to another by its shape.
 
     Where no mode at the end is like it, the way is halved, so that a shape that changes slowly is followed step by step.
     solve(place on the way 0 ... 1, count) gives the lowest modes there.

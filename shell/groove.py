@@ -1,4 +1,4 @@
-r"""The change of a pair's split by a real cut: the material that is gone, and the stress that its walls relieve beside it.
+r"""Change of a pair's split by a real cut: the removed material, and the stress relieved beside it.
 
 A cut takes the volume Ω off the mode u. Beside it the wall moves by v, which makes the new surface free of traction; tested
 with u, the equations of the cut body give (T = ∫ ρ u² dV, λ = ω²)
@@ -55,7 +55,7 @@ class Groove:
 
 @dataclass(frozen=True)
 class GrooveSplit:
-    """What one cut at the azimuth 0 does to a pair, relative to its frequency.
+    """Effect of one cut at the azimuth 0 on a pair, relative to its frequency.
 
     mass : removed, kg. layer : (f_cos - f_sin)/f by the material that is gone. relief : by the stress relieved beside it.
     error : standard error of their sum.

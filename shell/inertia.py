@@ -15,7 +15,7 @@ from shell.system import Group, SolidPart
 
 @dataclass(frozen=True)
 class MassProperties:
-    """What a body of revolution weighs."""
+    """Mass properties of a body of revolution."""
 
     volume: float  # m³
     mass: float  # kg

@@ -33,7 +33,7 @@ _SHIPPED = Path(__file__).with_name("materials.toml")
 
 @dataclass(frozen=True, eq=False)
 class Prior:
-    """What a law leaves open: coefficients of its deviation, jointly Gaussian about zero."""
+    """Uncertainty of a law: coefficients of its deviation, jointly Gaussian about zero."""
 
     # (k,) such as `shear_modulus.log_slope_per_K`; x counts from the material's reference temperature
     names: tuple[str, ...]

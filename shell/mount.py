@@ -1,4 +1,4 @@
-"""Thermal mismatch with the base: it stresses the resonator."""
+"""Thermal mismatch with the base, which stresses the resonator."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""The outline of a resonator's cross-section, with what a mode does there: the start of every picture and mesh.
+"""The outline of a resonator's cross-section, with the displacement of a mode: the basis of pictures and meshes.
 
 The outline is made of the free sides of the solver's own elements: the two faces of the shell, its ends, and the sides
 of the solid cells of roots and corners that no other element shares. So it is the real solid: shell with its thickness,

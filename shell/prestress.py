@@ -1,4 +1,4 @@
-r"""What static stresses of revolution do to the frequency of a mode: uneven temperature, thermal mismatch with the base, spin.
+r"""Frequency shift of a mode by axisymmetric static stress: temperature gradients, thermal mismatch with the base, spin.
 
 A static field u_0 changes the energy of the mode u by its stresses σ (geometric stiffness K_σ) and by its shape,
 
@@ -34,7 +34,7 @@ DONE = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Prestress:
-    """What expansion does to one mode through stress and shape; computed once, when it is asked for.
+    """Effect of thermal expansion on one mode through stress and shape; computed once, on demand.
 
     In shell theory, and for the harmonic 0, shares are those of the energies alone, and no base is known.
     """
@@ -73,7 +73,7 @@ class Prestress:
 
 
 def expansion_shares(mode: Mode) -> Array:
-    """What a growth β(s) of the material by warmth contributes to δ ln f = Σ share β, the base held as it was.
+    """Contributions of a thermal strain β(s) to δ ln f = Σ share β, the base unchanged.
 
     E, ν and ρ of the warm material come besides. Free resonators: the shares add up to ½.
     """

@@ -71,7 +71,7 @@ def rayleigh_frequency(
 
 
 def rayleigh_bryan_factor(n: int, phi_1: float = 0.0, phi_2: float = pi / 2) -> float:
-    """Return the Bryan factor: how far the standing wave lags behind the turning shell, per angle turned.
+    """Return the Bryan factor: the angle by which the standing wave lags behind the rotating shell, per angle of rotation.
 
     The Coriolis energy of the mode over its kinetic energy: K = N / J = 2 ∫ sin³φ tan²ⁿ(φ/2) dφ / J
     (`shell.derivation.coriolis`); 0.27699 for n = 2 on the hemisphere.
@@ -81,7 +81,7 @@ def rayleigh_bryan_factor(n: int, phi_1: float = 0.0, phi_2: float = pi / 2) -> 
 
 
 def rayleigh_log_derivatives(n: int, nu: float, phi_1: float = 0.0, phi_2: float = pi / 2) -> RayleighLogDerivatives:
-    """Return how the logarithm of the frequency (13) follows each of its arguments.
+    """Return the derivatives of the logarithm of the frequency (13).
 
     d ln f = ½ d ln E − ½ d ln ρ − dν/(2(1+ν)) + d ln h − 2 d ln R + ½ [i(φ₂)/I − j(φ₂)/J] dφ₂, where i and j
     are the integrands of I and J.

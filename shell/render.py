@@ -33,11 +33,11 @@ VIEWS = ("oblique", "axis", "side")
 
 
 class NoOpenGL(RuntimeError):
-    """The machine cannot draw; the message says how to mend it."""
+    """Pictures cannot be drawn on this machine; the message says what to install."""
 
 
 def render_png(scenes: Scene | Sequence[Scene], view: View = "oblique", width: int = 900, height: int = 700) -> bytes:
-    """Return a PNG: the mode at its largest swing, the undeformed shape as a ghost; several scenes stand side by side.
+    """Return a PNG: the mode at maximum displacement, with the undeformed shape in grey; several scenes stand side by side.
 
     All share one colour and one length scale; views: "oblique" into the open end, "axis" straight into it, or "side".
     """

@@ -1,4 +1,4 @@
-"""What one resonator in a picture is made of."""
+"""The parts of one resonator in a picture."""
 
 from dataclasses import dataclass, field
 
@@ -30,7 +30,7 @@ class Scene:
 
 
 def compose_scene(surface: Surface, values: Array, legend: str, title: str = "", axes: Array | None = None) -> Scene:
-    """Compose a picture of a mode: nodal meridians and antinodes marked, the swing exaggerated to a visible size."""
+    """Compose a picture of a mode: nodal meridians and antinodes marked, the displacement exaggerated to a visible size."""
     lines = surface.nodes
     nodes = np.full((len(lines), max(map(len, lines), default=0)), -1, dtype=np.int64)
     for k, line in enumerate(lines):

@@ -1,4 +1,4 @@
-"""The shape factor Φ(ν) = f/√(E/ρ) of one mode of one resonator: all that a frequency law needs the solver for."""
+"""The shape factor Φ(ν) = f/√(E/ρ) of one mode of one resonator: the part of a frequency law that needs the solver."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace

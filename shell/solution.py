@@ -1,4 +1,4 @@
-"""What one eigenvector says: strain and kinetic energy, precession, and where along the meridian they sit."""
+"""Results from one eigenvector: strain and kinetic energy, precession, and their distribution along the meridian."""
 
 from dataclasses import dataclass
 from functools import cached_property

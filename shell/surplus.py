@@ -1,4 +1,4 @@
-r"""How far a mode is from the exact one: what the functions that its level lacks would still change.
+r"""Error estimate of a mode, from the functions that its level lacks.
 
 The stresses of a mode u leave forces on the next functions w of every element,
 

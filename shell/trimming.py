@@ -1,4 +1,4 @@
-r"""Which masses to take off where, so that a split vanishes and the balance is kept.
+r"""Trimming plan: masses and places that null a split and preserve the balance.
 
 A mass μ_j taken off at the azimuth θ_j moves the wave of the split of harmonic n by μ_j w_n exp(2 i n θ_j), and the
 harmonics of the mass around by μ_j exp(i k θ_j). The least mass that nulls the splits z_n is a linear programme,
@@ -77,7 +77,7 @@ class SplitWave:
 
 @dataclass(frozen=True, eq=False)
 class Sites:
-    """Where material can be taken off."""
+    """Places where material can be removed."""
 
     azimuth: Array  # rad, (sites,)
     position: Array  # of the meridian, (sites,)
@@ -87,7 +87,7 @@ class Sites:
 
 @dataclass(frozen=True)
 class Cut:
-    """A mass (kg) to take off at an azimuth (rad) and position."""
+    """A mass (kg) to remove at an azimuth (rad) and position."""
 
     azimuth: float
     position: float

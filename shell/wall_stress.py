@@ -1,4 +1,4 @@
-"""Stress in the plane of the wall, where a mode bends it: what piezo elements on a face collect."""
+"""In-plane stress of the wall under a mode, which piezo elements on a face sense."""
 
 from dataclasses import dataclass
 from typing import Literal

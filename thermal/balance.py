@@ -1,4 +1,4 @@
-"""Does a transient conserve energy?"""
+"""Energy balance of a transient."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""What drives a network in time: boundaries, powers, the initial state; checked before every transient."""
+"""Inputs of a network over time: boundaries, powers, the initial state; checked before every transient."""
 
 from collections.abc import Mapping
 

@@ -26,7 +26,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Node:
-    """A lump of one temperature; `capacity` in J/K, a number or a callable of temperature (K), of arrays too."""
+    """A lumped mass at one temperature; `capacity` in J/K, a number or a callable of temperature (K), of arrays too."""
 
     name: str
     capacity: float | Callable[[Any], Any]
@@ -49,7 +49,7 @@ class Boundary:
 
 @dataclass(frozen=True)
 class Link:
-    """What lets heat from one end to the other."""
+    """A path for heat between two ends."""
 
     one: str
     other: str

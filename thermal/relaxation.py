@@ -1,4 +1,4 @@
-"""How a network relaxes: its time constants, their modes, and what each constant of the network does to them."""
+"""Relaxation of a network: time constants, modes, and their sensitivities to the constants of the network."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""How much of a chamber step is left after a time, and which conductance explains a settling that was observed."""
+"""Remaining share of a chamber step after a time, and the conductance that explains an observed settling."""
 
 from collections.abc import Callable
 

@@ -1,4 +1,4 @@
-"""Waveform relaxation: what radiation adds to a linear network is swept over the whole run until it stays the same.
+"""Waveform relaxation: the nonlinear part of radiation is iterated over the whole run until it converges.
 
 With L₀, C₀ of the network linearised at the mean temperature, C dT/dt = q − L T − σ R T⁴ is C₀ dT/dt = q − L₀ T + b(T),
 
@@ -30,7 +30,7 @@ MOST_CORNERS = 200  # of profiles whose every corner is a knot; a measured colum
 
 
 class SweepError(ThermalError):
-    """Radiation so strong that sweeps do not converge."""
+    """Radiation is too strong for the sweeps to converge."""
 
 
 @dataclass(frozen=True)

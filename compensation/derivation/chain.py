@@ -1,4 +1,4 @@
-"""The averaged dynamics as one chain of equations, from the oscillator of two patterns to what a rate does to the measured one.
+"""The averaged dynamics as one chain of equations, from the oscillator of two patterns to the measured rate.
 
 A row is a step: its number in the paper on demodulated dynamics (empty where it has none), its title, the left sides (names
 parted by spaces, or expressions) and the right sides; 0 says that the left sides vanish.

@@ -1,4 +1,4 @@
-"""The amplitude equations of the CVG paper on demodulated dynamics, eqs. (4)–(25), and that they are the averaged ones.
+"""The amplitude equations of the CVG paper on demodulated dynamics, eqs. (4)–(25), and their agreement with the averaged ones.
 
 The paper keeps the second derivative of the amplitudes; where they vary slowly, the leading order of its eqs. (7) is
 dX/dt, dY/dt of `averaging` with both axes of the anisotropies along the primary, less one term: the Coriolis force of

@@ -42,6 +42,6 @@ def stiffness() -> sp.Matrix:
 
 @cache
 def small_forces(position: sp.Matrix, velocity: sp.Matrix, force: sp.Matrix) -> sp.Matrix:
-    """Return g of q̈ + ω² q = g for a constant rate: all that damping, detuning, rotation and drive do."""
+    """Return g of q̈ + ω² q = g for a constant rate: damping, detuning, rotation and drive."""
     rotation = 2 * n * k * Omega * J * velocity
     return rotation - damping() * velocity - (stiffness() - omega**2 * sp.eye(2)) * position + force

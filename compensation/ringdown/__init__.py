@@ -1,1 +1,1 @@
-"""Ring-downs: frequencies, Q, axes of elasticity and of damping from the free decay of a resonator."""
+"""Ring-downs: frequencies, Q, axes of stiffness and of damping from the free decay of a resonator."""

@@ -1,4 +1,4 @@
-"""Ring-down of one resonator: the free part of a record, its decay, what of it is not linear, and the values with intervals."""
+"""Ring-down of one resonator: the free part of a record, its decay, nonlinear terms, and the values with intervals."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -36,7 +36,7 @@ class Estimate:
 
 @dataclass(frozen=True)
 class RingDown:
-    """What one decay says."""
+    """Results of one decay."""
 
     # mapping, `frequency_1_Hz` (the higher), `frequency_2_Hz`, `q_1`, `q_2`, `frequency_Hz`, `inverse_q`,
     # `decay_time_s`; of two channels `split_Hz`, `frequency_axis_deg`, `damping_split_per_s`, `damping_axis_deg`; where

@@ -1,4 +1,4 @@
-"""What many decays of one resonator say together: frequency and 1/Q over temperature, pressure, amplitude and time.
+"""Laws from many decays of one resonator: frequency and 1/Q over temperature, pressure, amplitude and time.
 
     ln f = c + α T + h a² (+ β t) (+ a step between sessions),      1/Q = 1/Q₀ + s p + q T + g a² (+ β t) (+ steps)
 

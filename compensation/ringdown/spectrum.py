@@ -26,7 +26,7 @@ NARROW = 3.0  # points within the width below which the analyser, not the resona
 
 @dataclass(frozen=True)
 class SpectrumFit:
-    """What a spectrum says: values by name as of a decay, the fitted powers, and what is not as it should be.
+    """Results of a spectrum: values by name as of a decay, the fitted powers, and remarks.
 
     `widening` is the root of the misfit of means of neighbouring points over what their scatter leaves of it.
     """

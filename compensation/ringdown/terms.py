@@ -1,4 +1,4 @@
-"""Terms of a decay: one mode or two, rates beyond the linear ones where they pay, and lines that are no decay."""
+"""Terms of a decay: one mode or two, nonlinear rates where they improve the fit, and lines that are interference."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""Whiteness of what a decay's fit leaves: how much wider the bound must be, lines in it, and a start that is not free decay."""
+"""Whiteness of the residual of a decay: how much wider the bound must be, lines in it, and a start that is not free decay."""
 
 from dataclasses import dataclass
 
@@ -14,7 +14,7 @@ RARE = 1e-3  # probability below which noise is not held for the reason
 
 @dataclass(frozen=True)
 class Leftover:
-    """What a residual (channels, rows) shows beside white noise."""
+    """Structure of a residual (channels, rows) besides white noise."""
 
     # √ of the largest ratio between the variance of block means and what white noise leaves of it, at least 1
     widening: float

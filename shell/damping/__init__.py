@@ -1,1 +1,1 @@
-"""Where a mode loses its energy: 1/Q as a sum of parts, each from the solved mode itself."""
+"""Loss of a mode: 1/Q as a sum of contributions, each computed from the solved mode."""

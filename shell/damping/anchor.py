@@ -1,4 +1,4 @@
-"""Anchor loss: what a mode sends down its stem into the body that the stem stands on."""
+"""Anchor loss: the energy that a mode radiates through its stem into the base."""
 
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -23,7 +23,7 @@ LAYER = 3  # cells across the absorbing layer
 
 
 def anchor_loss(mode: Mode, elastic: Elastic | VaryingElastic, base: Elastic | None = None) -> Radiating:
-    """The mode on its stem, no longer clamped but standing on an elastic half-space that takes its waves away.
+    """Solve the mode with its stem on an elastic half-space, which absorbs the waves, instead of a clamp.
 
     A mode with n >= 2 has neither force nor moment on the stem, and its motion dies out along it as exp(-1.8 z/a) or faster:
     what arrives is tiny. The harmonics 0 and 1 arrive as a force; an imperfect resonator has them too (`unbalance_loss`).
@@ -35,7 +35,7 @@ def anchor_loss(mode: Mode, elastic: Elastic | VaryingElastic, base: Elastic | N
 
 @dataclass(frozen=True)
 class Unbalance:
-    """What an unbalanced rim costs a mode with n = 2: α₁₁, α₃₃ and α₁₃ of 1/Q, per kg².
+    """Loss of a mode n = 2 by an unbalanced rim: α₁₁, α₃₃ and α₁₃ of 1/Q, per kg².
 
     With u_k = Σ m exp(ikθ) of masses on the rim (kg), k = 1 and 3, a pattern with an antinode at θ₀ loses
 
@@ -58,7 +58,7 @@ class Unbalance:
 
 
 def unbalance_loss(mode: Mode, elastic: Elastic | VaryingElastic, base: Elastic | None = None) -> Unbalance:
-    """Loss of a mode with n = 2 through its stem because the rim is heavier on one side.
+    """Loss of a mode n = 2 through its stem, due to an unbalanced rim.
 
     Masses that move with the mode push the motion of n = 1, which reaches the base: of a mass density with the wave k around,
     (K₁ - ω² M₁) v_k = ω² L_k with L_k = (1/2π)(w₂ w₁ ± v₂ v₁ + z₂ z₁) at the rim, + for k = 1 and - for k = 3, and

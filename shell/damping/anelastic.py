@@ -1,4 +1,4 @@
-"""Loss inside the material by processes that heat activates."""
+"""Loss inside the material by thermally activated processes."""
 
 import numpy as np
 from numpy.typing import ArrayLike

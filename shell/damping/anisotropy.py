@@ -1,4 +1,4 @@
-"""Damping that differs around the axis: what a film or surface that varies over θ does to the two patterns of a mode.
+"""Damping anisotropy of a mode pair, from films and surfaces that vary over θ.
 
 A part of the loss whose density goes as 1 + Σ a_k cos k(θ - θ_k) around meets the energies of a pattern at the azimuth θ₀: normal
 strains, u and w as cos² n(θ - θ₀), twist and v as sin². Only the wave k = 2n is felt, to first order in a:

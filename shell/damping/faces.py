@@ -1,4 +1,4 @@
-"""A mode with its material, and what it does at the free surfaces of its body: strains, stresses and motion at the faces, the edges and the root.
+"""A mode at the free surfaces of its body: strains, stresses and motion of the faces, the edges and the root.
 
 Areas are per π around the axis, as the solver's volumes are (`table.volume`), so that ratios to its energies need no factor.
 """
@@ -28,7 +28,7 @@ SIDES = ((None, -1.0), (None, 1.0), (-1.0, None), (1.0, None))  # (ξ, η) held 
 
 @dataclass(frozen=True, eq=False)
 class FreeFaces:
-    """A free surface of the body as a mode moves it: arrays over quadrature points."""
+    """The motion of a mode on a free surface: arrays over quadrature points."""
 
     kind: Kind  # inner or outer face of the shell, its free edges, the surface of roots, corners and stem
     position: Array  # of the meridian, 0 ... 1, (points,)
@@ -52,7 +52,7 @@ class FreeFaces:
 
 @dataclass(frozen=True, eq=False)
 class Vibration:
-    """A solved mode with its material, for the causes of loss to work on.
+    """A solved mode with its material, from which losses are computed.
 
     reference : temperature (K) at which it was solved. Over temperature its shape stays and ω follows √(E/ρ).
     """

@@ -1,4 +1,4 @@
-"""A thin film on the faces, a coating or electrodes: what it does to a frequency, its own loss, and the heat between it and the wall.
+"""A thin film on the faces (coating or electrodes): its frequency shift, its own loss, and the loss by heat flow to the wall.
 
 The film follows the strain of the face. Its stiffness in plane stress and its mass move the frequency, to first order in t/h, by
 
@@ -64,7 +64,7 @@ class Film:
 
 
 def check_film(film: Film, wall: float) -> None:
-    """Refuse a film that is not thin against the thinnest wall (m)."""
+    """Refuse a film that is not thin compared with the thinnest wall (m)."""
     if film.thickness >= wall:
         raise ShellError(
             f"the film ({mm(film.thickness)}) is thicker than the wall ({mm(wall)}): film thickness is in nm."
@@ -100,7 +100,7 @@ def film_internal_loss(film: Film, vibration: Vibration) -> float:
 
 
 def film_thermoelastic_loss(film: Film, vibration: Vibration, wall: Heat, temperature: float) -> float:
-    """1/Q of the heat that flows between film and wall (formula above), at a temperature (K)."""
+    """1/Q from heat flow between film and wall (formula above), at a temperature (K)."""
     if film.heat is None or film.thickness == 0:
         return 0.0
     inside, omega, gap = film.heat, float(vibration.omega(temperature)), 0.0
@@ -120,7 +120,7 @@ def exchange(thickness: float, film: Heat, wall: Heat, omega: float) -> float:
 
 
 def thickness_power(film: Film, wall: Heat, omega: float) -> float:
-    """Power of the thickness with which the heat's loss grows: 2 of a thin film, whose heat meets no resistance within."""
+    """Power of the film thickness in the thermoelastic loss: 2 for a film thin enough to be isothermal."""
     if film.heat is None:
         raise ShellError("a film without heat constants has no thermoelastic loss.")
     step = 1e-3

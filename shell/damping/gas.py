@@ -1,4 +1,4 @@
-"""Loss to the gas around the shell: molecules one by one at low pressure, a viscous layer at high pressure.
+"""Gas damping: free molecular at low pressure, a viscous layer at high pressure.
 
 A face that moves with velocity v loses Z v² per area, so 1/Q = ∫ Z |u|² dA / (ω ∫ ρ |u|² dV). Free molecules at rest
 give, per face and with the accommodation a of the wall,
@@ -72,7 +72,7 @@ def gas_loss(vibration: Vibration, gas: Gas, pressure: float, temperature: float
 def free_molecular_loss(
     vibration: Vibration, gas: Gas, pressure: float, temperature: float, accommodation: float
 ) -> float:
-    """1/Q to molecules that hit the faces one by one."""
+    """1/Q from free molecular damping."""
     normal = (1 - accommodation) * 2 * sqrt(2 / pi) + accommodation * (sqrt(2 / pi) + 0.5 * sqrt(pi / 2))
     along = accommodation / sqrt(2 * pi)
     hit = sum(
@@ -84,12 +84,12 @@ def free_molecular_loss(
 
 
 def free_impedance(pressure: ArrayLike, molar_mass: float, temperature: ArrayLike) -> Array:
-    """P √(M/(R T)), kg/(m² s): what free molecules take from a face per velocity, up to a number of the wall."""
+    """P √(M/(R T)), kg/(m² s): free molecular pressure per velocity of the face, up to a constant."""
     return np.asarray(np.asarray(pressure) * np.sqrt(molar_mass / (R * np.asarray(temperature, dtype=float))))
 
 
 def viscous_loss(vibration: Vibration, gas: Gas, pressure: float, temperature: float) -> float:
-    """1/Q to the viscous layer on the faces; the waves' own flow runs around as fast as the wall moves along its normal."""
+    """1/Q from the viscous layer on the faces; the gas flows around as fast as the wall moves along its normal."""
     omega = float(vibration.omega(temperature))
     density = pressure * gas.molar_mass / (R * temperature)
     resistance = sqrt(density * gas.viscosity_at(temperature) * omega / 2)
@@ -101,5 +101,5 @@ def viscous_loss(vibration: Vibration, gas: Gas, pressure: float, temperature: f
 
 
 def mean_free_path(gas: Gas, pressure: float, temperature: float) -> float:
-    """λ = (μ/p) √(π R T/(2 M)), m: how far molecules fly; below it a gap or a layer is no continuum."""
+    """λ = (μ/p) √(π R T/(2 M)), m: the mean free path; a smaller gap or layer is no continuum."""
     return float(gas.viscosity_at(temperature) / pressure * np.sqrt(pi * R * temperature / (2 * gas.molar_mass)))

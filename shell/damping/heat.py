@@ -22,7 +22,7 @@ from shell.system import SolidGroup
 
 @dataclass(frozen=True)
 class Heat:
-    """What a material does with heat: expansion α (1/K), capacity C = ρ c (J/(m³ K)), conductivity k (W/(m K))."""
+    """Thermal constants of a material: expansion α (1/K), capacity C = ρ c (J/(m³ K)), conductivity k (W/(m K))."""
 
     expansion: float
     capacity: float

@@ -1,4 +1,4 @@
-"""Waves that leave a body through its base: axisymmetric elasticity with an absorbing layer, at one harmonic n.
+"""Waves radiated through the base of a body: axisymmetric elasticity with an absorbing layer, at one harmonic n.
 
 In the layer the coordinates become complex, r̃ = r - i ∫ b dr and z̃ likewise (perfectly matched: nothing is reflected at its
 inner edge; Berenger 1994, for elastic waves Chew and Liu 1996, in axisymmetric elements Bindel and Govindjee 2005). Stiffness and

@@ -1,4 +1,4 @@
-"""Thermoelastic loss of a mode: what is squeezed warms up, and the heat flows away through the wall.
+"""Thermoelastic loss of a mode: compression warms the wall, and heat flows through it.
 
 The mode's mean stress tr σ warms the material against its surroundings by θ = -(α T/C) tr σ (C = ρ c). With the heat
 flowing by k, in one period,

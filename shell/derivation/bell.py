@@ -1,4 +1,4 @@
-"""The bell-shaped resonator: BVG paper eqs. (1)–(6) and (16)–(22), with what their copy has lost derived anew.
+"""The bell-shaped resonator: BVG paper eqs. (1)–(6) and (16)–(22), with illegible parts derived anew.
 
 The meridian's radii, the strains of a body in shell coordinates, the assumed pattern (19) and how far it is from
 stretching nothing, and the two-degree-of-freedom model (20), whose coefficients are ours (Galerkin by Lagrange's

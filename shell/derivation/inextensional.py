@@ -1,4 +1,4 @@
-"""The mode that stretches nothing: HRG paper eqs. (9)–(11), solved by separation, and its curvatures.
+"""The inextensional mode: HRG paper eqs. (9)–(11), solved by separation, and its curvatures.
 
 With u, w ∝ cos nθ and v ∝ sin nθ the three conditions (9) are ordinary differential equations in φ. W drops
 out, sum and difference of U and V decouple, each separates and is integrated in T = tan(φ/2).
@@ -112,7 +112,7 @@ def inextensional_displacement() -> Displacement:
 
 @cache
 def mode_deformation() -> Deformation:
-    """Return (8) of the mode (10) at its greatest swing: no strain, κ_φ = −κ_θ = k cos nθ, τ = −k sin nθ.
+    """Return (8) of the mode (10) at maximum displacement: no strain, κ_φ = −κ_θ = k cos nθ, τ = −k sin nθ.
 
     k = C n(n²−1) tanⁿ(φ/2) / (r² sin²φ).
     """

@@ -1,4 +1,4 @@
-"""What an imperfect resonator has more than the perfect one, as quadrature: its δK and δM times vectors."""
+"""The difference between the imperfect and the perfect resonator: products of δK and δM with vectors, by quadrature."""
 
 from collections.abc import Iterator, Sequence
 from math import pi

@@ -184,7 +184,7 @@ class Faded:
 
 
 def add(*fields: "Field | None") -> "Field | None":
-    """The sum of those that there are."""
+    """Sum of the fields that are given."""
     present = [one for one in fields if one is not None]
     if len(present) < 2:
         return present[0] if present else None

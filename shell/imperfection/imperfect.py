@@ -1,4 +1,4 @@
-"""What makes a resonator differ from the body of revolution that was designed."""
+"""Deviations of a resonator from the designed body of revolution."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
@@ -105,6 +105,6 @@ def teeth(count: int, width: float, height: float, azimuth: float = 0.0, errors:
 def holes(
     count: int, radius: float, wall: float, density: float, position: float, azimuth: float = 0.0
 ) -> tuple[PointMass, ...]:
-    """Round holes through the wall as masses taken away, ρ π a² h each; what they take off the stiffness is left out."""
+    """Round holes through the wall as masses taken away, ρ π a² h each; their effect on the stiffness is left out."""
     mass = -density * pi * radius**2 * wall
     return tuple(PointMass(mass, azimuth + 2 * pi * k / count, position) for k in range(count))

@@ -47,7 +47,7 @@ class Density:
 
 @dataclass(frozen=True, eq=False)
 class Pair:
-    """A solved mode n >= 1 as the pair that it is, with what every kind of imperfection does to it."""
+    """A solved mode n >= 1 as a degenerate pair, with the effect of every kind of imperfection."""
 
     mode: Mode
 

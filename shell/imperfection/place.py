@@ -1,4 +1,4 @@
-"""A mode at one place of its shell: strains and displacements on a cross-section."""
+"""A mode at one position of its shell: strains and displacements on a cross-section."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -37,7 +37,7 @@ class CrossSection:
 
 
 def fade(resonator: Resonator, system: System) -> Callable[[Array], Array] | None:
-    """What the departures of the faces are multiplied with along the meridian: 1, and 0 where a solid part or clamp holds.
+    """Factor of the departures of the faces along the meridian: 1, falling to 0 at a solid part or clamp.
 
     Solid roots, corners and clamps keep their shape; the faces of the shell join them smoothly over √(h R). None: nothing held.
     """

@@ -55,7 +55,7 @@ class Split:
 
 
 def find_split(pair: Pair, imperfection: Imperfection) -> Split:
-    """The split to first order in the imperfection: only its waves 0 and 2n are felt."""
+    """The split to first order in the imperfection: only its harmonics 0 and 2n act."""
     mean, z = 0.0, 0j
     n = pair.mode.harmonic
     inner, outer = imperfection.faces(pair.fade)

@@ -51,7 +51,7 @@ def find_departures(
 
 
 def depart_points(points: Array, resonator: Resonator, imperfection: Imperfection) -> Array:
-    """Points (count, 3) of a perfect solid where they lie in the imperfect one."""
+    """Move points (count, 3) of the perfect solid to their places in the imperfect one."""
     at = Projector(resonator).place(points)
     r = np.hypot(points[:, 0], points[:, 1])
     x = np.clip(at.position, 0.0, 1.0)

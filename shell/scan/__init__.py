@@ -1,1 +1,1 @@
-"""Measured points of the faces of a shell: aligned, turned into waves around with their errors, and into a split."""
+"""Measured points of the faces of a shell: alignment, circumferential harmonics with their errors, and the resulting split."""

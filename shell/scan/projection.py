@@ -1,4 +1,4 @@
-"""Where measured points lie on the shell: position along the meridian, azimuth, distance from the middle surface."""
+"""Projection of measured points onto the shell: position along the meridian, azimuth, distance from the middle surface."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-r"""Faces as sums of waves around, from scattered points with gaps and outliers.
+r"""Circumferential harmonics of faces, from scattered points with gaps and outliers.
 
     δ(x, θ) = Σ_m Σ_j (a_mj cos mθ + b_mj sin mθ) P_j(x),   m = 0 ... highest, P_j Legendre polynomials over the covered positions,
 
@@ -32,7 +32,7 @@ Points: TypeAlias = tuple[Array, Array, Array]  # position, azimuth and how far 
 
 @dataclass(frozen=True, eq=False)
 class Face:
-    """One face: how far it stands out of the material, as waves with their covariance."""
+    """One face: its deviation away from the material, as harmonics with their covariance."""
 
     side: int  # -1 inner, 1 outer
     waves: WaveBasis  # the basis, over the positions that the points cover
