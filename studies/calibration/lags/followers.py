@@ -1,8 +1,7 @@
-"""How a resonator may follow its housing: by lags, or through a network with named constants."""
+"""A resonator behind its housing: lags in series, part of whose heat is radiated."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
@@ -34,58 +33,6 @@ class Constant:
     def is_positive(self) -> bool:
         """Whether the constant is fitted in its logarithm."""
         return self.low > 0
-
-
-class Follower(Protocol):
-    """A model of the resonator's temperature behind the housing's."""
-
-    @property
-    def constants(self) -> tuple[Constant, ...]:
-        """The constants to be identified."""
-
-    @property
-    def states(self) -> int:
-        """Number of temperatures that are unknown at the start of a run."""
-
-    def follow(
-        self, constants: Mapping[str, float], departure: Array, time: Array, housing_temperature: Array
-    ) -> Array:
-        """Temperature of the resonator (K) at every row; `departure` (states,) is from the steady start, in K."""
-
-
-@dataclass(frozen=True)
-class Lags:
-    """T_r = Σ w_j T_j with Σ w_j = 1 and τ_j dT_j/dt = T_h − T_j: the modes of any linear network.
-
-    Constants: "time_constant_1" … (s) and, for the second lag and later ones, "weight_2" … . A negative weight is a
-    lag in series rather than in parallel.
-    """
-
-    constants: tuple[Constant, ...]
-
-    @property
-    def states(self) -> int:
-        """One for each lag."""
-        return sum(constant.name.startswith("time_constant") for constant in self.constants)
-
-    def follow(
-        self, constants: Mapping[str, float], departure: Array, time: Array, housing_temperature: Array
-    ) -> Array:
-        """Sum of the lags; `departure` j decays with lag j."""
-        T = np.zeros_like(time)
-        first_weight = 1.0 - sum(constants[f"weight_{j}"] for j in range(2, self.states + 1))
-        for j in range(1, self.states + 1):
-            tau = constants[f"time_constant_{j}"]
-            weight = first_weight if j == 1 else constants[f"weight_{j}"]
-            T += weight * lag(time, housing_temperature, tau) + departure[j - 1] * np.exp((time[0] - time) / tau)
-        return T
-
-
-def make_lags(*starts: float, shortest: float = 10.0, longest: float = 1e5) -> Lags:
-    """Lags with these starting time constants (s), all sharing the weight at first."""
-    taus = [Constant(f"time_constant_{j}", tau, shortest, longest) for j, tau in enumerate(starts, 1)]
-    weights = [Constant(f"weight_{j}", 1 / len(starts), -5.0, 5.0) for j in range(2, len(starts) + 1)]
-    return Lags((*taus, *weights))
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import scipy
 
-from studies.calibration.lags.followers import Follower, make_series
+from studies.calibration.lags.followers import LagSeries, make_series
 from studies.calibration.lags.housing_run import HousingRun, even_rows, row_step
 from studies.calibration.lags.least_squares import LagProblem, LagSolution, solve
 from studies.calibration.lags.wander import Wander, estimate_wander
@@ -80,7 +80,7 @@ class Identification:
 
 
 def identify(
-    runs: Sequence[HousingRun], follower: Follower, law: FrequencyPolynomial, confidence: float = 0.9
+    runs: Sequence[HousingRun], follower: LagSeries, law: FrequencyPolynomial, confidence: float = 0.9
 ) -> Identification:
     """Fit the follower's constants and the unknown coefficients of the law to one run or several."""
     if not runs:
@@ -121,20 +121,13 @@ def identify_lags(
     law: FrequencyPolynomial,
     most: int = 3,
     confidence: float = 0.9,
-    make: Callable[..., Follower] = make_series,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Identification:
-    """Identify as many lags as the record supports, each further one paid for by the information criterion.
-
-    Args:
-        make: From starting time constants (s) and the bounds `shortest` and `longest` to a follower: `make_series` for
-            lags in series with radiation, `make_lags` for lags side by side.
-        progress: Told in words what comes next.
-    """
+    """Identify as many lags as the record supports, each further one paid for by the information criterion."""
     best: Identification | None = None
     for count in range(1, most + 1):
         progress(f"{count} in series" if count > 1 else "one")
-        trial = identify(runs, _best_start(runs, law, count, make, best), law, confidence)
+        trial = identify(runs, _best_start(runs, law, count, best), law, confidence)
         if best is not None and trial.criterion > best.criterion - EVIDENCE:
             break
         best = trial
@@ -146,9 +139,8 @@ def _best_start(
     runs: Sequence[HousingRun],
     law: FrequencyPolynomial,
     count: int,
-    make: Callable[..., Follower],
     fewer: Identification | None,
-) -> Follower:
+) -> LagSeries:
     """Return the follower whose fit under white noise is closest: the lags found so far and one more."""
     if not runs:
         raise ThermalError("no run given; name at least one record.")
@@ -161,10 +153,10 @@ def _best_start(
         for name, estimate in (fewer.estimates.items() if fewer else ())
         if name.startswith("time_constant")
     ]
-    trials: list[tuple[float, Follower]] = []
+    trials: list[tuple[float, LagSeries]] = []
     for fraction in FRACTIONS:
         starts = [float(np.clip(tau, 1.01 * shortest, 0.99 * longest)) for tau in (*found, fraction * span)]
-        follower = make(*starts, shortest=shortest, longest=longest)
+        follower = make_series(*starts, shortest=shortest, longest=longest)
         problem = LagProblem(even, follower, law.reference_temperature, (law.slope, law.curvature, law.cubic))
         solution = solve(problem, problem.guess(), problem.first_noise())
         values = problem.constants(solution.parameters)
@@ -172,7 +164,7 @@ def _best_start(
             float(np.clip(values[f"time_constant_{j}"], *np.array([1.01, 0.99]) * [shortest, longest]))
             for j in range(1, count + 1)
         ]
-        trials.append((solution.cost, make(*fitted, shortest=shortest, longest=longest)))
+        trials.append((solution.cost, make_series(*fitted, shortest=shortest, longest=longest)))
     return min(trials, key=lambda trial: trial[0])[1]
 
 

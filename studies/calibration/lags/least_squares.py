@@ -9,7 +9,7 @@ import scipy
 from numpy.typing import NDArray
 
 from compensation.noise_regression import Runs, runs_between
-from studies.calibration.lags.followers import Follower
+from studies.calibration.lags.followers import LagSeries
 from studies.calibration.lags.housing_run import EvenRun
 from studies.calibration.lags.wander import Wander, whiten
 from thermal.errors import ThermalError
@@ -30,7 +30,7 @@ class LagProblem:
     """Parameters in order: follower's constants, free powers of the law, offset; then departures run by run."""
 
     runs: tuple[EvenRun, ...]
-    follower: Follower
+    follower: LagSeries
     reference_temperature: float
     coefficients: tuple[float | None, ...]
 
@@ -172,42 +172,27 @@ class LagSolution:
     noise: Wander
 
 
-def solve(problem: LagProblem, start: Array, noise: Wander, fixed: dict[int, float] | None = None) -> LagSolution:
-    """Minimise the whitened residuals with weak priors; `fixed` holds parameters by place."""
-    fixed = fixed or {}
-    free = np.array([k for k in range(problem.count) if k not in fixed])
+def solve(problem: LagProblem, start: Array, noise: Wander) -> LagSolution:
+    """Minimise the whitened residuals with weak priors."""
     low, high = _bounds(problem)
-    parameters = start.copy()
-    for k, value in fixed.items():
-        parameters[k] = value
     prior = _prior(problem)
 
-    def place(x: Array) -> Array:
-        full = parameters.copy()
-        full[free] = x
-        return full
-
     def residuals(x: Array) -> Array:
-        full = place(x)
-        white = whiten(problem.model(full) - problem.frequency, noise, problem.stretches)
-        return np.concatenate([white, prior @ full])
+        white = whiten(problem.model(x) - problem.frequency, noise, problem.stretches)
+        return np.concatenate([white, prior @ x])
 
     def slopes(x: Array) -> Array:
-        white = whiten(problem.slope(place(x)), noise, problem.stretches)
-        J: Array = np.vstack([white, prior])[:, free]
-        return J
+        return np.vstack([whiten(problem.slope(x), noise, problem.stretches), prior])
 
-    inside = np.clip(parameters[free], low[free] + 1e-9, high[free] - 1e-9)
+    inside = np.clip(start, low + 1e-9, high - 1e-9)
     result = scipy.optimize.least_squares(
-        residuals, inside, slopes, bounds=(low[free], high[free]), x_scale="jac", xtol=1e-7, ftol=1e-9, max_nfev=60
+        residuals, inside, slopes, bounds=(low, high), x_scale="jac", xtol=1e-7, ftol=1e-9, max_nfev=60
     )
     if not np.isfinite(result.cost):
         raise ThermalError("the fit of the thermal constants broke down; start it nearer or fix a constant.")
-    full = place(result.x)
-    covariance = np.zeros((problem.count, problem.count))
-    covariance[np.ix_(free, free)] = _invert(np.asarray(result.jac))
-    slope = problem.slope(full)
-    return LagSolution(full, covariance, problem.frequency - problem.model(full), slope, float(2 * result.cost), noise)
+    x, covariance = np.asarray(result.x), _invert(np.asarray(result.jac))
+    rest = problem.frequency - problem.model(x)
+    return LagSolution(x, covariance, rest, problem.slope(x), float(2 * result.cost), noise)
 
 
 def _prior(problem: LagProblem) -> Array:
