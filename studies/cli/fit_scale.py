@@ -55,14 +55,10 @@ def fit_scale(
     record at one temperature, first at rest and then at one rate (the paper: five minutes of rest, then +100 °/s), gives the
     rough null and scale (33); without it they are found from the record with several rates.
 
-    Parameters
-    ----------
-    cutoff : float
-        Cut-off frequency of the FIR filter in Hz; below half the output rate.
-    order : int
-        Order of the FIR filter; the paper uses 50.
-    no_filter : bool
-        Omit the FIR filter; the record may then have gaps.
+    Args:
+        cutoff: Cut-off frequency of the FIR filter in Hz; below half the output rate.
+        order: Order of the FIR filter; the paper uses 50.
+        no_filter: Omit the FIR filter; the record may then have gaps.
     """
     if len(data) < 3:
         raise InputError(

@@ -71,20 +71,14 @@ def loads(
 ) -> Result:
     """Show frequency shift, stress and displacement of a held resonator under loads, its sensitivity to 1 g, and Duffing's coefficient.
 
-    Parameters
-    ----------
-    along : float
-        Acceleration of the base along the axis, from the rim of a dome to its pole, in g; 1 g is a gyro that stands upright.
-    across : float
-        Acceleration of the base across the axis in g.
-    rotation : float
-        Rate of rotation about the axis in °/s.
-    pressure : float
-        Pressure of the gas around the resonator in kPa.
-    gradient : float
-        Temperature of the base less that of the free end in °C, falling evenly along the meridian.
-    strength : float
-        Strength in MPa that the largest stress is compared with.
+    Args:
+        along: Acceleration of the base along the axis, from the rim of a dome to its pole, in g; 1 g is a gyro that
+            stands upright.
+        across: Acceleration of the base across the axis in g.
+        rotation: Rate of rotation about the axis in °/s.
+        pressure: Pressure of the gas around the resonator in kPa.
+        gradient: Temperature of the base less that of the free end in °C, falling evenly along the meridian.
+        strength: Strength in MPa that the largest stress is compared with.
     """
     instrument, T = open_card(card, temperature)
     if harmonic < 2:

@@ -148,10 +148,9 @@ def read_decay(
 ) -> Decay:
     """Read one decay and analyse it.
 
-    Parameters
-    ----------
-    frequency : Hz, carrier of raw samples, reference of a lock-in, frequency of a trace; in place of the file's.
-    expected : Hz, what a card predicts; raw samples whose frequency is an alias of it are refused.
+    Args:
+        frequency: Hz, carrier of raw samples, reference of a lock-in, frequency of a trace; in place of the file's.
+        expected: Hz, what a card predicts; raw samples whose frequency is an alias of it are refused.
     """
     table, notes = _read(path)
     if frequency is not None:
