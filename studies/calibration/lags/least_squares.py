@@ -182,7 +182,7 @@ def solve(problem: LagProblem, start: Array, noise: Wander) -> LagSolution:
         return np.concatenate([white, prior @ x])
 
     def slopes(x: Array) -> Array:
-        return np.vstack([whiten(problem.slope(x), noise, problem.stretches), prior])
+        return np.asfortranarray(np.vstack([whiten(problem.slope(x), noise, problem.stretches), prior]))
 
     inside = np.clip(start, low + 1e-9, high - 1e-9)
     result = scipy.optimize.least_squares(
