@@ -166,8 +166,9 @@ def _remark(
             f"The first {start - first:.4g} s are not a free decay (drive, transient or release) and are left out."
         )
     said += [f"{SAID_OF[name]}." for name in beyond]
-    for line in lines:
-        said.append(f"Interference at {envelope.carrier + line:.6g} Hz is removed; find its source.")
+    if lines:
+        at = ", ".join(f"{envelope.carrier + line:.8g}" for line in lines)
+        said.append(f"Interference at {at} Hz is removed; find its source.")
     if envelope.clipped:
         said.append(
             f"{100 * envelope.clipped:.2g} % of the first samples are clipped: the early decay is distorted; lower the gain."

@@ -56,7 +56,7 @@ def import_records(paths: Sequence[str], import_map: LoadedMap) -> dict[str, Rec
     base = series[0]
     shifts = [shift_between(base, other) for other in series]
     grid = _lay_grid(base, import_map)
-    notes = [f"imported with {import_map.path}; every change is listed here"]
+    notes = [f"imported with {import_map.path}; all changes are listed here"]
     columns: dict[tuple[str, str], Array] = {}
     for number, (one, shift) in enumerate(zip(series, shifts, strict=True), 1):
         notes += [f"file {number}, {note}" for note in one.notes]
@@ -99,7 +99,7 @@ def import_table(path: str, import_map: LoadedMap) -> "tuple[dict[str, Array], t
     if not whole.any():
         raise InputError(f"{path}: no row has both {' and '.join(columns)}.")
     notes = [
-        f"imported with {import_map.path}; every change is listed here",
+        f"imported with {import_map.path}; all changes are listed here",
         f"{_name_files(table)}, {int(whole.sum())} of {len(whole)} rows",
         *empty,
         *(_describe(column, columns[column.target], moved=False) for column in file.columns),
@@ -293,7 +293,7 @@ def _describe(column: ColumnMap, values: "Array", moved: bool) -> str:
     same = unit.words == "x"
     steps.append(f"in {column.unit}" if same else f"{column.unit} to {column.target}: {unit.words}{stated}")
     if column.sign < 0:
-        steps.append("sign turned")
+        steps.append("sign reversed")
     if moved:
         steps.append(f"resampled: {column.resample}")
     empty = int(np.isnan(values).sum())

@@ -180,7 +180,7 @@ def infer(card: "Instrument", campaign: Campaign, progress: Report = lambda _: N
     shipped = plain.residuals(Kept(np.zeros(problem.count), ()))
     calibrated = plain.residuals(Kept(found.point, ()))
     bank = generic_bank(search)
-    progress("rows that the fit has not seen")
+    progress("held-out rows")
     outcome, held, rows = _confirmed(search, outcome, plain)
     progress("lack of fit")
     left = look(search, bank, outcome.plain, outcome.final, rows)

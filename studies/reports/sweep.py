@@ -200,9 +200,10 @@ def _shapes(results: Results) -> list[Part]:
     if np.isfinite(y).any() and any(name.startswith("resonator.") for name in study.names):
         designs[f"Minimum {column.label}"] = results.design(int(np.nanargmin(y)))
         designs[f"Maximum {column.label}"] = results.design(int(np.nanargmax(y)))
+    units = {parameter.name: parameter.unit for parameter in study.parameters}
     parts: list[Part] = []
     for title, design in designs.items():
-        words = ", ".join(f"{name} = {number(value)}" for name, value in design.items())
+        words = ", ".join(f"{figures.label(name, units[name])} = {number(value)}" for name, value in design.items())
         instrument = set_parameters(study.instrument, design, study.derived)
         parts.append(f"{title}: {words or 'as in the card'}.")
         parts.append(Blocks(lambda shown=instrument: mode_picture.mode_blocks(shown, (n,))))  # type: ignore[misc]

@@ -67,7 +67,7 @@ def _sobol(results: Results, column: Output) -> list[Part]:
     if found.variance == 0:
         return [Sentence(f"{column.label} is the same for every design: no parameter influences it.", "note")]
     names = ("first", "first_low", "first_high", "total", "total_low", "total_high")
-    rows = rows_of({"parameter": found.parameters, **row_of(found, *names)})
+    rows = rows_of({"parameter": [figures.label(p, "1") for p in found.parameters], **row_of(found, *names)})
     note = "A parameter whose total interval includes zero has no significant influence."
     table = Table(f"Sobol indices of {column.label}", rows, SOBOL, note, sortable=True)
     return [table, figures.sobol_figure(found, column)]
@@ -77,7 +77,7 @@ def _slopes(results: Results, column: Output) -> list[Part]:
     found = local_slopes(results, column.name)
     units = _slope_units(results, column)
     columns = (
-        PARAMETER,
+        Column(lambda slope: figures.label(slope.parameter, "1"), "Parameter"),
         SLOPE,
         Column("uncertainty", "±", form=".2g"),
         Column(lambda slope: units[slope.parameter], "Unit"),
@@ -96,7 +96,7 @@ def _shares(results: Results, column: Output) -> list[Part]:
         return []
     units = _slope_units(results, column)
     rows = rows_of({"parameter": found.parameters, **row_of(found, "slope", "half_width", "share")})
-    rows = [row | {"unit": units[row["parameter"]]} for row in rows]
+    rows = [row | {"parameter": figures.label(row["parameter"], "1"), "unit": units[row["parameter"]]} for row in rows]
     note = (
         f"A linear model explains {100 * found.r_squared:.2f} % of the variance. ± is half of the 90 % interval; a slope"
         " smaller than ± is not significant."

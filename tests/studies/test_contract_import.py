@@ -222,7 +222,7 @@ def test_sign_scale_and_offset(tmp_path):
     column = 'to = "bias_deg_per_h"\nunit = "deg/s"\nscale = 2.0\noffset = 1.0\nsign = -1'
     record = simple(tmp_path, ["0,0.5", "1,1"], column=column)
     assert record["bias_deg_per_h"].tolist() == [-7200.0, -10800.0]
-    assert any("sign turned" in note and "x × 2.0 + 1.0" in note for note in record.comments)
+    assert any("sign reversed" in note and "x × 2.0 + 1.0" in note for note in record.comments)
 
 
 def test_resampling_keeps_gaps_and_never_extrapolates():
