@@ -78,7 +78,7 @@ def test_page_is_self_contained_and_escapes(results, monkeypatch):
     page = render_result(study_result(hostile))
     assert "<script>alert" not in page
     assert "https://" not in page.split("<footer")[0]
-    for part in ("Influence of the parameters", "Tolerances", "Provenance", "sortable", "resonator.thickness_mm"):
+    for part in ("Influence of the parameters", "Tolerances", "Provenance", "sortable", "thickness (mm)"):
         assert part in page
 
 
