@@ -160,7 +160,8 @@ def _command_line(words: Sequence[str]) -> "App":
         suppress_keyboard_interrupt=False,
         default_parameter=Parameter(negative="", validator=refuse_unsound, show_default=spell_default),
     )
-    app.register_install_completion_command(help="Install completion for the shell in use (bash, zsh or fish).")
+    if not words or words[0] in ("--install-completion", "--help", "-h"):  # it takes a tenth of a short command to load
+        app.register_install_completion_command(help="Install completion for the shell in use (bash, zsh or fish).")
     groups: dict[str, App] = {}
     for place, (title, commands) in enumerate(CHAPTERS.items()):
         heading = Group(title, sort_key=place)
@@ -271,12 +272,15 @@ def describe_environment_error(error: BaseException) -> str:
     return f"{named}the system refuses ({error.strerror or error}); check permissions, path and disk space."
 
 
+DEFERRED = ("numpy.f2py", "numpy.testing", "pydoc")
+
+
 class _Deferred:
-    """Parts of NumPy that SciPy imports with all the rest and nothing here uses: loaded when first used, if ever (0.14 s)."""
+    """What SciPy imports with all the rest and nothing here uses: loaded when first used, if ever (0.15 s)."""
 
     @staticmethod
     def find_spec(name: str, path: Sequence[str] | None = None, target: object = None) -> ModuleSpec | None:
-        found = PathFinder.find_spec(name, path) if name in ("numpy.f2py", "numpy.testing") else None
+        found = PathFinder.find_spec(name, path) if name in DEFERRED else None
         if found and found.loader:
             found.loader = LazyLoader(found.loader)
         return found
