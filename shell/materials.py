@@ -224,7 +224,7 @@ class Material:
 
     def _lack(self, name: str) -> str:
         return (
-            f"material '{self.name}', law '{self.law}': no source states its {name.replace('_', ' ')};"
+            f"material '{self.name}', law '{self.law}': no source states its {spell([name])};"
             " give it in the card or in a material file of your own."
         )
 

@@ -238,7 +238,7 @@ def noise_table(study: BiasStudy) -> Table:
         Column(lambda row: _measured(row[1].noise.N * n_scale, row[1].noise.N_uncertainty * n_scale), "N", n_unit),
         Column(lambda row: _measured(row[1].noise.B, row[1].noise.B_uncertainty), "B", unit),
         Column(lambda row: _measured(row[1].noise.K * k_scale, row[1].noise.K_uncertainty * k_scale), "K", k_unit),
-        Column(lambda row: "{:.3g} ({:.3g} … {:.3g})".format(*row[1].allan.bias_instability), f"Minimum over {FLAT:.3f}, 90 %", unit),
+        Column(lambda row: "{:.3g} ({:.3g} … {:.3g})".format(*row[1].allan.bias_instability), f"Minimum / {FLAT:.3f}, 90 %", unit),
         Column("1.noise.misfit", "Misfit", form=".1f"),
     ]  # fmt: skip
     note = (
