@@ -416,7 +416,7 @@ def _check_keys(where: str, entry: Any, known: tuple[str, ...] | None, required:
 
 
 def spell(names: Sequence[str]) -> str:
-    """Names of properties as a list in words."""
+    """Return names as a list in words: "density, Poisson's ratio and expansion"."""
     words = [name.replace("youngs", "Young's").replace("poisson", "Poisson's").replace("_", " ") for name in names]
     return " and ".join([", ".join(words[:-1]), words[-1]] if words[1:] else words)
 

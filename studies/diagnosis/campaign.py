@@ -151,7 +151,7 @@ def load_campaign(records: Sequence[Record], reference_degC: float | None = None
     responses, skipped = _usable_responses(records, tables)
     offsets, timed = place_in_time(records)
     if not timed and len(records) > 1:
-        notes.append("not every record states its start; the records are treated as consecutive, with unknown gaps.")
+        notes.append("Not every record states its start; the records are treated as consecutive, with unknown gaps.")
     spans = [float(table["time_s"][-1] - table["time_s"][0]) for table in tables]
     sampling = max(float(np.median(np.diff(table["time_s"]))) if table["time_s"].size > 1 else 1.0 for table in tables)
     # whole rows to a bin: the mean of rows is then compared with the mean of the model at the same moments
@@ -196,11 +196,11 @@ def load_campaign(records: Sequence[Record], reference_degC: float | None = None
         for label, count in parts.items()
         if count > 1
     ]
-    for drive in ("amplitude_squared", "voltage_squared", "quadrature", "pattern_angle"):
-        if any(getattr(run.states, drive) is None for run in runs) and any(
-            getattr(run.states, drive) is not None for run in runs
-        ):
-            notes.append(f"{drive} is not in every record and was left out.")
+    drives = ("amplitude_squared", "voltage_squared", "quadrature", "pattern_angle")
+    columns = ("drive_amplitude_V", "electrode_bias_V", "quadrature_V", "pattern_angle_deg")
+    for drive, column in zip(drives, columns, strict=True):
+        if len({getattr(run.states, drive) is None for run in runs}) > 1:
+            notes.append(f"{column} is not in every record and was left out.")
             runs = [_without(run, drive) for run in runs]
     return Campaign(
         tuple(runs),

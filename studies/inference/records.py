@@ -73,7 +73,7 @@ def make_ready(given: Sequence[Record]) -> Campaign:
         raise InputError(f"{kept[0].path or 'record'}: a diagnosis needs frequency_Hz, bias_deg_per_h or inverse_q.")
     _, timed = place_in_time(kept)
     if not timed and len(kept) > 1:
-        notes.append("not every record states its start; the records are treated as consecutive, with unknown gaps.")
+        notes.append("Not every record states its start; the records are treated as consecutive, with unknown gaps.")
     for name in COMMAND_COLUMNS:
         there = [name in record and np.isfinite(record[name]).all() for record in kept]
         if any(there) and not all(there) and name != RATE:

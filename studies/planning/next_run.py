@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from shell.materials import spell
 from studies.diagnosis.constants import CONSTANTS
 from studies.effects import find_effect, library
 from studies.inference.inferred import Inferred
@@ -80,18 +81,18 @@ def _separate(
     sensors = sorted({find_effect(name).sensor for name in (*names, *exact)} - {""})
     more = f" Alternatively, without a run: {'; or '.join(sensors)}." if sensors else ""
     if exact:
-        more = f" No run can distinguish {term.effect.name} from {', '.join(exact)}: {term.effect.isolate}."
+        more = f" No run can distinguish {term.effect.name} from {spell(exact)}: {term.effect.isolate}."
     if len(rivals) > 1:
         scored = between(found, rivals, _candidates(found, chamber, [one for h in rivals for one in h.terms]))
         evidence, pair, best = max(scored, key=_worth)
         if evidence > SMALLEST:
-            begin = f"To distinguish {names[0]} from {' and '.join(names[1:])}, run"
+            begin = f"To distinguish {names[0]} from {spell(names[1:])}, run"
             repeat = max((e for e, _, p in scored if p.repeats), default=None)
             run = NextRun.of(best, expected_evidence=evidence, repeat_evidence=repeat, separates=pair)
             return f"{begin} {_told(best, evidence, scored)}.{more}", run
     if exact:
         return more.strip(), None
-    return f"To distinguish {names[0]} from {', '.join(names[1:])}: {term.effect.isolate}.{more}", None
+    return f"To distinguish {names[0]} from {spell(names[1:])}: {term.effect.isolate}.{more}", None
 
 
 def between(found: Inferred, rivals: Sequence[Hypothesis], runs: Sequence[Candidate]) -> list[Scored]:
@@ -136,7 +137,7 @@ def _sharpen(found: Inferred, chamber: Chamber) -> Advice:
     if not worth:
         return None, None
     narrows, best = min(worth, key=lambda one: np.log(one[0]) / one[1].hours)
-    names = " and ".join(dict.fromkeys(term.effect.name for term in model.terms))
+    names = spell(list(dict.fromkeys(term.effect.name for term in model.terms)))
     text = f"To know {names} better, run {best.name} ({best.hours:.2g} h): the interval of its size becomes {narrows:.2f} times as wide."
     return text, NextRun.of(best, narrows=narrows)
 

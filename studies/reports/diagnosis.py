@@ -167,8 +167,12 @@ def response_table(verdict: Verdict) -> Table:
 
 def remarks(verdict: Verdict) -> list[Sentence]:
     """Return remarks on responses, and the notes."""
-    found = [f"{NAMES[name]}: {one.remark}." for name, one in verdict.responses.items() if one.remark]
-    return [Sentence(f"{words[:1].upper()}{words[1:]}", "note") for words in (*found, *verdict.notes)]
+    found = [
+        f"{NAMES[name][:1].upper()}{NAMES[name][1:]}: {one.remark}."
+        for name, one in verdict.responses.items()
+        if one.remark
+    ]
+    return [Sentence(words, "note") for words in (*found, *verdict.notes)]
 
 
 def next_step(verdict: Verdict) -> list[Sentence]:

@@ -40,7 +40,7 @@ def _print(part: Part) -> None:
         case str() if part:
             print(printable(part))
         case Sentence() if part.where != "page":
-            print(printable(part.text))
+            print(printable(part.text).replace("`", '"'))  # words to copy
 
 
 def print_table(title: str, columns: Sequence[str], rows: Sequence[Sequence[object]], note: str = "") -> None:

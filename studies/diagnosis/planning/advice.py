@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
+from shell.materials import spell
 from studies.diagnosis.campaign import Campaign, longest_resolved
 from studies.diagnosis.model import Fit
 from studies.diagnosis.planning.next_run import (
@@ -52,7 +53,7 @@ def suggest_next(
         if len(near) > 1:
             scored = between_rivals(campaign, place, near, _clock_for(cause, clock), chamber)
             if scored and scored[0].evidence > SMALLEST:
-                return _told(scored, f"To confirm {cause.effect} against {' and '.join(near[1:])}, run")
+                return _told(scored, f"To confirm {cause.effect} against {spell(near[1:])}, run")
     return None, None
 
 
@@ -79,15 +80,15 @@ def _separate(
     names = [cause.effect, *(name for name in cause.equivalent if name not in exact)]
     sensors = {find_effect(name).sensor for name in cause.names} - {""}
     sensor = f" Alternatively, without a run: {'; or '.join(sorted(sensors))}." if sensors else ""
-    further = f"No run can distinguish {cause.effect} from {', '.join(exact)}: {effect.isolate}."
+    further = f"No run can distinguish {cause.effect} from {spell(exact)}: {effect.isolate}."
     if place is not None and len(names) > 1:
         scored = between_rivals(campaign, place, names, _clock_for(cause, clock), chamber)
         if scored and scored[0].evidence > SMALLEST:
-            text, run = _told(scored, f"To distinguish {cause.effect} from {' and '.join(names[1:])}, run")
+            text, run = _told(scored, f"To distinguish {cause.effect} from {spell(names[1:])}, run")
             return (f"{text} {further}" if exact else f"{text}{sensor}"), run
     if exact:
         return further, None
-    return f"To distinguish {cause.effect} from {', '.join(names[1:])}: {effect.isolate}.{sensor}", None
+    return f"To distinguish {cause.effect} from {spell(names[1:])}: {effect.isolate}.{sensor}", None
 
 
 def _detect(campaign: Campaign, models: Mapping[str, Fit], chamber: Chamber | None) -> Advice:
