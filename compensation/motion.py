@@ -85,12 +85,13 @@ def propagate_envelope(
     hh = h[:, None, None]
     resolved = hh * element.omega < 1
     exponents = hh * M + np.where(resolved, hh**3 / 12, 0.0) * (drift @ M - M @ drift)
-    kinds, kind = np.unique(exponents, axis=0, return_inverse=True)
-    steps = expm(kinds)
+    as_bytes = exponents.reshape(len(h), -1).view((np.void, exponents[0].nbytes)).ravel()
+    _, first, kind = np.unique(as_bytes, return_index=True, return_inverse=True)
+    steps = expm(exponents[first])
     y = np.empty((len(t), 5), dtype=complex)
     A1 = 0j if from_rest else element.primary_amplitude
     y[0] = [A1, 0, 1j * element.omega * A1, 0, 1]
-    for n, k in enumerate(kind.ravel()):
+    for n, k in enumerate(kind):
         y[n + 1] = steps[k] @ y[n]
     return Motion(t, y[:, 0], y[:, 1])
 

