@@ -36,14 +36,14 @@ def diagnose(
     Args:
         runs: Records (CSV with time_s), or one table with temperature_degC,frequency_Hz.
         card: The gyro's card. The records are compared with its simulation, calibrated within the card's uncertainties.
-        save: Save the extended model as a card (TOML): the card with what was found. Without --card it is a polynomial
-            law ([law]) beside which the records are diagnosed anew, so that causes may differ from those without
+        save: Save the extended model as a card (TOML): the card with the causes found. Without --card it is a card with a
+            polynomial law ([law]); the records are diagnosed again with it, and causes may differ from those without
             --save. Not saved, with exit status 2, if its calibration does not converge.
         plan: Chamber profiles of a planned campaign, as text or as files, one for each run: predict which effects the
             campaign can identify with the gyro of --card, and how small they may be. Further profiles may follow
             without --plan.
-        next_: Propose the next run: the profile that separates what is still confused, or else sharpens what was found,
-            per hour of chamber.
+        next_: Propose the next run: the profile that best separates the remaining candidates, or else narrows the
+            intervals of the causes found, per hour of chamber time.
         chamber: Limits of the chamber, such as "rate 3 range -40 85" (K/min, °C), for --plan and for the next run.
         device: A device of a fleet and its records, such as A=a1.csv,a2.csv; repeat it for each device of the same
             design. Shows what the devices have in common and which one differs.

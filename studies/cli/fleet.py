@@ -16,13 +16,13 @@ from studies.results import Result
 def fleet(folder: str, *, out: str, card: str | None = None, workers: Annotated[int, COUNT] = 1) -> Result:
     """Calibrate and diagnose all devices of a lot: common causes, odd devices and batches, control charts.
 
-    Run it again to go on, or after adding devices: only new or changed devices are computed.
+    Run it again to resume, or after adding devices: only new or changed devices are computed.
 
     Args:
         folder: Folder of the lot: a folder for each device, named by its serial number, with the device's records (CSV)
             and, if it has its own, its card (TOML). A file lot.csv with the columns serial, date, batch may stand
             beside them.
-        out: Folder for the answers: lot.html, lot.json, and a page and an answer for each device in devices/.
+        out: Folder for the results: lot.html, lot.json, and a page and a result for each device in devices/.
         card: The card of the design. Without it each device gets a polynomial card from its records.
         workers: Devices processed at the same time.
     """

@@ -47,9 +47,9 @@ def simulate(
             applied), or words in quotes with temperatures in °C, durations as 5h, 30min or 90s, and rates in K/min:
             "soak T DURATION", "step FROM TO DURATION", "ramp FROM TO RATE", "staircase FROM TO STEP HOLD", "cycle START
             FIRST SECOND RATE HOLD COUNT", joined by "then"; for example "step 20 -10 5h then ramp -10 40 1". Or a
-            record: its housing column, else its chamber column, is imposed on its own rows. The gyro starts settled at
-            the first temperature.
-        row: Time between rows in s; a record has its own rows.
+            record: its housing temperature, or else its chamber temperature, is imposed at its rows. The gyro starts
+            settled at the first temperature.
+        row: Time between rows in s; a record keeps its rows.
         noiseless: Leave out noise, sensor lag and rounding.
         boundary: Column of a record that is imposed: chamber or housing.
         spread: Show the standard deviation of every column due to the uncertainties of the card, without noise.

@@ -197,8 +197,7 @@ def load_campaign(records: Sequence[Record], reference_degC: float | None = None
         if count > 1
     ]
     drives = ("amplitude_squared", "voltage_squared", "quadrature", "pattern_angle")
-    columns = ("drive_amplitude_V", "electrode_bias_V", "quadrature_V", "pattern_angle_deg")
-    for drive, column in zip(drives, columns, strict=True):
+    for drive, column in zip(drives, COMMANDS, strict=True):
         if len({getattr(run.states, drive) is None for run in runs}) > 1:
             notes.append(f"{column} is not in every record and was left out.")
             runs = [_without(run, drive) for run in runs]
