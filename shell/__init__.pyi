@@ -4,7 +4,8 @@ from .elastic import Elastic
 from .errors import ShellError
 from .imperfection.split import find_split
 from .law import FrequencyLaw, build_law
-from .materials import Material, find_material
+from .material import Material
+from .materials import find_material
 from .meridian import bell, cylinder, hemisphere, meridian
 from .modes import Mode, solve_modes
 from .resonator import Resonator, Stem

@@ -25,7 +25,7 @@ from shell.constants import zero_Celsius
 from shell.elastic import Elastic
 from shell.errors import ShellError
 from shell.levels import Theory
-from shell.materials import Material
+from shell.material import Material
 from shell.modes import Mode, solve_modes
 from shell.mount import Mount
 from shell.prestress import Prestress

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from shell.materials import Material
+from shell.material import Material
 
 Array = NDArray[np.float64]
 

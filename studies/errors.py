@@ -1,12 +1,12 @@
 """The errors that a user can mend, by the exit status that they cause."""
 
-import difflib
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from compensation.errors import CompensationError
 from shell.errors import ShellError
+from shell.errors import nearest as nearest
 from thermal.errors import ThermalError
 
 
@@ -28,10 +28,3 @@ def naming(place: str | Path) -> Iterator[None]:
         yield
     except (ShellError, ThermalError, CompensationError) as error:
         raise InputError(f"{place}: {error}") from error
-
-
-def nearest(word: str, known: Iterable[str]) -> str:
-    """Return "; did you mean 'x'?" for the known word nearest to `word`, or the list of known words, those with `word` in them first."""
-    known = sorted(known, key=lambda one: (word.lower() not in one.lower(), one))
-    close = difflib.get_close_matches(word, known, n=1, cutoff=0.5)
-    return f"; did you mean '{close[0]}'?" if close else f"; known: {', '.join(known)}."

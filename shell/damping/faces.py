@@ -15,7 +15,7 @@ from shell.blocks import surface_sides
 from shell.cells import CellTable, Reference, tabulate_cells
 from shell.errors import ShellError
 from shell.kernel import StrainTable, shell_table
-from shell.materials import Material
+from shell.material import Material
 from shell.modes import Mode
 from shell.quadrature import Array, gauss, nodal
 from shell.resonator import Resonator

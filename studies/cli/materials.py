@@ -7,7 +7,8 @@ import numpy as np
 
 from shell.constants import zero_Celsius
 from shell.errors import ShellError
-from shell.materials import Material, Prior, read_materials, spell
+from shell.material import Material, Prior, spell
+from shell.materials import read_materials
 from shell.property import PROPERTIES
 from studies.cli.arguments import Card, Harmonic
 from studies.cli.output import answers

@@ -24,7 +24,7 @@ from studies.schema.reader import read_keys, read_toml
 
 if TYPE_CHECKING:
     from shell.elastic import Elastic
-    from shell.materials import Material
+    from shell.material import Material
     from shell.resonator import Resonator
     from studies.instrument.tables.bias import Bias
     from studies.instrument.tables.effect import EffectEntry

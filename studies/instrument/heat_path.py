@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from shell.materials import Material
+    from shell.material import Material
     from shell.resonator import Resonator
     from studies.instrument.tables.thermal import Thermal
     from thermal.meridian import MeridianCells

@@ -9,7 +9,7 @@ from studies.instrument.uncertain import UncertainValue
 from studies.instrument.units import unit_of
 
 if TYPE_CHECKING:
-    from shell.materials import Material
+    from shell.material import Material
     from studies.instrument.tables.thermal import Thermal
 
 LAW = "material.deviation."

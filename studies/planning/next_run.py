@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from shell.materials import spell
+from shell.material import spell
 from studies.diagnosis.constants import CONSTANTS
 from studies.effects import find_effect, library
 from studies.inference.inferred import Inferred

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from shell.constants import zero_Celsius
-from shell.materials import spell
+from shell.material import spell
 from studies.calibration.calibrate import Calibration
 from studies.calibration.observed import HOUSING, QUADRATURE, SETTLED, WORDS
 from studies.instrument.display import display_name

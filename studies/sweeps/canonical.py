@@ -6,7 +6,7 @@ from hashlib import blake2b
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from shell.materials import Material
+    from shell.material import Material
 
 PHYSICS_VERSION = "2"
 """Changes only when a computed result may change; results of another version are never mixed with these."""

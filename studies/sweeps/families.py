@@ -24,7 +24,7 @@ from studies.sweeps.quantities.tcf import PARTS, STEEPEST
 from studies.sweeps.quantity import ModeQuantity, Quantity
 
 if TYPE_CHECKING:
-    from shell.materials import Material
+    from shell.material import Material
     from shell.resonator import Resonator
     from studies.sweeps.definition import Study
     from studies.sweeps.design import Design

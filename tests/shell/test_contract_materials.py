@@ -6,7 +6,8 @@ from scipy.constants import zero_Celsius
 
 from shell.crystal import Crystal, bounds_of
 from shell.errors import ShellError
-from shell.materials import ELASTIC, PROPERTIES, constant_material, find_material, read_materials
+from shell.material import ELASTIC, constant_material
+from shell.materials import PROPERTIES, find_material, read_materials
 
 LAWS = [law for laws in read_materials().values() for law in laws.values()]
 

@@ -25,7 +25,8 @@ from shell.damping.heat import Heat
 from shell.damping.thermoelastic import heat_flow, trace_share
 from shell.elastic import Elastic
 from shell.errors import ShellError
-from shell.materials import Material, constant_material, find_material
+from shell.material import Material, constant_material
+from shell.materials import find_material
 from shell.meridian import hemisphere
 from shell.modes import Mode, solve_modes
 from shell.resonator import Resonator

@@ -13,7 +13,7 @@ from shell.damping.film import Film, film_energies, thickness_power
 from shell.damping.heat import Heat
 from shell.elastic import Elastic
 from shell.errors import ShellError
-from shell.materials import constant_material
+from shell.material import constant_material
 from shell.meridian import hemisphere
 from shell.modes import Mode, solve_modes
 from shell.resonator import Resonator

@@ -6,7 +6,8 @@ import pytest
 from shell import law as law_module
 from shell.errors import ShellError
 from shell.law import build_law
-from shell.materials import constant_material, find_material
+from shell.material import constant_material
+from shell.materials import find_material
 from shell.meridian import hemisphere
 from shell.modes import solve_modes
 

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from shell.materials import spell
+from shell.material import spell
 from studies.diagnosis.campaign import Campaign, longest_resolved
 from studies.diagnosis.model import Fit
 from studies.diagnosis.planning.next_run import (

@@ -14,7 +14,7 @@ from studies.schema.keys import Keys, Note, number, says
 
 if TYPE_CHECKING:
     from shell.cubic import Cubic
-    from shell.materials import Material
+    from shell.material import Material
 
 STIFFEST = 2000.0  # GPa
 LIGHTEST, HEAVIEST = 30.0, 30000.0  # kg/m³
@@ -137,7 +137,8 @@ class MaterialKeys(Keys, frozen=True, kw_only=True):
 
 def build_material(keys: MaterialKeys, place: CardPlace) -> "Material":
     """Find the law, with the given values at the reference temperature."""
-    from shell.materials import constant_material, find_material, read_materials
+    from shell.material import constant_material
+    from shell.materials import find_material, read_materials
 
     own = None if keys.file is None else place.folder / keys.file
     with naming(place.where):
