@@ -114,7 +114,7 @@ def _stand(mode: Mode, elastic: Elastic | VaryingElastic, base: Elastic | None, 
     bases = [
         np.array([part == "base" for part in group.place.mesh.parts])
         if isinstance(group, SolidGroup)
-        else np.zeros(0, dtype=bool)
+        else np.zeros(len(group.unknowns), dtype=bool)
         for group in system.groups
     ]
     return system, assemble_waves(system, (elastic, base), bases, layer)

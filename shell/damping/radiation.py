@@ -60,37 +60,60 @@ class Radiating:
 
 @dataclass(frozen=True, eq=False)
 class RadiatingBody:
-    """Complex stiffness and mass of body and base on free unknowns, and the body's part of the mass."""
+    """Complex stiffness and mass of the elements of every group of a body and its base, and which of them belong to the base."""
 
-    stiffness: "scipy.sparse.csc_matrix"
-    mass: "scipy.sparse.csc_matrix"
-    body: "scipy.sparse.csc_matrix"
+    system: System
+    stiffness: list[Complex]
+    mass: list[Complex]
+    bases: Sequence[Mask]
 
     def factor(self, shift: complex) -> Callable[[Complex], Complex]:
         """The solution of (K - shift M) x = b as a function of b."""
-        return factor_symmetric(self.stiffness - shift * self.mass, 1e-3)
+        elements = (one for K, M in zip(self.stiffness, self.mass, strict=True) for one in K - shift * M)
+        maps = self.system.maps
+        free = [at.restrict(one) for at, one in zip(maps, elements, strict=True)]
+        size = self.system.constraint.shape[1]
+        return factor_symmetric(assemble_elements([at.free for at in maps], free, size), 1e-3)
+
+    def local(self, v: Complex) -> list[Complex]:
+        """A vector on the unknowns of the elements of every group."""
+        raw = self.system.constraint @ v
+        return [np.asarray(raw[group.unknowns], dtype=complex) for group in self.system.groups]
+
+    def times(self, elements: list[Complex], v: Complex) -> Complex:
+        """The product of the matrix of these elements with a vector."""
+        raw = np.zeros(self.system.constraint.shape[0], dtype=complex)
+        for group, own, x in zip(self.system.groups, elements, self.local(v), strict=True):
+            np.add.at(raw, group.unknowns, (own @ x[..., None])[..., 0])
+        return np.asarray(self.system.constraint.T @ raw)
 
     def judge(self, v: Complex, eigenvalue: complex) -> Radiating:
         """Frequency and loss of an eigenvector."""
-        k_r, k_i, m_r, m_i, body = (
-            float(np.real(np.conj(v) @ (A @ v)))
-            for A in (self.stiffness.real, self.stiffness.imag, self.mass.real, self.mass.imag, self.body.real)
-        )
-        inverse_q = (k_i * m_r - k_r * m_i) / (k_r * m_r + k_i * m_i)
-        return Radiating(float(np.sqrt(eigenvalue.real) / (2 * np.pi)), inverse_q, body / m_r)
+        k_r, k_i, m_r, m_i = np.zeros(4)
+        body = 0.0
+        for K, M, base, x in zip(self.stiffness, self.mass, self.bases, self.local(v), strict=True):
+            forms = (
+                np.real(np.sum(x.conj() * (A @ x[..., None])[..., 0], axis=1)) for A in (K.real, K.imag, M.real, M.imag)
+            )
+            stiff, lossy, heavy, absorbed = forms
+            k_r, k_i, m_r, m_i = k_r + stiff.sum(), k_i + lossy.sum(), m_r + heavy.sum(), m_i + absorbed.sum()
+            body += float(heavy[~base].sum())
+        inverse_q = float((k_i * m_r - k_r * m_i) / (k_r * m_r + k_i * m_i))
+        return Radiating(float(np.sqrt(eigenvalue.real) / (2 * np.pi)), inverse_q, body / float(m_r))
 
 
 def radiating_mode(waves: RadiatingBody, frequency: float) -> Radiating:
     """The mode nearest to a frequency (Hz) that moves the body."""
     shift = complex((2 * np.pi * frequency) ** 2)
-    start = np.random.default_rng(0).standard_normal(waves.body.shape[0])
-    v: Complex = np.asarray(waves.body @ start, dtype=complex)
+    start = np.random.default_rng(0).standard_normal(waves.system.constraint.shape[1]).astype(complex)
+    body = [np.where(base[:, None, None], 0.0, M) for base, M in zip(waves.bases, waves.mass, strict=True)]
+    v = waves.times(body, start)
     for _ in range(SHIFTS):
         solve, before = waves.factor(shift), shift
         for _ in range(ITERATIONS):
-            v = solve(np.asarray(waves.mass @ (v / np.max(abs(v))), dtype=complex))
-            now = complex((v @ (waves.stiffness @ v)) / (v @ (waves.mass @ v)))
-            if abs(now - before) < 1e-12 * abs(now):
+            v = solve(waves.times(waves.mass, v / np.max(abs(v))))
+            now = complex((v @ waves.times(waves.stiffness, v)) / (v @ waves.times(waves.mass, v)))
+            if abs(now - before) < 1e-11 * abs(now):
                 found = waves.judge(v, now)
                 if found.body > 0.5:
                     return found
@@ -103,32 +126,31 @@ def radiating_mode(waves: RadiatingBody, frequency: float) -> Radiating:
 
 
 def assemble_waves(system: System, materials: Sequence[Elastic], bases: Sequence[Mask], layer: Layer) -> RadiatingBody:
-    """Stiffness and mass of body and base; `bases` says of every group which of its cells belong to the base."""
-    P, size = system.constraint.astype(complex), system.constraint.shape[0]
-    total: list[scipy.sparse.csc_matrix] = [scipy.sparse.csc_matrix((size, size), dtype=complex) for _ in range(3)]
-    for group, base in zip(system.groups, bases, strict=True):
-        for k, elements in enumerate(_matrices(group, materials, base, layer, system.n)):
-            total[k] = total[k] + assemble_elements(group.unknowns, elements, size)
-    return RadiatingBody(*(scipy.sparse.csc_matrix(P.T @ one @ P) for one in total))
+    """Stiffness and mass of body and base; `bases` says of every group which of its elements belong to the base."""
+    found = [
+        _matrices(group, materials, base, layer, system.n) for group, base in zip(system.groups, bases, strict=True)
+    ]
+    return RadiatingBody(system, [K for K, _ in found], [M for _, M in found], bases)
 
 
 def _matrices(
     group: ShellGroup | SolidGroup, materials: Sequence[Elastic], base: Mask, layer: Layer, n: int
-) -> tuple[Complex, Complex, Complex]:
-    """Stiffness, mass, and the body's mass of every element."""
+) -> tuple[Complex, Complex]:
+    """Stiffness and mass of every element."""
     if isinstance(group, ShellGroup):
         body = materials[0]
         lam, G = lame(np.array(body.E), np.array(body.nu), group.table.plane_stress)
         trace, sheared, mass = group.units
-        K, M = (lam * trace + G * sheared).astype(complex), (body.rho * mass).astype(complex)
-        return K, M, M
+        return (lam * trace + G * sheared).astype(complex), (body.rho * mass).astype(complex)
     E, nu, rho = (np.where(base, getattr(materials[1], x), getattr(materials[0], x)) for x in ("E", "nu", "rho"))
     lam, G = lame(E, nu, False)
     products = _products(group, base, layer)
-    real, imaginary = np.asarray(products.real, dtype=float), np.asarray(products.imag, dtype=float)
-    K = cell_stiffness(real, lam, G, n) + 1j * cell_stiffness(imaginary, lam, G, n)
-    M = rho[:, None, None] * (cell_mass(real) + 1j * cell_mass(imaginary))
-    return np.asarray(K, dtype=complex), np.asarray(M, dtype=complex), np.where(base[:, None, None], 0.0, M)
+    absorbs = np.flatnonzero(products.imag.any(axis=(1, 2)))
+    real, imaginary = np.ascontiguousarray(products.real), np.ascontiguousarray(products.imag[absorbs])
+    K, M = cell_stiffness(real, lam, G, n).astype(complex), cell_mass(real).astype(complex)
+    K[absorbs] += 1j * cell_stiffness(imaginary, lam[absorbs], G[absorbs], n)
+    M[absorbs] += 1j * cell_mass(imaginary)
+    return K, rho[:, None, None] * M
 
 
 def _products(group: SolidGroup, base: Mask, layer: Layer) -> Complex:

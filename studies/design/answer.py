@@ -66,10 +66,6 @@ class Answer:
     evaluations: int
     failures: tuple[tuple[Array, str], ...] = field(default=())
 
-    def named(self, design: Array) -> dict[str, float]:
-        """Return a design by the names of its parameters."""
-        return dict(zip(self.task.study.names, design.tolist(), strict=True))
-
     def place(self, column: str) -> int:
         """Return where a column stands."""
         return self.task.columns.index(column)
@@ -107,7 +103,7 @@ def answer(task: Task, explorer: Explorer, plan: WorkPlan) -> Answer:
     )
     spreads = spread_about(search, best) if task.keys.tolerance else ()
     design = np.round(search.low + centre * search.width, 12)
-    row = evaluate_case(plan, dict(zip(task.study.names, design.tolist(), strict=True)))
+    row = evaluate_case(plan, task.named(design))
     merits = [(search.goals.violation(v, search.margins), scalar(search.goals.objectives(v))) for v in search.values]
     return Answer(
         task,

@@ -36,7 +36,7 @@ def optimise(
     """
     task = read_task(source)
     study = task.study
-    plan = replace(WorkPlan.of(study), start=dict(zip(study.names, task.start.tolist(), strict=True)))
+    plan = replace(WorkPlan.of(study), start=task.named(task.start))
     store = memory_store() if out is None else claim_store(out)
     count = workers or cores()
     crew = Here() if count == 1 else Pool(count)
@@ -63,7 +63,7 @@ def optimise(
 def best_instrument(found: Answer) -> Instrument:
     """Return the instrument of the best design, under the task's name."""
     study = found.task.study
-    instrument = set_parameters(study.instrument, found.named(found.best), study.derived)
+    instrument = set_parameters(study.instrument, found.task.named(found.best), study.derived)
     return replace(instrument, name=f"{found.task.name}, best design")
 
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -15,13 +16,15 @@ from studies.instrument.card import load_card
 from studies.schema.reader import read_keys, read_toml
 from studies.sweeps.definition import Study
 from studies.sweeps.keys import Requirement
-from studies.sweeps.parameters import find_nominal
+from studies.sweeps.parameters import find_nominal, set_parameters
 from studies.sweeps.quantities import library
+from studies.sweeps.quantities.split_per_wave import SURFACES
 from studies.sweeps.spec import check_study
 
 Array = NDArray[np.float64]
 MOST_HARMONIC = 12  # up to which a column finds its quantity
-NEIGHBOURS: dict[str, Any] = {"name": "mode-separation", "distances": True, "each": 3}
+# a limit of the distance needs no neighbour's frequency to better than the solver finds it at once
+NEIGHBOURS: dict[str, Any] = {"name": "mode-separation", "distances": True, "each": 3, "tolerance": 1e-4}
 
 
 @dataclass(frozen=True)
@@ -44,6 +47,10 @@ class Task:
     def wanted(self) -> list[str]:
         """The columns of objectives and constraints, each once."""
         return list(dict.fromkeys(goal.column for goal in _goals(self.keys)))
+
+    def named(self, design: Array) -> dict[str, float]:
+        """A design by the names of its parameters."""
+        return dict(zip(self.study.names, design.tolist(), strict=True))
 
     def unit(self, column: str) -> str:
         """The unit of a column, as people read it; nothing where it is 1."""
@@ -97,6 +104,7 @@ def read_task(source: str | Path) -> Task:
     task = Task(keys, keys.name or path.stem, study, len(free), np.array(start))
     for goal in _goals(keys):
         _check_magnitude(goal, where)
+    _check_bounds(task, where)
     return task
 
 
@@ -129,6 +137,26 @@ def _check_magnitude(goal: Objective | Requirement, where: str) -> None:
         raise InputError(f"{where}: '{goal.column}' takes goal = 'greatest', or a constraint with low alone.")
 
 
+def _check_bounds(task: Task, where: str) -> None:
+    """Refuse a bound at which no resonator can be built: not with the first design's other values, nor with all at one end."""
+    start, free = task.named(task.start), task.keys.parameter
+    others = [start, *({**start, **{one.name: getattr(one, end) for one in free}} for end in ("low", "high"))]
+    for number, one in enumerate(free, 1):
+        for end in ("low", "high"):
+            reasons = []
+            for other in others:
+                try:
+                    set_parameters(task.study.instrument, {**other, one.name: getattr(one, end)}, task.study.derived)
+                    break
+                except InputError as error:
+                    reasons.append(str(error))
+            else:
+                raise InputError(
+                    f"{where} [[parameter]] number {number}: {end} = {getattr(one, end):g} of '{one.name}' allows no resonator"
+                    f" ({reasons[0].rstrip('.')}); narrow the bounds, or tie lengths with [[derived]]."
+                )
+
+
 def _quantities(keys: DesignKeys, content: Mapping[str, Any], where: str) -> Iterator[dict[str, Any]]:
     """Yield the tables of all quantities: those of the file, and for columns that these do not give those found by name."""
     known: dict[str, dict[str, Any]] = {}
@@ -158,9 +186,13 @@ def _by_column() -> dict[str, dict[str, Any]]:
         if name == "python":
             continue
         base: dict[str, Any] = NEIGHBOURS if name == "mode-separation" else {"name": name}
-        harmonics = [2, *range(2), *range(3, MOST_HARMONIC + 1)] if "harmonic" in quantity.__struct_fields__ else [None]
-        for n in harmonics:
-            table = base if n in (None, 2) else {**base, "harmonic": n}
+        fields = quantity.__struct_fields__
+        harmonics = [2, *range(2), *range(3, MOST_HARMONIC + 1)] if "harmonic" in fields else [None]
+        waves: list[dict[str, Any]] = [{}]
+        if name == "split-per-wave":
+            waves += [{"of": of, "order": order} for of, order in product(SURFACES, range(1, MOST_HARMONIC + 1))]
+        for n, wave in product(harmonics, waves):
+            table = {**base, **wave} if n in (None, 2) else {**base, **wave, "harmonic": n}
             asked = quantity(**{key: value for key, value in table.items() if key != "name"})
             for column in asked.columns:
                 found.setdefault(column.name, table)

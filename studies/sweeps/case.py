@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
+from math import inf
 from typing import TYPE_CHECKING, Any
 
 from shell.constants import zero_Celsius
@@ -15,6 +16,8 @@ if TYPE_CHECKING:
     from shell.modes import Mode
     from shell.resonator import Resonator
 
+TOLERANCE = 1e-5  # relative error of a frequency
+
 
 @dataclass
 class Case:
@@ -25,7 +28,7 @@ class Case:
     # the instrument at a place 0 ... 1 of the way from the start of a search to this design, where modes keep their
     # names by their shapes; None where they have them by their order
     on_the_way: "Callable[[float], Instrument] | None" = None
-    _solved: dict[tuple[int, str, float], "tuple[Mode, ...]"] = field(default_factory=dict, repr=False)
+    _solved: dict[tuple[int, str, float], tuple[float, "tuple[Mode, ...]"]] = field(default_factory=dict, repr=False)
 
     def temperature(self, given: float | None) -> float:
         """Return the temperature in K that a quantity gives (°C), else the study's, or the card's reference."""
@@ -33,15 +36,19 @@ class Case:
             given = self.parameters.get("temperature_degC")
         return self.instrument.reference_temperature if given is None else float(given) + zero_Celsius
 
-    def modes(self, harmonic: int, count: int, theory: "Theory", temperature: float) -> "tuple[Mode, ...]":
+    def modes(
+        self, harmonic: int, count: int, theory: "Theory", temperature: float, tolerance: float = TOLERANCE
+    ) -> "tuple[Mode, ...]":
         """Return at least the `count` lowest modes at a uniform temperature (K), solved once for all quantities."""
         from shell.modes import solve_modes
 
         key = (harmonic, theory, temperature)
-        if len(self._solved.get(key, ())) < count:
+        within, found = self._solved.get(key, (inf, ()))
+        if len(found) < count or within > tolerance:
             resonator, elastic = self.instrument.at(temperature)
-            self._solved[key] = solve_modes(resonator, elastic, harmonic, count, theory)
-        return self._solved[key]
+            found = solve_modes(resonator, elastic, harmonic, count, theory, tolerance)
+            self._solved[key] = tolerance, found
+        return found
 
     def mode(self, harmonic: int, index: int, theory: "Theory", temperature: float) -> "Mode":
         """Return one mode of a harmonic: by its order, or the one that the start's becomes on the way to this design."""

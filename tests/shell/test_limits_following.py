@@ -9,6 +9,7 @@ from shell.errors import ShellError
 from shell.following import follow, likeness
 from shell.meridian import cylinder, hemisphere
 from shell.modes import solve_modes
+from tests.benchmarks.crossings import Tube, is_even
 
 METAL = Elastic(190e9, 0.3, 8000.0)
 
@@ -40,6 +41,22 @@ def test_twist_and_stretch_cross_and_keep_their_names():
     followed = follow(solve, before[2])
     assert (followed.label, followed.index) == ("axial", 3)
     assert follow(solve, before[1]).index == 1
+
+
+@pytest.mark.parametrize(
+    ("tube", "start", "end"),
+    [
+        (Tube(20e-3, 1.06e-3, 0.33, 1, (32e-3, 73e-3)), 1, 0),
+        (Tube(10e-3, 0.55e-3, 0.17, 2, (6.3e-3, 13.1e-3)), 3, 2),
+    ],
+)
+def test_even_and_odd_modes_of_a_tube_cross(tube, start, end):
+    """They do not mix: the k-th even one stays the k-th even one (100 of 100 drawn tubes: tests/benchmarks/crossings.py)."""
+    before, after = tube.solve(0.0, 4), tube.solve(1.0, 4)
+    kind = is_even(before[start])
+    assert is_even(after[end]) == kind
+    assert sum(is_even(one) == kind for one in before[:start]) == sum(is_even(one) == kind for one in after[:end])
+    assert follow(tube.solve, before[start]).index == end
 
 
 def test_a_design_far_away_is_reached_step_by_step():

@@ -1,11 +1,14 @@
 """How far the nearest other mode is from a mode, in Hz: parasitic modes close by couple under vibration."""
 
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from shell.separation import nearest_mode
 from studies.schema.keys import number, says
-from studies.sweeps.case import Case
+from studies.sweeps.case import TOLERANCE, Case
 from studies.sweeps.quantity import Column, ModeQuantity, Number
+
+if TYPE_CHECKING:
+    from shell.modes import Mode
 
 
 class ModeSeparation(ModeQuantity, frozen=True, kw_only=True, tag="mode-separation"):
@@ -13,6 +16,9 @@ class ModeSeparation(ModeQuantity, frozen=True, kw_only=True, tag="mode-separati
 
     highest: Annotated[int, number("highest harmonic that is searched", least=0, most=20)] = 4
     each: Annotated[int, number("least number of modes solved for each harmonic", least=1, most=10)] = 2
+    tolerance: Annotated[float, number("relative error allowed of the other harmonics", least=1e-8, most=1e-2)] = (
+        TOLERANCE
+    )
     distances: Annotated[bool, says("an extra column for the distance to each of these modes")] = False
 
     def list_columns(self) -> tuple[Column, ...]:
@@ -31,14 +37,17 @@ class ModeSeparation(ModeQuantity, frozen=True, kw_only=True, tag="mode-separati
     def evaluate(self, case: Case) -> tuple[Number, ...]:
         """Return distance and harmonic."""
         at = case.temperature(self.temperature_degC)
+        case.modes(self.harmonic, self.each, self.theory, at)  # at once, and no less exact than all that is asked of it
         own = case.mode(self.harmonic, 0, self.theory, at)
-        nearest = nearest_mode(
-            lambda n, count: case.modes(n, count, self.theory, at), own, range(self.highest + 1), self.each
-        )
+
+        def solve(n: int, count: int) -> "tuple[Mode, ...]":
+            return case.modes(n, count, self.theory, at, TOLERANCE if n == self.harmonic else self.tolerance)
+
+        nearest = nearest_mode(solve, own, range(self.highest + 1), self.each)
         error = sum(mode.frequency * mode.relative_error_estimate for mode in (own, nearest))
         each = []
         for n, k in self._others:
-            found = case.modes(n, self.each, self.theory, at)
+            found = solve(n, self.each)
             others = [mode for mode in found if (n, mode.index) != (own.harmonic, own.index)]
             each.append(Number(others[k].frequency - own.frequency))
         return (Number(nearest.frequency - own.frequency, error), Number(float(nearest.harmonic), 0.0), *each)

@@ -1,19 +1,21 @@
 """Split of a pair per micrometre of one wave around of the wall, a face or the rim."""
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, TypeAlias, get_args
 
 from studies.schema.keys import number, says
 from studies.sweeps.case import Case
 from studies.sweeps.quantity import Column, ModeQuantity, Number
 
 AMPLITUDE = 1.0  # µm
+Surface: TypeAlias = Literal["wall", "outer", "inner", "offset", "rim"]
+SURFACES = get_args(Surface)
 
 
 class SplitPerWave(ModeQuantity, frozen=True, kw_only=True, tag="split-per-wave"):
     """Split by a wave of 1 µm: order 2n splits by itself, order n by its square, others only together."""
 
     theory: Annotated[Literal["solid", "shell"], says("solid (three-dimensional) or shell (Naghdi)")] = "solid"
-    of: Annotated[Literal["wall", "outer", "inner", "offset", "rim"], says("surface with the wave")] = "wall"
+    of: Annotated[Surface, says("surface with the wave")] = "wall"
     order: Annotated[int, number("crests around; 2n splits by itself", least=1, most=40)] = 4
 
     def list_columns(self) -> tuple[Column, ...]:

@@ -56,6 +56,8 @@ def write(folder, text=TASK):
             "thicknes_mm",
             "has no parameter 'resonator.thicknes_mm'; did you mean 'resonator.thickness_mm'?",
         ),
+        ("high = 1.4", "high = 40.0", "high = 40 of 'resonator.thickness_mm' allows no resonator"),
+        ("low = 12.0", "low = -12.0", "radius_mm must be above 0"),
         ("low = 0.5\nhigh = 1.4", "low = 1.5\nhigh = 1.4", "low must be below high, not 1.5 and 1.4"),
         ("high = 18.0", "high = 18.0\nstart = 19.0", "start = 19 lies outside 12 to 18"),
         ('column = "mass_g"', 'column = "mass_g"\ngoal = "target"', "target = ... and goal = 'target' belong together"),
@@ -67,6 +69,21 @@ def test_a_wrong_key_is_named_with_the_mend(tmp_path, capsys, old, new, words):
     told = capsys.readouterr().err
     assert words in told
     assert told.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    "column",
+    [
+        *("frequency_n2_Hz", "bryan_factor_n2", "tcf_n2_ppm_per_degC", "mass_g", "time_constant_shell_s"),
+        *(f"inverse_q_n2_{part}" for part in ("mount", "films", "gas", "surface", "thermoelastic")),
+        *("split_n2_wall_3_Hz_per_um", "split_n2_rim_4_Hz_per_um", "loop_bias_deg_per_h"),
+        *("acceleration_shift_n2_ppb_per_g", "rim_tilt_urad_per_g", "shock_stress_MPa"),
+    ],
+)
+def test_what_a_study_computes_can_be_wanted(tmp_path, column):
+    """By its column alone, as an objective and as a constraint."""
+    asked = TASK.replace('"mass_g"', f'"{column}"') + f'\n[[constraint]]\ncolumn = "{column}"\nhigh = 1.0\n'
+    assert column in read_task(write(tmp_path, asked)).wanted
 
 
 @pytest.mark.slow
