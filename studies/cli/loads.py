@@ -31,7 +31,7 @@ from studies.cli.arguments import (
 from studies.cli.output import answers
 from studies.errors import InputError, naming
 from studies.instrument.card import Instrument
-from studies.loads import STANDARD_GRAVITY, bias_by_tilt, shift_per_kelvin
+from studies.resonator.loads import STANDARD_GRAVITY, bias_by_tilt, shift_per_kelvin
 from studies.results import Column, Facts, Result, Table, row_of
 
 ABROAD = (

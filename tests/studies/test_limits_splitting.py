@@ -295,7 +295,7 @@ def test_a_saved_card_takes_its_maps_along(tmp_path):
 
 def test_an_acceleration_across_even_electrodes_makes_no_bias():
     """A wave of order 1 in the gap makes the wave 4 of the springs only beside one of order 3 or 5, and then in proportion to it."""
-    from studies.loads import bias_by_tilt, loads_of
+    from studies.resonator.loads import bias_by_tilt, loads_of
 
     card = load_card("hrg-30mm-loops")
     T, electrodes = card.reference_temperature, {"gap_um": 50.0, "count": 16, "voltage_V": 100.0}

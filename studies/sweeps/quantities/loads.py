@@ -26,7 +26,7 @@ class LoadsOfDesign(Quantity, frozen=True, kw_only=True, tag="loads"):
     def evaluate(self, case: Case) -> tuple[Number, ...]:
         """Return the three."""
         from shell.loads import Kind, Loads
-        from studies.loads import STANDARD_GRAVITY
+        from studies.resonator.loads import STANDARD_GRAVITY
 
         T = case.temperature(self.temperature_degC)
         loads = Loads(case.mode(self.harmonic, 0, "solid", T), case.instrument.at(T)[1])
