@@ -19,7 +19,8 @@ from studies.calibration.priors import Priors
 from studies.calibration.start import start_spread
 from studies.resonator.law import law_of, moved_law
 from studies.simulation.drive import Drive
-from studies.simulation.prediction import Prediction, Variations, predict
+from studies.simulation.prediction import Prediction, predict
+from studies.simulation.variations import Variations
 
 if TYPE_CHECKING:
     from shell.law import FrequencyLaw

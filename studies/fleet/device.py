@@ -19,7 +19,8 @@ from studies.instrument.card import load_card
 from studies.record import read_record
 from studies.simulation.drive import Drive
 from studies.simulation.heat_path import slowest_lag
-from studies.simulation.prediction import HEATED, Variations, predict
+from studies.simulation.prediction import predict
+from studies.simulation.variations import HEATED, Variations
 from studies.workbench import infer_records
 from thermal.profile import Profile
 
@@ -143,7 +144,7 @@ def _slowest(varied: Variations, T: float, slopes: Array) -> tuple[float, Array]
         below, above = varied.sides(name) if name.startswith(HEATED) else (None, None)
         moved = [slowest_lag(side.network("housing"), T) for side in (below, above) if side is not None]
         by_value.append((moved[1] - moved[0]) / (above.distance - below.distance) if above and below else 0.0)
-    return slowest_lag(varied.network("housing"), T), np.array(by_value) @ slopes
+    return slowest_lag(varied.here.network("housing"), T), np.array(by_value) @ slopes
 
 
 def standings_of(found: Inferred) -> dict[str, dict[str, Standing]]:
