@@ -6,21 +6,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from compensation.errors import CompensationError
-from compensation.ringdown.envelope import Envelope, thin
-from compensation.ringdown.fit import DecayFit
+from compensation.ringdown.envelope import Envelope
+from compensation.ringdown.fit import DecayFit, drift_shapes
 from compensation.ringdown.model import Decay
-from compensation.ringdown.terms import fit_terms
-from compensation.ringdown.whiteness import Leftover, examine
-from compensation.ringdown.window import find_end, find_jump, find_start
+from compensation.ringdown.whiteness import Leftover
+from compensation.ringdown.window import find_end, find_free, find_jump
 
 RESOLVED = 3.0  # standard deviations above zero from which a split has an axis
 LENGTHS = ("split_Hz", "damping_split_per_s")
-ROWS = 1024
 DRAWS = 2000
 SAID_OF = {
     "hardening": "The frequency depends on the amplitude (cubic stiffness)",
     "thickening": "The damping depends on the amplitude",
-    "chirp": "The frequency drifts with time",
 }
 
 
@@ -40,7 +37,7 @@ class RingDown:
 
     # mapping, `frequency_1_Hz` (the higher), `frequency_2_Hz`, `q_1`, `q_2`, `frequency_Hz`, `inverse_q`,
     # `decay_time_s`; of two channels `split_Hz`, `frequency_axis_deg`, `damping_split_per_s`, `damping_axis_deg`; where
-    # they are seen `hardening_Hz`, `thickening_per_s`, at the first amplitude, and `drift_Hz_per_s`
+    # they are seen `hardening_Hz`, and `thickening_per_s`, at the first amplitude
     estimates: Mapping[str, Estimate]
     fit: DecayFit  # the decay within `window`
     window: tuple[float, float]  # (float, float), seconds of the record that are free decay above the noise
@@ -63,17 +60,14 @@ def analyse_decay(envelope: Envelope, *, harmonic: int = 2, confidence: float = 
                 " Cut the file there and fit the longer part."
             )
         envelope = envelope.within(jump, float(envelope.time[-1]))
-    end = find_end(envelope)
-    whole = envelope.within(envelope.time[0], end)
-    start = find_start(whole)
-    free = thin(whole.within(start, end), ROWS)
-    fit, beyond, lines = fit_terms(free)
-    left = examine(free.time, fit.residual)
+    found = find_free(envelope.within(envelope.time[0], find_end(envelope)))
+    fit, left = found.fit, found.left
     _check_decays(fit)
     fit = replace(fit, covariance=fit.covariance * left.widening**2, widening=left.widening)
     estimates = _estimate(fit, harmonic, confidence)
-    remarks = (*_remark(given, fit, left, beyond, lines, start, jump), *_undetermined(fit, estimates))
-    return RingDown(estimates, fit, (float(free.time[0]), float(free.time[-1])), remarks, tuple(lines))
+    remarks = (*_remark(given, fit, left, jump), *_undetermined(fit, estimates))
+    window = (float(fit.envelope.time[0]), float(fit.envelope.time[-1]))
+    return RingDown(estimates, fit, window, remarks, tuple(tone / (2 * np.pi) for tone in fit.found.tones))
 
 
 def _check_decays(fit: DecayFit) -> None:
@@ -118,8 +112,6 @@ def _derive(decay: Decay, fit: DecayFit, harmonic: int) -> dict[str, float]:
         found["hardening_Hz"] = decay.hardening * first / (2 * np.pi)
     if "thickening" in fit.names:
         found["thickening_per_s"] = decay.thickening * first
-    if "chirp" in fit.names:
-        found["drift_Hz_per_s"] = decay.chirp / (2 * np.pi)
     return found
 
 
@@ -146,28 +138,26 @@ def _estimate(fit: DecayFit, harmonic: int, confidence: float) -> dict[str, Esti
     return found
 
 
-def _remark(
-    envelope: Envelope,
-    fit: DecayFit,
-    left: Leftover,
-    beyond: tuple[str, ...],
-    lines: list[float],
-    start: float,
-    jump: float | None,
-) -> list[str]:
+def _remark(envelope: Envelope, fit: DecayFit, left: Leftover, jump: float | None) -> list[str]:
     said = []
-    first = float(envelope.time[0])
+    first, start = float(envelope.time[0]), float(fit.envelope.time[0])
     if jump is not None:
         said.append(
             f"The phase jumps at {jump:.4g} s (reference or samples lost, or a drive switched): only the part after it is used."
         )
-    if start > first:
+    if start - first > 2 * fit.envelope.width:
         said.append(
             f"The first {start - first:.4g} s are not a free decay (drive, transient or release) and are left out."
         )
-    said += [f"{SAID_OF[name]}." for name in beyond]
-    if lines:
-        at = ", ".join(f"{envelope.carrier + line:.8g}" for line in lines)
+    said += [f"{SAID_OF[name]}." for name in fit.terms.curved]
+    if fit.terms.drift:
+        x = (fit.envelope.time - start) / (fit.envelope.time[-1] - start)
+        course = np.gradient(np.array(fit.found.drift) @ drift_shapes(x, fit.terms.drift), fit.envelope.time)
+        said.append(
+            f"The frequency drifts with time, by {np.ptp(course) / (2 * np.pi):.2g} Hz: the frequencies are means over the window."
+        )
+    if fit.found.tones:
+        at = ", ".join(f"{envelope.carrier + tone / (2 * np.pi):.8g}" for tone in fit.found.tones)
         said.append(f"Interference at {at} Hz is removed; find its source.")
     if envelope.clipped:
         said.append(

@@ -2,7 +2,7 @@
 
 Raw samples x(t) = Re{z e^{2πi f_c t}} are mixed with e^{−2πi f_c t} and averaged over blocks of whole carrier periods; the
 average of an exponential over a block is corrected where it is fitted. Blocks with lost samples count what they have. What a block
-that holds no whole number of periods leaves of the image z* e^{−4πi f_c t} is solved for: uncorrected, it looks like a second mode.
+that holds no whole number of periods leaves of the image z* e^{−4πi f_c t} is taken out: left in, it looks like a second mode.
 """
 
 from dataclasses import dataclass, replace
@@ -15,6 +15,7 @@ from compensation.errors import CompensationError
 
 MOST_BLOCKS = 4096
 CHUNK = 1 << 18
+PASSES = 3  # each takes the image out with the amplitudes of the one before, straight between the blocks
 WRITTEN = 0.5  # part of a step by which the times of an even grid may be off for their few digits
 
 
@@ -30,11 +31,12 @@ class Envelope:
     # part of the raw samples at the ends of their range where the record is flat there; 0 of a lock-in
     clipped: float = 0.0
     lost: float = 0.0  # part of the time without samples
+    spread: float = 0.0  # s², variance of the times that a row averages; 0 of a lock-in's own rows
 
     def within(self, start: float, end: float) -> "Envelope":
         """The rows between two times (s)."""
         keep = (self.time >= start) & (self.time <= end)
-        return Envelope(self.time[keep], self.values[:, keep], self.carrier, self.width, self.clipped, self.lost)
+        return replace(self, time=self.time[keep], values=self.values[:, keep])
 
 
 def find_carrier(samples: ArrayLike, rate: float) -> float:
@@ -77,36 +79,38 @@ def mix_down(time: ArrayLike, channels: ArrayLike, carrier: float | None = None)
     size = int(sizes[int(np.argmin(np.abs(np.sin(2 * np.pi * sizes / period)) / sizes))])
     block = rows // size
     count = int(block[-1]) + 1
-    total = np.zeros((x.shape[0], count), dtype=complex)
-    image = np.zeros((x.shape[0], count), dtype=complex)
-    weight = np.zeros((x.shape[0], count))
-    level = np.nanmean(x, axis=1)
-    for k in range(0, t.size, CHUNK):
-        part = slice(k, k + CHUNK)
-        turn = np.exp(-2j * np.pi * carrier * (t[part] - t[0]))
-        first = int(block[part][0])
-        for c in range(x.shape[0]):
-            fine = np.isfinite(x[c, part])
-            value = np.where(fine, x[c, part] - level[c], 0.0)
+    level = np.nanmean(x, axis=1, keepdims=True)
+    fine = np.all(np.isfinite(x), axis=0) & ~_stuck(x, period)
+    weight = np.bincount(block, fine, count)
+    middle = np.bincount(block, fine * (t - t[0]), count) / np.maximum(weight, 1)
+    keep = weight >= 0.5 * size
+    keep[-1] &= (int(rows[-1]) + 1) % size == 0  # a part of a block is no row like the others
+    if np.count_nonzero(keep) < 2:
+        raise CompensationError("fewer than two blocks of eight periods have half of their samples; record longer.")
+    ends = middle[keep][[0, -1]] + size * step * np.array([-1, 1])
+    knots = np.concatenate([ends[:1], middle[keep], ends[1:]])
+    values = np.zeros((x.shape[0], np.count_nonzero(keep)), dtype=complex)
+    for _ in range(PASSES):
+        around = np.concatenate(
+            [2 * values[:, :1] - values[:, 1:2], values, 2 * values[:, -1:] - values[:, -2:-1]], axis=1
+        )
+        total = np.zeros((x.shape[0], count), dtype=complex)
+        for k in range(0, t.size, CHUNK):
+            part = slice(k, k + CHUNK)
+            turn = np.exp(-2j * np.pi * carrier * (t[part] - t[0]))
+            first = int(block[part][0])
             index = block[part] - first
             places = slice(first, first + int(index[-1]) + 1)
-            for sums, terms in ((total, 2 * value * turn), (image, np.where(fine, turn**2, 0.0))):
-                sums[c, places] += np.bincount(index, terms.real) + 1j * np.bincount(index, terms.imag)
-            weight[c, places] += np.bincount(index, fine)
-    enough = weight >= 0.5 * size
-    # x = Re{z e^{iωt}}, so the sum of 2 x e^{−iωt} is N z + C z*, with C the sum of e^{−2iωt}
-    free = np.where(enough, weight**2 - np.abs(image) ** 2, 1.0)
-    values = np.where(enough, (weight * total - image * total.conj()) / free, np.nan + 0j)
-    middle: Array = (np.arange(count, dtype=np.float64) * size + (size - 1) / 2) * step
-    keep = np.all(np.isfinite(values), axis=0)
+            for c in range(x.shape[0]):
+                # x = Re{z e^{iωt}}, so 2 x e^{−iωt} is z + z* e^{−2iωt}
+                image = np.interp(t[part] - t[0], knots, around[c]).conj() * turn**2
+                terms = np.where(fine[part], 2 * (x[c, part] - level[c]) * turn - image, 0.0)
+                total[c, places] += np.bincount(index, terms.real) + 1j * np.bincount(index, terms.imag)
+        values = total[:, keep] / weight[keep]
     return Envelope(
-        middle[keep],
-        values[:, keep],
-        carrier,
-        size * step,
-        _clipped(x),
-        1 - float(np.sum(weight)) / (weight.size * size),
-    )
+        middle[keep], values, carrier, size * step, _clipped(x),
+        1 - float(np.sum(weight)) / int(block[-1] * size + size), (size * step) ** 2 / 12,
+    )  # fmt: skip
 
 
 def even_rows(time: Array) -> "tuple[float, NDArray[np.int64]]":
@@ -128,7 +132,7 @@ def from_lock_in(time: ArrayLike, amplitudes: ArrayLike, carrier: float = 0.0) -
     """Return the complex amplitudes of a lock-in's rows, averaged to a few thousand blocks where there are more."""
     t = np.asarray(time, dtype=np.float64)
     z = np.atleast_2d(np.asarray(amplitudes, dtype=np.complex128))
-    keep = np.isfinite(t) & np.all(np.isfinite(z), axis=0)
+    keep = np.isfinite(t) & np.all(np.isfinite(z), axis=0) & ~_stuck(z, 1.0)
     lost = 1 - float(np.mean(keep))
     t, z = t[keep], z[:, keep]
     if t.size < 16:
@@ -154,13 +158,26 @@ def thin(envelope: Envelope, rows: int) -> Envelope:
         block = even_rows(t)[1] // size
         _, first, count = np.unique(block, return_index=True, return_counts=True)
         full = count > size / 2
+        full[-1] &= count[-1] == size
         means = np.add.reduceat(z, first, axis=1)[:, full] / count[full]
         whole = float(np.sum(np.abs(means) ** 2 @ count[full])) / float(np.sum(count[full]))
         if whole - noise * full.sum() / float(np.sum(count[full])) > 0.998 * signal:
             time = (np.add.reduceat(t, first) / count)[full]
-            return replace(envelope, time=time, values=means, width=envelope.width * size)
+            spread = envelope.spread + (size**2 - 1) / 12 * envelope.width**2
+            return replace(envelope, time=time, values=means, width=envelope.width * size, spread=spread)
         size //= 2
     return envelope
+
+
+def _stuck(x: Array | Complex, most: float) -> NDArray[np.bool_]:
+    """Mark runs of more than `most` rows that repeat the row before them, or are zero, in all channels: no measurement."""
+    same = np.all(x[:, 1:] == x[:, :-1], axis=0)
+    ends = np.flatnonzero(np.diff(np.r_[False, same, False].astype(np.int8)))
+    found = np.zeros(x.shape[1], dtype=bool)
+    for first, last in ends.reshape(-1, 2):  # rows first … last are equal
+        if last - first >= most:
+            found[first + bool(np.any(x[:, first])) : last + 1] = True
+    return found
 
 
 def _clipped(x: Array) -> float:

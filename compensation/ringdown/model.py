@@ -2,16 +2,17 @@
 
 With z = (X, Y) the complex amplitudes along cos nθ and sin nθ (`compensation.wave`, no rate and no force),
 
-    ż = M z + (i κ − γ) |z|² z,    M = iδ − 1/τ − C·S + i W·S,    C·S = [[C₁, C₂], [C₂, −C₁]],
+    ż = M z + iκ (2 |z|² z + (z·z) z*)/3 − γ |z|² z,    M = iδ − 1/τ − C·S + i W·S,    C·S = [[C₁, C₂], [C₂, −C₁]],
 
 C = ½ Δ(1/τ) (cos 2nθ_τ, sin 2nθ_τ), W = ½ Δω (cos 2nθ_ω, sin 2nθ_ω), δ the mean frequency against the carrier of the
-demodulation. κ (a cubic stiffness) and γ (a cubic damping) act on the amplitude common to both patterns; what they do to
-the form of an ellipse is of the order of its eccentricity and left out. A slow drift of the temperature is ½ β t² of phase.
+demodulation. κ is a cubic stiffness of a body of revolution, the average of |x|² x: it shifts a straight line by κ|z|² and turns an
+ellipse, which a split makes of any line; γ is a cubic damping.
 """
 
 from dataclasses import dataclass, fields
 
 import numpy as np
+import scipy
 
 from compensation.arrays import Array, Complex
 
@@ -30,7 +31,6 @@ class Decay:
     stiffness_sin: float = 0.0
     hardening: float = 0.0  # hardening, thickening: κ and γ per squared amplitude
     thickening: float = 0.0
-    chirp: float = 0.0  # β (rad/s²)
 
     @property
     def mean(self) -> complex:
@@ -59,38 +59,72 @@ class Decay:
 
 NAMES = tuple(field.name for field in fields(Decay))
 ONE_MODE = ("detuning", "decay")
+MOST_TURNS = 600.0  # radians within a window, beyond which a trial point is not followed
 TWO_MODES = (*ONE_MODE, "damping_cos", "damping_sin", "stiffness_cos", "stiffness_sin")
 
 
 def propagate(decay: Decay, time: Array, start: Complex) -> Complex:
-    """Return z (channels, rows) at the times (s) after the start, where it is `start` (channels,).
+    """Return z (channels, rows) of the linear decay (κ = γ = 0) at the times (s) after the start, where it is `start`."""
+    return differentiate(decay, time, start)[0]
 
-    exp(M t) = e^{mt} (cosh st + (M − m) sinh(st)/s) with s² = C-W determinant, a scalar for one channel.
+
+def differentiate(decay: Decay, time: Array, start: Complex) -> tuple[Complex, dict[str, Complex], list[Complex]]:
+    """Return z of the linear decay, its derivatives by the rates, and by each start amplitude.
+
+    exp(M t) = e^{mt} (c + A r) with A = M − m = [[a, b], [b, −a]], s² = a² + b², c = cosh st, r = sinh(st)/s; of q = s²
+    dc/dq = t r/2 and dr/dq = (t c − r)/2q.
     """
-    common = np.exp(decay.mean * time + 0.5j * decay.chirp * time**2)
+    common = np.exp(decay.mean * time)
     if start.size == 1:
         z = start[:, None] * common
-    else:
-        a, b = decay.matrix[0]
-        s = np.sqrt(a * a + b * b + 0j)
-        small = np.abs(s) * time < 1e-2
-        up = np.exp(s * time)
-        down, square = 1 / up, (s * time) ** 2
-        ratio = np.where(small, time * (1 + square / 6 * (1 + square / 20)), (up - down) / (2 * (s or 1.0)))
-        z = common * ((up + down) / 2 * start[:, None] + ratio * (decay.matrix @ start)[:, None])
-    if decay.hardening or decay.thickening:
-        # E = E₀/(1 + 2γ ∫E₀ dt) and the phase κ ∫E dt, E₀ = |z|² of the linear decay
-        energy = np.sum(np.abs(z) ** 2, axis=0)
-        shrink = 1 / np.sqrt(np.maximum(1 + 2 * decay.thickening * _integrate(time, energy), 1e-6))
-        z = z * shrink * np.exp(1j * decay.hardening * _integrate(time, energy * shrink**2))
-    return np.asarray(z)
+        return z, {"detuning": 1j * time * z, "decay": -time * z}, [common[None, :]]
+    A = decay.matrix
+    a, b = A[0]
+    q = a * a + b * b
+    s = np.sqrt(q + 0j)
+    small = np.abs(s * time) < 1e-2
+    up, square = np.exp(s * time), q * time**2
+    c = (up + 1 / up) / 2
+    r = np.where(small, time * (1 + square / 6 * (1 + square / 20)), (up - 1 / up) / (2 * (s or 1.0)))
+    bend = np.where(small, time**3 / 6 * (1 + square / 10), (time * c - r) / (2 * (q or 1.0)))
+    units = [common * (c * one[:, None] + r * (A @ one)[:, None]) for one in np.eye(2, dtype=complex)]
+    z = start[0] * units[0] + start[1] * units[1]
+    by_q = common * (time * r / 2 * start[:, None] + bend * (A @ start)[:, None])
+    along = common * r
+    by_a = 2 * a * by_q + along * np.array([start[0], -start[1]])[:, None]
+    by_b = 2 * b * by_q + along * start[::-1, None]
+    by = {
+        "detuning": 1j * time * z, "decay": -time * z, "damping_cos": -by_a, "stiffness_cos": 1j * by_a,
+        "damping_sin": -by_b, "stiffness_sin": 1j * by_b,
+    }  # fmt: skip
+    return z, by, units
 
 
-def _integrate(time: Array, values: Array) -> Array:
-    """Return the running integral from t = 0, exact for an exponential between two rows."""
-    before = np.concatenate([[values[0]], values])
-    steps = np.diff(time, prepend=0.0)
-    logarithm = np.log(np.maximum(before[1:], 1e-300) / np.maximum(before[:-1], 1e-300))
-    flat = np.abs(logarithm) < 1e-6
-    mean = np.where(flat, (before[1:] + before[:-1]) / 2, np.diff(before) / np.where(flat, 1.0, logarithm))
-    return np.cumsum(steps * mean)
+def swing(decays: "list[Decay]", time: Array, starts: Complex) -> Complex:
+    """Return z (decays, channels, rows) of decays with κ and γ from their start amplitudes (decays, channels).
+
+    Without the phase δt + κ∫|z|² dt that all patterns share, κ turns a pattern (x, y) by ⅔κ S, S = Im(x* y) the area of its ellipse.
+    All decays are integrated in the same steps.
+    """
+    channels = starts.shape[1]
+    turn, loss, decay = (np.array([getattr(one, k) for one in decays]) for k in ("hardening", "thickening", "decay"))
+    a, b = np.array([one.matrix[0] for one in decays]).T if channels == 2 else (0j * turn, 0j * turn)
+    first = np.zeros((3, len(decays)), complex)
+    first[:channels] = starts.T
+
+    def law(_: float, state: Complex) -> Complex:
+        x, y = state.reshape(first.shape)[:2]
+        energy = x.real**2 + x.imag**2 + y.real**2 + y.imag**2
+        rate, spin = decay + loss * energy, 2 / 3 * turn * (x.real * y.imag - x.imag * y.real)
+        return np.concatenate([(a - rate) * x + (b - spin) * y, (b + spin) * x - (a + rate) * y, energy])
+
+    size, end = float(np.max(np.abs(starts))), float(time[-1]) or 1.0
+    fastest = float(np.max(np.abs([a, b, decay, turn * size**2, loss * size**2])))
+    if not fastest * abs(end) < MOST_TURNS:
+        return np.full((len(decays), channels, time.size), np.nan + 0j)
+    solved = scipy.integrate.solve_ivp(law, (0.0, end), first.ravel(), "DOP853", time, rtol=3e-8, atol=3e-8 * size)
+    if solved.y.shape[1] < time.size:  # a trial point that grows without limit
+        return np.full((len(decays), channels, time.size), np.nan + 0j)
+    states = solved.y.reshape(*first.shape, -1)
+    phase = np.array([one.detuning for one in decays])[:, None] * time + turn[:, None] * states[2].real
+    return np.asarray(np.moveaxis(states[:channels], 0, 1) * np.exp(1j * phase)[:, None, :])

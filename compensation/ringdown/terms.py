@@ -1,102 +1,153 @@
-"""Terms of a decay: one mode or two, nonlinear rates where they improve the fit, and lines that are interference."""
+"""Terms of a decay: one mode or two, nonlinear rates and drift where they improve the fit, and lines that are interference."""
 
-from dataclasses import replace
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from compensation.arrays import Array, Complex
 from compensation.ringdown.envelope import Envelope
-from compensation.ringdown.fit import DecayFit, fit_decay
-from compensation.ringdown.whiteness import Leftover, examine
+from compensation.ringdown.fit import CURVED, DecayFit, Guess, Terms, drift_shapes, fit_decay
+from compensation.ringdown.model import swing
+from compensation.ringdown.whiteness import Leftover, examine, find_line
 
-PAYS = 20.0  # least fall of −2 ln L, over the widening², for a second mode, beside 2 ln N
+PAYS = 20.0  # least fall of −2 ln L, over the widening², for a second mode or a tone, beside 2 ln N
 NAMED = 10.0
-"""The same for a rate beyond the linear ones: noise passes it once in 200 records, and left out it shifts what is stated by up to √10 of its errors, and more."""
+"""The same for any other term: noise passes it once in 200 records, and left out it shifts what is stated by up to √10 of its errors, and more."""
 WHITE = 1.3
-LINES = 3
-BEYOND = ("hardening", "thickening", "chirp")
+TONES, DEGREES = 3, 8
+SMALL = 1e-4  # radians of the trial step of a curved rate
+TAIL = 0.3  # last part of a window, in which a weak tone stands out of a decay
 
 
-def fit_terms(envelope: Envelope) -> tuple[DecayFit, tuple[str, ...], list[float]]:
-    """Fit one mode or two, the rates beyond the linear ones that pay, and lines that are no decay."""
-    lines: list[float] = []
-    data = envelope
-    fit = fit_modes(data)
-    left = examine(data.time, fit.residual)
-    beyond: tuple[str, ...] = ()
-    while True:
-        fit, left, beyond = extend(data, fit, left, beyond)
-        if left.line is None or len(lines) == LINES:
-            break
-        lines.append(left.line)
-        data, fit = _without_lines(envelope, fit, lines, beyond)
-        left = examine(data.time, fit.residual)
-    return replace(fit, envelope=envelope), beyond, lines
+@dataclass(frozen=True)
+class Found:
+    """A fit with the terms that pay, and what it leaves."""
 
-
-def extend(
-    envelope: Envelope, fit: DecayFit, left: Leftover, beyond: tuple[str, ...]
-) -> tuple[DecayFit, Leftover, tuple[str, ...]]:
-    """Add rates beyond the linear ones, the best first, while they pay."""
-    modes = 1 if fit.one_mode else 2
-    while len(beyond) < len(BEYOND):
-        rivals = {
-            name: fit_decay(envelope, extra=(*beyond, name), modes=modes, starts=[fit.decay])
-            for name in BEYOND
-            if name not in beyond
-        }
-        name = min(rivals, key=lambda one: rivals[one].cost)
-        after = examine(envelope.time, rivals[name].residual)
-        if not fit.cost - rivals[name].cost > NAMED * after.widening**2:
-            break
-        fit, left, beyond = rivals[name], after, (*beyond, name)
-    return fit, left, beyond
-
-
-def fit_modes(envelope: Envelope) -> DecayFit:
-    """Fit two modes where the second pays: one that is not excited, or not split, cannot be told from the first.
-
-    Noise offers as many places for a second mode as there are rows; each costs the odds.
-    """
-    one = fit_decay(envelope, modes=1)
-    two = fit_decay(envelope, modes=2)
-    left = examine(envelope.time, two.residual)
-    price = (PAYS + 2 * np.log(envelope.time.size)) * left.widening**2
-    return two if one.cost - two.cost > price and np.all(two.decay.rates.real < 0) else one
-
-
-def _without_lines(
-    envelope: Envelope, fit: DecayFit, lines: list[float], beyond: tuple[str, ...]
-) -> tuple[Envelope, DecayFit]:
-    """Take lines of constant amplitude out of the data, in turn with the decay."""
-    data = envelope
-    for _ in range(3):
-        left = envelope.values - (data.values - fit.residual)
-        step = 1 / (envelope.time[-1] - envelope.time[0])
-        tones = np.zeros_like(left)
-        for k, line in enumerate(lines):
-            near = line + step * np.linspace(-1, 1, 81)
-            basis = np.exp(2j * np.pi * np.outer(near, envelope.time))
-            power = np.sum(np.abs((left - tones) @ basis.conj().T) ** 2, axis=0)
-            lines[k] = float(near[int(np.argmax(power))])
-            tone = np.exp(2j * np.pi * lines[k] * envelope.time)
-            tones += np.outer(np.mean((left - tones) * tone.conj(), axis=1), tone)
-        data = replace(envelope, values=envelope.values - tones)
-        fit = fit_decay(data, extra=beyond, modes=1 if fit.one_mode else 2, starts=[fit.decay])
-    return data, fit
+    fit: DecayFit
+    left: Leftover
 
 
 def is_plain(left: Leftover) -> bool:
-    """Return whether a residual is white, from its first row on."""
+    """Whether a residual is white, from its first row on."""
     return not left.early and left.widening < WHITE
 
 
-def examine_without_lines(envelope: Envelope, fit: DecayFit) -> Leftover:
-    """Examine a residual less its largest lines: interference is no reason to shorten the window."""
-    residual = fit.residual
-    for _ in range(LINES):
-        left = examine(envelope.time, residual)
-        if left.line is None:
+def fit_terms(envelope: Envelope, known: tuple[Terms, Guess] | None = None, most: int = 12) -> Found:
+    """Fit one mode or two, then add up to `most` terms beyond the linear decay while they pay, and drop those that no longer do."""
+    if known is None:
+        one, two = fit_decay(envelope, Terms(1)), fit_decay(envelope, Terms(2))
+        fit = _extend(envelope, two if one.cost - two.cost > _second(envelope) else one, most)
+    else:
+        fit = _drop(envelope, _add(envelope, fit_decay(envelope, known[0], [known[1]]), False, most))
+    left = examine(fit.residual)
+    if not fit.one_mode:
+        one = fit_decay(envelope, replace(fit.terms, modes=1), [replace(fit.found, start=None)])
+        if np.any(fit.decay.rates.real > 0) or one.cost - fit.cost < _second(envelope) * left.widening**2:
+            fit = _extend(envelope, one, most)
+            left = examine(fit.residual)
+    return Found(fit, left)
+
+
+def _second(envelope: Envelope) -> float:
+    """Return what a second mode must save: noise offers as many places for it as there are rows; each costs the odds."""
+    return PAYS + 2 * float(np.log(envelope.time.size))
+
+
+def _price(fit: DecayFit, terms: Terms) -> float:
+    """Return what terms must save beyond those of a fit."""
+    tones = terms.tones - fit.terms.tones
+    more = len(terms.curved) - len(fit.terms.curved) + (terms.drift - fit.terms.drift + 1) // 2
+    return NAMED * more + tones * (PAYS + 2 * float(np.log(fit.envelope.time.size)))
+
+
+def _extend(envelope: Envelope, fit: DecayFit, most: int) -> DecayFit:
+    """Add amplitude and drift first, or tones first where that takes tones or leaves something; then drop what does not pay."""
+    ways = [_add(envelope, fit, False, most)]
+    if ways[0].terms.tones or not is_plain(examine(ways[0].residual)):
+        ways.append(_add(envelope, fit, True, most))
+    ways = [_drop(envelope, one) if is_plain(examine(one.residual)) else one for one in ways]
+    return min(ways, key=lambda one: one.cost + _price(fit, one.terms))
+
+
+def _add(envelope: Envelope, fit: DecayFit, tones_first: bool, most: int) -> DecayFit:
+    """Add terms, by the fall that the linearised fit promises of each, while they pay."""
+    sure = fit  # the last whose price is paid for a residual that is not white, too
+    for _ in range(most):
+        rivals = [one for one in _rivals(envelope, fit) if one[0] > 0.5 * _price(fit, one[1])]
+        rivals.sort(key=lambda one: ((one[1].tones > fit.terms.tones) != tones_first, _price(fit, one[1]) - one[0]))
+        for _, terms, guess in rivals[:2]:
+            tried = fit_decay(envelope, terms, [guess])
+            if fit.cost - tried.cost > _price(fit, terms):
+                widening = examine(tried.residual).widening
+                sure = tried if sure.cost - tried.cost > _price(sure, terms) * widening**2 else sure
+                fit = tried
+                break
+        else:
             break
-        tone = np.exp(2j * np.pi * left.line * envelope.time)
-        residual = residual - np.outer(np.mean(residual * tone.conj(), axis=1), tone)
-    return examine(envelope.time, residual)
+    return sure
+
+
+def _drop(envelope: Envelope, fit: DecayFit) -> DecayFit:
+    """Leave out a term without which nothing is lost: a drift that stood for a cubic stiffness, or the other way round."""
+    terms, found = fit.terms, fit.found
+    poorer = [
+        (replace(terms, curved=tuple(one for one in terms.curved if one != name)), found) for name in terms.curved
+    ]
+    poorer += [(replace(terms, drift=0), replace(found, drift=()))] if terms.drift else []
+    for k in range(terms.tones):
+        tones, sizes = ((*each[:k], *each[k + 1 :]) for each in (found.tones, found.sizes))
+        poorer.append((replace(terms, tones=terms.tones - 1), replace(found, tones=tones, sizes=sizes)))
+    for less, guess in poorer if len(poorer) > 1 else []:
+        tried = fit_decay(envelope, less, [guess])
+        if tried.cost - fit.cost < _price(tried, terms):
+            return _drop(envelope, tried)
+    return fit
+
+
+def _rivals(envelope: Envelope, fit: DecayFit) -> Iterator[tuple[float, Terms, Guess]]:
+    """Yield (fall of −2 ln L that the linearised fit promises, terms, where to start) of every term that may be added."""
+    time = envelope.time - envelope.time[0]
+    noise = fit.noise[:, None]
+    r = fit.residual / noise
+    unit = SMALL / float(np.sum(np.abs(fit.start) ** 2) * time[-1])
+    more = [replace(fit.decay, **{name: getattr(fit.decay, name) + unit}) for name in CURVED]
+    swung = swing([fit.decay, *more], time, np.array([fit.start] * 3))
+    phase = np.exp(1j * (np.array(fit.found.drift) @ drift_shapes(time / time[-1], fit.terms.drift)))
+    z, *curved = (swung.sum(axis=1, keepdims=True) if fit.summed else swung) * phase / noise
+    Q = np.linalg.qr(fit.jacobian)[0]
+
+    def promise(*columns: Complex) -> tuple[float, Array]:
+        D = np.stack([np.concatenate([one.real.ravel(), one.imag.ravel()]) for one in columns], axis=1)
+        free = D - Q @ (Q.T @ D)
+        flat = np.concatenate([r.real.ravel(), r.imag.ravel()])
+        step = np.linalg.lstsq(free, flat, rcond=None)[0]
+        return 2 * float(flat @ free @ step), step
+
+    terms, found = fit.terms, fit.found
+    for name, column in zip(CURVED, curved, strict=True):
+        if name not in terms.curved:
+            gain, step = promise((column - z) / unit)
+            yield (
+                gain,
+                replace(terms, curved=(*terms.curved, name)),
+                replace(found, decay=replace(found.decay, **{name: float(step[0])})),
+            )
+    if terms.drift < DEGREES:
+        shapes = drift_shapes(time / time[-1], terms.drift + 2)[-2:]
+        gain, step = promise(*(1j * shape * z for shape in shapes))
+        yield gain, replace(terms, drift=terms.drift + 2), replace(found, drift=(*found.drift, *step.tolist()))
+    if terms.tones < TONES:
+        late = time > (1 - TAIL) * time[-1]
+        lines = {find_line(envelope.time, fit.residual), find_line(envelope.time[late], envelope.values[:, late])}
+        for line in lines - {None}:
+            tone = 2 * np.pi * float(line or 0.0)
+            wave = np.exp(1j * tone * time)
+            units = [np.eye(len(noise))[:, c : c + 1] / noise * wave for c in range(len(noise))]
+            gain, step = promise(*units, *(1j * one for one in units))
+            size = tuple((step[: len(noise)] + 1j * step[len(noise) :]).tolist())
+            yield (
+                gain,
+                replace(terms, tones=terms.tones + 1),
+                replace(found, tones=(*found.tones, tone), sizes=(*found.sizes, size)),
+            )

@@ -1,4 +1,4 @@
-"""Whiteness of the residual of a decay: how much wider the bound must be, lines in it, and a start that is not free decay."""
+"""Whiteness of the residual of a decay: how much wider the bound must be, a start that is not free decay, and lines."""
 
 from dataclasses import dataclass
 
@@ -19,12 +19,10 @@ class Leftover:
     # √ of the largest ratio between the variance of block means and what white noise leaves of it, at least 1
     widening: float
     early: bool  # whether the first rows miss by more than the rest: a transient, or a drive that still acts
-    line: float | None  # frequency (Hz, from the carrier) of a line in the residual, None where there is none
-    amplitude: float  # of that line, in the unit of the record
 
 
-def examine(time: Array, residual: Complex) -> Leftover:
-    """Return what a residual shows: a ratio of variances over block lengths, its first blocks, its largest line."""
+def examine(residual: Complex) -> Leftover:
+    """Return what a residual shows: a ratio of variances over block lengths, and its first blocks."""
     channels, rows = residual.shape
     variance = np.mean(np.abs(residual) ** 2, axis=1)
     scaled = residual / np.sqrt(variance)[:, None]
@@ -45,16 +43,16 @@ def examine(time: Array, residual: Complex) -> Leftover:
             rest = float(np.mean(energy[first:]))
             bound = scipy.stats.f.isf(RARE / 4, 2 * channels * first, 2 * channels * (count - first))
             early |= float(np.mean(energy[:first])) > max(bound, 1.0) * max(rest, 1e-300)
-    line, amplitude = _find_line(time, scaled, np.sqrt(variance))
-    return Leftover(float(np.sqrt(widest)), bool(early), line, amplitude)
+    return Leftover(float(np.sqrt(widest)), bool(early))
 
 
-def _find_line(time: Array, scaled: Complex, sd: Array) -> tuple[float | None, float]:
-    """Return the largest line of the residual where its power passes what the noise beside it has once in a thousand records."""
+def find_line(time: Array, residual: Complex) -> float | None:
+    """Return the frequency (Hz, from the carrier) of the largest line where its power passes what the noise beside it has once in a thousand records."""
+    scaled = residual / np.sqrt(np.mean(np.abs(residual) ** 2, axis=1))[:, None]
     step = float(np.median(np.diff(time)))
     grid = np.rint((time - time[0]) / step).astype(int)
     if grid[-1] > 8 * time.size:
-        return None, 0.0
+        return None
     even = np.zeros((scaled.shape[0], int(grid[-1]) + 1), dtype=complex)
     even[:, grid] = scaled
     power = np.sum(np.abs(np.fft.fft(even * np.hanning(even.shape[1]), axis=1)) ** 2, axis=0)
@@ -62,7 +60,5 @@ def _find_line(time: Array, scaled: Complex, sd: Array) -> tuple[float | None, f
     near = np.take(power, np.arange(at - 40, at + 41), mode="wrap")
     level = float(np.median(near)) / scipy.stats.chi2.median(2 * scaled.shape[0]) * 2
     if power[at] < level * scipy.stats.chi2.isf(RARE / power.size, 2 * scaled.shape[0]) / 2:
-        return None, 0.0
-    frequency = float(np.fft.fftfreq(power.size, step)[at])
-    tone = np.exp(-2j * np.pi * frequency * (time - time[0]))
-    return frequency, float(np.sqrt(np.sum(np.abs(np.mean(scaled * sd[:, None] * tone, axis=1)) ** 2)))
+        return None
+    return float(np.fft.fftfreq(power.size, step)[at])

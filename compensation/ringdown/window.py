@@ -3,13 +3,15 @@
 import numpy as np
 
 from compensation.ringdown.envelope import Envelope, estimate_noise, thin
-from compensation.ringdown.terms import examine_without_lines, extend, fit_modes, is_plain
+from compensation.ringdown.fit import carry_over
+from compensation.ringdown.terms import Found, fit_terms, is_plain
 from compensation.samples import block_means
 
-LATER = (0.35, 0.6, 0.15)  # parts of the record at whose end a free decay is looked for, where the whole is none
+LATER = (0.6, 0.35, 0.15)  # parts of the record after which a free decay is looked for, where the whole is none
+EASY = 3  # terms that are tried on the whole before
 HALVINGS = 4
 LEAST_ROWS = 64
-SEARCH_ROWS = 300
+SEARCH_ROWS, ROWS = 300, 1024
 JUMP = 0.5  # radians from which a turn of the phase between rows is no drift
 NEAR = 41
 
@@ -51,32 +53,42 @@ def find_jump(envelope: Envelope) -> float | None:
     return float(t[pairs[both[-1]] + 2]) if both.size else None
 
 
-def find_start(whole: Envelope) -> float:
-    """Return the first time from which one decay describes all that follows, its first rows as well as the rest.
+def find_free(whole: Envelope) -> Found:
+    """Return the fit from the first time from which one decay describes all that follows, its first rows as well as the rest.
 
-    Where that is not the whole record, the last start that fails and the first that does are brought together by halving.
+    Where that is not the whole record, the window grows backwards from its end, each fit from what the one before foretells, and the
+    last start that fails and the first that does not are brought together by halving; where all fail, what leaves the least is taken.
     """
     first, last = float(whole.time[0]), float(whole.time[-1])
-    judged: list[tuple[float, float]] = []
+    judged: list[tuple[float, float, Found]] = []
 
-    def describes(start: float) -> bool:
-        tried = thin(whole.within(start, last), SEARCH_ROWS)
+    def describe(start: float, known: Found | None = None, rows: int = SEARCH_ROWS, most: int = 12) -> Found | None:
+        tried = thin(whole.within(start, last), rows)
         if tried.time.size < LEAST_ROWS:
-            return False
-        fit = fit_modes(tried)
-        left = examine_without_lines(tried, fit)
-        if not is_plain(left):
-            fit, left, _ = extend(tried, fit, left, ())
-        judged.append((left.widening + (10.0 if left.early else 0.0), start))
-        return is_plain(left)
+            return None
+        found = fit_terms(
+            tried, None if known is None else (known.fit.terms, carry_over(known.fit, tried)), EASY if known else most
+        )
+        judged.append((found.left.widening + (10.0 if found.left.early else 0.0), start, found))
+        return found if is_plain(found.left) else None
 
-    if describes(first):
-        return first
-    good = next((start for part in LATER if describes(start := first + part * (last - first))), None)
-    if good is None:
-        return min(judged)[1] if judged else first
-    bad = max((start for _, start in judged if start < good), default=first)
-    for _ in range(HALVINGS):
-        middle = (bad + good) / 2
-        bad, good = (bad, middle) if describes(middle) else (middle, good)
-    return good
+    best, good, bad = describe(first, most=EASY), first, first
+    if best is None:
+        for start in (first + part * (last - first) for part in (*LATER, 0.0)):
+            found = describe(start, best)
+            if found is None and best is not None:
+                bad = start
+                break
+            best, good = (found, start) if found is not None else (best, good)
+        for _ in range(HALVINGS if best is not None and good > bad else 0):
+            middle = (bad + good) / 2
+            found = describe(middle, best)
+            bad, good, best = (middle, good, best) if found is None else (bad, middle, found)
+    if best is None:
+        if not judged:
+            return fit_terms(thin(whole, ROWS))
+        _, good, best = min(judged, key=lambda one: one[0])
+    full = thin(whole.within(good, last), ROWS)
+    if full.width == best.fit.envelope.width:
+        return best
+    return fit_terms(full, (best.fit.terms, carry_over(best.fit, full)))

@@ -41,7 +41,6 @@ QUANTITIES = {
     "damping_axis_deg": "axis of most damping (°)",
     "hardening_Hz": "frequency shift due to amplitude, at the start (Hz)",
     "thickening_per_s": "extra damping due to amplitude, at the start (1/s)",
-    "drift_Hz_per_s": "drift of the frequency (Hz/s)",
 }
 ESTIMATE = (
     "quantity",
