@@ -18,7 +18,7 @@ from studies.calibration.misreading import check_readings
 from studies.calibration.observed import HOUSING, QUADRATURE, RESPONSES, SETTLED, ObservedRun, SettledTable, observe
 from studies.calibration.posterior import posterior_card
 from studies.calibration.priors import Priors, check_exact, gather_priors
-from studies.calibration.problem import JUMP, SHIFT, CardProblem, State, wide_law
+from studies.calibration.problem import CardProblem, State, wide_law
 from studies.calibration.remarks import warn
 from studies.calibration.settled import SettledComparison, compare_settled
 from studies.errors import InputError
@@ -27,6 +27,7 @@ from studies.record import Record, drop_repeats
 from studies.record.plausible import check_card_frequency, check_one_gyro
 from studies.results.shown import Shown
 from studies.simulation.drive import COLUMN
+from studies.simulation.variations import JUMP, SHIFT
 
 if TYPE_CHECKING:
     from pandas import DataFrame

@@ -20,14 +20,13 @@ from studies.calibration.start import start_spread
 from studies.resonator.law import law_of, moved_law
 from studies.simulation.drive import Drive
 from studies.simulation.prediction import Prediction, predict
-from studies.simulation.variations import Variations
+from studies.simulation.variations import JUMP, KINK, SHIFT, Variations
 
 if TYPE_CHECKING:
     from shell.law import FrequencyLaw
     from studies.instrument.card import Instrument
 
 Array = NDArray[np.float64]
-SHIFT, JUMP, KINK = "shift", "jump.", "kink."
 MOST_JUMPS = 24  # of a run whose times are free, each for itself
 Progress = Callable[[str], None]
 

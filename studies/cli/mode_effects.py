@@ -14,7 +14,6 @@ from shell.modes import Mode
 from shell.prestress import Prestress
 from studies.errors import InputError, naming
 from studies.instrument.card import Instrument
-from studies.instrument.imperfect import is_imperfect
 from studies.loss.films import film_shifts
 from studies.results import Column, Table, row_of
 
@@ -60,7 +59,7 @@ def describe_effects(found: list[Mode], asked: Asked) -> list[dict[str, Any]]:
 
 def _split(m: Mode, asked: Asked) -> Entry | None:
     """What the card's imperfection and electrodes make of a pair."""
-    if m.theory == "rayleigh" or m.harmonic < 1 or not is_imperfect(asked.instrument):
+    if m.theory == "rayleigh" or m.harmonic < 1 or not asked.instrument.is_imperfect:
         return None
     from studies.resonator.splitting import SplitPair
 

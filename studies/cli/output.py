@@ -6,15 +6,17 @@ import json as json_module
 import math
 import re
 import sys
-from collections.abc import Callable, Mapping
+import tomllib
+from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
 from studies.errors import InputError
 from studies.files.paths import guarded
-from studies.instrument.caveats import caveats_of
 from studies.results import Result, Sentence
 from studies.results.terminal import print_result
 
@@ -45,7 +47,7 @@ def answers(schema: str, page: bool = True) -> Callable[[Callable[..., Result]],
             with guarded({**own.bind(*arguments, **options).arguments, "report": report}) as read:
                 result = command(*arguments, **options)
                 result = replace(result, payload=usual | result.payload)
-                if caveats := caveats_of(read):
+                if caveats := _caveats_of(read):
                     parts = [*result.parts, *(Sentence(text, "note") for text in caveats)]
                     result = replace(result, payload=result.payload | {"caveats": caveats}, parts=parts)
                 if report is not None:
@@ -67,6 +69,23 @@ def answers(schema: str, page: bool = True) -> Callable[[Callable[..., Result]],
         return run
 
     return give
+
+
+def _caveats_of(paths: Iterable[Path]) -> list[str]:
+    """Return the caveats of the materials of all cards among some files, each once."""
+    from shell.errors import ShellError
+    from studies.instrument.card import SCHEMA, load_card
+
+    found: dict[str, None] = {}
+    for path in paths:
+        if path.suffix != ".toml":
+            continue
+        with suppress(
+            OSError, ValueError, RecursionError, InputError, ShellError
+        ):  # the command says what is wrong with it
+            if tomllib.loads(path.read_text(encoding="utf-8-sig")).get("schema") == SCHEMA:
+                found |= dict.fromkeys(load_card(path).material.caveats)
+    return list(found)
 
 
 def keep_card(instrument: "Instrument", path: str | None) -> None:

@@ -14,9 +14,8 @@ from studies.reports.sweep import study_result
 from studies.reports.sweep_analysis import tolerance_table
 from studies.results import Column, Result, Table, row_of
 from studies.results.page import render_result
-from studies.sweeps.export import export_results
 from studies.sweeps.opening import is_running
-from studies.sweeps.results import Results, open_results
+from studies.sweeps.results import Results, export_results, open_results
 from studies.sweeps.run import Effort, check_functions, estimate_study, run_study
 from studies.sweeps.spec import read_study
 from studies.sweeps.validity import find_invalid

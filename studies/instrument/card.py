@@ -91,6 +91,12 @@ class Instrument:
         return found
 
     @property
+    def is_imperfect(self) -> bool:
+        """Whether the card says anything that could split a pair; else the resonator is a body of revolution."""
+        own, electrodes = self.part("imperfection"), self.part("electrodes")
+        return bool(own.fields is not None or own.split is not None or electrodes.are_charged)
+
+    @property
     def thermal(self) -> "Thermal":
         """The table `[thermal]` with its defaults."""
         found: Thermal = self.part("thermal")

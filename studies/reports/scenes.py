@@ -117,13 +117,12 @@ def show_mode(
     """
     from shell.modes import solve_modes
     from shell.surface import build_surface
-    from studies.instrument.imperfect import is_imperfect
 
     T = instrument.reference_temperature if temperature is None else temperature
     resonator, elastic = instrument.at(T)
     mode = solve_modes(resonator, elastic, harmonic, index + 1, theory, tolerance=1e-4)[index]
     surface = build_surface(resonator, mode)
-    if harmonic < 1 or not is_imperfect(instrument):
+    if harmonic < 1 or not instrument.is_imperfect:
         return ModeScene(instrument, T, resonator, mode, surface)
     return _show_split(instrument, T, resonator, mode, surface, exaggerated)
 

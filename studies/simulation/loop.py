@@ -14,7 +14,6 @@ from compensation.settled_turn import read_turning, turn_settled
 from compensation.wave import StandingWave
 from compensation.whole_angle import WITHOUT_RATE, simulate_whole_angle
 from studies.errors import InputError, naming
-from studies.instrument.imperfect import is_imperfect
 from studies.resonator.splitting import reference_split
 
 if TYPE_CHECKING:
@@ -57,7 +56,7 @@ def wave_of(
 def _frequency_split(instrument: "Instrument", loop: "Loop", harmonic: int) -> tuple[float, float]:
     """Δω (rad/s) and the axis of the higher frequency (rad): that of [loop], and what imperfection and electrodes make besides."""
     own = loop.frequency_split_mHz * 1e-3, float(np.radians(loop.frequency_axis_deg))
-    if not is_imperfect(instrument):
+    if not instrument.is_imperfect:
         return 2 * np.pi * own[0], own[1]
     split = reference_split(instrument, harmonic).split
     wave = own[0] * np.exp(2j * harmonic * own[1]) + split.frequency * split.wave

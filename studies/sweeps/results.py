@@ -1,5 +1,8 @@
 """The results of a study: a table with units, columns as arrays, failures, outcomes of searches."""
 
+import csv
+import io
+import json
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -9,6 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from studies.files.writing import write_text, written_whole
 from studies.instrument.card import build_instrument
 from studies.results.shown import Shown
 from studies.sweeps.block import Array, decode
@@ -211,3 +215,25 @@ def open_results(folder: str | Path) -> Results:
     given = about["instrument"]
     instrument = build_instrument(given["content"], given["path"])
     return Results(check_study(about["spec"], instrument, str(folder), about["folder"], about["spec_text"]), store)
+
+
+def export_results(results: Results, path: str | Path) -> Path:
+    """Write the table as CSV and, beside it, `NAME.units.json`, whose path is returned; floats keep every digit."""
+    with written_whole(path) as file:
+        text = io.TextIOWrapper(file, "utf-8", newline="")
+        csv.writer(text, lineterminator="\n").writerow(map(_harmless, results.header))
+        for frame in results.frames():
+            for name in frame.select_dtypes(exclude="number"):
+                frame[name] = frame[name].map(_harmless)
+            frame.to_csv(text, header=False, index=False, lineterminator="\n")
+        text.flush()
+        text.detach()
+    beside = Path(path).with_suffix(".units.json")
+    attributes = {"study": results.study.name, "units": results.units}
+    write_text(beside, json.dumps(attributes, indent=2, ensure_ascii=False) + "\n")
+    return beside
+
+
+def _harmless(cell: str) -> str:
+    """Return a text that no spreadsheet takes for a formula."""
+    return f"'{cell}" if cell.startswith(("=", "+", "-", "@", "\t")) else cell

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from shell.constants import zero_Celsius
 from studies.errors import InputError
-from studies.instrument.imperfect import is_imperfect
 from studies.instrument.units import unit_of
 from studies.simulation.heat_path import SENSOR, behind_housing, build_network, slowest_lag, with_sensor
 from studies.simulation.response import observed_rows
@@ -213,7 +212,7 @@ def _constants(instrument: "Instrument", law: "FrequencyLaw", boundary: "Boundar
     keys = instrument.part("electrodes").keys if instrument.part("electrodes").are_charged else None
     split, shift, own, per_volt = 0j, 0.0, 0.0, 0.0
     at = np.array([T0])
-    if is_imperfect(instrument):
+    if instrument.is_imperfect:
         found = reference_split(instrument).split
         split = complex(found.frequency * found.wave)
         shift = float(np.ravel(mean_shift(instrument, at))[0])

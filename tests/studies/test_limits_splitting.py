@@ -13,7 +13,6 @@ from shell.modes import solve_modes
 from studies.cli import main
 from studies.errors import InputError
 from studies.instrument.card import load_card, save_card
-from studies.instrument.imperfect import is_imperfect
 from studies.reports.scenes import show_mode
 from studies.resonator.splitting import SplitPair, mean_shift
 from studies.simulation.drive import drive_by_profile
@@ -109,7 +108,7 @@ def test_parts_add_as_waves(tmp_path):
 
 
 def test_a_plain_card_is_perfect_and_uncertain_numbers_are_listed(tmp_path):
-    assert not is_imperfect(loaded(tmp_path))
+    assert not loaded(tmp_path).is_imperfect
     assert not [one for one in loaded(tmp_path).uncertain if one.name.startswith(("imperfection", "electrodes"))]
     names = {one.name: one.sd for one in loaded(tmp_path, WALL, ELECTRODES).uncertain}
     assert names["imperfection.wave.0.amplitude_um"] == 0.1
@@ -290,7 +289,7 @@ def test_a_saved_card_takes_its_maps_along(tmp_path):
     instrument = loaded(tmp_path, '[[imperfection.map]]\nof = "wall"\nfile = "wall.csv"\n')
     (tmp_path / "deeper").mkdir()
     save_card(instrument, tmp_path / "deeper" / "card.toml")
-    assert is_imperfect(load_card(tmp_path / "deeper" / "card.toml"))
+    assert load_card(tmp_path / "deeper" / "card.toml").is_imperfect
 
 
 def test_an_acceleration_across_even_electrodes_makes_no_bias():

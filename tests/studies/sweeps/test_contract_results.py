@@ -17,8 +17,8 @@ import pytest
 from studies.errors import InputError, MissingEnvironment
 from studies.reports.sweep import study_result
 from studies.results.page import render_result
-from studies.sweeps.export import export_results
 from studies.sweeps.progress import Lines
+from studies.sweeps.results import export_results
 from studies.sweeps.run import run_study
 from tests.studies.sweeps.processes import environment, rows_of, spec_of, words_of
 
