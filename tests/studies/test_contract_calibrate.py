@@ -15,6 +15,7 @@ from studies.simulation.chamber import load_profile
 from studies.simulation.virtual_gyro import simulate_run
 
 
+@pytest.mark.slow
 @pytest.fixture(scope="module")
 def run(tmp_path_factory):
     path = tmp_path_factory.mktemp("calibrate") / "run<1>.csv"

@@ -18,6 +18,7 @@ def install(home, shell):
     return subprocess.run(command, capture_output=True, text=True, env=environment, cwd=home, timeout=600)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(BASH is None, reason="no bash on this machine")
 def test_bash_completes_commands_and_options(tmp_path):
     done = install(tmp_path, BASH)

@@ -54,7 +54,7 @@ def random_shells(seed, count=20):
         }
 
 
-@pytest.mark.parametrize("case", CASES, ids=str)
+@pytest.mark.parametrize("case", [pytest.param(CASES[0], marks=pytest.mark.slow), *CASES[1:]], ids=str)
 def test_emitted_code_agrees_with_quadrature(case, tmp_path, capsys):
     """Python, and C where there is a compiler: one derivation for both."""
     status, said = speak(capsys, "--code", "python", *options(*case))
@@ -214,6 +214,7 @@ def test_code_says_how_far_rayleigh_is_off_for_its_harmonic(n, solid, capsys):
         assert f"lower, by {100 * (1 - solid / assumed):.1f} % at h/R = 0.06" in said
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("words", [["--latex"], ["--code", "c"]])
 def test_out_holds_what_the_terminal_shows(words, tmp_path, capsys):
     file = tmp_path / "text"

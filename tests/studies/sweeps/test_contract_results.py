@@ -60,6 +60,7 @@ def test_values_are_those_of_the_solver(results):
     from shell.modes import solve_modes
     from studies.sweeps.parameters import set_parameters
 
+@pytest.mark.slow
     instrument = set_parameters(results.study.instrument, results.design(3))
     (mode,) = solve_modes(*instrument.at(instrument.reference_temperature), 2, 1, "shell")
     assert results.values[3, 0] == pytest.approx(mode.frequency, rel=1e-12)
