@@ -62,10 +62,10 @@ def misses(found, truth):
 
 @pytest.mark.slow
 def test_two_channels_reach_the_bound_and_their_intervals_hold():
-    """7 kHz, Q = 1e7, split 15 to 25 mHz: within 1.3 of the Cramér–Rao bound, and 90 % intervals hold 84 to 96 %."""
+    """7 kHz, Q = 1e7, split 15 to 25 mHz: within 1.3 of the Cramér–Rao bound, and 90 % intervals hold 86 to 94 %."""
     random = np.random.default_rng(20)
     scores, held, split, q, axis = [], [], [], [], []
-    for _ in range(20):
+    for _ in range(40):
         gyro = draw_gyro(random)
         found = analyse_decay(from_lock_in(TIME, ring(gyro, random), CARRIER))
         truth = truth_of(gyro)
@@ -76,8 +76,8 @@ def test_two_channels_reach_the_bound_and_their_intervals_hold():
         q.append(found.estimates["inverse_q"].value / truth["inverse_q"] - 1)
         axis.append(z["frequency_axis_deg"] * found.estimates["frequency_axis_deg"].sd)
     assert np.all(np.sqrt(np.mean(np.square(scores), axis=0)) < 1.3)
-    # 160 statements, of which some are about one thing: the binomial band of half as many
-    assert 0.84 <= np.mean(held) <= 0.96
+    # 320 statements, of which some are about one thing: the binomial band of half as many
+    assert 0.86 <= np.mean(held) <= 0.94
     assert np.max(np.abs(split)) < 1e-4
     assert np.max(np.abs(q)) < 0.01
     assert np.max(np.abs(axis)) < 1.0

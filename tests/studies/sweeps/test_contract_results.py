@@ -60,13 +60,13 @@ def test_values_are_those_of_the_solver(results):
     from shell.modes import solve_modes
     from studies.sweeps.parameters import set_parameters
 
-@pytest.mark.slow
     instrument = set_parameters(results.study.instrument, results.design(3))
     (mode,) = solve_modes(*instrument.at(instrument.reference_temperature), 2, 1, "shell")
     assert results.values[3, 0] == pytest.approx(mode.frequency, rel=1e-12)
     assert results.values[3, 1] == pytest.approx(mode.bryan_factor, rel=1e-10)
 
 
+@pytest.mark.slow
 def test_two_workers_give_the_same_bits(results):
     again = run_study(SPEC, workers=2)
     assert again.values.tobytes() == results.values.tobytes()
