@@ -29,8 +29,9 @@ DAY = 86400.0
 SESSION = 6 * 3600.0
 VISCOUS = 10.0  # Pa from which viscous gas is tried
 ROBUST = 2.0  # standard deviations beyond which a row counts less
-UNLIKE = 2.5
-"""Standard deviations of the difference from which the effect of the amplitude is another one at the beginning of the decays."""
+OUT = 5.0  # usual scatter of the places from which the first rows stand out
+UNLIKE = 1.96
+"""Standard deviations of the difference from which the effect of the amplitude is another one at the beginning of the decays: a false alarm costs one row in twenty, a launch that is kept a wrong law."""
 BEND = 20.0  # span of temperature (K) from which a bend of 1/Q is tried
 
 
@@ -94,7 +95,7 @@ def fit_law(rows: Rows, *, loss: bool) -> Law:
         one, two = (next(term for term in each.terms if term.name == "energy") for each in (law, rival))
         means = np.bincount(place, law.fitted - rows.value) / np.bincount(place)
         usual = 1.4826 * float(np.median(np.abs(means[first:])))
-        stands_out = float(np.max(np.abs(means[:first]))) > 2 * UNLIKE * usual
+        stands_out = float(np.max(np.abs(means[:first]))) > OUT * usual
         if stands_out or abs(one.value - two.value) > UNLIKE * sqrt(abs(two.sd**2 - one.sd**2)):
             fitted = np.full(len(rows.value), np.nan)
             fitted[keep] = rival.fitted

@@ -111,12 +111,16 @@ def swing(decays: "list[Decay]", time: Array, starts: Complex) -> Complex:
     a, b = np.array([one.matrix[0] for one in decays]).T if channels == 2 else (0j * turn, 0j * turn)
     first = np.zeros((3, len(decays)), complex)
     first[:channels] = starts.T
+    most = 4 * np.sum(np.abs(starts) ** 2, axis=1) + 1e-300
 
     def law(_: float, state: Complex) -> Complex:
         x, y = state.reshape(first.shape)[:2]
         energy = x.real**2 + x.imag**2 + y.real**2 + y.imag**2
+        free = energy < most  # what grows is no decay, and is not followed
         rate, spin = decay + loss * energy, 2 / 3 * turn * (x.real * y.imag - x.imag * y.real)
-        return np.concatenate([(a - rate) * x + (b - spin) * y, (b + spin) * x - (a + rate) * y, energy])
+        return np.concatenate(
+            [free * ((a - rate) * x + (b - spin) * y), free * ((b + spin) * x - (a + rate) * y), energy]
+        )
 
     size, end = float(np.max(np.abs(starts))), float(time[-1]) or 1.0
     fastest = float(np.max(np.abs([a, b, decay, turn * size**2, loss * size**2])))
