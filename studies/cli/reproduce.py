@@ -2,20 +2,15 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import TYPE_CHECKING
 
 from studies.cli.output import answers, dump_json, say
-from studies.diagnosis.table import diagnose_table
 from studies.files.writing import check_folder, write_text
-from studies.instrument.card import load_card
-from studies.papers import bias_twin, hrg
-from studies.papers.settling import study_settling
-from studies.reports.gyro_papers import reproduce_gyro_papers
-from studies.reports.reproduce import Reproduction, reproduce_result
 from studies.results import Result
-from studies.results.page import render_result
+
+if TYPE_CHECKING:
+    from compensation.arrays import Array
+    from studies.reports.reproduce import Reproduction
 
 GYROS = 12
 
@@ -29,6 +24,9 @@ def reproduce(*, out: str = "report") -> Result:
     Args:
         out: Folder for the files; created if it does not exist.
     """
+    from studies.reports.reproduce import reproduce_result
+    from studies.results.page import render_result
+
     folder = check_folder(out)
     parts = _reproduce()
     study, result = parts.study, reproduce_result(parts)
@@ -48,8 +46,15 @@ def reproduce(*, out: str = "report") -> Result:
     return replace(result, printed=told)
 
 
-def _reproduce() -> Reproduction:
+def _reproduce() -> "Reproduction":
     """Compute every part of the page, telling which one is under way."""
+    from studies.diagnosis.table import diagnose_table
+    from studies.instrument.card import load_card
+    from studies.papers import bias_twin, hrg
+    from studies.papers.settling import study_settling
+    from studies.reports.gyro_papers import reproduce_gyro_papers
+    from studies.reports.reproduce import Reproduction
+
     say("1/5 modes over temperature and a first diagnosis of Table 1 ...")
     instrument = load_card(hrg.CARD)
     study = hrg.study_table(*hrg.printed_table1(), resolution=hrg.RESOLUTION)
@@ -65,6 +70,6 @@ def _reproduce() -> Reproduction:
     return Reproduction(study, physics, diagnosis, settling, twins, chapters, summary)
 
 
-def _csv(columns: Mapping[str, NDArray[np.float64]]) -> str:
+def _csv(columns: "Mapping[str, Array]") -> str:
     rows = "\n".join(",".join(f"{float(x):.10g}" for x in row) for row in zip(*columns.values(), strict=True))
     return f"{','.join(columns)}\n{rows}\n"

@@ -10,10 +10,8 @@ from studies.cli.arguments import Folder, Quiet, Workers
 from studies.cli.output import answers, say
 from studies.errors import InputError
 from studies.files.writing import write_text
-from studies.reports.sweep import study_result
 from studies.reports.sweep_analysis import tolerance_table
 from studies.results import Column, Result, Table, row_of
-from studies.results.page import render_result
 from studies.sweeps.opening import is_running
 from studies.sweeps.results import Results, export_results, open_results
 from studies.sweeps.run import Effort, check_functions, estimate_study, run_study
@@ -115,6 +113,9 @@ def report(folder: Folder, *, out: Annotated[str | None, Parameter(name=("--repo
     Args:
         out: The page; default: report.html in the folder.
     """
+    from studies.reports.sweep import study_result
+    from studies.results.page import render_result
+
     results = open_results(folder)
     page = Path(out) if out else Path(folder) / "report.html"
     say("writing the page, with mode shapes if the study has modes ...")
