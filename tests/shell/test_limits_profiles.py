@@ -37,7 +37,6 @@ def test_the_same_frequency_as_with_an_element_between_each_two_points(h: float,
     assert abs(mode.frequency / point_by_point(resonator, 2) - 1) <= mode.relative_error_estimate
 
 
-@pytest.mark.slow
 def test_three_hundred_points_need_no_more_unknowns_than_a_constant_wall() -> None:
     (smooth,), (even,) = (solve_modes(one, SILICA, 2) for one in (measured(300, 1e-4), hemisphere(R, 0.9e-3)))
     assert smooth.solution is not None
@@ -46,6 +45,7 @@ def test_three_hundred_points_need_no_more_unknowns_than_a_constant_wall() -> No
     assert smooth.relative_error_estimate < 1e-5
 
 
+@pytest.mark.slow
 def test_a_kink_and_a_step_stay_where_they_are() -> None:
     s = np.array([*np.linspace(0, 0.6, 100), *np.linspace(0.6, 1, 100)[1:]])
     kinked = hemisphere(R, [(x, 0.9e-3 * (1 + 2 * max(x - 0.6, 0.0))) for x in s.tolist()])

@@ -15,7 +15,6 @@ from studies.simulation.chamber import load_profile
 from studies.simulation.virtual_gyro import simulate_run
 
 
-@pytest.mark.slow
 @pytest.fixture(scope="module")
 def run(tmp_path_factory):
     path = tmp_path_factory.mktemp("calibrate") / "run<1>.csv"
@@ -24,6 +23,7 @@ def run(tmp_path_factory):
     return path
 
 
+@pytest.mark.slow
 def test_what_has_not_converged_is_no_card(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr("studies.calibration.fit.MOST_STEPS", 1)
     card = tmp_path / "calibrated.toml"
