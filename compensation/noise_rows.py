@@ -206,9 +206,6 @@ def estimate_noise(
             since none is known from another.
         near: Levels from which the search begins: those of residuals that were much the same.
         stated: What is said of the slow levels beforehand, to a factor of 3; of a level of 0 nothing is.
-
-    Returns:
-        Noise
     """
     X = np.zeros((rows.count, 0)) if columns is None else columns
     size = np.linalg.norm(X, axis=0)
