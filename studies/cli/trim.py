@@ -210,6 +210,7 @@ def measure_after(planned: CardPlan) -> list[str]:
         found.append(
             f"A groove of this depth at position {entry['position']:g} has {number} ± {spread} (90 %) times the effect of "
             f"a wide, shallow cut of the same mass on the split of n = {entry['harmonic']}."
+            + (" Cuts side by side count as one groove." if planned.cuts[entry["position"]].touching > 1.01 else "")
         )
         if abs(value - 1) > 0.15 or error > 0.15:
             found.append(

@@ -1,7 +1,7 @@
 """Trimming of a card's resonator: the sites that its rim or teeth offer, and a plan for measured splits.
 
 What a groove does depends on its depth: the shape derivative holds for shallow, wide ones alone. So a plan is made, its cuts are
-solved (shell.groove), and made again with what they do, until the depth stays.
+solved (shell.groove), and made again with what they do, until the depth stays. Cuts that touch are one wide groove.
 """
 
 from collections.abc import Mapping, Sequence
@@ -51,11 +51,12 @@ class PlannedCut:
     splits: Mapping[int, GrooveSplit]  # by harmonic n
     first: Mapping[int, float]  # relative split per kg by the shape derivative, by n
     scatter: float  # relative, of the masses of the cuts there
+    touching: float = 1.0  # cuts side by side, which are one groove
 
     @property
     def mass(self) -> float:
         """What one cut removes, kg."""
-        return next(iter(self.splits.values())).mass
+        return next(iter(self.splits.values())).mass / self.touching
 
     @property
     def error(self) -> float:
@@ -230,29 +231,38 @@ def plan_for_card(
             for n, w in sites.gain.items()
         }
         plan = plan_with(gains, hypot(gain_error, max((cut.error for cut in cuts.values()), default=0.0)))
-        planned = {x: _typical(plan, x) for x in sorted({cut.position for cut in plan.round.cuts})}
-        if all(x in cuts and abs(mass / cuts[x].mass - 1) < SAME_DEPTH for x, (mass, _) in planned.items()):
+        planned = {x: _typical(plan, sites, x) for x in sorted({cut.position for cut in plan.round.cuts})}
+        if all(
+            x in cuts and max(abs(mass / cuts[x].mass - 1), abs(touching / cuts[x].touching - 1)) < SAME_DEPTH
+            for x, (mass, _, touching) in planned.items()
+        ):
             used = {x: cuts[x] for x in planned}
             for cut in used.values():
                 cut.check()
             return CardPlan(plan, used)
-        for x, (mass, spread) in planned.items():
+        for x, (mass, spread, touching) in planned.items():
             wall = float(resonator.at([x * resonator.length]).thickness[0])
             across = wall if kind == "edge" else tool.length
             depth = cuts[x].depth(mass) if x in cuts else mass / (elastic.rho * tool.width * across)
-            groove = Groove(kind, x, tool.width, tool.length, depth)
+            groove = Groove(kind, x, tool.width * touching, tool.length, depth)
             first = {n: float(w[sites.position == x][0]) for n, w in sites.gain.items()}
-            cuts[x] = PlannedCut(groove, {n: solve_groove(pair, groove) for n, pair in pairs.items()}, first, spread)
+            cuts[x] = PlannedCut(
+                groove, {n: solve_groove(pair, groove) for n, pair in pairs.items()}, first, spread, touching
+            )
     raise ShellError(
         f"no depth of these cuts achieves the plan: the stress that narrow grooves relieve cancels the effect of the mass they remove. {WIDER}"
     )
 
 
-def _typical(plan: TrimPlan, position: float) -> tuple[float, float]:
-    """Mean mass of the cuts at a position, weighted by itself, and its relative scatter."""
-    masses = np.array([cut.mass for cut in plan.round.cuts if cut.position == position])
+def _typical(plan: TrimPlan, sites: Sites, position: float) -> tuple[float, float, float]:
+    """Mean mass of the cuts at a position, weighted by itself, its relative scatter, and how many touch: (Σ m)²/Σ m² of a run."""
+    there = sorted((cut.azimuth % (2 * pi), cut.mass) for cut in plan.round.cuts if cut.position == position)
+    around, masses = np.array(there).T
+    step = 2 * pi / np.count_nonzero(sites.position == position)
+    runs = max(np.count_nonzero(np.diff(around, append=around[0] + 2 * pi) > 1.5 * step), 1)
     mean = float(masses @ masses / masses.sum())
-    return mean, float(np.sqrt(masses @ (masses - mean) ** 2 / masses.sum()) / mean)
+    scatter = float(np.sqrt(masses @ (masses - mean) ** 2 / masses.sum()) / mean)
+    return mean, scatter, max(float(masses.sum() / mean) / runs, 1.0)
 
 
 def other_cuts(resonator: "Resonator", elastic: "Elastic", harmonic: int, kind: CutKind) -> dict[str, float]:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from shell.elastic import Elastic
+from shell.groove import Groove, solve_groove
 from shell.imperfection import CoupledHarmonics, Imperfection, Pair, PointMass, find_split, wave
 from shell.meridian import cylinder, hemisphere
 from shell.modes import solve_modes
@@ -14,7 +15,7 @@ from shell.scan.projection import Projector
 from shell.scan.survey import rigid_shapes, survey
 from shell.trimming import SplitWave, plan_trim
 from studies.resonator.scan import polar_intervals
-from studies.resonator.trim import Teeth, rim_sites, tooth_sites
+from studies.resonator.trim import Teeth, Tool, plan_for_card, rim_sites, tooth_sites
 from tests.shell.scans import dome_points
 
 SILICA = Elastic(72.7e9, 0.17, 2203.0)
@@ -154,6 +155,18 @@ def test_planted_splits_end_below_half_a_millihertz_in_three_rounds(pair):
             for cut in plan.round.cuts:
                 gone.append(PointMass(-cut.mass * (1 + 0.02 * rng.standard_normal()), cut.azimuth))
         assert coupled.solve(Imperfection(density=density, masses=tuple(gone))).hertz < 5e-4
+
+
+@pytest.mark.slow
+def test_cuts_side_by_side_are_one_wide_groove(pair):
+    """Five touching cuts of 1 mm change the split as one of their width does; each alone would change it a third less."""
+    plan = plan_for_card(DOME, SILICA, [(2, 6.0, 0.5, 1e-4)], goal=1e-3, tool=Tool(1e-3, 1e-3, 0.1), kind="edge")
+    (cut,) = plan.cuts.values()
+    whole = solve_groove(pair, Groove("edge", 1.0, 5e-3, 1e-3, cut.groove.depth))
+    alone = solve_groove(pair, Groove("edge", 1.0, 1e-3, 1e-3, cut.groove.depth))
+    assert len(plan.plan.round.cuts) == 20
+    assert cut.gain(2) == pytest.approx(whole.wave / (whole.mass * cut.first[2]), rel=0.02)
+    assert alone.wave / alone.mass < 0.75 * whole.wave / whole.mass
 
 
 @pytest.mark.parametrize("errors", [0.0, 1.0, 5.0, 1200.0])
