@@ -256,8 +256,8 @@ def plan_for_card(
 
 def _typical(plan: TrimPlan, sites: Sites, position: float) -> tuple[float, float, float]:
     """Mean mass of the cuts at a position, weighted by itself, its relative scatter, and how many touch: (Σ m)²/Σ m² of a run."""
-    there = sorted((cut.azimuth % (2 * pi), cut.mass) for cut in plan.round.cuts if cut.position == position)
-    around, masses = np.array(there).T
+    there = [cut for cut in plan.round.cuts if cut.position == position]
+    masses, around = np.array([cut.mass for cut in there]), np.sort([cut.azimuth % (2 * pi) for cut in there])
     step = 2 * pi / np.count_nonzero(sites.position == position)
     runs = max(np.count_nonzero(np.diff(around, append=around[0] + 2 * pi) > 1.5 * step), 1)
     mean = float(masses @ masses / masses.sum())
