@@ -259,10 +259,10 @@ def _typical(plan: TrimPlan, sites: Sites, position: float) -> tuple[float, floa
     there = [cut for cut in plan.round.cuts if cut.position == position]
     masses, around = np.array([cut.mass for cut in there]), np.sort([cut.azimuth % (2 * pi) for cut in there])
     step = 2 * pi / np.count_nonzero(sites.position == position)
-    runs = max(np.count_nonzero(np.diff(around, append=around[0] + 2 * pi) > 1.5 * step), 1)
+    apart = np.diff(around, append=around[0] + 2 * pi) > 1.5 * step
     mean = float(masses @ masses / masses.sum())
     scatter = float(np.sqrt(masses @ (masses - mean) ** 2 / masses.sum()) / mean)
-    return mean, scatter, max(float(masses.sum() / mean) / runs, 1.0)
+    return mean, scatter, max(float(masses.sum()) / mean) / runs, 1.0)
 
 
 def other_cuts(resonator: "Resonator", elastic: "Elastic", harmonic: int, kind: CutKind) -> dict[str, float]:
