@@ -262,7 +262,7 @@ def _typical(plan: TrimPlan, sites: Sites, position: float) -> tuple[float, floa
     apart = np.diff(around, append=around[0] + 2 * pi) > 1.5 * step
     mean = float(masses @ masses / masses.sum())
     scatter = float(np.sqrt(masses @ (masses - mean) ** 2 / masses.sum()) / mean)
-    return mean, scatter, max(float(masses.sum()) / mean) / runs, 1.0)
+    return mean, scatter, max(float(masses.sum()) / mean / max(int(apart.sum()), 1), 1.0)
 
 
 def other_cuts(resonator: "Resonator", elastic: "Elastic", harmonic: int, kind: CutKind) -> dict[str, float]:
