@@ -22,6 +22,7 @@ Array = NDArray[np.float64]
 TOGETHER = 4  # designs that are computed together
 ROUNDS = 6  # over the whole box, at most
 BOXES = (0.15, 0.04, 0.01)  # half widths of the trust region, in parts of the ranges
+WIDER = 2.0  # half widths of a second step, computed beside the first
 REFINED = 8  # steps within boxes of one size, at most
 DRAWN = 100  # of which one is looked at because it is far off
 ENOUGH = 3  # regions that lead to one place
@@ -117,22 +118,25 @@ class Search:
         hopeful = sorted(drawn, key=lambda x: self._judge(surface, scalar, x))[: DRAWN // 4]
         return max(hopeful, key=lambda x: float(np.linalg.norm(self.x - x, axis=1).min()))
 
-    def descend(self, scalar: Scalar, best: int, boxes: Sequence[float] = BOXES) -> int:
-        """Improve a design within boxes that move with it and shrink, and return the place of the best one found."""
+    def descend(self, scalar: Scalar, best: int, boxes: Sequence[float] = BOXES, known: Sequence[int] = ()) -> int:
+        """Improve a design within boxes that move with it and shrink, and return the place of the best one found.
+
+        It ends where it comes to one of the designs `known` before.
+        """
         for half in boxes:
             centre, idle = np.full_like(self.start, np.inf), 0
             for _ in range(REFINED):
-                if np.abs(self.x[best] - centre).max() > half:
-                    centre = self.x[best]
+                if np.abs(self.x[best] - centre).max() > half and (idle or not (known or np.isfinite(centre).all())):
+                    centre = self.x[best]  # steps that keep what the interpolant said need no new star
                     self.margins = self.goals.margins(self.values[best], self.slopes(best, half))
                 surface = self.local(self.x[best], half)
                 best = self._best_near(best, half, scalar)
                 before = self._merit(best, scalar)
-                _, x = self._step(surface, scalar, self.x[best], *self._box(self.x[best], half))
-                self.look([x])
-                best = self._best_near(best, half, scalar)
+                boxes_here = (self._box(self.x[best], reach) for reach in (half, WIDER * half))
+                self.look([self._step(surface, scalar, self.x[best], *box)[1] for box in boxes_here])
+                best = self._best_near(best, WIDER * half, scalar)
                 idle = 0 if self._gained(before, scalar, best) else idle + 1
-                if self.spent or idle == 2:
+                if self.spent or idle == 2 or any(np.abs(self.x[best] - self.x[k]).max() < half for k in known):
                     break
         return best
 
@@ -143,7 +147,7 @@ class Search:
         """
         found: list[int] = []
         for k in self.explore(scalar):
-            found.append(self.descend(scalar, k, BOXES[:1]))
+            found.append(self.descend(scalar, k, BOXES[:1], found))
             apart = np.abs(self.x[found] - self.x[found[-1]]).max(axis=1)
             if (apart < BOXES[0]).sum() == ENOUGH or self.spent:
                 break
