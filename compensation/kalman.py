@@ -55,14 +55,6 @@ def model_gyro(k: float, zeta: float, step: float, process_noise: ArrayLike, mea
     )
 
 
-def observability(model: LinearModel) -> Array:
-    """Return C, C F, … C Fⁿ⁻¹ under each other: eq. (41). The states can be observed if it has rank n."""
-    rows = [model.measurement]
-    for _ in range(len(model.transition) - 1):
-        rows.append(rows[-1] @ model.transition)
-    return np.vstack(rows)
-
-
 def predict(model: LinearModel, x: Array, P: Array) -> tuple[Array, Array]:
     """Return state and covariance one step on: F x, F P Fᵀ + Q."""
     F = model.transition

@@ -28,6 +28,15 @@ def simulate(network: Network, boundaries: Mapping[str, Profile], initial: Array
         return integrate(network, boundaries, initial)
 
 
+def step_remaining(network: Network, before: float, after: float, weights: Array, time: ArrayLike) -> Array:
+    """Share of a step of all boundaries from `before` to `after` (K) that a mean over nodes lacks, `time` (s) after it."""
+    time = np.asarray(time, dtype=float)
+    profile = Profile(np.array([0.0, 0.0, time.max()]), np.array([before, after, after]))
+    transient = simulate(network, {boundary.name: profile for boundary in network.boundaries})
+    left: Array = (transient.observe(time, weights[None, :])[:, 0] - after) / (before - after)
+    return left
+
+
 def integrate(
     network: Network,
     boundaries: Mapping[str, Profile],

@@ -24,9 +24,8 @@ from studies.simulation.heat_path import build_network, build_shell_and_stem
 from studies.simulation.response import cell_weights
 from thermal.network import Network
 from thermal.profile import Profile
-from thermal.radiative import simulate
+from thermal.radiative import simulate, step_remaining
 from thermal.resonator import shell_weights
-from thermal.settling import identify_conductance, step_remaining
 
 ROOM_degC = 20.0
 STEPS_degC = (-10.0, 40.0)
@@ -79,24 +78,6 @@ class SettlingStudy:
     measured_curvature: float
     law_slope: float
     law_curvature: float
-
-
-def identify_mount(instrument: "Instrument") -> float:
-    """Find the mount's conductance (W/K) that leaves 5 % at 9 000 s, the mean of the two steps of Figure 3.
-
-    What is left is that of the temperature which the frequency sees.
-    """
-    weights = cell_weights(instrument, _law(instrument))
-
-    def remaining(conductance: float) -> float:
-        changed = instrument.with_values({"thermal.mount_conductance_W_per_K": conductance})
-        network = build_network(changed, radiation=True)
-        row = shell_weights(tuple(node.name for node in network.nodes), weights)
-        room = ROOM_degC + zero_Celsius
-        left = [step_remaining(network, room, T + zero_Celsius, row, [FAST])[0] for T in STEPS_degC]
-        return float(np.mean(left))
-
-    return identify_conductance(remaining, REMAINING)
 
 
 def study_settling(instrument: "Instrument", hours: tuple[float, ...] = (4.0, 4.5, 5.0)) -> SettlingStudy:

@@ -4,7 +4,7 @@ import pytest
 
 from studies.instrument.card import load_card
 from studies.instrument.tables.thermal import IDENTIFIED_MOUNT
-from studies.papers.settling import FAST, SETTLED, identify_mount, settling_chapter, soak_sentence, study_settling
+from studies.papers.settling import FAST, SETTLED, settling_chapter, soak_sentence, study_settling
 from studies.results import Figure, Sentence, Table
 
 
@@ -23,9 +23,8 @@ def curves(study, network):
 
 
 def test_the_cards_mount_is_the_identified_one(instrument):
-    mount = instrument.thermal.mount_conductance_W_per_K
-    assert mount == pytest.approx(identify_mount(instrument), rel=1e-3)
-    assert pytest.approx(mount, rel=1e-2) == IDENTIFIED_MOUNT
+    """What identifies it is the next test: 5 % left at 9 000 s."""
+    assert pytest.approx(instrument.thermal.mount_conductance_W_per_K, rel=1e-2) == IDENTIFIED_MOUNT
 
 
 def test_figure_3_is_95_percent_at_9000_s_and_under_1_percent_at_15000_s(study):
