@@ -25,6 +25,7 @@ STEPS = {
 FORMS = (
     "Form",
     Column("gain", "Evidence over the line", digits=3),
+    Column("over", "Null and scale over"),
     Column("held_out_deg_per_s", "Error on rates left out", "°/s", digits=2),
     Column("chosen", ""),
 )
@@ -123,7 +124,7 @@ def _law_row(law: RateLaw | None) -> dict[str, Any] | None:
         "chosen": law.chosen.name,
         "left_over": "structure" if law.structure else "none",
         "forms": [
-            {"form": f.name, "gain": f.gain, "held_out_deg_per_s": f.held_out, "values": f.values,
+            {"form": f.name, "gain": f.gain, "over": ", ".join(f.over), "held_out_deg_per_s": f.held_out, "values": f.values,
              "chosen": "←" if f.name == law.chosen.name else ""}
             for f in law.forms
         ],

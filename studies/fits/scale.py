@@ -88,11 +88,15 @@ def study_scale(records: "Sequence[Record]", cutoff: float | None, order: int) -
     output = choose_column(records, RAW, "a fit of the scale")
     column = choose_column(records, TEMPERATURES, "a fit of the scale over temperature")
     sorted_runs: dict[str, tuple[BellRun, str]] = {}
+    tables: list[BellRun] = []
     left_out = 0
     for record in records:
         run, missing = _read_run(record, output, column)
         left_out += missing
         kind = _classify(run, record.path)
+        if kind == TABLES or (kind == next(iter(KINDS)) and kind in sorted_runs):
+            tables.append(run)
+            continue
         if kind in sorted_runs:
             raise InputError(f"{record.path} and {sorted_runs[kind][1]} are both runs {kind}; give only one of them.")
         sorted_runs[kind] = (run, record.path)
@@ -112,12 +116,13 @@ def study_scale(records: "Sequence[Record]", cutoff: float | None, order: int) -
         before, after = _hold_out(thin, rough)
         figures = judge_steps(chain, rates, rest, turning)
     averaged = any(len(less.time) < len(run.time) for less, run in zip(thin, runs, strict=True))
-    judged = (figures, before, after, averaged, rough is not None, read_law(rates))
+    judged = (figures, before, after, averaged, rough is not None, read_law([rates, *tables]))
     return ScaleStudy(chain, runs, output, column, left_out, *judged)
 
 
 ROUGH = "at rest and then at one rate"
 """The paper's run for the rough null and scale, equation (33); without one they come from the run of several rates."""
+TABLES = "of several rates over temperature"  # for the law over rate and temperature only, as are further ones at one temperature
 PLATEAU = 0.05  # part of a run's rows from which an applied rate counts as a plateau
 KINDS = {
     "of several rates at one temperature": "equation (35)",
@@ -126,16 +131,35 @@ KINDS = {
 }
 
 
-def read_law(run: BellRun) -> RateLaw | None:
-    """Return the law of the raw output over the held rates (°/s), each by its mean with the error that its fifths show."""
-    level = same_rate(run.rate)
-    held = [rows for one in np.unique(level) if len(rows := np.flatnonzero(level == one)) >= 4 * BLOCKS]
-    fifths = np.array([[run.output[part].mean() for part in np.array_split(rows, BLOCKS)] for rows in held])
-    if not held:
+def read_law(runs: Sequence[BellRun]) -> RateLaw | None:
+    """Return the law of the raw output over rate (°/s) and temperature, from the mean of every hold within a kelvin.
+
+    A hold's error is what its fifths show about the line through them. It warms or cools where its run sweeps the temperature.
+    """
+    means: list[tuple[float, ...]] = []
+    scatter: list[float] = []
+    for run in runs:
+        level = same_rate(run.rate)
+        sweeps = float(np.ptp(run.temperature)) > SWEPT
+        half = 25 + level.size // 100
+        padded = np.pad(run.temperature, half, "edge")
+        course = np.convolve(padded[half:] - padded[:-half], np.ones(half + 1), "valid")
+        kelvin = np.floor(run.temperature) if sweeps else np.zeros_like(level)
+        key = np.stack([level, kelvin, np.sign(course) if sweeps else kelvin])
+        for rows in np.split(np.arange(level.size), np.flatnonzero(np.any(np.diff(key) != 0, axis=0)) + 1):
+            if len(rows) < 4 * BLOCKS:
+                continue
+            fifths = np.array([run.output[part].mean() for part in np.array_split(rows, BLOCKS)])
+            trend = np.polyval(np.polyfit(np.arange(BLOCKS), fifths, 1), np.arange(BLOCKS))
+            scatter.append(float(np.sum((fifths - trend) ** 2)) / (BLOCKS - 2))
+            middle = float(np.mean(run.temperature[rows]))
+            means.append((float(np.mean(run.rate[rows])) / DEG, float(fifths.mean()), middle, float(key[2, rows[0]])))
+    if not means:
         return None
+    rate, output, temperature, warming = np.array(means).T
     # one error of all, of many fifths
-    error = np.sqrt(np.mean(fifths.var(axis=1, ddof=1)) / BLOCKS) * np.ones(len(held))
-    return fit_rate_law(np.array([level[rows[0]] for rows in held]) / DEG, fifths.mean(axis=1), error)
+    error = np.sqrt(np.mean(scatter) / BLOCKS) * np.ones(len(means))
+    return fit_rate_law(rate, output, error, temperature, warming)
 
 
 def _classify(run: BellRun, path: str) -> str:
@@ -143,7 +167,7 @@ def _classify(run: BellRun, path: str) -> str:
     swept = float(np.ptp(run.temperature)) > SWEPT
     if np.ptp(run.rate) > max(LARGEST_REST * DEG, STEADY * np.max(np.abs(run.rate))):
         if swept:
-            raise InputError(f"{path}: both rate and temperature change; change one at a time.")
+            return TABLES
         levels, counts = np.unique(same_rate(run.rate), return_counts=True)
         held = levels[counts > PLATEAU * len(run.rate)]
         two = len(held) == 2 and float(np.min(np.abs(held))) <= LARGEST_REST * DEG

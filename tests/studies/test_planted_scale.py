@@ -14,7 +14,7 @@ from compensation.bell_calibration import BellRun, fit_chain
 from compensation.rate_law import fit_rate_law
 from studies.cli import main
 from studies.errors import InputError
-from studies.fits.scale import settled_rows
+from studies.fits.scale import read_law, settled_rows
 from studies.models import compensate, emit_c, read_model
 from studies.models.kinds.scale import load_scale
 from studies.papers.bvg import DEG, examine_claims, read_printed_chain, reduce_white, reproduce_bell, simulate_runs
@@ -86,6 +86,26 @@ def test_the_form_over_rate_is_chosen_by_evidence_and_rates_left_out():
         assert not law.structure
     wavy = fit_rate_law(x, x + 0.5 * np.sin(x / 30), np.full(x.size, 0.02))
     assert wavy.structure
+
+
+def test_a_rate_table_over_temperature_tells_warming_from_cooling():
+    """Thirteen rates again and again in a chamber that warms and cools: what null and scale were given comes back."""
+    rng, time = np.random.default_rng(4), 0.1 * np.arange(26 * 130)
+    rate = np.repeat(np.tile(np.linspace(-300.0, 300.0, 13), 10), 26)
+    away, warming = 15 * np.sin(2 * np.pi * time / time[-1]), np.sign(np.cos(2 * np.pi * time / time[-1]))
+    output = -690 + 40 * rate + 2 * away + 0.01 * away * rate + 3 * warming + 0.5 * rng.standard_normal(time.size)
+    law = read_law([BellRun(time, output, 293.15 + away, rate * DEG)])
+    assert law.chosen.name == "line"
+    assert set(law.chosen.over) == {"temperature", "warming"}
+    assert not law.structure
+    for name, value, within in (
+        ("k", 40, 1e-3),
+        ("a_T", 2, 0.02),
+        ("k_T", 0.01, 1e-4),
+        ("a_warming", 3, 0.1),
+        ("k_warming", 0, 1e-3),
+    ):
+        assert law.chosen.values[name] == pytest.approx(value, abs=within)
 
 
 def test_saved_model_is_the_fitted_chain_and_compensates(records, fitted):
