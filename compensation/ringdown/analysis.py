@@ -145,7 +145,7 @@ def _remark(envelope: Envelope, fit: DecayFit, left: Leftover, jump: float | Non
         said.append(
             f"The phase jumps at {jump:.4g} s (reference or samples lost, or a drive switched): only the part after it is used."
         )
-    if start - first > 2 * fit.envelope.width:
+    if start - (first if jump is None else jump) > 2 * fit.envelope.width:
         said.append(
             f"The first {start - first:.4g} s are not a free decay (drive, transient or release) and are left out."
         )

@@ -272,4 +272,5 @@ def carry_over(fit: DecayFit, envelope: Envelope) -> Guess:
     decay = replace(found.decay, detuning=found.decay.detuning + slope / float(time[-1] - time[0]))
     turned = [np.exp(1j * tone * back) for tone in found.tones]
     sizes = tuple(tuple(c * one for c in size) for size, one in zip(found.sizes, turned, strict=True))
-    return Guess(decay, start * np.exp(1j * level), tuple(drift), found.tones, sizes)
+    known = start * np.exp(1j * level) if np.all(np.isfinite(start)) else None
+    return Guess(decay, known, tuple(drift), found.tones, sizes)

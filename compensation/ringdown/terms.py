@@ -119,6 +119,8 @@ def _rivals(envelope: Envelope, fit: DecayFit) -> Iterator[tuple[float, Terms, G
 
     def promise(*columns: Complex) -> tuple[float, Array]:
         D = np.stack([np.concatenate([one.real.ravel(), one.imag.ravel()]) for one in columns], axis=1)
+        if not np.all(np.isfinite(D)):
+            return 0.0, np.zeros(D.shape[1])
         free = D - Q @ (Q.T @ D)
         flat = np.concatenate([r.real.ravel(), r.imag.ravel()])
         step = np.linalg.lstsq(free, flat, rcond=None)[0]

@@ -54,7 +54,8 @@ def fit_scale(
     Give three records in any order, each with time_s, rate_deg_per_s (the applied rate), a temperature, and output_counts or
     measured_rate_deg_per_s: several rates at one temperature; at rest over temperature; at one rate over temperature. A fourth
     record at one temperature, first at rest and then at one rate (the paper: five minutes of rest, then +100 °/s), gives the
-    rough null and scale (33); without it they are found from the record with several rates.
+    rough null and scale (33); without it they are found from the record with several rates. Further records with several rates, also
+    while the temperature changes, give the law over rate, temperature, warming and cooling.
 
     Args:
         cutoff: Cut-off frequency of the FIR filter in Hz; below half the output rate.
