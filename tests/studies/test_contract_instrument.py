@@ -59,6 +59,7 @@ COMMANDS = {
     "trim": ["trim", "CARD", "--split", "0.1", "--axis", "10"],
     "twin": ["twin", "CARD", "--c", "OUT"],
     "fleet": ["fleet", "LOT", "--out", "OUT", "--card", "CARD"],
+    "loads": ["loads", "CARD"],
 }
 
 
