@@ -1,7 +1,5 @@
 """Linearity of a rate output: measured against applied rate."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -19,18 +17,11 @@ def same_rate(rate: ArrayLike) -> Array:
     return np.asarray(np.round(x / grain) * grain, dtype=float)
 
 
-@dataclass(frozen=True)
-class Linearity:
-    """The line through measured over applied rate, and the largest departure from it."""
+def measure_nonlinearity(applied: ArrayLike, measured: ArrayLike) -> float:
+    """Return the largest departure from the line through measured over applied rate (rad/s), over the largest applied rate.
 
-    slope: float  # slope, intercept: of the line (1, rad/s)
-    intercept: float
-    # largest deviation from the line over full scale (1), full scale being the largest applied rate
-    nonlinearity: float
-
-
-def measure_linearity(applied: ArrayLike, measured: ArrayLike) -> Linearity:
-    """Judge measured against applied rate (rad/s) by the means of each applied rate, as the BVG paper does."""
+    By the means of each applied rate, as the BVG paper does.
+    """
     x, y = read_columns(applied=applied, measured=measured)
     _, kind = np.unique(same_rate(x), return_inverse=True)
     rates = np.bincount(kind, x) / np.bincount(kind)
@@ -38,5 +29,4 @@ def measure_linearity(applied: ArrayLike, measured: ArrayLike) -> Linearity:
         raise CompensationError(f"nonlinearity needs three applied rates or more, not {len(rates)}.")
     means = np.bincount(kind, y) / np.bincount(kind)
     slope, intercept = np.polynomial.polynomial.polyfit(rates, means, 1)[::-1]
-    worst = np.max(np.abs(means - slope * rates - intercept))
-    return Linearity(float(slope), float(intercept), float(worst / np.max(np.abs(rates))))
+    return float(np.max(np.abs(means - slope * rates - intercept)) / np.max(np.abs(rates)))

@@ -22,7 +22,6 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from compensation.noise import Noise
 from compensation.regression import LinearFit, fit_linear
 
 Array = NDArray[np.float64]
@@ -48,14 +47,6 @@ class ColouredFit:
     def white_deviation(self) -> float:
         """Standard deviation of the innovations, one row each."""
         return float(np.sqrt(self.regression.variance))
-
-
-def noise_of(theta: float, innovation: float = 1.0, step: float = 1.0) -> Noise:
-    """Return the levels of the noise of a θ, its innovations (one row each) and the step of the rows, s."""
-    white = max(theta + (1.0 - theta) ** 2 / 6.0, 0.0)
-    return Noise(
-        white=innovation * float(np.sqrt(white * step)), walk=innovation * (1.0 - theta) / float(np.sqrt(step))
-    )
 
 
 def whiten(Z: Array, theta: float, runs: Runs) -> Array:

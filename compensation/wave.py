@@ -49,11 +49,6 @@ class StandingWave:
         """N k, the precession of n θ per rate."""
         return self.harmonic * self.bryan_factor
 
-    @property
-    def quality(self) -> float | Array:
-        """Q = ω τ/2."""
-        return self.omega * self.tau / 2
-
     def decay(self, angle: ArrayLike) -> Array:
         """1/τ of a wave at the azimuth θ (1/s): 1/τ + ½ Δ(1/τ) cos 2n(θ − θ_τ)."""
         return np.asarray(1 / self.tau + self.damped(angle).real)

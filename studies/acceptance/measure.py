@@ -10,7 +10,7 @@ import scipy
 
 from compensation.arrays import Array
 from compensation.decimation import average_blocks
-from compensation.linearity import measure_linearity, same_rate
+from compensation.linearity import measure_nonlinearity, same_rate
 from compensation.noise_regression import fit_coloured
 from compensation.regression import LinearFit, fit_linear
 from compensation.stability import AllanDeviation, NoiseCoefficients
@@ -174,7 +174,7 @@ def measure_scale(record: "Record") -> Found:
         raise InputError(f"{record.path}: a scale factor needs at least three constant rates of eight rows each.")
     full, source = float(np.abs(rates).max()), [record.path]
     with naming(record.path):
-        departure = measure_linearity(rates, means).nonlinearity
+        departure = measure_nonlinearity(rates, means)
         fit = fit_linear(rates[:, None], means, ["rate"])
     found = {
         "scale_factor_error_ppm": of_fit(fit, 1, source, 1e6, -1.0),

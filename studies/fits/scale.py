@@ -10,7 +10,7 @@ from compensation.arrays import Array
 from compensation.bell import BellChain, apply_chain
 from compensation.bell_calibration import BellRun, fit_chain
 from compensation.decimation import average_blocks
-from compensation.linearity import measure_linearity, same_rate
+from compensation.linearity import measure_nonlinearity, same_rate
 from compensation.rate_law import RateLaw, fit_rate_law
 from compensation.samples import is_regular
 from compensation.stability import allan_deviation
@@ -70,7 +70,7 @@ def judge_steps(chain: BellChain, rates: BellRun, rest: BellRun, turning: BellRu
         steady = settled_rows(rates.rate, len(chain.taps) if step == "filtered" else 0)
         enough = len(np.unique(same_rate(rates.rate)[steady])) > 2
         wander, short, long = _read_allan((rest.time[-1] - rest.time[0]) / (len(rest.time) - 1), at_rest)
-        nonlinearity = measure_linearity(rates.rate[steady], at_rates[steady]).nonlinearity if enough else None
+        nonlinearity = measure_nonlinearity(rates.rate[steady], at_rates[steady]) if enough else None
         rest_sd, turning_sd = (float(np.std(one)) / DEG for one in (at_rest, at_turning))
         figures.append(StepFigures(step, nonlinearity, rest_sd, turning_sd, wander, short, long))
     return figures

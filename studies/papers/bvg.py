@@ -13,7 +13,7 @@ from compensation.arrays import Array
 from compensation.bell import BellChain, PolynomialCurve, invert_chain
 from compensation.bell_calibration import BellRun, fit_chain
 from compensation.fir import design_smoother
-from compensation.linearity import measure_linearity
+from compensation.linearity import measure_nonlinearity
 from shell.constants import zero_Celsius
 from studies.fits.scale import StepFigures, judge_steps
 
@@ -116,7 +116,7 @@ def examine_claims() -> Claims:
     gyro = read_printed_chain()
     sweep = zero_Celsius + np.linspace(LOWEST, HIGHEST, 2001)
     rates = np.linspace(-360, 360, 2001) * DEG
-    curved = measure_linearity(rates, gyro.scale_over_rate.value(rates)).nonlinearity
+    curved = measure_nonlinearity(rates, gyro.scale_over_rate.value(rates))
     over_rate = float(gyro.scale_over_rate.value(-361.4 * DEG))
     taps = design_smoother(STEP, CUTOFF, ORDER)
     before, after = PRINTED["random_walk"]

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from compensation.noise_regression import coloured_covariance, fit_coloured, noise_of, restricted_deviance, whiten
+from compensation.noise import Noise
+from compensation.noise_regression import coloured_covariance, fit_coloured, restricted_deviance, whiten
 from compensation.regression import fit_linear
 
 RUNS = [slice(0, 70), slice(70, 120)]
@@ -11,11 +12,17 @@ TIMES = [30.0 * np.arange(70), 30.0 * np.arange(50)]
 THETAS = (0.999, 0.8, 0.3, 0.0, -0.2)
 
 
+def noise_of(theta, step=1.0):
+    """Levels of the noise of a θ with innovations of 1 in rows of one step (s): N² = Δ (θ + (1 − θ)²/6), K² = (1 − θ)²/Δ."""
+    white = max(theta + (1.0 - theta) ** 2 / 6.0, 0.0)
+    return Noise(white=float(np.sqrt(white * step)), walk=(1.0 - theta) / float(np.sqrt(step)))
+
+
 def dense(theta):
     """Covariance of both runs, of rows that are means over 30 s, for innovations of 1."""
     total = np.zeros((120, 120))
     for run, t in zip(RUNS, TIMES, strict=True):
-        total[run, run] = noise_of(theta, 1.0, 30.0).covariance(t, 30.0)
+        total[run, run] = noise_of(theta, 30.0).covariance(t, 30.0)
     return total
 
 
