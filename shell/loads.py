@@ -21,11 +21,11 @@ from shell.elastic import Elastic
 from shell.errors import ShellError
 from shell.finite import displacement_gradients, solved_as_solid, tensor
 from shell.inertia import MassProperties, weigh
-from shell.kernel import StrainTable, shell_table
+from shell.kernel import StrainTable
 from shell.modes import Mode
 from shell.prestress import expansion_shares, mean_answer, neighbour, settle
-from shell.quadrature import Array, Basis, gauss
-from shell.solution import COSINE, SINE, Solution, total
+from shell.quadrature import Array, gauss
+from shell.solution import COSINE, SINE, Solution, face_table, total
 from shell.system import Group, ShellGroup, System
 
 Kind = Literal["axial", "lateral", "spin", "pressure", "cooling"]
@@ -108,7 +108,7 @@ class Loads:
             elif kind == "spin":
                 force = along_r(group, rho * radii(group, system))
             elif kind == "axial":
-                force = _along_z(group, np.full(shape, -rho))
+                force = _directed(group, np.full(shape, -rho), 2)
             else:
                 force = along_r(group, np.full(shape, -rho))
                 force[:, :, 1] = rho
@@ -144,15 +144,12 @@ class Loads:
         """Displacement of the rim's middle surface under loads, and its tilt, the slope of its axial displacement."""
         axial = lateral = tilt = 0.0
         for kind, amount in amounts.items():
-            solution = self.answers[kind]
-            d, edge = self._rim(solution)
-            u, w = d[0] * amount, d[2] * amount
-            along_axis, outwards = edge.tangent_z * u + edge.tangent_r * w, edge.tangent_r * u - edge.tangent_z * w
+            outwards, along_axis, radius = self._rim(self.answers[kind])
             if WAVES[kind]:
-                lateral, tilt = lateral + outwards, tilt + along_axis / edge.r
+                lateral, tilt = lateral + amount * outwards, tilt + amount * along_axis / radius
             else:
-                axial += along_axis
-        return Sag(float(axial), float(lateral), float(tilt))
+                axial += amount * along_axis
+        return Sag(axial, lateral, tilt)
 
     def gap(self, kind: Kind, first: float, last: float) -> float:
         """Mean displacement of the wall along its normal between two positions, m per unit, at azimuth 0."""
@@ -206,14 +203,6 @@ class Loads:
         return mean_answer(self.mode)[0]
 
     @cached_property
-    def _tables(self) -> dict[int, list[StrainTable | CellTable]]:
-        """Strains where stresses are largest: at the faces of the wall, over whole cells."""
-        found: dict[int, list[StrainTable | CellTable]] = {}
-        for kind, wave in WAVES.items():
-            found.setdefault(wave, [_edges(group, self._systems[kind]) for group in self._systems[kind].groups])
-        return found
-
-    @cached_property
     def _parts(self) -> list[list[str]]:
         groups = self._systems["axial"].groups
         return [
@@ -223,7 +212,8 @@ class Loads:
 
     def _stress(self, kind: Kind, amount: float) -> tuple[int, list[Array]]:
         solution, found = self.answers[kind], []
-        for table, c, q in zip(self._tables[WAVES[kind]], solution.constants, solution.unknowns, strict=True):
+        for k, (c, q) in enumerate(zip(solution.constants, solution.unknowns, strict=True)):
+            table = _edges(solution, k)
             stress = c.stress(table, table.strains(q))
             if kind == "cooling":
                 lam, G = c.lame
@@ -231,29 +221,17 @@ class Loads:
             found.append(amount * stress)
         return WAVES[kind], found
 
-    def _rim(self, solution: Solution) -> tuple[Array, "_Edge"]:
-        """The free end of the wall: displacement (3,) of its middle surface nearest to the end, along its axes."""
-        assert self.mode.resonator is not None
-        at_start = self.mode.resonator.support == "clamped-rim"
-        best: tuple[float, Array, _Edge] | None = None
-        for group, d in zip(solution.system.groups, solution.displacement, strict=True):
-            if not isinstance(group, ShellGroup):
-                continue
-            position = group.table.position if at_start else 1 - group.table.position
-            e, s = np.unravel_index(int(np.argmin(position)), position.shape)
-            if best is None or position[e, s] < best[0]:
-                section, weight = group.place.section, group.table.volume[e, s]
-                edge = _Edge(*(float(x[e, s]) for x in (section.r, section.tangent_r, section.tangent_z)))
-                best = float(position[e, s]), d[e, s] @ weight / weight.sum(), edge
-        assert best is not None
-        return best[1:]
-
-
-@dataclass(frozen=True)
-class _Edge:
-    r: float
-    tangent_r: float
-    tangent_z: float
+    def _rim(self, solution: Solution) -> tuple[float, float, float]:
+        """Displacement along r and z of the middle surface next to the free end of the wall, and its radius."""
+        walls = [k for k, group in enumerate(solution.system.groups) if isinstance(group, ShellGroup)]
+        far = {k: self.away(solution.system.groups[k].table.position) for k in walls}
+        k = max(walls, key=lambda k: far[k].max())
+        group, (e, s) = solution.system.groups[k], np.unravel_index(int(np.argmax(far[k])), far[k].shape)
+        assert isinstance(group, ShellGroup)
+        weight, section = group.table.volume[e, s], group.place.section
+        u, _, w = solution.displacement[k][e, s] @ weight / weight.sum()
+        t_r, t_z = section.tangent_r[e, s], section.tangent_z[e, s]
+        return float(t_r * u - t_z * w), float(t_z * u + t_r * w), float(section.r[e, s])
 
 
 def radii(group: Group, system: System) -> Array:
@@ -267,29 +245,25 @@ def radii(group: Group, system: System) -> Array:
 
 def along_r(group: Group, amount: Array) -> Array:
     """A vector field along r, in the axes of a group: (elements, stations, 3, points)."""
+    return _directed(group, amount, 0)
+
+
+def _directed(group: Group, amount: Array, axis: int) -> Array:
+    """A vector field along r (axis 0) or z (axis 2), in the axes of a group."""
     field = np.zeros((*amount.shape[:2], 3, amount.shape[2]))
-    if isinstance(group, ShellGroup):
-        section = group.place.section
-        field[:, :, 0], field[:, :, 2] = section.tangent_r[..., None] * amount, -section.tangent_z[..., None] * amount
-    else:
-        field[:, :, 0] = amount
+    if not isinstance(group, ShellGroup):
+        field[:, :, axis] = amount
+        return field
+    t_r, t_z = group.place.section.tangent_r[..., None], group.place.section.tangent_z[..., None]
+    tangent, normal = (t_r, -t_z) if axis == 0 else (t_z, t_r)
+    field[:, :, 0], field[:, :, 2] = tangent * amount, normal * amount
     return field
 
 
-def _along_z(group: Group, amount: Array) -> Array:
-    field = np.zeros((*amount.shape[:2], 3, amount.shape[2]))
+def _edges(solution: Solution, number: int) -> StrainTable | CellTable:
+    group = solution.system.groups[number]
     if isinstance(group, ShellGroup):
-        section = group.place.section
-        field[:, :, 0], field[:, :, 2] = section.tangent_z[..., None] * amount, section.tangent_r[..., None] * amount
-    else:
-        field[:, :, 2] = amount
-    return field
-
-
-def _edges(group: Group, system: System) -> StrainTable | CellTable:
-    if isinstance(group, ShellGroup):
-        faces = np.array([-1.0, 1.0]), np.ones(2)
-        return shell_table(group.place.section, system.n, system.level.through, faces, Basis(*group.table.along))
+        return face_table(solution, number)
     mesh, degree = group.place.mesh, group.place.mesh.grid.shape[2] - 1
     place = Reference.at(ACROSS, ACROSS, np.ones((len(ACROSS),) * 2), degree, degree)
-    return tabulate_cells(mesh.grid, place, system.n, float(group.table.position[0, 0]))
+    return tabulate_cells(mesh.grid, place, solution.system.n, float(group.table.position[0, 0]))

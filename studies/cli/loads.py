@@ -31,7 +31,7 @@ from studies.cli.arguments import (
 from studies.cli.output import answers
 from studies.errors import InputError, naming
 from studies.instrument.card import Instrument
-from studies.resonator.loads import STANDARD_GRAVITY, bias_by_tilt, shift_per_kelvin
+from studies.resonator.loads import STANDARD_GRAVITY, bias_by_tilt, loads_of, shift_per_kelvin
 from studies.results import Column, Facts, Result, Table, row_of
 
 ABROAD = (
@@ -83,10 +83,9 @@ def loads(
     instrument, T = open_card(card, temperature)
     if harmonic < 2:
         raise InputError(f"--harmonic {harmonic}: the effects of loads are computed for n = 2 and above.")
-    resonator, elastic = instrument.at(T)
     with naming(instrument.path):
-        (mode,) = solve_modes(resonator, elastic, harmonic)
-        found = Loads(mode, elastic)
+        found = loads_of(instrument, T, harmonic)
+        mode, elastic = found.mode, found.elastic
         amounts: dict[str, tuple[Kind, float, str, float, float]] = {
             # load: kind, amount, unit, units of the solver in it, δ ln f
             "acceleration along the axis": ("axial", along, "g", STANDARD_GRAVITY * along, found.shift("axial")),
