@@ -37,7 +37,7 @@ from studies.results import Column, Facts, Result, Table, row_of
 ABROAD = (
     "Shift of the mean frequency of the pair, in the frame of the resonator. An acceleration across the axis shifts it only in second order."
     " Stresses: the largest tension and that after von Mises, in the wall{root}; at sharp corners and at the clamp a linear elastic"
-    " stress is not finite, so they are not counted: see the stem below."
+    " stress is not finite, so they are not counted."
 )
 COLUMNS = (
     Column("load", "load"),
@@ -86,40 +86,38 @@ def loads(
     with naming(instrument.path):
         found = loads_of(instrument, T, harmonic)
         mode, elastic = found.mode, found.elastic
-        amounts: dict[str, tuple[Kind, float, str, float, float]] = {
-            # load: kind, amount, unit, units of the solver in it, δ ln f
-            "acceleration along the axis": ("axial", along, "g", STANDARD_GRAVITY * along, found.shift("axial")),
-            "acceleration across the axis": ("lateral", across, "g", STANDARD_GRAVITY * across, 0.0),
-            "rotation": (
-                "spin",
-                rotation,
-                "°/s",
-                radians(rotation) ** 2,
-                spin_shift(mode, elastic).total if rotation else 0.0,
-            ),
-            "pressure": ("pressure", pressure, "kPa", 1e3 * pressure, found.shift("pressure") if pressure else 0.0),
-            "temperature of the base": ("cooling", gradient, "°C", *_warmth(instrument, found, T, gradient)),
+        g, alpha = STANDARD_GRAVITY, float(instrument.material.value("expansion", T)) if gradient else 0.0
+        amounts: dict[str, tuple[Kind, float, str, float]] = {
+            # load: kind, amount, unit, units of the solver in it
+            "acceleration along the axis": ("axial", along, "g", g * along),
+            "acceleration across the axis": ("lateral", across, "g", g * across),
+            "rotation": ("spin", rotation, "°/s", radians(rotation) ** 2),
+            "pressure": ("pressure", pressure, "kPa", 1e3 * pressure),
+            "temperature of the base": ("cooling", gradient, "°C", alpha * gradient),
         }
         given = {name: one for name, one in amounts.items() if one[1]}
         if not given:
             raise InputError("no load is given; --along 1 is an acceleration of 1 g along the axis.")
+
+        def shift(kind: Kind, units: float) -> float:
+            if kind == "spin":
+                return units * spin_shift(mode, elastic).total
+            return gradient * shift_per_kelvin(instrument, found, T) if kind == "cooling" else units * found.shift(kind)
+
+        every: dict[Kind, float] = {kind: units for kind, _, _, units in given.values()}
+        shifts = {kind: shift(kind, units) for kind, units in every.items()}
         rows = [
-            {"load": name, "amount": amount, "unit": unit} | _under(found, {kind: units}, units * shift)
-            for name, (kind, amount, unit, units, shift) in given.items()
+            {"load": name, "amount": amount, "unit": unit} | _under(found, {kind: units}, shifts[kind])
+            for name, (kind, amount, unit, units) in given.items()
         ]
-        every: dict[Kind, float] = {kind: units for kind, _, _, units, _ in given.values()}
-        whole = _under(found, every, sum(units * shift for *_, units, shift in given.values()))
+        whole = _under(found, every, sum(shifts.values()))
         if len(rows) > 1:
             rows.append({"load": "all together", "amount": None, "unit": ""} | whole)
-        stem = found.beam(STANDARD_GRAVITY * along, STANDARD_GRAVITY * across)
-        tilted, nonlinear = (
-            bias_by_tilt(instrument, found, T),
-            _amplitudes(instrument, harmonic, lay_temperatures(from_degC, to_degC, step)),
-        )
+        stem, tilted = found.beam(g * along, g * across), bias_by_tilt(instrument, found, T)
+        nonlinear = _amplitudes(instrument, harmonic, lay_temperatures(from_degC, to_degC, step))
     bias = row_of(tilted, "deg_per_h_per_g", "azimuth_deg", gap_nm_per_g=("gap", 1e9)) if tilted else None
     worst = max(whole["tension_MPa"], whole["mises_MPa"], 1e-6 * stem)
     safety = None if strength is None else strength / worst
-    g = STANDARD_GRAVITY
     (upright, aside) = found.sag({"axial": g}), found.sag({"lateral": g})
     per_g = {
         "axial_ppb": 1e9 * g * found.shift("axial"),
@@ -163,14 +161,6 @@ AMPLITUDE = (
     Column("change_ppm_per_degC", "relative change from the first row", "ppm/°C", "+.3g"),
 )
 NONLINEAR = "Geometry alone, of a standing wave; hrg modes --amplitude shows its parts."
-
-
-def _warmth(instrument: Instrument, found: Loads, T: float, gradient: float) -> tuple[float, float]:
-    """Units of `cooling` in a difference of temperature, and δ ln f per unit."""
-    if not gradient:
-        return 0.0, 0.0
-    alpha = float(instrument.material.value("expansion", T))
-    return alpha * gradient, shift_per_kelvin(instrument, found, T) / alpha
 
 
 def _under(found: Loads, amounts: dict[Kind, float], shift: float) -> dict[str, Any]:
