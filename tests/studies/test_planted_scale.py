@@ -245,7 +245,7 @@ def test_filter_reduces_the_allan_deviation_as_predicted():
 @pytest.mark.slow
 def test_long_runs_are_averaged_for_the_fit(monkeypatch):
     """Block averages give the same chain as the rows, and no block mixes two applied rates."""
-    from studies import scale
+    from studies.fits import scale
 
     rates, rest, turning = (
         BellRun(run.time[::4], run.output[::4], run.temperature[::4], run.rate[::4])
