@@ -7,7 +7,10 @@ import numpy as np
 import pytest
 
 from studies.cli import main
+from studies.fits.ringdown import read_decay
 from studies.instrument.card import load_card
+from tests.benchmarks.hands.decays import make
+from tests.benchmarks.ringdowns import PAIRS
 from tests.compensation.two_oscillators import Gyro, noisy
 
 GYRO = Gyro(4599.75, 4599.63, 9.0e5, 1.1e6, np.radians(31), np.radians(70))
@@ -195,3 +198,19 @@ def test_decays_over_pressure_give_the_gas_law(tmp_path, capsys):
     assert law["level"] == pytest.approx(1e-7, rel=0.03)
     assert law["terms"][0]["term"] == "pressure"
     assert law["terms"][0]["value"] == pytest.approx(5e-5, rel=0.03)
+
+
+@pytest.mark.parametrize(
+    ("kind", "word"), [("cubic", "cubic stiffness"), ("crosstalk", "Interference"), ("drift", "drifts with time")]
+)
+def test_decays_of_an_independent_generator_are_named_and_fitted(tmp_path, kind, word):
+    """A shift of 6.6 line widths of an ellipse, a drive that leaks into the pick-offs, a drift: no interval misses by twice its width."""
+    index = {"cubic": 1, "crosstalk": 3, "drift": 3}[kind]
+    decay = make(kind, 1, index)
+    found = read_decay(decay.write(tmp_path / "decay.csv"))
+    assert any(word in remark for remark in found.remarks)
+    for name, e in found.estimates.items():
+        truth = decay.truth.get(PAIRS.get(name, ""))
+        if truth is not None and not (kind == "drift" and name in ("frequency_1_Hz", "frequency_2_Hz", "frequency_Hz")):
+            away = (truth - e.value + 45) % 90 - 45 if name.endswith("axis_deg") else truth - e.value
+            assert 1.5 * e.low - 0.5 * e.high < e.value + away < 1.5 * e.high - 0.5 * e.low, name
