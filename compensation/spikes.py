@@ -9,7 +9,6 @@ from compensation.arrays import Array
 REACH = 3
 NEIGHBOURS = 2 * REACH + 1
 SPIKE, ALONE = 6.0, 4.0
-FEW, LEVEL = 3, 25
 STUCK = 20  # readings in a row that are alike, where those beside them mostly differ, make a sensor that is stuck
 
 
@@ -72,29 +71,6 @@ def find_dropouts(values: Array) -> NDArray[np.bool_]:
     low, high = np.percentile(others, [1, 99])
     room = 0.5 * (high - low)
     return np.asarray((values == 0) & bool(low - room > 0 or high + room < 0))
-
-
-def find_spike_groups(rests: Array, step: float = 0.0) -> NDArray[np.bool_]:
-    """Mark one to three readings within four rows that stand out together from what a model leaves, (m,).
-
-    The level is the median of the twenty-five rows about each, which three readings do not move. Those farther from it than 6
-    robust standard deviations are together where no two rows lie between them, and are marked where the mean distance of
-    the three rows before, and of the three after, is below a quarter of the smallest among them: a dip, a decay or a jump
-    has a shoulder, what lasts longer is for the model, and what an end cuts off may last longer. `step` as of `find_spikes`.
-    """
-    marked, rows = np.zeros(len(rests), dtype=bool), np.flatnonzero(np.isfinite(rests))
-    if len(rows) < LEVEL:
-        return marked
-    distance = np.abs(rests[rows] - scipy.ndimage.median_filter(rests[rows], LEVEL, mode="mirror"))
-    far = np.flatnonzero(distance > SPIKE * max(1.4826 * float(np.median(distance)), 0.5 * step))
-    groups = np.split(far, np.flatnonzero(np.diff(far) > 2) + 1) if far.size else []
-    for own in groups:
-        first, last = int(own[0]), int(own[-1])
-        sides = distance[max(first - REACH, 0) : first], distance[last + 1 : last + 1 + REACH]
-        few = own.size <= FEW and last - first <= FEW and all(side.size == REACH for side in sides)
-        if few and ALONE * max(side.mean() for side in sides) < distance[own].min():
-            marked[rows[own]] = True
-    return marked
 
 
 def _stand_out(values: Array, least: float) -> NDArray[np.bool_]:

@@ -15,7 +15,6 @@ from studies.record import Record, read_record
 
 if TYPE_CHECKING:
     from studies.calibration.calibrate import Calibration
-    from studies.diagnosis.investigate import Diagnosis
     from studies.diagnosis.table import TableDiagnosis
     from studies.inference.diagnosis import Inference
     from studies.inference.unjudged import Unjudged
@@ -79,7 +78,7 @@ def calibrate(
     return find_values(open_card(card), records, settled, left, exact, progress=progress or (lambda _: None))
 
 
-def diagnose(*runs: Run, card: Card | None = None) -> "Diagnosis | Inference | Unjudged | TableDiagnosis":
+def diagnose(*runs: Run, card: Card | None = None) -> "Inference | Unjudged | TableDiagnosis":
     """Return what a campaign shows and the simulation lacks, with its causes: `hrg diagnose`; `.verdict` is the outcome.
 
     Args:
@@ -104,27 +103,8 @@ def diagnose_records(
     card: Instrument | None = None,
     chamber: "Chamber | None" = None,
     progress: Progress | None = None,
-) -> "Diagnosis | Inference | Unjudged":
-    """Return what a campaign shows and the simulation lacks; with a `chamber`, the run that should come next in it.
-
-    Without a card the engine of `studies.diagnosis` answers: on unseen campaigns it names more single effects rightly than the
-    joint inference with a polynomial card (43 of 47 against 36).
-    """
-    from studies.diagnosis.campaign import load_campaign
-    from studies.diagnosis.investigate import investigate
-
-    if card is None:
-        return investigate(load_campaign(records), progress=progress, chamber=chamber)
-    return infer_records(records, card, chamber, progress)
-
-
-def infer_records(
-    records: Sequence[Record],
-    card: Instrument | None = None,
-    chamber: "Chamber | None" = None,
-    progress: Progress | None = None,
 ) -> "Inference | Unjudged":
-    """Return the joint inference of all responses beside a card, or beside a polynomial card made from the records."""
+    """Return what a campaign shows and the simulation lacks: the joint inference of all responses beside a card, or beside a polynomial card made from the records; with a `chamber`, the run that should come next in it."""
     from studies.calibration.misreading import bias_of_opposite_sign, check_readings
     from studies.inference.diagnosis import infer
     from studies.inference.polynomial_card import polynomial_card

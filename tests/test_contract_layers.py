@@ -13,7 +13,7 @@ ROOT = Path(__file__).parents[1]
 PHYSICS = ("shell", "thermal", "compensation")
 SHORT = {
     "calibrate": "import studies.calibration.fit as module; module.MOST_STEPS = 1",
-    "diagnose": "import studies.diagnosis.campaign as module; module.MOST_BINS = 60",
+    "diagnose": "import studies.inference.diagnosis as module; module.BLOCKS, module.BLOCKS_OF_RUN = 60, (60, 60)",
 }
 """What ends a command early: the way that it goes counts here, not how far."""
 LAZY = {"pyvista", "trimesh", "matplotlib", "dask", "distributed", "vtk"}

@@ -98,7 +98,7 @@ def _campaign(runs: tuple[str, ...], card: str | None, limits: Chamber | None, s
 
     instrument, records = None if card is None else load_card(card), workbench.open_records(runs)
     with Told("diagnosis") as told:
-        ask = workbench.diagnose_records if save is None else workbench.infer_records
+        ask = workbench.diagnose_records
         found = ask(records, instrument, limits, told)
         extended = extend(found, told) if save is not None and isinstance(found, Inference) else None
     refused = extended is not None and not extended.fit.converged

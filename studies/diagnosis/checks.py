@@ -21,11 +21,11 @@ def check_units(records: Sequence[Record], tables: Sequence[dict[str, FloatArray
     """Raise InputError when a column can hardly be in the unit that its name says."""
     for record, table in zip(records, tables, strict=True):
         where = record.path or "record"
-        if "frequency_Hz" in table and not 100.0 < (value := float(np.nanmedian(table["frequency_Hz"]))) < 1e9:
+        if not 100.0 < (value := _level(table, "frequency_Hz", 1e3)) < 1e9:
             raise InputError(
                 f"{where}: frequency_Hz is about {value:g}; a resonator vibrates at 100 Hz to 1 GHz. Is it in another unit?"
             )
-        if "inverse_q" in table and not 0.0 < (value := float(np.nanmedian(table["inverse_q"]))) < 0.1:
+        if not 0.0 < (value := _level(table, "inverse_q", 1e-3)) < 0.1:
             raise InputError(
                 f"{where}: inverse_q is about {value:g}; it must be 1/Q, between 0 and 0.1. Is it Q itself?"
             )
@@ -38,6 +38,12 @@ def check_units(records: Sequence[Record], tables: Sequence[dict[str, FloatArray
                 f"{where}: the temperature changes by {np.ptp(temperature):.3g} K within {lasts:.3g} s, faster than any "
                 "chamber. time_s must be in seconds: is it in minutes or hours?"
             )
+
+
+def _level(table: dict[str, FloatArray], name: str, none: float) -> float:
+    """Return the median of a column, or what stands for one without values."""
+    known = table[name][np.isfinite(table[name])] if name in table else np.empty(0)
+    return float(np.median(known)) if known.size else none
 
 
 def check_device(records: Sequence[Record], tables: Sequence[dict[str, FloatArray]]) -> None:

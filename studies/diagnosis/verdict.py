@@ -280,7 +280,7 @@ def same_cause(one: Cause, two: Cause) -> bool:
     An equal that does not act on both tells of a choice that the other response does not have: then each is named.
     """
     if one.response == two.response:
-        return one.effect in two.equivalent and two.effect in one.equivalent
+        return one.effect == two.effect or (one.effect in two.equivalent and two.effect in one.equivalent)
     if not all(_acts(name, own.response) for name in (*one.names, *two.names) for own in (one, two)):
         return False
     shared = [name for name in (one.effect, two.effect) if name in one.names and name in two.names]

@@ -116,6 +116,8 @@ class Effect:
     # A column of the record that settles whether it is this effect or its equivalent, where it is there.
     judge: str = ""
     positive: bool = False  # whether it cannot go against its first column
+    # Whether it looks like a response that comes later (1) or earlier (-1) than one lag predicts, or either (0).
+    delay: int | None = None
     event: bool = False  # whether other runs know nothing of it, so that no held-out run can confirm it
     # Whether time alone drives it, so that no programme of temperatures and drives shows it better than another.
     by_clock: bool = False
@@ -124,8 +126,6 @@ class Effect:
     # The shape parameter that is the time constant with which fades what it had at the start of a run: of what came
     # before a record nobody knows. "" where it has none.
     memory: str = ""
-    # Whether its columns need the fine grid (lags of fast drives, narrow curves) before they are averaged.
-    fine: bool = False
     sees_heat: bool = False  # whether an effect on the temperature depends on what the others have made of it
     # callable (span, response, shape) -> list of shapes: Where the grid is coarser than what records tell apart: the
     # shapes that one of it stands for.

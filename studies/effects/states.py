@@ -2,7 +2,7 @@
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,16 +31,9 @@ class States:
     voltage_squared: FloatArray | None = None
     quadrature: FloatArray | None = None
     pattern_angle: FloatArray | None = None
-    # (N,) array or 0: Variance of the resonator temperature within each sample of an averaged grid, K²: the mean of x²
-    # is x̄² + spread.
-    spread: FloatArray | float = 0.0
-    # (N,) array or 0: What is left of an initial offset of the resonator, e^(−t/τ), once there is a lag.
-    fading: FloatArray | float = 0.0
     # (K,) array or None: Temperatures at which the resonator turned in the runs before, K: all that a loop may remember
     # of them.
     before: FloatArray | None = None
-    rows: int = 1  # readings at even moments of which a sample is the mean
-    record: int = -1  # number of the record of which the run is an unbroken stretch; −1 where it is one by itself
     # (N,) array or None: Rate of the resonator temperature, K/s, where a simulation knows it.
     known_rate: FloatArray | None = None
 
@@ -63,35 +56,6 @@ class States:
             return np.zeros_like(self.time)
         return np.asarray(np.gradient(self.resonator, self.step))
 
-    def averaged(self, group: int) -> "States":
-        """Return the means over `group` samples at a time: the same run on a coarser grid."""
-        if group == 1:
-            return self
-
-        def mean(values: FloatArray | None) -> FloatArray | None:
-            return None if values is None else average(values, group)
-
-        return replace(
-            self,
-            time=average(self.time, group),
-            campaign_time=average(self.campaign_time, group),
-            housing=average(self.housing, group),
-            resonator=average(self.resonator, group),
-            amplitude_squared=mean(self.amplitude_squared),
-            voltage_squared=mean(self.voltage_squared),
-            quadrature=mean(self.quadrature),
-            pattern_angle=mean(self.pattern_angle),
-            fading=average(self.fading, group) if isinstance(self.fading, np.ndarray) else self.fading,
-            spread=average(self.excess**2, group) - average(self.excess, group) ** 2,
-            rows=group * self.rows,
-            known_rate=mean(self.known_rate),
-        )
-
-    def with_lag(self, tau: float) -> "States":
-        """Return the same run with the resonator following the housing through the lag `tau`, s."""
-        fading = np.exp(-(self.time - self.time[0]) / tau)
-        return replace(self, tau=tau, resonator=lag(self.housing, self.step, tau), fading=fading, known_rate=None)
-
 
 def remembered(runs: Sequence[States]) -> list[FloatArray]:
     """Return, for every run, the temperatures at which the resonator turned in the runs before it, K."""
@@ -103,16 +67,8 @@ def remembered(runs: Sequence[States]) -> list[FloatArray]:
     return out
 
 
-def average(values: FloatArray, group: int) -> FloatArray:
-    """Return means of `group` samples at a time along the first axis; an incomplete last group is left out."""
-    count = values.shape[0] // group
-    return np.asarray(np.full(group, 1.0 / group) @ values[: count * group].reshape(count, group, -1)).reshape(
-        count, *values.shape[1:]
-    )
-
-
-def lag(drive: FloatArray, step: float, tau: float) -> FloatArray:
-    """Return the response of a first-order lag, τ y′ = u − y, started in equilibrium.
+def lag(drive: FloatArray, step: float, tau: float, start: float | None = None) -> FloatArray:
+    """Return the response of a first-order lag, τ y′ = u − y, started in equilibrium or from a value.
 
     Exact for a drive that is linear between its samples (first-order hold).
 
@@ -124,7 +80,8 @@ def lag(drive: FloatArray, step: float, tau: float) -> FloatArray:
     decay = np.exp(-ratio)
     ramp = -np.expm1(-ratio) / ratio if ratio > 1e-12 else 1.0
     ahead, behind = 1.0 - ramp, ramp - decay
-    return recur(decay, np.concatenate([drive[:1], ahead * drive[1:] + behind * drive[:-1]]))
+    first = drive[:1] if start is None else np.full_like(drive[:1], start)
+    return recur(decay, np.concatenate([first, ahead * drive[1:] + behind * drive[:-1]]))
 
 
 def play(drive: FloatArray, radius: float | Sequence[float], start: float = 0.0) -> FloatArray:

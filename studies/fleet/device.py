@@ -21,7 +21,7 @@ from studies.simulation.drive import Drive
 from studies.simulation.heat_path import slowest_lag
 from studies.simulation.prediction import predict
 from studies.simulation.variations import HEATED, Variations
-from studies.workbench import infer_records
+from studies.workbench import diagnose_records
 from thermal.profile import Profile
 
 SCHEMA = "hrg.fleet-device/1"
@@ -81,7 +81,7 @@ def diagnose_device(
     if not device.records:
         raise InputError(f"device {device.serial}: its folder has no records (*.csv).")
     records = [read_record(path) for path in device.records]
-    found = infer_records(records, None if device.card is None else load_card(device.card), progress=progress)
+    found = diagnose_records(records, None if device.card is None else load_card(device.card), progress=progress)
     if not isinstance(found, Inferred):
         raise InputError(f"device {device.serial}: its records say too little to be judged.")
     at = USUAL + zero_Celsius if device.card is None else found.card.reference_temperature

@@ -13,8 +13,8 @@ INDEPENDENT = 10.0
 """Neighbouring rows share slow noise: one row in so many counts as independent."""
 
 
-def clock_drifts(records: Sequence[Record]) -> bool | None:
-    """Return whether the gyro's clock drifts against the reference; None where a record has none."""
+def drift_of(records: Sequence[Record]) -> tuple[float, float] | None:
+    """Return the drift of the gyro's clock against the reference, Hz a day, and its standard deviation; None where a record has none."""
     starts, _ = place_in_time(records)
     days, errors = [], []
     for record, start in zip(records, starts, strict=True):
@@ -29,7 +29,7 @@ def clock_drifts(records: Sequence[Record]) -> bool | None:
     slope, level = np.polyfit(t[known], error[known], 1)
     rest = error[known] - slope * t[known] - level
     spread = np.sqrt(INDEPENDENT * np.mean(rest**2) / known.sum()) / max(float(np.std(t[known])), 1e-300)
-    return bool(abs(slope) > CLEAR * spread)
+    return float(slope), float(spread)
 
 
 def settle(names: Sequence[str], judge: str, equals: Sequence[str], drifts: bool | None) -> list[str]:

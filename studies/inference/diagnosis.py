@@ -20,13 +20,14 @@ from studies.calibration.priors import gather_priors
 from studies.calibration.problem import CardProblem, wide_law
 from studies.diagnosis.constants import CONSTANTS
 from studies.diagnosis.seen import SeenResponse
+from studies.inference.apart import only_apart, with_levels
 from studies.inference.held_out import Kept, Model, Rows
 from studies.inference.housing import set_housing_apart
 from studies.inference.inferred import Inferred
 from studies.inference.lack_of_fit import generic_bank, look
 from studies.inference.model import Background, Linear, Term
 from studies.inference.records import Campaign
-from studies.inference.relinearise import relinearise
+from studies.inference.relinearise import columns_of, relinearise
 from studies.inference.search import Hypothesis, Outcome, Search, Shapes
 from studies.inference.sharp import RESOLVED, fast_line, longest_resolved
 from studies.inference.signatures import Signatures
@@ -45,8 +46,8 @@ Array = NDArray[np.float64]
 Report = Callable[[str], None]
 BLOCKS, BLOCKS_OF_RUN = 800, (100, 400)
 """Block averages of a campaign, and fewest and most of a run."""
-AGAIN = 3
-"""Most linearisations after the first."""
+AGAIN, SETTLING = 7, 4
+"""Most linearisations after the first, and how many of these look for no further effects."""
 STRAYED = 1.0
 """Error of −2 ln L up to which a linearisation is taken as it is."""
 FAR = 2.0
@@ -183,7 +184,10 @@ def infer(card: "Instrument", campaign: Campaign, progress: Report = lambda _: N
     progress("held-out rows")
     outcome, held, rows = _confirmed(search, outcome, plain)
     progress("lack of fit")
-    left = look(search, bank, outcome.plain, outcome.final, rows)
+    plain_, final = outcome.plain, outcome.final
+    for name in search.linear.responses:
+        plain_, final = (with_levels(search, one, name) for one in (plain_, final))
+    left = look(search, bank, plain_, final, rows)
     unknown = []
     for base in outcome.without:
         seen = search.scan(base, bank)
@@ -214,9 +218,17 @@ def _from(start: CardFit, told: Array | None, progress: Report) -> tuple[Search,
 
     def holds(final: Hypothesis) -> bool:
         """Whether the straight lines are those of the simulation where they end."""
-        linear, there = search.linear, reached(final)
+        model = Model(search.linear, search.signatures, final.terms, final.noise)
+        linear, mean, there = model.linear, model.mean(), reached(final)
         state = problem.evaluate(there, slopes=False)
-        apart = {n: linear.target[n] - linear.slope[n] @ there - state.residual[n] for n in linear.responses}
+        apart = {
+            n: linear.target[n] - linear.columns(final.terms, n) @ mean - state.residual[n] for n in linear.responses
+        }
+        if final.terms:
+            paths = Signatures.at(problem, there)
+            for term, size in zip(final.terms, model.kept(mean).coefficients, strict=True):
+                for n, columns in columns_of(paths, term).items():
+                    apart[n] = apart[n] + columns @ size
         return STRAYED > sum(np.sum(linear.rows[n].whiten(own, final.noise[n]) ** 2) for n, own in apart.items())
 
     def linearise(
@@ -234,7 +246,10 @@ def _from(start: CardFit, told: Array | None, progress: Report) -> tuple[Search,
                 break
             progress("linearised anew beside the effects")
             search, point, terms = linearise(final.terms, final.noise)
-            plain, final = search.grow(terms, (lambda _: True) if left == 1 else near)
+            if left > SETTLING:
+                plain, final = search.grow(terms, near if left > SETTLING + 1 else lambda _: True)
+            else:
+                plain, final = search.grow(terms, most=0)
         return plain, final
 
     plain, final = straightened(*search.grow(near=near))
@@ -243,7 +258,7 @@ def _from(start: CardFit, told: Array | None, progress: Report) -> tuple[Search,
     tried = []
     for terms, noise in search.suspects(final):
         there, at, own = linearise(terms, noise, [])
-        grown = there.grow(own, lambda _: False, noise)[1]
+        grown = there.grow(own, noise=noise, most=0)[1]
         tried.append((_on_all_rows(there, grown), there, at, grown))
     best = max(tried, key=lambda one: one[0], default=None)
     if best is not None and best[0] > _on_all_rows(search, final) + STRAYED:
@@ -269,7 +284,9 @@ def _confirmed(
         weak = [
             k
             for k, name in enumerate(term.response for term in final.terms)
-            if _worse(*before[name].beside(after[name])) or rows[name].rms > alone[name].rms
+            if _worse(*before[name].beside(after[name]))
+            or rows[name].rms > alone[name].rms
+            or only_apart(search, outcome, k)
         ]
         if not weak:
             return outcome, {name: before[name].beside(after[name]) for name in before}, rows

@@ -42,12 +42,13 @@ def definite(found: Inference, background: Background, k: int) -> Background:
     term = background.terms[k]
     if len(term.members) == 1:
         return background
+    count = len(term.members)
     others = replace(background, terms=(*background.terms[:k], *background.terms[k + 1 :]))
     one = replace(
         term,
-        columns={name: own[:, :1] for name, own in term.columns.items()},
+        columns={name: np.delete(own, slice(1, count), axis=1) for name, own in term.columns.items()},
         members=term.members[:1],
-        unit=term.unit[:1],
+        unit=np.delete(term.unit, slice(1, count)),
     )
     whole, single = others.with_term(term), others.with_term(found.search.polish(others, one))
     kept = single[0] if single[1] > whole[1] + SURE else term
@@ -59,7 +60,7 @@ def entry_of(found: Inference, background: Background, k: int) -> dict[str, Any]
     term = background.terms[k]
     effect = term.effect
     values = np.zeros(effect.spread.size)
-    values[list(term.members)] = background.coefficients(k)[0]
+    values[list(term.members)] = background.coefficients(k)[0][: len(term.members)]
     values = np.minimum(values, np.concatenate([np.full(len(own.spread), own.most) for own in effect.coefficients]))
     numbers: dict[str, Any] = {p.name: float(value) for p, value in zip(effect.shape, term.shape, strict=True)}
     if effect.sees_heat:  # the fit knew the temperature with it; a simulation has to solve for it

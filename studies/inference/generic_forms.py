@@ -1,6 +1,6 @@
 """Generic forms: families like any effect, with many columns and no physics, by which structure that nobody explains is seen.
 
-Smooth in temperature, in temperature and rate, in history, in a drive, in time; a bump at one temperature, a step at one moment. They are
+Smooth in temperature, in temperature and rate, in history, in a drive, in time; a narrow feature at one temperature, a step at one moment. They are
 weighed by the same marginal likelihood; the name of one is where structure is left.
 """
 
@@ -65,7 +65,7 @@ def generic_forms(span: Span, runs: Sequence[States]) -> list[Effect]:
 
     def time(states: States, shape: Sequence[float], response: str) -> FloatArray:
         t = (states.time - states.time[0]) / max(float(np.ptp(states.time)), 1e-9)
-        waves = np.cos(np.pi * t[:, None] * np.arange(TIME_ORDERS))
+        waves = np.cos(np.pi * t[:, None] * np.arange(1, TIME_ORDERS + 1))
         out = np.zeros((t.size, len(runs) * TIME_ORDERS))
         out[:, states.run * TIME_ORDERS : (states.run + 1) * TIME_ORDERS] = waves
         return out
@@ -95,7 +95,7 @@ def generic_forms(span: Span, runs: Sequence[States]) -> list[Effect]:
         _generic("temperature", temperature, 2.0 / orders),
         _generic("rate and temperature", rate, [1.0] * 12),
         _generic("history of the temperature", history, [1.0] * 8),
-        _generic("time", time, np.tile(1.0 / (1.0 + np.arange(TIME_ORDERS)), len(runs))),
+        replace(_generic("time", time, np.tile(1.0 / (1.0 + np.arange(TIME_ORDERS)), len(runs))), by_clock=True),
     ]
     for field, word in (
         ("voltage_squared", "voltage"),
@@ -106,6 +106,15 @@ def generic_forms(span: Span, runs: Sequence[States]) -> list[Effect]:
         count = 16 if field != "pattern_angle" else 8
         forms.append(_generic(word, drive(field), [1.0] * count, (field,)))
     return forms
+
+
+def offsets(count: int) -> Effect:
+    """Return the form of runs that lie apart: a level of each."""
+
+    def levels(states: States, shape: Sequence[float], response: str) -> FloatArray:
+        return np.tile(np.arange(count) == states.run, (states.time.size, 1)).astype(float)
+
+    return _generic("offsets of the runs", levels, [1.0] * count)
 
 
 def _step(states: States, shape: Sequence[float], response: str) -> FloatArray:
@@ -140,8 +149,7 @@ def _bumps(span: Span, response: str) -> list[tuple[float, ...]]:
 BUMPS = tuple(2.0 ** (-0.5 * k) for k in range(8, 14))
 """Widths of bumps in parts of the covered range: a sixteenth to a ninetieth."""
 BUMP = replace(
-    _generic("temperature: a bump", _bump, [1.0, 0.5, 0.5]),
+    _generic("temperature: a narrow feature", _bump, [1.0, 0.5, 0.5]),
     shape=(Parameter("centre", 0.0, 1e4, "centre", False, True), Parameter("width", 0.0, 1e4, "width", True, True)),
     grid=_bumps,
-    fine=True,
 )

@@ -8,12 +8,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 from compensation.noise import Noise
 from compensation.spikes import find_spikes
 from studies.inference.model import Linear, Term, solve_posterior
-from studies.inference.signatures import Signatures
+from studies.inference.signatures import Path, Signatures, starts_of
 from studies.simulation.prediction import predict
 
 Array = NDArray[np.float64]
@@ -24,6 +25,8 @@ FREE = 1e3
 """Prior standard deviation of the offset of a run that is held out, in parts of the noise of its mean."""
 KNOWN = 1.0
 """Standard deviation of a prediction, in parts of the noise, up to which the rest of the records predict a row."""
+CARRIED_OFF = 2.0
+"""Standard deviations by which slow noise carries a whole run off at most."""
 FEWEST = 0.5
 """Part of the rows from which on they speak for the records."""
 
@@ -94,6 +97,7 @@ class Model:
         """Return what is left of every response on the rows of some runs."""
         instrument = self.problem.instrument_at(numbers.point)
         law = self.problem.law_at(instrument)
+        paths = Signatures.at(self.problem, numbers.point).paths if self.terms else self.signatures.paths
         found: dict[str, tuple[list[Array], list[Array]]] = {name: ([], []) for name in self.problem.responses}
         for k, part in enumerate(self.problem.parts):
             if runs is not None and part.run not in runs:
@@ -101,7 +105,7 @@ class Model:
             record, drive = self.problem.runs[part.run].record, self.problem.drive_at(numbers.point, k)
             columns = dict(predict(instrument, drive, (), law).columns)
             for term, values in zip(self.terms, numbers.coefficients, strict=True):
-                for name, change in self.change(term, values, k).items():
+                for name, change in self.change(term, values, k, paths[k]).items():
                     columns[name] = columns[name] + change
             rows = np.asarray(record["time_s"], dtype=float)
             for name in part.responses:
@@ -114,10 +118,14 @@ class Model:
                 found[name][1].append(rest)
         return {name: Rows(tuple(t), tuple(r)) for name, (t, r) in found.items() if r}
 
-    def change(self, term: Term, values: Array, k: int) -> dict[str, Array]:
-        """Return what a term makes of the responses of a part at its predicted rows."""
-        path = self.signatures.paths[k]
-        own = np.asarray(term.effect.columns(path.states, term.shape, term.response))[:, term.members] @ values
+    def change(self, term: Term, values: Array, k: int, path: Path | None = None) -> dict[str, Array]:
+        """Return what a term makes of the responses of a part at its predicted rows, along the path where it is linearised unless given."""
+        path, count = path or self.signatures.paths[k], len(term.members)
+        own = np.asarray(term.effect.columns(path.states, term.shape, term.response))[:, term.members] @ values[:count]
+        if term.starts:
+            wide = self.signatures.span.temperature_range
+            began = starts_of(term.effect, path.states, term.shape, len(self.problem.runs), wide)
+            own = own + began @ values[count:]
         found = path.changes(term.effect, own[:, None], term.response)
         return {name: change[:, 0] for name, change in found.items() if name in self.problem.parts[k].responses}
 
@@ -136,10 +144,19 @@ class Model:
         """Return what is left on the rows of each part after a step of the coordinates: what the step does is smooth."""
         change, level = self.linear.columns(self.terms, name) @ step, self.linear.rows[name]
         found = []
-        for t, rest, own, at in zip(rows[name].time, rows[name].residual, level.slices, level.times, strict=True):
+        for k, (t, rest) in enumerate(zip(rows[name].time, rows[name].residual, strict=True)):
+            at, own = level.times[k], level.slices[k]
             left = rest - np.interp(t, at - at[0], change[own])
-            found.append(left - left.mean() if name == OWN_OFFSET else left)
+            found.append(left - self._level(name, k, float(left.mean())))
         return found
+
+    def _level(self, name: str, k: int, mean: float) -> float:
+        """Return the part of a run's mean that is its own: of a turn-on all, else what slow noise may carry a whole run off."""
+        if name == OWN_OFFSET:
+            return mean
+        slow = self.linear.rows[name].covariance(k, replace(self.noise[name], white=0.0))
+        most = CARRIED_OFF * float(np.sqrt(max(float(slow.mean()), 0.0)))
+        return float(np.clip(mean, -most, most))
 
     def _by_record(self, whole: Array, rows: Mapping[str, Rows]) -> "dict[str, Unseen]":
         parts: dict[str, list[tuple[Array, Mask]]] = {name: [] for name in rows}
@@ -180,8 +197,12 @@ class Model:
 
     def _own(self, run: int) -> list[int]:
         """Coordinates of a run of its own: how it began."""
-        first = len(self.problem.priors.values)
-        return [first + i for i, (k, _, _) in enumerate(self.problem.starts) if self.problem.parts[k].run == run]
+        first, at = len(self.problem.priors.values), self.linear.count
+        own = [first + i for i, (k, _, _) in enumerate(self.problem.starts) if self.problem.parts[k].run == run]
+        for term in self.terms:
+            own += [at + len(term.members) + run] * term.starts
+            at += len(term.unit)
+        return own
 
     def _trained(self, keep: Mapping[str, Sequence[Mask]]) -> tuple[Array, Array]:
         seen = {name: own for name, own in keep.items() if any(mask.any() for mask in own)}
@@ -225,12 +246,13 @@ class Model:
 
 
 def on_rows(rows: Array, time: Array, values: Array) -> Array:
-    """Return values at the rows of a record; beyond the ends, which lie within groups of rows, on a straight line."""
-    if len(time) < 2:
+    """Return values at the rows of a record, between groups of rows on Akima's curve; beyond the ends, within groups, on a straight line."""
+    if len(time) < 2 or np.array_equal(rows, time):
         return np.interp(rows, time, values)
     first, last = (values[1] - values[0]) / (time[1] - time[0]), (values[-1] - values[-2]) / (time[-1] - time[-2])
     beyond = first * np.minimum(rows - time[0], 0.0) + last * np.maximum(rows - time[-1], 0.0)
-    return np.asarray(np.interp(rows, time, values) + beyond)
+    inside = scipy.interpolate.Akima1DInterpolator(time, values)(np.clip(rows, time[0], time[-1]))
+    return np.asarray(inside + beyond)
 
 
 def _outside(time: Array, block: int, gap: float) -> Mask:

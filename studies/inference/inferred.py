@@ -6,7 +6,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 from studies.calibration.fit import CardFit
-from studies.inference.clock import clock_drifts
+from studies.inference.clock import CLEAR, drift_of
 from studies.inference.held_out import Kept, Model, Rows
 from studies.inference.lack_of_fit import Leftover
 from studies.inference.model import Background
@@ -49,9 +49,14 @@ class Inferred:
         return self.outcome.final
 
     @cached_property
+    def clock(self) -> tuple[float, float] | None:
+        """Drift of the gyro's clock against a reference, Hz a day, with its standard deviation; None without one."""
+        return drift_of(self.campaign.records)
+
+    @property
     def clock_drifts(self) -> bool | None:
         """Whether the gyro's clock drifts against a reference; None without one."""
-        return clock_drifts(self.campaign.records)
+        return None if self.clock is None else abs(self.clock[0]) > CLEAR * self.clock[1]
 
     @cached_property
     def background(self) -> Background:

@@ -11,7 +11,7 @@ from studies.diagnosis.constants import CONSTANTS
 from studies.inference.generic_forms import BUMP, STEP, generic_forms
 from studies.inference.held_out import Rows
 from studies.inference.model import Background, Term
-from studies.inference.search import Hypothesis, Search, Shapes
+from studies.inference.search import LESS, SUSPICIOUS, Hypothesis, Search, Shapes
 from studies.inference.sharp import brief_events, fast_line, intermittent, tails_of
 
 Array = NDArray[np.float64]
@@ -69,6 +69,11 @@ def look(
     for name in search.linear.responses:
         best = max((one for one in seen if one.term.response == name), key=lambda one: one.gain)
         word, smooth = best.term.effect.name, best.gain
+        if search.linear.rows[name].slow_share(final.noise[name]) > SUSPICIOUS:
+            instead = _instead_of_noise(search, bank, final, name)
+            if instead is not None and instead.evidence - final.evidence > smooth:
+                best = replace(best, term=instead.terms[-1])
+                word, smooth = best.term.effect.name, instead.evidence - final.evidence
         evidence, line = smooth, None
         white = search.linear.rows[name].whiten(own.residual(name), final.noise[name])
         brief = brief_events(white, tails_of(white / max(float(np.std(white)), 1e-300)))
@@ -88,6 +93,13 @@ def look(
             share = min(share, gained / max(gained + evidence, 1e-9))
         found[name] = Leftover(word, float(evidence), share, line)
     return found
+
+
+def _instead_of_noise(search: Search, bank: Sequence[Shapes], final: Hypothesis, name: str) -> Hypothesis | None:
+    """Return the model with the likeliest form where slow noise stands that may hide it; none in time, which slow noise is too."""
+    forms = [own for own in bank if own.response == name and not own.effect.by_clock]
+    seen = search.scan(final, forms, less=LESS[:1])[:1]
+    return search.settle((*final.terms, seen[0].term), seen[0].noise, [name]) if seen else None
 
 
 def _share(search: Search, name: str, before: Background, own: Background, generic: Term) -> float:

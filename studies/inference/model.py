@@ -39,7 +39,7 @@ class Term:
     effect, response, shape
     columns : response -> (M, k), of the members that are fitted
     members : which columns of the effect these are
-    unit : array (k,), prior standard deviations in a strong case
+    unit : array (k,), prior standard deviations in a strong case; behind those of the members what each run began with
     scale : of SCALES
     price : log prior of the effect and of the choice of shape and scale
     brought : log posterior that it brought when it was found
@@ -61,6 +61,11 @@ class Term:
     def key(self) -> tuple[str, str]:
         """Name and response."""
         return self.effect.name, self.response
+
+    @property
+    def starts(self) -> bool:
+        """Whether what each run began with is beside its members."""
+        return len(self.unit) > len(self.members)
 
     @property
     def spread(self) -> Array:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from compensation.noise import white_rms
 from shell.constants import zero_Celsius
+from studies.calibration.fit import LASTING
 from studies.calibration.observed import ObservedRun, observe
 from studies.record import Record
 from thermal.lag import lag
@@ -67,6 +68,8 @@ def polynomial_card(records: Sequence[Record], name: str = "") -> "Instrument":
         "lag_s": {"value": tau, "sd": LAG_WIDTH * tau},
         "delay_s": {"value": 0.0, "sd": 10.0},
     }
+    if {"frequency_Hz", "bias_deg_per_h"} <= set(thermometers):
+        law["bias_bend"] = {"value": 0.5, "sd": 0.5}
     if by_chamber:
         law["chamber_lag_s"] = _exact(1.0)
     content: dict[str, Any] = {
@@ -128,8 +131,8 @@ def _followed(runs: Sequence[ObservedRun], column: str, tau: float, x0: float) -
     return np.concatenate(value), np.concatenate(excess), np.concatenate(starts)
 
 
-def _fit(runs: Sequence[ObservedRun], column: str, tau: float, x0: float) -> tuple[Array, float]:
-    """Return the coefficients of a polynomial with starts (and offsets, of a bias) of each run, and what is left over its noise.
+def _fit(runs: Sequence[ObservedRun], column: str, tau: float, x0: float, apart: bool) -> tuple[Array, float]:
+    """Return the coefficients of a polynomial with starts (and levels, where they lie `apart`) of each run, and what is left over its noise.
 
     Starts and bends have the priors of a card: else a single slow run is followed by any lag. What a first fit leaves is no less than
     `MISFIT` of what the response varies by.
@@ -141,7 +144,7 @@ def _fit(runs: Sequence[ObservedRun], column: str, tau: float, x0: float) -> tup
     columns = [np.ones_like(x), *(x**power for power in powers), *starts.T]
     prior = [np.inf, STEEP * spread / reach, *(BENT[column] * spread / reach**power for power in powers if power > 1)]
     prior += [START * spread / reach] * starts.shape[1]
-    if column == "bias_deg_per_h":
+    if apart:
         columns += list((starts[:, 1:] > 0).astype(float).T)
         prior += [np.inf] * (starts.shape[1] - 1)
     X = np.stack(columns, axis=1)
@@ -160,7 +163,7 @@ def _likeliest_lag(runs: Sequence[ObservedRun], column: str, x0: float) -> float
 
     def left(logarithm: float) -> float:
         unusual = (logarithm - np.log(USUAL_LAG)) / USUAL_SPREAD
-        return _fit(runs, column, float(np.exp(logarithm)), x0)[1] + float(unusual) ** 2
+        return _fit(runs, column, float(np.exp(logarithm)), x0, True)[1] + float(unusual) ** 2
 
     grid = np.log(LAGS[LAGS <= most])
     best = int(np.argmin([left(one) for one in grid]))
@@ -170,7 +173,7 @@ def _likeliest_lag(runs: Sequence[ObservedRun], column: str, x0: float) -> float
 
 def _levels(runs: Sequence[ObservedRun], column: str, tau: float, x0: float) -> tuple[float, Array, float]:
     """Return a column's level and coefficients about the reference, and the rms that it varies by about its mean."""
-    own, _ = _fit(runs, column, tau, x0)
+    own, _ = _fit(runs, column, tau, x0, column not in LASTING)
     y = np.concatenate([run.responses[column].value for run in runs if column in run.responses])
     spread = max(float(np.std(y)), 1e-12 * abs(float(np.median(y))), 1e-300)
     level = float(own[0])

@@ -28,8 +28,8 @@ STEPS, PARTS = 6, (1.0, 0.4, 0.15)
 """Most steps, and the parts of one that are tried."""
 STEP = 0.02
 """Prior standard deviations, for differences."""
-CLOSE = 0.1
-"""Prior standard deviations: a step that is taken as none."""
+CLOSE = 0.5
+"""Fall of Q that a step must promise to be taken."""
 
 
 def relinearise(
@@ -47,8 +47,9 @@ def relinearise(
     terms = tuple(_bent(start, signatures, point, one, size) for one, size in zip(terms, sizes, strict=True))
     for _ in range(STEPS):
         model = Model(linear, signatures, terms, noise)
-        moved = model.kept(model.mean()).point
-        if np.abs(moved - point).max(initial=0.0) < CLOSE:
+        mean = model.mean()
+        moved = model.kept(mean).point
+        if best - _promised(linear, terms, noise, mean) < CLOSE:
             break
         for part in PARTS:
             trial = point + part * (moved - point)
@@ -57,7 +58,7 @@ def relinearise(
             except (InputError, ShellError, ThermalError, CompensationError):
                 continue
             here = Linear.of(replace(start, state=state), linear.told)
-            fresh = tuple(replace(one, columns=_columns(there, one), bend={}) for one in terms)
+            fresh = tuple(replace(one, columns=columns_of(there, one), bend={}) for one in terms)
             left, sizes = _left(here, trial, fresh, noise)
             if left < best:
                 break
@@ -69,25 +70,50 @@ def relinearise(
 
 
 def _bent(start: CardFit, signatures: Signatures, point: Array, term: Term, size: Array) -> Term:
-    """Return a term that knows how what it makes of the temperature goes with the law and the lag of a polynomial card: no record may know its slope."""
-    problem = start.problem
-    if problem.instrument.polynomial is None or not term.effect.thermal:
-        return term
+    """Return a term that knows how what it does goes with the path of the temperature: with the starts of runs, and with the lag of a polynomial card.
+
+    Of an effect on the temperature itself also with the slope of such a card, which no record may know.
+    """
+    problem, names = start.problem, start.problem.priors.names
     own = {name: columns @ size for name, columns in term.columns.items()}
     bend = {name: np.zeros((len(change), problem.count + 1)) for name, change in own.items()}
-    for k, name in enumerate(problem.priors.names):
-        if name.startswith("law.a") or name == "law.lag_s":
-            moved = Signatures.at(problem, point + STEP * np.eye(problem.count)[k])
-            for response, columns in _columns(moved, term).items():
-                bend[response][:, k] = (columns @ size - own[response]) / STEP
+    law = [
+        k for k, name in enumerate(names) if name == "law.lag_s" or (term.effect.thermal and name.startswith("law.a"))
+    ]
+    kinds: dict[str, list[int]] = {}
+    for i, (_, name, _) in enumerate(problem.starts):
+        if name.startswith("initial."):
+            kinds.setdefault(name, []).append(len(names) + i)
+    for places in [*([k] for k in law), *kinds.values()]:  # runs know nothing of each other: their starts move at once
+        moved = Signatures.at(problem, point + STEP * np.isin(np.arange(problem.count), places))
+        for response, columns in columns_of(moved, term).items():
+            change = (columns @ size - own[response]) / STEP
+            for k in places:
+                bend[response][_rows_of(start, response, k), k] = change[_rows_of(start, response, k)]
     for columns in bend.values():
         columns[:, -1] = columns[:, :-1] @ point
-    return replace(term, bend=bend)
+    return replace(term, bend=bend) if any(columns.any() for columns in bend.values()) else term
 
 
-def _columns(signatures: Signatures, term: Term) -> dict[str, Array]:
-    found = signatures.columns(term.effect, term.shape, term.response)
-    return {name: own[:, list(term.members)] for name, own in found.items()}
+def _rows_of(start: CardFit, response: str, k: int) -> slice:
+    """Rows of a response that a coordinate reaches: those of its run, or all."""
+    problem = start.problem
+    if k < len(problem.priors.names):
+        return slice(None)
+    own = problem.parts[problem.starts[k - len(problem.priors.names)][0]]
+    members = problem.members(response)
+    return start.rows[response].slices[members.index(own)] if own in members else slice(0, 0)
+
+
+def columns_of(signatures: Signatures, term: Term) -> dict[str, Array]:
+    """Return the columns of a term along some paths."""
+    return signatures.of_term(term.effect, term.shape, term.response, term.members, term.starts)
+
+
+def _promised(linear: Linear, terms: Sequence[Term], noise: Mapping[str, Noise], mean: Array) -> float:
+    """Q of the straight lines where they end."""
+    X, r, _ = linear.bent(terms).whitened(terms, noise)
+    return float(mean @ mean + sum(np.sum((r[name] - X[name] @ mean) ** 2) for name in X))
 
 
 def _left(linear: Linear, point: Array, terms: Sequence[Term], noise: Mapping[str, Noise]) -> tuple[float, list[Array]]:

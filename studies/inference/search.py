@@ -29,6 +29,8 @@ MARGIN, UNSTATED, FURTHER = 4.0, 1.0, 0.06
 NEAR = 0.35, 15.0
 """Part of the best scan, less so much, down to which contenders are refitted."""
 HOPELESS, FINITE = -3.0, 1e3
+MOVES, EDGE = 3, 0.05
+"""Most moves of a shape parameter to the next shapes of its grid, and the part of a move from whose end it goes on."""
 SUSPICIOUS, SUSPECTS = 3.0, 2
 """Slow noise within a run over that of a row, from which on effects are tried with values of their own, and how many."""
 Report = Callable[[str], None]
@@ -123,8 +125,12 @@ class Search:
     def term(self, effect: Effect, response: str, shape: tuple[float, ...], price: float = PRICE) -> Term:
         """Return a term with all members of the effect that have a prior."""
         members = tuple(int(k) for k in np.flatnonzero(effect.spread > 0))
-        columns = {name: own[:, members] for name, own in self.signatures.columns(effect, shape, response).items()}
-        return Term(effect, response, shape, columns, members, self.unit(effect, response, members), 1.0, price)
+        starts = self.signatures.remembers(effect, shape)
+        columns = self.signatures.of_term(effect, shape, response, members, starts)
+        unit = self.unit(effect, response, members)
+        if starts:
+            unit = np.append(unit, np.full(len(self.linear.problem.runs), unit[0]))
+        return Term(effect, response, shape, columns, members, unit, 1.0, price)
 
     def gains(self, beside: Background, own: Shapes) -> Array:
         """Return what an effect adds to the evidence beside a model, for each of SCALES and of its shapes."""
@@ -196,27 +202,31 @@ class Search:
         effect = term.effect
         series = np.array([shape for shape in grid if _steady(effect, shape) == _steady(effect, term.shape)] or grid)
         for k, parameter in enumerate(effect.shape):
-            if not parameter.moves(term.shape[k]):
-                continue
-            low, high = self._between(series[:, k], term.shape[k], parameter)
-            if high <= low:
-                continue
-            logarithmic = parameter.logarithmic and low > 0
-            start = term
+            for _ in range(MOVES):
+                if not parameter.moves(term.shape[k]):
+                    break
+                low, high = self._between(series[:, k], term.shape[k], parameter)
+                if high <= low:
+                    break
+                logarithmic = parameter.logarithmic and low > 0
+                start = term
 
-            def at(x: float, k: int = k, logarithmic: bool = logarithmic, start: Term = start) -> Term:
-                value = float(np.exp(x)) if logarithmic else float(x)
-                return self._moved(start, (*start.shape[:k], value, *start.shape[k + 1 :]))
+                def at(x: float, k: int = k, logarithmic: bool = logarithmic, start: Term = start) -> Term:
+                    value = float(np.exp(x)) if logarithmic else float(x)
+                    return self._moved(start, (*start.shape[:k], value, *start.shape[k + 1 :]))
 
-            ends = (np.log(low), np.log(high)) if logarithmic else (low, high)
-            lowest = scipy.optimize.minimize_scalar(
-                lambda x, at=at, least=best - FINITE: -max(beside.with_term(at(x))[1], least),
-                bounds=ends,
-                method="bounded",
-                options={"maxiter": 10},
-            )
-            if -lowest.fun > best:
+                ends = (np.log(low), np.log(high)) if logarithmic else (low, high)
+                lowest = scipy.optimize.minimize_scalar(
+                    lambda x, at=at, least=best - FINITE: -max(beside.with_term(at(x))[1], least),
+                    bounds=ends,
+                    method="bounded",
+                    options={"maxiter": 10},
+                )
+                if -lowest.fun <= best:
+                    break
                 best, term = float(-lowest.fun), at(lowest.x)
+                if ends[0] + EDGE * (ends[1] - ends[0]) < lowest.x < ends[1] - EDGE * (ends[1] - ends[0]):
+                    break
         return best, term
 
     def _moved(self, term: Term, shape: tuple[float, ...]) -> Term:
@@ -227,6 +237,9 @@ class Search:
         span, near = self.signatures.span, 1e-9 * max(abs(at), 1.0)
         values = np.unique(grid)
         below, above = values[values < at - near], values[values > at + near]
+        if below.size and above.size:  # one that it nearly is is no neighbour
+            apart = 2.0 * EDGE * (above[0] - below[-1])
+            below, above = below[below < at - apart], above[above > at + apart]
         step = 1.6 if parameter.logarithmic else 1.0
         low = below[-1] if below.size else (at / step if parameter.logarithmic else at - step)
         high = above[0] if above.size else (at * step if parameter.logarithmic else at + step)
@@ -256,8 +269,9 @@ class Search:
         before: Sequence[Term] = (),
         near: Callable[[Hypothesis], bool] = lambda _: True,
         noise: Mapping[str, Noise] | None = None,
+        most: int = MOST_TERMS,
     ) -> tuple[Hypothesis, Hypothesis]:
-        """Return the model without effects and the one that grew from it, or from terms of another linearisation, as long as it is `near` this one."""
+        """Return the model without effects and the one that grew from it, or from terms of another linearisation, by at most so many as long as it is `near` this one."""
         own = estimate_noise_of(self.linear, (), self.noise)
         plain = now = Hypothesis((), own, Background(self.linear, (), own).evidence)
         for term in before:
@@ -265,7 +279,7 @@ class Search:
             here = self.polish(beside, self._moved(term, term.shape), anew=False)
             now = _credited(self.settle((*now.terms, here), noise or now.noise), now)
         now = self._without_idle(now, plain)
-        for _ in range(MOST_TERMS):  # a term may leave when another one comes
+        for _ in range(most):  # a term may leave when another one comes
             if len(now.terms) == MOST_TERMS or not self.bank or (now.terms and not near(now)):
                 break
             tried = self.contenders(now)
@@ -273,7 +287,16 @@ class Search:
                 break
             self.progress(f"{tried[0].terms[-1].effect.name} explains {tried[0].score - now.score:.0f} of log evidence")
             now = self._without_idle(_credited(self.settle(tried[0].terms, tried[0].noise), now), plain)
-        return plain, now
+        return plain, self._tuned(now)
+
+    def _tuned(self, now: Hypothesis) -> Hypothesis:
+        """Move the shapes to where they are likeliest in the noise that the model leaves, not in that of the model before."""
+        for k, term in enumerate(now.terms):
+            others = (*now.terms[:k], *now.terms[k + 1 :])
+            here = self.polish(Background(self.linear, others, now.noise), term, anew=False)
+            there = self.settle((*now.terms[:k], here, *now.terms[k + 1 :]), now.noise)
+            now = there if there.score > now.score else now
+        return now
 
     def needed(self, term: Term, others: Sequence[Term]) -> float:
         """Return the log posterior that a cause must bring beside others."""
@@ -317,7 +340,13 @@ class Search:
             rest = Background(self.linear, now.terms, now.noise).residual(name)
             white = min(own.white, white_rms(*(rest[place] for place in rows.slices)) * rows.span**0.5 or own.white)
             for part in parts:
-                less = replace(own, white=white, flicker=own.flicker * max(part, 0.1), walk=own.walk * part)
+                less = replace(
+                    own,
+                    white=white,
+                    flicker=own.flicker * max(part, 0.1),
+                    walk=own.walk * part,
+                    offset=own.offset * max(part, 0.1),
+                )
                 found.append((name, {**now.noise, name: less}))
         return found
 

@@ -4,7 +4,7 @@ An effect on a response adds its columns there. One on the resonator's temperatu
 ∂y/∂T dT + ∂y/∂Ṫ dṪ, the slopes by differences of the read-out at the temperatures that the card predicts.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -138,6 +138,18 @@ def trace(instrument: "Instrument", law: "FrequencyLaw", drive: Drive, run: int)
     )
 
 
+def memory_of(effect: Effect, shape: Sequence[float]) -> float:
+    """Return the time constant, s, with which an effect forgets what came before a run."""
+    return float(shape[[one.name for one in effect.shape].index(effect.memory)])
+
+
+def starts_of(effect: Effect, states: States, shape: Sequence[float], runs: int, wide: float) -> Array:
+    """Return what an effect with memory had at the start of each run, on the even grid: as much as the covered range would give it."""
+    out = np.zeros((states.time.size, runs))
+    out[:, states.run] = wide * np.exp(-(states.time - states.time[0]) / memory_of(effect, shape))
+    return out
+
+
 @dataclass(frozen=True)
 class Signatures:
     """Paths of all runs of a calibration at one point."""
@@ -180,7 +192,7 @@ class Signatures:
             runs=len(states),
             bins=tuple(first),
             turns=bool(np.ptp(angles) > VARIES),
-            timed=True,
+            timed=len(states) == 1 or all(run.record.start is not None for run in self.problem.runs),
         )
 
     def away(self, other: "Signatures") -> float:
@@ -231,6 +243,22 @@ class Signatures:
                 if name in part.responses:
                     found[name].append(self._operators[k, name, kinds[name]] @ own)
         return {name: np.concatenate(parts) for name, parts in found.items() if parts}
+
+    def of_term(
+        self, effect: Effect, shape: tuple[float, ...], response: str, members: Sequence[int], starts: bool
+    ) -> dict[str, Array]:
+        """Return what some members make of each response, beside them what every run began with where the effect remembers it."""
+        own = {name: found[:, list(members)] for name, found in self.columns(effect, shape, response).items()}
+        if not starts:
+            return own
+        runs, wide = len(self.problem.runs), self.span.temperature_range
+        fading = replace(effect, columns=lambda states, shape, response: starts_of(effect, states, shape, runs, wide))
+        began = self.columns(fading, shape, response)
+        return {name: np.hstack([columns, began[name]]) for name, columns in own.items()}
+
+    def remembers(self, effect: Effect, shape: tuple[float, ...]) -> bool:
+        """Whether an effect keeps what came before a run for longer than the resonator does."""
+        return bool(effect.memory) and memory_of(effect, shape) > self.span.tau
 
     @cached_property
     def _operators(self) -> "dict[tuple[int, str, str], csr_array]":

@@ -47,6 +47,8 @@ SLOW_THAN = {True: "what the card states of its noise", False: "what noise usual
 DELAY = "law.delay_s"
 SURE_DELAY, LEAST_DELAY = 3.0, 0.5
 """Standard deviations, and part of what is expected of it beforehand, from which on a delay is said."""
+ODD = 5.0
+"""Times the scatter of the other runs from which on one is odd."""
 NARROW_RANGE = 1.0
 """Kelvin below which a temperature does not vary."""
 STEP, WORTH = 0.03, 0.5
@@ -56,7 +58,9 @@ STEP, WORTH = 0.03, 0.5
 def judge(found: Inferred) -> Verdict:
     """Return the verdict."""
     shifts = find_shifts(found) if found.card.polynomial is None else []
-    physics = _merged([*(_cause(found, k) for k in range(len(found.final.terms))), *_delay_cause(found)])
+    physics = _merged(
+        [*(_cause(found, k) for k in range(len(found.final.terms))), *_delay_cause(found), *_clock_cause(found)]
+    )
     causes = tuple(sorted((*wrong_values(shifts), *physics), key=lambda cause: -cause.evidence))
     results = {name: _result(found, name, causes) for name in found.search.linear.responses}
     results |= skipped_results(found.campaign)
@@ -174,8 +178,8 @@ def _shape_spread(background: Background, signatures: Signatures, k: int, place:
     def moved(by: float) -> Background:
         there = value * float(np.exp(by)) if parameter.logarithmic else value + by
         shape = (*term.shape[:place], there, *term.shape[place + 1 :])
-        columns = signatures.columns(term.effect, shape, term.response)
-        own = replace(term, shape=shape, columns={n: X[:, term.members] for n, X in columns.items()})
+        columns = signatures.of_term(term.effect, shape, term.response, term.members, term.starts)
+        own = replace(term, shape=shape, columns=columns)
         return replace(background, terms=(*background.terms[:k], own, *background.terms[k + 1 :]))
 
     for _ in range(6):
@@ -226,12 +230,14 @@ def _judge(
     patched = bool(mine) and max(cause.probability for cause in mine) < CONSTANTS["believed"]
     if left.significant and (share is None or not clean or patched):
         return "unexplained", ""
+    apart = _apart(found, name)
+    if apart and not terms and not mine:
+        return "not-identifiable", apart
     if slow > CONSTANTS["wander_usual"]:
         return "not-identifiable", (
             f"the slow part of the residual is {slow:.2g} times {SLOW_THAN[found.card.polynomial is None]}: these records cannot"
             " distinguish slow noise from a cause that acts slowly"
         )
-    apart = _apart(found, name)
     if terms or mine:
         return ("not-identifiable" if any(cause.equivalent for cause in mine) else "explained"), apart
     if values:
@@ -245,8 +251,6 @@ def _judge(
                 "not-identifiable",
                 f"too short to judge: {lasts:.0f} s, and the resonator may follow the housing with {lag:.0f} s or more",
             )
-    if apart:
-        return "not-identifiable", apart
     resonator = np.concatenate([path.states.resonator for path in found.search.signatures.paths])
     if np.ptp(resonator) < NARROW_RANGE:
         return (
@@ -265,13 +269,29 @@ def _delay_cause(found: Inferred) -> list[Cause]:
     z, sd = float(found.background.posterior[0][k]), float(np.sqrt(found.background.posterior[1][k, k]))
     if abs(z) < SURE_DELAY:
         return []
-    names = ["rate-frequency", "second-lag", "thermometer-lag"][:: -1 if z < 0 else 1]
-    delay = (
-        {"sensor_time_constant_s": Interval.about(-z * priors.values[k].sd, sd * priors.values[k].sd)} if z < 0 else {}
-    )
+    alike = sorted((e for e in library().values() if e.delay is not None), key=lambda e: -(e.delay or 0) * z)
+    delay = Interval.about(abs(z) * priors.values[k].sd, sd * priors.values[k].sd)
     return [
-        Cause(names[0], name, float(scipy.special.erf(abs(z) / np.sqrt(2.0))), tuple(sorted(names[1:])), delay, z**2)
+        Cause(
+            alike[0].name,
+            name,
+            float(scipy.special.erf(abs(z) / np.sqrt(2.0))),
+            tuple(sorted(effect.name for effect in alike[1:])),
+            dict.fromkeys(alike[0].coefficient_names(name), delay) if z < 0 else {},
+            z**2,
+        )
     ]
+
+
+def _clock_cause(found: Inferred) -> list[Cause]:
+    """Return a drift of the clock that a reference shows, however small it is beside the noise of the frequency."""
+    if found.clock is None or not found.clock_drifts:
+        return []
+    (slope, sd), effect = found.clock, next(one for one in library().values() if one.judge == REFERENCE)
+    (response,) = effect.sizes
+    (name,) = effect.coefficient_names(response)
+    sure = float(scipy.special.erf(abs(slope) / sd / np.sqrt(2.0)))
+    return [Cause(effect.name, response, sure, (), {name: Interval.about(slope, sd)}, (slope / sd) ** 2)]
 
 
 def _delayed(found: Inferred, name: str) -> str:
@@ -292,14 +312,21 @@ def _delayed(found: Inferred, name: str) -> str:
 
 def _turned_on(found: Inferred, name: str, verdict: str) -> str:
     """Return the sentence on offsets of runs far beyond what is left within them."""
-    rows = found.rows[name].residual
-    if name != "bias_deg_per_h" or verdict != "adequate" or found.card.polynomial is None:
+    if name != "bias_deg_per_h" or verdict != "adequate":
         return ""
-    apart = float(np.sqrt(np.mean(np.square(_run_shifts(found, name)))))
+    shifts, rows, response = np.array(_run_shifts(found, name)), found.rows[name].residual, RESPONSES[name]
     within = float(np.sqrt(np.mean(np.concatenate([own - own.mean() for own in rows]) ** 2)))
-    if apart <= CONSTANTS["wander_usual"] * within:
+    far = int(np.argmax(np.abs(shifts - np.median(shifts))))
+    others = np.delete(shifts, far)
+    if len(others) > 1 and abs(odd := shifts[far] - others.mean()) > ODD * max(float(np.std(others, ddof=1)), within):
+        record = found.campaign.records[far].path or f"run {far + 1}"
+        return (
+            f"{record}: its bias lies {odd * response.scale:+.3g} {response.shown} from that of the other runs, which agree to"
+            f" {np.std(others, ddof=1) * response.scale:.2g} {response.shown}: one turn-on, or something done between the runs"
+        )
+    apart = float(np.sqrt(np.mean(shifts**2)))
+    if apart <= CONSTANTS["wander_usual"] * within or found.card.polynomial is None:
         return ""
-    response = RESPONSES[name]
     return (
         f"the runs lie {apart * response.scale:.3g} {response.shown} (rms) apart, which is treated as a turn-on offset; ageing or a jump"
         " between runs would look the same. A saved model states it as turn-on; a card with bias_turn_on_deg_per_h distinguishes them"

@@ -16,6 +16,7 @@ WHOLE = {
     "law.lag_s": "lag of the resonator behind its housing",
     "law.chamber_lag_s": "lag of the housing behind its chamber",
     "law.delay_s": "delay of the resonator behind the housing sensor",
+    "law.bias_bend": "part of the bend of the frequency that the bias follows",
     "loss.inverse_q": "1/Q at the reference temperature",
     "loss.slope_per_K": "relative temperature slope of 1/Q",
     "loss.curvature_per_K2": "relative temperature curvature of 1/Q",

@@ -50,10 +50,12 @@ class Candidate:
     def columns(self, term: Term) -> Array:
         """Return the columns of a term in white rows, in units of their priors."""
         found = self.signatures.columns(term.effect, term.shape, term.response)
-        parts = []
+        parts, members = [], list(term.members)
         for name, whitener in self.whiteners.items():
             rows = sum(place.stop - place.start for place in whitener.slices)
-            own = found[name][:, list(term.members)] if name in found else np.zeros((rows, len(term.unit)))
+            own = np.zeros((rows, len(term.unit)))  # what other runs began with is not in this one
+            if name in found:
+                own[:, : len(members)] = found[name][:, members]
             parts.append(whitener(own * term.spread))
         return np.vstack(parts)
 

@@ -155,7 +155,11 @@ def plan_campaign(
     problem = build_problem(card, records, housing=False)
     state = problem.evaluate(np.zeros(problem.count))
     linear = Linear(
-        problem, problem.rows, {name: np.zeros_like(own) for name, own in state.residual.items()}, state.slope
+        problem,
+        problem.rows,
+        {name: np.zeros_like(own) for name, own in state.residual.items()},
+        state.slope,
+        np.zeros((0, problem.count + 1)),
     )
     noise = stated_noises(card, records)
     progress("all effects in all shapes")

@@ -13,7 +13,6 @@ from studies.reports.digits import plain
 from studies.results import Chapter, Column, Facts, Figure, Part, Sentence, Table
 
 if TYPE_CHECKING:
-    from studies.diagnosis.investigate import Diagnosis
     from studies.inference.diagnosis import Inference
     from studies.inference.unjudged import Unjudged
 
@@ -180,7 +179,7 @@ def next_step(verdict: Verdict) -> list[Sentence]:
     return [Sentence(f"Next experiment: {verdict.next_experiment}", "note")] if verdict.next_experiment else []
 
 
-def diagnosis_parts(diagnosis: "Diagnosis | Inference | Unjudged") -> list[Chapter]:
+def diagnosis_parts(diagnosis: "Inference | Unjudged") -> list[Chapter]:
     """Return what people read of the diagnosis of a campaign."""
     verdict = diagnosis.verdict
     files = ", ".join(diagnosis.labels)
@@ -203,7 +202,7 @@ def diagnosis_parts(diagnosis: "Diagnosis | Inference | Unjudged") -> list[Chapt
     ]  # fmt: skip
 
 
-def _residual(diagnosis: "Diagnosis | Inference | Unjudged") -> Iterator[Part]:
+def _residual(diagnosis: "Inference | Unjudged") -> Iterator[Part]:
     main, run = _main_response(diagnosis.verdict), diagnosis.verdict.next_run
     if main is not None and main in diagnosis.shown_responses:
         when = " before and after the named causes are added" if diagnosis.seen(main).named else ""
@@ -212,7 +211,7 @@ def _residual(diagnosis: "Diagnosis | Inference | Unjudged") -> Iterator[Part]:
         yield Figure(lambda: pictures.next_run_picture(run), f"Suggested next run: {run.profile}.")
 
 
-def _alternatives(diagnosis: "Diagnosis | Inference | Unjudged", response: str) -> Iterator[Part]:
+def _alternatives(diagnosis: "Inference | Unjudged", response: str) -> Iterator[Part]:
     seen = diagnosis.seen(response)
     caption = f"Baseline residual of {spoken(response)} (averages over {seen.step:.0f} s) against its inputs."
     yield Figure(lambda: pictures.residual_views(diagnosis, response), caption)

@@ -11,13 +11,12 @@ from studies.reports.style import BLACK, BLUE, ORANGE, VERMILION, figure
 from studies.results import Drawing
 
 if TYPE_CHECKING:
-    from studies.diagnosis.investigate import Diagnosis
     from studies.inference.diagnosis import Inference
     from studies.inference.unjudged import Unjudged
     from studies.planning.programme import NextRun
 
 
-def ladder(diagnosis: "Diagnosis | Inference | Unjudged") -> Drawing:
+def ladder(diagnosis: "Inference | Unjudged") -> Drawing:
     """Draw what is left of every response: as shipped, calibrated, with the named physics, noise; on held-out rows."""
     columns = diagnosis.shown_responses
     with figure(1, len(columns), height=3.0, squeeze=False) as (canvas, axes):
@@ -58,7 +57,7 @@ def rungs(result: ResponseResult) -> list[tuple[str, float | None]]:
     ]
 
 
-def as_temperature(diagnosis: "Diagnosis | Inference | Unjudged", column: str, value: float) -> str | None:
+def as_temperature(diagnosis: "Inference | Unjudged", column: str, value: float) -> str | None:
     """Return the error of temperature that a residual of the frequency amounts to; None for the others."""
     if not RESPONSES[column].thermometer:
         return None
@@ -72,7 +71,7 @@ def as_temperature(diagnosis: "Diagnosis | Inference | Unjudged", column: str, v
     )
 
 
-def before_and_after(diagnosis: "Diagnosis | Inference | Unjudged", response: str) -> Drawing:
+def before_and_after(diagnosis: "Inference | Unjudged", response: str) -> Drawing:
     """Draw the residual over the campaign before and, if anything is named, after the extension; the noise as a band."""
     seen, unit = diagnosis.seen(response), RESPONSES[response]
     noise = (diagnosis.verdict.responses[response].noise or 0.0) * unit.scale
@@ -101,7 +100,7 @@ def _thinned(time: np.ndarray, values: np.ndarray, most: int = 500) -> tuple[np.
     return time[::step], values[::step]
 
 
-def residual_views(diagnosis: "Diagnosis | Inference | Unjudged", response: str) -> Drawing:
+def residual_views(diagnosis: "Inference | Unjudged", response: str) -> Drawing:
     """Draw the baseline's residual against temperature (heating and cooling), rate, frequency and the drives."""
     seen, unit = diagnosis.seen(response), RESPONSES[response]
     inputs, rest, runs = seen.inputs, seen.rest * unit.scale, seen.run

@@ -112,6 +112,8 @@ def read_out(
     inverse_q = own + changes.get("inverse_q", 0.0) + more_loss
     wave = None if damping is None or damping.wave is None else damping.wave(warmed)
     change = thermal - float(law.frequency(reference))
+    if instrument.polynomial is not None:
+        change = instrument.polynomial.change_of_bias(change, warmed)
     slope, angle = (
         thermal * (law.slope(warmed) * rate + found.rate[:, 2:] @ slopes),
         drive.commands.get("pattern_angle"),

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from compensation.spikes import find_spike_groups, find_spikes, find_step
+from compensation.spikes import find_spikes, find_step
 
 ROWS = np.arange(600.0)
 SHAPES = {
@@ -57,37 +57,6 @@ def test_gaussian_noise_has_next_to_none():
     assert found <= 1
 
 
-@pytest.mark.parametrize(
-    "places", [[200], [200, 201], [200, 202], [200, 201, 202], [200, 201, 203], [3, 4], [595, 596]]
-)
-def test_a_few_rows_that_stand_out_together_are_found(places):
-    rests = np.random.default_rng(6).standard_normal(ROWS.size)
-    rests[places] += 30.0
-    assert np.flatnonzero(find_spike_groups(rests)).tolist() == places
-
-
-@pytest.mark.parametrize(
-    "event",
-    [
-        np.where(ROWS < 300.0, 0.0, 30.0),
-        np.where(np.abs(ROWS - 300.0) < 2.5, 30.0, 0.0),  # five rows
-        30.0 * np.exp(-0.5 * ((ROWS - 300.0) / 2.0) ** 2),
-        30.0 / (1.0 + ((ROWS - 300.0) / 2.0) ** 2),
-        np.where(ROWS < 300.0, 0.0, 30.0 * np.exp(-(ROWS - 300.0) / 3.0)),
-        30.0 * (np.sin(ROWS / 5.0) > 0.5),
-    ],
-    ids=["jump", "five rows", "bump", "dip", "decay", "telegraph"],
-)
-def test_an_event_of_many_rows_is_no_group_of_spikes(event):
-    for seed in range(20):
-        assert not find_spike_groups(event + np.random.default_rng(seed).standard_normal(ROWS.size)).any()
-
-
-def test_noise_has_next_to_no_groups():
-    """Six deviations of Gaussian rows are passed by 2e-9 of them."""
-    assert not any(find_spike_groups(np.random.default_rng(k).standard_normal(600)).any() for k in range(100))
-
-
 def test_one_digit_more_or_less_is_no_spike_where_a_smooth_model_was_taken_away():
     """Readings that change by their last digit now and then: beside a smooth model that digit is many of the usual distances."""
     readings = np.round(np.cumsum(0.1 * np.random.default_rng(4).standard_normal(4000)) + 20.0)
@@ -95,8 +64,6 @@ def test_one_digit_more_or_less_is_no_spike_where_a_smooth_model_was_taken_away(
     step = find_step(readings)
     assert step == 1.0
     assert find_spikes(rests).any()
-    assert find_spike_groups(rests).any()
     assert not find_spikes(rests, step=step).any()
-    assert not find_spike_groups(rests, step).any()
     rests[2000] += 10.0
     assert np.flatnonzero(find_spikes(rests, step=step)).tolist() == [2000]

@@ -6,10 +6,9 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
-from unittest.mock import patch
 
-from studies.diagnosis.campaign import load_campaign
-from studies.diagnosis.investigate import investigate
+from studies import workbench
+from studies.calibration.observed import RESPONSES
 from studies.diagnosis.verdict import Verdict
 from studies.record import read_record
 from tests.stranger.aliens import ALIENS
@@ -29,8 +28,6 @@ CASES: tuple[tuple[str, str, float | None], ...] = (
 )
 """Kind, what is hidden, SNR; every effect of the library, every noise, every cause outside the library."""
 FIRST_SEED = 5000
-STEPS = 300
-"""Steps of the grid, of all runs: the engine's own 800 take two to three times as long."""
 Line = dict[str, Any]
 
 
@@ -50,11 +47,10 @@ def truth_of(place: int, folder: Path) -> tuple[Line, list[str], set[str]]:
 
 
 def diagnose(files: list[str], asked: set[str]) -> Verdict:
-    """Ask for the frequency and the responses in which something is hidden, without a score of held-out rows."""
-    with patch("studies.diagnosis.campaign.MOST_BINS", STEPS):
-        campaign = load_campaign([read_record(file) for file in files])
-    campaign = replace(campaign, responses=tuple(one for one in campaign.responses if one in asked))
-    return investigate(campaign, score_held_out=False, advise=False).verdict
+    """Ask for the frequency and the responses in which something is hidden."""
+    records = [read_record(file) for file in files]
+    kept = [{n: own for n, own in r.columns.items() if n in asked or n not in RESPONSES} for r in records]
+    return workbench.diagnose_records([replace(r, columns=own) for r, own in zip(records, kept, strict=True)]).verdict
 
 
 def answer(place: int, folder: Path) -> Line:

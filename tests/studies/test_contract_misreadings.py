@@ -8,8 +8,8 @@ import pytest
 from studies.calibration.calibrate import calibrate
 from studies.calibration.misreading import bias_of_opposite_sign, check_readings
 from studies.calibration.observed import observe, read_settled
-from studies.diagnosis.campaign import load_campaign
 from studies.errors import InputError
+from studies.inference.records import make_ready
 from studies.instrument.card import load_card, save_card
 from studies.simulation.chamber import load_profile
 from studies.simulation.virtual_gyro import simulate_run
@@ -95,7 +95,7 @@ def test_two_gyros_are_not_mixed(card, record):
     """2.8 % apart at one temperature: a diagnosis without a card once added three effects."""
     other = dataclasses.replace(spoilt(record, frequency_Hz=lambda f: f * 4555.0 / 4432.0), path="other.csv")
     with pytest.raises(InputError, match="The records are of different gyros"):
-        load_campaign([record, other])
+        make_ready([record, other])
     with pytest.raises(InputError, match="The records are of different gyros"):
         calibrate(card, [record, other])
 

@@ -69,7 +69,6 @@ EFFECT = Effect(
         Parameter("temperature_degC", -150.0, 250.0, "where the modes cross", False),
         Parameter("width_K", 0.05, 2.5, "half width of the crossing"),
     ),
-    fine=True,
     steady=steady,
     steady_grid=lambda low, high: [
         (float(c), float(w)) for c in np.linspace(low, high, 25) for w in np.array([0.05, 0.1, 0.2, 0.4]) * (high - low)

@@ -32,5 +32,4 @@ EFFECT = Effect(
     sizes={"bias_deg_per_h": 30.0},
     shape=(Parameter("rotation_deg_per_10K", -90.0, 90.0, "turn of the axes", False),),
     needs=("pattern_angle",),
-    fine=True,
 )

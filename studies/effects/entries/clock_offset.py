@@ -28,5 +28,4 @@ EFFECT = Effect(
     acts_on="temperature",
     event=True,
     once=True,
-    fine=True,
 )

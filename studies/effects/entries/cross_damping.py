@@ -74,5 +74,4 @@ EFFECT = Effect(
             refined=True,
         ),
     ),
-    fine=True,
 )

@@ -29,6 +29,5 @@ EFFECT = Effect(
     grid=grid,
     sizes={"frequency_Hz": 2e-8},
     needs=("voltage_squared",),
-    fine=True,
     positive=True,
 )

@@ -39,5 +39,4 @@ EFFECT = Effect(
         Parameter("width_K", 2.5, 60.0, "width of the peak"),
     ),
     positive=True,
-    fine=True,
 )

@@ -7,13 +7,15 @@ from studies.effects.states import FloatArray, States, lag
 
 
 def columns(states: States, shape: Shape, response: str) -> FloatArray:
-    """Maxwell elements: stress ∝ T_r − lag(T_r; τ_s), a mismatch that relaxes with τ_s, a third and three times of it.
+    """Maxwell elements: stress ∝ T_r − lag(T_r; τ_s), a mismatch that relaxes with τ_s, a third and three times of it,
+    from none in a resonator that is as warm as its housing.
 
     Beside it, in the frequency, what strains a joint between housing and resonator, s = T_h − T_r, the part of it that
     relaxes, s³, per (30 K)², of a joint that hardens, and u/√(1 + (u/k)²) − u of one that yields, k = 10 and 30 K, u = s and what
     is left of s when half of it has relaxed. In the bias s is the rate bias, behind one lag exactly.
     """
-    strains = [lag(states.resonator, states.step, shape[0] * ratio) for ratio in (1.0, 1.0 / 3.0, 3.0)]
+    rest = float(states.housing[0])
+    strains = [lag(states.resonator, states.step, shape[0] * ratio, rest) for ratio in (1.0, 1.0 / 3.0, 3.0)]
     across = (states.housing - states.resonator) * (response == "frequency_Hz")
     relaxing = lag(across, states.step, shape[0])
     joint = [across, relaxing, across * (across / 30.0) ** 2]
@@ -46,7 +48,6 @@ EFFECT = Effect(
     grid=grid,
     sizes={"frequency_Hz": 5e-5, "bias_deg_per_h": 2.0},
     shape=(Parameter("relaxation_time_s", 600.0, 1e6, "time in which the stress relaxes"),),
-    fine=True,
     steady=steady,
     steady_grid=lambda low, high: [
         (float(c),) for c in np.linspace(low + 0.15 * (high - low), high - 0.15 * (high - low), 29)

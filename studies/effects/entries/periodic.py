@@ -1,35 +1,25 @@
 """Periodic disturbance: a line at one period, with harmonics."""
 
-from functools import lru_cache
-
 import numpy as np
-import scipy
 
 from studies.effects.effect import Coefficient, Effect, Parameter, Shape, Span
 from studies.effects.states import FloatArray, States
 
 
 def columns(states: States, shape: Shape, response: str) -> FloatArray:
-    """Σ A_h sin(2πht/P) + B_h cos(2πht/P), h = 1 … 3, means over the readings of a step; t of the campaign or, after a restart, of the run.
+    """Σ A_h sin(2πht/P) + B_h cos(2πht/P), h = 1 … 3; t of the campaign or, after a restart, of the run.
 
     A line that nothing ties to the start of a run, or to runs whose starts are not known, has its own sines and cosines in each.
     """
     period, restarts = shape
     turn = np.exp(2j * np.pi * (states.time if restarts else states.campaign_time) / period)
-    waves = np.stack([turn, turn**2, turn**3], axis=1) * _of_means(period, states.step, states.rows)
+    waves = np.stack([turn, turn**2, turn**3], axis=1)
     pairs = np.concatenate([waves.imag, waves.real], axis=1)
     out = np.zeros((states.time.size, 6 * (1 + MOST_RUNS)))
     place = 1 + states.run if restarts == OWN else 0
     if place <= MOST_RUNS:
         out[:, 6 * place : 6 * (place + 1)] = pairs
     return out
-
-
-@lru_cache(maxsize=8192)
-def _of_means(period: float, step: float, rows: int) -> FloatArray:
-    """Return the amplitudes of means over the `rows` readings of a step, of a line and its harmonics."""
-    apart = 2.0 * np.pi * step / (rows * period)  # phase from one reading to the next
-    return np.asarray(scipy.special.diric(np.arange(1, 4) * apart, rows), dtype=float)
 
 
 def grid(span: Span, response: str) -> list[tuple[float, ...]]:

@@ -52,7 +52,6 @@ EFFECT = Effect(
     ),
     acts_on="temperature",
     positive=True,
-    fine=True,
     sees_heat=True,
     steady=steady,
     steady_grid=lambda low, high: [(b,) for b in (3.0, 4.0, 5.0, 6.0, 8.0)],

@@ -35,5 +35,4 @@ EFFECT = Effect(
     columns=columns,
     grid=grid,
     sizes={"bias_deg_per_h": 1000.0},
-    fine=True,
 )

@@ -23,7 +23,7 @@ EFFECT = Effect(
     coefficients=(Coefficient("coefficient_{unit}_per_K_per_s"),),
     columns=columns,
     grid=grid,
+    delay=1,
     sizes={"frequency_Hz": 0.02},
     equivalents={"frequency_Hz": ("thermometer-lag",)},
-    fine=True,
 )

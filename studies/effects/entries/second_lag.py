@@ -28,9 +28,9 @@ EFFECT = Effect(
     coefficients=(Coefficient("weight", (1.0, 0.2, 0.2), most=1.0),),
     columns=columns,
     grid=grid,
+    delay=0,
     sizes={"frequency_Hz": 0.5},
     shape=(Parameter("second_time_constant_s", 20.0, 3e5, "the other time constant"),),
     acts_on="temperature",
     memory="second_time_constant_s",
-    fine=True,
 )

@@ -27,5 +27,4 @@ EFFECT = Effect(
     acts_on="temperature",
     needs=("amplitude_squared",),
     positive=True,
-    fine=True,
 )

@@ -26,9 +26,9 @@ EFFECT = Effect(
     coefficients=(Coefficient("sensor_time_constant_s"),),
     columns=columns,
     grid=grid,
+    delay=-1,
     sizes={"frequency_Hz": 300.0},
     acts_on="temperature",
     equivalents={"frequency_Hz": ("rate-frequency",)},
     positive=True,
-    fine=True,
 )

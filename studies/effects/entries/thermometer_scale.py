@@ -51,7 +51,6 @@ EFFECT = Effect(
     sizes={"frequency_Hz": 0.3},
     shape=(Parameter("from_run", 0.0, 1e4, "first run with this error, counted from 0", False, True),),
     acts_on="temperature",
-    fine=True,
     steady=steady,
     steady_grid=lambda low, high: [(3.0,), (4.0,)],
     steady_words="thermometer error up to order {0:.0f}",

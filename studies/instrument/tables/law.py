@@ -32,6 +32,9 @@ class LawKeys(Keys, frozen=True, kw_only=True):
     delay_s: Annotated[float, number("of the resonator beside its lag, less that of the housing's sensor", sd=10.0)] = (
         0.0
     )
+    bias_bend: Annotated[
+        float, number("part of the bend of f that the bias follows: 1 f, as in eq. 21; 0 T alone", sd=0.5)
+    ] = 1.0
     note: Note = ""
 
     def __post_init__(self) -> None:
@@ -52,6 +55,7 @@ class PolynomialLaw:
     lag: float
     chamber_lag: float
     delay: float = 0.0
+    bias_bend: float = 1.0  # part of its bend that the bias follows
     lowest: float = 0.0
     highest: float = np.inf
     bryan_factor: float = 0.2774
@@ -75,6 +79,11 @@ class PolynomialLaw:
         x = np.asarray(temperature, dtype=float) - self.reference_temperature
         a1, a2, a3 = self.coefficients
         return np.asarray((a1 + x * (2 * a2 + x * 3 * a3)) * self.f0 / self.frequency(temperature))
+
+    def change_of_bias(self, change: Array, temperature: Array) -> Array:
+        """Return the change of frequency (Hz) that the bias follows: f₀ a₁ x, and its part of the rest."""
+        straight = self.f0 * self.coefficients[0] * (temperature - self.reference_temperature)
+        return np.asarray(straight + self.bias_bend * (change - straight))
 
     def uneven_slopes(self, temperature: float) -> Array:
         """What an uneven temperature does: nothing, for the resonator has one."""
@@ -105,7 +114,13 @@ def build(keys: LawKeys, place: CardPlace) -> PolynomialLaw | None:
         return None
     coefficients = (keys.a1_per_K, keys.a2_per_K2, keys.a3_per_K3)
     return PolynomialLaw(
-        keys.f0_Hz, coefficients, place.reference_temperature, keys.lag_s, keys.chamber_lag_s, keys.delay_s
+        keys.f0_Hz,
+        coefficients,
+        place.reference_temperature,
+        keys.lag_s,
+        keys.chamber_lag_s,
+        keys.delay_s,
+        keys.bias_bend,
     )
 
 

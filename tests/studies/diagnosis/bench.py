@@ -5,6 +5,12 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.signal import lfilter
 
+from studies.calibration.fit import fit
+from studies.inference.diagnosis import build_problem
+from studies.inference.model import Linear
+from studies.inference.polynomial_card import polynomial_card
+from studies.inference.search import Search
+from studies.inference.signatures import Signatures
 from studies.record import Record
 
 LAG = 1200.0  # s
@@ -59,3 +65,11 @@ class Bench:
         table = {"time_s": self.time, "housing_temperature_degC": self.chamber} | columns
         table = {name: values[keep] for name, values in table.items()}
         return Record(table, path=f"run{number}.csv", sha256=f"{number}{self.seed}", start=start)
+
+
+def searched(records, *named):
+    """Return the search beside the polynomial card of records, its bank of the named effects alone, and the model without effects."""
+    found = fit(build_problem(polynomial_card(records), records))
+    search = Search(Linear.of(found), Signatures.at(found.problem, found.point), found.noise, bank=[])
+    search.bank = search.shapes_of((e, r) for e, r in search.signatures.applicable() if e.name in named)
+    return search, search.settle((), found.noise)

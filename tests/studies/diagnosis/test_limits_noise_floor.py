@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from studies.diagnosis.campaign import load_campaign
-from studies.diagnosis.investigate import investigate
 from studies.record import Record
+from studies.workbench import diagnose_records
 
 NOISE, TAU, FINE = 3e-4, 800.0, 1.0
 
@@ -37,30 +36,8 @@ def test_the_residual_is_the_noise(step, hours, before):
     """Also on long records, which are binned, and on records that start in full slew, 10 K from equilibrium."""
     rng = np.random.default_rng(3)
     records = [baseline_record(run, step, hours, before, rng) for run in range(3)]
-    verdict = investigate(load_campaign(records), advise=False).verdict
+    verdict = diagnose_records(records).verdict
     result = verdict.responses["frequency_Hz"]
     assert verdict.verdict == "adequate", verdict.causes
     assert result.noise == pytest.approx(NOISE, rel=0.05)
     assert result.baseline[1] == pytest.approx(NOISE, rel=0.05)
-
-
-def test_a_gap_that_hides_a_step_starts_a_new_thermal_state():
-    """A quarter of an hour without rows while the chamber steps: nobody knows what the resonator has seen."""
-    time = np.arange(0.0, 6 * 3600.0, 10.0)
-    housing = np.where(time < 9000.0, 20.0, 35.0 - 15.0 * np.exp(-(time - 9000.0) / 300.0))
-    decay = np.exp(-10.0 / TAU)
-    resonator, _ = lfilter([1.0 - decay], [1.0, -decay], housing, zi=[decay * housing[0]])
-    x = resonator - 20.0
-    frequency = 5000.0 + 0.4 * x + NOISE * np.random.default_rng(4).standard_normal(time.size)
-    known = (time < 8600.0) | (time > 9400.0)
-    columns = {"time_s": time, "housing_temperature_degC": housing, "frequency_Hz": frequency}
-    campaign = load_campaign([Record({name: values[known] for name, values in columns.items()})])
-    assert len(campaign.runs) == 2
-    soaked = load_campaign(
-        [
-            Record(
-                {n: v[known] for n, v in {**columns, "housing_temperature_degC": 0 * time + 20.0 + time / 1e4}.items()}
-            )
-        ]
-    )
-    assert len(soaked.runs) == 1

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from studies.diagnosis.campaign import load_campaign
-from studies.diagnosis.investigate import _judge, investigate
+from studies.inference.diagnosis import blocks_of
 from studies.record import Record
+from studies.workbench import diagnose_records
 
 ROWS, SAMPLING, LAG, NOISE = 2880, 5.0, 900.0, 4e-4  # rows a run, s, s, Hz
 
@@ -29,7 +29,7 @@ def a_campaign(period, size=3.0, runs=2, rows=ROWS):
         columns = {"time_s": time, "housing_temperature_degC": chamber, "frequency_Hz": frequency}
         columns = {name: column[:rows] for name, column in columns.items()}
         records.append(Record(columns, path=f"run{run}.csv", sha256=str(run)))
-    return load_campaign(records[:runs])
+    return records[:runs]
 
 
 def amplitude(cause):
@@ -37,15 +37,15 @@ def amplitude(cause):
     return np.hypot(cause.parameters["sine_Hz"].value, cause.parameters["cosine_Hz"].value)
 
 
-def test_without_a_line_the_grid_is_the_usual_one():
+def test_without_a_line_the_blocks_are_the_usual_ones_and_what_is_left_decides():
     campaign = a_campaign(60.0, size=0.0)
-    assert campaign.step == 35.0
-    found = investigate(campaign, advise=False)
+    assert blocks_of(campaign) == blocks_of(a_campaign(17.0)) == 400
+    found = diagnose_records(campaign)
     assert found.verdict.verdict == "adequate"
-    inquiry = found.inquiries["frequency_Hz"]
+    left = found.left["frequency_Hz"]
     states = [
-        _judge(found.campaign, replace(inquiry, leftover=replace(inquiry.leftover, evidence=left)), (), None, False)[0]
-        for left in (3.9, 4.1, 11.9, 12.1)  # nothing is said to be adequate beside more than noise leaves
+        replace(found, left={"frequency_Hz": replace(left, evidence=evidence)}).verdict.verdict
+        for evidence in (3.9, 4.1, 11.9, 12.1)  # nothing is said to be adequate beside more than noise leaves
     ]
     assert states == ["adequate", "not-identifiable", "not-identifiable", "unexplained"]
 
@@ -53,8 +53,8 @@ def test_without_a_line_the_grid_is_the_usual_one():
 @pytest.mark.slow
 def test_a_line_of_less_than_two_steps_is_named_on_a_finer_grid():
     campaign = a_campaign(60.0)
-    assert campaign.step <= 60.0 / 2.5
-    verdict = investigate(campaign, advise=False).verdict
+    assert ROWS * SAMPLING / blocks_of(campaign) <= 60.0 / 2.5
+    verdict = diagnose_records(campaign).verdict
     (cause,) = verdict.causes
     assert (verdict.verdict, cause.effect) == ("explained", "periodic")
     assert cause.parameters["period_s"].value == pytest.approx(60.0, abs=0.02)
@@ -62,21 +62,19 @@ def test_a_line_of_less_than_two_steps_is_named_on_a_finer_grid():
 
 
 def test_a_line_that_no_grid_resolves_is_said_to_be_there():
-    """Means over a step show nothing of it: fitted, the record is as good as noise, and its noise is 2.3 times too large."""
-    campaign = a_campaign(17.0)
-    assert campaign.step == 35.0
-    verdict = investigate(campaign).verdict
+    """Means over a block show nothing of it: fitted, the record is as good as noise, and its noise is 2.3 times too large."""
+    verdict = diagnose_records(a_campaign(17.0)).verdict
     result = verdict.responses["frequency_Hz"]
     assert verdict.verdict == "unexplained"
     assert result.left_over == "structure"
     assert "a line of 17 s" in result.left_over_input
-    assert "a part of at most 2.3 h" in verdict.next_experiment
+    assert "a part of at most 1.3 h" in verdict.next_experiment
 
 
 @pytest.mark.slow
 def test_a_shorter_stretch_resolves_it():
     """A row is then a step, a reading at a moment: the amplitude is that of the line, not that of its means."""
-    verdict = investigate(a_campaign(17.0, runs=1, rows=900), advise=False).verdict
+    verdict = diagnose_records(a_campaign(17.0, runs=1, rows=900)).verdict
     (cause,) = verdict.causes
     assert (verdict.verdict, cause.effect) == ("explained", "periodic")
     assert cause.parameters["period_s"].value == pytest.approx(17.0, abs=1e-3)

@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from studies.diagnosis.campaign import load_campaign
-from studies.diagnosis.investigate import investigate
 from studies.record import Record
+from studies.workbench import diagnose_records
 from thermal.lag import lag
 
 STEP, RUN, PAUSE = 20.0, 9000.0, 2400.0  # s
@@ -37,7 +36,7 @@ def a_day_in_the_chamber():
 @pytest.mark.slow
 def test_a_slow_mass_that_the_runs_before_have_warmed_is_one_cause():
     """The second path starts every run with what it has kept; it was once called mounting stress, ageing and a jump."""
-    verdict = investigate(load_campaign(a_day_in_the_chamber()), advise=False).verdict
+    verdict = diagnose_records(a_day_in_the_chamber()).verdict
     (cause,) = verdict.causes
     assert cause.effect == "second-lag"
     result = verdict.responses["frequency_Hz"]

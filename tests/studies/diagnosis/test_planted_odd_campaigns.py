@@ -5,19 +5,16 @@ from datetime import UTC, datetime, timedelta
 import numpy as np
 import pytest
 
-from studies.diagnosis.campaign import load_campaign
-from studies.diagnosis.held_out import Score, is_worse
-from studies.diagnosis.inquiry import begin
-from studies.diagnosis.investigate import investigate
-from studies.diagnosis.scan import build_bank, scan
-from studies.effects import find_effect, library
-from tests.studies.diagnosis.bench import BACK, CYCLE, Bench
+from studies.effects import library
+from studies.inference import signatures
+from studies.workbench import diagnose_records
+from tests.studies.diagnosis.bench import BACK, CYCLE, Bench, searched
 
 FIRST_DAY = datetime(2026, 3, 1, tzinfo=UTC)
 
 
 def told(records):
-    return investigate(load_campaign(records), advise=False).verdict
+    return diagnose_records(records).verdict
 
 
 @pytest.mark.slow
@@ -30,10 +27,7 @@ def test_a_gap_in_a_log_is_no_turn_on():
         bias = 1.0 + 3.0 * number + 0.8 * x - 0.3 * x**2 + 0.05 * bench.rng.standard_normal(x.size)
         hole = (bench.time < 3.6 * 3600.0) | (bench.time > 4.1 * 3600.0)
         records.append(bench.record(number, hole, bias_deg_per_h=bias))
-    campaign = load_campaign(records)
-    assert len(campaign.runs) == 4
-    assert sum("split it into 2 parts" in note for note in campaign.notes) == 2
-    verdict = investigate(campaign, advise=False).verdict
+    verdict = told(records)
     result = verdict.responses["bias_deg_per_h"]
     assert (verdict.verdict, verdict.causes) == ("adequate", ())
     assert result.run_shifts == pytest.approx((-1.5, 1.5), abs=0.2)  # one a record
@@ -50,9 +44,8 @@ def test_a_voltage_that_swings_about_its_mean_softens_and_never_stiffens(softeni
             voltage = 100.0 + 10.0 * np.sin(2.0 * np.pi * bench.time / 5200.0 + number)
             frequency = bench.frequency(8e-4) - softening * voltage**2
             records.append(bench.record(number, frequency_Hz=frequency, electrode_bias_V=voltage))
-        plain = begin(load_campaign(records), "frequency_Hz", None)
-        found = scan(plain, build_bank(plain, [find_effect("electrostatic-softening")]))
-        assert [one.gain > 20.0 for one in found] == [True] * seen
+        search, plain = searched(records, "electrostatic-softening")
+        assert [one.score - plain.score > 20.0 for one in search.contenders(plain)] == [True] * seen
 
 
 @pytest.mark.slow
@@ -100,21 +93,7 @@ def test_uneven_stamps_on_a_ramp_are_no_noise():
     assert result.white == pytest.approx(1e-3, rel=0.15)
 
 
-@pytest.mark.parametrize(
-    ("before", "after", "worse"),
-    [
-        (Score(1.0, 1.0), Score(0.5, 1.1), True),
-        (Score(1.0, 1.0), Score(1.5, 0.9), False),
-        (Score(1.0, None), Score(1.1, None), True),
-        (Score(1.0, 2.0), Score(1.001, None), False),
-    ],
-)
-def test_more_is_left_where_it_was_held_out_or_else_where_it_was_fitted(before, after, worse):
-    assert is_worse(before, after) is worse
-
-
 @pytest.mark.slow
-@pytest.mark.usefixtures("coarse_grid")
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_a_drift_of_the_frequency_is_no_reason_for_one_of_the_loss_and_damping_that_falls_is_no_leak(sign):
     """A clock that drifts looks like a resonator that ages; the loss of a gyro that leaks is not its doing. A leak only adds gas."""
@@ -146,7 +125,6 @@ def drifting(size, spread, reference=None):
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("coarse_grid")
 @pytest.mark.parametrize(("hidden", "seen"), [("clock-drift", False), ("ageing", True)])
 def test_a_reference_clock_tells_a_drifting_clock_from_ageing(hidden, seen):
     verdict = told(drifting(0.01, 2e-3, seen))
@@ -156,7 +134,6 @@ def test_a_reference_clock_tells_a_drifting_clock_from_ageing(hidden, seen):
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("coarse_grid")
 def test_a_reference_clock_finds_a_drift_that_the_record_hides():
     """A drift that white noise of each row covers: without the reference nothing is named, with it the clock is."""
     assert "clock-drift" in {cause.effect for cause in told(drifting(2e-5, 2e-3, False)).causes}
@@ -164,21 +141,20 @@ def test_a_reference_clock_finds_a_drift_that_the_record_hides():
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("coarse_grid")
-def test_an_effect_without_its_file_is_not_explained_by_another():
+def test_an_effect_without_its_file_is_not_explained_by_another(monkeypatch):
     records = []
     for k, corners in enumerate([CYCLE, BACK]):
         bench = Bench(corners, seed=90 + k)
         voltage = 80.0 + 20.0 * (np.floor(bench.time / 4000.0) % 3)
         frequency = bench.frequency(2e-3) - 4e-6 * voltage**2
         records.append(bench.record(k, frequency_Hz=frequency, electrode_bias_V=voltage))
-    others = [effect for effect in library().values() if effect.name != "electrostatic-softening"]
-    verdict = investigate(load_campaign(records), effects=others, advise=False).verdict
+    others = {name: effect for name, effect in library().items() if name != "electrostatic-softening"}
+    monkeypatch.setattr(signatures, "library", lambda: others)
+    verdict = told(records)
     assert verdict.verdict == "unexplained", verdict.causes
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("coarse_grid")
 def test_a_bias_that_wanders_is_no_line():
     """Six knots a run: noise, or unexplained, but no periodic disturbance."""
     for seed in (1, 2):

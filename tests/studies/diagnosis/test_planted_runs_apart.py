@@ -5,9 +5,8 @@ import datetime
 import numpy as np
 import pytest
 
-from studies.diagnosis.campaign import load_campaign
-from studies.diagnosis.investigate import investigate
 from studies.record import Record
+from studies.workbench import diagnose_records
 from thermal.lag import lag
 
 NOISE = 1e-3  # Hz
@@ -24,11 +23,11 @@ def runs(offsets, gap=None):
         columns = {"time_s": TIME, "housing_temperature_degC": HOUSING, "frequency_Hz": f}
         start = None if gap is None else datetime.datetime(2026, 1, 1) + datetime.timedelta(seconds=k * gap)
         records.append(Record(columns, start=start, path=f"run{k}.csv", sha256=str(k)))
-    return load_campaign(records)
+    return records
 
 
-def judge(campaign):
-    return investigate(campaign, advise=False).verdict
+def judge(records):
+    return diagnose_records(records).verdict
 
 
 @pytest.mark.slow
@@ -58,7 +57,7 @@ def test_a_bias_that_differs_from_run_to_run_is_adequate_as_turn_on_and_what_els
         bias = 0.2 * (HOUSING - 20.0) + offset + 0.05 * rng.standard_normal(TIME.size)
         columns = {"time_s": TIME, "housing_temperature_degC": HOUSING, "bias_deg_per_h": bias}
         records.append(Record(columns, path=f"run{k}.csv", sha256=str(k)))
-    result = judge(load_campaign(records)).responses["bias_deg_per_h"]
+    result = judge(records).responses["bias_deg_per_h"]
     assert result.verdict == "adequate"
     assert "lie 2 °/h (rms) apart" in result.remark
     assert "turn-on" in result.remark

@@ -1,19 +1,45 @@
 """Every effect of the library keeps the same contract; the names are those of the contract."""
 
 import ast
-from dataclasses import replace
+import json
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import studies.diagnosis
-from studies.diagnosis.baseline import View
-from studies.diagnosis.terms import Term, term_columns
+import studies.inference
+from studies.cli import main
 from studies.effects import Span, States, apply_effect, apply_effects, find_effect, library
-from studies.effects.states import average, lag
+from studies.effects.states import lag
 from studies.errors import InputError
 from studies.instrument.card import load_card, save_card
+
+NAMES = {
+    "second-lag",
+    "rate-bias",
+    "hysteresis",
+    "ageing",
+    "jump",
+    "activity-dip",
+    "electrostatic-softening",
+    "amplitude-frequency",
+    "curvature",
+    "cross-damping",
+    "self-heating",
+    "loss-peak",
+    "leak",
+    "periodic",
+    "radiation",
+    "clock-drift",
+    "quadrature-leakage",
+    "axis-rotation",
+    "thermometer-scale",
+    "mounting-stress",
+    "thermometer-lag",
+    "rate-frequency",
+    "clock-offset",
+}
 
 
 def make_states(run=0):
@@ -35,6 +61,10 @@ def make_states(run=0):
 
 
 SPAN = Span(270.0, 315.0, 20000.0, 106400.0, 60.0, 1500.0, 2, (make_states().time, make_states(1).time), turns=True)
+
+
+def test_library_has_every_name_of_the_contract():
+    assert set(library()) >= NAMES
 
 
 @pytest.mark.parametrize("name", sorted(library()))
@@ -102,6 +132,8 @@ def test_a_number_is_the_first_member_of_a_list():
 
 def test_slow_sensor_ahead_of_its_device():
     """Forward, the lag of a sensor undoes itself: lag(T_s + τ_s dT_s/dt; τ), with T_s the lag of the true temperature."""
+    from dataclasses import replace
+
     t = np.arange(0.0, 20000.0, 5.0)
     true = 293.15 + 10.0 * np.sin(t / 3000.0)
     sensed = lag(true, 5.0, 120.0)
@@ -146,6 +178,8 @@ def test_radiation_settles_on_the_nonlinear_balance():
 
 
 def test_static_effects_see_the_temperature_that_thermal_effects_leave():
+    from dataclasses import replace
+
     states = make_states()
     warm = ("self-heating", "frequency_Hz", {"heating_K_per_V2": 3.0})
     rate = ("rate-bias", "bias_deg_per_h", {"coefficient_deg_per_h_per_K_per_s": 100.0})
@@ -158,14 +192,28 @@ def test_static_effects_see_the_temperature_that_thermal_effects_leave():
 
 def test_the_engine_knows_no_effect_by_its_name():
     """Names live in the entries: what a diagnosis must know of an effect is a field of it."""
-    folder = Path(studies.diagnosis.__file__).parent
+    folders = [Path(package.__file__).parent for package in (studies.diagnosis, studies.inference)]
     found = [
         (path.name, node.lineno, node.value)
-        for path in sorted(folder.rglob("*.py"))
+        for path in sorted(path for folder in folders for path in folder.rglob("*.py"))
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
         if isinstance(node, ast.Constant) and node.value in library()
     ]
     assert not found
+
+
+def test_the_command_lists_every_effect_and_shows_one_in_full(capsys):
+    """Names, parameters with units and bounds, what drives it, where it is from, and the run that isolates it."""
+    assert main(["effects", "--json"]) == 0
+    listed = json.loads(capsys.readouterr().out)
+    assert listed["schema"] == "hrg.effects/1"
+    assert {entry["name"] for entry in listed["effects"]} == set(library())
+    assert main(["effects", "hysteresis"]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    for part in ("half_width_K", "0.02 to 40", "loop_deg_per_h_per_K", "To isolate it", "Source", "frequency"):
+        assert part in said
+    assert main(["effects", "histeresis"]) == 2
+    assert "hysteresis" in capsys.readouterr().err
 
 
 def test_of_a_positive_effect_only_the_first_coefficient_cannot_be_negative(tmp_path):
@@ -187,19 +235,3 @@ def test_no_more_heat_is_radiated_than_there_is():
         card.with_table("effect", [whole | {"radiated_share": 1.4}])
     with pytest.raises(InputError, match=r"radiated_share must be at most 1, not 1\.4"):
         apply_effect("radiation", {"radiated_share": 1.4}, make_states())
-
-
-@pytest.mark.parametrize("name", [*sorted(e.name for e in library().values() if e.needs), "cross-damping"])
-def test_a_drive_that_steps_within_a_mean_is_averaged_as_the_record_is(name):
-    """The mean of sin 4θ is not sin 4 of the mean: an azimuth that stepped within a mean once hid a turn of the axes."""
-    fine, group = make_states(), 7
-    coarse = fine.averaged(group)
-    view = View(fine, coarse, fine, coarse, np.ones(coarse.time.size))
-    effect = find_effect(name)
-    span = replace(SPAN, turns=True)
-    for response in effect.responses:
-        for shape in effect.grid(span, response)[-2:]:
-            expected = average(effect.columns(fine, shape, response), group)
-            found = term_columns(Term(effect, tuple(shape)), view, group, response)
-            size = np.abs(expected).max(axis=0)
-            assert np.all(np.abs(found - expected).max(axis=0) <= 0.01 * size), (response, shape)

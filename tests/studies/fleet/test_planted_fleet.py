@@ -148,7 +148,7 @@ def test_a_lot_goes_on_where_it_was_and_past_what_it_cannot_read(tmp_path, capsy
     assert set(first["devices"]) == {"G001", "G002"}
     assert {path.name for path in (out / "devices").iterdir()} == {"G001.json", "G001.html", "G002.json", "G002.html"}
     assert "Control charts" in (out / "lot.html").read_text(encoding="utf-8")
-    monkeypatch.setattr("studies.fleet.device.infer_records", None)
+    monkeypatch.setattr("studies.fleet.device.diagnose_records", None)
     for path in (folder / "empty", folder / "torn"):
         for one in path.iterdir():
             one.unlink()

@@ -126,7 +126,10 @@ def test_rows_held_out_are_those_of_a_refit_to_the_other_records(search):
     assert np.abs(whole).max() < 0.2 * np.abs(refitted["frequency_Hz"].residual[1]).min()
     for name in linear.responses:
         rest = refitted[name].residual[1]
-        assert unseen[name].residual[-len(rest) :] == pytest.approx(rest, abs=0.1 * np.sqrt(np.mean(rest**2))), name
+        own = rest - unseen[name].residual[-len(rest) :]  # a level of its own, as slow noise may give a run
+        assert np.ptp(own) < 0.1 * np.sqrt(np.mean(rest**2)), name
+        slow = linear.rows[name].covariance(1, replace(noise[name], white=0.0)).mean()
+        assert abs(own.mean()) < 2.0 * np.sqrt(slow) + 0.1 * np.sqrt(np.mean(rest**2)), name
 
 
 def test_a_block_whose_gaps_leave_no_row_for_the_fit_is_not_held_out(search):
