@@ -25,7 +25,7 @@ from compensation.noise import SLOW_TIMES, Noise, flicker, random_walk
 Array = NDArray[np.float64]
 COARSE = 150
 """Most rows of a run from which noise is estimated in a model with many unknowns."""
-LEAST, MOST = -7.0, 5.0  # ln of the rms of slow noise within a run over that of a row's white noise
+LEAST, MOST = -7.0, 8.0  # ln of the rms of slow noise within a run over that of a row's white noise
 KINDS = ("white", "flicker", "walk", "offset")
 USUAL, SPREAD = -1.0, 3.0  # their weak prior, which keeps a level that the rows say nothing about from running away
 STATED_SPREAD = 0.7  # the same about ln of a level that is stated: a factor of 2
@@ -244,10 +244,33 @@ def estimate_noise(
         first = np.log([white / spread, *slow])
         first[1:] = np.clip(first[1:], LEAST, MOST)
     bounds = [(-12.0, 12.0), *[(LEAST, MOST)] * len(free)]
-    found = scipy.optimize.minimize(
-        objective, first, jac=True, method="L-BFGS-B", bounds=bounds, options={"ftol": 1e-7}
-    )
+
+    def search(start: Array) -> scipy.optimize.OptimizeResult:
+        return scipy.optimize.minimize(
+            objective, start, jac=True, method="L-BFGS-B", bounds=bounds, options={"ftol": 1e-7}
+        )
+
+    found = search(first)
+    for start in _other_slow(found.x, free):  # what is slow may be of another kind than where the search began
+        if objective(start)[0] < found.fun:
+            found = min(found, search(start), key=lambda one: one.fun)
     return levels(found.x)
+
+
+def _other_slow(x: Array, free: Sequence[str]) -> list[Array]:
+    """Return starts with all slow noise within a run as flicker, and as random walk."""
+    kinds = [k for k, kind in enumerate(free, 1) if kind != "offset"]
+    if len(kinds) < 2:
+        return []
+    total = 0.5 * float(np.logaddexp.reduce(2.0 * x[kinds]))
+    starts = []
+    for k in kinds:
+        start = x.copy()
+        start[kinds] = total + USUAL - SPREAD
+        start[k] = total
+        start[1:] = np.clip(start[1:], LEAST, MOST)
+        starts.append(start)
+    return starts
 
 
 def log_prior(rows: NoiseRows, noise: Noise, stated: Noise | None = None) -> float:

@@ -206,7 +206,7 @@ class Search:
                 if not parameter.moves(term.shape[k]):
                     break
                 low, high = self._between(series[:, k], term.shape[k], parameter)
-                if high <= low:
+                if high <= low or not np.isfinite(best):
                     break
                 logarithmic = parameter.logarithmic and low > 0
                 start = term
