@@ -27,7 +27,7 @@ from studies.inference.inferred import Inferred
 from studies.inference.lack_of_fit import generic_bank, look
 from studies.inference.model import Background, Linear, Term
 from studies.inference.records import Campaign
-from studies.inference.relinearise import columns_of, relinearise
+from studies.inference.relinearise import IMPOSSIBLE, columns_of, relinearise
 from studies.inference.search import Hypothesis, Outcome, Search, Shapes
 from studies.inference.sharp import RESOLVED, fast_line, longest_resolved
 from studies.inference.signatures import Signatures
@@ -184,10 +184,10 @@ def infer(card: "Instrument", campaign: Campaign, progress: Report = lambda _: N
     progress("held-out rows")
     outcome, held, rows = _confirmed(search, outcome, plain)
     progress("lack of fit")
-    plain_, final = outcome.plain, outcome.final
+    without, levelled = outcome.plain, outcome.final
     for name in search.linear.responses:
-        plain_, final = (with_levels(search, one, name) for one in (plain_, final))
-    left = look(search, bank, plain_, final, rows)
+        without, levelled = (with_levels(search, one, name) for one in (without, levelled))
+    left = look(search, bank, without, levelled, rows)
     unknown = []
     for base in outcome.without:
         seen = search.scan(base, bank)
@@ -220,15 +220,16 @@ def _from(start: CardFit, told: Array | None, progress: Report) -> tuple[Search,
         """Whether the straight lines are those of the simulation where they end."""
         model = Model(search.linear, search.signatures, final.terms, final.noise)
         linear, mean, there = model.linear, model.mean(), reached(final)
-        state = problem.evaluate(there, slopes=False)
+        try:
+            state, paths = problem.evaluate(there, slopes=False), Signatures.at(problem, there)
+        except IMPOSSIBLE:
+            return False
         apart = {
             n: linear.target[n] - linear.columns(final.terms, n) @ mean - state.residual[n] for n in linear.responses
         }
-        if final.terms:
-            paths = Signatures.at(problem, there)
-            for term, size in zip(final.terms, model.kept(mean).coefficients, strict=True):
-                for n, columns in columns_of(paths, term).items():
-                    apart[n] = apart[n] + columns @ size
+        for term, size in zip(final.terms, model.kept(mean).coefficients, strict=True):
+            for n, columns in columns_of(paths, term).items():
+                apart[n] = apart[n] + columns @ size
         return STRAYED > sum(np.sum(linear.rows[n].whiten(own, final.noise[n]) ** 2) for n, own in apart.items())
 
     def linearise(

@@ -28,6 +28,8 @@ STEPS, PARTS = 6, (1.0, 0.4, 0.15)
 """Most steps, and the parts of one that are tried."""
 STEP = 0.02
 """Prior standard deviations, for differences."""
+IMPOSSIBLE = (InputError, ShellError, ThermalError, CompensationError)
+"""What a point says that has no prediction."""
 CLOSE = 0.5
 """Fall of Q that a step must promise to be taken."""
 
@@ -55,7 +57,7 @@ def relinearise(
             trial = point + part * (moved - point)
             try:
                 state, there = problem.evaluate(trial), Signatures.at(problem, trial)
-            except (InputError, ShellError, ThermalError, CompensationError):
+            except IMPOSSIBLE:
                 continue
             here = Linear.of(replace(start, state=state), linear.told)
             fresh = tuple(replace(one, columns=columns_of(there, one), bend={}) for one in terms)
