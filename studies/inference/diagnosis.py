@@ -221,7 +221,8 @@ def _from(start: CardFit, told: Array | None, progress: Report) -> tuple[Search,
         model = Model(search.linear, search.signatures, final.terms, final.noise)
         linear, mean, there = model.linear, model.mean(), reached(final)
         try:
-            state, paths = problem.evaluate(there, slopes=False), Signatures.at(problem, there)
+            state = problem.evaluate(there, slopes=False)
+            paths = Signatures.at(problem, there) if final.terms else search.signatures
         except IMPOSSIBLE:
             return False
         apart = {

@@ -13,13 +13,13 @@ from numpy.typing import NDArray
 
 from compensation.noise import Noise
 from compensation.spikes import find_spikes
+from studies.calibration.fit import LASTING
 from studies.inference.model import Linear, Term, solve_posterior
-from studies.inference.signatures import Path, Signatures, starts_of
+from studies.inference.signatures import Path, Signatures
 from studies.simulation.prediction import predict
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
-OWN_OFFSET = "bias_deg_per_h"
 BLOCKS = 5
 FREE = 1e3
 """Prior standard deviation of the offset of a run that is held out, in parts of the noise of its mean."""
@@ -112,7 +112,7 @@ class Model:
                 own = np.asarray(record[name], dtype=float)
                 good = np.isfinite(own) & ~find_spikes(own)
                 rest = own[good] - on_rows(rows[good], drive.time, columns[name])
-                if name == OWN_OFFSET:  # from turn-on to turn-on
+                if name not in LASTING:  # from turn-on to turn-on
                     rest = rest - rest.mean()
                 found[name][0].append(rows[good] - rows[0])
                 found[name][1].append(rest)
@@ -120,19 +120,15 @@ class Model:
 
     def change(self, term: Term, values: Array, k: int, path: Path | None = None) -> dict[str, Array]:
         """Return what a term makes of the responses of a part at its predicted rows, along the path where it is linearised unless given."""
-        path, count = path or self.signatures.paths[k], len(term.members)
-        own = np.asarray(term.effect.columns(path.states, term.shape, term.response))[:, term.members] @ values[:count]
-        if term.starts:
-            wide = self.signatures.span.temperature_range
-            began = starts_of(term.effect, path.states, term.shape, len(self.problem.runs), wide)
-            own = own + began @ values[count:]
+        path = path or self.signatures.paths[k]
+        grid = self.signatures.on_grid(term.effect, term.members, term.starts)
+        own = grid(path.states, term.shape, term.response) @ values
         found = path.changes(term.effect, own[:, None], term.response)
         return {name: change[:, 0] for name, change in found.items() if name in self.problem.parts[k].responses}
 
     def mean(self) -> Array:
         """Most probable coordinates."""
-        X, r, _ = self.linear.whitened(self.terms, self.noise)
-        return solve_posterior(np.vstack(list(X.values())), np.concatenate(list(r.values())))[0]
+        return solve_posterior(*self.linear.stacked(self.terms, self.noise))[0]
 
     def held_out(self, by_record: bool) -> "dict[str, Unseen]":
         """Return what is left of rows that were held out."""
@@ -152,7 +148,7 @@ class Model:
 
     def _level(self, name: str, k: int, mean: float) -> float:
         """Return the part of a run's mean that is its own: of a turn-on all, else what slow noise may carry a whole run off."""
-        if name == OWN_OFFSET:
+        if name not in LASTING:
             return mean
         slow = self.linear.rows[name].covariance(k, replace(self.noise[name], white=0.0))
         most = CARRIED_OFF * float(np.sqrt(max(float(slow.mean()), 0.0)))
@@ -182,7 +178,7 @@ class Model:
     def _known(self, name: str, C: Array, others: NDArray[np.intp]) -> Mask:
         """Blocks that a trained model predicts to `KNOWN` times the noise; the level of a run of its own is refitted."""
         X, level = self.linear.columns(self.terms, name)[:, others], self.linear.rows[name]
-        if name == OWN_OFFSET:
+        if name not in LASTING:
             X = np.concatenate([X[own] - X[own].mean(axis=0) for own in level.slices])
         spread = np.sqrt(np.einsum("ij,jk,ik->i", X, C, X))
         quiet = replace(self.noise[name], offset=0.0)
@@ -206,8 +202,7 @@ class Model:
 
     def _trained(self, keep: Mapping[str, Sequence[Mask]]) -> tuple[Array, Array]:
         seen = {name: own for name, own in keep.items() if any(mask.any() for mask in own)}
-        X, r, _ = self.linear.whitened(self.terms, self.noise, seen)
-        return solve_posterior(np.vstack(list(X.values())), np.concatenate(list(r.values())))
+        return solve_posterior(*self.linear.stacked(self.terms, self.noise, seen))
 
     def _restarted(self, mean: Array, run: int, keep: Mapping[str, Sequence[Mask]]) -> Array:
         """Refit start and offset of a run that was held out."""
@@ -221,8 +216,7 @@ class Model:
             name: replace(level, offset=FREE * level.white / self.linear.rows[name].span ** 0.5)
             for name, level in self.noise.items()
         }
-        X, r, _ = self.linear.whitened(self.terms, noise, seen)
-        columns, rest = np.vstack(list(X.values())), np.concatenate(list(r.values()))
+        columns, rest = self.linear.stacked(self.terms, noise, seen)
         mean[own] = solve_posterior(columns[:, own], rest - columns @ mean)[0]
         return mean
 

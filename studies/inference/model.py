@@ -152,6 +152,16 @@ class Linear:
             X[TOLD], r[TOLD] = told[:, :-1], told[:, -1]
         return X, r, total
 
+    def stacked(
+        self,
+        terms: Sequence[Term],
+        noise: Mapping[str, Noise],
+        keep: Mapping[str, Sequence[NDArray[np.bool_]]] | None = None,
+    ) -> tuple[Array, Array]:
+        """Return columns and target of all responses together, as `whitened` gives them."""
+        X, r, _ = self.whitened(terms, noise, keep)
+        return np.vstack(list(X.values())), np.concatenate(list(r.values()))
+
     def told_beside(self, terms: Sequence[Term]) -> Array | None:
         """Return the rows of what is told beside terms, of which nothing is."""
         if self.told is None:
@@ -268,8 +278,7 @@ class Background:
     @cached_property
     def posterior(self) -> tuple[Array, Array]:
         """Mean and covariance of all coordinates: the card's and starts, then coefficients in units of their priors."""
-        X, r, _ = self._bent.whitened(self.terms, self.noise)
-        return solve_posterior(np.vstack(list(X.values())), np.concatenate(list(r.values())))
+        return solve_posterior(*self._bent.stacked(self.terms, self.noise))
 
     def coefficients(self, k: int) -> tuple[Array, Array]:
         """Return mean and covariance of the coefficients of one term, in its own units."""

@@ -46,13 +46,14 @@ def relinearise(
     problem = start.problem
     terms = tuple(replace(one, bend={}) for one in terms)
     best, sizes = _left(linear, point, terms, noise)
-    terms = tuple(_bent(start, signatures, point, one, size) for one, size in zip(terms, sizes, strict=True))
+    terms = _bent(start, point, terms, sizes)
     for _ in range(STEPS):
         model = Model(linear, signatures, terms, noise)
-        mean = model.mean()
-        moved = model.kept(mean).point
-        if best - _promised(linear, terms, noise, mean) < CLOSE:
+        X, r = model.linear.stacked(terms, noise)
+        mean = solve_posterior(X, r)[0]
+        if best - float(mean @ mean + np.sum((r - X @ mean) ** 2)) < CLOSE:
             break
+        moved = model.kept(mean).point
         for part in PARTS:
             trial = point + part * (moved - point)
             try:
@@ -67,34 +68,40 @@ def relinearise(
         else:
             break
         linear, signatures, point, best = here, there, trial, left
-        terms = tuple(_bent(start, there, trial, one, size) for one, size in zip(fresh, sizes, strict=True))
+        terms = _bent(start, trial, fresh, sizes)
     return linear, signatures, point, terms
 
 
-def _bent(start: CardFit, signatures: Signatures, point: Array, term: Term, size: Array) -> Term:
-    """Return a term that knows how what it does goes with the path of the temperature: with the starts of runs, and with the lag of a polynomial card.
+def _bent(start: CardFit, point: Array, terms: Sequence[Term], sizes: Sequence[Array]) -> tuple[Term, ...]:
+    """Return terms that know how what they do goes with the path of the temperature: with the starts of runs, and with the lag of a polynomial card.
 
     Of an effect on the temperature itself also with the slope of such a card, which no record may know.
     """
     problem, names = start.problem, start.problem.priors.names
-    own = {name: columns @ size for name, columns in term.columns.items()}
-    bend = {name: np.zeros((len(change), problem.count + 1)) for name, change in own.items()}
-    law = [
-        k for k, name in enumerate(names) if name == "law.lag_s" or (term.effect.thermal and name.startswith("law.a"))
-    ]
+    thermal = any(term.effect.thermal for term in terms)
+    law = [k for k, name in enumerate(names) if name == "law.lag_s" or (thermal and name.startswith("law.a"))]
     kinds: dict[str, list[int]] = {}
     for i, (_, name, _) in enumerate(problem.starts):
         if name.startswith("initial."):
             kinds.setdefault(name, []).append(len(names) + i)
-    for places in [*([k] for k in law), *kinds.values()]:  # runs know nothing of each other: their starts move at once
-        moved = Signatures.at(problem, point + STEP * np.isin(np.arange(problem.count), places))
-        for response, columns in columns_of(moved, term).items():
-            change = (columns @ size - own[response]) / STEP
-            for k in places:
-                bend[response][_rows_of(start, response, k), k] = change[_rows_of(start, response, k)]
-    for columns in bend.values():
-        columns[:, -1] = columns[:, :-1] @ point
-    return replace(term, bend=bend) if any(columns.any() for columns in bend.values()) else term
+    # runs know nothing of each other: their starts move at once
+    directions = [*([k] for k in law), *kinds.values()] if terms else []
+    moved = [Signatures.at(problem, point + STEP * np.isin(np.arange(problem.count), places)) for places in directions]
+    found = []
+    for term, size in zip(terms, sizes, strict=True):
+        own = {name: columns @ size for name, columns in term.columns.items()}
+        bend = {name: np.zeros((len(change), problem.count + 1)) for name, change in own.items()}
+        for places, paths in zip(directions, moved, strict=True):
+            if places[0] < len(names) and names[places[0]].startswith("law.a") and not term.effect.thermal:
+                continue
+            for response, columns in columns_of(paths, term).items():
+                change = (columns @ size - own[response]) / STEP
+                for k in places:
+                    bend[response][_rows_of(start, response, k), k] = change[_rows_of(start, response, k)]
+        for columns in bend.values():
+            columns[:, -1] = columns[:, :-1] @ point
+        found.append(replace(term, bend=bend) if any(columns.any() for columns in bend.values()) else term)
+    return tuple(found)
 
 
 def _rows_of(start: CardFit, response: str, k: int) -> slice:
@@ -112,16 +119,9 @@ def columns_of(signatures: Signatures, term: Term) -> dict[str, Array]:
     return signatures.of_term(term.effect, term.shape, term.response, term.members, term.starts)
 
 
-def _promised(linear: Linear, terms: Sequence[Term], noise: Mapping[str, Noise], mean: Array) -> float:
-    """Q of the straight lines where they end."""
-    X, r, _ = linear.bent(terms).whitened(terms, noise)
-    return float(mean @ mean + sum(np.sum((r[name] - X[name] @ mean) ** 2) for name in X))
-
-
 def _left(linear: Linear, point: Array, terms: Sequence[Term], noise: Mapping[str, Noise]) -> tuple[float, list[Array]]:
     """Q at a point where the model is linearised, and the coefficients of the terms there."""
-    X, target, _ = linear.whitened(terms, noise)
-    whole, r = np.vstack(list(X.values())), np.concatenate(list(target.values()))
+    whole, r = linear.stacked(terms, noise)
     count = linear.count
     rest, own = r - whole[:, :count] @ point, whole[:, count:]
     c = solve_posterior(own, rest)[0] if own.shape[1] else np.zeros(0)

@@ -12,15 +12,12 @@ import scipy
 from numpy.typing import NDArray
 
 from compensation.noise import Noise, white_rms
-from studies.effects import Effect, Parameter
+from studies.effects import Effect
 from studies.inference.model import PRICE, Background, Linear, Term, estimate_noise_of
+from studies.inference.shapes import chosen, leading, polish
 from studies.inference.signatures import Signatures
 
 Array = NDArray[np.float64]
-MOST_SHAPES = 400
-"""Of an effect; of a larger grid every second, third, … of the shapes that differ only in what a fit moves."""
-FEW, LEADING, WIDTH = 40, 0.4, 4
-"""Of effects with more shapes than FEW only the leading columns are scanned: those with a prior of at least this part of the widest."""
 LESS = (0.1, 0.01)
 """Of the slow noise of a response: what an effect has been taken for until it is named."""
 MOST_TERMS, CONTENDERS = 4, 5
@@ -28,9 +25,7 @@ MARGIN, UNSTATED, FURTHER = 4.0, 1.0, 0.06
 """Log posterior that a cause must bring, and more where no card states the noise; part of what others explain of its response that it must bring besides."""
 NEAR = 0.35, 15.0
 """Part of the best scan, less so much, down to which contenders are refitted."""
-HOPELESS, FINITE = -3.0, 1e3
-MOVES, EDGE = 3, 0.05
-"""Most moves of a shape parameter to the next shapes of its grid, and the part of a move from whose end it goes on."""
+HOPELESS = -3.0
 SUSPICIOUS, SUSPECTS = 3.0, 2
 """Slow noise within a run over that of a row, from which on effects are tried with values of their own, and how many."""
 Report = Callable[[str], None]
@@ -103,10 +98,9 @@ class Search:
         found = []
         for effect, response in effects:
             grid = [tuple(shape) for shape in effect.grid(self.signatures.span, response)]
-            chosen = _chosen(effect, grid)
             groups: dict[tuple[int, ...], list[tuple[tuple[float, ...], dict[str, Array]]]] = {}
-            first = _leading(effect, len(grid))
-            for shape in chosen:
+            first = leading(effect, len(grid))
+            for shape in chosen(effect, grid):
                 columns = self.signatures.columns(effect, shape, response)
                 there = np.any([np.any(own != 0, axis=0) for own in columns.values()], axis=0)
                 members = tuple(k for k in first if there[k])
@@ -177,74 +171,12 @@ class Search:
         return Hypothesis((*terms[:-1], last), noise, beside.evidence + gain)
 
     def polish(self, beside: Background, term: Term, anew: bool = True) -> Term:
-        """Move a shape to where the evidence is largest: among those that it stands for, then between the next ones.
+        """Return a term whose shape is where the evidence is largest; not `anew`, near the one that it has."""
+        return polish(self.moved, self.signatures.span, beside, term, anew)
 
-        Not `anew`, only the latter: after values of the card have moved.
-        """
-        effect, span = term.effect, self.signatures.span
-        grid = [tuple(shape) for shape in effect.grid(span, term.response)]
-        around = _passed(effect, grid, term.shape) if len(grid) > MOST_SHAPES else []
-        if effect.near is not None:
-            grid = [tuple(shape) for shape in effect.near(span, term.response, term.shape)]
-            around = grid[:: -(-len(grid) // MOST_SHAPES)]
-        best: dict[tuple[float, ...], tuple[float, Term]] = {}
-        for one in [term, *(self._moved(term, shape) for shape in around if anew)]:
-            series, gain = _steady(effect, one.shape), beside.with_term(one)[1]
-            if series not in best or gain > best[series][0]:
-                best[series] = (gain, one)
-        tried = [self._between_shapes(beside, one, gain, grid) for gain, one in best.values()]
-        return max(tried, key=lambda found: found[0])[1]
-
-    def _between_shapes(
-        self, beside: Background, term: Term, best: float, grid: Sequence[tuple[float, ...]]
-    ) -> tuple[float, Term]:
-        """Move the free parameters of a shape, one after another, between the next shapes of its series."""
-        effect = term.effect
-        series = np.array([shape for shape in grid if _steady(effect, shape) == _steady(effect, term.shape)] or grid)
-        for k, parameter in enumerate(effect.shape):
-            for _ in range(MOVES):
-                if not parameter.moves(term.shape[k]):
-                    break
-                low, high = self._between(series[:, k], term.shape[k], parameter)
-                if high <= low or not np.isfinite(best):
-                    break
-                logarithmic = parameter.logarithmic and low > 0
-                start = term
-
-                def at(x: float, k: int = k, logarithmic: bool = logarithmic, start: Term = start) -> Term:
-                    value = float(np.exp(x)) if logarithmic else float(x)
-                    return self._moved(start, (*start.shape[:k], value, *start.shape[k + 1 :]))
-
-                ends = (np.log(low), np.log(high)) if logarithmic else (low, high)
-                lowest = scipy.optimize.minimize_scalar(
-                    lambda x, at=at, least=best - FINITE: -max(beside.with_term(at(x))[1], least),
-                    bounds=ends,
-                    method="bounded",
-                    options={"maxiter": 10},
-                )
-                if -lowest.fun <= best:
-                    break
-                best, term = float(-lowest.fun), at(lowest.x)
-                if ends[0] + EDGE * (ends[1] - ends[0]) < lowest.x < ends[1] - EDGE * (ends[1] - ends[0]):
-                    break
-        return best, term
-
-    def _moved(self, term: Term, shape: tuple[float, ...]) -> Term:
+    def moved(self, term: Term, shape: tuple[float, ...]) -> Term:
+        """Return a term with another shape."""
         return replace(self.term(term.effect, term.response, shape, term.price), scale=term.scale, bend=term.bend)
-
-    def _between(self, grid: Array, at: float, parameter: Parameter) -> tuple[float, float]:
-        """Return the neighbours of a value in a grid, within the bounds of its parameter."""
-        span, near = self.signatures.span, 1e-9 * max(abs(at), 1.0)
-        values = np.unique(grid)
-        below, above = values[values < at - near], values[values > at + near]
-        if below.size and above.size:  # one that it nearly is is no neighbour
-            apart = 2.0 * EDGE * (above[0] - below[-1])
-            below, above = below[below < at - apart], above[above > at + apart]
-        step = 1.6 if parameter.logarithmic else 1.0
-        low = below[-1] if below.size else (at / step if parameter.logarithmic else at - step)
-        high = above[0] if above.size else (at * step if parameter.logarithmic else at + step)
-        ends = parameter.high, parameter.of_run * span.longest_run, parameter.of_range * span.temperature_range
-        return float(max(low, parameter.low)), float(min(high, *ends))
 
     def contenders(self, now: Hypothesis) -> list[Hypothesis]:
         """Return the models with one effect more, best first: each with shape, noise and size of its own where it is near enough."""
@@ -276,7 +208,7 @@ class Search:
         plain = now = Hypothesis((), own, Background(self.linear, (), own).evidence)
         for term in before:
             beside = Background(self.linear, now.terms, noise or now.noise)
-            here = self.polish(beside, self._moved(term, term.shape), anew=False)
+            here = self.polish(beside, self.moved(term, term.shape), anew=False)
             now = _credited(self.settle((*now.terms, here), noise or now.noise), now)
         now = self._without_idle(now, plain)
         for _ in range(most):  # a term may leave when another one comes
@@ -360,32 +292,6 @@ class Search:
         return now
 
 
-def _series(effect: Effect, grid: Sequence[tuple[float, ...]]) -> list[list[tuple[float, ...]]]:
-    """Return the shapes of a grid in series of equal steady parameters, each in its order."""
-    found: dict[tuple[float, ...], list[tuple[float, ...]]] = {}
-    for shape in grid:
-        found.setdefault(_steady(effect, shape), []).append(shape)
-    return list(found.values())
-
-
-def _steady(effect: Effect, shape: tuple[float, ...]) -> tuple[float, ...]:
-    return tuple(value for value, parameter in zip(shape, effect.shape, strict=True) if parameter.steady)
-
-
-def _chosen(effect: Effect, grid: list[tuple[float, ...]]) -> list[tuple[float, ...]]:
-    every = -(-len(grid) // MOST_SHAPES)
-    return [shape for series in _series(effect, grid) for shape in series[every // 2 :: every]]
-
-
-def _passed(effect: Effect, grid: list[tuple[float, ...]], at: tuple[float, ...]) -> list[tuple[float, ...]]:
-    """Return the shapes about a chosen one that were passed over."""
-    every = -(-len(grid) // MOST_SHAPES)
-    series = next(own for own in _series(effect, grid) if _steady(effect, own[0]) == _steady(effect, at))
-    shapes = np.array(series)
-    place = int(np.argmin((np.abs(shapes - at) / np.maximum(np.ptp(shapes, axis=0), 1e-300)).sum(axis=1)))
-    return series[max(place - every, 0) : place + every + 1]
-
-
 def _near(gain: float, best: float) -> bool:
     part, less = NEAR
     return gain > max(part * best - less, HOPELESS)
@@ -395,10 +301,3 @@ def _credited(now: Hypothesis, before: Hypothesis) -> Hypothesis:
     """Return a model whose last term knows what it brought."""
     last = replace(now.terms[-1], brought=max(now.score - before.score, 0.0))
     return replace(now, terms=(*now.terms[:-1], last))
-
-
-def _leading(effect: Effect, shapes: int) -> list[int]:
-    spread = effect.spread
-    least = 0.0 if shapes <= FEW else LEADING * float(spread.max())
-    first = [int(k) for k in np.argsort(-spread, kind="stable") if spread[k] > 0 and spread[k] >= least]
-    return first if shapes <= FEW else first[: max(WIDTH, int(np.sum(spread == spread.max())))]

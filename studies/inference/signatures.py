@@ -4,7 +4,7 @@ An effect on a response adds its columns there. One on the resonator's temperatu
 ∂y/∂T dT + ∂y/∂Ṫ dṪ, the slopes by differences of the read-out at the temperatures that the card predicts.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -248,13 +248,21 @@ class Signatures:
         self, effect: Effect, shape: tuple[float, ...], response: str, members: Sequence[int], starts: bool
     ) -> dict[str, Array]:
         """Return what some members make of each response, beside them what every run began with where the effect remembers it."""
-        own = {name: found[:, list(members)] for name, found in self.columns(effect, shape, response).items()}
-        if not starts:
-            return own
-        runs, wide = len(self.problem.runs), self.span.temperature_range
-        fading = replace(effect, columns=lambda states, shape, response: starts_of(effect, states, shape, runs, wide))
-        began = self.columns(fading, shape, response)
-        return {name: np.hstack([columns, began[name]]) for name, columns in own.items()}
+        return self.columns(replace(effect, columns=self.on_grid(effect, members, starts)), shape, response)
+
+    def on_grid(
+        self, effect: Effect, members: Sequence[int], starts: bool
+    ) -> Callable[[States, Sequence[float], str], Array]:
+        """Return what gives these columns on the even grid of a run."""
+
+        def columns(states: States, shape: Sequence[float], response: str) -> Array:
+            own = np.asarray(effect.columns(states, shape, response))[:, list(members)]
+            if not starts:
+                return own
+            began = starts_of(effect, states, shape, len(self.problem.runs), self.span.temperature_range)
+            return np.hstack([own, began])
+
+        return columns
 
     def remembers(self, effect: Effect, shape: tuple[float, ...]) -> bool:
         """Whether an effect keeps what came before a run for longer than the resonator does."""

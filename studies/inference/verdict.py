@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from compensation.lines import Line
 from compensation.noise import Noise, white_rms
 from studies.calibration.estimates import SILENT
-from studies.calibration.fit import stated_noise
+from studies.calibration.fit import LASTING, stated_noise
 from studies.calibration.ladder import noise_rms
 from studies.calibration.priors import from_standard
 from studies.diagnosis.constants import CONSTANTS
@@ -260,22 +260,34 @@ def _judge(
     return ("not-identifiable", doubt_of(left.input, left.evidence)) if left.doubtful else ("adequate", "")
 
 
+def _within(z: float) -> float:
+    """Probability that a normal number is within so many standard deviations."""
+    return float(scipy.special.erf(abs(z) / np.sqrt(2.0)))
+
+
+def _delay(found: Inferred) -> tuple[float, float, float]:
+    """A delay that a polynomial law has taken and its standard deviation, in parts of what sensors and clocks usually have, and that, s."""
+    priors = found.search.linear.problem.priors
+    if DELAY not in priors.names:
+        return 0.0, 0.0, 0.0
+    k = priors.names.index(DELAY)
+    mean, C = found.background.posterior
+    return float(mean[k]), float(np.sqrt(C[k, k])), priors.values[k].sd
+
+
 def _delay_cause(found: Inferred) -> list[Cause]:
     """Return a delay that a polynomial law has taken, as the causes that look like one, when it is more than sensors and clocks have."""
-    priors, name = found.search.linear.problem.priors, found.search.linear.responses[0]
-    if DELAY not in priors.names or name != "frequency_Hz":
-        return []
-    k = priors.names.index(DELAY)
-    z, sd = float(found.background.posterior[0][k]), float(np.sqrt(found.background.posterior[1][k, k]))
-    if abs(z) < SURE_DELAY:
+    name = found.search.linear.responses[0]
+    z, sd, usual = _delay(found)
+    if name != "frequency_Hz" or abs(z) < SURE_DELAY:
         return []
     alike = sorted((e for e in library().values() if e.delay is not None), key=lambda e: -(e.delay or 0) * z)
-    delay = Interval.about(abs(z) * priors.values[k].sd, sd * priors.values[k].sd)
+    delay = Interval.about(abs(z) * usual, sd * usual)
     return [
         Cause(
             alike[0].name,
             name,
-            float(scipy.special.erf(abs(z) / np.sqrt(2.0))),
+            _within(z),
             tuple(sorted(effect.name for effect in alike[1:])),
             dict.fromkeys(alike[0].coefficient_names(name), delay) if z < 0 else {},
             z**2,
@@ -290,20 +302,15 @@ def _clock_cause(found: Inferred) -> list[Cause]:
     (slope, sd), effect = found.clock, next(one for one in library().values() if one.judge == REFERENCE)
     (response,) = effect.sizes
     (name,) = effect.coefficient_names(response)
-    sure = float(scipy.special.erf(abs(slope) / sd / np.sqrt(2.0)))
-    return [Cause(effect.name, response, sure, (), {name: Interval.about(slope, sd)}, (slope / sd) ** 2)]
+    return [Cause(effect.name, response, _within(slope / sd), (), {name: Interval.about(slope, sd)}, (slope / sd) ** 2)]
 
 
 def _delayed(found: Inferred, name: str) -> str:
     """Return the sentence on a delay that a polynomial law has taken: it tolerates what sensors and clocks may have."""
-    priors = found.search.linear.problem.priors
-    if DELAY not in priors.names or name != found.search.linear.responses[0]:
+    z, sd, usual = _delay(found)
+    if name != found.search.linear.responses[0] or abs(z) < max(SURE_DELAY * sd, LEAST_DELAY):
         return ""
-    k = priors.names.index(DELAY)
-    mean, C = found.background.posterior
-    delay, sd = priors.values[k].sd * float(mean[k]), priors.values[k].sd * float(np.sqrt(C[k, k]))
-    if abs(delay) < max(SURE_DELAY * sd, LEAST_DELAY * priors.values[k].sd):
-        return ""
+    delay = z * usual
     return (
         f"it follows the temperature {abs(delay):.2g} s {'later' if delay > 0.0 else 'earlier'} than one lag predicts, as sensors and"
         " clocks may; a thermometer lag or a rate effect of this size looks the same"
@@ -312,10 +319,10 @@ def _delayed(found: Inferred, name: str) -> str:
 
 def _turned_on(found: Inferred, name: str, verdict: str) -> str:
     """Return the sentence on offsets of runs far beyond what is left within them."""
-    if name != "bias_deg_per_h" or verdict != "adequate":
+    if name in LASTING or verdict != "adequate":
         return ""
-    shifts, rows, response = np.array(_run_shifts(found, name)), found.rows[name].residual, RESPONSES[name]
-    within = float(np.sqrt(np.mean(np.concatenate([own - own.mean() for own in rows]) ** 2)))
+    shifts, within = _shifts_and_rest(found, name)
+    response = RESPONSES[name]
     far = int(np.argmax(np.abs(shifts - np.median(shifts))))
     others = np.delete(shifts, far)
     if len(others) > 1 and abs(odd := shifts[far] - others.mean()) > ODD * max(float(np.std(others, ddof=1)), within):
@@ -335,10 +342,10 @@ def _turned_on(found: Inferred, name: str, verdict: str) -> str:
 
 def _apart(found: Inferred, name: str) -> str:
     """Return the sentence on runs of a response without turn-on that lie farther apart than what is left within them."""
-    if name == "bias_deg_per_h" or found.card.polynomial is None:
+    if name not in LASTING or found.card.polynomial is None:
         return ""
-    apart, rows = float(np.sqrt(np.mean(np.square(_run_shifts(found, name))))), found.rows[name].residual
-    within = float(np.sqrt(np.mean(np.concatenate([own - own.mean() for own in rows]) ** 2)))
+    shifts, within = _shifts_and_rest(found, name)
+    apart = float(np.sqrt(np.mean(shifts**2)))
     if apart <= CONSTANTS["wander_usual"] * within:
         return ""
     response = RESPONSES[name]
@@ -363,6 +370,14 @@ def _slow(found: Inferred, name: str) -> float:
     stated = stated_noise(found.card.noise, name) or Noise(0.0)
     slow = noise_rms(found.fit, name, replace(stated, white=0.0, offset=0.0))
     return rows.rms / max(float(np.hypot(white_rms(*rows.residual), slow)), 1e-300)
+
+
+def _shifts_and_rest(found: Inferred, name: str) -> tuple[Array, float]:
+    """Means of the runs about their mean, and the rms of what is left within the runs."""
+    rows = found.rows[name].residual
+    return np.array(_run_shifts(found, name)), float(
+        np.sqrt(np.mean(np.concatenate([own - own.mean() for own in rows]) ** 2))
+    )
 
 
 def _run_shifts(found: Inferred, name: str) -> tuple[float, ...]:

@@ -23,7 +23,8 @@ from studies.diagnosis.constants import CONSTANTS
 from studies.diagnosis.verdict import temper_of
 from studies.effects import Effect
 from studies.inference.model import PRICE, SCALES, Background
-from studies.inference.search import MARGIN, MOST_SHAPES, Search, Shapes
+from studies.inference.search import MARGIN, Search, Shapes
+from studies.inference.shapes import MOST_SHAPES
 
 Array = NDArray[np.float64]
 Key = tuple[str, str]
