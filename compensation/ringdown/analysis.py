@@ -151,10 +151,10 @@ def _remark(envelope: Envelope, fit: DecayFit, left: Leftover, jump: float | Non
         )
     said += [f"{SAID_OF[name]}." for name in fit.terms.curved]
     if fit.terms.drift:
-        x = (fit.envelope.time - start) / (fit.envelope.time[-1] - start)
-        course = np.gradient(np.array(fit.found.drift) @ drift_shapes(x, fit.terms.drift), fit.envelope.time)
+        phase = np.array(fit.found.drift) @ drift_shapes(fit.envelope, fit.terms.drift)
+        course = np.gradient(phase, fit.envelope.time)
         said.append(
-            f"The frequency drifts with time, by {np.ptp(course) / (2 * np.pi):.2g} Hz: the frequencies are means over the window."
+            f"The frequency drifts with time, by {np.ptp(course) / (2 * np.pi):.2g} Hz: the frequencies are means, weighted with the power of the decay."
         )
     if fit.found.tones:
         at = ", ".join(f"{envelope.carrier + tone / (2 * np.pi):.8g}" for tone in fit.found.tones)

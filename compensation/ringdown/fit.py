@@ -2,8 +2,8 @@
 
     data = z(t) e^{iφ(t)} + Σ tones + noise
 
-z is the decay of `model`, φ a slow drift of all frequencies (Legendre polynomials less their ends, so that δ stays the mean over the
-window), a tone a line of constant amplitude. The noise of each channel is white and complex, so least squares of the real and
+z is the decay of `model`, φ a slow drift of all frequencies (polynomials without a straight line, so that δ stays the mean with the
+power of the decay as weight), a tone a line of constant amplitude. The noise of each channel is white and complex, so least squares of the real and
 imaginary parts are the maximum likelihood, and σ² (JᵀJ)⁻¹ is the bound that no unbiased estimate passes. What is derived of the
 rates (frequencies, Q, axes) gets its interval from draws of that normal distribution, because a split near zero and an axis bend.
 """
@@ -106,11 +106,16 @@ def fit_decay(envelope: Envelope, terms: Terms = Terms(), starts: Sequence[Guess
     return min((_fit_from(envelope, terms, one) for one in tried), key=lambda one: one.cost)
 
 
-def drift_shapes(x: Array, count: int) -> Array:
-    """Legendre polynomials of degree 2, 3, … over the window (x from 0 to 1), less their ends."""
-    y = 2 * x - 1
-    shapes = [np.polynomial.Legendre.basis(k)(y) - (y if k % 2 else 1.0) for k in range(2, count + 2)]
-    return np.array(shapes).reshape(count, x.size)
+def drift_shapes(envelope: Envelope, count: int) -> Array:
+    """Legendre polynomials of degree 2, 3, … over the window, less the straight line that fits them best where the decay is strong.
+
+    The weights are the power Σ|z|², so a drift moves neither δ nor its error: δ stays the frequency that a fit without drift gives.
+    """
+    y = 2 * (envelope.time - envelope.time[0]) / (envelope.time[-1] - envelope.time[0]) - 1
+    size = np.linalg.norm(envelope.values, axis=0)
+    line = np.vander(y, 2)
+    shapes = np.array([np.polynomial.Legendre.basis(k)(y) for k in range(2, count + 2)]).reshape(count, y.size)
+    return np.asarray(shapes - (line @ np.linalg.lstsq(line * size[:, None], (shapes * size).T, rcond=None)[0]).T)
 
 
 @dataclass(frozen=True)
@@ -179,7 +184,7 @@ def _fit_from(envelope: Envelope, terms: Terms, guess: Guess) -> DecayFit:
     time = envelope.time - envelope.time[0]
     span, size = float(time[-1]) or 1.0, float(np.sqrt(np.mean(np.abs(z) ** 2))) or 1.0
     x, data = time / span, z / size
-    form = _Form(x, terms, names, channels, 2 if summed else channels, drift_shapes(x, terms.drift),
+    form = _Form(x, terms, names, channels, 2 if summed else channels, drift_shapes(envelope, terms.drift),
                  envelope.spread / 2 / float(np.median(np.diff(time))) ** 2)  # fmt: skip
     scale = np.array([span * size**2 if name in CURVED else span for name in names])
     scaled = Decay(**dict(zip(names, (guess.decay.vector(names) * scale).tolist(), strict=True)))
@@ -261,13 +266,13 @@ def carry_over(fit: DecayFit, envelope: Envelope) -> Guess:
         start = swing([found.decay], np.array([0.0, back]), fit.start[None, :])[0, :, -1] if back else fit.start
     else:
         start = propagate(found.decay, np.array([back]), fit.start)[:, 0]
-    phase = np.array(found.drift) @ drift_shapes((old - old[0]) / (old[-1] - old[0]), fit.terms.drift)
+    phase = np.array(found.drift) @ drift_shapes(fit.envelope, fit.terms.drift)
     beside = np.clip(time, old[0], old[-1])
     ends = np.gradient(phase, old)[[0, -1]] if fit.terms.drift else (0.0, 0.0)
     phase = np.interp(beside, old, phase) + np.where(time < beside, ends[0], ends[1]) * (time - beside)
     x = (time - time[0]) / (time[-1] - time[0])
     level, slope, *drift = np.linalg.lstsq(
-        np.vstack([np.ones_like(x), x, drift_shapes(x, fit.terms.drift)]).T, phase, rcond=None
+        np.vstack([np.ones_like(x), x, drift_shapes(envelope, fit.terms.drift)]).T, phase, rcond=None
     )[0].tolist()
     decay = replace(found.decay, detuning=found.decay.detuning + slope / float(time[-1] - time[0]))
     turned = [np.exp(1j * tone * back) for tone in found.tones]

@@ -4,16 +4,17 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy
 
 from compensation.arrays import Array, Complex
 from compensation.ringdown.envelope import Envelope
 from compensation.ringdown.fit import CURVED, DecayFit, Guess, Terms, drift_shapes, fit_decay
 from compensation.ringdown.model import swing
-from compensation.ringdown.whiteness import Leftover, examine, find_line
+from compensation.ringdown.whiteness import RARE, Leftover, examine, find_line
 
 PAYS = 20.0  # least fall of −2 ln L, over the widening², for a second mode or a tone, beside 2 ln N
-NAMED = 10.0
-"""The same for any other term: noise passes it once in 200 records, and left out it shifts what is stated by up to √10 of its errors, and more."""
+NAMED = scipy.stats.chi2.isf(RARE, [1, 2])
+"""The same for a rate that depends on the amplitude and for two degrees of drift: noise passes it once in a thousand records."""
 WHITE = 1.3
 TONES, DEGREES = 3, 8
 SMALL = 1e-4  # radians of the trial step of a curved rate
@@ -57,8 +58,8 @@ def _second(envelope: Envelope) -> float:
 def _price(fit: DecayFit, terms: Terms) -> float:
     """Return what terms must save beyond those of a fit."""
     tones = terms.tones - fit.terms.tones
-    more = len(terms.curved) - len(fit.terms.curved) + (terms.drift - fit.terms.drift + 1) // 2
-    return NAMED * more + tones * (PAYS + 2 * float(np.log(fit.envelope.time.size)))
+    more = np.array([len(terms.curved) - len(fit.terms.curved), (terms.drift - fit.terms.drift + 1) // 2])
+    return float(NAMED @ more) + tones * (PAYS + 2 * float(np.log(fit.envelope.time.size)))
 
 
 def _extend(envelope: Envelope, fit: DecayFit, most: int) -> DecayFit:
@@ -113,7 +114,7 @@ def _rivals(envelope: Envelope, fit: DecayFit) -> Iterator[tuple[float, Terms, G
     unit = SMALL / float(np.sum(np.abs(fit.start) ** 2) * time[-1])
     more = [replace(fit.decay, **{name: getattr(fit.decay, name) + unit}) for name in CURVED]
     swung = swing([fit.decay, *more], time, np.array([fit.start] * 3))
-    phase = np.exp(1j * (np.array(fit.found.drift) @ drift_shapes(time / time[-1], fit.terms.drift)))
+    phase = np.exp(1j * (np.array(fit.found.drift) @ drift_shapes(envelope, fit.terms.drift)))
     z, *curved = (swung.sum(axis=1, keepdims=True) if fit.summed else swung) * phase / noise
     Q = np.linalg.qr(fit.jacobian)[0]
 
@@ -136,7 +137,7 @@ def _rivals(envelope: Envelope, fit: DecayFit) -> Iterator[tuple[float, Terms, G
                 replace(found, decay=replace(found.decay, **{name: float(step[0])})),
             )
     if terms.drift < DEGREES:
-        shapes = drift_shapes(time / time[-1], terms.drift + 2)[-2:]
+        shapes = drift_shapes(envelope, terms.drift + 2)[-2:]
         gain, step = promise(*(1j * shape * z for shape in shapes))
         yield gain, replace(terms, drift=terms.drift + 2), replace(found, drift=(*found.drift, *step.tolist()))
     if terms.tones < TONES:
