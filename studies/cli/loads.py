@@ -4,10 +4,11 @@ With --json one object, schema `hrg.loads/1`: `card`, `temperature_degC`, `harmo
 of all together (`load`, `amount`, `unit`, `shift_ppm`, `tension_MPa`, `mises_MPa`, `part`, `rim_axial_um`, `rim_lateral_um`, `rim_tilt_urad`);
 `stem_MPa` (null without a single stem) and `safety` (null without --strength); `per_g` with `axial_ppb`, `rim_axial_nm`, `rim_lateral_nm`,
 `tilt_urad`; `bias` (null without [loop] and charged [electrodes]) with `deg_per_h_per_g`, `azimuth_deg`, `gap_nm_per_g`;
-`amplitude`, over `temperature_degC`: `shift_Hz_per_um2` and its relative `change_ppm_per_degC` (Duffing's coefficient).
+`waves` (null without --rotation), `lower_Hz` and `upper_Hz` of the travelling waves, and `stress_ppm`, `centrifugal_ppm`, `coriolis_ppm` of the shift;
+`amplitude`, over `temperature_degC`: `shift_Hz_per_um2`, its parts `static_…` and `inertial_…`, and its relative `change_ppm_per_degC` (Duffing).
 """
 
-from math import radians
+from math import pi, radians
 from typing import Annotated, Any
 
 import numpy as np
@@ -15,8 +16,8 @@ import numpy as np
 from shell.constants import zero_Celsius
 from shell.duffing import amplitude_shift
 from shell.loads import Kind, Loads
-from shell.modes import solve_modes
-from shell.spin import spin_shift
+from shell.modes import Mode, solve_modes
+from shell.spin import SpinShift, spin_shift
 from studies.cli.arguments import (
     POSITIVE,
     Card,
@@ -99,9 +100,11 @@ def loads(
         if not given:
             raise InputError("no load is given; --along 1 is an acceleration of 1 g along the axis.")
 
+        spin = spin_shift(mode, elastic) if rotation else None
+
         def shift(kind: Kind, units: float) -> float:
             if kind == "spin":
-                return units * spin_shift(mode, elastic).total
+                return units * spin.total if spin else 0.0
             return gradient * shift_per_kelvin(instrument, found, T) if kind == "cooling" else units * found.shift(kind)
 
         every: dict[Kind, float] = {kind: units for kind, _, _, units in given.values()}
@@ -115,6 +118,7 @@ def loads(
             rows.append({"load": "all together", "amount": None, "unit": ""} | whole)
         stem, tilted = found.beam(g * along, g * across), bias_by_tilt(instrument, found, T)
         nonlinear = _amplitudes(instrument, harmonic, lay_temperatures(from_degC, to_degC, step))
+    waves = spin and _waves(mode, spin, radians(rotation))
     bias = row_of(tilted, "deg_per_h_per_g", "azimuth_deg", gap_nm_per_g=("gap", 1e9)) if tilted else None
     worst = max(whole["tension_MPa"], whole["mises_MPa"], 1e-6 * stem)
     safety = None if strength is None else strength / worst
@@ -134,6 +138,7 @@ def loads(
         "stem_MPa": 1e-6 * stem or None,
         "safety": safety,
         "per_g": per_g,
+        "waves": waves,
         "bias": bias,
         "amplitude": nonlinear,
     }
@@ -148,6 +153,7 @@ def loads(
         [
             Facts(_facts(worst, strength, safety, per_g)),
             Table("Loads", rows, COLUMNS, ABROAD.format(root=" and at the root" if "root" in found.counted else "")),
+            WAVES.format(**waves) if waves else None,
             beam if stem else None,
             _bias_words(instrument, bias),
             Table("Coefficient of the amplitude (Duffing)", nonlinear, AMPLITUDE, NONLINEAR),
@@ -155,12 +161,30 @@ def loads(
     )  # fmt: skip
 
 
+WAVES = (
+    "Rotation: two travelling waves at {lower_Hz:.5f} and {upper_Hz:.5f} Hz in the frame of the resonator (Bryan's effect). Their mean shifts by"
+    " {stress_ppm:+.3g} ppm by stress, {centrifugal_ppm:+.3g} by centrifugal softening and {coriolis_ppm:+.3g} by Coriolis forces."
+)
 AMPLITUDE = (
     Column("temperature_degC", "T", "°C", ".1f"),
-    Column("shift_Hz_per_um2", "shift per square of the largest displacement", "Hz/µm²", "+.5g"),
+    *(Column(f"{key}_Hz_per_um2", name, "Hz/µm²", "+.5g") for key, name in (
+        ("shift", "shift per square of the largest displacement"), ("static", "static part"), ("inertial", "inertial part"),
+    )),
     Column("change_ppm_per_degC", "relative change from the first row", "ppm/°C", "+.3g"),
+)  # fmt: skip
+PARTS = {"shift": "total", "static": "static", "inertial": "inertial"}
+NONLINEAR = (
+    "Geometric nonlinearity of a standing wave: the static part stiffens, the inertia of the motion at twice the frequency softens. Third-order"
+    " elastic constants, which may matter as much in thick shells, and electrostatic springs are not included."
 )
-NONLINEAR = "Geometry alone, of a standing wave; hrg modes --amplitude shows its parts."
+
+
+def _waves(mode: Mode, spin: SpinShift, omega: float) -> dict[str, float]:
+    """The travelling waves f + shift ± g Ω/2π, g = n K of Bryan's factor K, in the frame of the resonator."""
+    mean = mode.frequency * (1 + spin.total * omega**2)
+    apart = mode.harmonic * abs(mode.bryan_factor * omega) / (2 * pi)
+    ppm = {f"{name}_ppm": (name, 1e6 * omega**2) for name in ("stress", "centrifugal", "coriolis")}
+    return {"lower_Hz": mean - apart, "upper_Hz": mean + apart} | row_of(spin, **ppm)
 
 
 def _under(found: Loads, amounts: dict[Kind, float], shift: float) -> dict[str, Any]:
@@ -179,14 +203,13 @@ def _amplitudes(instrument: Instrument, harmonic: int, temperatures: "np.ndarray
     rows: list[dict[str, float]] = []
     for T in instrument.material.check(temperatures):
         (mode,) = solve_modes(*instrument.at(float(T)), harmonic)
-        value = amplitude_shift(mode).total * mode.frequency * 1e-12
-        change = 0.0
+        unit, change = mode.frequency * 1e-12, 0.0
+        row = row_of(amplitude_shift(mode), **{f"{name}_Hz_per_um2": (key, unit) for name, key in PARTS.items()})
         if rows:
             first = rows[0]
-            change = 1e6 * (value / first["shift_Hz_per_um2"] - 1) / (T - zero_Celsius - first["temperature_degC"])
-        rows.append(
-            {"temperature_degC": float(T - zero_Celsius), "shift_Hz_per_um2": value, "change_ppm_per_degC": change}
-        )
+            change = 1e6 * (row["shift_Hz_per_um2"] / first["shift_Hz_per_um2"] - 1)
+            change /= T - zero_Celsius - first["temperature_degC"]
+        rows.append({"temperature_degC": float(T - zero_Celsius), **row, "change_ppm_per_degC": change})
     return rows
 
 

@@ -1,18 +1,17 @@
-"""What else `hrg modes` shows of a mode: imperfections, spin, amplitude, a mount, films, a crystal.
+"""What else `hrg modes` shows of a mode: imperfections, a mount, films, a crystal.
 
 Each function returns what is under its key of a mode in the JSON, or None where it does not apply; `TABLES` shows the keys.
 """
 
 from dataclasses import dataclass
-from math import degrees, isfinite, pi, radians
+from math import degrees
 from typing import TYPE_CHECKING, Any
 
-from shell.elastic import Elastic
 from shell.errors import ShellError
 from shell.law import check_mount
 from shell.modes import Mode
 from shell.prestress import Prestress
-from studies.errors import InputError, naming
+from studies.errors import naming
 from studies.instrument.card import Instrument
 from studies.loss.films import film_shifts
 from studies.results import Column, Table, row_of
@@ -20,41 +19,21 @@ from studies.results import Column, Table, row_of
 if TYPE_CHECKING:
     from shell.imperfection import Split
 
-MICROMETRE = 1e-6
 Entry = dict[str, Any]
 
 
 @dataclass(frozen=True, eq=False)
 class Asked:
-    """The card at T (K), and what was asked of its modes: rate of spin (°/s), amplitude (µm)."""
+    """The card at T (K), and the largest error that was asked of its modes."""
 
     instrument: Instrument
     T: float
-    elastic: Elastic
     tolerance: float
-    spin: float | None
-    amplitude: float | None
-
-    def __post_init__(self) -> None:
-        if self.spin is not None and not isfinite(self.spin):
-            raise InputError(f"--spin {self.spin:g}: it is a rate in °/s.")
-        if self.amplitude is not None and not (isfinite(self.amplitude) and self.amplitude > 0):
-            raise InputError(f"--amplitude {self.amplitude:g}: it is a largest displacement in µm, above 0.")
 
 
-def describe_effects(found: list[Mode], asked: Asked) -> list[dict[str, Any]]:
-    """Return what applies to each mode, by its key."""
-    entries = [
-        {key: entry for key, describe in EFFECTS.items() if (entry := describe(mode, asked)) is not None}
-        for mode in found
-    ]
-    for key, wanted, which in (
-        ("spin", asked.spin, "effect of spin is computed for the lowest mode of a harmonic from 2 up"),
-        ("amplitude", asked.amplitude, "effect of the amplitude is computed for harmonics from 2 up"),
-    ):
-        if wanted is not None and not any(key in entry for entry in entries):
-            raise InputError(f"--{key}: the {which}, in the solid theory; none of these modes is one.")
-    return entries
+def describe_effects(mode: Mode, asked: Asked) -> dict[str, Any]:
+    """Return what applies to a mode, by its key."""
+    return {key: entry for key, describe in EFFECTS.items() if (entry := describe(mode, asked)) is not None}
 
 
 def _split(m: Mode, asked: Asked) -> Entry | None:
@@ -72,32 +51,6 @@ def _split(m: Mode, asked: Asked) -> Entry | None:
     parts = {name: told(getattr(whole, name)) for name in ("imperfection", "measured", "electrodes")}
     every = {"slow_Hz": slow, "fast_Hz": fast, "every_order_split_Hz": whole.of_every_order().hertz, "parts": parts}
     return told(whole.split) | every
-
-
-def _spin(m: Mode, asked: Asked) -> Entry | None:
-    """What a spin makes of a pair, in the frame of the resonator: two waves with f + shift ± g Ω/2π, g = n K of Bryan's factor K."""
-    if asked.spin is None or m.theory != "solid" or m.harmonic < 2 or m.index:
-        return None
-    from shell.spin import spin_shift
-
-    shift, omega = spin_shift(m, asked.elastic), radians(asked.spin)
-    mean = m.frequency * (1 + shift.total * omega**2)
-    apart = m.harmonic * abs(m.bryan_factor * omega) / (2 * pi)
-    ppm = {f"{name}_ppm": (name, 1e6 * omega**2) for name in ("stress", "centrifugal", "coriolis")}
-    waves = {"rate_deg_per_s": asked.spin, "lower_wave_Hz": mean - apart, "upper_wave_Hz": mean + apart}
-    return waves | row_of(shift, shift_ppm=("total", 1e6 * omega**2), **ppm)
-
-
-def _amplitude(m: Mode, asked: Asked) -> Entry | None:
-    """The shift in ppb by the largest displacement that was asked."""
-    if asked.amplitude is None or m.theory != "solid" or m.harmonic < 2:
-        return None
-    from shell.duffing import amplitude_shift
-
-    shift, square = amplitude_shift(m), (asked.amplitude * MICROMETRE) ** 2
-    ppb = 1e9 * square
-    parts = row_of(shift, shift_ppb=("total", ppb), static_ppb=("static", ppb), inertial_ppb=("inertial", ppb))
-    return parts | {"amplitude_um": asked.amplitude, "shift_Hz_per_um2": shift.total * m.frequency * MICROMETRE**2}
 
 
 def _mount(m: Mode, asked: Asked) -> Entry | None:
@@ -147,8 +100,6 @@ def _crystal(m: Mode, asked: Asked) -> Entry | None:
 
 EFFECTS = {
     "split": _split,
-    "spin": _spin,
-    "amplitude": _amplitude,
     "mount": _mount,
     "films": _films,
     "crystal": _crystal,
@@ -161,18 +112,6 @@ SPLIT = (
     Column("split.every_order_split_Hz", "split, all orders", "Hz", ".5f"),
     Column("split.slow_axis_deg", "slow axis", "°", ".2f"),
     Column("split.shift_ppm", "shift", "ppm", "+.3f"),
-)
-SPIN = (
-    MODE[0],
-    *(Column(f"spin.{key}_wave_Hz", f"{key} wave", "Hz", ".5f") for key in ("lower", "upper")),
-    *(Column(f"spin.{key}_ppm", name, "ppm", "+.3g") for key, name in (
-        ("shift", "shift of the mean"), ("stress", "by stress"), ("centrifugal", "centrifugal"), ("coriolis", "Coriolis"),
-    )),
-)  # fmt: skip
-AMPLITUDE = (
-    *MODE,
-    *(Column(f"amplitude.{key}_ppb", key, "ppb", "+.4g") for key in ("shift", "static", "inertial")),
-    Column("amplitude.shift_Hz_per_um2", "coefficient", "Hz/µm²", "+.4g"),
 )
 MOUNT = (
     *MODE,
@@ -193,15 +132,6 @@ CRYSTAL = (
     )),
     Column("crystal.relative_error_estimate", "solver error, relative", form=".0e"),
 )  # fmt: skip
-ROTATION = (
-    "In the frame of the resonator. Bryan's effect separates the two waves; their mean shifts with the square of the rate,"
-    " by the stress of rotation, centrifugal softening and Coriolis forces."
-)
-NONLINEAR = (
-    "Standing wave; the shift is proportional to the square of the largest displacement. Geometric nonlinearity only: the static"
-    " part stiffens, the inertia of the motion at twice the frequency softens. Third-order elastic constants, which may matter as much in thick shells,"
-    " and electrostatic springs are not included."
-)
 MISMATCH = (
     "The base has expanded {:.4g} ppm more than the resonator since they were joined. First order in the resulting stress"
     " and deformation. The frequencies above do not include it; those of hrg tcf and of simulations do."
@@ -210,7 +140,7 @@ BARE = "By stiffness and mass, to first order in the thickness. The frequencies 
 VOIGT = "[001] along the axis. The table above and every other command use the isotropic (Voigt-Reuss-Hill) mean of the elastic constants."
 
 
-def effect_tables(modes: list[dict[str, Any]], asked: Asked) -> list[Table]:
+def effect_tables(modes: list[dict[str, Any]]) -> list[Table]:
     """Return the tables of what applies to the modes."""
 
     def those(key: str) -> list[dict[str, Any]]:
@@ -221,8 +151,6 @@ def effect_tables(modes: list[dict[str, Any]], asked: Asked) -> list[Table]:
     antinode = "Slow axis: an antinode of the slower mode."
     return [
         Table("Pairs with imperfections and electrodes", those("split"), SPLIT, antinode),
-        Table(f"Effects of rotation at {asked.spin or 0.0:g} °/s", those("spin"), SPIN, ROTATION),
-        Table(f"Effect of an amplitude of {asked.amplitude or 0.0:g} µm", those("amplitude"), AMPLITUDE, NONLINEAR),
         Table("Thermal mismatch with the base", those("mount"), MOUNT, MISMATCH.format(strain)),
         Table("Effect of the films", films, FILMS, BARE),
         Table("Pairs of the anisotropic crystal", those("crystal"), CRYSTAL, VOIGT),

@@ -2,9 +2,7 @@
 
 Where the card has imperfections or charged electrodes, the pairs n >= 1 have `split` in the JSON besides: `split_Hz`, `slow_Hz`, `fast_Hz`,
 `slow_axis_deg` (azimuth of an antinode of the slower mode), `shift_ppm` of the mean, all to first order, and `every_order_split_Hz`; and
-`parts`, split_Hz, slow_axis_deg and shift_ppm by the imperfection, the measured split and the electrodes alone. With `--spin` the lowest modes of
-n >= 2 in the solid theory have `spin`: `rate_deg_per_s`, `lower_wave_Hz` and `upper_wave_Hz`, and `shift_ppm` of their mean with its parts; with
-`--amplitude` all modes of n >= 2 there have `amplitude`: `amplitude_um`, `shift_ppb` with its parts, `shift_Hz_per_um2`.
+`parts`, split_Hz, slow_axis_deg and shift_ppm by the imperfection, the measured split and the electrodes alone.
 Where the card has a [mount] the pairs of n >= 1 have `mount`: `strain_ppm` of the base, `shift_ppm`, `slope_ppm_per_degC`, `per_strain`.
 Where the card has films ([[loss.film]]), modes have `films`: `film`, `shift_ppm`, and the `missing` keys where that is null. Where its material is
 a crystal, the lowest pairs of n = 2, 3, 5, 6, 7, 9 … have `crystal`: `antinode_along_100_Hz`, `other_Hz`, `split_Hz`, `relative_split`.
@@ -56,8 +54,6 @@ def modes(
     theory: AnyTheory = "solid",
     tolerance: Annotated[float, FRACTION] = 1e-5,
     sensitivities: bool = False,
-    spin: float | None = None,
-    amplitude: float | None = None,
 ) -> Result:
     """Compute the lowest modes of a resonator: frequency, Bryan factor, energies, sensitivities.
 
@@ -67,17 +63,14 @@ def modes(
         tolerance: Largest relative discretization error of the frequency.
         sensitivities: Show the sensitivities of each frequency to E, ν, ρ, thickness and radius, and where its energy
             is.
-        spin: Rate of rotation about the axis in °/s: frequencies of the two travelling waves, with second-order
-            effects.
-        amplitude: Largest displacement in µm: shift of the frequency by geometric nonlinearity.
     """
     instrument, T = open_card(card, temperature)
     detailed = theory != "rayleigh"
     with naming(instrument.path):
         resonator, elastic = instrument.at(T)
         found = [m for n in harmonic for m in solve_modes(resonator, elastic, n, count, theory, tolerance)]
-        asked = Asked(instrument, T, elastic, tolerance, spin, amplitude)
-        more = describe_effects(found, asked)
+        asked = Asked(instrument, T, tolerance)
+        more = [describe_effects(m, asked) for m in found]
     share = float(law_of(instrument, T, T).uncertainty(np.array([T]))[0])
     mean = float(sum(h for _, h in resonator.thickness) / len(resonator.thickness))
     entries = []
@@ -103,7 +96,7 @@ def modes(
         f"Natural frequencies and Bryan factors at {T - zero_Celsius:g} °C, {THEORIES[theory]}.",
         [
             Table(name, entries, COLUMNS, _note(theory, share)),
-            *effect_tables(entries, asked),
+            *effect_tables(entries),
             *_all_orders(entries),
             *_detail_tables(entries if detailed else [], "everywhere" if sensitivities else "page"),
             Blocks(lambda: _view(instrument, sorted(set(harmonic)), T, theory)),
