@@ -25,19 +25,11 @@ from studies.results import Chapter, Column, Drawing, Facts, Figure, Part, Resul
 from studies.schema.reader import read_file
 
 VERDICTS = {"pass": "all limits met", "fail": "a limit is not met", "incomplete": "not all limits could be judged"}
-QUANTITY = Column("words", "quantity")
 MEASURED = (
-    QUANTITY,
-    "section",
-    Column("value", "value", within=("low", "high")),
-    Column("value", "90 % interval", interval=("low", "high"), digits=0),
-    Column("shown_unit", "unit"),
-    Column("shown_limit", "limit"),
-    "verdict",
+    "words: quantity | section | value in low … high: value | low … high: 90 % interval .0 | shown_unit: unit"
+    " | shown_limit: limit | verdict"
 )
-MISSING = (QUANTITY, "section", Column("limited", "has a limit"), "needs")
 RECORDS = (
-    Column("path", "file"),
     Column(lambda record: np.ptp(record["time_s"]) / 3600, "duration", "h", digits=3),
     Column(len, "rows"),
     Column(lambda record: record.sha256[:12], "SHA-256, first digits"),
@@ -98,10 +90,11 @@ def acceptance(card: Card, *runs: Records, limits: str | None = None, output: st
         Facts(_facts(found)),
         Chapter("Quantities", [Table("Measured, in the order of IEEE Std 1431", [row for row in rows if not row["needs"]], MEASURED, note)]),
         Chapter("Drift (12.11)", _drift(found)),
-        Chapter("Not judged", [Table("Missing quantities and tests", missing, MISSING)]),
+        Chapter("Not judged", [Table("Missing quantities and tests", missing,
+            "words: quantity | section | limited: has a limit | needs")]),
         Chapter("Records", [
-            Table("Files read", records, (RECORDS[0], used, *RECORDS[1:]), where="page"),
-            Table("Free decays read", decays, (RECORDS[0], Column("window", "free decay", "s", interval=("window.0", "window.1"))), where="page"),
+            Table("Files read", records, ("path: file", used, *RECORDS), where="page"),
+            Table("Free decays read", decays, "path: file | window.0 … window.1: free decay (s)", where="page"),
             *(Sentence(f"{decay.path}: {' '.join(decay.remarks)}", "warning") for decay in decays if decay.remarks),
         ]),
     ]  # fmt: skip

@@ -33,7 +33,7 @@ def cards(card: str = "") -> Result:
         | {"note": card["note"], "path": str(path)}
         for path, card in found
     ]
-    columns = ("name", "shape", "material", Column("note", "what is published, what is illustrative"))
+    columns = "name | shape | material | note: what is published, what is illustrative"
     return Result({"cards": entries}, "Cards", LEAD, [Table("Cards", entries, columns)])
 
 
@@ -75,11 +75,7 @@ def _show_values(card: str) -> Result:
     ]
     columns = (
         Column("name", "quantity", spell=display_name, where="page"),
-        "key",
-        Column("value", "value", form=".4g"),
-        Column("spread", "±"),
-        "from",
-        Column("interval", "90 % interval", interval=("interval.0", "interval.1")),
+        "key | value: value .4g | spread: ± | from | interval.0 … interval.1: 90 % interval",
     )
     tables: dict[str, list[dict[str, Any]]] = {}
     for row in rows:

@@ -40,7 +40,7 @@ def compare(*card: str) -> Result:
         f"{', '.join(names)}: natural frequencies, slope, settling, and the keys in which the cards differ.",
         [
             Table("Designs", known, [
-                Column("name", "quantity"), "unit",
+                "name: quantity | unit",
                 *(Column(f"values.{k}", name, error=f"uncertainties.{k}") for k, name in enumerate(names)),
             ], note),
             *(f"{row[0].name.capitalize()}: {'; '.join(f'{name}: {one.of}' for name, one in zip(names, row, strict=True))}."

@@ -14,7 +14,7 @@ from studies.errors import InputError
 from studies.instrument.units import unit_of
 from studies.record import COMPENSATED, RESONATOR, Record, read_record, write_record
 from studies.reports import style
-from studies.results import Column, Drawing, Figure, Part, Result, Sentence, Table
+from studies.results import Drawing, Figure, Part, Result, Sentence, Table
 
 AVERAGE = 100.0  # s
 NOISE = 0.02  # relative: what the noise of a model's inputs may add to a record that has nothing to compensate
@@ -28,13 +28,7 @@ OWN_THERMOMETER = (
     "{1} has no thermometer, so {0} has the resonator's temperature, found from the frequency, instead of a compensated frequency."
     " To compensate other outputs over this temperature, use hrg fit bias --over temperature."
 )
-COLUMNS = (
-    Column("name", "Column"),
-    Column("stability_before", "Before"),
-    Column("stability_after", "After"),
-    "Unit",
-    Column("rows_not_compensated", "Empty rows"),
-)
+COLUMNS = "name: Column | stability_before: Before | stability_after: After | Unit | rows_not_compensated: Empty rows"
 
 
 @answers("hrg.compensate/1")

@@ -22,7 +22,7 @@ from studies.cli.output import answers, say
 from studies.errors import InputError
 from studies.files.writing import write_text
 from studies.papers.bvg_theory import compare_bell_theory
-from studies.results import Chapter, Column, Result, Sentence, Table
+from studies.results import Chapter, Result, Sentence, Table
 from studies.results.terminal import print_result
 
 if TYPE_CHECKING:
@@ -153,12 +153,10 @@ def _derive_bell(latex: bool) -> Result:
     if latex:
         return Result(payload, title, lead, _chapters(chain), printed=text)
     theory = compare_bell_theory()
-    columns = [
-        Column("name", "pattern"),
-        Column("frequency", "f", "Hz", ".6g"),
-        Column("precession_factor", "precession factor", form=".5f"),
-        Column("membrane_share", "membrane share of the energy", form=".3g"),
-    ]
+    columns = (
+        "name: pattern | frequency: f (Hz) .6g | precession_factor: precession factor .5f"
+        " | membrane_share: membrane share of the energy .3g"
+    )
     title_of = f"Equations (21), (22) with these patterns, and the solver: card {theory.card}"
     table = Table(title_of, [*theory.rows, theory.free, theory.solid], columns)
     printed = Sentence(text, "source", "terminal")

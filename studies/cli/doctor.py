@@ -1,7 +1,7 @@
 """`hrg doctor`: what this environment has and what it lacks."""
 
 from studies.cli.output import answers
-from studies.results import Column, Result, Table
+from studies.results import Result, Table
 
 NEEDED = ["numpy", "scipy", "sympy", "pandas", "pyvista", "vtk", "trimesh", "matplotlib", "cyclopts", "rich", "jinja2"]
 OPTIONAL = (
@@ -54,6 +54,6 @@ def doctor() -> Result:
         {"healthy": healthy, "checks": described},
         "Environment",
         "Versions, OpenGL and optional parts.",
-        [Table("Environment", rows, (Column("name", "part"), "state", "found", "remedy"))],
+        [Table("Environment", rows, "name: part | state | found | remedy")],
         status=0 if healthy else 3,
     )

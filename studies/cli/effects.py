@@ -5,7 +5,7 @@ from typing import Any
 from studies.cli.output import answers
 from studies.diagnosis.response import RESPONSES
 from studies.effects import Effect, find_effect, library
-from studies.results import Column, Result, Sentence, Table, row_of
+from studies.results import Result, Sentence, Table, row_of
 
 
 @answers("hrg.effects/1")
@@ -20,7 +20,7 @@ def effects(name: str = "") -> Result:
     payload = {"effects": entries}
     if not name:
         rows = [{**entry, "acts": _words(effect)} for entry, effect in zip(entries, chosen, strict=True)]
-        columns = ("name", Column("acts", "acts on"), Column("summary", "description"))
+        columns = "name | acts: acts on | summary: description"
         table = Table("Effects", rows, columns, "hrg effects NAME shows one of them in full.")
         lead = "What a diagnosis can name, and an [[effect]] table of a card can have."
         return Result(payload, "Effects", lead, [table])
@@ -41,7 +41,7 @@ def effects(name: str = "") -> Result:
             Table(
                 "Parameters of its [[effect]] table",
                 entry["parameters"],
-                (Column("name", "key"), "kind", "bounds", "meaning"),
+                "name: key | kind | bounds | meaning",
             ),
             *(f"{label}: {words}." for label, words in said.items() if words),
         ],

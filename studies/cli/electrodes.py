@@ -20,7 +20,7 @@ from studies.cli.output import answers
 from studies.errors import InputError, naming
 from studies.instrument.tables.electrodes import ElectrodeKeys
 from studies.resonator.splitting import SplitPair
-from studies.results import Column, Part, Result, Sentence, Table, row_of
+from studies.results import Part, Result, Sentence, Table, row_of
 
 
 @answers("hrg.electrodes/1")
@@ -111,5 +111,5 @@ def _parts(payload: dict[str, Any], split: float, resolved: bool, keys: Electrod
     ]
     title = f"Trim voltages for a split of {1e3 * split:.4g} mHz, in addition to the card's own voltages"
     note = f"They lower the frequency of the pair by {abs(trim['shift_ppm']):.3g} ppm. Squares of voltages add; in a card these are trim_V."
-    columns = ("electrode", Column("azimuth", "azimuth", "°", ".2f"), Column("voltage", "voltage", "V", ".3f"))
+    columns = "electrode | azimuth: azimuth (°) .2f | voltage: voltage (V) .3f"
     return [head, Table(title, voltages, columns, note)]

@@ -19,7 +19,7 @@ from studies.record.rest import RestData, gather_rest
 from studies.reports import style
 from studies.reports.cross_damping import SOURCES, draw_runs
 from studies.reports.digits import lowered, raised
-from studies.results import Chapter, Column, Drawing, Facts, Figure, Result, Sentence, Table, row_of
+from studies.results import Chapter, Drawing, Facts, Figure, Result, Sentence, Table, row_of
 
 LABELS = {
     "training": "fitted, rows",
@@ -27,12 +27,7 @@ LABELS = {
     "held_out": "held out, rows",
     "held_out_averages_100s": "held out, 100 s averages",
 }
-COEFFICIENTS = (
-    Column("name", "Coefficient"),
-    Column("value", "Value", error="error"),
-    "Unit",
-    Column("ratio", "Ratio to ζ₀"),
-)
+COEFFICIENTS = "name: Coefficient | value ± error: Value | Unit | ratio: Ratio to ζ₀"
 USELESS = (
     "On held-out data the compensation does not improve the output: beyond its noise, this record shows no cross-damping that varies"
     " with temperature."
@@ -110,10 +105,8 @@ def fit_cross_damping(
             Chapter("Output before and after", [
                 Figure(lambda: draw_runs(study.runs, study.model, OUTPUTS[gathered.output], unit),
                     "Temperature, and zero-rate output before and after compensation, 100 s averages."),
-                Table("Zero-rate output", changes, [
-                    Column("label", "Data"), Column("before", "Before", unit), Column("after", "After", unit),
-                    Column("improvement", "Improvement", form=".2f"),
-                ], HELD_OUT),
+                Table("Zero-rate output", changes,
+                    f"label: Data | before: Before ({unit}) | after: After ({unit}) | improvement: Improvement .2f", HELD_OUT),
             ]),
             Chapter("Cross-damping over temperature", [
                 Figure(lambda: _draw_curve(study), "Cross-damping over temperature, relative to its value at calibration."),

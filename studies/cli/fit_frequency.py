@@ -19,17 +19,13 @@ from studies.record import read_frequency_table, read_record, reading_resolution
 from studies.record.plausible import records_of_one_gyro
 from studies.record.settled import Soak, advise_hold, find_soaks, settled_table
 from studies.reports import frequency as parts
-from studies.results import Chapter, Column, Result, Table, row_of
+from studies.results import Chapter, Result, Table, row_of
 
 SHOWN = ("temperature_degC", "frequency_Hz", "error_Hz", "left_K", "extrapolated_K")
 SOAKS = (
-    "Record",
-    Column("start_s", "From", "s", ".0f"),
-    Column("end_s", "To", "s", ".0f"),
-    Column("temperature_degC", "Temperature", "°C", ".3f"),
-    Column("frequency_Hz", "Frequency", "Hz", error="error_Hz"),
-    Column("left_K", "Settling error", "K", digits=2),
-    Column("extrapolated_K", "Extrapolated by", "K", digits=2),
+    "Record | start_s: From (s) .0f | end_s: To (s) .0f | temperature_degC: Temperature (°C) .3f"
+    " | frequency_Hz ± error_Hz: Frequency (Hz) | left_K: Settling error (K) .2"
+    " | extrapolated_K: Extrapolated by (K) .2"
 )
 
 

@@ -14,7 +14,7 @@ from studies.errors import InputError
 from studies.instrument.card import load_card
 from studies.record import read_record
 from studies.reports import style
-from studies.results import Column, Drawing, Figure, Result, Sentence, Table, row_of
+from studies.results import Drawing, Figure, Result, Sentence, Table, row_of
 
 NAMES = {
     "radiated_share": ("Radiated share of the heat exchange at 20 °C", ""),
@@ -72,7 +72,6 @@ def fit_thermal(
         [f"{share:+.2f} × {(word := _name(key)[0])[:1].lower()}{word[1:]}" for key, share in one.parts.items()]
         for one in found.undetermined
     ]
-    ends = Column("value", f"{100 * confidence:g} % interval", interval=("low", "high"), digits=0)
     note = f"Fitted to averages over {found.row_step:g} s; rms residual {rms:.2g} Hz."
     return Result(
         payload,
@@ -82,7 +81,7 @@ def fit_thermal(
             Table(
                 "Thermal constants",
                 rows,
-                ("Constant", Column("shown", "Value", within=("low", "high")), ends, "Unit"),
+                f"Constant | shown in low … high: Value | low … high: {100 * confidence:g} % interval .0 | Unit",
                 note,
             ),
             *(Sentence(OPEN.format(" ".join(words)), "warning") for words in combined),

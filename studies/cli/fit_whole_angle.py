@@ -17,7 +17,7 @@ from studies.instrument.card import Instrument, load_card
 from studies.instrument.tables.loop import Loop
 from studies.record import read_record
 from studies.resonator.law import law_of
-from studies.results import Column, Result, Sentence, Table
+from studies.results import Result, Sentence, Table
 
 KEYS = {
     # estimate: key of the card, factor to its unit, name, unit
@@ -79,11 +79,7 @@ def fit_whole_angle(
     payload |= {"estimates": estimates, "undetermined": found.undetermined}
     rows = [{"quantity": NAMES[key][0], "unit": NAMES[key][1], "key": key} | e for key, e in estimates.items()]
     columns = (
-        "Quantity",
-        Column("value", "Value", error="sd"),
-        Column("low", f"{100 * confidence:g} % interval", interval=("low", "high"), error="sd"),
-        "Unit",
-        Column("key", "Key of the card"),
+        f"Quantity | value ± sd: Value | low … high ± sd: {100 * confidence:g} % interval | Unit | key: Key of the card"
     )
     return Result(
         payload,

@@ -7,10 +7,10 @@ from typing import Any
 from studies.cli.output import answers
 from studies.errors import InputError, nearest
 from studies.instrument.registry import card_tables
-from studies.results import Column, Result, Table
+from studies.results import Result, Table
 from studies.schema.reference import list_keys, spell_uncertainty
 
-COLUMNS = ("key", "unit", Column("shown", "default"), "bounds", Column("uncertainty", "known to"), "type", "meaning")
+COLUMNS = "key | unit | shown: default | bounds | uncertainty: known to | type | meaning"
 
 
 @answers("hrg.keys/1")

@@ -21,7 +21,7 @@ from studies.loss.account import StatedLoss, damping_around, stated_loss
 from studies.loss.model import LossModel, loss_model
 from studies.reports import style
 from studies.reports.digits import plain
-from studies.results import Chapter, Column, Drawing, Facts, Figure, Result, Sentence, Table, row_of, rows_of
+from studies.results import Chapter, Drawing, Facts, Figure, Result, Sentence, Table, row_of, rows_of
 
 DEG = float(np.degrees(1))
 WALL = (
@@ -122,11 +122,8 @@ def _parts(
         shown = {"share": 100 * own / total, "half": 1 / (total - own / 2), "advice": _sentence(part.advice)}
         rows.append(entry | shown | {"without": rest if np.isfinite(rest) else "nothing left"})
     picked = sorted({0, at, len(degrees) - 1})
-    name = Column("name", "contribution")
-    interval = Column("inverse_q", "90 % interval", "1e-9", digits=2, scale=1e9, interval=(f"low.{at}", f"high.{at}"))
-    values = [Column(f"inverse_q.{k}", f"1/Q at {degrees[k]:.0f} °C", "1e-9", ".3g", scale=1e9) for k in picked]
+    values = " | ".join(f"inverse_q.{k}: 1/Q at {degrees[k]:.0f} °C (1e-9) ×1e9 .3g" for k in picked)
     damped = [] if around is None else rows_of({"T": degrees, **around})
-    T = Column("T", "T", "°C", ".1f")
     words = [
         f"Reduce first: {budget.first.name}. {_sentence(budget.first.advice)}",
         f"Largest share of the uncertainty of the total: {budget.least_known.name}.",
@@ -139,19 +136,15 @@ def _parts(
             Figure(lambda: _draw_bars(budget, at), f"Contributions to 1/Q at {degrees[at]:g} °C with 90 % intervals."),
         ]),
         Chapter(f"Contributions at {degrees[at]:g} °C", [
-            Table("Contributions", rows, [
-                name, Column("share", "share", "%", ".3g"), *values, interval, Column(f"slope_per_K.{at}", "slope", "%/°C", "+.2g", scale=100.0),
-                Column("half", "Q if it is halved", digits=3), Column("without", "Q without it", digits=3),
-            ], "Largest first; all columns except 1/Q are at the temperature above."),
-            Table("Remedies and sources", rows, [
-                name, Column("relative_sd", "standard uncertainty", "%", ".0f", scale=100.0), Column("advice", "remedy"), Column("source", "source"),
-            ]),
+            Table("Contributions", rows,
+                f"name: contribution | share: share (%) .3g | {values} | low.{at} … high.{at}: 90 % interval (1e-9) ×1e9 .2"
+                f" | slope_per_K.{at}: slope (%/°C) ×100 +.2g | half: Q if it is halved .3 | without: Q without it .3", "Largest first; all columns except 1/Q are at the temperature above."),
+            Table("Remedies and sources", rows,
+                "name: contribution | relative_sd: standard uncertainty (%) ×100 .0f | advice: remedy | source"),
         ]),
         Chapter("Over temperature", [
-            Table("Q", over, [
-                T, Column("q", "Q", digits=3), Column("q", "90 % interval", digits=3, interval=("q_low", "q_high")),
-                Column("inverse_q", "1/Q", "1e-9", ".3g", scale=1e9), Column("slope", "slope of 1/Q", "%/°C", "+.2g", scale=100.0),
-            ]),
+            Table("Q", over, "T: T (°C) .1f | q: Q .3 | q_low … q_high: 90 % interval .3 | inverse_q: 1/Q (1e-9) ×1e9 .3g"
+                " | slope: slope of 1/Q (%/°C) ×100 +.2g"),
             Figure(lambda: _draw_course(budget, stated, model.vibration.reference), "1/Q and its parts.") if len(degrees) > 1 else None,
         ]),
         Chapter("Along the meridian", [
@@ -160,10 +153,10 @@ def _parts(
             Figure(lambda: _draw_along(model), "Energy, area strain and normal motion of the faces, each per area over its mean."),
         ]),
         Chapter("Around the axis", [
-            Table("Damping anisotropy", damped, [
-                T, Column("inverse_q_split", "Δ(1/Q)", "1e-9", ".3g", scale=1e9), Column("damping_axis_deg", "axis", "°", ".2f"),
-                Column("largest_drift_deg_per_h", "largest drift", "°/h"),
-            ], "Axis: azimuth of the pattern with the largest damping. The drift is proportional to sin 2n of the angle from it."),
+            Table("Damping anisotropy", damped,
+                "T: T (°C) .1f | inverse_q_split: Δ(1/Q) (1e-9) ×1e9 .3g | damping_axis_deg: axis (°) .2f"
+                " | largest_drift_deg_per_h: largest drift (°/h)",
+                "Axis: azimuth of the pattern with the largest damping. The drift is proportional to sin 2n of the angle from it."),
         ]),
         Chapter("Not included", [
             *(Sentence(_sentence(words), where="page") for words in model.left_out),

@@ -15,7 +15,7 @@ from studies.cli.output import answers
 from studies.errors import InputError, naming, nearest
 from studies.instrument.card import load_card
 from studies.reports.digits import plain, to_error
-from studies.results import Column, Result, Table, row_of, rows_of
+from studies.results import Result, Table, row_of, rows_of
 
 if TYPE_CHECKING:
     from shell.resonator import Resonator
@@ -42,8 +42,9 @@ def materials(name: str = "", *, compare: bool = False, card: Card = "", harmoni
     laws = [law for key, laws in table.items() if name in ("", key) for law in laws.values()]
     entries = [_describe(law) for law in laws]
     rows = [row | {key: spell(row[key]) or "—" for key in ("lacks", "unchecked")} for row in entries]
-    span = Column("range_degC", "range", "°C", "g", interval=("range_degC.0", "range_degC.1"))
-    columns = ("name", "law", span, Column("lacks", "not stated"), Column("unchecked", "not checked"), "source")
+    columns = (
+        "name | law | range_degC.0 … range_degC.1: range (°C) g | lacks: not stated | unchecked: not checked | source"
+    )
     return Result(
         {"materials": entries},
         "Materials",
@@ -56,13 +57,9 @@ def materials(name: str = "", *, compare: bool = False, card: Card = "", harmoni
 
 
 COMPARED = (
-    "material",
-    "law",
-    Column("frequency_Hz", "f", "Hz", error="frequency_sd_Hz"),
-    Column("slope_ppm_per_degC", "TCF", "ppm/°C", error="slope_sd_ppm_per_degC"),
-    Column("thermoelastic_q", "thermoelastic Q", digits=3),
-    Column("surface_q", "surface Q", digits=3),
-    Column("surface_layer_pm", "break-even surface", "pm", ".3g"),
+    "material | law | frequency_Hz ± frequency_sd_Hz: f (Hz)"
+    " | slope_ppm_per_degC ± slope_sd_ppm_per_degC: TCF (ppm/°C) | thermoelastic_q: thermoelastic Q .3"
+    " | surface_q: surface Q .3 | surface_layer_pm: break-even surface (pm) .3g"
 )
 WORTH = (
     "Thermoelastic Q: from heat conduction alone. Surface Q: where a source gives the depth times loss of a surface layer. Break-even surface:"
@@ -105,7 +102,7 @@ def _law_tables(law: "Material") -> list[Table]:
     correlated = [_correlated(prior, k) for k in range(len(prior.names))]
     coefficients = rows_of({"coefficient": prior.names, "sd": prior.sd, "correlation": correlated})
     note = "p(T) = law(T) exp(a + b x + ½ c x²), x = T − 20 °C: log_value, log_slope, log_curvature; without log, + instead of exp."
-    open_ones = ("coefficient", Column("sd", "standard deviation", form=".2g"), "correlation")
+    open_ones = "coefficient | sd: standard deviation .2g | correlation"
     columns = ("property", "unit", "form", "numbers", "source")
     return [
         Table(f"{law.name}, law '{law.law}'", properties, columns, " ".join([*law.caveats, law.note])),

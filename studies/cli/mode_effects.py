@@ -105,33 +105,24 @@ EFFECTS = {
     "crystal": _crystal,
 }
 
-MODE = (Column("harmonic", "n"), Column("index", "index"))
+MODE = "harmonic: n | index"
 SPLIT = (
-    *MODE,
-    *(Column(f"split.{key}_Hz", key, "Hz", ".5f") for key in ("slow", "fast", "split")),
-    Column("split.every_order_split_Hz", "split, all orders", "Hz", ".5f"),
-    Column("split.slow_axis_deg", "slow axis", "°", ".2f"),
-    Column("split.shift_ppm", "shift", "ppm", "+.3f"),
+    f"{MODE} | split.slow_Hz: slow (Hz) .5f | split.fast_Hz: fast (Hz) .5f | split.split_Hz: split (Hz) .5f"
+    " | split.every_order_split_Hz: split, all orders (Hz) .5f | split.slow_axis_deg: slow axis (°) .2f"
+    " | split.shift_ppm: shift (ppm) +.3f"
 )
 MOUNT = (
-    *MODE,
-    Column("mount.per_strain", "per strain", form="+.4g"),
-    Column("mount.shift_ppm", "shift", "ppm", "+.4g"),
-    Column("mount.slope_ppm_per_degC", "slope", "ppm/°C", "+.3g"),
+    f"{MODE} | mount.per_strain: per strain +.4g | mount.shift_ppm: shift (ppm) +.4g"
+    " | mount.slope_ppm_per_degC: slope (ppm/°C) +.3g"
 )
 FILMS = (
-    *MODE,
-    Column("film", "film"),
-    Column("shift_ppm", "shift", "ppm", "+.4g"),
+    f"{MODE} | film | shift_ppm: shift (ppm) +.4g",
     Column(lambda film: " and ".join(film["missing"]), "unknown without"),
 )
 CRYSTAL = (
-    MODE[0],
-    *(Column(f"crystal.{key}_Hz", name, "Hz", ".4f") for key, name in (
-        ("antinode_along_100", "antinode along [100]"), ("other", "other mode"), ("split", "split"),
-    )),
-    Column("crystal.relative_error_estimate", "solver error, relative", form=".0e"),
-)  # fmt: skip
+    "harmonic: n | crystal.antinode_along_100_Hz: antinode along [100] (Hz) .4f | crystal.other_Hz: other mode (Hz) .4f"
+    " | crystal.split_Hz: split (Hz) .4f | crystal.relative_error_estimate: solver error, relative .0e"
+)
 MISMATCH = (
     "The base has expanded {:.4g} ppm more than the resonator since they were joined. First order in the resulting stress"
     " and deformation. The frequencies above do not include it; those of hrg tcf and of simulations do."

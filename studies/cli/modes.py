@@ -32,15 +32,12 @@ if TYPE_CHECKING:
 
 FAR = 0.1  # relative difference of the first order from all orders from which on a split is doubted
 COLUMNS = (
-    *MODE,
-    Column("label", "kind"),
+    f"{MODE} | label: kind",
     Column(
         lambda m: to_numerical_error(m["frequency_Hz"], m["relative_error_estimate"] * m["frequency_Hz"], 4), "f", "Hz"
     ),
-    Column("bryan_factor", "Bryan factor", form=".5f"),
-    Column("relative_error_estimate", "solver error, relative", form=".0e"),
-    Column("material_uncertainty_Hz", "material uncertainty", "Hz", ".2g"),
-    Column("frequency_per_thickness_Hz_per_um", "df/dh", "Hz/µm", "+.3g"),
+    "bryan_factor: Bryan factor .5f | relative_error_estimate: solver error, relative .0e | material_uncertainty_Hz:"
+    " material uncertainty (Hz) .2g | frequency_per_thickness_Hz_per_um: df/dh (Hz/µm) +.3g",
 )
 
 
@@ -136,12 +133,12 @@ def _all_orders(modes: list[dict[str, Any]]) -> list[Sentence]:
 
 def _detail_tables(modes: list[dict[str, Any]], where: Where) -> list[Table]:
     names = {"E": "ln E", "nu": "ν", "rho": "ln ρ", "thickness": "ln h", "radius": "ln r"}
-    slopes = [Column(f"sensitivities.{key}", name, form="+.4f") for key, name in names.items()]
+    slopes = [f"sensitivities.{key}: {name} +.4f" for key, name in names.items()]
     kinds = {"bending": "bending", "membrane": "membrane", "shear": "transverse shear", "root": "root", "stem": "stem"}
-    shares = [Column(f"energy_fractions.{key}", name, form=".3f", scale=100.0) for key, name in kinds.items()]
-    mass = Column("modal_mass_kg", "modal mass", "g", ".4f", scale=1e3)
+    shares = [f"energy_fractions.{key}: {name} ×100 .3f" for key, name in kinds.items()]
+    mass = "modal_mass_kg: modal mass (g) ×1e3 .4f"
     note = "ν at constant E; ln r scales every length but the thickness. Modal mass: for a maximum displacement of 1."
     return [
-        Table("Derivatives of ln f", modes, [*MODE, *slopes, mass], note, where),
-        Table("Strain energy (%)", modes, [*MODE, *shares], "Root: the solid cap, fillet or corner.", where),
+        Table("Derivatives of ln f", modes, [MODE, *slopes, mass], note, where),
+        Table("Strain energy (%)", modes, [MODE, *shares], "Root: the solid cap, fillet or corner.", where),
     ]

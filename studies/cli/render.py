@@ -130,7 +130,7 @@ def _page(shown: Sequence[ModeScene]) -> bytes:
     first = shown[0]
     rows = [_row(one) | row_of(one.mode, "bryan_factor") for one in shown]
     lead = f"Mode shapes of {first.instrument.name} at {first.temperature - zero_Celsius:g} °C, {first.mode.theory} theory."
-    table = Table("Modes of this page", rows, [*COLUMNS[2:], Column("bryan_factor", "Bryan factor", form=".5f")])
+    table = Table("Modes of this page", rows, [*COLUMNS[2:], "bryan_factor: Bryan factor .5f"])
     chapter = Chapter("Mode shapes", [Blocks(lambda: view_blocks(shown)), table])
     return render_result(Result({}, first.instrument.name, lead, [chapter])).encode()
 

@@ -22,44 +22,27 @@ from studies.instrument.card import Instrument, save_card
 from studies.reports.digits import plain, to_interval
 from studies.reports.style import BLUE, ORANGE, figure
 from studies.resonator.scan import Scan, ScanInterval, scan_faces
-from studies.results import Chapter, Column, Drawing, Facts, Figure, Result, Sentence, Table, row_of
+from studies.results import Chapter, Drawing, Facts, Figure, Result, Sentence, Table, row_of
 
 NONE = "none"
 
 
-def _with_interval(key: str, heading: str, unit: str, form: str = "", scale: float = 1.0) -> tuple[Column, Column]:
-    """A value and its 90 % interval."""
-    ends = Column(key, "90 % interval", unit, form, interval=(f"{key}.low", f"{key}.high"), scale=scale)
-    return Column(f"{key}.value", heading, unit, form, scale=scale), ends
-
-
 SPLITS = (
-    Column("harmonic", "n"),
-    Column("frequency_Hz", "frequency", "Hz", ".3f"),
-    *_with_interval("split_Hz", "split", "mHz", scale=1e3),
-    *_with_interval("slow_axis_deg", "slow axis", "°", ".2f"),
-    Column("every_order.split_Hz", "split, all orders", "mHz", scale=1e3),
-    Column("every_order.slow_axis_deg", "slow axis, all orders", "°", ".2f"),
+    "harmonic: n | frequency_Hz: frequency (Hz) .3f"
+    " | split_Hz.value: split (mHz) ×1e3 | split_Hz.low … split_Hz.high: 90 % interval (mHz) ×1e3"
+    " | slow_axis_deg.value: slow axis (°) .2f | slow_axis_deg.low … slow_axis_deg.high: 90 % interval (°) .2f"
+    " | every_order.split_Hz: split, all orders (mHz) ×1e3 | every_order.slow_axis_deg: slow axis, all orders (°) .2f"
 )
 NAMES = {"wall": "wall", "offset": "middle surface", "inner": "inner face", "outer": "outer face"}
 HARMONICS = (
-    Column("order", "harmonic"),
-    *_with_interval("amplitude_um", "amplitude", "µm", ".3f"),
-    Column("crest", "azimuth of a crest", "°", ".1f"),
+    "order: harmonic | amplitude_um.value: amplitude (µm) .3f"
+    " | amplitude_um.low … amplitude_um.high: 90 % interval (µm) .3f | crest: azimuth of a crest (°) .1f"
 )
 FACES = (
-    *(Column(key, key) for key in ("face", "file", "points", "outliers")),
-    Column("noise_um", "noise", "nm", ".1f", scale=1e3),
-    Column("position", "positions", form=".3f", interval=("position.0", "position.1")),
-    *(Column(f"offset_um.{k}", f"offset {axis}", "µm", ".1f") for k, axis in enumerate("xyz")),
-    Column("tilt_deg", "tilt", "°", ".3f"),
+    "face | file | points | outliers | noise_um: noise (nm) ×1e3 .1f | position.0 … position.1: positions .3f"
+    " | offset_um.0: offset x (µm) .1f | offset_um.1: offset y (µm) .1f | offset_um.2: offset z (µm) .1f | tilt_deg: tilt (°) .3f"
 )
-ROUNDNESS = (
-    "face",
-    Column("position", "position", form=".3f"),
-    Column("peak_to_valley_um", "peak to valley", "µm", ".3f"),
-    Column("rms_um", "rms", "µm", ".3f"),
-)
+ROUNDNESS = "face | position: position .3f | peak_to_valley_um: peak to valley (µm) .3f | rms_um: rms (µm) .3f"
 
 
 @answers("hrg.scan/1")

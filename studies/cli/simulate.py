@@ -15,7 +15,7 @@ from studies.cli.arguments import POSITIVE, Card, Out, Seed, Theory
 from studies.cli.output import answers, say, tell_rows
 from studies.instrument.card import load_card
 from studies.record import write_record
-from studies.results import Column, Figure, Result, Sentence, Table, row_of
+from studies.results import Figure, Result, Sentence, Table, row_of
 from studies.simulation.chamber import load_drive
 from studies.simulation.virtual_gyro import simulate_run
 
@@ -91,7 +91,7 @@ def simulate(
             Table(
                 "Uncertainty of the prediction (standard deviation, rms over the run)",
                 [{"column": name, "sd": value} for name, value in (known or {}).items()],
-                ("column", Column("sd", "standard deviation", digits=3)),
+                "column | sd: standard deviation .3",
             ),
             Figure(run.record.plot, "The columns of the record."),
         ],

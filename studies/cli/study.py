@@ -11,7 +11,7 @@ from studies.cli.output import answers, say
 from studies.errors import InputError
 from studies.files.writing import write_text
 from studies.reports.sweep_analysis import tolerance_table
-from studies.results import Column, Result, Table, row_of
+from studies.results import Result, Table, row_of
 from studies.sweeps.opening import is_running
 from studies.sweeps.results import Results, export_results, open_results
 from studies.sweeps.run import Effort, check_functions, estimate_study, run_study
@@ -101,7 +101,7 @@ def status(folder: Folder) -> Result:
     results = open_results(folder)
     found = _status(results, folder, is_running(folder))
     rows = [{"item": key.replace("_", " "), "value": found[key]} for key in STATUS]
-    columns = ("item", Column("value", "value", digits=3))
+    columns = "item | value: value .3"
     table = Table(results.study.name, rows, columns, results.study.note)
     return Result(found, f"Study {results.study.name}", "Its progress.", [table, _reasons(results)])
 

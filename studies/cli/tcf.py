@@ -68,14 +68,13 @@ def tcf(
     if law.mount:
         note += " Base: stress from the thermal mismatch of the card's [mount]."
     columns = [
-        Column("temperature_degC", "T", "°C", ".1f"),
-        Column("frequency_Hz", "f", "Hz", ".3f"),
-        *(Column(f"parts_ppm_per_degC.{name}", PARTS[name], form="+.2f") for name in parts),
-        Column("slope_ppm_per_degC", "slope", error="uncertainty_ppm_per_degC"),
+        "temperature_degC: T (°C) .1f | frequency_Hz: f (Hz) .3f",
+        *(f"parts_ppm_per_degC.{name}: {PARTS[name]} +.2f" for name in parts),
+        "slope_ppm_per_degC ± uncertainty_ppm_per_degC: slope",
     ]
     shown = sorted({0, len(T) // 2, len(T) - 1})
     at = [f"at {points[k]['temperature_degC']:g} °C".replace("-", "−") for k in shown]
-    moved = [Column(f"moves_slope_ppm_per_degC.{k}", words, form="+.2f") for k, words in zip(shown, at, strict=True)]
+    moved = [f"moves_slope_ppm_per_degC.{k}: {words} +.2f" for k, words in zip(shown, at, strict=True)]
     uncertain = [one for one in moves if max(map(abs, one["moves_slope_ppm_per_degC"])) >= LEAST]
     return Result(
         payload,
@@ -84,13 +83,10 @@ def tcf(
         [
             Table(f"{instrument.name}, n = {harmonic}, {theory}", points, columns, note),
             Figure(lambda: _curves(points, parts, local), CAPTION) if len(points) > 1 else None,
-            Table("Uncertainty of the law: change of the slope by one standard deviation (ppm/°C)", uncertain, [
-                Column("coefficient", "quantity", spell=display_name), Column("coefficient", "key"),
-                Column("sd", "standard deviation", form=".2g"), *moved,
-            ]),
-            Table("Measured slope between adjacent points", local, [
-                Column("temperature_degC", "T", "°C", ".1f"), Column("slope_ppm_per_degC", "slope", "ppm/°C", ".2f"),
-            ]),
+            Table("Uncertainty of the law: change of the slope by one standard deviation (ppm/°C)", uncertain,
+                [Column("coefficient", "quantity", spell=display_name), "coefficient: key | sd: standard deviation .2g", *moved]),
+            Table("Measured slope between adjacent points", local,
+                "temperature_degC: T (°C) .1f | slope_ppm_per_degC: slope (ppm/°C) .2f"),
             live_chapter(instrument, harmonic, theory),
         ],
     )  # fmt: skip

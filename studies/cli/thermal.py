@@ -80,20 +80,18 @@ def thermal(
         for words, modes in (("whole heat path", whole), ("shell and stem alone", alone))
     ]
     decisive = [{"constant": name, "effect": value} for name, value in list(influence.items())[:6]]
-    orders = [Column(f"tau.{k}", name, "s", ".0f") for k, name in enumerate(("slowest", "second", "third"))]
-    over_time = [Column("time_s", "time", "s", ".0f"), Column("chamber_temperature_degC", "chamber", form=".3f")]
     return Result(
         payload,
         f"Heat path of {instrument.name}",
         f"Time constants and temperatures of the heat path for the chamber profile {profile}.",
         [
-            Table(f"{instrument.name}: time constants at {T0 - zero_Celsius:g} °C", constants, ["network", *orders]),
-            Table("Sensitivity of the slowest time constant τ to each constant p", decisive, [
-                Column("constant", "constant", spell=name_constant), Column("effect", "d ln τ / d ln p", form="+.3f"),
-            ]),
+            Table(f"{instrument.name}: time constants at {T0 - zero_Celsius:g} °C", constants,
+                "network | tau.0: slowest (s) .0f | tau.1: second (s) .0f | tau.2: third (s) .0f"),
+            Table("Sensitivity of the slowest time constant τ to each constant p", decisive,
+                [Column("constant", "constant", spell=name_constant), "effect: d ln τ / d ln p +.3f"]),
             Figure(lambda: _curves(transient, chamber, weights, names), "Temperatures in time."),
             Table("Temperatures (°C)" + (", with radiation" if not network.is_linear else ", linearised"),
-                rows_of(housed | temperatures), [*over_time, *(Column(name, name, form=".3f") for name in names)],
+                rows_of(housed | temperatures), ["time_s: time (s) .0f | chamber_temperature_degC: chamber .3f", *(f"{name}: {name} .3f" for name in names)],
                 f"Shell: mean temperature. The heat balance closes within {energy.error:.0e} of the heat exchanged."),
         ],
     )  # fmt: skip

@@ -25,7 +25,7 @@ from studies.files.writing import write_text
 from studies.reports.digits import plain, to_error
 from studies.reports.style import BLUE, GREEN, VERMILION, figure
 from studies.resonator.trim import SURE, CardPlan, Teeth, Tool, other_cuts, plan_for_card
-from studies.results import Chapter, Column, Drawing, Facts, Figure, Result, Sentence, Table, row_of
+from studies.results import Chapter, Drawing, Facts, Figure, Result, Sentence, Table, row_of
 
 KINDS = {
     "mass": "unstrained mass",
@@ -34,20 +34,12 @@ KINDS = {
     "outer": "from the outer face",
 }
 CUTS = (
-    Column("number", "cut"),
-    Column("azimuth_deg", "azimuth", "°", ".2f"),
-    Column("height_mm", "height z", "mm", ".3f"),
-    Column("mass_ug", "mass", "µg", ".3f"),
-    Column("depth_um", "depth", "µm", ".3f"),
-    "done",
+    "number: cut | azimuth_deg: azimuth (°) .2f | height_mm: height z (mm) .3f | mass_ug: mass (µg) .3f"
+    " | depth_um: depth (µm) .3f | done"
 )
 STATES = (
-    "state",
-    Column("harmonic", "n"),
-    Column("split_Hz", "split", "mHz", ".3f", scale=1e3),
-    Column("error_Hz", "standard error", "mHz", ".3f", scale=1e3),
-    Column("most_Hz", "95 % upper limit", "mHz", ".3f", scale=1e3),
-    Column("slow_axis_deg", "slow axis", "°", ".2f"),
+    "state | harmonic: n | split_Hz: split (mHz) ×1e3 .3f | error_Hz: standard error (mHz) ×1e3 .3f"
+    " | most_Hz: 95 % upper limit (mHz) ×1e3 .3f | slow_axis_deg: slow axis (°) .2f"
 )
 
 LIMIT = "Upper limit: the split is the length of a vector with this standard error in each component; it lies below with 95 % probability."

@@ -13,7 +13,7 @@ from studies.cli.output import answers
 from studies.errors import InputError
 from studies.files.writing import check_folder, write_text
 from studies.instrument.card import load_card
-from studies.results import Column, Result, Sentence, Table
+from studies.results import Result, Sentence, Table
 from studies.twin.fmu import write_fmu
 from studies.twin.plan import input_starts, plan_twin, symbol
 from studies.twin.source import PROGRAM, exposed, outputs_of, sources
@@ -73,7 +73,7 @@ def twin(
         **{"boundary": boundary, "fmu": fmu, "c": c, "fmi": fmi if fmu is not None else None, "compiled": compiled},
         **{"bytes": size, "inputs": inputs, "outputs": outputs, "parameters": parameters},
     }
-    columns = ("name", "unit", Column("start", "start", digits=6))
+    columns = "name | unit | start: start .6"
     return Result(
         payload,
         f"Twin of {plan.instrument.name}",
@@ -81,7 +81,7 @@ def twin(
         [
             *sentences,
             Table("Inputs", inputs, columns),
-            Table("Outputs", outputs, columns[:2]),
+            Table("Outputs", outputs, columns),
             Table("Parameters", parameters, columns, where="page"),
         ],
     )

@@ -19,7 +19,7 @@ from shell.law import FrequencyLaw
 from studies.instrument.card import load_card
 from studies.reports import style
 from studies.reports.bias import METHOD, SYMBOLS
-from studies.results import Chapter, Column, Drawing, Figure, Table
+from studies.results import Chapter, Drawing, Figure, Table
 from studies.simulation.chamber import load_profile
 from studies.simulation.virtual_gyro import simulate_run
 
@@ -189,11 +189,8 @@ def _draw_trace(fit: TwinFit) -> Drawing:
 
 
 IMPROVEMENT = (
-    "Selection",
-    Column("fitted", "Fitted to"),
-    Column("training", "On the training run"),
-    Column("cooling", "Held out: new cooling run"),
-    Column("warming", "Held out: warming run"),
+    "Selection | fitted: Fitted to | training: On the training run | cooling: Held out: new cooling run"
+    " | warming: Held out: warming run"
 )
 
 
@@ -221,8 +218,7 @@ def terms_table(twins: Twins) -> Table:
         | {m: f"{sum(name in fit.terms for fit in _fits(twins, m, 1))} of {len(twins)}" for m in METHODS}
         for number, name in enumerate(TERMS, 1)
     ]
-    columns = [Column("number", ""), Column("term", "Term"), Column("printed", "In eq. (22)")]
-    columns += [Column(method, f"Virtual gyros, {METHOD[method]}") for method in METHODS]
+    columns = ["number:  | Term | printed: In eq. (22)", *(f"{m}: Virtual gyros, {METHOD[m]}" for m in METHODS)]
     return Table("How often a term is selected from one cooling run", rows, columns)
 
 

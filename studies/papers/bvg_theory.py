@@ -205,9 +205,9 @@ COEFFICIENTS = (
 
 
 PATTERNS = (
-    Column("name", "Pattern"),
+    "name: Pattern",
     Column(lambda row: _hertz(row.frequency), "Frequency"),
-    Column("precession_factor", "Precession factor", form=".4f"),
+    "precession_factor: Precession factor .4f",
     Column(lambda row: 0 if row.membrane_share < 1e-9 else row.membrane_share, "Membrane energy", "%", ".3g", scale=100.0),
 )  # fmt: skip
 PATTERNS_NOTE = (
@@ -219,11 +219,8 @@ SYMBOLS_NOTE = (
     " pattern. Our copy of the paper lacks fraction bars, most minus signs and derivative marks: a blank between two terms"
     " is a missing sign, and … marks illegible parts."
 )
-CHECKED = (Column("0", "Equation"), Column("1", "Content"), Column("2", "Result of the check"))
-CORRECTED = tuple(
-    Column(f"{k}", heading)
-    for k, heading in enumerate(("", "Printed, as far as legible", "Corrected (U, V, W as in (19))", "Difference"))
-)
+CHECKED = "0: Equation | 1: Content | 2: Result of the check"
+CORRECTED = "0:  | 1: Printed, as far as legible | 2: Corrected (U, V, W as in (19)) | 3: Difference"
 
 
 def theory_chapters(theory: BellTheory, reading: LoopReading) -> list[Chapter]:
@@ -258,7 +255,7 @@ def theory_chapters(theory: BellTheory, reading: LoopReading) -> list[Chapter]:
         ]),
         Chapter("BVG equations (23)–(30): rate from the control loop", [
             Table("Rate recovered from a simulation of (23) with a coupling c₁", list(loop.items()),
-                (Column("0", "Quantity"), Column("1", "Value"))),
+                "0: Quantity | 1: Value"),
         ]),
     ]  # fmt: skip
 

@@ -154,19 +154,14 @@ NO_HEAT_PATH = (
 )
 STEPS = (
     Column(lambda curve: f"20 → {curve.target_degC:g} °C", "Step"),
-    Column("network", "Heat path"),
+    "network: Heat path",
     Column(lambda curve: curve.left_at(FAST), "Remaining at 9 000 s", "%", ".2f", scale=100.0),
     Column(lambda curve: curve.left_at(SETTLED), "Remaining at 15 000 s", "%", ".2f", scale=100.0),
     Column(lambda curve: curve.time_to(0.05), "95 % complete", "s", ".0f"),
     Column(lambda curve: curve.time_to(0.01), "99 % complete", "s", ".0f"),
 )
 IDENTIFIED = "The mount conductance is identified from the mean of the two radiative steps at 9 000 s; all other values are predictions."
-SOAKS = (
-    "Soak",
-    Column("network", "Heat path"),
-    Column("slope", "Slope at 20 °C", "ppm/°C", "+.3f"),
-    Column("curvature", "Curvature", "ppm/°C²", "+.4f"),
-)
+SOAKS = "Soak | network: Heat path | slope: Slope at 20 °C (ppm/°C) +.3f | curvature: Curvature (ppm/°C²) +.4f"
 QUADRATIC = (
     "From a quadratic fitted to the logarithms of the seven frequencies. From room: each point starts at room temperature; upwards:"
     " each point starts at the one before."

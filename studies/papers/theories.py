@@ -13,7 +13,7 @@ from shell.materials import find_material
 from shell.meridian import hemisphere
 from shell.modes import TheoryRangeWarning, solve_modes
 from studies.reports import style
-from studies.results import Chapter, Column, Drawing, Figure, Table
+from studies.results import Chapter, Drawing, Figure, Table
 
 THEORIES: tuple[Theory, ...] = ("rayleigh", "shell", "solid")
 RADIUS = 15e-3
@@ -70,14 +70,10 @@ def slopes_by_theory(ratio: float = 0.06, temperature: float = 293.15) -> dict[s
 
 
 FREQUENCIES = (
-    Column("ratio", "h/R", form="g"),
-    Column("rayleigh", "Rayleigh", "Hz", ".3f"),
-    Column("shell", "Shell", "Hz", ".3f"),
-    Column("solid", "Solid", "Hz", ".3f"),
-    Column("excess", "Rayleigh above solid", "%", "+.2f", scale=100.0),
-    Column("coefficient", "Relative excess / √(h/R)", form=".3f"),
+    "ratio: h/R g | rayleigh: Rayleigh (Hz) .3f | shell: Shell (Hz) .3f | solid: Solid (Hz) .3f"
+    " | excess: Rayleigh above solid (%) ×100 +.2f | coefficient: Relative excess / √(h/R) .3f"
 )
-SLOPES = ("Theory", Column("slope", "Slope", form=".2f", scale=1e6))
+SLOPES = "Theory | slope: Slope ×1e6 .2f"
 
 
 def theories_chapter() -> Chapter:

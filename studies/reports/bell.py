@@ -29,13 +29,9 @@ ALLAN = (
 )
 DEG = float(np.pi / 180)
 STEP_COLUMNS = (
-    Column("name", "After"),
-    Column("nonlinearity", "Nonlinearity", "%", ".4f", scale=100.0),
-    Column("at_rest", "σ at rest", "°/s", ".4f"),
-    Column("turning", "σ at constant rate", "°/s", ".4f"),
-    Column("bias_instability", "Bias instability", "°/h", ".2f"),
-    Column("random_walk_1s", "Random walk at 1 s", "°/√h", ".3f"),
-    Column("random_walk_100s", "Random walk at 100 s", "°/√h", ".3f"),
+    "name: After | nonlinearity: Nonlinearity (%) ×100 .4f | at_rest: σ at rest (°/s) .4f"
+    " | turning: σ at constant rate (°/s) .4f | bias_instability: Bias instability (°/h) .2f"
+    " | random_walk_1s: Random walk at 1 s (°/√h) .3f | random_walk_100s: Random walk at 100 s (°/√h) .3f"
 )
 
 

@@ -14,7 +14,7 @@ from studies.models.file import widen
 from studies.models.kinds.bias import OUTPUTS
 from studies.reports import style
 from studies.reports.digits import plain, raised, to_error
-from studies.results import Column, Drawing, Facts, Figure, Part, Sentence, Table, Where
+from studies.results import Column, Drawing, Facts, Figure, Head, Part, Sentence, Table, Where
 
 SOURCES = (
     "Wang X. et al., Sensors 2012, 12, 6434 (the HRG paper), eqs. (19)–(22).",
@@ -40,22 +40,9 @@ NO_TERMS = (
     "These data support no term: a constant describes the bias just as well. Compensation brings no improvement; the saved model only"
     " removes the mean."
 )
-STEP_COLUMNS = (
-    "Step",
-    Column("action", "Term"),
-    Column("F", "F", form=".2f"),
-    "p",
-    Column("bic", "BIC", form=".2f"),
-    Column("score", "Held out", form=".3f"),
-    "Model",
-)
+STEP_COLUMNS = "Step | action: Term | F: F .2f | p | bic: BIC .2f | score: Held out .3f | Model"
 COEFFICIENTS = (
-    Column("number", "No."),
-    "Term",
-    Column("value", "Value", error="error"),
-    Column("naive", "Error if rows were independent", digits=2),
-    "Unit",
-    Column("printed", "In eq. (22)"),
+    "number: No. | Term | value ± error: Value | naive: Error if rows were independent .2 | Unit | printed: In eq. (22)"
 )
 
 
@@ -197,13 +184,10 @@ def gain_table(study: BiasStudy) -> Table:
             data = f"held-out {'runs' if held.by_runs else 'blocks'}"
             reselected = (METHOD[judged.method], "reselected without the held-out data", data)
             rows.append((*reselected, held.before, held.after, held.gain, held.coverage))
-    columns = [
-        *(Column(f"{k}", heading) for k, heading in enumerate(("Selection", "Terms", "Data"))),
-        Column("3", "Before", unit),
-        Column("4", "After", unit),
-        Column("5", "Improvement", form=".2f"),
-        Column("6", "Rows in range", "%", ".0f", scale=100.0),
-    ]
+    columns = (
+        f"0: Selection | 1: Terms | 2: Data | 3: Before ({unit}) | 4: After ({unit}) | 5: Improvement .2f"
+        " | 6: Rows in range (%) ×100 .0f"
+    )
     note = "Standard deviation of 100 s averages about the mean of each run or block."
     if study.no_held_out:
         note += f" No held-out data: {study.no_held_out}"
@@ -233,13 +217,13 @@ def noise_table(study: BiasStudy) -> Table:
     hours, unit = study.output == "bias_deg_per_h", _unit(study.output)
     n_scale, k_scale, n_unit, k_unit = (1 / 60, 60.0, "°/√h", "°/h/√h") if hours else (1.0, 1.0, "°/√s", "°/s/√s")
 
-    columns = [
-        Column("0", "Output"),
+    columns: Head = [
+        "0: Output",
         Column(lambda row: _measured(row[1].noise.N * n_scale, row[1].noise.N_uncertainty * n_scale), "N", n_unit),
         Column(lambda row: _measured(row[1].noise.B, row[1].noise.B_uncertainty), "B", unit),
         Column(lambda row: _measured(row[1].noise.K * k_scale, row[1].noise.K_uncertainty * k_scale), "K", k_unit),
         Column(lambda row: "{:.3g} ({:.3g} … {:.3g})".format(*row[1].allan.bias_instability), f"Minimum / {FLAT:.3f}, 90 %", unit),
-        Column("1.noise.misfit", "Misfit", form=".1f"),
+        "1.noise.misfit: Misfit .1f",
     ]  # fmt: skip
     note = (
         f"Longest run, samples of {study.allan_step:g} s. A misfit well above 1 shows more than white noise, flicker noise and random"

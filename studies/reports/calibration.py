@@ -27,32 +27,19 @@ SHOWN = {
 VALUE = ("parameter", "unit", "card", "value", "low", "high", "shift_sd", "width", "told_by", "bound", "interval")
 """What is told of each value in the JSON."""
 TOLD = {"data": "data", "prior": "prior", "both": "data and prior"}
-RESPONSE = (Column("response", "response"), Column("unit", "unit"))
 VALUES = (
     Column("parameter", "quantity", spell=display_name),
-    Column("unit", "unit"),
-    Column("card", "card", digits=5),
-    Column("value", "calibrated", within=("low", "high")),
-    Column("value", "90 % interval", interval=("low", "high"), digits=0),
-    Column("shift_sd", "shift", "sd", "+.2f"),
-    Column("width", "width", form=".3f"),
-    Column("told", "determined by"),
+    "unit | card: card .5",
+    "value in low … high: calibrated | low … high: 90 % interval .0 | shift_sd: shift (sd) +.2f | width: width .3f"
+    " | told: determined by",
 )
-KEY = Column("parameter", "key of the card")
-RESIDUALS = (
-    *RESPONSE,
-    *(Column(key, heading, digits=3) for key, heading in (("as_shipped", "as given"), ("calibrated", "calibrated"), ("noise", "noise"))),
-    Column("run_offset", "run offset", digits=2),
-    Column("outliers", "outliers"),
-)  # fmt: skip
+KEY = "parameter: key of the card"
+RESIDUALS = "response | unit | as_shipped: as given .3 | calibrated: calibrated .3 | noise: noise .3 | run_offset: run offset .2 | outliers"
 PREDICTED = (
-    *RESPONSE,
-    Column("source", "predicted from"),
-    *(Column(key, heading, digits=3) for key, heading in (("as_shipped", "as given"), ("calibrated", "calibrated"))),
-    Column("stated", "expected error", digits=3),
-    Column("noise", "noise", digits=3),
+    "response | unit | source: predicted from | as_shipped: as given .3 | calibrated: calibrated .3"
+    " | stated: expected error .3 | noise: noise .3"
 )
-LEVELS = (*RESPONSE, *(Column(key, key, digits=3) for key in ("white", "flicker", "walk", "offset")))
+LEVELS = "response | unit | white: white .3 | flicker: flicker .3 | walk: walk .3 | offset: offset .3"
 OFFSETS = "Rms of block averages about the mean of each run; run offset: rms of these means after the calibration."
 DRIVEN = "The measured housing drives the other responses where there is one."
 ROWS = "Settled frequency: rms over the rows of the tables; its noise is their scatter about the calibrated card."
@@ -113,7 +100,7 @@ def calibration_parts(found: Calibration, payload: Mapping[str, Any]) -> list[Ch
             Table(title, touched, VALUES, WIDTHS + unchanged, "terminal"),
             *(f"The data determine only a combination of {spell([display_name(name) for name in group])}." for group in found.groups),
             Figure(lambda: _draw_shifts(found), "Shifts of the values that the data determine at least in part, with 90 % intervals; shaded: 90 % of the prior."),
-            Table("Values that the data do not depend on", rest, (*VALUES[:3], KEY), "", "page", sortable=True),
+            Table("Values that the data do not depend on", rest, (*VALUES[:2], KEY), "", "page", sortable=True),
         ]),
         Chapter("Residuals over time, and noise" if runs else "Residuals over temperature", [
             Figure(lambda: residual_figure(found), "Measured minus predicted after the calibration" + ("; block averages, one colour for each run." if runs else ".")),

@@ -9,7 +9,7 @@ from shell.constants import zero_Celsius
 from studies.papers import cvg_cross_damping as paper
 from studies.papers.cvg_cross_damping import CrossDampingTwin
 from studies.reports import style
-from studies.results import Chapter, Column, Drawing, Figure, Sentence, Table
+from studies.results import Chapter, Drawing, Figure, Sentence, Table
 
 SOURCES = ("Apostolyuk V., Chikovani V., Temperature error model in Coriolis vibratory gyroscopes: eqs. (1)–(10).",)
 
@@ -41,12 +41,12 @@ def twin_chapters(twin: CrossDampingTwin) -> list[Chapter]:
 def _determinants_table(twin: CrossDampingTwin) -> Table:
     """Return what the improvement depends on: lag of the resonator and white noise."""
     rows = [(lag, *ratios) for lag, ratios in zip(twin.lags, twin.table, strict=True)]
-    noises = [Column(f"{k}", f"{noise:g} °/√h", form=".1f") for k, noise in enumerate(twin.noises, 1)]
+    noises = [f"{k}: {noise:g} °/√h .1f" for k, noise in enumerate(twin.noises, 1)]
     note = (
         "Median over noise seeds, on held-out runs. Without a lag, the random walk of the bias sets the limit; with a lag, the"
         " temperature difference between sensor and resonator."
     )
-    columns = [Column("0", "Lag", "s", "g"), *noises]
+    columns = ["0: Lag (s) g", *noises]
     return Table("Improvement factor by resonator lag and white noise", rows, columns, note)
 
 

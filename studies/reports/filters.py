@@ -17,22 +17,20 @@ RESPONSES = (
 )
 APART, LIGHT = 1.02, 0.2
 WIENER = (
-    Column("name", "Noise"),
+    "name: Noise",
     Column(lambda case: case.optimum.error / case.rate_variance, "Error, optimum", form=".4f"),
     Column(lambda case: case.renormalised.error / case.rate_variance, "Error, as printed", form=".4f"),
     Column(lambda case: case.renormalised.distortion / case.rate_variance, "Distortion part", form=".4f"),
     Column(lambda case: case.renormalised.noise / case.rate_variance, "Noise part", form=".4f"),
-    Column("optimum.filter.steady_gain.real", "G(0) of the optimum", form=".4f"),
+    "optimum.filter.steady_gain.real: G(0) of the optimum .4f",
 )
 WIENER_NOTE = (
     "Error variance divided by the variance of the rate. The printed filters are the optimum scaled to G(0) W(0) = 1, which removes"
     " the error for a constant rate but increases the mean square error."
 )
 STEPS = (
-    Column("0.0", "Step", "ms", "g", scale=1e3),
-    Column("1.1", "Noise of the estimate", "rad/s", ".4f"),
-    Column("0.1.lag_error", "Lag error", "rad/s", ".3f"),
-    Column("0.1.output_error", "Lag error of the output", "rad/s", ".3f"),
+    "0.0: Step (ms) ×1e3 g | 1.1: Noise of the estimate (rad/s) .4f | 0.1.lag_error: Lag error (rad/s) .3f"
+    " | 0.1.output_error: Lag error of the output (rad/s) .3f"
 )
 STEPS_NOTE = (
     "Noise: standard deviation of the settled filter, from its Riccati equation. Lag errors: rms for pulses of 0.25 s."

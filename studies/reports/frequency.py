@@ -9,7 +9,7 @@ from studies.models.file import widen
 from studies.papers.hrg import FrequencyStudy
 from studies.reports import style
 from studies.reports.digits import raised
-from studies.results import Column, Drawing, Facts, Figure, Part, Table, row_of, rows_of
+from studies.results import Column, Drawing, Facts, Figure, Head, Part, Table, row_of, rows_of
 
 SOURCES = ("Wang X. et al., Sensors 2012, 12, 6434 (the HRG paper), eqs. (16)–(18), Table 2, figures 4 and 5.",)
 ORDERS = {1: "straight line", 2: "quadratic", 3: "cubic", 4: "quartic", 5: "quintic"}
@@ -39,7 +39,7 @@ def coefficients_table(study: FrequencyStudy) -> Table:
         {"name": f"a{k}" if k else "f0", "value": c, "error": u, "unit": "Hz" + f"/°C{raised(k) * (k > 1)}" * (k > 0)}
         for k, (c, u) in enumerate(zip(study.fit.coefficients, study.fit.standard_errors, strict=True))
     ]
-    columns = (Column("name", "Coefficient"), Column("value", "Value", error="error"), "Unit")
+    columns = "name: Coefficient | value ± error: Value | Unit"
     low, high = widen(*study.fit.temperature_range_degC)
     note = f"With standard errors; a saved model has all digits and is valid from {low:.4g} to {high:.4g} °C."
     return Table(f"Coefficients about T0 = {study.fit.reference_temperature_degC:g} °C", rows, columns, note)
@@ -50,27 +50,20 @@ def inverse_table(study: FrequencyStudy) -> Table:
     actual = np.round(study.temperature_degC, 3)
     found = row_of(study, "frequency", calculated="calculated_degC", error="error_degC", residual="fit.residuals")
     rows = rows_of({"actual": actual, **found})
-    columns = [
-        Column("frequency", "Frequency", "Hz", ".2f"),
-        Column("actual", "Actual", "°C", "g"),
-        Column("calculated", "Calculated", "°C", ".3f"),
-        Column("error", "Error", "K", "+.3f"),
-        Column("residual", "Fit residual", "Hz", "+.4f"),
-    ]
+    columns = (
+        "frequency: Frequency (Hz) .2f | actual: Actual (°C) g | calculated: Calculated (°C) .3f"
+        " | error: Error (K) +.3f | residual: Fit residual (Hz) +.4f"
+    )
     return Table("Temperature from frequency", rows, columns, "Error: actual minus calculated temperature.")
 
 
 def order_table(study: FrequencyStudy) -> Table:
     """Return the fits of rising order and the F-test of each against the one before."""
     rows = list(zip(study.orders.fits, [None, *study.orders.against_next], strict=False))
-    columns = [
+    columns: Head = [
         Column(lambda row: name_order(row[0].order), "Order"),
-        Column("0.degrees_of_freedom", "Degrees of freedom"),
-        Column("0.sum_of_squares", "Sum of squares", "Hz²", ".3e"),
-        Column("0.chi_squared", "χ²", form=".3g"),
-        Column("0.leave_one_out_rms", "Leave-one-out error", "Hz", ".4f"),
-        Column("1.statistic", "F", form=".3g"),
-        Column("1.p_value", "p", form=".2g"),
+        "0.degrees_of_freedom: Degrees of freedom | 0.sum_of_squares: Sum of squares (Hz²) .3e | 0.chi_squared: χ² .3g"
+        " | 0.leave_one_out_rms: Leave-one-out error (Hz) .4f | 1.statistic: F .3g | 1.p_value: p .2g",
     ]
     note = (
         "χ² assumes that rounding to the last digit is the only noise. F and p test each order against the one below."

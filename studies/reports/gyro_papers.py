@@ -16,11 +16,7 @@ CLAIMS_SOURCES = (
     "Micromachines 2021, 12, 266 (Q, split, open and closed loop of a quartz gyro); Microsystems & Nanoengineering 2025,"
     " s41378-025-00872-z (abstract).",
 )
-CLAIMS = (
-    "Verdict",
-    Column(lambda one: f"{one.claim} ({one.source})", "Claim and source"),
-    Column("twin", "Simulation"),
-)
+CLAIMS = ("Verdict", Column(lambda one: f"{one.claim} ({one.source})", "Claim and source"), "twin: Simulation")
 SOURCES = (*cross_damping.SOURCES, *filters.SOURCES, *bell.SOURCES, *CLAIMS_SOURCES)
 MAP_POINTS = 31
 

@@ -38,7 +38,6 @@ NAMES = {
     "all": "total",
 }
 SMALLEST = 1e-4  # of the largest effect on the bias: smaller ones are not listed
-SOURCE = Column("name", "source")
 
 
 def describe(payload: Mapping[str, Any]) -> str:
@@ -65,30 +64,28 @@ def loop_parts(study: LoopStudy, payload: dict[str, Any], run: Record | None) ->
             *_largest(slopes, study.sources[-1].sd),
         ]),
         Chapter("Bias", [
-            Table("Bias by source, settled", named("bias"), [SOURCE, Column("deg_per_h", "bias", "°/h", error="sd_deg_per_h")],
+            Table("Bias by source, settled", named("bias"), "name: source | deg_per_h ± sd_deg_per_h: bias (°/h)",
                 "± one standard deviation, from the card's uncertain values. Total: including split and axis angles, which several sources share."),
             Figure(lambda: _around(study), "Bias by source over the azimuth of the standing wave; removing an error removes its curve."),
             Table("Sensitivity of the bias to the card's values", moving, [
-                Column("key", "quantity", spell=display_name), Column("key", "key of the card"), Column("value", "value", error="sd"), Column("slope", "slope", "°/h per unit of the key", digits=3),
-                Column("effect", "1 σ effect", "°/h", digits=3),
+                Column("key", "quantity", spell=display_name),
+                "key: key of the card | value ± sd: value | slope: slope (°/h per unit of the key) .3 | effect: 1 σ effect (°/h) .3",
             ], "Largest first.", "page"),
         ]),
         Chapter("Rate noise", [
-            Table("Rate noise by source", named("noise"), [
-                SOURCE, Column("deg_per_h_over_1s", "1 s average", "°/h", digits=3), Column("deg_per_rt_h", "angle random walk", "°/√h", ".3g"),
-            ], "Standard deviations; the angle random walk is taken from 100 s averages."),
+            Table("Rate noise by source", named("noise"),
+                "name: source | deg_per_h_over_1s: 1 s average (°/h) .3 | deg_per_rt_h: angle random walk (°/√h) .3g",
+                "Standard deviations; the angle random walk is taken from 100 s averages."),
             Figure(lambda: _noise(study), "Noise of the averaged rate: white angle noise falls as 1/t, white rate noise as 1/√t."),
         ]),
         Chapter("Stability and range", [
-            Table("Stability margins", payload["margins"], [
-                Column("loop", "loop"), Column("paper", "symbol in the BVG paper"), Column("crossover_Hz", "gain crossover", "Hz", ".3g"),
-                Column("phase_margin_deg", "phase margin", "°", ".0f"), Column("gain_margin_dB", "gain margin", "dB", ".1f"),
-                Column("reversal_Hz", "phase crossover", "Hz", ".3g"),
-            ]),
+            Table("Stability margins", payload["margins"],
+                "loop | paper: symbol in the BVG paper | crossover_Hz: gain crossover (Hz) .3g"
+                " | phase_margin_deg: phase margin (°) .0f | gain_margin_dB: gain margin (dB) .1f"
+                " | reversal_Hz: phase crossover (Hz) .3g"),
             Figure(lambda: _bode(study), "Open-loop frequency response. Dots: gain crossover; squares: phase crossover (−180°)."),
-            Table("Actuator range in use", _ranges(study, payload), [
-                Column("loop", "loop"), Column("actuator", "actuator and range"), Column("use", "in use", "%", ".3g", scale=100.0),
-            ]),
+            Table("Actuator range in use", _ranges(study, payload),
+                "loop | actuator: actuator and range | use: in use (%) ×100 .3g"),
         ]),
         Chapter("Step response", [Figure(lambda: _steps(study),
             "Command of each loop after a unit step of its input: rate, quadrature, resonance frequency, amplitude disturbance.")]),

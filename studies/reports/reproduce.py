@@ -56,32 +56,24 @@ SOURCES = (
 
 
 TABLE1 = (
-    Column("temperature", "T", "°C", "g"),
-    Column("frequency", "Measured", "Hz", ".2f"),
-    Column("cubic", "Cubic", "Hz", ".3f"),
-    Column("residual", "Residual", "mHz", "+.1f", scale=1e3),
+    "temperature: T (°C) g | frequency: Measured (Hz) .2f | cubic: Cubic (Hz) .3f | residual: Residual (mHz) ×1e3 +.1f"
 )
 TABLE2 = (
-    Column("frequency", "f", "Hz", ".2f"),
-    Column("actual", "Actual", "°C", "g"),
-    Column("printed", "Paper", "°C", "g"),
-    Column("calculated", "Here", "°C", ".4f"),
+    "frequency: f (Hz) .2f | actual: Actual (°C) g | printed: Paper (°C) g | calculated: Here (°C) .4f",
     Column(lambda row: row["calculated"] - row["printed"], "Here − paper", "K", "+.4f"),
-    Column("printed_error", "Error in the paper", "K", "+g"),
-    Column("error", "Error here", "K", "+.4f"),
+    "printed_error: Error in the paper (K) +g | error: Error here (K) +.4f",
 )
 NAMES = {"E": "E", "nu": "ν (μ in the paper)", "rho": "ρ", "h": "h", "r": "r"}
 SLOPES = (
-    Column("T", "T", "°C", ".0f"),
-    *(Column(key, name, form="+.2f", scale=1e6) for key, name in NAMES.items()),
-    Column("predicted", "Predicted"),
-    Column("measured", "Measured", form=".1f"),
+    "T: T (°C) .0f",
+    *(f"{key}: {name} ×1e6 +.2f" for key, name in NAMES.items()),
+    "Predicted | measured: Measured .1f",
 )
 SLOPES_NOTE = (
     "Measured: from neighbouring points of Table 1 (± 0.09 from rounding); at 20 °C, the slope of the cubic. The uncertainty is one"
     " standard deviation of the prior on the law: its published values, and a curvature that no source determines."
 )
-LAWS = (Column("0", "Law"), Column("1", "Slope", "ppm/°C", ".1f"), Column("2", "Uncertainty", form=".1f"))
+LAWS = "0: Law | 1: Slope (ppm/°C) .1f | 2: Uncertainty .1f"
 LAWS_NOTE = "The laws differ by more than any stated uncertainty: most of the spread comes from the literature, not from the solver."
 LEAD = (
     "Tables 1 and 2 and figures 3 to 6 of the HRG paper, recomputed from its measured data and from virtual gyros and compared"

@@ -15,7 +15,7 @@ from studies.record.survey import CONFIDENCE, Survey, average_evenly
 from studies.record.uses import Use
 from studies.reports import style
 from studies.reports.columns import column_title, draw_columns
-from studies.results import Chapter, Column, Drawing, Figure, Part, Sentence, Table, row_of
+from studies.results import Chapter, Column, Drawing, Figure, Head, Part, Sentence, Table, row_of
 
 
 def _count(key: str, unit: str = "") -> Column:
@@ -24,48 +24,35 @@ def _count(key: str, unit: str = "") -> Column:
     return Column(lambda row: row.get(key) or None, heading, unit, digits=3)
 
 
-COLUMNS = (
+COLUMNS: Head = (
     Column("column", "Column", spell=display_name),
-    Column("unit", "Unit"),
-    Column("low", "Minimum", form=".7g"),
-    Column("high", "Maximum", form=".7g"),
-    Column("resolution", "Resolution", digits=2),
+    "Unit | low: Minimum .7g | high: Maximum .7g | resolution: Resolution .2",
     *(_count(key) for key in ("missing", "gaps")),
     _count("longest_gap_s", "s"),
     *(_count(key) for key in ("spikes", "stuck", "zeros", "steps")),
 )
 COLUMNS_NOTE = "Missing values, gaps, spikes, stuck readings, dropouts to 0 and steps are counted where there are any."
-ENDS = ("noise.instability_low", "noise.instability_high")
 NOISE = (
     Column("column", "Column", spell=display_name),
-    Column("unit", "Unit"),
-    *(Column(f"noise.{key}", heading, error=f"noise.{key}_sd") for key, heading in (
-        ("white", "White, at 1 s"), ("flicker", "Flicker, flat part"), ("walk", "Random walk, in 1 s"),
-    )),
-    Column("noise.misfit", "Misfit", digits=2),
-    Column("noise.instability", "Minimum / 0.664, 90 %", interval=ENDS, digits=3),
-    Column("line.period_s", "Period of a line", "s", digits=4),
-    Column("line.rms", "Its rms", digits=2),
-)  # fmt: skip
+    "Unit | noise.white ± noise.white_sd: White, at 1 s | noise.flicker ± noise.flicker_sd: Flicker, flat part"
+    " | noise.walk ± noise.walk_sd: Random walk, in 1 s | noise.misfit: Misfit .2 | noise.instability_low …"
+    " noise.instability_high: Minimum / 0.664, 90 % .3 | line.period_s: Period of a line (s) | line.rms: Its rms .2",
+)
 NOISE_NOTE = (
     "White noise, flicker and random walk have the Allan deviations N/√τ, a flat part and K √(τ/3), fitted together. Where they do not explain"
     " the curve (misfit above 3), for example where temperature drives a column, only the white noise is given, from second differences of the rows:"
     " judge the others on a settled run."
 )
-USES = ("Command", "Gives", Column("ready", "Possible"), "Missing")
-STEPS = (Column("column", "Column", spell=display_name), Column("time_s", "At", "s", ".1f"), "Size")
+USES = "Command | Gives | ready: Possible | Missing"
+STEPS = (Column("column", "Column", spell=display_name), "time_s: At (s) .1f | Size")
 SETTLED = (
-    Column("start_s", "From", "s", ".0f"),
-    Column("end_s", "To", "s", ".0f"),
-    Column("temperature_degC", "Temperature", "°C", ".3f"),
-    Column("frequency_Hz", "Frequency", "Hz", ".6f"),
-    Column("left_K", "Still to settle, at most", "K", digits=2),
+    "start_s: From (s) .0f | end_s: To (s) .0f | temperature_degC: Temperature (°C) .3f"
+    " | frequency_Hz: Frequency (Hz) .6f | left_K: Still to settle, at most (K) .2"
 )
 CORRELATIONS = (
     Column("one", "Column", spell=display_name),
     Column("two", "With", spell=display_name),
-    Column("values", "Correlation of values", form="+.3f"),
-    Column("changes", "Correlation of changes", form="+.3f"),
+    "values: Correlation of values +.3f | changes: Correlation of changes +.3f",
 )
 CORRELATION_NOTE = "Slow drifts correlate without a common cause; the correlation of changes (of means over 1/200 of the record) is more telling."
 DRIVEN = 3.0  # misfit from which on a column is driven by something, and its curve is not that of noise

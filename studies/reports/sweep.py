@@ -40,9 +40,7 @@ METHODS = {
     "one-at-a-time": "one parameter at a time about the nominal design",
 }
 RUNS = (
-    "Run",
-    Column("started_utc", "Started"),
-    Column("finished_utc", "Ended"),
+    "Run | started_utc: Started | finished_utc: Ended",
     Column(lambda run: run["outcome"] or "killed", "Outcome"),
     Column(lambda run: run["provenance"].get("commit", "none")[:12], "Commit"),
     Column(lambda run: run["provenance"].get("lock_sha256", "none")[:12], "Lock file"),
@@ -99,13 +97,12 @@ def _asked(results: Results) -> list[Part]:
     study, sampling = results.study, results.study.sampling
     parameters = (
         Column(lambda p: figures.label(p.name, p.unit), "Parameter"),
-        Column("nominal", "Nominal", form=".8g"),
+        "nominal: Nominal .8g",
         Column(_range, "Range"),
         Column(_distribution, "Distribution"),
     )
     quantities = (
-        Column("columns.0.name", "Column"),
-        Column("__doc__", "Quantity"),
+        "columns.0.name: Column | __doc__: Quantity",
         Column(lambda one: ", ".join(f"{k} = {v}" for k, v in one.options.items() if v is not None), "Options"),
     )
     words = f"Sampling: {METHODS[sampling.method]}"

@@ -8,7 +8,7 @@ import numpy as np
 from studies.errors import InputError
 from studies.reports import sweep_figures as figures
 from studies.reports.digits import plain, to_numerical_error
-from studies.results import Column, Part, Sentence, Table, row_of, rows_of
+from studies.results import Column, Head, Part, Sentence, Table, row_of, rows_of
 from studies.sweeps.definition import StudyParameter
 from studies.sweeps.quantity import Column as Output
 from studies.sweeps.results import Results
@@ -16,26 +16,17 @@ from studies.sweeps.search import name_search
 from studies.sweeps.sensitivity import linear_shares, local_slopes, sobol_indices
 from studies.sweeps.tolerance import Yield, find_reach, find_yield, resolve_limits
 
-PARAMETER, SLOPE, UNIT = Column("parameter", "Parameter"), Column("slope", "Slope", form=".6g"), Column("unit", "Unit")
-EITHER_SIDE = Column("half_width", "±", form=".2g")
 SOBOL = (
-    PARAMETER,
-    Column("first", "First order", form=".4f"),
-    Column("first", "90 % interval", form=".4f", interval=("first_low", "first_high")),
-    Column("total", "Total", form=".4f"),
-    Column("total", "90 % interval", form=".4f", interval=("total_low", "total_high")),
+    "Parameter | first: First order .4f | first_low … first_high: 90 % interval .4f | total: Total .4f"
+    " | total_low … total_high: 90 % interval .4f"
 )
-SHARES = (PARAMETER, SLOPE, EITHER_SIDE, UNIT, Column("share", "Share of variance", "%", ".2f", scale=100.0))
+SHARES = "Parameter | slope: Slope .6g | half_width: ± .2g | Unit | share: Share of variance (%) ×100 .2f"
 YIELD = (
-    "Requirement",
-    Column("from", "From", form=".8g"),
-    Column("to", "To", form=".8g"),
-    Column("share", "Designs that meet it", "%", ".2f", scale=100.0),
-    Column("share", "90 % interval", "%", ".2f", scale=100.0, interval=("low", "high")),
-    Column("unknown", "Without a result"),
+    "Requirement | from: From .8g | to: To .8g | share: Designs that meet it (%) ×100 .2f"
+    " | low … high: 90 % interval (%) ×100 .2f | unknown: Without a result"
 )
-INVERSION = ("Column", Column("target", "Target", form=".8g"), Column("found", "Found", form=".8g"))
-TOLERANCES = (Column("label", "Parameter"), Column("asked", "Specified"), "Found")
+INVERSION = "Column | target: Target .8g | found: Found .8g"
+TOLERANCES = "label: Parameter | asked: Specified | Found"
 
 
 def main_columns(results: Results) -> list[Output]:
@@ -78,8 +69,7 @@ def _slopes(results: Results, column: Output) -> list[Part]:
     units = _slope_units(results, column)
     columns = (
         Column(lambda slope: figures.label(slope.parameter, "1"), "Parameter"),
-        SLOPE,
-        Column("uncertainty", "±", form=".2g"),
+        "slope: Slope .6g | uncertainty: ± .2g",
         Column(lambda slope: units[slope.parameter], "Unit"),
         Column("swing", "Change over the range", column.unit, ".6g"),
     )
@@ -169,8 +159,8 @@ def search_parts(results: Results, *kinds: str) -> list[Part]:
 
 def _worst_case(results: Results, found: Mapping[str, Any]) -> list[Part]:
     rows = [{"end": end} | found[end] for end in ("least", "greatest")]
-    columns = (
-        Column("end", ""),
+    columns: Head = (
+        "end: ",
         Column("value", found["column"], form=".8g"),
         *(Column(_parameter(p.name), figures.label(p.name, p.unit), form=".8g") for p in results.study.parameters),
     )
@@ -224,8 +214,8 @@ SEARCHES: dict[str, Callable[[Results, Mapping[str, Any]], list[Part]]] = {
 
 
 STATISTICS = (
-    *(Column("label", "Quantity"), "Unit", "Nominal", "Mean", Column("deviation", "Standard deviation")),
-    *(Column("least", "Minimum"), Column("greatest", "Maximum"), Column("error", "Numerical error")),
+    "label: Quantity | Unit | Nominal | Mean | deviation: Standard deviation | least: Minimum | greatest: Maximum"
+    " | error: Numerical error"
 )
 NUMERICAL = "The numerical error is the largest error estimate of the solver over all designs, relative to the exact solution of its theory."
 

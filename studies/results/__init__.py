@@ -5,6 +5,7 @@ tables, figures. A `Table` shows rows of the payload: a `Column` names the key t
 column is added in one place.
 """
 
+import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import reduce
@@ -15,6 +16,7 @@ from studies.reports.digits import plain, short_exponent, to_error, to_interval
 
 Payload = Mapping[str, Any]
 Key = str | Callable[[Any], Any]
+Head = str | Sequence["Column | str"]  # of a table; a text is (a part of) it: see `columns`
 Drawing = Any  # a matplotlib figure, by a name that does not load matplotlib
 Where = Literal["everywhere", "page", "terminal"]
 
@@ -45,9 +47,11 @@ class Column:
     def write(self, row: Any) -> str:
         """Return the cell of a row: here a number becomes text."""
         ends = self.within or (self.interval if not self.digits else None)
-        if ends is not None and all(isinstance(find(row, key), float | int) for key in (self.key, *ends)):
-            value, low, high = to_interval(*(float(find(row, key)) * self.scale for key in (self.key, *ends)))
-            return value if self.within else f"{low} … {high}"
+        if ends is not None:
+            keys = (self.key if self.within else ends[0], *ends)
+            if all(isinstance(find(row, key), float | int) for key in keys):
+                value, low, high = to_interval(*(float(find(row, key)) * self.scale for key in keys))
+                return value if self.within else f"{low} … {high}"
         if self.interval is not None:
             error = find(row, self.error) if self.error else None
             low, high = (
@@ -75,6 +79,36 @@ class Column:
         if not text.strip("-0."):
             text = text.replace("-", "+" if self.form.startswith("+") else "")
         return short_exponent(text)
+
+
+HEAD = re.compile(
+    r"""(?P<key>\S+) (?:\ in\ (?P<from>\S+)\ …\ (?P<to>\S+)|\ …\ (?P<end>\S+))? (?:\ ±\ (?P<error>\S+))?
+    :\ (?P<title>.*?) (?:\ ×(?P<scale>\S+))? (?:\ (?P<form>\+?g|\+?\.\d+[aefg]|\.(?P<digits>\d+)))?""",
+    re.VERBOSE,
+)
+
+
+def columns(head: str) -> list[Column]:
+    """Return the columns of the head of a table, which | parts: "harmonic: n | frequency_Hz: f (Hz) .4f | slope ± slope_sd: slope (ppm/°C)".
+
+    A column says what its cells show, a colon, what stands above them, and if it must be a factor (×1e6) and a format: .4f as in
+    Python, .4 for so many significant digits. Besides a key there may be: value ± error; low … high, an interval, with .0 to the second digit
+    of its width; and value in low … high, the value alone to the second digit of that. A heading alone, such as At bound,
+    is the column of the key that it spells.
+    """
+    found = []
+    for one in head.split(" | "):
+        if not (match := HEAD.fullmatch(one)):
+            assert one.replace(" ", "").isidentifier(), f"not a column: {one}"
+            found.append(Column(one.lower().replace(" ", "_"), one))
+            continue
+        said = match.groupdict()
+        form = "" if said["digits"] else said["form"] or ""
+        interval = (said["key"], said["end"]) if said["end"] else None
+        within = (said["from"], said["to"]) if said["from"] else None
+        digits, scale = int(said["digits"] or 4), float(said["scale"] or 1)
+        found.append(Column(said["key"], said["title"], "", form, digits, said["error"] or "", interval, within, scale))
+    return found
 
 
 def find(row: Any, key: Key) -> Any:
@@ -112,23 +146,21 @@ def row_of(found: Any, *keys: str, **named: str | tuple[str, float]) -> dict[str
 
 @dataclass(frozen=True)
 class Table:
-    """Rows, of the payload or of any objects, as people see them; without rows it is not shown, and neither is a column of which no row has anything.
-
-    A column that is a text stands for the key that it spells: "At bound" for `at_bound`.
-    """
+    """Rows, of the payload or of any objects, as people see them; without rows it is not shown, and neither is a column of which no row has anything."""
 
     title: str
     rows: Sequence[Any]
-    columns: Sequence[Column | str]
+    columns: Head
     note: str = ""
     where: Where = "everywhere"
     sortable: bool = False
 
     def cells(self, where: Where = "everywhere") -> tuple[list[str], list[list[str]]]:
         """Return headings and rows of text, in the terminal or on the page."""
-        named = [Column(c.lower().replace(" ", "_"), c) if isinstance(c, str) else c for c in self.columns]
-        columns = [column for column in named if column.where in ("everywhere", where)]
-        written = [(column.title, [column.write(row) for row in self.rows]) for column in columns]
+        given = [self.columns] if isinstance(self.columns, str) else self.columns
+        head = [column for part in given for column in (columns(part) if isinstance(part, str) else [part])]
+        seen = [column for column in head if column.where in ("everywhere", where)]
+        written = [(column.title, [column.write(row) for row in self.rows]) for column in seen]
         shown = [(title, cells) for title, cells in written if any(cells)]
         return [title for title, _ in shown], [list(row) for row in zip(*(cells for _, cells in shown), strict=True)]
 

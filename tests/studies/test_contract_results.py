@@ -9,7 +9,7 @@ import pytest
 
 from studies.cli import COMMANDS
 from studies.cli.output import answers, print_json
-from studies.results import Blocks, Chapter, Column, Facts, Figure, Result, Sentence, Table, rows_of
+from studies.results import Blocks, Chapter, Column, Facts, Figure, Result, Sentence, Table, columns, rows_of
 from studies.results.page import render_result
 from studies.results.terminal import print_result
 
@@ -45,6 +45,30 @@ ROW = {"a": 1.23456789, "sd": 0.0234, "low": 1e-7, "high": 3.0e6, "in": {"list":
 )
 def test_a_number_becomes_text_in_one_place(column, text):
     assert column.write(ROW) == text
+
+
+@pytest.mark.parametrize(
+    ("head", "column"),
+    [
+        ("a: f (Hz) ×1e3 +.3g", Column("a", "f", "Hz", "+.3g", scale=1e3)),
+        ("in.list.1: no. 2 .2", Column("in.list.1", "no. 2", digits=2)),
+        ("a ± sd: a", Column("a", "a", error="sd")),
+        ("low … high ± sd: 90 % interval", Column("low", "90 % interval", interval=("low", "high"), error="sd")),
+        ("low … high: 90 % interval .0", Column("low", "90 % interval", interval=("low", "high"), digits=0)),
+        ("a in low … high: a", Column("a", "a", within=("low", "high"))),
+        ("At bound", Column("at_bound", "At bound")),
+        ("n: ", Column("n", "")),
+    ],
+)
+def test_a_head_declares_its_columns(head, column):
+    (found,) = columns(head)
+    assert (found.title, found.write(ROW)) == (column.title, column.write(ROW))
+    assert len(columns(f"{head} | name")) == 2
+
+
+def test_a_head_with_an_error_is_no_column():
+    with pytest.raises(AssertionError, match="frequency"):
+        columns("harmonic: n | frequency_Hz f (Hz)")
 
 
 def test_a_row_may_be_any_object():
