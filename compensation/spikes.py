@@ -16,11 +16,12 @@ def find_spikes(values: Array, least: float = 0.0, step: float = 0.0) -> NDArray
     """Mark readings (m,) that stand out from their neighbours by more than 6 robust standard deviations.
 
     What the neighbours say is the median of (y_{i−k} + y_{i+k})/2, k = 1, 2, 3, which follows any straight trend; at the
-    ends of the series that of 2 y_{i+k} − y_{i+2k}, looking inwards, whose distance counts half. The distance from it must
-    exceed 6 times 1.4826 times the median distance of the whole series, be the largest within two rows, and exceed 4 times
-    the distance that is usual (at the ends: largest) next to it without this reading, so that bends, gaps and jumps are no
-    spikes. Spikes that are found are left out, and the rest is searched again: one does not hide another beside it. Missing
-    readings, NaN, are not marked, nor is anything in fewer than seven.
+    ends of the series that of 2 y_{i+k} − y_{i+2k}, looking inwards, whose distance counts half; there a reading between it
+    and the next one is no spike either, since a run may begin at rest. The distance must exceed 6 times 1.4826 times the
+    median distance of the whole series, be the largest within two rows, and exceed 4 times the distance that is usual next
+    to it without this reading, so that bends, gaps and jumps are no spikes. Spikes that are found are left out, and the rest
+    is searched again: one does not hide another beside it. Missing readings, NaN, are not marked, nor is anything in fewer
+    than seven.
 
     `least`: part of the series' span, spikes left out of it, by which a spike must stand out too: a smooth column has no
     noise to measure a spike by. `step`: what the readings were rounded to, where the values do not show it any more: half of
@@ -86,11 +87,8 @@ def _stand_out(values: Array, least: float) -> NDArray[np.bool_]:
         without = left.copy()
         without[candidates] = np.nan
         around = np.pad(_distance(without), REACH, mode="reflect")
-        beside = [np.fmax(_shifted(around, -k), _shifted(around, k)) for k in (1, 2, 3)]
-        nearby = _median(beside)
-        ends = [*range(REACH), *range(-REACH, 0)]  # a run may begin with a bend, which is no spike
-        nearby[ends] = np.fmax.reduce(beside)[ends]
-        found = candidates[distance[candidates] > ALONE * nearby[candidates]]
+        nearby = _median([np.fmax(_shifted(around, -k), _shifted(around, k)) for k in (1, 2, 3)])[candidates]
+        found = candidates[distance[candidates] > ALONE * nearby]
         if not found.size:
             return np.isnan(left)
         left[found] = np.nan
@@ -101,14 +99,17 @@ def _distance(values: Array) -> Array:
     """Return how far every sample is from what its neighbours say; NaN where it or they are missing."""
     padded = np.pad(values, REACH, mode="reflect", reflect_type="odd")
     expected = _median([(_shifted(padded, -k) + _shifted(padded, k)) / 2 for k in (1, 2, 3)])
-    ends = values.size > 3 * REACH
-    if ends:
-        for series, end in ((values, expected), (values[::-1], expected[::-1])):  # views: written through
-            end[:REACH] = _median([2 * series[k : REACH + k] - series[2 * k : REACH + 2 * k] for k in (1, 2, 3)])
     distance = np.abs(values - expected)
-    if ends:  # y_i − 2 y_{i+k} + y_{i+2k} has twice the bend and the noise of y_i − (y_{i−k} + y_{i+k})/2
-        distance[:REACH] /= 2
-        distance[-REACH:] /= 2
+    if values.size > 3 * REACH:
+        near = min(4 * REACH, values.size - 2 * REACH)  # rows that the bend of an end may reach
+        for series, end in ((values, distance), (values[::-1], distance[::-1])):  # views: written through
+            inwards = _median([2 * series[k : near + k] - series[2 * k : near + 2 * k] for k in (1, 2, 3)])
+            own, beside = series[:near], series[1 : near + 1]
+            off = np.abs(own - np.clip(own, np.fmin(inwards, beside), np.fmax(inwards, beside)))
+            # y_i − 2 y_{i+k} + y_{i+2k} has twice the bend and the noise of y_i − (y_{i−k} + y_{i+k})/2
+            half = np.fmin(np.abs(own - inwards) / 2, off)
+            end[:REACH] = half[:REACH]
+            end[REACH:near] = np.fmin(end[REACH:near], half[REACH:])
     # A straight ramp is left with the rounding of its own arithmetic, which is no spread.
     distance[distance < 64 * np.finfo(float).eps * np.nanmax(np.abs(values))] = 0.0
     return distance

@@ -40,8 +40,8 @@ NOISE = (
 )
 NOISE_NOTE = (
     "White noise, flicker and random walk have the Allan deviations N/√τ, a flat part and K √(τ/3), fitted together. Where they do not explain"
-    " the curve (misfit above 3), for example where temperature drives a column, only the white noise is given, from second differences of the rows:"
-    " judge the others on a settled run."
+    " the curve (misfit above 3) or leave the white noise open, for example where temperature drives a column, only the white noise is given, from"
+    " second differences of the rows. Judge the others on a settled run."
 )
 USES = "Command | Gives | ready: Possible | Missing"
 STEPS = (Column("column", "Column", spell=display_name), "time_s: At (s) .1f | Size")
@@ -73,7 +73,8 @@ def columns_table(survey: Survey, told: dict[str, Any]) -> Table:
 
 def run_chapters(survey: Survey, told: dict[str, Any], several: bool) -> list[Chapter]:
     """Return the chapters of one record; `told` is what the payload says of it."""
-    before = f"{Path(survey.record.path).name}: " if several else ""
+    name = Path(survey.record.path).name
+    before, of = (f"{name}: ", f" of {name}") if several else ("", "")
     count = len(survey.record)
     drawn, step = "", 2 * count // style.MOST_POINTS
     if count > style.MOST_POINTS:
@@ -90,17 +91,17 @@ def run_chapters(survey: Survey, told: dict[str, Any], several: bool) -> list[Ch
             Figure(lambda: draw_columns(survey.record.columns), f"All columns. Shaded: no values.{drawn}"),
         ],
         "steps and settled parts": [
-            Table("Steps", told["steps"], STEPS, "Small steps are found in means of 8 or 64 rows; the time is that between the two rows of the best fit."),
-            Table("Settled parts", told["settled"], SETTLED),
+            Table(f"Steps{of}", told["steps"], STEPS, "Small steps are found in means of 8 or 64 rows; the time is that between the two rows of the best fit."),
+            Table(f"Settled parts{of}", told["settled"], SETTLED),
         ],
         "over temperature": _temperature_parts(survey),
         "noise": [
             Figure(lambda: _draw_stability(survey),
                 "Overlapping Allan deviation with its 90 % interval, and (dashed) white noise, flicker and random walk fitted together."),
-            Table("Noise", told["columns"], NOISE, NOISE_NOTE),
+            Table(f"Noise{of}", told["columns"], NOISE, NOISE_NOTE),
         ] if noise else ["No column varies over enough rows for an Allan deviation."],
         "spectra": [Figure(lambda: _draw_spectra(survey), f"Amplitude spectral density ({how}), mean and slope removed.")] if dense else [],
-        "correlation": [Table("Correlation between columns", told["correlations"], CORRELATIONS, CORRELATION_NOTE, "page", sortable=True)],
+        "correlation": [Table(f"Correlation between columns{of}", told["correlations"], CORRELATIONS, CORRELATION_NOTE, "page", sortable=True)],
     }  # fmt: skip
     chapters = [Chapter((before + title) if before else title.capitalize(), parts) for title, parts in found.items()]
     return [chapter for chapter in chapters if chapter.parts]
@@ -185,7 +186,7 @@ def tell(survey: Survey) -> dict[str, Any]:
                 "flicker": noise.noise.flicker, "flicker_sd": FLAT * noise.B_uncertainty,
                 "walk": noise.noise.walk, "walk_sd": noise.K_uncertainty,
                 "instability": value, "instability_low": low, "instability_high": high, "confidence": CONFIDENCE,
-            } if noise.misfit < DRIVEN else {"white": column.white}  # fmt: skip
+            } if noise.misfit < DRIVEN and noise.N_uncertainty <= max(noise.noise.white, column.white) else {"white": column.white}  # fmt: skip
             row["noise"] = {**levels, "misfit": noise.misfit}
         if column.line is not None:
             row["line"] = {"period_s": column.line.period, "rms": column.line.rms}

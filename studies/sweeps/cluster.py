@@ -44,10 +44,21 @@ class Cluster(Workers):
             if name.partition(".")[0] in ("distributed", "tornado", "asyncio"):
                 logging.getLogger(name).setLevel(logging.CRITICAL)
         security = distributed.Security(require_encryption=True) if is_encrypted(address) else None
+
+        class Client(distributed.Client):  # type: ignore[misc]
+            """One that cannot start is closed at once: collected while another starts, it would block that for ever."""
+
+            def start(self, **given: Any) -> None:
+                try:
+                    super().start(**given)
+                    self.wait_for_workers(1, timeout=PATIENCE)
+                except BaseException:
+                    leave(self)
+                    raise
+
         try:
             with dask.config.set({"distributed.comm.timeouts.connect": f"{PATIENCE} s"}):
-                self.client = distributed.Client(address, timeout=PATIENCE, set_as_default=False, security=security)
-                self.client.wait_for_workers(1, timeout=PATIENCE)
+                self.client = Client(address, timeout=PATIENCE, set_as_default=False, security=security)
         except (OSError, TimeoutError, ValueError, TypeError, RuntimeError) as error:
             more = " Certificates stand under distributed.comm.tls in Dask's configuration." if security else ""
             raise MissingEnvironment(
@@ -88,7 +99,7 @@ class Cluster(Workers):
         """Take back what is queued and leave the cluster."""
         with suppress(OSError, TimeoutError, RuntimeError, CancelledError):
             self.executor.shutdown(wait=False)
-            self.client.close(timeout=5)
+        leave(self.client)
 
     def _check_versions(self) -> None:
         ours = self.code = describe_code()
@@ -96,10 +107,16 @@ class Cluster(Workers):
         others = {address: text for address, text in theirs.items() if text != ours}
         if others:
             address, text = next(iter(others.items()))
-            self.client.close(timeout=5)
+            leave(self.client)
             raise MissingEnvironment(
                 f"worker {address} has {text}, here is {ours}; install the same versions on every machine."
             )
+
+
+def leave(client: Any) -> None:
+    """Close a client, also one whose scheduler is lost."""
+    with suppress(OSError, TimeoutError, RuntimeError, CancelledError):
+        client.close(timeout=5)
 
 
 def is_encrypted(address: str) -> bool:

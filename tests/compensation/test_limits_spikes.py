@@ -25,11 +25,22 @@ def test_smooth_shapes_have_no_spikes(shape):
     assert not find_spikes(SHAPES[shape] + noise * np.ptp(SHAPES[shape])).any()
 
 
+@pytest.mark.parametrize("lag", [0.3, 0.7, 1.0, 1.5, 3.0])
+@pytest.mark.parametrize("settling", [20.0, 100.0, 400.0])
+def test_the_start_of_a_step_through_a_lag_has_none(lag, settling):
+    """The response 1 − (T e^{−t/T} − τ e^{−t/τ})/(T − τ) starts at rest and bends for a few rows."""
+    step = 1 - (settling * np.exp(-ROWS / settling) - lag * np.exp(-ROWS / lag)) / (settling - lag)
+    for noise in (0.0, 1e-5, 1e-4):
+        values = step + noise * np.random.default_rng(6).standard_normal(ROWS.size)
+        assert not find_spikes(values).any()
+        assert not find_spikes(values[::-1]).any()
+
+
 @pytest.mark.parametrize("slope", [0.0, 0.1, 3.0])
 def test_spikes_are_found_however_steep_the_record(slope):
     values = slope * ROWS + 0.01 * np.random.default_rng(2).standard_normal(ROWS.size)
     places = [0, 3, 40, 200, 311, 598]
-    values[places] += [0.3, -0.4, 0.2, -0.2, 0.3, 0.4]
+    values[places] += [-0.3, -0.4, 0.2, -0.2, 0.3, 0.4]  # +0.3 in the first row could be a run that begins at rest
     assert np.flatnonzero(find_spikes(values)).tolist() == places
 
 

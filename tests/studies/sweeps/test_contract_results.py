@@ -135,15 +135,17 @@ def started(file: Path, protocol: str = "tcp", *given: str):
     until = time.monotonic() + 120
     while not file.exists() and time.monotonic() < until:
         time.sleep(0.1)
-    yield json.loads(file.read_text())["address"], *processes
-    for process in reversed(processes):
-        process.terminate()
-    for process in processes:
-        try:
-            process.wait(60)
-        except subprocess.TimeoutExpired:
-            process.kill()
-            process.wait()
+    try:
+        yield json.loads(file.read_text())["address"], *processes
+    finally:
+        for process in reversed(processes):
+            process.terminate()
+        for process in processes:
+            try:
+                process.wait(60)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                process.wait()
 
 
 @pytest.fixture
@@ -249,16 +251,20 @@ def test_missing_dask_is_said(monkeypatch):
 
 
 @pytest.mark.slow
-def test_no_scheduler_is_said(tmp_path):
+@pytest.mark.parametrize("protocol", ["tcp", "tls"])
+def test_no_scheduler_is_said(protocol):
     pytest.importorskip("distributed", reason="the extra 'cluster' (dask[distributed]) is not installed")
     from studies.sweeps import cluster as module
 
     patience, module.PATIENCE = module.PATIENCE, 1.0
     try:
         with pytest.raises(MissingEnvironment, match="no scheduler"):
-            run_study(SPEC, scheduler=f"tcp://127.0.0.1:{free_port()}")
+            run_study(SPEC, scheduler=f"{protocol}://127.0.0.1:{free_port()}")
     finally:
         module.PATIENCE = patience
+    distributed = sys.modules["distributed"]
+    left = [one.status for one in gc.get_objects() if issubclass(type(one), distributed.Client)]
+    assert set(left) <= {"closed"}, "collected while another client starts, it would wait for that one's lock"
 
 
 def test_a_store_that_is_forgotten_is_closed():
