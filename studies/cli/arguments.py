@@ -8,11 +8,13 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from cyclopts import Parameter
 
 from shell.constants import zero_Celsius
-from studies.errors import InputError
+from studies.errors import InputError, naming
 from studies.files.given import refuse_unsound
 
 if TYPE_CHECKING:
     from compensation.arrays import Array
+    from shell.elastic import Elastic
+    from shell.resonator import Resonator
     from studies.instrument.card import Instrument
 
 
@@ -63,6 +65,13 @@ def open_card(card: str, temperature: float | None) -> "tuple[Instrument, float]
 
     instrument = load_card(card)
     return instrument, instrument.reference_temperature if temperature is None else temperature + zero_Celsius
+
+
+def open_resonator(card: str, temperature: float | None) -> "tuple[Instrument, float, Resonator, Elastic]":
+    """Return the same, and the resonator and the elastic constants at that temperature."""
+    instrument, T = open_card(card, temperature)
+    with naming(instrument.path):
+        return instrument, T, *instrument.at(T)
 
 
 def ending_of(out: str, kinds: Sequence[str]) -> str:

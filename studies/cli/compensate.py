@@ -9,10 +9,10 @@ from compensation.decimation import average_blocks
 from compensation.errors import CompensationError
 from studies import models
 from studies.cli.arguments import EmitC
-from studies.cli.output import answers, keep_model, say, tell_rows
+from studies.cli.output import answers, keep_model, keep_record, say
 from studies.errors import InputError
 from studies.instrument.units import unit_of
-from studies.record import COMPENSATED, RESONATOR, Record, read_record, write_record
+from studies.record import COMPENSATED, RESONATOR, Record, read_record
 from studies.reports import style
 from studies.results import Drawing, Figure, Part, Result, Sentence, Table
 
@@ -62,8 +62,7 @@ def compensate(
         say(f"reading {run}")
         record = read_record(run)
         result = models.compensate(loaded, record, extrapolate=extrapolate)
-        write_record(result, out, tell_rows(len(result)))
-        say(f"record: {out}")
+        keep_record(result, out)
         added = [name for name in result.columns if name not in record]
         columns = {name: _judge(record, result, name) for name in added if name.startswith(COMPENSATED)}
         parts = _show(record, result, columns)

@@ -17,10 +17,10 @@ import numpy as np
 from compensation.controllers import Loops
 from shell.constants import zero_Celsius
 from studies.cli.arguments import POSITIVE, Card, Seed, Temperature, open_card
-from studies.cli.output import answers, say
+from studies.cli.output import answers, keep_record, say
 from studies.errors import InputError
 from studies.loss.damping_law import damping_law, settled_loss
-from studies.record import Record, write_record
+from studies.record import Record
 from studies.reports.loop import describe, loop_parts
 from studies.resonator.law import law_of
 from studies.results import Result, row_of
@@ -85,7 +85,6 @@ def loop(
     if out is not None:
         drawn = None if noiseless else seed
         run = _run(study, T, out, hours or 1.0, row or 1.0, rate, profile, both_ways, drawn)
-        say(f"record: {out}, {len(run)} rows")
     payload = {
         "card": instrument.name,
         "mode": keys.mode,
@@ -161,5 +160,5 @@ def _run(
         say(f"warning: an actuator saturated in {run.limited} of {len(time)} rows.")
     source = f"loops, {keys.mode}, " + ("without noise" if seed is None else f"seed {seed}")
     record = Record(columns, instrument=instrument.name, source=source, path=out)
-    write_record(record, out)
+    keep_record(record, out)
     return record

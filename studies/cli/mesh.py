@@ -10,7 +10,7 @@ from shell.imperfection.surface import depart_points
 from shell.inertia import weigh
 from shell.volume import build_volume
 from shell.volume_files import VolumeKind, encode_volume
-from studies.cli.arguments import Card, Out, Temperature, ending_of, open_card
+from studies.cli.arguments import Card, Out, Temperature, ending_of, open_resonator
 from studies.cli.output import answers
 from studies.errors import InputError, naming
 from studies.files.writing import written_whole
@@ -48,9 +48,8 @@ def mesh(
     kind = ending_of(out, KINDS)
     if complete and kind == ".inp":
         raise InputError("--complete: an .inp file has elements of 20 and 15 nodes only; leave it out, or take .msh.")
-    instrument, T = open_card(card, temperature)
+    instrument, T, resonator, elastic = open_resonator(card, temperature)
     with naming(instrument.path):
-        resonator, elastic = instrument.at(T)
         found = build_volume(resonator, layers, around, None if spacing_mm is None else 1e-3 * spacing_mm)
     found = found if complete else found.serendipity()
     fields = instrument.part("imperfection").fields

@@ -16,7 +16,7 @@ import numpy as np
 
 from shell.constants import zero_Celsius
 from shell.modes import solve_modes
-from studies.cli.arguments import COUNT, FRACTION, MANY, WHOLE, AnyTheory, Card, Temperature, open_card
+from studies.cli.arguments import COUNT, FRACTION, MANY, WHOLE, AnyTheory, Card, Temperature, open_resonator
 from studies.cli.mode_effects import MODE, Asked, describe_effects, effect_tables
 from studies.cli.output import answers
 from studies.errors import naming
@@ -61,10 +61,9 @@ def modes(
         sensitivities: Show the sensitivities of each frequency to E, ν, ρ, thickness and radius, and where its energy
             is.
     """
-    instrument, T = open_card(card, temperature)
+    instrument, T, resonator, elastic = open_resonator(card, temperature)
     detailed = theory != "rayleigh"
     with naming(instrument.path):
-        resonator, elastic = instrument.at(T)
         found = [m for n in harmonic for m in solve_modes(resonator, elastic, n, count, theory, tolerance)]
         asked = Asked(instrument, T, tolerance)
         more = [describe_effects(m, asked) for m in found]

@@ -23,6 +23,7 @@ from studies.results.terminal import print_result
 if TYPE_CHECKING:
     from studies.instrument.card import Instrument
     from studies.models import Model
+    from studies.record import Record
 
 
 def answers(schema: str, page: bool = True) -> Callable[[Callable[..., Result]], Callable[..., int]]:
@@ -110,6 +111,15 @@ def keep_model(model: "Model", save: str | None, emit: str | None = None) -> Non
         say(f"C source: {emit}")
 
 
+def keep_record(record: "Record", path: str) -> None:
+    """Write a record, telling of long ones, and say so."""
+    from studies.record import write_record
+
+    count = len(record)
+    write_record(record, path, lambda row: say(f"written {row:,} of {count:,} rows") if row % 500_000 == 0 else None)
+    say(f"record: {path}")
+
+
 def print_json(payload: Mapping[str, Any]) -> None:
     """Print one JSON object."""
     sys.stdout.write(dump_json(payload))
@@ -125,11 +135,6 @@ def say(message: str) -> None:
     from studies.files.given import printable
 
     print(printable(message), file=sys.stderr)
-
-
-def tell_rows(count: int) -> Callable[[int], None]:
-    """Return what tells, of so many rows that are written, every half million."""
-    return lambda done: say(f"written {done:,} of {count:,} rows") if done % 500_000 == 0 else None
 
 
 def _plain(value: Any) -> Any:

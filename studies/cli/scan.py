@@ -14,14 +14,14 @@ import numpy as np
 from cyclopts import Parameter
 
 from shell.constants import zero_Celsius
-from studies.cli.arguments import COUNT, MANY, Card, Temperature, Theory, open_card
+from studies.cli.arguments import COUNT, MANY, Card, Temperature, Theory, open_resonator
 from studies.cli.output import answers, say
-from studies.errors import InputError, naming
-from studies.files.writing import write_text
+from studies.errors import InputError
+from studies.files.writing import write_csv
 from studies.instrument.card import Instrument, save_card
 from studies.reports.digits import plain, to_interval
 from studies.reports.style import BLUE, ORANGE, figure
-from studies.resonator.scan import Scan, ScanInterval, scan_faces
+from studies.resonator.scan import Scan, scan_faces
 from studies.results import Chapter, Drawing, Facts, Figure, Result, Sentence, Table, row_of
 
 NONE = "none"
@@ -80,14 +80,12 @@ def scan(
     files = {name: path for name, path in (("inner", inner), ("outer", outer)) if path != NONE}
     if not files:
         raise InputError("no face given: name the file of the inner face, of the outer face, or of both.")
-    instrument, T = open_card(card, temperature)
-    with naming(instrument.path):
-        resonator, elastic = instrument.at(T)
+    instrument, T, resonator, elastic = open_resonator(card, temperature)
     found = scan_faces(
         resonator, elastic, files, unit=unit, frames=frames, harmonics=harmonic, highest=highest, theory=theory, say=say
     )  # fmt: skip
     if map_file is not None:
-        write_text(map_file, _map_csv(found))
+        _write_maps(map_file, found)
         say(f"wrote {map_file}")
     if save is not None:
         _save(save, instrument, found)
@@ -148,47 +146,28 @@ def _facts(payload: dict[str, Any]) -> list[tuple[str, str, str]]:
 
 
 def _payload(found: Scan, name: str, temperature: float, files: dict[str, str]) -> dict[str, Any]:
-    def of(interval: ScanInterval | None, factor: float) -> dict[str, float] | None:
-        ends = {key: (key, factor) for key in ("value", "low", "high")}
-        return None if interval is None else row_of(interval, **ends)
-
     degrees = float(np.rad2deg(1.0))
-    moved = {"offset_um": ("motion.offset", 1e6), "tilt_deg": ("motion.tilt", degrees), "told": "motion.told"}
     faces = {
         side: {"file": files[side], "position": [face.low, face.high]}
         | row_of(face, "points", "outliers", noise_um=("noise", 1e6))
-        | (row_of(face, **moved) if face.motion else row_of(None, *moved))  # type: ignore[arg-type]
+        | row_of(face.motion, offset_um=("offset", 1e6), tilt_deg=("tilt", degrees), told="told")
         for side, face in found.faces.items()
     }
     splits = [
-        row_of(one, harmonic="split.harmonic", frequency_Hz="split.frequency", shift_ppm=("split.shift", 1e6))
-        | {
-            "split_Hz": of(one.hertz, 1.0),
-            "relative_ppm": of(one.relative, 1e6),
-            "slow_axis_deg": of(one.slow_axis, degrees),
-        }
-        | {
-            "every_order": row_of(
-                one.whole, split_Hz="hertz", slow_axis_deg=("slow_axis", degrees), shift_ppm=("shift", 1e6)
-            )
-        }
+        row_of(one, harmonic="split.harmonic", frequency_Hz="split.frequency", split_Hz="hertz", relative_ppm=("relative", 1e6),
+            slow_axis_deg=("slow_axis", degrees), shift_ppm=("split.shift", 1e6))
+        | {"every_order": row_of(one.whole, split_Hz="hertz", slow_axis_deg=("slow_axis", degrees), shift_ppm=("shift", 1e6))}
         for one in found.splits
-    ]
-    waves = [
-        row_of(w, "quantity", "order", "position", azimuth_deg=("azimuth", degrees))
-        | {"amplitude_um": of(w.amplitude, 1e6)}
-        for w in found.waves
-    ]
+    ]  # fmt: skip
+    wave = {"azimuth_deg": ("azimuth", degrees), "amplitude_um": ("amplitude", 1e6)}
+    circle = {"peak_to_valley_um": ("peak_to_valley", 1e6), "rms_um": ("rms", 1e6)}
     return {
         "card": name,
         "temperature_degC": temperature,
         "faces": faces,
         "splits": splits,
-        "waves": waves,
-        "roundness": [
-            row_of(r, "face", "position", peak_to_valley_um=("peak_to_valley", 1e6), rms_um=("rms", 1e6))
-            for r in found.roundness
-        ],
+        "waves": [row_of(w, "quantity", "order", "position", **wave) for w in found.waves],
+        "roundness": [row_of(r, "face", "position", **circle) for r in found.roundness],
     }
 
 
@@ -197,26 +176,24 @@ def _save(path: str, instrument: Instrument, found: Scan) -> None:
     target, maps = Path(path).resolve(), []
     for name in found.faces:
         x, theta, values = found.map_of(name, columns=72)
-        lines = ["position," + ",".join(f"{angle:g}" for angle in np.rad2deg(theta))]
-        cells = (",".join(f"{1e6 * cell:.7g}" for cell in row) for row in values)
-        lines += [f"{at:.9g},{row}" for at, row in zip(x, cells, strict=True)]
         own = target.with_name(f"{target.stem}-{name}.csv")
-        write_text(own, "\n".join(lines) + "\n")
+        rows = ([f"{at:.9g}", *(f"{1e6 * cell:.7g}" for cell in row)] for at, row in zip(x, values, strict=True))
+        write_csv(own, ["position", *(f"{angle:g}" for angle in np.rad2deg(theta))], rows)
         maps.append({"of": name, "file": str(own)})
     table = {**instrument.content.get("imperfection", {}), "map": maps}
     save_card(instrument.with_table("imperfection", table), path)
 
 
-def _map_csv(found: Scan) -> str:
+def _write_maps(path: str, found: Scan) -> None:
     names = [*found.faces, *(("wall", "offset") if len(found.faces) == 2 else ())]
     maps = {name: found.map_of(name) for name in names}
     x, theta, _ = next(iter(maps.values()))
-    lines = [",".join(["position", "azimuth_deg", *(f"{name}_um" for name in names)])]
-    for i, at in enumerate(x):
-        for j, angle in enumerate(theta):
-            cells = (f"{1e6 * values[i, j]:.5f}" for _, _, values in maps.values())
-            lines.append(f"{at:.6f},{np.rad2deg(angle):.3f}," + ",".join(cells))
-    return "\n".join(lines) + "\n"
+    rows = (
+        [f"{at:.6f}", f"{np.rad2deg(angle):.3f}", *(f"{1e6 * values[i, j]:.5f}" for _, _, values in maps.values())]
+        for i, at in enumerate(x)
+        for j, angle in enumerate(theta)
+    )
+    write_csv(path, ["position", "azimuth_deg", *(f"{name}_um" for name in names)], rows)
 
 
 def _draw_maps(scan: Scan) -> Drawing:

@@ -12,9 +12,8 @@ import numpy as np
 
 from studies.calibration.ahead import spread_of_prediction
 from studies.cli.arguments import POSITIVE, Card, Out, Seed, Theory
-from studies.cli.output import answers, say, tell_rows
+from studies.cli.output import answers, keep_record, say
 from studies.instrument.card import load_card
-from studies.record import write_record
 from studies.results import Figure, Result, Sentence, Table, row_of
 from studies.simulation.chamber import load_drive
 from studies.simulation.virtual_gyro import simulate_run
@@ -56,11 +55,9 @@ def simulate(
     """
     instrument = load_card(card)
     run = simulate_run(instrument, load_drive(profile, boundary, 1 / row), 1 / row, seed, not noiseless, theory)
-    rows = len(run.record)
     for warning in run.warnings:
         say(f"warning: {warning}")
-
-    write_record(run.record, out, tell_rows(rows))
+    keep_record(run.record, out)
     known: dict[str, float] | None = None
     if spread:
         found = spread_of_prediction(instrument, run.prediction.drive, run.law)
@@ -68,7 +65,7 @@ def simulate(
     summary = {
         "card": instrument.name,
         "out": out,
-        "rows": rows,
+        "rows": len(run.record),
         "columns": list(run.record.columns),
         "rate_Hz": 1 / float(np.median(np.diff(run.record["time_s"]))),
         "boundary": run.prediction.drive.boundary,
@@ -85,7 +82,7 @@ def simulate(
         f"Virtual run of {instrument.name}",
         f"Run through {profile}; the {summary['boundary']} temperature is imposed.",
         [
-            f"{out}: {rows} rows over {length:g} s; the resonator's temperature varies by {span:.2f} K.",
+            f"{out}: {len(run.record)} rows over {length:g} s; the resonator's temperature varies by {span:.2f} K.",
             f"Frequency law: interpolation error {run.law.interpolation_error:.0e}, solver error {run.law.solver_error:.0e}, both relative.",
             *(Sentence(one, "warning", "page") for one in run.warnings),
             Table(

@@ -3,11 +3,11 @@
 import numpy as np
 
 from compensation.arrays import Array
-from studies.cli.output import answers, say
+from studies.cli.output import answers, keep_record
 from studies.errors import InputError, naming
 from studies.models import read_model
 from studies.models.kinds.frequency import find_temperature, temperature_error
-from studies.record import Record, read_record, write_record
+from studies.record import Record, read_record
 from studies.reports import style
 from studies.results import Drawing, Facts, Figure, Result, Sentence
 
@@ -51,8 +51,7 @@ def temperature(model: str, run: str, /, *, out: str | None = None) -> Result:
         words = f"That is {off / sd:.0f} times the uncertainty of the curve: is the model of this gyro?"
         doubt = Sentence(words, "warning") if off > FAR * sd else None
     if out is not None:
-        write_record(record.with_columns({"resonator_temperature_degC": found}), out)
-        say(f"record: {out}")
+        keep_record(record.with_columns({"resonator_temperature_degC": found}), out)
     return Result(
         {"model": model, "run": run, "out": out, **facts},
         "Resonator temperature from its frequency",

@@ -17,11 +17,10 @@ import numpy as np
 from shell.constants import zero_Celsius
 from shell.resonator import Resonator
 from shell.trimming import SplitWave, TrimPlan
-from studies.cli.arguments import MANY, Card, Temperature, open_card
+from studies.cli.arguments import MANY, Card, Temperature, open_resonator
 from studies.cli.measured_splits import pair_splits, read_scan, read_unbalance
 from studies.cli.output import answers, say
-from studies.errors import naming
-from studies.files.writing import write_text
+from studies.files.writing import write_csv
 from studies.reports.digits import plain, to_error
 from studies.reports.style import BLUE, GREEN, VERMILION, figure
 from studies.resonator.trim import SURE, CardPlan, Teeth, Tool, other_cuts, plan_for_card
@@ -42,6 +41,7 @@ STATES = (
     " | most_Hz: 95 % upper limit (mHz) ×1e3 .3f | slow_axis_deg: slow axis (°) .2f"
 )
 
+CELLS = {"azimuth_deg": ".4f", "position": ".6f", "height_mm": ".4f", "mass_ug": ".5f", "depth_um": ".4f"}  # of --out
 LIMIT = "Upper limit: the split is the length of a vector with this standard error in each component; it lies below with 95 % probability."
 
 
@@ -102,14 +102,12 @@ def trim(
             opposite direction.
         out: Write the cuts as CSV, for the machine.
     """
-    instrument, T = open_card(card, temperature)
+    instrument, T, resonator, elastic = open_resonator(card, temperature)
     if scan is not None:
         measured = read_scan(scan, harmonic)
     else:
         measured = pair_splits(split, axis, harmonic, reading_error, instrument)
     tool = Tool(1e-3 * width_mm, 1e-3 * length_mm, depth_limit)
-    with naming(instrument.path):
-        resonator, elastic = instrument.at(T)
     planned = plan_for_card(
         resonator, elastic, measured, goal=goal, heights=position, tool=tool, kind=cut,
         teeth=Teeth(teeth, np.deg2rad(tooth_azimuth), 1e-9 * tooth_limit_ug) if teeth else None,
@@ -130,7 +128,11 @@ def trim(
         "measure": measure_after(planned),
     }
     if out is not None:
-        write_text(out, _csv(payload))
+        rows = (
+            [f"{c[key]:{form}}" if c[key] is not None else "" for key, form in CELLS.items()]
+            for c in payload["rounds"][0]["cuts"]
+        )
+        write_csv(out, ["round", *CELLS], (["1", *row] for row in rows))
         say(f"wrote {out}")
     return Result(
         payload,
@@ -223,16 +225,6 @@ def measure_after(planned: CardPlan) -> list[str]:
 def _state(state: SplitWave) -> dict[str, Any]:
     row = row_of(state, "harmonic", frequency_Hz="frequency", split_Hz="hertz", most_Hz="most")
     return row | {"error_Hz": state.error * state.frequency, "slow_axis_deg": degrees(state.slow_axis)}
-
-
-def _csv(payload: dict[str, Any]) -> str:
-    lines = ["round,azimuth_deg,position,height_mm,mass_ug,depth_um"]
-    for k, one in enumerate(payload["rounds"], 1):
-        for c in one["cuts"]:
-            depth = "" if c["depth_um"] is None else f"{c['depth_um']:.4f}"
-            place = f"{c['azimuth_deg']:.4f},{c['position']:.6f},{c['height_mm']:.4f}"
-            lines.append(f"{k},{place},{c['mass_ug']:.5f},{depth}")
-    return "\n".join(lines) + "\n"
 
 
 def _draw_polar(plan: TrimPlan, cuts: Sequence[dict[str, Any]]) -> Drawing:

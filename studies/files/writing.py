@@ -4,7 +4,7 @@ import errno
 import os
 import shutil
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import IO
@@ -88,6 +88,11 @@ def write_text(path: str | Path, text: str) -> None:
     """Write UTF-8 text, whole or not at all."""
     with written_whole(path) as file:
         file.write(text.encode("utf-8"))
+
+
+def write_csv(path: str | Path, head: Iterable[str], rows: Iterable[Iterable[str]]) -> None:
+    """Write a table whose cells are text, whole or not at all."""
+    write_text(path, "".join(f"{','.join(row)}\n" for row in (head, *rows)))
 
 
 def _umask() -> int:

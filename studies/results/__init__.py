@@ -7,7 +7,7 @@ column is added in one place.
 
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields, is_dataclass
 from functools import reduce
 from math import isfinite
 from typing import Any, Literal
@@ -134,14 +134,19 @@ def rows_of(columns: Mapping[str, Iterable[Any]]) -> list[dict[str, Any]]:
 def row_of(found: Any, *keys: str, **named: str | tuple[str, float]) -> dict[str, Any]:
     """Return a row of what an object has: attributes by their own names, others under new ones (q="fit.quality", f_mHz=("f", 1e3)).
 
-    Of nothing (None) it has every key, and None.
+    A part that has fields, such as an interval, becomes a row of its own. Of nothing (None) it has every key, and None.
     """
     row = {}
     for name, key in (dict(zip(keys, keys, strict=True)) | named).items():
         path, factor = key if isinstance(key, tuple) else (key, 1.0)
-        value = None if found is None else reduce(getattr, path.split("."), found)
-        row[name] = value if value is None or factor == 1.0 else factor * value
+        row[name] = _times(factor, None if found is None else reduce(getattr, path.split("."), found))
     return row
+
+
+def _times(factor: float, value: Any) -> Any:
+    if is_dataclass(value):
+        return {one.name: _times(factor, getattr(value, one.name)) for one in fields(value)}
+    return value if value is None or factor == 1.0 else factor * value
 
 
 @dataclass(frozen=True)
