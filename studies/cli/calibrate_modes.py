@@ -23,23 +23,13 @@ from studies.reports.calibration import KEY, TOLD, VALUE, VALUES
 from studies.results import Column, Result, Sentence, Table, row_of
 
 MODES = (
-    "line",
-    Column("harmonic", "n"),
-    "index",
-    Column("frequency_Hz", "measured", "Hz", digits=9),
-    Column("predicted_Hz", "calibrated", "Hz", digits=9),
-    Column("residual_ppm", "residual", "ppm", "+.2g"),
-    Column("sd_ppm", "noise", "ppm", ".2g"),
-    Column("chance", "probability", "%", ".3g", scale=100.0),
-    Column("others", "or n, index (%)"),
+    "line | harmonic: n | index | frequency_Hz: measured (Hz) .9 | predicted_Hz: calibrated (Hz) .9"
+    " | residual_ppm: residual (ppm) +.2g | sd_ppm: noise (ppm) .2g | chance: probability (%) ×100 .3g"
+    " | others: or n, index (%)"
 )
 NEXT = (
     Column("parameter", "quantity", spell=display_name),
-    Column("harmonic", "n"),
-    "index",
-    Column("frequency_Hz", "near", "Hz", digits=6),
-    Column("sd", "now ±", form=".2g"),
-    Column("sd_then", "then ±", form=".2g"),
+    "harmonic: n | index | frequency_Hz: near (Hz) .6 | sd: now ± .2g | sd_then: then ± .2g",
 )
 UNTOUCHED = 0.9995
 WIDTHS = "Shift: change in prior standard deviations. Width: posterior over prior standard deviation; the modes determine a value up to 0.5."

@@ -21,7 +21,7 @@ from studies.instrument.card import load_card
 from studies.record.decays import Decays, fit_laws, is_table, read_table, table_of, write_decays
 from studies.reports import style
 from studies.resonator.law import law_of
-from studies.results import Chapter, Column, Drawing, Figure, Part, Result, Sentence, Table, row_of
+from studies.results import Chapter, Drawing, Figure, Part, Result, Sentence, Table, row_of
 
 if TYPE_CHECKING:
     from compensation.ringdown.laws import Law, Term
@@ -42,18 +42,10 @@ QUANTITIES = {
     "hardening_Hz": "frequency shift due to amplitude, at the start (Hz)",
     "thickening_per_s": "extra damping due to amplitude, at the start (1/s)",
 }
-ESTIMATE = (
-    "quantity",
-    Column("value", "value", error="sd"),
-    Column("low", "90 % interval", interval=("low", "high"), error="sd"),
-)
+ESTIMATE = "quantity | value ± sd: value | low … high ± sd: 90 % interval"
 DECAY = (
-    "file",
-    Column("frequency_Hz", "f", "Hz", digits=9),
-    Column("q", "Q"),
-    Column("q", "90 % interval of Q", interval=("q_low", "q_high")),
-    Column("window_s", "free decay", "s", interval=("window_s.0", "window_s.1")),
-    Column("widening", "interval / Cramér–Rao bound", digits=2),
+    "file | frequency_Hz: f (Hz) .9 | Q | q_low … q_high: 90 % interval of Q"
+    " | window_s.0 … window_s.1: free decay (s) | widening: interval / Cramér–Rao bound .2"
 )
 
 
@@ -185,10 +177,7 @@ WORDS = {
 }
 TITLES = {"frequency_Hz": "Frequency", "inverse_q": "1/Q"}
 TERM = (
-    Column("words", "depends on"),
-    Column("shown", "value", error="shown_sd"),
-    Column("shown_low", "90 % interval", interval=("shown_low", "shown_high"), error="shown_sd"),
-    Column("shown_unit", "unit"),
+    "words: depends on | shown ± shown_sd: value | shown_low … shown_high ± shown_sd: 90 % interval | shown_unit: unit"
 )
 
 

@@ -14,7 +14,7 @@ from studies.models.kinds.scale import save_scale
 from studies.record import read_record
 from studies.reports.bell import ERRORS, SOURCES, draw_steps, steps_table
 from studies.reports.digits import raised
-from studies.results import Chapter, Column, Facts, Figure, Result, Table, row_of
+from studies.results import Chapter, Facts, Figure, Result, Table, row_of
 
 STEPS = {
     "rough": "null and scale (33)",
@@ -23,22 +23,14 @@ STEPS = {
     "scale_over_temperature": "scale over temperature (36)",
 }
 FORMS = (
-    "Form",
-    Column("gain", "Evidence over the line", digits=3),
-    Column("over", "Null and scale over"),
-    Column("held_out_deg_per_s", "Error on rates left out", "°/s", digits=2),
-    Column("chosen", ""),
+    "Form | gain: Evidence over the line .3 | over: Null and scale over"
+    " | held_out_deg_per_s: Error on rates left out (°/s) .2 | chosen: "
 )
 FORM_NOTE = (
     "Evidence: fall of N ln(mean square) + p ln N; above 6 is 20:1. Directions: different scales for positive and negative rates. The"
     " coefficients below follow the paper's quadratic form."
 )
-COEFFICIENTS = (
-    "Step",
-    Column("name", "Coefficient"),
-    Column("value", "Value", error="standard_error"),
-    "Unit",
-)
+COEFFICIENTS = "Step | name: Coefficient | value ± standard_error: Value | Unit"
 NOTE = (
     "Each step is fitted to the output of the steps before it; its errors assume that those are exact, and allow for white noise plus"
     " a random walk. Temperature in °C, rate in °/s."

@@ -33,7 +33,7 @@ from studies.cli.output import answers
 from studies.errors import InputError, naming
 from studies.instrument.card import Instrument
 from studies.resonator.loads import STANDARD_GRAVITY, bias_by_tilt, loads_of, shift_per_kelvin
-from studies.results import Column, Facts, Result, Table, row_of
+from studies.results import Facts, Result, Table, row_of
 
 ABROAD = (
     "Shift of the mean frequency of the pair, in the frame of the resonator. An acceleration across the axis shifts it only in second order."
@@ -41,16 +41,9 @@ ABROAD = (
     " stress is not finite, so they are not counted."
 )
 COLUMNS = (
-    Column("load", "load"),
-    Column("amount", "amount", form=".6g"),
-    Column("unit", "unit"),
-    Column("shift_ppm", "shift of f", "ppm", "+.4g"),
-    Column("tension_MPa", "largest tension", "MPa", digits=3),
-    Column("mises_MPa", "von Mises", "MPa", digits=3),
-    Column("part", "where"),
-    Column("rim_axial_um", "rim along the axis", "µm", "+.3g"),
-    Column("rim_lateral_um", "rim across", "µm", "+.3g"),
-    Column("rim_tilt_urad", "tilt of the rim", "µrad", "+.3g"),
+    "load | amount: amount .6g | unit | shift_ppm: shift of f (ppm) +.4g | tension_MPa: largest tension (MPa) .3"
+    " | mises_MPa: von Mises (MPa) .3 | part: where | rim_axial_um: rim along the axis (µm) +.3g"
+    " | rim_lateral_um: rim across (µm) +.3g | rim_tilt_urad: tilt of the rim (µrad) +.3g"
 )
 
 
@@ -166,12 +159,10 @@ WAVES = (
     " {stress_ppm:+.3g} ppm by stress, {centrifugal_ppm:+.3g} by centrifugal softening and {coriolis_ppm:+.3g} by Coriolis forces."
 )
 AMPLITUDE = (
-    Column("temperature_degC", "T", "°C", ".1f"),
-    *(Column(f"{key}_Hz_per_um2", name, "Hz/µm²", "+.5g") for key, name in (
-        ("shift", "shift per square of the largest displacement"), ("static", "static part"), ("inertial", "inertial part"),
-    )),
-    Column("change_ppm_per_degC", "relative change from the first row", "ppm/°C", "+.3g"),
-)  # fmt: skip
+    "temperature_degC: T (°C) .1f | shift_Hz_per_um2: shift per square of the largest displacement (Hz/µm²) +.5g"
+    " | static_Hz_per_um2: static part (Hz/µm²) +.5g | inertial_Hz_per_um2: inertial part (Hz/µm²) +.5g"
+    " | change_ppm_per_degC: relative change from the first row (ppm/°C) +.3g"
+)
 PARTS = {"shift": "total", "static": "static", "inertial": "inertial"}
 NONLINEAR = (
     "Geometric nonlinearity of a standing wave: the static part stiffens, the inertia of the motion at twice the frequency softens. Third-order"

@@ -127,12 +127,12 @@ def _parts(found: Answer, payload: dict[str, Any]) -> list[Any]:
             Facts(facts),
             f"{payload['best_card']} is the best design as a card; {TABLE} beside it has all {found.evaluations} designs.{words}",
             Table("Parameters", payload["parameters"], [
-                Column(lambda row: row["name"].removeprefix("resonator."), "parameter"), Column("start", "before", digits=7), Column("best", "best", digits=7),
-                Column("low", "lowest"), Column("high", "highest"), "at bound",
+                Column(lambda row: row["name"].removeprefix("resonator."), "parameter"),
+                "start: before .7 | best: best .7 | low: lowest | high: highest | at bound",
             ]),
             Table("Before and after", payload["columns"], [
-                Column("label", "quantity"), Column(lambda row: row["unit"] if row["unit"] != "1" else None, "unit"), Column("start", "before", digits=6), Column("interpolant", "best, interpolated", digits=7),
-                Column("best", "best, full solve", digits=7),
+                "label: quantity", Column(lambda row: row["unit"] if row["unit"] != "1" else None, "unit"),
+                "start: before .6 | interpolant: best, interpolated .7 | best: best, full solve .7",
             ], "Interpolated: from all other designs. Full solve: the design itself, solved again from its card with the same result."
                " Only the magnitude of a separation counts; its sign shows on which side the nearest mode lies."),
             Figure(lambda: show_mode(best_instrument(found)).mode.plot(), "Section of the best design, at rest and at maximum displacement."),
@@ -140,8 +140,8 @@ def _parts(found: Answer, payload: dict[str, Any]) -> list[Any]:
         Chapter("About the best design", [Blocks(lambda: _live(found))]),
         Chapter("Constraints", [
             Table("Cost of the limits", payload["constraints"], [
-                Column(lambda row: named(row["column"]), "quantity"), Column("kind", "bound"), Column("limit", "limit", digits=7), Column("value", "value", digits=7),
-                Column("room", "distance to the limit", digits=3), Column(lambda row: row["margin"] or None, "margin for tolerances", digits=3), Column("price", price, digits=3),
+                Column(lambda row: named(row["column"]), "quantity"), "kind: bound | limit: limit .7 | value: value .7 | room: distance to the limit .3",
+                Column(lambda row: row["margin"] or None, "margin for tolerances", digits=3), Column("price", price, digits=3),
             ], "Price: gain of the objective per unit by which the limit is relaxed, to first order and before rounding; empty where the limit"
                " is not active."),
         ]),
@@ -152,8 +152,9 @@ def _parts(found: Answer, payload: dict[str, Any]) -> list[Any]:
         ]),
         Chapter("Tolerances", [
             Table("Effect of the tolerances", payload["tolerances"], [
-                Column(lambda row: named(row["column"]), "quantity"), Column("value", "value", digits=6), Column("worst_case", "worst case ±", digits=3), Column("sd", "standard deviation", digits=3),
-                Column("value", "full solves", digits=6, interval=("low", "high")), Column("passed", "within limits", "%", ".1f", scale=100.0),
+                Column(lambda row: named(row["column"]), "quantity"),
+                "value: value .6 | worst_case: worst case ± .3 | sd: standard deviation .3 | low … high: full solves .6"
+                " | passed: within limits (%) ×100 .1f",
             ], "Worst case and standard deviation to first order; full solves: the extremes among the worst corners and designs drawn from the tolerances."),
         ]),
         Chapter("Search", [

@@ -10,7 +10,7 @@ from studies.instrument.display import display_name
 from studies.instrument.units import split_unit, unit_of
 from studies.reports import diagnosis_pictures as pictures
 from studies.reports.digits import plain
-from studies.results import Chapter, Column, Facts, Figure, Part, Sentence, Table
+from studies.results import Chapter, Facts, Figure, Part, Sentence, Table
 
 if TYPE_CHECKING:
     from studies.inference.diagnosis import Inference
@@ -25,29 +25,12 @@ WORDS = {
 }
 UNDECIDED = "Not decided: these data neither confirm the simulation nor name a cause."
 CAUSES = (
-    Column("cause", "cause"),
-    Column("or", "or equally"),
-    Column("response", "response"),
-    Column("peak", "peak to peak"),
-    Column("probability", "probability", form=".2f"),
-    Column("name", "parameter"),
-    Column("value", "value", within=("low", "high")),
-    Column("value", "90 % interval", interval=("low", "high"), digits=0),
+    "cause | or: or equally | response | peak: peak to peak | probability: probability .2f | name: parameter"
+    " | value in low … high: value | low … high: 90 % interval .0"
 )
-NUMBERS = {
-    "baseline": "baseline",
-    "extended": "with causes",
-    "noise": "noise",
-    "white": "white noise",
-    "wander": "coloured noise",
-}
 RESULTS = (
-    Column("response", "response"),
-    Column("verdict", "verdict"),
-    *(Column(key, heading, digits=3) for key, heading in NUMBERS.items()),
-    Column("gain", "gain", digits=3),
-    Column("explained_share", "explained", "%", ".1f", scale=100.0),
-    Column("left", "lack of fit"),
+    "response | verdict | baseline: baseline .3 | extended: with causes .3 | noise: noise .3 | white: white noise .3"
+    " | wander: coloured noise .3 | gain: gain .3 | explained_share: explained (%) ×100 .1f | left: lack of fit"
 )
 WITH_CARD = (
     "Frequency, bias and 1/Q are fitted together: the card's uncertain values within their tolerances, the start of each run, what"
@@ -217,7 +200,7 @@ def _alternatives(diagnosis: "Inference | Unjudged", response: str) -> Iterator[
     yield Figure(lambda: pictures.residual_views(diagnosis, response), caption)
     for rivals in seen.alternatives:
         rows = [{"name": name, "evidence": evidence} for name, evidence in rivals]
-        columns = (Column("name", "effect"), Column("evidence", "evidence", "2 ln odds", ".1f"))
+        columns = "name: effect | evidence: evidence (2 ln odds) .1f"
         yield Table(f"Alternatives to {rivals[0][0]}", rows, columns, where="page")
     if seen.left is not None:
         words = f"Lack of fit: strongest against {seen.left[0]}, evidence {seen.left[1]:.0f}."

@@ -9,7 +9,7 @@ from studies.diagnosis.response import RESPONSES
 from studies.planning.plan import ROW, SNRS, SURE, Plan, Prospect
 from studies.reports.digits import plain
 from studies.reports.style import figure
-from studies.results import Chapter, Column, Drawing, Facts, Figure, Sentence, Table
+from studies.results import Chapter, Column, Drawing, Facts, Figure, Head, Sentence, Table
 
 SNR_WORDS = (
     "SNR: rms of the part of the effect that the calibrated card cannot absorb, over the rms noise of one row of the record."
@@ -21,7 +21,7 @@ METHOD = (
     " expected log odds and their scatter follow from Gram matrices; sets and margins are those of the diagnosis. Answers that need a"
     " comparison with rows left out of the fit, and unknown causes, are not predicted."
 )
-SENSORS = (Column("sensor", "sensor"), Column("count", "pairs"), Column("pairs", "effects distinguished"))
+SENSORS = "sensor | count: pairs | pairs: effects distinguished"
 
 
 def headline(plan: Plan) -> str:
@@ -55,15 +55,14 @@ def plan_table(plan: Plan) -> Table:
     """Return the prediction as a table, the effects that are identified at the smallest SNR first."""
     rows: list[dict[str, Any]] = [{**one.as_dict(), "shown": shown(one)} for one in plan.prospects]
     rows += [{"shown": name, "instead": {why: 1.0}, "why": why} for name, why in plan.invisible.items()]
-    columns = (
-        Column("shown", "hidden effect"),
-        Column("least.snr", "smallest SNR identified", digits=2),
+    columns: Head = (
+        "shown: hidden effect | least.snr: smallest SNR identified .2",
         Column(_size, "smallest size identified"),
         *(Column(_at(snr), f"at SNR {snr:g}", "%", ".0f", scale=100.0) for snr in SNRS),
-        Column("least_alone.snr", "smallest SNR identified alone", digits=2),
+        "least_alone.snr: smallest SNR identified alone .2",
         Column(_listed("as_set_with"), "in one set with, at the smallest size"),
         Column(lambda row: row.get("why") or _listed("instead")(row), "named instead, at half that size"),
-        Column("survives_baseline", "share that the card cannot absorb", "%", ".0f", scale=100.0),
+        "survives_baseline: share that the card cannot absorb (%) ×100 .0f",
     )
     note = f"Identified: the answer is the effect, or a set that contains it. Smallest: identified in {100 * SURE:.0f} % of cases. "
     return Table("Effects that this campaign can identify", rows, columns, note + SNR_WORDS)
@@ -92,7 +91,7 @@ def plan_parts(plan: Plan, profiles: Sequence[str]) -> list[Chapter]:
         Chapter("In short", [
             Sentence(headline(plan), where="terminal"),
             Facts(facts, "page"),
-            Table("Planned runs", runs, (Column("run", "run"), Column("chamber", "chamber")), where="page"),
+            Table("Planned runs", runs, "run | chamber", where="page"),
             Figure(lambda: _draw(plan), "Probability (%) that each effect is identified, by its SNR; grey: larger than any published effect."),
         ]),
         Chapter("All effects", [
