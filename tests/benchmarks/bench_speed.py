@@ -1,6 +1,6 @@
 """Processor time of single tasks beside their targets, the shortest of several runs: PYTHONPATH=. python tests/benchmarks/bench_speed.py [NAME …].
 
-Names: modes, study, loops, loss, split, twin, run, record. bench_solver.py has the solver beside others, bench_family.py families.
+Names: modes, study, loops, loss, split, twin, run, record. bench_solver.py has the solver beside others.
 """
 
 import resource

@@ -143,42 +143,6 @@ def test_an_isotropic_resonator_has_no_axis_and_says_so():
     assert 0.29 < squares < 13.3  # 98 % of χ² with 4 degrees of freedom
 
 
-def _harden(gyro, random):
-    """Cubic stiffness: the phase of all turns with ∫|z|² dt, here by fine summation."""
-    fine = np.arange(0.0, TIME[-1] + 0.02, 0.02)
-    z = gyro.envelope(fine, CARRIER, [1.0, 0.6j])
-    phase = 2 * np.pi * 2e-3 * np.concatenate([[0], np.cumsum(np.sum(np.abs(z) ** 2, axis=0))[:-1]]) * 0.02
-    return noisy((z * np.exp(1j * phase))[:, ::20][:, : TIME.size], 0.02, random)
-
-
-def _hold(gyro, random):
-    """A drive that is switched off after 100 s."""
-    rows = 250
-    free = gyro.envelope(TIME[:-rows], CARRIER, [1.0, 0.6j])
-    driven = free[:, :1] * np.exp(2j * np.pi * 0.015 * (TIME[:rows] - TIME[rows]))
-    return noisy(np.concatenate([driven, free], axis=1), 0.02, random)
-
-
-def _hum(gyro, random):
-    return ring(gyro, random) + 0.05 * np.exp(2j * np.pi * 0.31 * TIME)
-
-
-def _drift(gyro, random):
-    return ring(gyro, random) * np.exp(1j * np.pi * 3e-6 * TIME**2)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("spoil", [_harden, _hold, _hum, _drift])
-def test_what_is_no_plain_decay_is_named_and_its_intervals_hold(spoil):
-    random = np.random.default_rng(7)
-    gyro = draw_gyro(random)
-    found = analyse_decay(from_lock_in(TIME, spoil(gyro, random), CARRIER))
-    truth = {name: value for name, value in truth_of(gyro).items() if not name.startswith("frequency_")}
-    z, _ = misses(found, truth)
-    assert found.remarks
-    assert max(map(abs, z.values())) < 4
-
-
 def test_refused():
     random = np.random.default_rng(8)
     z = ring(draw_gyro(random), random)

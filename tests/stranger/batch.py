@@ -7,6 +7,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from studies import workbench
 from studies.calibration.observed import RESPONSES
 from studies.diagnosis.verdict import Verdict
@@ -16,6 +18,7 @@ from tests.stranger.baseline import COLUMN
 from tests.stranger.campaign import make_campaign
 from tests.stranger.effects import EFFECTS
 from tests.stranger.noise import FAMILIES
+from tests.stranger.truth import Truth
 
 PAIRS = ("hysteresis+amplitude-frequency", "jump+leak", "rate-bias+periodic", "second-lag+quadrature-leakage",
          "rate-frequency+radiation")  # fmt: skip
@@ -31,6 +34,32 @@ FIRST_SEED = 5000
 Line = dict[str, Any]
 
 
+def faults_of(truth: Truth, snr: float | None, folder: Path) -> list[str]:
+    """What of a campaign is not as its truth says: its files, its SNR, a null that hides something."""
+    found = []
+    for file, clean, noise in zip(truth.files, truth.clean, truth.noise, strict=True):
+        record = read_record(folder / file)
+        for key in noise:
+            departure = np.abs(record[COLUMN[key]] - clean[key])
+            if not np.nanmedian(departure) < 2 * truth.floor[COLUMN[key]] + 3 * np.std(noise[key]):
+                found.append(f"{file}: {key} is not what was drawn")
+    for hidden in truth.hidden:
+        own = EFFECTS.get(hidden.effect)
+        pairs = zip(truth.clean, truth.bare, strict=True)
+        changed = np.concatenate([clean[hidden.response] - bare[hidden.response] for clean, bare in pairs])
+        shown = (own is not None and own.targets == ("reading",)) or np.std(changed) > truth.floor[
+            COLUMN[hidden.response]
+        ]
+        if not (abs(hidden.snr / snr - 1.0) < 0.06 and hidden.effect in hidden.right_names and shown):
+            found.append(f"{hidden.effect} has SNR {hidden.snr:.2f}")
+    if truth.kind == "null" and not (
+        truth.verdicts == ("adequate",)
+        and all(np.array_equal(c[k], b[k]) for c, b in zip(truth.clean, truth.bare, strict=True) for k in c if k in b)
+    ):
+        found.append("a null hides something")
+    return found
+
+
 def truth_of(place: int, folder: Path) -> tuple[Line, list[str], set[str]]:
     """Draw a campaign of two runs; return its truth in the form that marks read, its files and the responses that matter."""
     kind, name, snr = CASES[place]
@@ -41,6 +70,7 @@ def truth_of(place: int, folder: Path) -> tuple[Line, list[str], set[str]]:
         "snr": snr or 0.0,
         "verdicts": truth.verdicts,
         "tolerated": truth.tolerated,
+        "faults": faults_of(truth, snr, folder),
     }
     asked = {"frequency_Hz", *(COLUMN[h.response] for h in truth.hidden)} if truth.hidden else set(COLUMN.values())
     return line, [str(folder / file) for file in truth.files], asked

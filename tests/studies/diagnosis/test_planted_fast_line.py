@@ -61,6 +61,7 @@ def test_a_line_of_less_than_two_steps_is_named_on_a_finer_grid():
     assert verdict.responses["frequency_Hz"].noise == pytest.approx(NOISE, rel=0.05)
 
 
+@pytest.mark.slow
 def test_a_line_that_no_grid_resolves_is_said_to_be_there():
     """Means over a block show nothing of it: fitted, the record is as good as noise, and its noise is 2.3 times too large."""
     verdict = diagnose_records(a_campaign(17.0)).verdict

@@ -37,7 +37,7 @@ def test_a_gap_in_a_log_is_no_turn_on():
 @pytest.mark.parametrize(("softening", "seen"), [(2.5e-7, True), (-2.5e-7, False)])
 def test_a_voltage_that_swings_about_its_mean_softens_and_never_stiffens(softening, seen):
     """V² and V⁴ are nearly one curve there: which of their two coefficients is negative says nothing, their sum does."""
-    for seed in range(10, 90, 20):
+    for seed in (10, 50):
         records = []
         for number, corners in enumerate([CYCLE, BACK]):
             bench = Bench(corners, seed=seed + number)
