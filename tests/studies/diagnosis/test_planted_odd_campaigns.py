@@ -5,8 +5,6 @@ from datetime import UTC, datetime, timedelta
 import numpy as np
 import pytest
 
-from studies.effects import library
-from studies.inference import signatures
 from studies.workbench import diagnose_records
 from tests.studies.diagnosis.bench import BACK, CYCLE, Bench, searched
 
@@ -15,23 +13,6 @@ FIRST_DAY = datetime(2026, 3, 1, tzinfo=UTC)
 
 def told(records):
     return diagnose_records(records).verdict
-
-
-@pytest.mark.slow
-def test_a_gap_in_a_log_is_no_turn_on():
-    """Half an hour is missing of each of two records: their stretches share an offset, and nothing is named."""
-    records = []
-    for number, corners in enumerate([CYCLE, BACK]):
-        bench = Bench(corners, seed=number + 3)
-        x = (bench.gyro() - 20.0) / 10.0
-        bias = 1.0 + 3.0 * number + 0.8 * x - 0.3 * x**2 + 0.05 * bench.rng.standard_normal(x.size)
-        hole = (bench.time < 3.6 * 3600.0) | (bench.time > 4.1 * 3600.0)
-        records.append(bench.record(number, hole, bias_deg_per_h=bias))
-    verdict = told(records)
-    result = verdict.responses["bias_deg_per_h"]
-    assert (verdict.verdict, verdict.causes) == ("adequate", ())
-    assert result.run_shifts == pytest.approx((-1.5, 1.5), abs=0.2)  # one a record
-    assert result.noise == pytest.approx(0.05, rel=0.1)
 
 
 @pytest.mark.parametrize(("softening", "seen"), [(2.5e-7, True), (-2.5e-7, False)])
@@ -63,19 +44,6 @@ def test_a_bias_alone_with_a_term_in_the_rate_finds_its_lag():
     assert verdict.responses["bias_deg_per_h"].noise == pytest.approx(0.05, rel=0.05)
 
 
-@pytest.mark.slow
-def test_a_bias_that_is_a_cubic_of_the_temperature_has_no_cause():
-    """The frequency is bent, so that a cubic of it is another curve: the difference is a tenth of the noise here."""
-    records = []
-    for number, corners in enumerate([CYCLE, BACK]):
-        bench = Bench(corners, sampling=20.0, seed=number + 9)
-        x = (bench.gyro() - 20.0) / 10.0
-        bias = number + 1.2 * x - 0.5 * x**2 + 0.3 * x**3 + 0.02 * bench.rng.standard_normal(x.size)
-        records.append(bench.record(number, frequency_Hz=bench.frequency(2e-3), bias_deg_per_h=bias))
-    verdict = told(records)
-    assert (verdict.verdict, verdict.causes) == ("adequate", ())
-
-
 def test_a_delay_is_said():
     """A thermometer that reads 12 s late: one record cannot tell that from clocks, and the answer says so."""
     records = []
@@ -84,13 +52,6 @@ def test_a_delay_is_said():
         records.append(bench.record(number, frequency_Hz=bench.frequency(1e-3, late=-12.0)))
     result = told(records).responses["frequency_Hz"]
     assert "12 s earlier" in result.remark
-
-
-@pytest.mark.slow
-def test_uneven_stamps_on_a_ramp_are_no_noise():
-    bench = Bench(CYCLE, seed=13, jitter=0.8)
-    result = told([bench.record(frequency_Hz=bench.frequency(1e-3))]).responses["frequency_Hz"]
-    assert result.white == pytest.approx(1e-3, rel=0.15)
 
 
 @pytest.mark.slow
@@ -138,30 +99,3 @@ def test_a_reference_clock_finds_a_drift_that_the_record_hides():
     """A drift that white noise of each row covers: without the reference nothing is named, with it the clock is."""
     assert "clock-drift" in {cause.effect for cause in told(drifting(2e-5, 2e-3, False)).causes}
     assert not told(drifting(2e-5, 2e-3)).causes
-
-
-@pytest.mark.slow
-def test_an_effect_without_its_file_is_not_explained_by_another(monkeypatch):
-    records = []
-    for k, corners in enumerate([CYCLE, BACK]):
-        bench = Bench(corners, seed=90 + k)
-        voltage = 80.0 + 20.0 * (np.floor(bench.time / 4000.0) % 3)
-        frequency = bench.frequency(2e-3) - 4e-6 * voltage**2
-        records.append(bench.record(k, frequency_Hz=frequency, electrode_bias_V=voltage))
-    others = {name: effect for name, effect in library().items() if name != "electrostatic-softening"}
-    monkeypatch.setattr(signatures, "library", lambda: others)
-    verdict = told(records)
-    assert verdict.verdict == "unexplained", verdict.causes
-
-
-@pytest.mark.slow
-def test_a_bias_that_wanders_is_no_line():
-    """Six knots a run: noise, or unexplained, but no periodic disturbance."""
-    for seed in (1, 2):
-        records = []
-        for k, corners in enumerate([CYCLE, BACK]):
-            bench = Bench(corners, seed=10 * seed + k)
-            wander = np.interp(bench.time, np.linspace(0, bench.time[-1], 7), np.cumsum(bench.rng.normal(0, 0.15, 7)))
-            bias = 0.8 * (bench.gyro() - 20.0) / 10.0 + wander + 0.05 * bench.rng.standard_normal(wander.size)
-            records.append(bench.record(k, frequency_Hz=bench.frequency(2e-3), bias_deg_per_h=bias))
-        assert not [c for c in told(records).causes if c.effect == "periodic" and c.probability > 0.5]

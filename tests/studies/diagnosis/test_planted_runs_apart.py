@@ -45,12 +45,6 @@ def test_runs_that_lie_apart_are_not_adequate_and_start_times_would_show_why():
 
 
 @pytest.mark.slow
-def test_the_same_runs_without_offsets_are_adequate():
-    verdict = judge(runs([0.0, 0.0, 0.0]))
-    assert verdict.verdict == "adequate", verdict.causes
-
-
-@pytest.mark.slow
 def test_a_bias_that_differs_from_run_to_run_is_adequate_as_turn_on_and_what_else_it_may_be_is_said():
     rng, records = np.random.default_rng(5), []
     for k, offset in enumerate((0.0, 4.0)):

@@ -70,7 +70,7 @@ def test_recovery_of_a_hidden_effect_without_a_card_and_of_an_unseen_run(tmp_pat
     runs = []
     for k, profile in enumerate(words):
         runs.append(str(tmp_path / f"run{k}.csv"))
-        simulate = ["simulate", str(tmp_path / "device.toml"), profile, "--row", "20", "--seed", str(k)]
+        simulate = ["simulate", str(tmp_path / "device.toml"), profile, "--row", "60", "--seed", str(k)]
         assert main([*simulate, "--out", runs[-1]]) == 0
     capsys.readouterr()
     saved = tmp_path / "saved.toml"
