@@ -194,6 +194,11 @@ class FrequencyLaw:
             [-0.5 * (density + 3 * alpha), float(self.material.slope("poisson_ratio", temperature)), alpha, base]
         )
 
+    @cached_property
+    def uneven(self) -> Array:
+        """The same at the reference temperature."""
+        return self.uneven_slopes(self.reference_temperature)
+
     def with_material(self, material: Material) -> "FrequencyLaw":
         """Return the law of the same resonator with another material; nothing is solved again."""
         nu = material.value("poisson_ratio", np.linspace(self.lowest, self.highest, 41))

@@ -112,6 +112,7 @@ def diagnose_records(
     from studies.inference.unjudged import Unjudged
     from studies.planning.next_run import suggest
     from studies.record.plausible import check_card_frequency
+    from studies.resonator.law import law_of
 
     campaign = make_ready(records)
     if not campaign.records:
@@ -121,11 +122,12 @@ def diagnose_records(
     else:
         if card.polynomial is None:
             card.material.check(np.concatenate([driving(record) for record in campaign.records]) + zero_Celsius)
+        law = law_of(card)
         for record in campaign.records:
             if "frequency_Hz" in record:
-                check_card_frequency(card, record["frequency_Hz"], record.path)
-        check_readings(card, campaign.records)
-        turned = [bias_of_opposite_sign(card, record) for record in campaign.records]
+                check_card_frequency(card, record["frequency_Hz"], record.path, law)
+        check_readings(card, campaign.records, law)
+        turned = [bias_of_opposite_sign(card, record, law) for record in campaign.records]
         campaign = campaign.noting(said for said in turned if said is not None)
     tell = progress or (lambda words: None)
     found = infer(card, campaign, tell)

@@ -36,6 +36,7 @@ LIKE = 10.0
 
 def check_readings(instrument: "Instrument", records: "Sequence[Record]", law: "FrequencyLaw | None" = None) -> None:
     """Refuse records whose frequency follows the temperatures only if these are read otherwise, and a bias in °/s."""
+    law = law or law_of(instrument)
     for record in records:
         _check_unit(instrument, record)
         names = [name for name in COLUMN.values() if name in record]
@@ -45,13 +46,13 @@ def check_readings(instrument: "Instrument", records: "Sequence[Record]", law: "
         changes = float(np.std(known)) if known.size > 2 else 0.0
         if changes <= CLEAR * white_rms(known):
             continue
-        left = _left(instrument, record, law or law_of(instrument))
+        (left,) = _left(instrument, record, law)
         if left < REFUSED * changes:
             continue
         whole = law_of(instrument)
         for words, read in READ_AS.items():
             columns = {name: read(record[name] + zero_Celsius) - zero_Celsius for name in names}
-            other = _left(instrument, record.with_columns(columns), whole)
+            (other,) = _left(instrument, record.with_columns(columns), whole)
             if other < min(FOLLOWED * changes, left / 3):
                 raise InputError(
                     f"{record.path}: frequency_Hz does not follow the temperatures as the card predicts, unless they are read {words}:"
@@ -65,10 +66,9 @@ def bias_of_opposite_sign(instrument: "Instrument", record: "Record", law: "Freq
         return None
     law = law or law_of(instrument)
     white = white_rms(record[BIAS][np.isfinite(record[BIAS])])
-    turned = record.with_columns({BIAS: -record[BIAS]})
     changes, left, rest = (
         float(np.sqrt(max(rms**2 - white**2, 0.0)))
-        for rms in (np.nanstd(record[BIAS]), _left(instrument, record, law, BIAS), _left(instrument, turned, law, BIAS))
+        for rms in (float(np.nanstd(record[BIAS])), *_left(instrument, record, law, BIAS, (1.0, -1.0)))
     )
     if not white < changes or not rest < min(FOLLOWED * changes, left / 3):
         return None
@@ -91,12 +91,18 @@ def _check_unit(instrument: "Instrument", record: "Record") -> None:
         )
 
 
-def _left(instrument: "Instrument", record: "Record", law: "FrequencyLaw", response: str = FREQUENCY) -> float:
-    """Rms of measured minus predicted about its mean, with the card as given; infinite where it cannot be predicted."""
+def _left(
+    instrument: "Instrument",
+    record: "Record",
+    law: "FrequencyLaw",
+    response: str = FREQUENCY,
+    signs: "Sequence[float]" = (1.0,),
+) -> list[float]:
+    """Rms of measured, with each sign, minus predicted about its mean, with the card as given; infinite where it cannot be predicted."""
     time = record["time_s"]
     places = np.unique(np.linspace(0, len(time) - 1, min(ROWS, len(time))).astype(int))
     try:
         found = predict(instrument, drive_by_record(record, time=time[places]), (), law)
     except (ShellError, ThermalError):
-        return np.inf
-    return float(np.nanstd(record[response][places] - found.columns[response]))
+        return [np.inf] * len(signs)
+    return [float(np.nanstd(sign * record[response][places] - found.columns[response])) for sign in signs]

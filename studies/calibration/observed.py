@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -79,6 +80,16 @@ class ObservedRun:
     # Rows of the measured housing's profile before which its chamber jumped or a hole is, and how far (K) the housing
     # may have been from the straight line midway between them.
     kinks: Mapping[int, float] = field(default_factory=dict)
+
+    @cached_property
+    def own_rows(self) -> Mapping[str, tuple[Array, Array]]:
+        """Of every response the record's own rows that have a value and no spike: seconds since the first row, and values."""
+        since, found = self.record["time_s"] - self.record["time_s"][0], {}
+        for name in self.responses:
+            own = self.record[name]
+            good = np.isfinite(own) & ~find_spikes(own)
+            found[name] = (since, own) if good.all() else (since[good], own[good])
+        return found
 
     def explaining(self, names: Sequence[str]) -> "ObservedRun":
         """Return it with some responses alone; without the housing among them the chamber drives nothing."""

@@ -21,6 +21,7 @@ from studies.resonator.law import law_of, moved_law
 from studies.simulation.drive import Drive
 from studies.simulation.prediction import Prediction, predict
 from studies.simulation.variations import JUMP, KINK, SHIFT, Variations
+from thermal.sweeping import LONGEST_ROW
 
 if TYPE_CHECKING:
     from shell.law import FrequencyLaw
@@ -28,6 +29,10 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 MOST_JUMPS = 24  # of a run whose times are free, each for itself
+KNOTS, FARTHEST = (
+    5,
+    180.0,
+)  # knots in a block, and their distance (s), at which temperatures are exact to microkelvins, at most
 Progress = Callable[[str], None]
 
 
@@ -157,6 +162,11 @@ class CardProblem:
         initial = {name.removeprefix("initial."): value for name, value in free.items()}
         return replace(self.parts[k].drive, initial=initial, shift=shift, jumps=jumps, kinks=kinks)
 
+    def knots(self, part: Part) -> float:
+        """Distance (s) of the knots of what radiation adds: some in every block of a long run, whose blocks are long."""
+        blocks = max(len(self.runs[part.run].responses[name].time) for name in part.responses)
+        return float(np.clip(np.ptp(part.drive.time) / (KNOTS * blocks), LONGEST_ROW, FARTHEST))
+
     def evaluate(self, point: Array, slopes: bool = True) -> State:
         """Predict all runs and compare."""
         values = self.priors.values
@@ -168,7 +178,7 @@ class CardProblem:
         varied = Variations(instrument, law, self.priors.names)
         for k, part in enumerate(self.parts):
             names = [*self.priors.names, *(name for one, name, _ in self.starts if one == k)] if slopes else []
-            prediction = predict(instrument, self.drive_at(point, k), varied.with_names(names), law)
+            prediction = predict(instrument, self.drive_at(point, k), varied.with_names(names), law, self.knots(part))
             for name in part.responses:
                 blocks = self.runs[part.run].responses[name]
                 residual[name].append(blocks.value - blocks.average(prediction.columns[name]))

@@ -180,13 +180,13 @@ def infer(card: "Instrument", campaign: Campaign, progress: Report = lambda _: N
     plain = Model(Linear.of(found, told), Signatures.at(problem, found.point), (), outcome.plain.noise)
     shipped = plain.residuals(Kept(np.zeros(problem.count), ()))
     calibrated = plain.residuals(Kept(found.point, ()))
-    bank = generic_bank(search)
     progress("held-out rows")
     outcome, held, rows = _confirmed(search, outcome, plain)
     progress("lack of fit")
     without, levelled = outcome.plain, outcome.final
     for name in search.linear.responses:
         without, levelled = (with_levels(search, one, name) for one in (without, levelled))
+    bank = generic_bank(search)
     left = look(search, bank, without, levelled, rows)
     unknown = []
     for base in outcome.without:
@@ -277,12 +277,13 @@ def _confirmed(
     """Leave out causes whose model predicts unseen rows no better than the card alone, the weakest first."""
     events = any(term.effect.event for term in outcome.final.terms)
     by_record = len(search.linear.problem.runs) > 1 and not events
-    before, alone = plain.held_out(by_record), plain.residuals(plain.kept(plain.mean()))
+    alone = plain.residuals(plain.kept(plain.mean()))
+    before = plain.held_out(by_record, alone)
     while True:
         final = outcome.final
         model = Model(search.linear, search.signatures, final.terms, final.noise)
-        after = model.held_out(by_record) if final.terms else before
         rows = model.residuals(model.kept(model.mean())) if final.terms else alone
+        after = model.held_out(by_record, rows) if final.terms else before
         weak = [
             k
             for k, name in enumerate(term.response for term in final.terms)

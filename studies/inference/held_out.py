@@ -12,7 +12,6 @@ import scipy
 from numpy.typing import NDArray
 
 from compensation.noise import Noise
-from compensation.spikes import find_spikes
 from studies.calibration.fit import LASTING
 from studies.inference.model import Linear, Term, solve_posterior
 from studies.inference.signatures import Path, Signatures
@@ -102,19 +101,17 @@ class Model:
         for k, part in enumerate(self.problem.parts):
             if runs is not None and part.run not in runs:
                 continue
-            record, drive = self.problem.runs[part.run].record, self.problem.drive_at(numbers.point, k)
+            run, drive = self.problem.runs[part.run], self.problem.drive_at(numbers.point, k)
             columns = dict(predict(instrument, drive, (), law).columns)
             for term, values in zip(self.terms, numbers.coefficients, strict=True):
                 for name, change in self.change(term, values, k, paths[k]).items():
                     columns[name] = columns[name] + change
-            rows = np.asarray(record["time_s"], dtype=float)
             for name in part.responses:
-                own = np.asarray(record[name], dtype=float)
-                good = np.isfinite(own) & ~find_spikes(own)
-                rest = own[good] - on_rows(rows[good], drive.time, columns[name])
+                rows, own = run.own_rows[name]
+                rest = own - on_rows(rows, drive.time - run.record["time_s"][0], columns[name])
                 if name not in LASTING:  # from turn-on to turn-on
-                    rest = rest - rest.mean()
-                found[name][0].append(rows[good] - rows[0])
+                    rest -= rest.mean()
+                found[name][0].append(rows)
                 found[name][1].append(rest)
         return {name: Rows(tuple(t), tuple(r)) for name, (t, r) in found.items() if r}
 
@@ -130,10 +127,9 @@ class Model:
         """Most probable coordinates."""
         return solve_posterior(*self.linear.stacked(self.terms, self.noise))[0]
 
-    def held_out(self, by_record: bool) -> "dict[str, Unseen]":
-        """Return what is left of rows that were held out."""
+    def held_out(self, by_record: bool, rows: Mapping[str, Rows]) -> "dict[str, Unseen]":
+        """Return what is left of rows that were held out; `rows`: what the model that has seen them leaves."""
         whole = self.mean()
-        rows = self.residuals(self.kept(whole))
         return self._by_record(whole, rows) if by_record else self._by_block(whole, rows)
 
     def _moved(self, rows: Mapping[str, Rows], name: str, step: Array) -> list[Array]:

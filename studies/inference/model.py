@@ -25,6 +25,8 @@ from studies.effects import Effect
 Array = NDArray[np.float64]
 SCALES = 10.0 ** np.arange(-4.0, 0.51, 0.5)
 """Sizes of an effect over that of strong cases, every one as likely."""
+AT_ONCE = 500_000
+"""Numbers of columns that are weighed at once, in memory."""
 TOLD = "told"
 PRICE = -4.0
 """Log prior of one effect of some thirty against nothing."""
@@ -217,6 +219,11 @@ class Background:
         units : array (H, k)
         effect : one that cannot go against its first column, or beyond the most of it, adds nothing there: −∞
         """
+        some = max(1, AT_ONCE // (units.shape[1] * max(len(own) for own in columns.values())))
+        if len(units) > some:
+            parts = (slice(k, k + some) for k in range(0, len(units), some))
+            each = [self.gains({n: own[:, h] for n, own in columns.items()}, units[h], effect) for h in parts]
+            return np.concatenate(each, axis=1)
         values, ways, along = self.against(
             columns, units, {name: rest[:, None] for name, rest in self._solved[1].items()}
         )

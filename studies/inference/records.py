@@ -115,8 +115,8 @@ def _temperature_source(records: Sequence[Record]) -> str:
 
 def _columns(record: Record, source: str) -> dict[str, Array]:
     names = ("time_s", *RESPONSES, *COMMAND_COLUMNS, REFERENCE, *((CHAMBER,) if source == HOUSING else ()))
-    table = {name: np.array(record[name], dtype=float) for name in names if name in record}
-    table["temperature"] = np.array(record[source], dtype=float)
+    table = {name: np.asarray(record[name], dtype=float) for name in names if name in record}
+    table["temperature"] = np.asarray(record[source], dtype=float)
     if "bias_deg_per_h" not in table and "measured_rate_deg_per_s" in record:
         applied = record.columns.get(RATE, 0.0)
         table["bias_deg_per_h"] = np.asarray(3600.0 * (record["measured_rate_deg_per_s"] - applied))
@@ -129,8 +129,9 @@ def _remove_outliers(table: dict[str, Array]) -> int:
     for name in ("temperature", *RESPONSES, REFERENCE):
         if name in table:
             outlying = find_spikes(table[name], LEAST_SPIKE if name == "temperature" else 0.0)
-            table[name][outlying] = np.nan
-            count += int(outlying.sum())
+            if outlying.any():
+                table[name] = np.where(outlying, np.nan, table[name])
+                count += int(outlying.sum())
     return count
 
 

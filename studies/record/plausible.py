@@ -1,6 +1,7 @@
 """Whether a record is of the gyro that a card or a model stands for: a question, with the sentence that confirms it."""
 
 from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,6 +13,9 @@ from studies.record import Record, drop_repeats
 from studies.record.rest import TEMPERATURES
 from studies.resonator.law import check_slope_known, law_of
 
+if TYPE_CHECKING:
+    from shell.law import FrequencyLaw
+
 ANOTHER = 0.2  # relative: no tolerance of one design makes so much
 ALIKE = 0.03  # relative: what trimming, temperature and small errors of dimensions make of a frequency
 AT_REST = 1e-5  # relative: frequencies that vary by less need no temperature law
@@ -20,14 +24,16 @@ ONE_GYRO, STEEPEST = 5e-3, 3e-4  # relative, and 1/K: what one gyro does from ru
 SAME_GYRO = 0.01  # relative: one gyro over temperature, beyond the range of its model
 
 
-def check_card_frequency(instrument: "Instrument", frequency: Array, path: str) -> None:
+def check_card_frequency(
+    instrument: "Instrument", frequency: Array, path: str, law: "FrequencyLaw | None" = None
+) -> None:
     """Ask whether a record is of the card's gyro where its frequency lies far from the card's."""
     known = frequency[np.isfinite(frequency)]
     if not known.size:
         return
     if np.ptp(known) > AT_REST * np.median(known):
         check_slope_known(instrument)
-    read, own = float(np.median(known)), _frequency(instrument)
+    read, own = float(np.median(known)), _frequency(instrument, law)
     away = abs(float(np.log(max(read, 1e-9) / own)))
     if away <= ALIKE or away <= SPREADS * (spread := _spread(instrument, own)):
         return
@@ -85,9 +91,9 @@ def check_model_frequency(frequency: Array, lowest: float, highest: float, path:
     )
 
 
-def _frequency(instrument: "Instrument") -> float:
+def _frequency(instrument: "Instrument", law: "FrequencyLaw | None" = None) -> float:
     T = instrument.reference_temperature
-    return float(law_of(instrument, T, T).frequency(T))
+    return float((law or law_of(instrument, T, T)).frequency(T))
 
 
 def _spread(instrument: "Instrument", own: float) -> float:

@@ -104,7 +104,7 @@ def read_out(
     if "resonator_temperature" in changes:
         warmed = resonator + changes["resonator_temperature"]
         rate = rate + np.gradient(changes["resonator_temperature"], drive.time)
-    slopes = law.uneven_slopes(reference)
+    slopes = law.uneven
     thermal = np.exp(law.logarithm(warmed) + slopes @ np.array(uneven))
     softened = thermal * (1 + mean_shift(instrument, warmed, drive.commands.get("voltage_squared")))
     frequency = softened + changes.get("frequency_Hz", 0.0)

@@ -114,7 +114,7 @@ def plan_twin(instrument: "Instrument", boundary: "Boundary" = "chamber", theory
     parameters["thermal.heat_capacity_J_per_kg_K"] = math.nan if callable(capacity) else capacity / density
     effects = tuple(_place_effects(instrument, parameters))
     rows = observed_rows(instrument, law, tuple(node.name for node in network.nodes))[1:6]
-    uneven = law.uneven_slopes(instrument.reference_temperature)
+    uneven = law.uneven
     return Plan(
         instrument, boundary, parameters, network, rows, uneven, _constants(instrument, law, boundary), splines, effects
     )

@@ -85,7 +85,8 @@ class PolynomialLaw:
         straight = self.f0 * self.coefficients[0] * (temperature - self.reference_temperature)
         return np.asarray(straight + self.bias_bend * (change - straight))
 
-    def uneven_slopes(self, temperature: float) -> Array:
+    @property
+    def uneven(self) -> Array:
         """What an uneven temperature does: nothing, for the resonator has one."""
         return np.zeros(4)
 

@@ -121,8 +121,8 @@ def test_rows_held_out_are_those_of_a_refit_to_the_other_records(search):
             targets.append(np.linalg.solve(L, (linear.target[name] - linear.slope[name] @ mean)[at]))
         mean[open_] = np.linalg.lstsq(np.vstack(rows), np.concatenate(targets), rcond=None)[0]
     model = Model(linear, search.signatures, (), noise)
-    refitted, unseen = model.residuals(Kept(mean, ())), model.held_out(by_record=True)
-    whole = model.residuals(model.kept(model.mean()))["frequency_Hz"].residual[1]
+    refitted, seen = model.residuals(Kept(mean, ())), model.residuals(model.kept(model.mean()))
+    unseen, whole = model.held_out(True, seen), seen["frequency_Hz"].residual[1]
     assert np.abs(whole).max() < 0.2 * np.abs(refitted["frequency_Hz"].residual[1]).min()
     for name in linear.responses:
         rest = refitted[name].residual[1]
@@ -135,5 +135,7 @@ def test_rows_held_out_are_those_of_a_refit_to_the_other_records(search):
 def test_a_block_whose_gaps_leave_no_row_for_the_fit_is_not_held_out(search):
     paths, span = search.signatures.paths, replace(search.signatures.span, tau=1e6)
     model = Model(search.linear, SimpleNamespace(span=span, paths=paths), (), search.noise)
-    unseen = model.held_out(by_record=False)
+    unseen = model.held_out(
+        False, Model(search.linear, search.signatures, (), search.noise).residuals(model.kept(model.mean()))
+    )
     assert {one.beside(one) for one in unseen.values()} == {(None, None)}
