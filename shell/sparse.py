@@ -16,11 +16,11 @@ def assemble_elements(
     unknowns: Sequence[Index] | Index, elements: Sequence[NDArray[Any]] | NDArray[Any], size: int
 ) -> "scipy.sparse.csc_matrix":
     """The sum of element matrices, each on its unknowns, (size, size)."""
-    rows = np.concatenate([np.repeat(own, len(own)) for own in unknowns])
-    columns = np.concatenate([np.tile(own, len(own)) for own in unknowns])
-    return scipy.sparse.csc_matrix(
-        (np.concatenate([np.ravel(one) for one in elements]), (rows, columns)), shape=(size, size)
-    )
+    numbers = [np.asarray(own, dtype=np.int32) for own in unknowns]
+    rows = np.concatenate([np.repeat(own, len(own)) for own in numbers])
+    columns = np.concatenate([np.tile(own, len(own)) for own in numbers])
+    values = np.concatenate([np.ravel(one) for one in elements])
+    return scipy.sparse.csc_matrix((values, (rows, columns)), shape=(size, size))
 
 
 def factor_symmetric(

@@ -4,6 +4,7 @@ Inside a solid part (i) nothing but the shell's edges (I) pulls, so that x_i = W
 and the shell feels A_II + A_Ii W. What an imperfection does inside a solid part is felt through the same W.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import pi
@@ -12,12 +13,13 @@ import numpy as np
 import scipy
 
 from shell.imperfection.place import cut
-from shell.imperfection.substructure import Substructures
 from shell.quadrature import Array
 from shell.resonator import Resonator
 from shell.solution import Constants
-from shell.sparse import Index, assemble_elements
+from shell.sparse import Index, assemble_elements, factor_symmetric
 from shell.system import ShellGroup, System
+
+PIVOTING = 0.01  # of matrices that are not definite
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,19 +60,20 @@ class Block:
         local = np.einsum("f,ca->cfa", here.along[0], table).reshape(3, size)
         return np.asarray((rows.T @ local.T).T)
 
-    @cached_property
-    def inverse(self) -> Substructures:
-        """Of K - λ M; in the pair's own block with a border that keeps the answers free of the pair."""
+    def answer(self, loads: Array) -> Array:
+        """(K - λ M)⁻¹ of loads (size, columns); in the pair's own block without the pair, for which it is singular."""
         if self.kept is None:
-            return Substructures(self.elements, self.size)
-        largest = max(float(np.abs(A).max()) for _, A in self.elements)
-        border = largest / np.abs(self.kept).max() * self.kept
-        bordered = []
-        for unknowns, A in self.elements:
-            edge = border[unknowns][:, None]
-            border[unknowns] = 0.0  # of what elements share the first has it
-            bordered.append((np.append(unknowns, self.size), np.block([[A, edge], [edge.T, np.zeros((1, 1))]])))
-        return Substructures(bordered, self.size + 1)
+            return self._solve(loads)
+        return self._solve(np.vstack([loads, np.zeros((1, loads.shape[1]))]))[:-1]
+
+    @cached_property
+    def _solve(self) -> "Callable[[Array], Array]":
+        unknowns, matrices = zip(*self.elements, strict=True)
+        A = assemble_elements(unknowns, matrices, self.size)
+        if self.kept is not None:  # a border keeps the answers free of the pair
+            border = scipy.sparse.csc_matrix(abs(A).max() / np.abs(self.kept).max() * self.kept[:, None])
+            A = scipy.sparse.bmat([[A, border], [border.T, None]])
+        return factor_symmetric(A, PIVOTING)
 
     def inner(self, number: int) -> Array:
         """What a unit of each shared unknown moves in a solid part: (shared, cells, size) in the plain basis."""
@@ -100,9 +103,9 @@ def condense(system: System, constants: tuple[Constants, ...], value: float, pai
         shared = np.searchsorted(shell, edge)
         of_solid = [(n, A) for n, A, mine in zip(numbers, matrices, of_shell, strict=True) if not mine]
         members, cells = zip(*of_solid, strict=True)
-        core = scipy.sparse.csr_matrix(assemble_elements(members, cells, system.pattern.size))
+        core = assemble_elements(members, cells, system.pattern.size)
         coupling = core[inside][:, edge].toarray()
-        lifted = -scipy.sparse.linalg.splu(scipy.sparse.csc_matrix(core[inside][:, inside])).solve(coupling)
+        lifted = -factor_symmetric(core[inside][:, inside], PIVOTING)(coupling)
         felt = core[edge][:, edge].toarray() + coupling.T @ lifted
         elements.append((shared, around * (felt + felt.T) / 2))
         moved = _lift(system, edge, inside, lifted)
@@ -126,14 +129,13 @@ def _lift(system: System, edge: Index, inside: Index, lifted: Array) -> Array:
 
 def _plain(group: ShellGroup, constraint: "scipy.sparse.csr_matrix") -> "scipy.sparse.csr_matrix":
     """Rows of the constraint for the unknowns of a chain's elements, its small elements out of their differences."""
-    rows = constraint[group.unknowns.ravel()]
-    elements, size = group.unknowns.shape
     functions = group.table.along.shape[2]
-    amplitudes = size // functions
+    count, number = group.unknowns.size, np.arange(group.unknowns.size).reshape(len(group.unknowns), functions, -1)
+    to, of = [number.ravel()], [number.ravel()]
     for element, node in group.anchors:
-        others = np.delete(np.arange(functions), node)
-        to = (element * size + others[:, None] * amplitudes + np.arange(amplitudes)).ravel()
-        of = np.tile(element * size + node * amplitudes + np.arange(amplitudes), len(others))
-        more = scipy.sparse.csr_matrix((np.ones(len(to)), (to, of)), shape=(elements * size,) * 2)
-        rows = (scipy.sparse.eye(elements * size, format="csr") + more) @ rows
-    return rows
+        others = np.delete(number[element], node, axis=0)
+        to.append(others.ravel())
+        of.append(np.broadcast_to(number[element, node], others.shape).ravel())
+    rows, columns = np.concatenate(to), group.unknowns.ravel()[np.concatenate(of)]
+    sums = scipy.sparse.csr_matrix((np.ones(len(rows)), (rows, columns)), shape=(count, constraint.shape[0]))
+    return scipy.sparse.csr_matrix(sums @ constraint)

@@ -11,12 +11,10 @@ import numpy as np
 import scipy
 
 from shell.imperfection.block import Block
-from shell.imperfection.substructure import Substructures, stack
 from shell.kernel import station_mass
 from shell.quadrature import Array
 from shell.resonator import Resonator
 from shell.solution import Constants
-from shell.sparse import Index
 from shell.system import ShellGroup
 
 WORKSPACE = 1 << 19  # numbers that a solve uses and frees again
@@ -70,22 +68,11 @@ class Together:
 
     def answer(self, loads: Array) -> Array:
         """-(K - λ M)⁻¹ of loads in every harmonic; in the pair's own without the pair, for which it is singular."""
-        flat = np.concatenate([loads.reshape(self.size, -1), np.zeros((1, loads[0].size))])
-        found = np.empty_like(flat)
-        for rows, inverse in self._inverses:
-            found[rows] = -inverse.solve(flat[rows])
-        return found[:-1].reshape(loads.shape)
-
-    @cached_property
-    def _inverses(self) -> list[tuple[Index, Substructures]]:
-        """Those of one layout stacked, with their unknowns; the number after all is that of the pair's border."""
-        alike: dict[tuple[bytes, ...], list[tuple[Index, Substructures]]] = {}
-        for block, rows in zip(self.blocks, self.rows, strict=True):
-            own = np.arange(rows.start, rows.stop)
-            if block.kept is not None:
-                own = np.append(own, self.size)
-            alike.setdefault(block.inverse.layout, []).append((own, block.inverse))
-        return [(np.stack([rows for rows, _ in own]), stack([one for _, one in own])) for own in alike.values()]
+        parts = [
+            block.answer(loads[rows].reshape(block.size, -1))
+            for block, rows in zip(self.blocks, self.rows, strict=True)
+        ]
+        return -np.concatenate(parts).reshape(loads.shape)
 
     def weigh(self, number: int, plain: Array) -> Array:
         """The mass of a perfect chain times unknowns of its elements as in `plain`."""

@@ -18,6 +18,7 @@ so that the waves of a vector meet those of the imperfection in the weights alon
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import ceil, log
 
 import numpy as np
 
@@ -26,7 +27,8 @@ from shell.kernel import Section, energy_weights
 from shell.quadrature import Array, gauss, legendre
 from shell.solution import Constants
 
-HEIGHTS = 4  # of a layer: exact to the third power of the height
+HEIGHTS = 4  # of a layer, at most: exact to the third power of the height
+MISSED = 1e-8  # what fewer heights may miss: of k of them a layer d of a wall h misses less than (d/h)^k
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,7 +161,9 @@ class Stretch:
             out = self.values(face, waves)
             reach = float(np.abs(out).max())
             if reach > 0:
-                nodes, powers = gauss(HEIGHTS)[0], np.arange(1, HEIGHTS + 1)[:, None]
+                thin = min(0.1, reach / float(self._thickness.min()))
+                count = min(HEIGHTS, ceil(log(MISSED) / log(thin)))
+                nodes, powers = gauss(count)[0], np.arange(1, count + 1)[:, None]
                 # ∫_0^x of Lagrange's polynomials on the nodes, (stations, nodes, θ)
                 shares = np.linalg.inv(np.vander(nodes, increasing=True)).T @ ((out / reach) ** powers / powers)
                 eta.append(sign * (1 + 2 * reach / self._thickness * nodes))
