@@ -38,7 +38,7 @@ def lay_system(resonator: Resonator, n: int, theory: Theory, level: Level, along
     return assemble(resonator, lay_resonator(resonator, n, level, alongside), n, level, rigid)
 
 
-@lru_cache(maxsize=8)
+@lru_cache(maxsize=12)
 def build_system(resonator: Resonator, n: int, theory: Theory, level: Level) -> System:
     """The system of a resonator, kept for the next material or temperature, since only the material changes with them."""
     return lay_system(resonator, n, theory, level)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from shell.assembly import lay_system
+from shell.assembly import build_system
 from shell.curves import Arc
 from shell.elastic import Elastic, VaryingElastic
 from shell.errors import ShellError
@@ -185,7 +185,7 @@ def _by_thickness(resonator: Resonator, solution: Solution, theory: Theory) -> f
     step = SMALL * min(value for _, value in resonator.thickness) / resonator.size
     found: dict[float, float] = {0.0: solution.eigenvalue}
     for change in (-step, step):
-        system = lay_system(resonator.thickened(1 + change), solution.system.n, theory, solution.system.level)
+        system = build_system(resonator.thickened(1 + change), solution.system.n, theory, solution.system.level)
         same = [
             a.unknowns.shape == b.unknowns.shape for a, b in zip(system.groups, solution.system.groups, strict=True)
         ]

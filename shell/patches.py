@@ -34,19 +34,17 @@ class Patch:
 
     def place(self, x: Array, y: Array) -> Planar:
         """The transfinite (Coons) interpolation of the sides at points of the unit square."""
-        zero, one = np.zeros(1), np.ones(1)
-        corners = {(0, 0): self.bottom(zero), (1, 0): self.bottom(one), (0, 1): self.top(zero), (1, 1): self.top(one)}
-        bottom, top, left, right = self.bottom(x), self.top(x), self.left(y), self.right(y)
+        # each side at its points and at its two ends
+        ends = np.array([0.0, 1.0])
+        low, high = (np.array(side(np.append(x, ends))) for side in (self.bottom, self.top))
+        left, right = (np.array(side(y)) for side in (self.left, self.right))
         r, z = (
-            (1 - y) * bottom[k]
-            + y * top[k]
-            + (1 - x) * left[k]
-            + x * right[k]
-            - (1 - x) * (1 - y) * corners[0, 0][k]
-            - x * (1 - y) * corners[1, 0][k]
-            - (1 - x) * y * corners[0, 1][k]
-            - x * y * corners[1, 1][k]
-            for k in (0, 1)
+            (1 - y) * low[:, :-2]
+            + y * high[:, :-2]
+            + (1 - x) * left
+            + x * right
+            - (1 - x) * ((1 - y) * low[:, -2:-1] + y * high[:, -2:-1])
+            - x * ((1 - y) * low[:, -1:] + y * high[:, -1:])
         )
         return r, z
 
@@ -54,7 +52,8 @@ class Patch:
         """Points of all cells at ξ, η in [-1, 1], (cells, points)."""
         weights = np.array([(1 - xi) * (1 - eta), (1 + xi) * (1 - eta), (1 - xi) * (1 + eta), (1 + xi) * (1 + eta)]) / 4
         x, y = np.moveaxis(np.array(self.cells), 2, 0) @ weights
-        return self.place(x, y)
+        r, z = self.place(x.ravel(), y.ravel())
+        return r.reshape(x.shape), z.reshape(x.shape)
 
 
 def whole() -> tuple[Cell, ...]:

@@ -294,12 +294,12 @@ def _at_radius(surface: Callable[[Array], Planar], r: float, s_most: float) -> f
 
 
 def _crossing(value: Callable[[Array], Array], low: float, high: float) -> float:
-    """Where a rising function vanishes: the interval of 32 on which it does, again and again.
+    """Where a rising function vanishes: the interval of 256 on which it does, again and again.
 
     scipy.optimize.brentq does the same, but its package takes half of what it takes to start and solve.
     """
-    for _ in range(11):  # 32^11 = 2^55
-        places = np.linspace(low, high, 33)
+    for _ in range(7):  # 256^7 = 2^56
+        places = np.linspace(low, high, 257)
         k = max(int(np.searchsorted(value(places[1:-1]), 0.0)), 0)
         low, high = places[k], places[k + 1]
     return float((low + high) / 2)

@@ -71,8 +71,9 @@ class Block:
         unknowns, matrices = zip(*self.elements, strict=True)
         A = assemble_elements(unknowns, matrices, self.size)
         if self.kept is not None:  # a border keeps the answers free of the pair
-            border = scipy.sparse.csc_matrix(abs(A).max() / np.abs(self.kept).max() * self.kept[:, None])
-            A = scipy.sparse.bmat([[A, border], [border.T, None]])
+            border = abs(A).max() / np.abs(self.kept).max() * self.kept[:, None]
+            beside, below = (scipy.sparse.csc_matrix(side) for side in (border, border.T))
+            A = scipy.sparse.bmat([[A, beside], [below, None]])
         return factor_symmetric(A, PIVOTING)
 
     def inner(self, number: int) -> Array:
