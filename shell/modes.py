@@ -6,7 +6,7 @@
 import warnings
 from dataclasses import dataclass, field
 from functools import cached_property
-from math import pi, sqrt
+from math import log, pi, sqrt
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 THEORIES = ("solid", "shell", "rayleigh")
 MOST_HARMONIC = 100  # waves shorter than any wall is thin; beyond, the meshes outgrow memory
-SMALL = 5e-4  # relative change of the thickness over h/R, of the difference that gives the slope of ln f
+SMALL = 5e-4  # relative change of the thickness over h/R (and a²/L² of a stem), of the difference that gives the slope of ln f
 THICKEST_SHELL = 0.1  # h/R up to which shell theory has been held against the solid
 
 
@@ -181,8 +181,12 @@ def solve_modes(
 
 def _by_thickness(resonator: Resonator, solution: Solution, theory: Theory) -> float:
     """D ln f / d ln h of the whole profile: change of the Rayleigh quotient with the shape kept (it is stationary)."""
-    # what is neglected goes as (step R/h)², 2.5 SMALL² of the slope; a smaller one leaves the digits of thin shells in rounding
+    # what is neglected goes as (step R/h)², 2.5 SMALL² of the slope, and in a stem, which bends far more easily than it
+    # stretches, as (step L²/a²)²; a smaller step leaves the digits of thin shells in rounding
     step = SMALL * min(value for _, value in resonator.thickness) / resonator.size
+    if resonator.stem:
+        top = float(resonator.at([0.0]).z[0])
+        step = min(step, *(SMALL * (resonator.stem.radius / (end - top)) ** 2 for _, end in resonator.stem.roots))
     found: dict[float, float] = {0.0: solution.eigenvalue}
     for change in (-step, step):
         system = build_system(resonator.thickened(1 + change), solution.system.n, theory, solution.system.level)
@@ -192,7 +196,7 @@ def _by_thickness(resonator: Resonator, solution: Solution, theory: Theory) -> f
         if all(same) and system.constraint.shape == solution.system.constraint.shape:
             found[change] = Solution(system, solution.constants, solution.vector).eigenvalue
     low, high = min(found), max(found)  # one-sided where one more cell fits on one side
-    return float(np.log(found[high] / found[low]) / (2 * np.log((1 + high) / (1 + low))))
+    return log(found[high] / found[low]) / (2 * log((1 + high) / (1 + low)))
 
 
 def _label(solution: Solution) -> str:

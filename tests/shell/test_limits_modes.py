@@ -244,3 +244,11 @@ def test_slope_by_thickness_is_that_of_full_solves(thickness: float) -> None:
     near, far = (logarithm(1 + k * step) - logarithm(1 - k * step) for k in (1, 2))
     (mode,) = solve_modes(hemisphere(15e-3, thickness), SILICA, 2)
     assert mode.sensitivities.thickness == pytest.approx((8 * near - far) / (12 * step), abs=2e-6)
+
+
+def test_slope_by_thickness_on_a_thin_stem_is_that_of_full_solves() -> None:
+    """The mode kept in shape stretches the stem, which resists some 1e5 times as much as it bends."""
+    whip = hemisphere(15e-3, 0.9e-3, support="stem", stem=Stem(0.5e-3, -5e-3, fillet=0.2e-3))
+    (mode,), (thick,), (thin,) = (solve_modes(whip.thickened(factor), SILICA, 1) for factor in (1, 1.001, 0.999))
+    expected = log(thick.frequency / thin.frequency) / log(1.001 / 0.999)
+    assert mode.sensitivities.thickness == pytest.approx(expected, abs=1e-6)
