@@ -158,8 +158,7 @@ def _drift(found: Acceptance) -> list[Figure | Sentence]:
 
     def draw() -> Drawing:
         with style.figure(height=3.6, x="averaging time τ (s)", y="Allan deviation (°/h)") as (made, axes):
-            axes.fill_between(allan.tau, allan.low, allan.high, color=style.SKY, alpha=0.3, label="90 % interval")
-            axes.loglog(allan.tau, allan.deviation, "o-", markersize=3, label="overlapping Allan deviation")
+            style.draw_allan(axes, allan, style.BLUE, "overlapping Allan deviation, 90 % interval")
             tau = np.geomspace(allan.tau[first], allan.tau[-1], 100)
             axes.loglog(tau, noise.deviation(tau), "--", color=style.VERMILION, label="fit N, B, K")
             return made

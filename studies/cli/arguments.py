@@ -54,7 +54,6 @@ Confidence = Annotated[float, FRACTION, Parameter(help="Confidence level of the 
 Workers = Annotated[int | None, COUNT, Parameter(help="Processes on this machine; default: one per core.")]
 Quiet = Annotated[bool, Parameter(help="Show no progress.")]
 SaveModel = Annotated[str | None, Parameter(help="Write the model (TOML) for hrg compensate.")]
-EmitC = Annotated[str | None, Parameter(help="Write the model as C99 source for firmware.")]
 Folder = Annotated[str, Parameter(help="Folder of the study (hrg study run --out).")]
 MOST_TEMPERATURES = 10_000
 

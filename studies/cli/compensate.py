@@ -8,9 +8,9 @@ from compensation.arrays import Array
 from compensation.decimation import average_blocks
 from compensation.errors import CompensationError
 from studies import models
-from studies.cli.arguments import EmitC
-from studies.cli.output import answers, keep_model, keep_record, say
+from studies.cli.output import answers, keep_record, say
 from studies.errors import InputError
+from studies.files.writing import write_text
 from studies.instrument.units import unit_of
 from studies.record import COMPENSATED, RESONATOR, Record, read_record
 from studies.reports import style
@@ -33,7 +33,7 @@ COLUMNS = "name: Column | stability_before: Before | stability_after: After | Un
 
 @answers("hrg.compensate/1")
 def compensate(
-    model: str, run: str | None = None, /, *, out: str | None = None, extrapolate: bool = False, emit: EmitC = None
+    model: str, run: str | None = None, /, *, out: str | None = None, extrapolate: bool = False, emit: str | None = None
 ) -> Result:
     """Apply a model saved by one of the hrg fit commands: write the record with compensated_… columns added.
 
@@ -47,13 +47,16 @@ def compensate(
         out: Write the record with the added columns.
         extrapolate: Apply the model outside its fitted range too; in a record without a thermometer, leave those rows
             empty.
+        emit: Write the model as C99 source for firmware.
     """
     loaded = models.read_model(model)
     if (run is None) != (out is None):
         raise InputError("a record and --out go together: hrg compensate MODEL RUN --out FILE.")
     if run is None and emit is None:
         raise InputError("nothing to do: give a record and --out FILE, or --emit FILE.c.")
-    keep_model(loaded, None, emit)
+    if emit is not None:
+        write_text(emit, models.emit_c(loaded))
+        say(f"C source: {emit}")
     columns: dict[str, dict[str, Any]] = {}
     added: list[str] = []
     parts: list[Part] = []

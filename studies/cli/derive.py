@@ -10,20 +10,15 @@ With --dynamics: schema hrg.derive-dynamics/1, `equations` and, with --code, `co
 CVG paper on demodulated dynamics.
 """
 
-import dataclasses
-import io
-from contextlib import redirect_stdout
-from dataclasses import replace
+from dataclasses import asdict, replace
 from math import radians
 from typing import TYPE_CHECKING, Any, Literal
 
 from shell.rayleigh import rayleigh_integrals
 from studies.cli.output import answers, say
 from studies.errors import InputError
-from studies.files.writing import write_text
 from studies.papers.bvg_theory import compare_bell_theory
 from studies.results import Chapter, Result, Sentence, Table
-from studies.results.terminal import print_result
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -46,7 +41,6 @@ def derive(
     harmonic: int = 2,
     pole_angle_deg: float = 0.0,
     rim_angle_deg: float = 90.0,
-    out: str | None = None,
 ) -> Result:
     """Derive the frequency of the inextensional spherical shell, HRG paper equations (1)-(15).
 
@@ -64,13 +58,7 @@ def derive(
         harmonic: Circumferential harmonic n of the closed forms and of the code, at least 2.
         pole_angle_deg: Polar angle where the shell starts; above 0 the pole is open.
         rim_angle_deg: Polar angle where the shell ends.
-        out: Write the text, LaTeX or code to this file instead of the terminal.
     """
-    if out is not None:
-        same = derive.__wrapped__  # type: ignore[attr-defined]
-        shape_of = {"harmonic": harmonic, "pole_angle_deg": pole_angle_deg, "rim_angle_deg": rim_angle_deg}
-        return _into_file(out, same(dynamics=dynamics, bell=bell, latex=latex, code=code, **shape_of))
-
     from shell.derivation.chain import DerivedCase, steps
     from shell.derivation.design_code import emit_code
     from studies.derivation import read_chain
@@ -113,20 +101,11 @@ def derive(
         "d_ln_f_d_rim_angle_per_rad": float(case.rim_derivative.evalf(20)),
     }
     say("deriving the equations ...")
-    emitted = emit_code(case, code) if code else None
-    text = _write(payload, chain := read_chain(steps(case)), HRG_TITLE, latex, code, emitted)
     lead = f"HRG paper, equations (1) to (15), closed forms for n = {harmonic} from {pole_angle_deg:g}° to {rim_angle_deg:g}°."
-    return Result(payload, "Frequency of the inextensional shell", lead, _chapters(chain), printed=text)
-
-
-def _into_file(out: str, result: Result) -> Result:
-    """Write what a derivation prints to a file, whole or not at all; the terminal is then left alone."""
-    text = io.StringIO()
-    with redirect_stdout(text):
-        print_result(result)
-    write_text(out, text.getvalue())
-    say(f"written: {out}")
-    return replace(result, printed="")
+    emitted = {"language": code, "text": emit_code(case, code)} if code else None
+    return _answer(
+        payload, read_chain(steps(case)), HRG_TITLE, latex, "Frequency of the inextensional shell", lead, emitted
+    )
 
 
 def _derive_dynamics(latex: bool, code: Literal["python", "c"] | None) -> Result:
@@ -134,11 +113,10 @@ def _derive_dynamics(latex: bool, code: Literal["python", "c"] | None) -> Result
     from compensation.derivation.design_code import emit_code
     from studies.derivation import read_chain
 
-    payload: dict[str, Any] = {"schema": "hrg.derive-dynamics/1"}
-    emitted = emit_code(code) if code else None
-    text = _write(payload, chain := read_chain(steps()), DYNAMICS_TITLE, latex, code, emitted)
     lead = "Averaged equations of amplitude, quadrature, precession and phase of the standing wave."
-    return Result(payload, "Dynamics of the standing wave", lead, _chapters(chain), printed=text)
+    emitted = {"language": code, "text": emit_code(code)} if code else None
+    schema = {"schema": "hrg.derive-dynamics/1"}
+    return _answer(schema, read_chain(steps()), DYNAMICS_TITLE, latex, "Dynamics of the standing wave", lead, emitted)
 
 
 def _derive_bell(latex: bool) -> Result:
@@ -146,47 +124,40 @@ def _derive_bell(latex: bool) -> Result:
     from studies.derivation import read_chain
 
     say("deriving the bell's equations ...")
-    payload: dict[str, Any] = {"schema": "hrg.derive-bell/1"}
-    text = _write(payload, chain := read_chain(bell_steps(), shorten), BELL_TITLE, latex)
-    payload["numbers"] = None
-    title, lead = "Theory of the bell", "BVG paper, equations (1) to (22), beside what is printed."
+    payload: dict[str, Any] = {"schema": "hrg.derive-bell/1", "numbers": None}
+    lead = "BVG paper, equations (1) to (22), beside what is printed."
+    found = _answer(payload, read_chain(bell_steps(), shorten), BELL_TITLE, latex, "Theory of the bell", lead)
     if latex:
-        return Result(payload, title, lead, _chapters(chain), printed=text)
+        return found
     theory = compare_bell_theory()
-    columns = (
+    title = f"Equations (21), (22) with these patterns, and the solver: card {theory.card}"
+    head = (
         "name: pattern | frequency: f (Hz) .6g | precession_factor: precession factor .5f"
         " | membrane_share: membrane share of the energy .3g"
     )
-    title_of = f"Equations (21), (22) with these patterns, and the solver: card {theory.card}"
-    table = Table(title_of, [*theory.rows, theory.free, theory.solid], columns)
-    printed = Sentence(text, "source", "terminal")
-    return Result(
-        payload | {"numbers": dataclasses.asdict(theory)},
-        title,
-        lead,
-        [printed, Chapter("Against the solver", [table]), *_chapters(chain)],
+    table = Table(title, [*theory.rows, theory.free, theory.solid], head)
+    printed = Sentence(found.printed or "", "source", "terminal")
+    return replace(
+        found,
+        payload=found.payload | {"numbers": asdict(theory)},
+        parts=[printed, Chapter("Against the solver", [table]), *found.parts],
+        printed=None,
     )
 
 
-def _chapters(chain: "Sequence[Step]") -> list[Chapter]:
-    """The steps of a derivation, for a page: the equations as on a terminal."""
-    from studies.derivation import draw
+def _answer(
+    payload: dict[str, Any], chain: "Sequence[Step]", latex_title: str, latex: bool, title: str, lead: str,
+    code: dict[str, str] | None = None,
+) -> Result:  # fmt: skip
+    """Return the equations of a derivation and its code; the page has the equations as a terminal shows them."""
+    from studies.derivation import draw, emit_latex, emit_text, typeset, write_plainly
 
-    return [Chapter(step.heading, [Sentence(draw(step), "source", "page")]) for step in chain]
-
-
-def _write(
-    payload: dict[str, Any], steps: "Sequence[Step]", title: str, latex: bool, code: str | None = None, emitted: str | None = None,
-) -> str:  # fmt: skip
-    """Put the equations of a derivation, and its code, into the payload; return what is printed of them."""
-    from studies.derivation import emit_latex, emit_text, typeset, write_plainly
-
-    payload["equations"] = [
+    equations = [
         {"number": step.number or None, "title": step.title, "latex": list(map(typeset, step.equations)),
          "plain": list(map(write_plainly, step.equations))}
-        for step in steps
+        for step in chain
     ]  # fmt: skip
-    if emitted is not None:
-        payload["code"] = {"language": code, "text": emitted}
-        return emitted
-    return emit_latex(steps, title) if latex else emit_text(steps)
+    text = code["text"] if code else emit_latex(chain, latex_title) if latex else emit_text(chain)
+    chapters = [Chapter(step.heading, [Sentence(draw(step), "source", "page")]) for step in chain]
+    found = payload | {"equations": equations} | ({"code": code} if code else {})
+    return Result(found, title, lead, chapters, printed=text)

@@ -9,7 +9,7 @@ unit·√s, B in unit, K in unit/√s; null for runs too short for it.
 
 from typing import Any, Literal
 
-from studies.cli.arguments import EmitC, Records, SaveModel
+from studies.cli.arguments import Records, SaveModel
 from studies.cli.output import answers, keep_model, say
 from studies.errors import InputError
 from studies.fits.bias import BiasStudy, Judged, study_bias
@@ -29,7 +29,6 @@ def fit_bias(
     causal: bool = False,
     over: Literal["auto", "frequency", "temperature"] = "auto",
     save: SaveModel = None,
-    emit: EmitC = None,
 ) -> Result:
     """Fit the bias over the change of frequency and its rate, with stepwise selection (HRG paper, equations 19 to 22).
 
@@ -52,7 +51,7 @@ def fit_bias(
         say(f"reading {path}")
         records.append(read_record(path))
     study = study_bias(records, method, average, window, causal=causal, over=over, progress=say)
-    keep_model(study.model, save, emit)
+    keep_model(study.model, save)
     judged, other = study.by(method), study.by("paper" if method == "guarded" else "guarded")
     variable = judged.fit.variable.name
     return Result(

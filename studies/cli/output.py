@@ -98,17 +98,13 @@ def keep_card(instrument: "Instrument", path: str | None) -> None:
         say(f"card: {path}")
 
 
-def keep_model(model: "Model", save: str | None, emit: str | None = None) -> None:
-    """Save a model as TOML and as C where paths were given, and say so."""
-    from studies.files.writing import write_text
-    from studies.models import emit_c, write_model
+def keep_model(model: "Model", path: str | None) -> None:
+    """Save a model where a path was given, and say so."""
+    from studies.models import write_model
 
-    if save is not None:
-        write_model(model, save)
-        say(f"model: {save}")
-    if emit is not None:
-        write_text(emit, emit_c(model))
-        say(f"C source: {emit}")
+    if path is not None:
+        write_model(model, path)
+        say(f"model: {path}")
 
 
 def keep_record(record: "Record", path: str) -> None:

@@ -128,8 +128,6 @@ def _draw_allan(chain: BellChain, rest: BellRun) -> Drawing:
             (result.temperature_compensated, style.BLUE, "compensated"),
             (result.filtered, style.GREEN, f"and filtered, {len(chain.taps)} taps"),
         ):
-            allan = allan_deviation(values / DEG * 3600, step)
-            axes.loglog(allan.tau, allan.deviation, color=colour, label=name)
-            axes.fill_between(allan.tau, allan.low, allan.high, color=colour, alpha=0.2)
+            style.draw_allan(axes, allan_deviation(values / DEG * 3600, step), colour, name)
         axes.axvline(step * len(chain.taps), color=style.BLACK, linewidth=0.8, linestyle=":")
         return made

@@ -269,12 +269,8 @@ def _draw_allan(study: BiasStudy) -> Drawing:
     label = f"Allan deviation ({_unit(study.output)})"
     with style.figure(height=3.8, x="averaging time τ (s)", y=label) as (figure, axes):
         for spectrum, colour, label in ((study.before, style.ORANGE, "before"), (study.after, style.BLUE, "after")):
-            if spectrum is None:
-                continue
-            allan = spectrum.allan
-            axes.fill_between(allan.tau, allan.low, allan.high, color=colour, alpha=0.25, linewidth=0)
-            axes.loglog(allan.tau, allan.deviation, color=colour, label=label)
-            axes.loglog(allan.tau, spectrum.noise.deviation(allan.tau), "--", color=colour, linewidth=1)
+            if spectrum is not None:
+                style.draw_allan(axes, spectrum.allan, colour, label, spectrum.noise)
         return figure
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from studies.diagnosis.response import RESPONSES
 from studies.diagnosis.verdict import ResponseResult
 from studies.reports.digits import plain
-from studies.reports.style import BLACK, BLUE, ORANGE, VERMILION, figure
+from studies.reports.style import BLACK, BLUE, ORANGE, VERMILION, figure, panels
 from studies.results import Drawing
 
 if TYPE_CHECKING:
@@ -105,26 +105,18 @@ def residual_views(diagnosis: "Inference | Unjudged", response: str) -> Drawing:
     seen, unit = diagnosis.seen(response), RESPONSES[response]
     inputs, rest, runs = seen.inputs, seen.rest * unit.scale, seen.run
     heating = inputs["rate (K/min)"] > 0
-    columns = 2
-    rows = (len(inputs) + 2) // columns
-    with figure(rows, columns, height=2.5 * rows, sharey=True) as (canvas, axes):
-        flat = list(np.ravel(axes))
-        for axis, (label, values) in zip(flat, inputs.items(), strict=False):
-            axis.plot(
-                values[heating], rest[heating], ".", color=VERMILION, markersize=2, label="heating", rasterized=True
-            )
-            axis.plot(values[~heating], rest[~heating], ".", color=BLUE, markersize=2, label="cooling", rasterized=True)
+    with panels(len(inputs) + 1, sharey=True) as (canvas, axes):
+        for axis, (label, values) in zip(axes, inputs.items(), strict=False):
+            for rows, colour, name in ((heating, VERMILION, "heating"), (~heating, BLUE, "cooling")):
+                axis.plot(values[rows], rest[rows], ".", color=colour, markersize=2, label=name, rasterized=True)
             axis.set_xlabel(label)
             axis.locator_params(axis="x", nbins=4)
             axis.ticklabel_format(axis="x", useOffset=False)
-        axis = flat[len(inputs)]
-        axis.boxplot([rest[runs == k] for k in np.unique(runs)], showfliers=False)
-        axis.set_xlabel("run")
-        for axis in flat[len(inputs) + 1 :]:
-            axis.set_visible(False)
-        for axis in flat[::columns]:
+        axes[-1].boxplot([rest[runs == k] for k in np.unique(runs)], showfliers=False)
+        axes[-1].set_xlabel("run")
+        for axis in axes[::2]:
             axis.set_ylabel(f"residual ({unit.shown})")
-        flat[0].legend(markerscale=4)
+        axes[0].legend(markerscale=4)
         return canvas
 
 

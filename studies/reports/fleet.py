@@ -10,7 +10,7 @@ from studies.fleet.lot import Lot
 from studies.fleet.population import Quantity
 from studies.reports.diagnosis import NAMES, spell_parameter
 from studies.reports.digits import plain
-from studies.reports.style import BLUE, ORANGE, VERMILION, figure
+from studies.reports.style import BLUE, ORANGE, VERMILION, panels
 from studies.results import Chapter, Column, Drawing, Facts, Figure, Sentence, Table
 
 if TYPE_CHECKING:
@@ -131,11 +131,8 @@ def _name(one: Quantity) -> str:
 
 
 def _draw(lot: Lot, quantities: list[Quantity], by_date: bool = False) -> Drawing:
-    rows = -(-len(quantities) // ACROSS)
-    with figure(rows, ACROSS, height=2.3 * rows, squeeze=False) as (canvas, axes):
-        for axis in axes.flat[len(quantities) :]:
-            axis.set_visible(False)
-        for axis, one in zip(axes.flat, quantities, strict=False):
+    with panels(len(quantities), ACROSS, 2.3) as (canvas, axes):
+        for axis, one in zip(axes, quantities, strict=True):
             _draw_chart(axis, lot, one, by_date)
         return canvas
 

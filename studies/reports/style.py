@@ -2,12 +2,15 @@
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from studies.results import Drawing
+
+if TYPE_CHECKING:
+    from compensation.stability import AllanDeviation, NoiseCoefficients
 
 # Okabe and Ito's set: distinguishable with every common kind of colour vision, and by lightness in print.
 BLACK, ORANGE, SKY, GREEN, YELLOW, BLUE, VERMILION, PURPLE = (
@@ -45,6 +48,31 @@ def outline_rows(values: NDArray[np.float64]) -> NDArray[np.intp]:
     first = np.concatenate([[0], np.cumsum(np.bincount(part))[:-1]])
     ends = np.concatenate([first, first + np.maximum(known, 1) - 1, first + known - 1 + (known < np.bincount(part))])
     return np.unique(np.concatenate([[0, len(values) - 1], order[ends]]))
+
+
+def draw_allan(
+    axes: Any, allan: "AllanDeviation", colour: str, label: str, noise: "NoiseCoefficients | None" = None
+) -> None:
+    """Draw an Allan deviation with its interval, and dashed the noise that was fitted to it."""
+    axes.fill_between(allan.tau, allan.low, allan.high, color=colour, alpha=0.25, linewidth=0)
+    axes.loglog(allan.tau, allan.deviation, color=colour, label=label)
+    if noise is not None:
+        axes.loglog(allan.tau, noise.deviation(allan.tau), "--", color=colour, linewidth=1, alpha=0.8)
+
+
+@contextmanager
+def panels(
+    count: int, across: int = 2, height: float = 2.5, x: str = "", **options: Any
+) -> Iterator[tuple[Drawing, list[Any]]]:
+    """Give a figure with so many axes side by side and below each other, as `figure` does; `x` stands below the last of every column."""
+    rows = -(-count // across)
+    with figure(rows, min(count, across), height=height * rows, squeeze=False, **options) as (made, axes):
+        shown = list(axes.flat)
+        for axis in shown[count:]:
+            axis.set_visible(False)
+        for axis in shown[max(count - across, 0) : count]:
+            axis.set_xlabel(x)
+        yield made, shown[:count]
 
 
 @contextmanager

@@ -1,7 +1,6 @@
 """The page of `hrg show`: a record's columns over time and temperature, their spectra, noise and correlation."""
 
 from collections.abc import Sequence
-from math import ceil
 from pathlib import Path
 from typing import Any
 
@@ -107,11 +106,6 @@ def run_chapters(survey: Survey, told: dict[str, Any], several: bool) -> list[Ch
     return [chapter for chapter in chapters if chapter.parts]
 
 
-def _grid(count: int, x: str, log: bool = False) -> Any:
-    rows = ceil(count / 2)
-    return style.figure(rows, 2 if count > 1 else 1, height=2.5 * rows + 0.3, x=x, squeeze=False)
-
-
 def _temperature_parts(survey: Survey) -> list[Figure]:
     wide = {c.name for c in survey.columns if c.range.high - c.range.low > 0.1}
     temperature = next((name for name in TEMPERATURES if name in wide), None)
@@ -124,46 +118,33 @@ def _temperature_parts(survey: Survey) -> list[Figure]:
 
 def _draw_over_temperature(survey: Survey, temperature: str, others: Sequence[str]) -> Drawing:
     time, T = survey.record["time_s"], survey.record[temperature]
-    with _grid(len(others), column_title(temperature)) as (made, axes):
-        for axis, name in zip(axes.flat, others, strict=False):
+    with style.panels(len(others), x=column_title(temperature)) as (made, axes):
+        for axis, name in zip(axes, others, strict=True):
             both = np.isfinite(T) & np.isfinite(survey.record[name])
             x, y = (average_evenly(time[both], values[both], FEW)[1] for values in (T, survey.record[name]))
             warming = np.gradient(np.convolve(np.pad(x, 7, mode="edge"), np.full(15, 1 / 15), mode="valid")) > 0 if len(x) > 2 else x > 0  # fmt: skip
             for rows, colour, label in ((warming, style.VERMILION, "warming"), (~warming, style.BLUE, "cooling")):
                 axis.plot(x[rows], y[rows], ".", color=colour, markersize=2, label=label)
             axis.set_title(column_title(name), fontsize=9, loc="left")
-        _blank(axes, len(others))
         return made
 
 
 def _draw_stability(survey: Survey) -> Drawing:
     shown = [(column.name, column.stability) for column in survey.columns if column.stability is not None]
-    with _grid(len(shown), "averaging time τ (s)") as (made, axes):
-        for axis, (name, found) in zip(axes.flat, shown, strict=False):
-            tau = found.allan.tau
-            axis.fill_between(tau, found.allan.low, found.allan.high, color=style.SKY, alpha=0.35)
-            axis.loglog(tau, found.allan.deviation, color=style.BLUE, label="Allan deviation")
-            axis.loglog(tau, found.noise.deviation(tau), "--", color=style.ORANGE, linewidth=1, label="fitted noise")
+    with style.panels(len(shown), x="averaging time τ (s)") as (made, axes):
+        for axis, (name, found) in zip(axes, shown, strict=True):
+            style.draw_allan(axis, found.allan, style.BLUE, "Allan deviation", found.noise)
             axis.set_title(column_title(name), fontsize=9, loc="left")
-        _blank(axes, len(shown))
         return made
 
 
 def _draw_spectra(survey: Survey) -> Drawing:
     shown = [(column.name, column.density) for column in survey.columns if column.density is not None]
-    with _grid(len(shown), "frequency (Hz)") as (made, axes):
-        for axis, (name, found) in zip(axes.flat, shown, strict=False):
+    with style.panels(len(shown), x="frequency (Hz)") as (made, axes):
+        for axis, (name, found) in zip(axes, shown, strict=True):
             axis.loglog(found.frequency, np.sqrt(found.density), color=style.BLUE, linewidth=1)
             axis.set_title(column_title(name, "/√Hz"), fontsize=9, loc="left")
-        _blank(axes, len(shown))
         return made
-
-
-def _blank(axes: Any, count: int) -> None:
-    for axis in axes.flat[count:]:
-        axis.set_visible(False)
-    if count % 2 and axes.size > 2:
-        axes[-2, 1].set_xlabel(axes[-1, 0].get_xlabel())
 
 
 def tell(survey: Survey) -> dict[str, Any]:

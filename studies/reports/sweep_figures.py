@@ -105,26 +105,21 @@ def _draw_response(results: Results, column: Column) -> Drawing:
         return _draw_map(results, column)
     numeric = _numeric(results)
     shown = numeric[:6]
-    columns = min(len(shown), 3)
-    rows = -(-len(shown) // columns)
     y = results.column(column.name)
     few = style.few_rows(len(y))
-    with style.figure(rows, columns, height=2.6 * rows, sharey=True, squeeze=False) as (made, axes):
-        for panel, parameter in zip(axes.flat, shown, strict=False):
+    mark = (
+        {"marker": "o", "markersize": 4} if len(numeric) == 1 else {"marker": ".", "markersize": 2.5, "linestyle": ""}
+    )
+    with style.panels(len(shown), 3, 2.6, sharey=True) as (made, axes):
+        for panel, parameter in zip(axes, shown, strict=True):
             x = results.parameter(parameter.name).astype(float)
-            line = len(numeric) == 1
-            order = np.argsort(x[few])
-            panel.plot(
-                x[few][order], y[few][order], "o-" if line else ".", markersize=4 if line else 2.5, color=style.BLUE,
-                rasterized=len(few) > 500,
-            )  # fmt: skip
+            order = few[np.argsort(x[few])]
+            panel.plot(x[order], y[order], color=style.BLUE, rasterized=len(few) > 500, **mark)
             panel.set_xlabel(label(parameter.name, parameter.unit), fontsize=9)
             panel.locator_params(axis="x", nbins=4)
             panel.tick_params(labelsize=8)
             panel.ticklabel_format(useOffset=False)
-        for panel in axes.flat[len(shown) :]:
-            panel.set_visible(False)
-        for panel in axes[:, 0]:
+        for panel in axes[::3]:
             panel.set_ylabel(column_label(column), fontsize=9)
     return made
 

@@ -214,19 +214,6 @@ def test_code_says_how_far_rayleigh_is_off_for_its_harmonic(n, solid, capsys):
         assert f"lower, by {100 * (1 - solid / assumed):.1f} % at h/R = 0.06" in said
 
 
-@pytest.mark.parametrize("words", [["--latex"], ["--code", "c"]])
-def test_out_holds_what_the_terminal_shows(words, tmp_path, capsys):
-    file = tmp_path / "text"
-    assert main(["derive", *words]) == 0
-    shown = capsys.readouterr().out
-    assert main(["derive", *words, "--out", str(file)]) == 0
-    assert capsys.readouterr().out == ""
-    assert file.read_text(encoding="utf-8") == shown
-    assert main(["derive", *words, "--out", str(file), "--json"]) == 0
-    assert capsys.readouterr().out.startswith("{")
-    assert file.read_text(encoding="utf-8") == shown
-
-
 @pytest.mark.slow
 def test_both_languages_agree(tmp_path, capsys):
     space = {}
