@@ -6,8 +6,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from studies import workbench
-from studies.cli.output import answers, say
-from studies.cli.telling import Told
+from studies.cli.output import Told, answers, say
 from studies.errors import InputError
 from studies.instrument.card import load_card, save_card
 from studies.planning.chamber import Chamber, parse_chamber

@@ -5,8 +5,7 @@ from pathlib import Path
 from typing import Annotated
 
 from studies.cli.arguments import COUNT
-from studies.cli.output import answers, dump_json, say
-from studies.cli.telling import Told
+from studies.cli.output import Told, answers, dump_json, say
 from studies.errors import InputError
 from studies.files.writing import write_text
 from studies.results import Result

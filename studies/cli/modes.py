@@ -9,18 +9,21 @@ a crystal, the lowest pairs of n = 2, 3, 5, 6, 7, 9 … have `crystal`: `antinod
 """
 
 from collections.abc import Sequence
-from dataclasses import asdict
+from math import degrees
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 
 from shell.constants import zero_Celsius
-from shell.modes import solve_modes
+from shell.errors import ShellError
+from shell.law import check_mount
+from shell.modes import Mode, solve_modes
+from shell.prestress import Prestress
 from studies.cli.arguments import COUNT, FRACTION, MANY, WHOLE, AnyTheory, Card, Temperature, open_resonator
-from studies.cli.mode_effects import MODE, Asked, describe_effects, effect_tables
 from studies.cli.output import answers
 from studies.errors import naming
 from studies.instrument.card import Instrument
+from studies.loss.films import film_shifts
 from studies.reports.digits import to_numerical_error
 from studies.reports.mode_picture import THEORIES
 from studies.reports.scenes import live_chapter, show_mode
@@ -28,9 +31,13 @@ from studies.resonator.law import law_of
 from studies.results import Blocks, Column, Result, Sentence, Table, Where, row_of
 
 if TYPE_CHECKING:
+    from shell.imperfection import Split
     from studies.results.page import Block
 
+Entry = dict[str, Any]
+
 FAR = 0.1  # relative difference of the first order from all orders from which on a split is doubted
+MODE = "harmonic: n | index"
 COLUMNS = (
     f"{MODE} | label: kind",
     Column(
@@ -39,6 +46,39 @@ COLUMNS = (
     "bryan_factor: Bryan factor .5f | relative_error_estimate: solver error, relative .0e | material_uncertainty_Hz:"
     " material uncertainty (Hz) .2g | frequency_per_thickness_Hz_per_um: df/dh (Hz/µm) +.3g",
 )
+SPLIT = (
+    f"{MODE} | split.slow_Hz: slow (Hz) .5f | split.fast_Hz: fast (Hz) .5f | split.split_Hz: split (Hz) .5f"
+    " | split.every_order_split_Hz: split, all orders (Hz) .5f | split.slow_axis_deg: slow axis (°) .2f"
+    " | split.shift_ppm: shift (ppm) +.3f"
+)
+MOUNT = (
+    f"{MODE} | mount.per_strain: per strain +.4g | mount.shift_ppm: shift (ppm) +.4g"
+    " | mount.slope_ppm_per_degC: slope (ppm/°C) +.3g"
+)
+FILMS = (
+    f"{MODE} | film | shift_ppm: shift (ppm) +.4g",
+    Column(lambda film: " and ".join(film["missing"]), "unknown without"),
+)
+CRYSTAL = (
+    "harmonic: n | crystal.antinode_along_100_Hz: antinode along [100] (Hz) .4f | crystal.other_Hz: other mode (Hz) .4f"
+    " | crystal.split_Hz: split (Hz) .4f | crystal.relative_error_estimate: solver error, relative .0e"
+)
+MISMATCH = (
+    "The base has expanded {:.4g} ppm more than the resonator since they were joined. First order in the resulting stress"
+    " and deformation. The frequencies above do not include it; those of hrg tcf and of simulations do."
+)
+BARE = "By stiffness and mass, to first order in the thickness. The frequencies above are those of the bare wall."
+VOIGT = "[001] along the axis. The table above and every other command use the isotropic (Voigt-Reuss-Hill) mean of the elastic constants."
+SLOPES = (
+    f"{MODE} | sensitivities.E: ln E +.4f | sensitivities.nu: ν +.4f | sensitivities.rho: ln ρ +.4f"
+    " | sensitivities.thickness: ln h +.4f | sensitivities.radius: ln r +.4f | modal_mass_kg: modal mass (g) ×1e3 .4f"
+)
+ENERGY = (
+    f"{MODE} | energy_fractions.bending: bending ×100 .3f | energy_fractions.membrane: membrane ×100 .3f"
+    " | energy_fractions.shear: transverse shear ×100 .3f | energy_fractions.root: root ×100 .3f"
+    " | energy_fractions.stem: stem ×100 .3f"
+)
+DERIVED = "ν at constant E; ln r scales every length but the thickness. Modal mass: for a maximum displacement of 1."
 
 
 @answers("hrg.modes/1")
@@ -65,8 +105,7 @@ def modes(
     detailed = theory != "rayleigh"
     with naming(instrument.path):
         found = [m for n in harmonic for m in solve_modes(resonator, elastic, n, count, theory, tolerance)]
-        asked = Asked(instrument, T, tolerance)
-        more = [describe_effects(m, asked) for m in found]
+        more = [_effects(m, instrument, T, tolerance) for m in found]
     share = float(law_of(instrument, T, T).uncertainty(np.array([T]))[0])
     mean = float(sum(h for _, h in resonator.thickness) / len(resonator.thickness))
     entries = []
@@ -79,11 +118,11 @@ def modes(
             entry |= {
                 "material_uncertainty_Hz": share * m.frequency if share else None,
                 "frequency_per_thickness_Hz_per_um": per_micrometre,
-                "modal_mass_kg": m.modal_mass,
-                "sensitivities": asdict(m.sensitivities),
-                "energy_fractions": asdict(m.energy_fractions),
+                **row_of(m, "sensitivities", "energy_fractions", modal_mass_kg="modal_mass"),
             }
         entries.append(entry | effects)
+    shown = entries if detailed else []
+    where: Where = "everywhere" if sensitivities else "page"
     head = {"card": instrument.name, "temperature_degC": T - zero_Celsius, "theory": theory}
     name = f"{instrument.name} at {T - zero_Celsius:g} °C, {THEORIES[theory]}"
     return Result(
@@ -92,13 +131,101 @@ def modes(
         f"Natural frequencies and Bryan factors at {T - zero_Celsius:g} °C, {THEORIES[theory]}.",
         [
             Table(name, entries, COLUMNS, _note(theory, share)),
-            *effect_tables(entries),
+            *_effect_tables(entries),
             *_all_orders(entries),
-            *_detail_tables(entries if detailed else [], "everywhere" if sensitivities else "page"),
+            Table("Derivatives of ln f", shown, SLOPES, DERIVED, where),
+            Table("Strain energy (%)", shown, ENERGY, "Root: the solid cap, fillet or corner.", where),
             Blocks(lambda: _view(instrument, sorted(set(harmonic)), T, theory)),
             live_chapter(instrument, harmonic[0], theory),
         ],
     )
+
+
+def _effects(m: Mode, instrument: Instrument, T: float, tolerance: float) -> Entry:
+    """Return what else applies to a mode of a card at T (K), by its key in the JSON."""
+    found = {
+        "split": _split(m, instrument, T),
+        "mount": _mount(m, instrument, T),
+        "films": _films(m, instrument),
+        "crystal": _crystal(m, instrument, T, tolerance),
+    }
+    return {key: entry for key, entry in found.items() if entry is not None}
+
+
+def _split(m: Mode, instrument: Instrument, T: float) -> Entry | None:
+    """What the card's imperfection and electrodes make of a pair."""
+    if m.theory == "rayleigh" or m.harmonic < 1 or not instrument.is_imperfect:
+        return None
+    from studies.resonator.splitting import SplitPair
+
+    whole = SplitPair(instrument, m, T)
+    slow, fast = whole.split.frequencies
+
+    def told(one: "Split") -> Entry:
+        return row_of(one, split_Hz="hertz", slow_axis_deg=("slow_axis", degrees(1)), shift_ppm=("shift", 1e6))
+
+    parts = {name: told(getattr(whole, name)) for name in ("imperfection", "measured", "electrodes")}
+    every = {"slow_Hz": slow, "fast_Hz": fast, "every_order_split_Hz": whole.of_every_order().hertz, "parts": parts}
+    return told(whole.split) | every
+
+
+def _mount(m: Mode, instrument: Instrument, T: float) -> Entry | None:
+    """Shift and slope of a pair by the stress of [mount]."""
+    mount = instrument.part("mount")
+    if mount is None or m.theory != "solid" or not m.harmonic:
+        return None
+    with naming(f"{instrument.path} [mount]"):
+        strain, slope = (float(x(instrument.material, T)) for x in (mount.strain, mount.strain_slope))
+        check_mount(instrument.resonator, m.theory, m.harmonic)
+        s = Prestress(m).by_base
+    return {
+        "strain_ppm": 1e6 * strain,
+        "shift_ppm": 1e6 * s * strain + 0.0,  # no -0
+        "slope_ppm_per_degC": 1e6 * s * slope,
+        "per_strain": s,
+    }
+
+
+def _films(m: Mode, instrument: Instrument) -> list[Entry] | None:
+    """Every film and its shift in ppm, null where its numbers are not known."""
+    if m.theory == "rayleigh":
+        return None
+    shifts = film_shifts(instrument, m)
+    return [row_of(one, "missing", film="material", shift_ppm=("relative", 1e6)) for one in shifts] or None
+
+
+def _crystal(m: Mode, instrument: Instrument, T: float, tolerance: float) -> Entry | None:
+    """Both modes of a lowest pair n >= 2 but multiples of 4."""
+    given = instrument.keys("material").cubic
+    crystal = given or instrument.material.cubic(T)
+    if crystal is None or m.theory != "solid" or m.harmonic < 2 or m.harmonic % 4 == 0 or m.index:
+        return None
+    from shell.cubic import solve_cubic
+
+    assert m.resonator is not None
+    try:
+        pair = solve_cubic(m.resonator, crystal, m.harmonic, tolerance)
+    except ShellError:
+        if given is not None:
+            raise
+        return None  # of a stem or a clamp; the material's caveat says so
+    axes = {"antinode_along_100_Hz": "along_100", "other_Hz": "along_110"}
+    lines = row_of(pair, "relative_split", "relative_error_estimate", **axes)
+    return lines | {"split_Hz": abs(pair.along_110 - pair.along_100)}
+
+
+def _effect_tables(modes: list[Entry]) -> list[Table]:
+    """Return the tables of what applies to the modes."""
+    of = {key: [row for row in modes if key in row] for key in ("split", "mount", "films", "crystal")}
+    strain = next((row["mount"]["strain_ppm"] for row in of["mount"]), 0.0)
+    films = [row | film for row in of["films"] for film in row["films"]]
+    antinode = "Slow axis: an antinode of the slower mode."
+    return [
+        Table("Pairs with imperfections and electrodes", of["split"], SPLIT, antinode),
+        Table("Thermal mismatch with the base", of["mount"], MOUNT, MISMATCH.format(strain)),
+        Table("Effect of the films", films, FILMS, BARE),
+        Table("Pairs of the anisotropic crystal", of["crystal"], CRYSTAL, VOIGT),
+    ]
 
 
 def _view(instrument: Instrument, harmonics: list[int], T: float, theory: str) -> "Sequence[Block]":
@@ -119,7 +246,7 @@ def _note(theory: str, share: float) -> str:
     return f"Solver error: against the exact solution of the same theory. Material uncertainty: {spread}."
 
 
-def _all_orders(modes: list[dict[str, Any]]) -> list[Sentence]:
+def _all_orders(modes: list[Entry]) -> list[Sentence]:
     """Warn where imperfections are too large for the first order."""
     found = []
     for row in modes:
@@ -128,16 +255,3 @@ def _all_orders(modes: list[dict[str, Any]]) -> list[Sentence]:
             found.append(f"n = {row['harmonic']} ({one:.3g} and {every:.3g} Hz)")
     words = "to first order and of all orders the splits differ by more than 10 %"
     return [Sentence(f"The imperfections are large: {words} for {', '.join(found)}.", "warning")] if found else []
-
-
-def _detail_tables(modes: list[dict[str, Any]], where: Where) -> list[Table]:
-    names = {"E": "ln E", "nu": "ν", "rho": "ln ρ", "thickness": "ln h", "radius": "ln r"}
-    slopes = [f"sensitivities.{key}: {name} +.4f" for key, name in names.items()]
-    kinds = {"bending": "bending", "membrane": "membrane", "shear": "transverse shear", "root": "root", "stem": "stem"}
-    shares = [f"energy_fractions.{key}: {name} ×100 .3f" for key, name in kinds.items()]
-    mass = "modal_mass_kg: modal mass (g) ×1e3 .4f"
-    note = "ν at constant E; ln r scales every length but the thickness. Modal mass: for a maximum displacement of 1."
-    return [
-        Table("Derivatives of ln f", modes, [MODE, *slopes, mass], note, where),
-        Table("Strain energy (%)", modes, [MODE, *shares], "Root: the solid cap, fillet or corner.", where),
-    ]
