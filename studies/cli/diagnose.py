@@ -69,7 +69,6 @@ def diagnose(
 
 
 def _plan(profiles: list[str], card: str | None, limits: Chamber | None) -> Result:
-    """Predict which effects a planned campaign can identify."""
     from studies.planning.plan import plan_campaign
     from studies.reports import plan as parts
 
@@ -81,7 +80,6 @@ def _plan(profiles: list[str], card: str | None, limits: Chamber | None) -> Resu
 
 
 def _table(path: str, card: str | None) -> Result:
-    """Diagnose one steady-state table."""
     from studies.diagnosis.table import diagnose_table
     from studies.reports.diagnosis_table import table_parts
 
@@ -90,7 +88,6 @@ def _table(path: str, card: str | None) -> Result:
 
 
 def _campaign(runs: tuple[str, ...], card: str | None, limits: Chamber | None, save: str | None) -> Result:
-    """Diagnose the records of one gyro."""
     from studies.inference.diagnosis import Inference
     from studies.inference.extension import extend
     from studies.reports.diagnosis import diagnosis_parts
@@ -113,7 +110,6 @@ def _campaign(runs: tuple[str, ...], card: str | None, limits: Chamber | None, s
 
 
 def _fleet(devices: list[str], manifest: str | None, card: str | None) -> Result:
-    """Diagnose devices of one design together."""
     from studies.fleet.folder import read_devices
     from studies.fleet.run import run_lot
     from studies.reports import fleet as parts

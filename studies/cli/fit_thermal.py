@@ -98,7 +98,6 @@ MISFIT = (
 
 
 def _name(key: str) -> tuple[str, str]:
-    """Return the name and the unit of a constant."""
     return NAMES.get(key) or (key.replace("_", " ").capitalize(), "s" if key.startswith("time_constant") else "")
 
 

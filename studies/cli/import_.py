@@ -97,7 +97,6 @@ def _import(raw: tuple[str, ...], path: str, out: str) -> Result:
 
 
 def _import_table(raw: tuple[str, ...], import_map: LoadedMap, out: str) -> Result:
-    """Convert a table of settled readings."""
     if len(raw) != 1:
         raise InputError(f"{import_map.path}: describes one table, but {len(raw)} raw files are given.")
     columns, notes = import_table(raw[0], import_map)

@@ -133,7 +133,6 @@ def _run(
     study: LoopStudy, temperature: float, out: str, hours: float, row: float, rate: float, profile: str | None,
     both_ways: bool, seed: int | None,
 ) -> Record:  # fmt: skip
-    """Run the wave through the loops and write the record."""
     instrument, damping = study.instrument, None
     f, loss = np.array(study.frequency), np.array(study.inverse_q)
     if profile is not None:

@@ -205,7 +205,6 @@ def _draw_bars(budget: Budget, at: int) -> Drawing:
 
 
 def _draw_course(budget: Budget, stated: StatedLoss | None, reference: float) -> Drawing:
-    """1/Q and its parts over temperature."""
     degrees, middle = budget.temperatures - zero_Celsius, len(budget.temperatures) // 2
     low, high = budget.interval
     with style.figure(height=4.0, x="temperature (°C)", y="1/Q") as (made, axis):

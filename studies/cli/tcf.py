@@ -93,7 +93,6 @@ def tcf(
 
 
 def _curves(points: list[dict[str, Any]], parts: list[str], local: list[dict[str, float]]) -> Drawing:
-    """The slope, its uncertainty and its parts over temperature."""
     T, slope, sd = (
         np.array([p[key] for p in points])
         for key in ("temperature_degC", "slope_ppm_per_degC", "uncertainty_ppm_per_degC")

@@ -98,7 +98,6 @@ def thermal(
 
 
 def _curves(transient: Transient, chamber: Profile, weights: Array, names: list[str]) -> Drawing:
-    """Chamber and nodes over the whole profile."""
     time = np.linspace(chamber.start, chamber.end, 600)
     T = transient.observe(time, weights) - zero_Celsius
     with style.figure(x="time (h)", y="temperature (°C)") as (made, axis):
