@@ -35,6 +35,7 @@ def ramp(element, rate, *, rows=2001, length=10.0, rise=0.5):
     return time, rate * np.clip(time / (rise * tau), 0, 1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("element", [TUNED, MISTUNED], ids=["tuned", "mistuned"])
 def test_envelope_equals_the_integrated_carrier(element):
     time, rate = ramp(element, 5.0, length=4, rows=1601)
@@ -63,6 +64,7 @@ def test_envelope_converges_with_the_step(rows, rate_of_convergence):
     assert coarse / fine > rate_of_convergence
 
 
+@pytest.mark.slow
 def test_demodulated_carrier_gives_the_transfer_function_and_its_error_falls_with_the_rate():
     """Eq. (12) neglects the reaction on the primary: error (Ω/kζ)² of the carrier-resolved amplitude."""
     errors = []
@@ -170,6 +172,7 @@ def test_amplitude_response_is_that_of_the_integrated_carrier():
         assert np.hypot(*found[at : at + 2]) == pytest.approx(amplitude * 1e-3 / 2, rel=2e-3)
 
 
+@pytest.mark.slow
 def test_derived_transfer_functions_are_those_of_the_numbers():
     """Eqs. (8)–(24) as SymPy derives them from (7), at the numbers of a mistuned element."""
     import sympy

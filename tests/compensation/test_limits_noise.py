@@ -98,6 +98,7 @@ def test_whitened_rows_have_the_identity_as_covariance_where_rows_are_uneven():
     assert W @ covariance @ W.T == pytest.approx(np.eye(rows.count), abs=1e-9)
 
 
+@pytest.mark.slow
 def test_coarse_rows_are_means_of_neighbours_and_have_their_covariance():
     """400 rows of a run are 134 of three and a rest of one; rows without gaps: the walk and the white noise of means are exact."""
     rows, noise = NoiseRows.of([30.0 * np.arange(400.0), 20.0 * np.arange(90.0)]), Noise(2.0, 0.0, 0.05, 0.7)

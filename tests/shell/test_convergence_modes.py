@@ -121,6 +121,7 @@ def test_thin_shells_keep_their_digits(ratio: float) -> None:
     assert solid.frequency == pytest.approx(shell.frequency, rel=3e-3 * ratio + 2e-8)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("resonator", "n", "index"),
     [

@@ -46,6 +46,7 @@ def test_a_ring_of_silicon() -> None:
     assert errors[0] / errors[1] == pytest.approx([4, 4], rel=0.02)
 
 
+@pytest.mark.slow
 def test_a_dome_of_silicon_splits_by_seven_per_cent() -> None:
     """By NGSolve, a quarter of the dome in curved tetrahedra of order 5, from above (tests/benchmarks/cubic_ngsolve.py)."""
     pair = solve_cubic(DOME, SILICON)
@@ -54,6 +55,7 @@ def test_a_dome_of_silicon_splits_by_seven_per_cent() -> None:
     assert pair.relative_split == pytest.approx(0.07057, abs=1e-5)
 
 
+@pytest.mark.slow
 def test_a_crystal_that_is_isotropic_is_the_isotropic_body() -> None:
     glass = Elastic(72.7e9, 0.17, 2203.0)
     lam = glass.E * glass.nu / ((1 + glass.nu) * (1 - 2 * glass.nu))

@@ -232,6 +232,7 @@ def test_sensitivities_are_the_differences(resonator: Resonator, theory: str) ->
     assert slopes.thickness + slopes.radius == pytest.approx(-1, abs=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("thickness", [0.9e-3, 0.15e-3])
 def test_slope_by_thickness_is_that_of_full_solves(thickness: float) -> None:
     """Against fourth-order differences of frequencies solved to 4e-9: with the shape kept, only the step is left of the error."""

@@ -33,6 +33,7 @@ def _cells(columns: list[float], rows: list[float]) -> list[Patch]:
     ]
 
 
+@pytest.mark.slow
 def test_polysilicon_disk_on_a_post() -> None:
     """HiQLab (Bindel, Koyama, Govindjee; model disk_polysi): disk 20 µm by 2 µm, post 2 µm by 0.5 µm, E 150 GPa, ν 0.3, 2330 kg/m³.
 

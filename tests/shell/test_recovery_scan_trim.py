@@ -34,6 +34,7 @@ def projector():
     return Projector(DOME)
 
 
+@pytest.mark.slow
 def test_even_waves_of_both_faces_give_the_published_split(pair, projector):
     """cos 4θ of the same amplitude on both faces is a wall wave of twice it: 0.36902 of its share of the wall."""
     rng = np.random.default_rng(11)

@@ -29,9 +29,7 @@ def test_shipped_card_is_complete(name):
     ("old", "new", "words"),
     [
         ("hrg.card/1", "hrg.card/9", ["schema", "hrg.card/1"]),
-        ("radius_mm = 15.0", "", ["radius_mm", "missing"]),
         ("radius_mm = 15.0", "radius_mm = ]", ["TOML"]),
-        ('shape = "hemisphere"', 'shape = "sphere"', ["shape", "hemisphere"]),
         ('support = "stem"', 'support = "stme"', ["support", "'stem'"]),
         ('support = "stem"', 'support = "free"', ["[resonator.stem]"]),
         ("radius_mm = 2.5", "radius_mm = 25.0", ["stem", "larger"]),
@@ -44,7 +42,6 @@ def test_shipped_card_is_complete(name):
         ('name = "fused-silica"', 'name = "fused-silica"\nyoungs_modulus_GPa = -1', ["youngs_modulus_GPa", "above 0"]),
         ('name = "fused-silica"', 'name = "fused-silica"\nfile = "none.toml"', ["none.toml", "cannot be read"]),
         ("[material]", "[[effect]]\nsize = 1\n[material]", ["[[effect]] number 1", "name"]),
-        ("[material]", "[noize]\n[material]", ["'noize'", "'noise'"]),
     ],
 )
 def test_wrong_card_is_refused_by_key(tmp_path, old, new, words):

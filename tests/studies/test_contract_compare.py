@@ -45,16 +45,6 @@ def test_hertz_per_micrometre_is_a_difference_of_two_solves(tmp_path, capsys):
     assert mode["frequency_per_thickness_Hz_per_um"] == pytest.approx(frequencies[1] - frequencies[0], rel=1e-3)
 
 
-@pytest.mark.slow
-def test_nearest_mode_is_any_mode_and_not_the_lowest_of_its_harmonic(capsys):
-    """The card's second n = 1 mode is nearer to the drive mode than the first, as the list of modes shows."""
-    modes = ask(capsys, "modes", "hrg-30mm", "--harmonic", "0", "1", "2", "3", "4", "--count", "3")["modes"]
-    drive = next(one["frequency_Hz"] for one in modes if (one["harmonic"], one["index"]) == (2, 0))
-    others = [one["frequency_Hz"] - drive for one in modes if (one["harmonic"], one["index"]) != (2, 0)]
-    figures = {one["name"]: one for one in ask(capsys, "compare", "hrg-30mm", "free-dome")["figures"]}
-    assert figures["nearest other mode"]["values"][0] == pytest.approx(min(others, key=abs), abs=0.2)
-
-
 def test_nearest_mode_lies_behind_many_lower_ones():
     """Planted: five modes of n = 1 below the drive mode, the fifth nearest."""
     from types import SimpleNamespace

@@ -354,10 +354,3 @@ def test_a_run_with_the_opposite_sign_is_named(tmp_path, capsys, turned):
     assert main(["fit", "bias", *(str(tmp_path / f"{k}.csv") for k in range(3)), "--json"]) == 0
     named = json.loads(capsys.readouterr().out)["opposite_sign"]
     assert named == (None if turned is None else str(tmp_path / f"{turned}.csv"))
-
-
-def test_a_laboratory_file_is_sent_to_the_import(calibrated, tmp_path, capsys):
-    raw = tmp_path / "raw.csv"
-    raw.write_text("t [s],f [Hz]\n0,4430\n1,4430\n")
-    assert main(["compensate", str(calibrated / "m.toml"), str(raw), "--out", str(tmp_path / "out.csv")]) == 2
-    assert "hrg import" in capsys.readouterr().err

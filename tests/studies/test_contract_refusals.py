@@ -1,12 +1,33 @@
 """Command lines that cannot be worked: one plain message that names the mend, status 2, nothing on stdout and no file."""
 
+import importlib
+import inspect
+import math
 import shlex
 
 import pytest
 
-from studies.cli import main
+from studies.cli import COMMANDS, main
+from studies.instrument.card import shipped_cards
 
+WITH_A_CARD = (
+    "loss TYPO", "loop TYPO", "cards TYPO", "modes TYPO", "materials --compare --card TYPO", "compare free-dome TYPO", "tcf TYPO",
+    "thermal TYPO 'soak 20 1h'", "simulate TYPO 'soak 20 1h' --out out", "render TYPO --out out.ply", "mesh TYPO --out out.msh",
+    "study run STUDY --out out --card TYPO", "diagnose RUN --card TYPO", "diagnose --plan 'step 20 -10 5h' --card TYPO",
+    "fit thermal RUN --card TYPO", "fit whole-angle RUN --card TYPO", "fit ringdown RUN --card TYPO", "acceptance TYPO RUN",
+    "calibrate TYPO RUN", "electrodes TYPO", "scan TYPO RUN", "trim TYPO --split 0.1 --axis 10", "twin TYPO --c out",
+    "fleet LOT --out out --card TYPO", "loads TYPO",
+)  # fmt: skip
+"""Every command that takes a card reads the whole of it, whatever table it needs."""
+STUDY = """schema = "hrg.study/1"
+name = "s"
+card = "hrg-30mm"
+sampling = { method = "grid" }
+parameter = [{ name = "resonator.radius_mm", values = [15.0] }]
+quantity = [{ name = "frequency", theory = "shell" }]
+"""
 REFUSED = {
+    **dict.fromkeys(WITH_A_CARD, "[loss]: unknown key 'invers_q'; did you mean 'inverse_q'"),
     "nonsense": "nonsense",
     "cards none.toml --debug": "Traceback",  # only where it is asked for
     "compare free-dome": "two cards or more",
@@ -109,14 +130,44 @@ REFUSED = {
 SLOW = "trim free-dome --split 0.5 --axis 3 --cut edge"
 
 
+@pytest.fixture(scope="module")
+def given(tmp_path_factory, pytestconfig):
+    """Files that commands are given: a card with a typo, a record, a lot of it, a study, the paper's table."""
+    folder = tmp_path_factory.mktemp("given")
+    card = shipped_cards()["hrg-30mm"].read_text(encoding="utf-8").split("[loss]")
+    (folder / "typo.toml").write_text(f"{card[0]}[loss]\ninvers_q = 1e-7\n", encoding="utf-8")
+    (folder / "study.toml").write_text(STUDY, encoding="utf-8")
+    rows = "".join(f"{t},20.0,{4432 + 0.01 * math.sin(t):.4f}\n" for t in range(0, 4000, 100))
+    for place in (folder, folder / "lot" / "a", folder / "lot" / "b"):
+        place.mkdir(parents=True, exist_ok=True)
+        (place / "run.csv").write_text("time_s,housing_temperature_degC,frequency_Hz\n" + rows, encoding="utf-8")
+    files = {
+        "TYPO": folder / "typo.toml",
+        "STUDY": folder / "study.toml",
+        "RUN": folder / "run.csv",
+        "LOT": folder / "lot",
+    }
+    return {name: str(path) for name, path in files.items()} | {
+        "HRG": str(pytestconfig.rootpath / "studies/papers/hrg_table1.csv")
+    }
+
+
 @pytest.mark.parametrize("words", [pytest.param(w, marks=[pytest.mark.slow] * (w == SLOW)) for w in REFUSED])
-def test_it_is_refused_in_one_message(words, tmp_path, monkeypatch, capsys, request):
-    table = request.config.rootpath / "studies/papers/hrg_table1.csv"
+def test_it_is_refused_in_one_message(words, given, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "file").write_text("")
-    assert main(shlex.split(words.replace("HRG", str(table)))) == 2
+    assert main([given.get(word, word) for word in shlex.split(words)]) == 2
     out, err = capsys.readouterr()
     assert REFUSED[words] in err
     assert ("Traceback" in err) == ("--debug" in words)
     assert out == ""
     assert [path.name for path in tmp_path.iterdir()] == ["file"]
+
+
+def test_every_command_that_takes_a_card_is_tried():
+    takes = set()
+    for name, (target, _) in COMMANDS.items():
+        module, function = target.split(":")
+        if {"card", "cards"} & set(inspect.signature(getattr(importlib.import_module(module), function)).parameters):
+            takes.add(name)
+    assert takes <= {" ".join(words.split()[:k]) for words in WITH_A_CARD for k in (1, 2)}

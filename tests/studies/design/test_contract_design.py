@@ -108,6 +108,7 @@ def test_contradicting_limits_and_an_objective_without_value_are_said(tmp_path, 
     assert "is 0 whatever the free parameters are" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_a_run_resumes_and_the_best_card_holds_what_was_asked(tmp_path, capsys):
     path, out = write(tmp_path), tmp_path / "out"
     assert main(["optimise", path, "--out", str(out), "--workers", "1", "--quiet", "--json"]) == 0

@@ -127,6 +127,7 @@ def test_the_nearest_mode_is_kept_off_on_the_side_where_it_is(pose):
     assert abs(found.after[0]) >= 0.3 - 1e-6
 
 
+@pytest.mark.slow
 def test_limits_that_contradict_are_named_with_what_lacks(pose):
     posed = pose(
         XY,

@@ -8,6 +8,7 @@ from studies.record import Record
 from tests.studies.diagnosis.bench import searched
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("added", "bump", "structure"),
     [

@@ -7,6 +7,7 @@ from studies.record import Record
 from studies.workbench import diagnose_records
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("hours", "period", "tau", "start"),
     [(4.2, 500.0, 0.0, 20.0), (10.0, 2000.0, 800.0, -10.0)],

@@ -15,6 +15,7 @@ def told(records):
     return diagnose_records(records).verdict
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("softening", "seen"), [(2.5e-7, True), (-2.5e-7, False)])
 def test_a_voltage_that_swings_about_its_mean_softens_and_never_stiffens(softening, seen):
     """V² and V⁴ are nearly one curve there: which of their two coefficients is negative says nothing, their sum does."""
@@ -44,6 +45,7 @@ def test_a_bias_alone_with_a_term_in_the_rate_finds_its_lag():
     assert verdict.responses["bias_deg_per_h"].noise == pytest.approx(0.05, rel=0.05)
 
 
+@pytest.mark.slow
 def test_a_delay_is_said():
     """A thermometer that reads 12 s late: one record cannot tell that from clocks, and the answer says so."""
     records = []

@@ -113,6 +113,7 @@ def test_what_is_not_this_cards_table_is_said_to_be_another_gyros(spoil, said, o
         beside_card(tmp_path, WIDE, spoil(own(WIDE)))
 
 
+@pytest.mark.slow
 def test_the_cards_own_table_is_adequate_and_moves_nothing(own, tmp_path):
     found = beside_card(tmp_path, WIDE, own(WIDE) + np.random.default_rng(3).normal(0, 2e-3, WIDE.size))
     assert found.verdict.verdict == "adequate", found.verdict.causes
@@ -120,6 +121,7 @@ def test_the_cards_own_table_is_adequate_and_moves_nothing(own, tmp_path):
     assert abs(found.verdict.details["settled"]["slope_ppm_per_degC"]["away_sd"]) < 0.2
 
 
+@pytest.mark.slow
 def test_a_slope_four_standard_deviations_off_is_named_as_a_value(tmp_path):
     card, name = load_card(CARD), "material.deviation.shear_modulus.log_slope_per_K"
     sd = next(value.sd for value in card.uncertain if value.name == name)
@@ -132,6 +134,7 @@ def test_a_slope_four_standard_deviations_off_is_named_as_a_value(tmp_path):
     assert found.verdict.details["settled"]["slope_ppm_per_degC"]["away_sd"] == pytest.approx(4.0, abs=0.3)
 
 
+@pytest.mark.slow
 def test_a_dip_in_the_cards_own_table_is_named_and_its_values_stay(own, tmp_path):
     x = (WIDE - 25.0) / 6.0
     f = own(WIDE) + 0.2 * x / (1 + x**2) + np.random.default_rng(5).normal(0, 2e-3, WIDE.size)
@@ -142,6 +145,7 @@ def test_a_dip_in_the_cards_own_table_is_named_and_its_values_stay(own, tmp_path
     assert max(abs(one.shift_sd) for one in found.verdict.calibration) < 2.0
 
 
+@pytest.mark.slow
 def test_a_level_off_by_less_than_three_per_cent_is_a_value_of_the_card(own, tmp_path):
     """2.7 % is eight standard deviations of the modulus: no noise of the readings."""
     found = beside_card(tmp_path, WIDE, own(WIDE) * 0.9733)

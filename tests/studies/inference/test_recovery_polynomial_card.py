@@ -37,6 +37,7 @@ def test_limits_one_lag_behind_the_housing() -> None:
     )  # six digits of a temperature
 
 
+@pytest.mark.slow
 def test_recovery_of_the_law_from_records_alone(tmp_path) -> None:
     card = build_instrument(TRUE)
     words = ("step 20 -10 4h", "step -10 50 4h")

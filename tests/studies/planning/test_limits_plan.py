@@ -64,6 +64,7 @@ def drawn_scores(search, beside, signal, draws, rng):
     )
 
 
+@pytest.mark.slow
 def test_expected_answers_are_those_of_drawn_noise(hidden):
     """Chances and mean log odds against 100 draws of the noise, for sizes at which the answer is open."""
     search, beside, expected = hidden

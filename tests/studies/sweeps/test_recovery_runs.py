@@ -197,6 +197,7 @@ def test_python_needs_to_be_allowed_and_must_exist(tmp_path, functions, hrg):
     assert "cube" in missing.stderr
 
 
+@pytest.mark.slow
 def test_changed_spec_card_or_function_is_refused_with_what_changed(tmp_path, functions):
     spec = tmp_path / "square.toml"
     text = spec_of("square", 'method = "grid"', 'name = "user.x"\nvalues = [1, 2]')
