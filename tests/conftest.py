@@ -1,6 +1,7 @@
-"""What holds for every test: one thread for linear algebra, a heap that is swept once, figures of pages that are only sketched."""
+"""What holds for every test: one thread for linear algebra, a heap that is swept once, figures that are only sketched; how commands are asked."""
 
 import gc
+import json
 import os
 
 import pytest
@@ -35,3 +36,31 @@ def whole_figures():
 def drawn(monkeypatch, whole_figures):
     """Pages with their figures whole, where these are the subject."""
     monkeypatch.setattr("studies.results.page.draw", whole_figures)
+
+
+@pytest.fixture
+def ask(capsys):
+    """The JSON object that a command answers."""
+    from studies.cli import main
+
+    def answer(words):
+        capsys.readouterr()
+        assert main([*map(str, words), "--json"]) == 0
+        return json.loads(capsys.readouterr().out)
+
+    return answer
+
+
+@pytest.fixture
+def refuse(capsys):
+    """What a command says that cannot work: exit status 2, and nothing like a fault of the program."""
+    from studies.cli import main
+
+    def said(words):
+        capsys.readouterr()
+        assert main([*map(str, words)]) == 2
+        told = capsys.readouterr().err
+        assert "Traceback" not in told
+        return told
+
+    return said

@@ -44,9 +44,8 @@ def test_a_glitch_costs_its_own_row_alone(model, tmp_path, capsys):
     assert np.nanmax(np.abs(found - T)) < 1e-4
 
 
-def test_a_record_without_any_frequency_is_refused(model, tmp_path, capsys):
+def test_a_record_without_any_frequency_is_refused(model, tmp_path, refuse):
     run = _write(tmp_path / "run.csv", time_s=np.arange(9.0), frequency_Hz=np.full(9, np.nan))
     for command in ("compensate", "temperature"):
-        assert main([command, model, run, "--out", str(tmp_path / "out.csv")]) == 2
-        assert "'frequency_Hz' has no value" in capsys.readouterr().err
+        assert "'frequency_Hz' has no value" in refuse([command, model, run, "--out", str(tmp_path / "out.csv")])
     assert not (tmp_path / "out.csv").exists()

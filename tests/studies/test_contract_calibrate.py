@@ -38,7 +38,7 @@ def test_what_has_not_converged_is_no_card(tmp_path, monkeypatch, capsys):
 
 
 @pytest.mark.slow
-def test_tables_are_for_people(tmp_path, capsys):
+def test_tables_are_for_people(tmp_path, capsys, ask):
     """The residual is that of `hrg diagnose`: the level is a value of the card; a scatter of rows is no Allan deviation."""
     page = tmp_path / "page.html"
     assert main(["calibrate", "hrg-30mm", "studies/papers/hrg_table1.csv", "--report", str(page)]) == 0
@@ -50,13 +50,14 @@ def test_tables_are_for_people(tmp_path, capsys):
     assert "Allan" not in text
     assert "block averages" not in text
     assert "Values that the data do not depend on <small>(19 rows)" in text
-    assert main(["diagnose", "studies/papers/hrg_table1.csv", "--card", "hrg-30mm", "--json"]) == 0
-    left = json.loads(capsys.readouterr().out)["responses"]["frequency_Hz"]["shipped_rms"]
+    left = ask(["diagnose", "studies/papers/hrg_table1.csv", "--card", "hrg-30mm"])["responses"]["frequency_Hz"][
+        "shipped_rms"
+    ]
     assert f"{1e3 * left:.0f} mHz as given" in text
 
 
 @pytest.mark.slow
-def test_a_saved_card_keeps_what_was_found_of_intervals(tmp_path, capsys):
+def test_a_saved_card_keeps_what_was_found_of_intervals(tmp_path, capsys, refuse):
     """They need not be symmetric about the value, as value ± sd is."""
     card = tmp_path / "calibrated.toml"
     assert main(["calibrate", "hrg-30mm", "studies/papers/hrg_table1.csv", "--save", str(card), "--json"]) == 0
@@ -70,8 +71,7 @@ def test_a_saved_card_keeps_what_was_found_of_intervals(tmp_path, capsys):
     assert "90 %" in capsys.readouterr().out
     broken = card.read_text(encoding="utf-8").replace("interval = [", "interval = [[1.0, 0.0],", 1)
     card.write_text(broken, encoding="utf-8")
-    assert main(["modes", str(card)]) == 2
-    assert "interval must be" in capsys.readouterr().err
+    assert "interval must be" in refuse(["modes", str(card)])
 
 
 def test_every_response_has_a_name_and_a_unit_for_people():

@@ -1,13 +1,11 @@
 """Contract: every shipped card loads and says what is illustrative; a wrong card is refused by key with the mend."""
 
-import json
 import re
 import tomllib
 
 import pytest
 
 from shell.materials import read_materials
-from studies.cli import main
 from studies.errors import InputError
 from studies.instrument.card import load_card, save_card, shipped_cards
 
@@ -158,10 +156,9 @@ def _printed(value, text):
 
 
 @pytest.mark.parametrize("name", read_materials())
-def test_contract_every_value_of_a_material_has_a_source_or_says_that_it_was_not_checked(name, capsys):
+def test_contract_every_value_of_a_material_has_a_source_or_says_that_it_was_not_checked(name, ask):
     """Without a source of its own a value stands in the source of its law; what is not checked is told in every answer."""
-    assert main(["materials", name, "--json"]) == 0
-    shown = json.loads(capsys.readouterr().out)["materials"]
+    shown = ask(["materials", name])["materials"]
     laws = read_materials()[name]
     for row, law in zip(shown, laws.values(), strict=True):
         source = next(iter(laws.values())).source if law.source.startswith("as law") else law.source

@@ -120,19 +120,16 @@ def test_contract_time_stamps_are_the_clock_of_their_group(tmp_path, monkeypatch
         assert run.start.isoformat() == f"2026-03-01T12:00:00.500000{start}"
 
 
-def test_contract_a_channel_without_a_clock_asks_for_one(tmp_path, monkeypatch, capsys):
+def test_contract_a_channel_without_a_clock_asks_for_one(tmp_path, monkeypatch, refuse):
     monkeypatch.chdir(tmp_path)
     tdms("run.tdms", G=[("f", 4000 + np.cos(np.arange(50.0)), {"unit_string": "Hz"})])
     assert main(["import", "run.tdms", "--draft", "map.toml"]) == 0
     assert "sample_period_s = 0.0    # CHECK" in Path("map.toml").read_text()
     own = re.sub("sample_period_s.*", 'time_format = "own"', Path("map.toml").read_text())
     Path("map.toml").write_text(own)
-    capsys.readouterr()
-    assert main(["import", "run.tdms", "--map", "map.toml", "--out", "run.csv"]) == 2
-    assert "'f' has no clock of its own" in capsys.readouterr().err
+    assert "'f' has no clock of its own" in refuse(["import", "run.tdms", "--map", "map.toml", "--out", "run.csv"])
     Path("map.toml").write_text(own.replace('group = "G"', 'group = "g"'))
-    assert main(["import", "run.tdms", "--map", "map.toml", "--out", "run.csv"]) == 2
-    assert "no group 'g'" in capsys.readouterr().err
+    assert "no group 'g'" in refuse(["import", "run.tdms", "--map", "map.toml", "--out", "run.csv"])
 
 
 @pytest.mark.parametrize("kind", FORMATS)
@@ -188,21 +185,19 @@ def test_contract_a_missing_library_names_the_extra(kind, tmp_path, monkeypatch,
     assert not Path(f"out.{FORMATS[kind]}").exists()
 
 
-def test_contract_objects_are_never_opened(tmp_path, monkeypatch, capsys):
+def test_contract_objects_are_never_opened(tmp_path, monkeypatch, refuse):
     from scipy.io import savemat
 
     h5py = pytest.importorskip("h5py")
     monkeypatch.chdir(tmp_path)
     with h5py.File("run.h5", "w") as file:
         file.create_dataset("words", data=["a", "b"], dtype=h5py.string_dtype())
-    assert main(["import", "run.h5", "--draft", "map.toml"]) == 2
-    assert "holds objects" in capsys.readouterr().err
+    assert "holds objects" in refuse(["import", "run.h5", "--draft", "map.toml"])
     savemat("run.mat", {"c": np.array(["x", 1.0], dtype=object)})
-    assert main(["import", "run.mat", "--draft", "map.toml"]) == 2
-    assert "holds objects" in capsys.readouterr().err
+    assert "holds objects" in refuse(["import", "run.mat", "--draft", "map.toml"])
 
 
-def test_contract_a_class_of_matlab_is_refused_by_name(tmp_path, monkeypatch, capsys):
+def test_contract_a_class_of_matlab_is_refused_by_name(tmp_path, monkeypatch, refuse):
     from scipy.io import loadmat, savemat
     from scipy.io.matlab import MatlabOpaque
 
@@ -213,8 +208,9 @@ def test_contract_a_class_of_matlab_is_refused_by_name(tmp_path, monkeypatch, ca
     assert main(["import", "run.mat", "--draft", "map.toml"]) == 0
     named = Path("map.toml").read_text().replace('time = "t"', 'time = "when"')
     Path("map.toml").write_text(named)
-    assert main(["import", "run.mat", "--map", "map.toml", "--out", "run.csv"]) == 2
-    assert "'when' is of a class that only MATLAB reads" in capsys.readouterr().err
+    assert "'when' is of a class that only MATLAB reads" in refuse(
+        ["import", "run.mat", "--map", "map.toml", "--out", "run.csv"]
+    )
 
 
 def test_contract_a_matlab_7_3_file_and_matrices_are_channels(tmp_path, monkeypatch):
@@ -249,7 +245,7 @@ def raw(path, time, values):
     )
 
 
-def test_contract_files_that_overlap_are_joined_where_they_agree(tmp_path, monkeypatch, capsys):
+def test_contract_files_that_overlap_are_joined_where_they_agree(tmp_path, monkeypatch, capsys, refuse):
     monkeypatch.chdir(tmp_path)
     Path("map.toml").write_text(MAP)
     time = np.arange(100.0)
@@ -264,8 +260,9 @@ def test_contract_files_that_overlap_are_joined_where_they_agree(tmp_path, monke
     raw("two.csv", time[50:], f[50:] + 1e-3)
     assert main(["import", "one.csv", "two.csv", "--map", "map.toml", "--out", "run.csv"]) == 2
     assert "overlaps the one before it by 9 s, and they differ there" in capsys.readouterr().err
-    assert main(["import", "two.csv", "one.csv", "--map", "map.toml", "--out", "run.csv"]) == 2
-    assert "in the order of their times" in capsys.readouterr().err
+    assert "in the order of their times" in refuse(
+        ["import", "two.csv", "one.csv", "--map", "map.toml", "--out", "run.csv"]
+    )
 
 
 def test_contract_doubtful_readings_are_offered_as_missing_and_never_changed(tmp_path, monkeypatch, capsys):

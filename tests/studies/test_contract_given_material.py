@@ -29,28 +29,25 @@ def card(tmp_path):
     return path
 
 
-def test_slope_is_refused_with_the_keys_that_would_tell_it(card, capsys):
-    assert main(["tcf", str(card)]) == 2
-    said = capsys.readouterr().err
+def test_slope_is_refused_with_the_keys_that_would_tell_it(card, refuse):
+    said = refuse(["tcf", str(card)])
     assert "not known" in said
     assert str(card) in said
     assert "[material.deviation.youngs_modulus] log_slope_per_K" in said
     assert "[material.deviation.expansion] value" in said
 
 
-def test_one_missing_half_is_named_alone(card, capsys):
+def test_one_missing_half_is_named_alone(card, refuse):
     card.write_text(CARD + f"[material.deviation]\nyoungs_modulus.log_slope_per_K = {E_SLOPE}\n")
-    assert main(["tcf", str(card)]) == 2
-    said = capsys.readouterr().err
+    said = refuse(["tcf", str(card)])
     assert "expansion" in said
     assert "log_slope_per_K" not in said
 
 
-def test_given_slopes_are_those_of_the_free_shell(card, capsys):
+def test_given_slopes_are_those_of_the_free_shell(card, ask):
     """Free expansion without a change of ν: d ln f/dT = ½ (E′/E + α), since f ∝ √(E/ρ)/R and ρ ∝ R⁻³."""
     card.write_text(CARD + KNOWN)
-    assert main(["tcf", str(card), "--from", "20", "--to", "20", "--json"]) == 0
-    (point,) = json.loads(capsys.readouterr().out)["points"]
+    (point,) = ask(["tcf", str(card), "--from", "20", "--to", "20"])["points"]
     assert point["slope_ppm_per_degC"] == pytest.approx(1e6 * (E_SLOPE + EXPANSION) / 2, rel=1e-6)
 
 
@@ -65,10 +62,9 @@ def test_comparison_and_modes_leave_open_what_is_not_known(card, capsys):
 
 
 @pytest.mark.parametrize("words", [["calibrate", "CARD", "TABLE"], ["diagnose", "TABLE", "--card", "CARD"]])
-def test_readings_over_temperature_are_not_compared_with_a_slope_of_0(card, capsys, words):
+def test_readings_over_temperature_are_not_compared_with_a_slope_of_0(card, refuse, words):
     named = {"CARD": str(card), "TABLE": "studies/papers/hrg_table1.csv"}
-    assert main([named.get(word, word) for word in words]) == 2
-    said = capsys.readouterr().err
+    said = refuse([named.get(word, word) for word in words])
     assert "the slope of the frequency is not known" in said
     assert f"({card}:7)" in said  # the line of [material]
 

@@ -3,7 +3,6 @@
 The strategies are made from the declarations themselves, for every file that has one, so a new key is tried as soon as it is declared.
 """
 
-import json
 import string
 
 import pytest
@@ -12,7 +11,6 @@ from hypothesis import strategies as st
 from msgspec import inspect
 
 from studies.acceptance.limits import Limits
-from studies.cli import main
 from studies.design.keys import DesignKeys
 from studies.errors import InputError
 from studies.importing.mapping import ImportMap
@@ -120,9 +118,8 @@ def test_a_wrong_value_and_a_typo_name_the_key(kind):
 
 
 @pytest.mark.parametrize("kind", ["card", "study", "map", "model", "limits"])
-def test_the_reference_has_every_key_with_its_unit_and_default(kind, capsys):
-    assert main(["keys", kind, "--json"]) == 0
-    rows = json.loads(capsys.readouterr().out)["keys"]
+def test_the_reference_has_every_key_with_its_unit_and_default(kind, ask):
+    rows = ask(["keys", kind])["keys"]
     assert len({(row["table"], row["key"], row.get("only")) for row in rows}) == len(rows)
     assert all(row["meaning"] for row in rows)
     if kind == "card":

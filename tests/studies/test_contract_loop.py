@@ -21,11 +21,10 @@ def card(tmp_path):
     return write
 
 
-def test_schema_and_record(card, tmp_path, capsys):
+def test_schema_and_record(card, tmp_path, ask):
     path = card("misalignment_mrad = 0.5\nvibration_um = 1.0\nmodal_mass_mg = 500.0\n")
     out = tmp_path / "run.csv"
-    assert main(["loop", path, "--json", "--out", str(out), "--hours", "1"]) == 0
-    found = json.loads(capsys.readouterr().out)
+    found = ask(["loop", path, "--out", str(out), "--hours", "1"])
     assert found["schema"] == "hrg.loop/1"
     assert [margin["paper"] for margin in found["margins"]] == ["GA", "GF", "GR", "GQ"]
     assert list(found["bias"][0]) == ["source", "deg_per_h", "sd_deg_per_h"]
@@ -42,12 +41,11 @@ def test_schema_and_record(card, tmp_path, capsys):
 
 
 @pytest.mark.parametrize("lines", ["rate_bandwidth_Hz = 200.0\n", "rate_bandwidth_Hz = 120.0\ndelay_ms = 4.0\n"])
-def test_unstable_loop_is_said_with_its_margin_before_anything_is_simulated(card, tmp_path, capsys, lines):
+def test_unstable_loop_is_said_with_its_margin_before_anything_is_simulated(card, tmp_path, capsys, refuse, lines):
     out = tmp_path / "run.csv"
     path = card(lines)
     for words in (["loop", path, "--out", str(out)], ["simulate", path, "step 20 10 1h", "--out", str(out)]):
-        assert main(words) == 2
-        said = capsys.readouterr().err
+        said = refuse(words)
         assert "[loop]: the rate loop (GR) is unstable: gain margin -" in said
         assert not out.exists()
     calm = re.search(r"lower its bandwidth to about ([\d.]+) Hz", said)[1]
@@ -69,11 +67,10 @@ def test_half_of_the_thermal_noise_is_refused(card, capsys):
     assert "needs both vibration_um and modal_mass_mg" in capsys.readouterr().err
 
 
-def test_noise_of_a_free_wave_is_what_its_run_shows(card, tmp_path, capsys):
+def test_noise_of_a_free_wave_is_what_its_run_shows(card, tmp_path, ask):
     path = card('mode = "whole-angle"\nvibration_um = 1.0\nmodal_mass_mg = 500.0\n')
     out = tmp_path / "run.csv"
-    assert main(["loop", path, "--json", "--out", str(out), "--hours", "0.5"]) == 0
-    found = json.loads(capsys.readouterr().out)
+    found = ask(["loop", path, "--out", str(out), "--hours", "0.5"])
     assert [margin["paper"] for margin in found["margins"]] == ["GA", "GF", "GQ"]
     one = next(noise for noise in found["noise"] if noise["source"] == "all")["deg_per_h_over_1s"]
     assert np.std(read_record(out)["bias_deg_per_h"]) == pytest.approx(one, rel=0.06)
@@ -90,9 +87,10 @@ def test_a_profile_drives_the_resonator_not_its_reading(card, tmp_path):
 
 
 @pytest.mark.parametrize("lines", ["", 'mode = "whole-angle"\n'], ids=["force-rebalance", "no self-precession"])
-def test_a_reversal_of_what_does_not_precess_is_refused(card, capsys, lines):
-    assert main(["loop", card(lines), "--both-ways"]) == 2
-    assert "--both-ways reverses the self-precession of a whole-angle wave" in capsys.readouterr().err
+def test_a_reversal_of_what_does_not_precess_is_refused(card, refuse, lines):
+    assert "--both-ways reverses the self-precession of a whole-angle wave" in refuse(
+        ["loop", card(lines), "--both-ways"]
+    )
 
 
 @pytest.mark.parametrize(
@@ -105,23 +103,20 @@ def test_a_reversal_of_what_does_not_precess_is_refused(card, capsys, lines):
     ],
     ids=["rate", "split, force", "split, stiffness", "self-precession"],
 )
-def test_what_the_actuators_cannot_hold_is_refused_with_their_range(card, tmp_path, capsys, lines, words, said):
+def test_what_the_actuators_cannot_hold_is_refused_with_their_range(card, tmp_path, refuse, lines, words, said):
     """n k Ω, ½ Δω and n θ̇ against n k Ω_max: k = 0.2756 of the dome, so that 100 °/s hold a split of n k Ω_max/π = 306 mHz."""
     path = card(lines)
-    assert main(["loop", path, *words]) == 2
-    assert said in capsys.readouterr().err
+    assert said in refuse(["loop", path, *words])
     if not words:
-        assert main(["simulate", path, "soak 20 10min", "--out", str(tmp_path / "run.csv")]) == 2
-        assert said in capsys.readouterr().err
+        assert said in refuse(["simulate", path, "soak 20 10min", "--out", str(tmp_path / "run.csv")])
 
 
-def test_range_in_use_is_stated(card, capsys):
+def test_range_in_use_is_stated(card, ask):
     """A rate of 59 °/s of 100, and a split that takes eight tenths: √(0.6² + 0.8²); the stiffness takes it off the force."""
     lines = "frequency_split_mHz = 245.0\n"
     for quadrature, across, split in (("force", 1.0, 0.8), ("stiffness", 0.59, 0.245)):
         path = card(f'quadrature_control = "{quadrature}"\n' + lines)
-        assert main(["loop", path, "--json", "--rate", "59"]) == 0
-        found = json.loads(capsys.readouterr().out)["range"]
+        found = ask(["loop", path, "--rate", "59"])["range"]
         assert found["rate"] == pytest.approx(0.59, rel=1e-3)
         assert found["quadrature"] == pytest.approx(split, rel=3e-3)
         assert found["across"] == pytest.approx(across, rel=1e-2)

@@ -113,9 +113,8 @@ def test_the_drawing_process_ends_with_the_one_that_wants_it(tmp_path):
     assert not folder.exists()
 
 
-def test_a_mesh_for_another_program_says_what_it_holds(tmp_path, capsys):
-    assert main(["mesh", "hrg-30mm", "--out", str(tmp_path / "solid.msh"), "--around", "16", "--json"]) == 0
-    found = json.loads(capsys.readouterr().out)
+def test_a_mesh_for_another_program_says_what_it_holds(tmp_path, ask):
+    found = ask(["mesh", "hrg-30mm", "--out", str(tmp_path / "solid.msh"), "--around", "16"])
     assert found["schema"] == "hrg.mesh/1"
     text = (tmp_path / "solid.msh").read_text()
     assert text.split("$Nodes\n")[1].splitlines()[0] == str(found["nodes"])

@@ -32,7 +32,7 @@ def failing(capsys, *words):
 
 
 @pytest.mark.slow
-def test_a_scan_says_its_noise_and_saves_the_card_that_it_saw(faces, tmp_path, capsys):
+def test_a_scan_says_its_noise_and_saves_the_card_that_it_saw(faces, tmp_path, capsys, ask):
     words = ["scan", "free-dome", faces["inner"], faces["outer"], "--harmonic", 2, "--theory", "shell", "--json"]
     assert main([str(word) for word in (*words, "--map", tmp_path / "map.csv", "--save", tmp_path / "s.toml")]) == 0
     found = json.loads(capsys.readouterr().out)
@@ -43,8 +43,7 @@ def test_a_scan_says_its_noise_and_saves_the_card_that_it_saw(faces, tmp_path, c
     assert 0 < found["faces"]["outer"]["outliers"] < 40
     rows = list(csv.DictReader((tmp_path / "map.csv").read_text().splitlines()))
     assert set(rows[0]) == {"position", "azimuth_deg", "inner_um", "outer_um", "wall_um", "offset_um"}
-    assert main(["modes", str(tmp_path / "s.toml"), "--theory", "shell", "--json"]) == 0
-    (mode,) = json.loads(capsys.readouterr().out)["modes"]
+    (mode,) = ask(["modes", str(tmp_path / "s.toml"), "--theory", "shell"])["modes"]
     assert mode["split"]["split_Hz"] == pytest.approx(split["split_Hz"]["value"], rel=2e-3)
 
 
@@ -62,13 +61,12 @@ def test_a_plan_is_one_object_a_table_for_the_machine_and_a_page(tmp_path, capsy
     assert "Cuts of this round" in (tmp_path / "trim.html").read_text(encoding="utf-8")
 
 
-def test_a_scan_can_be_trimmed(faces, tmp_path, capsys):
+def test_a_scan_can_be_trimmed(faces, tmp_path, capsys, ask):
     words = ["scan", "free-dome", faces["inner"], faces["outer"], "--harmonic", 2, "--theory", "shell", "--json"]
     assert main([str(word) for word in words]) == 0
     text = capsys.readouterr().out
     (tmp_path / "scan.json").write_text(text, encoding="utf-8")
-    assert main(["trim", "free-dome", "--scan", str(tmp_path / "scan.json"), "--goal", "0.02", "--json"]) == 0
-    plan = json.loads(capsys.readouterr().out)
+    plan = ask(["trim", "free-dome", "--scan", str(tmp_path / "scan.json"), "--goal", "0.02"])
     assert plan["before"][0]["split_Hz"] == pytest.approx(json.loads(text)["splits"][0]["split_Hz"]["value"])
 
 
@@ -96,7 +94,7 @@ def test_scan_refuses_what_it_cannot_use(faces, tmp_path, capsys):
     assert "--highest" in failing(capsys, "scan", "free-dome", faces["inner"], "--harmonic", 7)
 
 
-def test_a_table_of_departures_must_close_the_circle(tmp_path, capsys):
+def test_a_table_of_departures_must_close_the_circle(tmp_path, capsys, ask):
     path = tmp_path / "grid.csv"
 
     def write(angles, unit=1.0, gap=0):
@@ -109,8 +107,7 @@ def test_a_table_of_departures_must_close_the_circle(tmp_path, capsys):
         path.write_text("\n".join(lines))
 
     write(np.arange(0, 360, 7.5))
-    assert main(["scan", "free-dome", "none", str(path), "--harmonic", "2", "--theory", "shell", "--json"]) == 0
-    found = json.loads(capsys.readouterr().out)
+    found = ask(["scan", "free-dome", "none", str(path), "--harmonic", "2", "--theory", "shell"])
     assert found["splits"][0]["slow_axis_deg"]["value"] == pytest.approx(np.rad2deg(0.4), abs=0.01)
     write(np.arange(0, 361, 7.5))
     assert "do not close the circle" in failing(capsys, "scan", "free-dome", "none", path)

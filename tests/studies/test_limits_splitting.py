@@ -1,6 +1,5 @@
 """A card's imperfection and electrodes: they add, they reach modes and studies, and what is wrong in them is named."""
 
-import json
 import pickle
 import re
 from dataclasses import replace
@@ -174,17 +173,15 @@ def test_even_voltages_make_no_split_and_rounding_is_not_trimmed(tmp_path, capsy
     assert "Trim voltages" not in out
 
 
-def test_commands_refuse_a_voltage_beyond_pull_in_and_a_map_with_holes(tmp_path, capsys):
+def test_commands_refuse_a_voltage_beyond_pull_in_and_a_map_with_holes(tmp_path, refuse):
     loaded(tmp_path, "[electrodes]\ngap_um = 10.0\nvoltage_V = 2000.0\n")
     for command in ("electrodes", "modes"):
-        assert main([command, str(tmp_path / "card.toml")]) == 2
-        assert "Lower the voltage or widen the gap" in capsys.readouterr().err
+        assert "Lower the voltage or widen the gap" in refuse([command, str(tmp_path / "card.toml")])
     angles = range(0, 360, 10)
     rows = [f"{x:.2f}," + "," * 14 + ",".join("0.1" for _ in angles[14:]) for x in np.linspace(0, 1, 12)]
     (tmp_path / "wall.csv").write_text("position," + ",".join(str(a) for a in angles) + "\n" + "\n".join(rows))
     (tmp_path / "card.toml").write_text(CARD + '[[imperfection.map]]\nof = "wall"\nfile = "wall.csv"\n')
-    assert main(["modes", str(tmp_path / "card.toml")]) == 2
-    assert "gaps between the points are too large" in capsys.readouterr().err
+    assert "gaps between the points are too large" in refuse(["modes", str(tmp_path / "card.toml")])
 
 
 def test_a_simulated_run_is_softened_by_the_volts_and_the_gap(tmp_path):
@@ -260,10 +257,9 @@ def test_an_imperfect_card_travels_to_workers(tmp_path):
     assert split_of(pickle.loads(pickle.dumps(instrument))).split.wave == split_of(instrument).split.wave
 
 
-def test_electrodes_null_the_cards_split_and_say_how_far_they_reach(tmp_path, capsys):
+def test_electrodes_null_the_cards_split_and_say_how_far_they_reach(tmp_path, ask, refuse):
     loaded(tmp_path, "[imperfection.split]\nsplit_Hz = 0.005\nslow_axis_deg = 70.0\n", "[electrodes]\ngap_um = 50.0\n")
-    assert main(["electrodes", str(tmp_path / "card.toml"), "--json"]) == 0
-    found = json.loads(capsys.readouterr().out)
+    found = ask(["electrodes", str(tmp_path / "card.toml")])
     assert found["schema"] == "hrg.electrodes/1"
     assert found["pull_in_factor"] is None  # no voltage yet
     assert found["reach_Hz"] > 0.005
@@ -275,11 +271,11 @@ def test_electrodes_null_the_cards_split_and_say_how_far_they_reach(tmp_path, ca
         f"[electrodes]\ngap_um = 50.0\ntrim_V = [{volts}]\n",
     )
     assert split_of(mended).split.hertz < 1e-8
-    assert main(["electrodes", str(tmp_path / "card.toml"), "--split", "50", "--axis", "3"]) == 2
-    assert "in any direction, not 50 Hz" in capsys.readouterr().err
+    assert "in any direction, not 50 Hz" in refuse(
+        ["electrodes", str(tmp_path / "card.toml"), "--split", "50", "--axis", "3"]
+    )
     loaded(tmp_path)
-    assert main(["electrodes", str(tmp_path / "card.toml")]) == 2
-    assert "no table [electrodes]" in capsys.readouterr().err
+    assert "no table [electrodes]" in refuse(["electrodes", str(tmp_path / "card.toml")])
 
 
 def test_a_saved_card_takes_its_maps_along(tmp_path):

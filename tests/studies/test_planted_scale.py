@@ -160,7 +160,7 @@ def test_gaps(records, fitted, tmp_path):
     assert np.flatnonzero(np.isnan(column)).tolist() == [7]
 
 
-def test_outliers_and_gaps_in_the_calibration_are_left_out(records, fitted, tmp_path, capsys):
+def test_outliers_and_gaps_in_the_calibration_are_left_out(records, fitted, tmp_path, ask):
     clean = fitted[0]
     lines = Path(records[1]).read_text().splitlines()
     for row in (50, 700, 2000):
@@ -170,8 +170,7 @@ def test_outliers_and_gaps_in_the_calibration_are_left_out(records, fitted, tmp_
     holed = tmp_path / "holed.csv"
     holed.write_text("\n".join(lines) + "\n")
     page = tmp_path / "page.html"
-    assert main(["fit", "scale", records[0], str(holed), records[2], "--report", str(page), "--json"]) == 0
-    found = json.loads(capsys.readouterr().out)
+    found = ask(["fit", "scale", records[0], str(holed), records[2], "--report", str(page)])
     assert found["rows_left_out"] == 4
     assert len(found["steps"]) == 4
     for name, coefficient in found["parts"]["bias"].items():
@@ -271,21 +270,20 @@ def test_settled_rows():
 @pytest.mark.parametrize(
     ("files", "words"), [([0, 1], "one rate over temperature"), ([0, 1, 1], "both runs at rest"), ([], "three records")]
 )
-def test_missing_runs_are_named(records, files, words, capsys):
-    assert main(["fit", "scale", *(records[i] for i in files)]) == 2
-    assert words in capsys.readouterr().err
+def test_missing_runs_are_named(records, files, words, refuse):
+    assert words in refuse(["fit", "scale", *(records[i] for i in files)])
 
 
-def test_impossible_cut_off_is_refused(records, capsys):
-    assert main(["fit", "scale", *records, "--cutoff", "200"]) == 2
-    assert "200 Hz is impossible" in capsys.readouterr().err
+def test_impossible_cut_off_is_refused(records, refuse):
+    assert "200 Hz is impossible" in refuse(["fit", "scale", *records, "--cutoff", "200"])
 
 
-def test_the_command_compensates_a_record_of_raw_counts(records, fitted, tmp_path, capsys):
+def test_the_command_compensates_a_record_of_raw_counts(records, fitted, tmp_path, ask):
     """The rate is made from counts, so there is no uncompensated column to compare with."""
     out = tmp_path / "out.csv"
-    assert main(["compensate", str(fitted[1]), records[2], "--out", str(out), "--json"]) == 0
-    column = json.loads(capsys.readouterr().out)["columns"]["compensated_measured_rate_deg_per_s"]
+    column = ask(["compensate", str(fitted[1]), records[2], "--out", str(out)])["columns"][
+        "compensated_measured_rate_deg_per_s"
+    ]
     assert column["stability_before"] is None
     assert column["rows_not_compensated"] == 0
     assert column["stability_after"] > 0

@@ -1,7 +1,5 @@
 """`hrg loop` makes a whole-angle run of a card, `hrg fit whole-angle` finds the card's values in it."""
 
-import json
-
 import numpy as np
 import pytest
 
@@ -24,7 +22,7 @@ pickoff_phase_deg = 0.6
 """
 
 
-def test_card_values_are_found_again(tmp_path, capsys):
+def test_card_values_are_found_again(tmp_path, capsys, ask):
     card, run = str(tmp_path / "card.toml"), str(tmp_path / "run.csv")
     text = shipped_cards()["free-dome"].read_text() + LOOP
     (tmp_path / "card.toml").write_text(text + "self_precession_deg_per_s = 0.5\npickoff_gain_ratio = 0.008\n")
@@ -32,8 +30,7 @@ def test_card_values_are_found_again(tmp_path, capsys):
     capsys.readouterr()
     (tmp_path / "card.toml").write_text(text)
     saved = str(tmp_path / "found.toml")
-    assert main(["fit", "whole-angle", run, "--card", card, "--json", "--save", saved]) == 0
-    found = json.loads(capsys.readouterr().out)
+    found = ask(["fit", "whole-angle", run, "--card", card, "--save", saved])
     assert found["schema"] == "hrg.fit-whole-angle/1"
     assert found["undetermined"] == []
     truth = {
@@ -50,15 +47,13 @@ def test_card_values_are_found_again(tmp_path, capsys):
     assert stated["loop.frequency_split_mHz"] == pytest.approx(found["estimates"]["loop.frequency_split_mHz"]["sd"])
 
 
-def test_what_is_missing_is_said(tmp_path, capsys):
+def test_what_is_missing_is_said(tmp_path, refuse):
     path = str(tmp_path / "run.csv")
     time = np.arange(0.0, 400.0)
     write_record(Record({"time_s": time, "pattern_angle_deg": 0.5 * time, "bias_deg_per_h": 0 * time}), path)
-    assert main(["fit", "whole-angle", path]) == 2
-    assert "give --bryan-factor" in capsys.readouterr().err
+    assert "give --bryan-factor" in refuse(["fit", "whole-angle", path])
     write_record(Record({"time_s": time, "pattern_angle_deg": 0.01 * time, "bias_deg_per_h": 0 * time}), path)
-    assert main(["fit", "whole-angle", path, "--bryan-factor", "0.277"]) == 2
-    assert "the fit needs 90°" in capsys.readouterr().err
+    assert "the fit needs 90°" in refuse(["fit", "whole-angle", path, "--bryan-factor", "0.277"])
 
 
 @pytest.mark.slow

@@ -6,7 +6,6 @@ Those sets are read from the folder that HRG_MEASURED names: `membrane_ringdown`
 
 import csv
 import datetime
-import json
 import os
 from pathlib import Path
 
@@ -15,7 +14,6 @@ import pytest
 from scipy.special import ellipk
 
 from studies.calibration.observed import observe
-from studies.cli import main
 from studies.record import read_record
 
 MEASURED = Path(os.environ.get("HRG_MEASURED", "missing"))
@@ -28,10 +26,8 @@ def write(path, columns, comments=()):
     return str(path)
 
 
-def laws(capsys, *words):
-    capsys.readouterr()
-    assert main(["fit", "ringdown", *words, "--json"]) == 0
-    found = json.loads(capsys.readouterr().out)["laws"]
+def laws(ask, *words):
+    found = ask(["fit", "ringdown", *words])["laws"]
     return {name: law | {term["term"]: term for term in law["terms"]} for name, law in found.items()}
 
 
@@ -39,7 +35,7 @@ def holds(term, value):
     return term["low"] <= value <= term["high"]
 
 
-def test_a_pendulum_that_is_solved_exactly_follows_the_printed_law(tmp_path, capsys):
+def test_a_pendulum_that_is_solved_exactly_follows_the_printed_law(tmp_path, ask):
     """T = T₀ (1 + θ²/16), ½ α per kelvin; periods by the elliptic integral, late at the launch, with a reading error by place."""
     random, alpha, rows = np.random.default_rng(2), 1.6e-5, []
     for decay in range(60):
@@ -54,7 +50,7 @@ def test_a_pendulum_that_is_solved_exactly_follows_the_printed_law(tmp_path, cap
             (720.0 * decay + 3.4 * k, decay, 1 / p, T, a) for k, (p, a) in enumerate(zip(period, seen, strict=True))
         ]
     names = ("time_s", "decay", "frequency_Hz", "housing_temperature_degC", "vibration_amplitude_V")
-    law = laws(capsys, write(tmp_path / "swings.csv", dict(zip(names, zip(*rows, strict=True), strict=True))))[
+    law = laws(ask, write(tmp_path / "swings.csv", dict(zip(names, zip(*rows, strict=True), strict=True))))[
         "frequency_Hz"
     ]
     assert law["left_out_rows"] == 3
@@ -63,28 +59,28 @@ def test_a_pendulum_that_is_solved_exactly_follows_the_printed_law(tmp_path, cap
     assert abs(law["temperature"]["value"] + alpha / 2) < 3 * law["temperature"]["sd"] < 1e-5
 
 
-def test_a_step_between_sessions_is_a_step_and_ageing_is_ageing(tmp_path, capsys):
+def test_a_step_between_sessions_is_a_step_and_ageing_is_ageing(tmp_path, ask):
     random = np.random.default_rng(4)
     time = np.concatenate([day * 86400.0 + 600.0 * np.arange(8) for day in (0, 3, 11, 20)])
     noise = 1e-7 * random.standard_normal(time.size)
     stepped = np.repeat([0.0, 4e-6, -2e-6, 1e-6], 8)
     for shape, term in ((stepped, "step 2"), (2e-7 * time / 86400, "time")):
         path = write(tmp_path / "f.csv", {"time_s": time, "frequency_Hz": 7000 * (1 + shape + noise)})
-        law = laws(capsys, path)["frequency_Hz"]
+        law = laws(ask, path)["frequency_Hz"]
         assert term in law
         assert abs(law[term]["value"] - (-6e-6 if term == "step 2" else 2e-7)) < 4 * law[term]["sd"]
         assert ("time" in law) == (term == "time")
 
 
-def test_viscous_gas_goes_with_the_root_of_the_pressure(tmp_path, capsys):
+def test_viscous_gas_goes_with_the_root_of_the_pressure(tmp_path, ask):
     random = np.random.default_rng(5)
     p = np.geomspace(1.0, 1e5, 16)
     loss = (2e-6 + 3e-7 * np.sqrt(p)) * (1 + 0.05 * random.standard_normal(16))
-    law = laws(capsys, write(tmp_path / "p.csv", {"pressure_Pa": p, "inverse_q": loss}))["inverse_q"]
+    law = laws(ask, write(tmp_path / "p.csv", {"pressure_Pa": p, "inverse_q": loss}))["inverse_q"]
     assert holds(law["root pressure"], 3e-7)
 
 
-def test_decays_over_temperature_become_a_record_for_calibration(tmp_path, capsys):
+def test_decays_over_temperature_become_a_record_for_calibration(tmp_path, ask):
     """1/Q = 1e-6 (1 + 0.01 (T − 20 °C)) in twelve traces; calibration takes the record that is written."""
     random, paths = np.random.default_rng(6), []
     for k, T in enumerate(np.linspace(0, 40, 12)):
@@ -99,7 +95,7 @@ def test_decays_over_temperature_become_a_record_for_calibration(tmp_path, capsy
         ]
         paths.append(write(tmp_path / f"{k}.csv", {"time_s": t, "power_dB": power}, notes))
     out = tmp_path / "decays.csv"
-    law = laws(capsys, *paths, "--out", str(out))["inverse_q"]
+    law = laws(ask, *paths, "--out", str(out))["inverse_q"]
     assert law["temperature"]["value"] == pytest.approx(1e-8, rel=0.05)
     assert law["level"] == pytest.approx(1e-6, rel=0.01)
     (run,) = observe([read_record(out)])
@@ -115,9 +111,8 @@ def test_decays_over_temperature_become_a_record_for_calibration(tmp_path, capsy
         ({"time_s": [0, 1], "frequency_Hz": [7e3] * 2, "pressure_mbar": [1, 2]}, "pressure_mbar"),
     ],
 )
-def test_tables_that_hold_no_decays_are_refused(tmp_path, capsys, columns, said):
-    assert main(["fit", "ringdown", write(tmp_path / "x.csv", columns)]) == 2
-    err = capsys.readouterr().err
+def test_tables_that_hold_no_decays_are_refused(tmp_path, refuse, columns, said):
+    err = refuse(["fit", "ringdown", write(tmp_path / "x.csv", columns)])
     assert said in err
     assert "x.csv" in err
 
@@ -126,7 +121,7 @@ needs = pytest.mark.skipif(not MEASURED.is_dir(), reason="HRG_MEASURED names no 
 
 
 @needs
-def test_published_gas_law_of_a_membrane(tmp_path, capsys):
+def test_published_gas_law_of_a_membrane(tmp_path, ask):
     """Free-molecular gas on 60 nm of silicon nitride: 5.3e-5 1/Pa; four steps of the frequency between five days."""
     with open(MEASURED / "membrane_ringdown" / "sample0321_mode1.csv") as file:
         rows = list(csv.DictReader(file))
@@ -137,7 +132,7 @@ def test_published_gas_law_of_a_membrane(tmp_path, capsys):
         "inverse_q": [1 / float(row["Q"]) for row in rows],
         "pressure_Pa": [100 * float(row["pressure_mbar"]) for row in rows],
     }
-    found = laws(capsys, write(tmp_path / "membrane.csv", columns))
+    found = laws(ask, write(tmp_path / "membrane.csv", columns))
     assert holds(found["inverse_q"]["pressure"], 5.3e-5)
     assert "step 4" in found["frequency_Hz"]
     assert "time" not in found["frequency_Hz"]
@@ -145,7 +140,7 @@ def test_published_gas_law_of_a_membrane(tmp_path, capsys):
 
 @needs
 @pytest.mark.parametrize("first", [1, 4])
-def test_published_law_of_a_pendulum(tmp_path, capsys, first):
+def test_published_law_of_a_pendulum(tmp_path, ask, first):
     """399 decays: θ²/16, and α/2 per kelvin with α = 1.6e-5."""
     with open(MEASURED / "pendulum" / "swings.csv") as file:
         rows = [row for row in csv.DictReader(file) if int(row["sample"]) >= first]
@@ -157,6 +152,6 @@ def test_published_law_of_a_pendulum(tmp_path, capsys, first):
         "housing_temperature_degC": [float(row["temperature_degC"]) for row in rows],
         "vibration_amplitude_V": [float(row["velocity_cm_per_s"]) / 100 / np.sqrt(9.81 * 2.8155) for row in rows],
     }
-    law = laws(capsys, write(tmp_path / "swings.csv", columns))["frequency_Hz"]
+    law = laws(ask, write(tmp_path / "swings.csv", columns))["frequency_Hz"]
     assert holds(law["energy"], -1 / 16)
     assert holds(law["temperature"], -0.8e-5)

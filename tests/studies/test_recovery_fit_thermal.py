@@ -1,7 +1,5 @@
 """hrg fit thermal finds the lags that a record was made with, and refuses a record that has none."""
 
-import json
-
 import numpy as np
 import pytest
 
@@ -24,11 +22,10 @@ def record(words, **columns):
     return Record({"time_s": t, "housing_temperature_degC": housing, "frequency_Hz": f} | columns, path="run.csv")
 
 
-def test_one_lag_without_radiation_is_found_with_its_interval(tmp_path, capsys):
+def test_one_lag_without_radiation_is_found_with_its_interval(tmp_path, capsys, ask):
     path = tmp_path / "run.csv"
     write_record(record("step 20 -20 4h then step -20 40 4h"), path)
-    assert main(["fit", "thermal", str(path), "--lags", "1", "--json"]) == 0
-    answer = json.loads(capsys.readouterr().out)
+    answer = ask(["fit", "thermal", str(path), "--lags", "1"])
     assert answer["schema"] == "hrg.fit-thermal/1"
     tau, share = answer["estimates"]["time_constant_1"], answer["estimates"]["radiated_share"]
     assert tau["low"] < 1800.0 < tau["high"]

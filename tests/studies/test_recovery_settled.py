@@ -1,6 +1,5 @@
 """Soaks found in a record against the law of the device that made it."""
 
-import json
 import re
 
 import numpy as np
@@ -99,16 +98,16 @@ def test_what_is_advised_settles(tmp_path, capsys):
     assert sum(not soak.extrapolated_K for soak in find_soaks([shorter])) < 4
 
 
-def test_the_command_takes_a_record(run, tmp_path, capsys):
+def test_the_command_takes_a_record(run, tmp_path, ask, refuse):
     path = tmp_path / "run.csv"
     write_record(run.record, path)
-    assert main(["fit", "frequency", str(path), "--order", "2", "--json"]) == 0
-    answer = json.loads(capsys.readouterr().out)
+    answer = ask(["fit", "frequency", str(path), "--order", "2"])
     assert answer["schema"] == "hrg.fit-frequency/1"
     assert set(answer["soaks"][0]) == {
         "record", "start_s", "end_s", "temperature_degC", "frequency_Hz", "error_Hz", "left_K", "extrapolated_K",
     }  # fmt: skip
     slope = float(run.law.slope(273.15) * run.law.frequency(273.15))
     assert answer["coefficients"][1] == pytest.approx(slope, rel=2e-3)
-    assert main(["fit", "frequency", str(path), "--time-constant", "1e7"]) == 2
-    assert "a fit over temperature needs at least two temperatures" in capsys.readouterr().err
+    assert "a fit over temperature needs at least two temperatures" in refuse(
+        ["fit", "frequency", str(path), "--time-constant", "1e7"]
+    )

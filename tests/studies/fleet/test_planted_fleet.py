@@ -189,9 +189,7 @@ def test_a_wrong_table_of_the_lot_is_told_with_its_line(tmp_path, table, said):
         read_lot(str(tmp_path))
 
 
-def test_a_folder_without_devices_and_a_lot_of_one_are_refused(tmp_path, capsys):
-    assert main(["fleet", str(tmp_path), "--out", str(tmp_path / "out")]) == 2
-    assert "give a folder outside" in capsys.readouterr().err
+def test_a_folder_without_devices_and_a_lot_of_one_are_refused(tmp_path, refuse):
+    assert "give a folder outside" in refuse(["fleet", str(tmp_path), "--out", str(tmp_path / "out")])
     (tmp_path / "lot").mkdir()
-    assert main(["fleet", str(tmp_path / "lot"), "--out", str(tmp_path / "out")]) == 2
-    assert "no folders of devices" in capsys.readouterr().err
+    assert "no folders of devices" in refuse(["fleet", str(tmp_path / "lot"), "--out", str(tmp_path / "out")])

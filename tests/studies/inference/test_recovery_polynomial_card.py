@@ -1,7 +1,5 @@
 """A card of a polynomial law: simulated, made from records alone, calibrated, written and read."""
 
-import json
-
 import numpy as np
 import pytest
 
@@ -63,7 +61,7 @@ def test_contract_a_card_has_one_law() -> None:
 
 
 @pytest.mark.slow
-def test_recovery_of_a_hidden_effect_without_a_card_and_of_an_unseen_run(tmp_path, capsys) -> None:
+def test_recovery_of_a_hidden_effect_without_a_card_and_of_an_unseen_run(tmp_path, capsys, ask) -> None:
     hidden = {"name": "rate-bias", "response": "bias_deg_per_h", "coefficient_deg_per_h_per_K_per_s": 600.0}
     device = build_instrument({**TRUE, "effect": [hidden]})
     save_card(device, tmp_path / "device.toml")
@@ -75,8 +73,7 @@ def test_recovery_of_a_hidden_effect_without_a_card_and_of_an_unseen_run(tmp_pat
         assert main([*simulate, "--out", runs[-1]]) == 0
     capsys.readouterr()
     saved = tmp_path / "saved.toml"
-    assert main(["diagnose", *runs, "--save", str(saved), "--json"]) == 0
-    verdict = json.loads(capsys.readouterr().out)
+    verdict = ask(["diagnose", *runs, "--save", str(saved)])
     (cause,) = verdict["causes"]
     assert "rate-bias" in (cause["effect"], *cause["equivalent"])
     unseen = load_profile("ramp 25 -5 1 then soak -5 1h then ramp -5 35 2 then soak 35 2h")

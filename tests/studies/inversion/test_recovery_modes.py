@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from studies.cli import main
 from studies.errors import InputError
 from studies.instrument.card import build_instrument, load_card
 from studies.inversion.assignment import assign
@@ -88,11 +87,9 @@ def test_contract_a_bad_row_is_named(tmp_path, rows, words):
         assert word in str(caught.value)
 
 
-def test_contract_a_mode_stands_once_and_alone(tmp_path, capsys):
+def test_contract_a_mode_stands_once_and_alone(tmp_path, refuse):
     path, run = tmp_path / "modes.csv", tmp_path / "run.csv"
     path.write_text("harmonic,index,frequency_Hz\n2,0,4500\n2,0,4501\n")
     run.write_text("time_s,housing_temperature_degC,frequency_Hz\n0,20,4500\n1,20,4500\n")
-    assert main(["calibrate", str(CARD[0]), str(path)]) == 2
-    assert "twice" in capsys.readouterr().err
-    assert main(["calibrate", str(CARD[0]), str(path), str(run)]) == 2
-    assert "alone" in capsys.readouterr().err
+    assert "twice" in refuse(["calibrate", str(CARD[0]), str(path)])
+    assert "alone" in refuse(["calibrate", str(CARD[0]), str(path), str(run)])

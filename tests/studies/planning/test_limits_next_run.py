@@ -1,13 +1,11 @@
 """The designed next run: words that simulate, evidence that dense algebra confirms, a candidate that is the run which it repeats."""
 
-import json
 from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from studies.cli import main
 from studies.inference.diagnosis import build_problem
 from studies.inference.model import Linear
 from studies.inference.polynomial_card import polynomial_card
@@ -111,13 +109,12 @@ def test_rivals_are_separated_by_runs_and_not_from_themselves(found):
 
 
 @pytest.mark.slow
-def test_a_diagnosis_with_a_card_proposes_the_next_run(tmp_path, capsys):
+def test_a_diagnosis_with_a_card_proposes_the_next_run(tmp_path, ask):
     card = load_card("hrg-30mm")
     (record,) = simulate_plan(card, [WORDS])
     write_record(record, tmp_path / "run.csv")
     words = ["diagnose", str(tmp_path / "run.csv"), "--card", "hrg-30mm", "--next", "--chamber", "rate 2 range -10 50"]
-    assert main([*words, "--json"]) == 0
-    answer = json.loads(capsys.readouterr().out)
+    answer = ask(words)
     run = answer["next_run"]
     keys = {"profile", "drives", "expected_evidence", "repeat_evidence", "separates", "narrows", "hours"}
     assert set(run) == keys

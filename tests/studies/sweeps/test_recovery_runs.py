@@ -236,7 +236,7 @@ def test_a_store_that_is_garbage_is_refused_and_made_anew_by_a_run(tmp_path, fun
     results.close()
 
 
-def test_a_torn_store_holds_what_was_whole(tmp_path, functions, capsys):
+def test_a_torn_store_holds_what_was_whole(tmp_path, functions, capsys, ask):
     spec = tmp_path / "square.toml"
     spec.write_text(spec_of("square", 'method = "grid"', 'name = "user.x"\nlow = 0\nhigh = 1\ncount = 400'))
     run_study(spec, tmp_path / "out", workers=1, allow_python=True).close()
@@ -246,8 +246,7 @@ def test_a_torn_store_holds_what_was_whole(tmp_path, functions, capsys):
     with contextlib.closing(open_results(tmp_path / "out")) as results:
         done = len(results)
         assert 0 < done < 400
-    assert main(["study", "export", str(tmp_path / "out"), "--json"]) == 0
-    said = json.loads(capsys.readouterr().out)
+    said = ask(["study", "export", str(tmp_path / "out")])
     assert (said["rows"], said["done"], said["cases"]) == (done, done, 400)
     assert main(["study", "export", str(tmp_path / "out")]) == 0
     assert f"{done} of 400 cases are done" in capsys.readouterr().err

@@ -96,12 +96,11 @@ def test_contract_failure_keeps_the_old_file(tmp_path, monkeypatch):
     assert [one.name for one in tmp_path.iterdir()] == ["twin.fmu"]
 
 
-def test_contract_bad_input(tmp_path, capsys):
+def test_contract_bad_input(tmp_path, refuse):
     """A part of the card that cannot be carried."""
     turning = tmp_path / "turning.toml"
     save_card(load_card("hrg-30mm-loops").with_table("loop", {"mode": "whole-angle"}), turning)
-    assert main(["twin", str(turning), "--c", str(tmp_path / "c")]) == 2
-    error = capsys.readouterr().err
+    error = refuse(["twin", str(turning), "--c", str(tmp_path / "c")])
     assert "turning.toml [loop]" in error
     assert "force-rebalance" in error
     assert not (tmp_path / "c").exists()
