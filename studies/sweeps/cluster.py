@@ -60,9 +60,13 @@ class Cluster(Workers):
             with dask.config.set({"distributed.comm.timeouts.connect": f"{PATIENCE} s"}):
                 self.client = Client(address, timeout=PATIENCE, set_as_default=False, security=security)
         except (OSError, TimeoutError, ValueError, TypeError, RuntimeError) as error:
-            more = " Certificates stand under distributed.comm.tls in Dask's configuration." if security else ""
+            if isinstance(error, TypeError):  # no context of TLS
+                raise MissingEnvironment(
+                    f"{address}: encryption needs certificates: distributed.comm.tls.ca-file, .client.cert and .client.key in"
+                    " Dask's configuration."
+                ) from error
             raise MissingEnvironment(
-                f"{address}: no scheduler with a worker answers ({error}); start both, or correct --scheduler.{more}"
+                f"{address}: no scheduler with a worker answers ({error}); start both, or correct --scheduler."
             ) from error
         self._check_versions()
         self.executor = self.client.get_executor(pure=False, retries=0)

@@ -114,7 +114,7 @@ def compute(
                 continue
             except workers.gone as error:
                 raise MissingEnvironment(
-                    f"the workers are gone ({error}); everything computed before is kept. Run the same command again to resume."
+                    f"the workers are gone ({str(error) or 'connection lost'}); everything computed before is kept. Run the same command again to resume."
                 ) from error
             _keep(found, store, progress)
             computed = True

@@ -258,7 +258,7 @@ def test_no_scheduler_is_said(protocol):
 
     patience, module.PATIENCE = module.PATIENCE, 1.0
     try:
-        with pytest.raises(MissingEnvironment, match="no scheduler"):
+        with pytest.raises(MissingEnvironment, match="certificates" if protocol == "tls" else "no scheduler"):
             run_study(SPEC, scheduler=f"{protocol}://127.0.0.1:{free_port()}")
     finally:
         module.PATIENCE = patience
