@@ -1,7 +1,8 @@
-"""Line of a TOML file where a key stands, for errors that name it."""
+"""Line of a TOML file where a key stands, or the name of a built-in card, for errors that name it."""
 
 import re
 from collections.abc import Iterator
+from importlib.resources import files
 from pathlib import Path
 
 from studies.errors import InputError
@@ -17,8 +18,14 @@ KEY = re.compile(r"\s*\"?([\w.-]+)\"?\s*=")
 
 
 def point_out(message: str) -> str:
-    """Return a message with "(file:line)" of the key that it names, or of the table where the key is missing; else as it is."""
+    """Return a message with "(file:line)" of the key that it names, or of the table where the key is missing; else as it is.
+
+    A built-in card is named, with what makes a copy of it that can be changed; its file is inside the installation.
+    """
     named = NAMED.match(message)
+    if named is not None and (file := Path(named["file"])).parent == Path(str(files("studies"))) / "cards":
+        copied = f"To change it, copy it: hrg card new MY.toml --like {file.stem}."
+        return f"the built-in card {file.stem}{message[named.end('file') :]} {copied}"
     if named is None or re.search(r"\bline \d", message):
         return message
     parts = (named["table"], named["inner"], named["unknown"] or named["key"])

@@ -104,9 +104,10 @@ def test_two_gyros_are_not_mixed(card, record):
     ("changed", "said"),
     [
         ({"radius_mm": 0.015, "thickness_mm": 0.0009}, "Lengths are in mm, not in m"),
+        ({"thickness_mm": 0.0009}, "thickness_mm = 0.0009 is too thin"),
         ({"rim_angle_deg": 1.5708}, "it looks like radians: 1.5708 rad are 90°"),
     ],
-    ids=["metres", "radians"],
+    ids=["metres", "wall in metres", "radians"],
 )
 def test_a_card_in_metres_or_radians_is_implausible(changed, said, tmp_path):
     text = tmp_path / "card.toml"

@@ -57,7 +57,7 @@ REFUSED = {
     "loads free-dome": "held against no load",
     "loads hrg-30mm --along 0 --across 0": "no load is given",
     "loads hrg-30mm --harmonic 1": "n = 2 and above",
-    "loop free-dome": "add a table [loop]",
+    "loop free-dome": "To change it, copy it: hrg card new MY.toml --like free-dome.",
     "loop hrg-30mm-loops --hours -1 --out run.csv": "--hours -1: must be positive",
     "loop hrg-30mm-loops --hours 1e9 --out run.csv": "more than",
     "loop hrg-30mm-loops --hours 2": "--hours: only for a simulated run; add --out",

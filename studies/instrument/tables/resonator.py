@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
 MM = 1e-3
 SMALLEST, LARGEST = 1e-4, 1.0  # m: micro-hemispheres begin at some tenths of a millimetre
+THINNEST = 3e-4  # of the size: films on micro-hemispheres are a few times thicker
 RADIANS = 2 * math.pi  # no dome ends at so few degrees: the angle is in radians
 Length = Annotated[float, number(above=0.0)]
 NotNegative = Annotated[float, number(least=0.0)]
@@ -211,6 +212,11 @@ def build_resonator(keys: Shape, place: CardPlace) -> "Resonator":
     if not SMALLEST <= resonator.size <= LARGEST:
         hint = " Lengths are in mm, not in µm." if resonator.size > LARGEST else " Lengths are in mm, not in m."
         raise InputError(f"{place.where}: a resonator of {resonator.size / MM:g} mm cannot be built.{hint}")
+    if (thinnest := min(h for _, h in resonator.thickness)) < THINNEST * resonator.size:
+        raise InputError(
+            f"{place.where}: thickness_mm = {thinnest / MM:g} is too thin for a resonator of {resonator.size / MM:g} mm."
+            " Lengths are in mm, not in m."
+        )
     return resonator
 
 
