@@ -202,7 +202,7 @@ def _describe(store: Store, study: Study, design: Design, identity: Mapping[str,
 
 def _is_finished(store: Store, study: Study, design: Design, sources: Mapping[str, str]) -> bool:
     """Return whether everything that is asked is in the store; if so its families need not be built again to know it."""
-    done = int(store.done.sum()) == len(design.unique) and store.find(nominal_row(study)) is not None
+    done = store.study and int(store.done.sum()) == len(design.unique) and store.find(nominal_row(study)) is not None
     if not done or not {name_search(search) for search in study.searches} <= store.findings.keys():
         return False
     solver = store.about()["identity"]["solver"]

@@ -223,11 +223,18 @@ def test_changed_spec_card_or_function_is_refused_with_what_changed(tmp_path, fu
         run()
 
 
-def test_a_store_that_is_garbage_is_refused_and_made_anew_by_a_run(tmp_path, functions):
+@pytest.mark.parametrize(
+    "spoil",
+    [lambda whole: b"this is no store" * 400, lambda whole: whole[:100] + bytes([whole[100] ^ 1]) + whole[101:]],
+    ids=["garbage", "what the study is"],
+)
+def test_a_store_that_is_damaged_is_refused_and_mended_by_a_run(spoil, tmp_path, functions):
+    """Without the block that says what the study is, all cases are there: such a store once stayed refused for ever."""
     spec = tmp_path / "square.toml"
     spec.write_text(spec_of("square", 'method = "grid"', 'name = "user.x"\nlow = 0\nhigh = 1\ncount = 40'))
     run_study(spec, tmp_path / "out", workers=1, allow_python=True).close()
-    (tmp_path / "out" / "study.store").write_bytes(b"this is no store" * 400)
+    store = tmp_path / "out" / "study.store"
+    store.write_bytes(spoil(store.read_bytes()))
     with pytest.raises(InputError, match="damaged"):
         open_results(tmp_path / "out")
     with pytest.warns(UserWarning, match="damaged in 1 place; .* computed again"):
