@@ -41,24 +41,6 @@ EXCLUDED = 6.0  # prior standard deviations that no value of a right card is awa
 
 
 @dataclass(frozen=True)
-class LinearResponse:
-    """A response as a linear problem about the calibrated values, one array per run (rows are block averages).
-
-    measured − predicted = columns · δ + noise, δ the move of the coordinates from the calibrated point, with prior mean
-    `prior_mean` and standard deviation `prior_sd`.
-    """
-
-    # time, residual: per run, arrays (N,)
-    time: tuple[Array, ...]
-    residual: tuple[Array, ...]
-    columns: tuple[Array, ...]  # per run, arrays (N, p)
-    names: tuple[str, ...]  # p; the card's values, then the departures at the start of each run
-    # prior_mean, prior_sd: arrays (p,)
-    prior_mean: Array
-    prior_sd: Array
-
-
-@dataclass(frozen=True)
 class HeldOutRun:
     """How one held-out run is predicted: rms of block averages by response."""
 
@@ -119,24 +101,6 @@ class Calibration(Shown):
         rows = [asdict(one) | {"told_by": one.told_by} for one in sorted(self.estimates, key=lambda one: one.width)]
         columns = ["unit", "card", "value", "low", "high", "shift_sd", "width", "told_by"]
         return pd.DataFrame(rows).set_index("parameter")[columns]
-
-    def baseline(self, response: str) -> LinearResponse:
-        """Return a response as a linear problem, for what else may be in it."""
-        problem, state = self.fit.problem, self.fit.state
-        if response not in problem.responses or response == SETTLED:
-            raise InputError(f"no record was calibrated in {response}; there are {', '.join(problem.responses)}.")
-        rows = problem.rows[response]
-        starts = [
-            f"{name} of run {problem.parts[k].run + 1} ({problem.parts[k].name})" for k, name, _ in problem.starts
-        ]
-        return LinearResponse(
-            time=rows.times,
-            residual=tuple(state.residual[response][s] for s in rows.slices),
-            columns=tuple(state.slope[response][s] for s in rows.slices),
-            names=(*problem.priors.names, *starts),
-            prior_mean=-state.point,
-            prior_sd=np.ones(problem.count),
-        )
 
 
 def calibrate(
