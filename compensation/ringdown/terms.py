@@ -13,8 +13,8 @@ from compensation.ringdown.model import swing
 from compensation.ringdown.whiteness import RARE, Leftover, examine, find_line
 
 PAYS = 20.0  # least fall of −2 ln L, over the widening², for a second mode or a tone, beside 2 ln N
-NAMED = scipy.stats.chi2.isf(RARE, [1, 2])
-"""The same for a rate that depends on the amplitude and for two degrees of drift: noise passes it once in a thousand records."""
+NAMED = (1, 2)
+"""Numbers that a rate depending on the amplitude and a drift have: the fall that noise passes once in a thousand records is χ² of so many."""
 WHITE = 1.3
 TONES, DEGREES = 3, 8
 SMALL = 1e-4  # radians of the trial step of a curved rate
@@ -59,7 +59,7 @@ def _price(fit: DecayFit, terms: Terms) -> float:
     """Return what terms must save beyond those of a fit."""
     tones = terms.tones - fit.terms.tones
     more = np.array([len(terms.curved) - len(fit.terms.curved), (terms.drift - fit.terms.drift + 1) // 2])
-    return float(NAMED @ more) + tones * (PAYS + 2 * float(np.log(fit.envelope.time.size)))
+    return float(scipy.special.chdtri(NAMED, RARE) @ more) + tones * (PAYS + 2 * float(np.log(fit.envelope.time.size)))
 
 
 def _extend(envelope: Envelope, fit: DecayFit, most: int) -> DecayFit:
