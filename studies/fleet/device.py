@@ -8,8 +8,8 @@ import numpy as np
 
 from compensation.arrays import Array
 from shell.constants import zero_Celsius
+from studies.calibration.observed import RESPONSES, UNITS
 from studies.diagnosis.verdict import NINETY
-from studies.effects.effect import UNITS
 from studies.errors import InputError
 from studies.fleet.folder import Device
 from studies.inference.diagnosis import Inference
@@ -24,7 +24,7 @@ from studies.simulation.variations import HEATED, Variations
 from studies.workbench import diagnose_records
 from thermal.profile import Profile
 
-SCHEMA = "hrg.fleet-device/1"
+SCHEMA = "hrg.fleet-device/2"
 USUAL, APART = 20.0, 5.0  # °C at which devices are compared without a common card, and kelvin to either side for slopes
 KNOWN, LITTLE = 0.5, 0.9
 """Standard deviation of a value, over that of its prior, below which its records tell it, and above which they say nothing."""
@@ -133,7 +133,7 @@ def _settled(varied: Variations, card: Any, law: Any, T: float, slopes: Array) -
     return {
         name: (float(own[-1]), np.array([found.derivatives[v][name][-1] for v in varied.names]) @ slopes)
         for name, own in found.columns.items()
-        if name in UNITS
+        if name in RESPONSES
     }
 
 
@@ -176,7 +176,7 @@ def _standing(background: Background, term: Term, score: float) -> Standing:
     if len(term.unit) == 1:
         name = term.effect.coefficient_names(term.response)[term.members[0]]
         return Standing(score, size, size / times, float(mean[0]), float(np.sqrt(C[0, 0])), name)
-    return Standing(score, size, size / times, size, size / times, f"rms_{UNITS[term.response]}")
+    return Standing(score, size, size / times, size, size / times, f"rms ({UNITS[term.response]})")
 
 
 def interval(value: float, sd: float) -> dict[str, float]:

@@ -73,6 +73,7 @@ VALUES = (
 def _sizes(one: Share) -> str:
     values = [size.first for size in one.sizes.values()]
     name = next(iter(one.sizes.values())).coefficient
+    name = name if " " in name else spell_parameter(name)[0]
     if len(values) == 1:
         return f"{name} {plain(values[0])}"
     return f"{name} {plain(min(values), 2)} … {plain(max(values), 2)}"
@@ -105,7 +106,7 @@ def fleet_parts(lot: Lot, page: Callable[[str], str] | None = None) -> list[Chap
     ]
     # those first in which a device or a batch differs
     ordered = sorted(lot.quantities, key=lambda q: min([*q.odd.values(), *q.bad_batches.values()], default=1.0))
-    caption = "Values with 90 % intervals in the order of the serial numbers; band: mean ± 3 scatter."
+    caption = "Values with 90 % intervals in the order of the serial numbers; red: odd device, orange: odd batch; band: mean ± 3 standard deviations."
     dated = [one for one in ordered[:DATED] if sum(s in lot.made for s in one.of) > 2]
     charts = [
         Figure(lambda: _draw(lot, ordered[:MOST]), caption) if ordered else None,

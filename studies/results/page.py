@@ -15,6 +15,7 @@ from importlib.metadata import version
 from importlib.resources import files
 from io import BytesIO
 from typing import TYPE_CHECKING, Any
+from urllib.parse import quote
 
 from studies.results import Blocks, Chapter, Drawing, Facts, Figure, Part, Result, Sentence, Table
 from studies.results.curves import read_curves
@@ -153,7 +154,12 @@ def _cell(text: str) -> "Markup":
     if re.match(r"[-+±<> ]*[.\d]", text):
         text = re.sub(r"(?<=\de)([-−+]?)0+(?=\d)", r"\1", text)
         text = re.sub(r"(?<![\w.)\]-])-(?=\.?\d)|(?<=\de)-(?=\d)", "−", text)
-    return Markup(escape(re.sub(r"(?<=\d)%", " %", text)))
+    shown = escape(re.sub(r"(?<=\d)%", " %", text))
+    if (
+        text.endswith(".html") and "/" in text and ":" not in text and not text.startswith("/")
+    ):  # a page beside this one
+        return Markup('<a href="{}">{}</a>').format(quote(text), shown)
+    return Markup(shown)
 
 
 def _stacked(table: Cells) -> bool:
