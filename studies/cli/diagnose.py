@@ -17,7 +17,7 @@ PLANNED = "hrg-30mm"
 """Card of a plan without --card."""
 
 
-@answers("hrg.diagnosis/1, with --plan hrg.plan/2, with --device hrg.fleet/2")
+@answers("hrg.diagnosis/1, with --plan hrg.plan/2")
 def diagnose(
     *runs: str,
     card: str | None = None,
@@ -25,8 +25,6 @@ def diagnose(
     plan: list[str] | None = None,
     next_: Annotated[bool, Parameter(name="--next")] = False,
     chamber: str | None = None,
-    device: list[str] | None = None,
-    fleet: str | None = None,
 ) -> Result:
     """Name the physical effect that the simulation lacks, or say that the data cannot identify it.
 
@@ -44,18 +42,10 @@ def diagnose(
         next_: Propose the next run: the profile that best separates the remaining candidates, or else narrows the
             intervals of the causes found, per hour of chamber time.
         chamber: Limits of the chamber, such as "rate 3 range -40 85" (K/min, °C), for --plan and for the next run.
-        device: A device of a fleet and its records, such as A=a1.csv,a2.csv; repeat it for each device of the same
-            design. Shows what the devices have in common and which one differs.
-        fleet: The same as a file (TOML): a table [devices] with lines such as A = ["a1.csv", "a2.csv"], beside the
-            records.
     """
     limits = None if chamber is None else parse_chamber(chamber)
     if plan:
         return _plan([*plan, *runs], card, limits)
-    if device or fleet is not None:
-        if runs or save is not None:
-            raise InputError("with --device or --fleet, give no other records and no --save.")
-        return _fleet(device or [], fleet, card)
     if not runs:
         raise InputError("no records given: hrg diagnose RUN.csv [RUN.csv ...].")
     tables = [path for path in runs if workbench.is_table(path)]
@@ -107,16 +97,3 @@ def _campaign(runs: tuple[str, ...], card: str | None, limits: Chamber | None, s
     payload = {**found.verdict.as_dict(), "extended_model": save}
     parts = diagnosis_parts(found)
     return Result(payload, "Diagnosis of a campaign", headline(found.verdict), parts, 2 if refused else 0)
-
-
-def _fleet(devices: list[str], manifest: str | None, card: str | None) -> Result:
-    from studies.fleet.folder import read_devices
-    from studies.fleet.run import run_lot
-    from studies.reports import fleet as parts
-
-    with Told("fleet") as told:
-        lot = run_lot(read_devices(devices, manifest, card), progress=told)
-    for why in lot.failed.values():
-        say(f"hrg: {why}")
-    status = 4 if lot.failed else 0
-    return Result(lot.as_dict(), "Diagnosis of a fleet", parts.headline(lot), parts.fleet_parts(lot), status)

@@ -11,15 +11,14 @@ from studies.design.task import Task, read_task
 from studies.files.writing import write_text
 from studies.instrument.card import Instrument, load_card, save_card
 from studies.sweeps.canonical import PHYSICS_VERSION, digest, spell_material
+from studies.sweeps.engine import hire
 from studies.sweeps.evaluate import WorkPlan
 from studies.sweeps.opening import claim_store
 from studies.sweeps.parameters import set_parameters
 from studies.sweeps.progress import Progress, shown_progress
 from studies.sweeps.provenance import describe_environment
-from studies.sweeps.run import cores
 from studies.sweeps.search import Explorer
 from studies.sweeps.store import Store, memory_store
-from studies.sweeps.workers import Here, Pool
 
 CARD, TABLE = "best.toml", "evaluations.csv"
 
@@ -38,8 +37,7 @@ def optimise(
     study = task.study
     plan = replace(WorkPlan.of(study), start=task.named(task.start))
     store = memory_store() if out is None else claim_store(out)
-    count = workers or cores()
-    crew = Here() if count == 1 else Pool(count)
+    crew = hire(workers)
     outcome = "stopped"
     try:
         _describe(store, task)

@@ -1,27 +1,16 @@
-"""Devices of a lot: a folder each with its records, words of a command, or a manifest; `lot.csv` says serial, date and batch."""
+"""Devices of a lot: a folder each with its records; `lot.csv` says serial, date and batch."""
 
 import csv
 import hashlib
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection
 from dataclasses import dataclass
 from datetime import date
 from pathlib import Path
-from typing import Annotated
 
 from studies.errors import InputError, nearest
 from studies.files.columns import read_header
-from studies.schema.keys import Keys, says
-from studies.schema.reader import read_keys, read_toml
 
 LOT, LOT_COLUMNS = "lot.csv", ("serial", "date", "batch")
-
-
-class Manifest(Keys, frozen=True, kw_only=True):
-    """The devices of a fleet."""
-
-    devices: Annotated[
-        dict[str, Annotated[tuple[str, ...], says("records", least=1)]], says('lines such as A = ["a1.csv", "a2.csv"]')
-    ]
 
 
 @dataclass(frozen=True)
@@ -92,23 +81,3 @@ def _read_table(path: Path, serials: Collection[str]) -> dict[str, tuple[date | 
                 raise InputError(f"{path}, line {line}: device '{serial}' is listed twice.")
             found[serial] = made, (row.get("batch") or "").strip()
     return found
-
-
-def read_devices(devices: Sequence[str] = (), manifest: str | None = None, card: str | None = None) -> list[Device]:
-    """Return devices from words such as "A=a1.csv,a2.csv", or from a TOML file with a table [devices]."""
-    paths: dict[str, Sequence[str]] = {}
-    for words in devices:
-        name, equals, files = words.partition("=")
-        if not (name and equals and files) or name in paths:
-            raise InputError(f"--device {words}: give a unique name and its records, as in A=a1.csv,a2.csv.")
-        paths[name] = files.split(",")
-    if manifest is not None:
-        paths |= _read_manifest(manifest, paths)
-    return [Device(name, tuple(own), card) for name, own in paths.items()]
-
-
-def _read_manifest(manifest: str, known: Collection[str]) -> Mapping[str, list[str]]:
-    devices = read_keys(read_toml(manifest), Manifest, manifest).devices
-    if twice := sorted(set(devices) & set(known)):
-        raise InputError(f"{manifest} [devices]: {twice[0]} is given by --device too; name each device once.")
-    return {name: [str(Path(manifest).parent / one) for one in files] for name, files in devices.items()}

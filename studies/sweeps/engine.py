@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from studies.errors import MissingEnvironment
 from studies.sweeps.block import Batch, Cases, join
 from studies.sweeps.evaluate import WorkPlan, evaluate_task, failed_cases
+from studies.sweeps.workers import Here, Pool, cores, say_gone
 
 if TYPE_CHECKING:
     from studies.sweeps.definition import Study
@@ -73,6 +74,16 @@ def batch_size(study: "Study", vectorised: bool) -> int:
     return study.sampling.batch or (BATCH_VECTORISED if vectorised else BATCH)
 
 
+def hire(workers: int | None, scheduler: str | None = None) -> "Workers":
+    """Return the workers of a Dask scheduler, or so many here, one for every core unless given."""
+    if scheduler is not None:
+        from studies.sweeps.cluster import Cluster
+
+        return Cluster(scheduler)
+    count = workers or cores()
+    return Here() if count == 1 else Pool(count)
+
+
 def compute(
     plan: WorkPlan, batches: "Batches | deque[Batch]", workers: "Workers", store: "Store", progress: "Progress"
 ) -> None:
@@ -113,9 +124,7 @@ def compute(
                     running.clear()
                 continue
             except workers.gone as error:
-                raise MissingEnvironment(
-                    f"the workers are gone ({str(error) or 'connection lost'}); everything computed before is kept. Run the same command again to resume."
-                ) from error
+                raise say_gone(error) from error
             _keep(found, store, progress)
             computed = True
             each = sum(cases.seconds for cases in found) / len(found)

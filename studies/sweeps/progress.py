@@ -1,4 +1,4 @@
-"""How far a study is: a bar on a terminal, one plain line every half minute in a pipe."""
+"""How far a study or a lot is: a bar on a terminal, one plain line every half minute in a pipe."""
 
 import sys
 import time
@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-LINE_EVERY = 30.0  # s
+FIRST, LINE_EVERY = 2.0, 30.0  # s until a line is printed, and from one to the next
 
 
 class Progress:
@@ -32,6 +32,10 @@ class Progress:
 
 class Lines(Progress):
     """Progress in logs."""
+
+    def __init__(self, total: int, done: int) -> None:
+        super().__init__(total, done)
+        self.last += FIRST - LINE_EVERY
 
     def show(self, now: float) -> None:
         """Print a line when the last is half a minute old."""

@@ -1,7 +1,6 @@
 """Run a study from spec to store: check, resume, compute, search."""
 
 import json
-import os
 import time
 import warnings
 from collections.abc import Mapping
@@ -17,7 +16,7 @@ from studies.sweeps.block import Batch
 from studies.sweeps.canonical import PHYSICS_VERSION, digest, spell, spell_material
 from studies.sweeps.definition import FREE, Study
 from studies.sweeps.design import Design, draw, nominal_row
-from studies.sweeps.engine import BATCH, BATCH_VECTORISED, compute, missing_batches
+from studies.sweeps.engine import BATCH, BATCH_VECTORISED, compute, hire, missing_batches
 from studies.sweeps.evaluate import WorkPlan, evaluate_task
 from studies.sweeps.families import Families, choose_solver, why_not
 from studies.sweeps.opening import claim_store
@@ -27,7 +26,7 @@ from studies.sweeps.results import Results, open_results
 from studies.sweeps.search import name_search, run_searches
 from studies.sweeps.spec import read_study
 from studies.sweeps.store import FILE, Store, memory_store
-from studies.sweeps.workers import Here, Pool, Workers
+from studies.sweeps.workers import Here, Workers, cores
 
 STORE_SECONDS = 3e-5  # for one case to be hashed, committed and counted
 
@@ -80,7 +79,7 @@ def run_study(
             if not fresh:
                 families = choose_solver(study, design)
             _describe(store, study, design, identify(study, design, sources, _describe_families(families)))
-            crew = Here() if families else _hire(workers, scheduler)
+            crew = Here() if families else hire(workers, scheduler)
             _run(store, study, design, WorkPlan.of(study, families), crew, show_progress)
     except BaseException:
         store.close()
@@ -141,11 +140,6 @@ def estimate_study(study: Study, workers: int | None = None) -> Effort:
 
 def _nominal(study: Study, count: int) -> Batch:
     return Batch(np.full(count, -1), np.tile(nominal_row(study), (count, 1)))
-
-
-def cores() -> int:
-    """Return the number of cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def check_functions(study: Study, allowed: bool) -> dict[str, str]:
@@ -255,12 +249,3 @@ def _run(store: Store, study: Study, design: Design, plan: WorkPlan, crew: Worke
     finally:
         crew.close()
         store.end_run(outcome)
-
-
-def _hire(workers: int | None, scheduler: str | None) -> Workers:
-    if scheduler is not None:
-        from studies.sweeps.cluster import Cluster
-
-        return Cluster(scheduler)
-    count = workers or cores()
-    return Here() if count == 1 else Pool(count)

@@ -10,6 +10,7 @@ from concurrent.futures import Executor, Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from typing import Any
 
+from studies.errors import MissingEnvironment
 from studies.threads import ONE_THREAD
 
 # One thread each, and no module of the working directory: a signal.py there must not be run by a worker.
@@ -90,6 +91,18 @@ class Pool(Workers):
             self._executor: Executor = ProcessPoolExecutor(
                 self.count, mp_context=context, initializer=become_worker, initargs=(os.getpid(),)
             )
+
+
+def cores() -> int:
+    """Return the number of cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def say_gone(error: BaseException) -> MissingEnvironment:
+    """Return the error that tells that all workers are gone."""
+    return MissingEnvironment(
+        f"the workers are gone ({str(error) or 'connection lost'}); everything computed before is kept. Run the same command again to resume."
+    )
 
 
 def become_worker(parent: int) -> None:

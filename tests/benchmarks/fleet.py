@@ -17,6 +17,8 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 from studies.fleet.folder import read_lot
 from studies.fleet.run import run_lot
+from studies.sweeps.engine import hire
+from studies.sweeps.progress import shown_progress
 from tests.studies.fleet.lots import CARD, make_lot
 
 BATCH = 20
@@ -39,7 +41,9 @@ def main() -> None:
     truth = json.loads(planted.read_text())
     begin = time.monotonic()
     out = str(given.folder / "answers") if given.pages else None
-    found = run_lot(read_lot(str(lot), CARD), out, given.workers, lambda words: print(words, file=sys.stderr))
+    devices = read_lot(str(lot), CARD)
+    with shown_progress(len(devices), 0) as progress:
+        found = run_lot(devices, out, hire(given.workers), progress)
     hours = (time.monotonic() - begin) / 3600.0
     who = resource.RUSAGE_CHILDREN if given.workers > 1 else resource.RUSAGE_SELF
     used = resource.getrusage(who)

@@ -40,7 +40,6 @@ def folder(tmp_path, monkeypatch):
     shutil.copytree(INPUTS, tmp_path, dirs_exist_ok=True)
     (tmp_path / "mapped.toml").write_text(MAPPED)
     (tmp_path / "spec.toml").write_text(STUDY)
-    (tmp_path / "fleet.toml").write_text('[devices]\nA = ["run1.csv"]\nB = ["run2.csv"]\n')
     (tmp_path / "scanned-inner.csv").write_text((tmp_path / "inner.csv").read_text())
     (tmp_path / "model.toml").write_text("")
     (tmp_path / "link.csv").symlink_to(tmp_path / "run1.csv")
@@ -63,9 +62,6 @@ def contents(folder):
         "simulate hrg-30mm run1.csv --out ../{name}/run1.csv",
         "scan free-dome inner.csv outer.csv --theory shell --map inner.csv",
         "scan free-dome none scanned-inner.csv --theory shell --save outer.csv --map outer.csv",
-        "diagnose --device A=run1.csv --device B=run2.csv --report run2.csv",
-        "diagnose --device A=run1.csv,run2.csv --report run2.csv",
-        "diagnose --fleet fleet.toml --report run1.csv",
         "diagnose run1.csv --card mapped.toml --report outer.csv",
         "calibrate hrg-30mm run1.csv --save run1.csv",
         "import raw.csv --map map.toml --out map.toml",

@@ -44,7 +44,6 @@ REFUSED = {
     "derive --rim-angle-deg 180": "hrg: ",
     "derive --rim-angle-deg 1e-9": "hrg: ",
     "diagnose --plan 'soak 20 2h' --card nobody": "nobody",
-    "diagnose --device A=a.csv": "needs at least two devices",
     "effects histeresis": "hysteresis",
     "fit ringdown none.csv": "there is no such file",
     "acceptance hrg-30mm none.csv": "there is no such file",

@@ -1,6 +1,7 @@
 """Devices of one design: an odd device and a bad batch are found and nobody else is named; a set that one leaves open is closed by another."""
 
 import json
+from concurrent.futures import Future
 
 import numpy as np
 import pytest
@@ -9,10 +10,11 @@ from studies.cli import main
 from studies.errors import InputError
 from studies.fleet.comparison import compare
 from studies.fleet.device import Answer, Measured, Standing
-from studies.fleet.folder import Device, read_devices, read_lot
+from studies.fleet.folder import Device, read_lot
 from studies.fleet.lot import gather
 from studies.fleet.population import Population, Quantity
 from studies.fleet.run import run_lot
+from studies.sweeps.workers import Workers
 from tests.studies.fleet.lots import make_lot
 
 QUICK = ("time_s", "housing_temperature_degC", "frequency_Hz")
@@ -160,16 +162,27 @@ def test_a_lot_goes_on_where_it_was_and_past_what_it_cannot_read(tmp_path, capsy
         run_lot(read_lot(str(folder), "hrg-30mm"), str(out))
 
 
-def test_a_manifest_names_devices_beside_it(tmp_path):
-    (tmp_path / "a.csv").write_text("time_s\n")
-    manifest = tmp_path / "fleet.toml"
-    manifest.write_text('[devices]\nA = ["a.csv"]\nB = ["a.csv", "a.csv"]\n')
-    assert {one.serial: len(one.records) for one in read_devices([], str(manifest))} == {"A": 1, "B": 2}
-    manifest.write_text('[devices]\nA = "a.csv"\n')
-    with pytest.raises(InputError, match="A must be a list of 1 or more texts"):
-        read_devices([], str(manifest))
-    with pytest.raises(InputError, match="give a unique name"):
-        read_devices(["a.csv"])
+class Losing(Workers):
+    """Workers that lose one device's process each time, and with it what the others have."""
+
+    count, lost = 2, (BrokenPipeError,)
+
+    def submit(self, function, device, out):
+        done = Future()
+        if device.serial == "B":
+            done.set_exception(BrokenPipeError())
+        else:
+            done.set_result(Answer(device.serial, "", {"causes": [], "verdict": "adequate"}, 4432.0, {}, {}))
+        return done
+
+    def restart(self):
+        return True
+
+
+def test_a_device_that_ends_its_worker_costs_no_other():
+    lot = run_lot([Device(serial, ()) for serial in "ABCD"], crew=Losing())
+    assert set(lot.answers) == set("ACD")
+    assert "its process was ended each time" in lot.failed["B"]
 
 
 @pytest.mark.parametrize(
