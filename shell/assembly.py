@@ -16,7 +16,7 @@ from shell.quadrature import Array, at_gauss, gauss, nodal
 from shell.resonator import Resonator
 from shell.root import lay_root
 from shell.sparse import Index, Rows
-from shell.system import Group, ShellGroup, ShellPart, SolidGroup, SolidPart, System
+from shell.system import Group, ShellGroup, SolidGroup, System
 
 SMALL = 0.5  # length over radius of a small element
 
@@ -123,7 +123,7 @@ def solid_group(
     numbers, signs, count = number_functions(mesh, degree)
     unknowns = start + (3 * numbers[:, :, None] + np.arange(3)).reshape(len(numbers), -1)
     table = tabulate_cells(mesh.grid, at_gauss_points(degree, degree, degree + 2), n, solid.position)
-    return SolidGroup(table, unknowns, SolidPart(mesh, boundary, signs)), rows, start + 3 * count
+    return SolidGroup(table, unknowns, mesh, boundary, signs), rows, start + 3 * count
 
 
 def _shell_group(resonator: Resonator, chain: Chain, n: int, level: Level, start: int) -> tuple[ShellGroup, Rows, int]:
@@ -137,7 +137,7 @@ def _shell_group(resonator: Resonator, chain: Chain, n: int, level: Level, start
     nodes = p * np.arange(elements)[:, None] + np.arange(p + 1)
     unknowns = start + (nodes[:, :, None] * m + np.arange(m)).reshape(elements, -1)
     anchors, rows, fresh = _anchor(resonator, chain, unknowns, m, start + (elements * p + 1) * m)
-    group = ShellGroup(table, unknowns, ShellPart(chain, section), anchors)
+    group = ShellGroup(table, unknowns, chain, section, anchors)
     return group, rows, fresh
 
 

@@ -149,7 +149,7 @@ def _strains(system: System) -> tuple[Array, Array, Array, Array]:
     """ε_z, ε_r + ε_θ, ε_r - ε_θ and γ_rθ at all points, times the root of their volume, per free unknown: (points, unknowns)."""
     (group,) = system.groups
     assert isinstance(group, ShellGroup)
-    place, table = group.place.section, group.table
+    place, table = group.section, group.table
     t_r, t_z = place.tangent_r[..., None], place.tangent_z[..., None]
     n_r, n_z = -t_z, t_r
     root = np.sqrt(table.volume)

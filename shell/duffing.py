@@ -75,10 +75,8 @@ def amplitude_shift(mode: Mode) -> AmplitudeShift:
 def _inertia(z: Solution, force: Array, driven: float) -> tuple[float, float]:
     """Return zᵀ M z_d with (K - Λ M) z_d = f at Λ = `driven`, and its derivative by Λ."""
     system = z.system
-    elements, inertia = operators(system, z.constants)
-    M = inertia.matrix()
-    K = assemble_elements(system.pattern.unknowns, elements, system.pattern.size)
-    solve = factor_symmetric(K - driven * M, 0.01)
-    heavy = M @ z.vector
+    elements, M = operators(system, z.constants, -driven)
+    solve = factor_symmetric(assemble_elements(system.pattern.unknowns, elements, system.pattern.size), 0.01)
+    (heavy,) = (M @ z.vector[:, None]).T
     z_d, other = solve(force), solve(heavy)
-    return float(heavy @ z_d), float(other @ (M @ z_d))
+    return float(heavy @ z_d), float(other @ (M @ z_d[:, None])[:, 0])

@@ -186,7 +186,7 @@ class Electrodes:
         for group in solution.system.groups:
             if not isinstance(group, ShellGroup):
                 continue
-            for one, two in pairwise(np.array(group.place.chain.breaks) / resonator.length):
+            for one, two in pairwise(np.array(group.chain.breaks) / resonator.length):
                 low, high = max(one, first), min(two, last)
                 if high - low < 1e-12:
                     continue

@@ -119,4 +119,4 @@ def _meet(A: Array, B: Array, doubled: bool) -> Array:
 
 def _table(system: System, group: ShellGroup) -> Array:
     through = system.level.through
-    return shell_gradients(group.place.section, system.n, through, gauss(max(through) + 2))
+    return shell_gradients(group.section, system.n, through, gauss(max(through) + 2))

@@ -10,7 +10,7 @@ from shell.assembly import build_system
 from shell.levels import LEVELS, Level
 from shell.quadrature import Array, gauss
 from shell.resonator import Resonator
-from shell.system import Group, SolidPart
+from shell.system import Group, SolidGroup
 
 
 @dataclass(frozen=True)
@@ -41,12 +41,12 @@ def weigh(resonator: Resonator, density: float) -> MassProperties:
 
 def _gauss_points(resonator: Resonator, group: Group, level: Level) -> tuple[Array, Array]:
     """Coordinates r and z (elements, stations, points) of the quadrature points of one group."""
-    if isinstance(group.place, SolidPart):
+    if isinstance(group, SolidGroup):
         points = gauss(level.block + 2)[0]
-        r, z = group.place.mesh.place(points, points)
+        r, z = group.mesh.place(points, points)
         return r, z
     xi, eta = gauss(level.along + 2)[0], gauss(max(level.through) + 2)[0]
-    chain, found = group.place.chain, []
+    chain, found = group.chain, []
     for (one, two), segment in zip(pairwise(chain.breaks), chain.segments, strict=True):
         at = resonator.at((one + two) / 2 + (two - one) / 2 * xi, segment)
         found.append(at.at_heights(eta))

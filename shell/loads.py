@@ -206,8 +206,7 @@ class Loads:
     def _parts(self) -> list[list[str]]:
         groups = self._systems["axial"].groups
         return [
-            ["wall"] * len(g.unknowns) if isinstance(g, ShellGroup) else list(map(str, g.place.mesh.parts))
-            for g in groups
+            ["wall"] * len(g.unknowns) if isinstance(g, ShellGroup) else list(map(str, g.mesh.parts)) for g in groups
         ]
 
     def _stress(self, kind: Kind, amount: float) -> tuple[int, list[Array]]:
@@ -228,7 +227,7 @@ class Loads:
         k = max(walls, key=lambda k: far[k].max())
         group, (e, s) = solution.system.groups[k], np.unravel_index(int(np.argmax(far[k])), far[k].shape)
         assert isinstance(group, ShellGroup)
-        weight, section = group.table.volume[e, s], group.place.section
+        weight, section = group.table.volume[e, s], group.section
         u, _, w = solution.displacement[k][e, s] @ weight / weight.sum()
         t_r, t_z = section.tangent_r[e, s], section.tangent_z[e, s]
         return float(t_r * u - t_z * w), float(t_z * u + t_r * w), float(section.r[e, s])
@@ -238,7 +237,7 @@ def radii(group: Group, system: System) -> Array:
     """Distance of the points from the axis, (elements, stations, points)."""
     if not isinstance(group, ShellGroup):
         return group.table.radius[:, None]
-    section = group.place.section
+    section = group.section
     eta = gauss(max(system.level.through) + 2)[0]
     return np.asarray(section.r[..., None] - section.tangent_z[..., None] * section.thickness[..., None] * eta / 2)
 
@@ -254,7 +253,7 @@ def _directed(group: Group, amount: Array, axis: int) -> Array:
     if not isinstance(group, ShellGroup):
         field[:, :, axis] = amount
         return field
-    t_r, t_z = group.place.section.tangent_r[..., None], group.place.section.tangent_z[..., None]
+    t_r, t_z = group.section.tangent_r[..., None], group.section.tangent_z[..., None]
     tangent, normal = (t_r, -t_z) if axis == 0 else (t_z, t_r)
     field[:, :, 0], field[:, :, 2] = tangent * amount, normal * amount
     return field
@@ -264,6 +263,6 @@ def _edges(solution: Solution, number: int) -> StrainTable | CellTable:
     group = solution.system.groups[number]
     if isinstance(group, ShellGroup):
         return face_table(solution, number)
-    mesh, degree = group.place.mesh, group.place.mesh.grid.shape[2] - 1
+    mesh, degree = group.mesh, group.mesh.grid.shape[2] - 1
     place = Reference.at(ACROSS, ACROSS, np.ones((len(ACROSS),) * 2), degree, degree)
     return tabulate_cells(mesh.grid, place, solution.system.n, float(group.table.position[0, 0]))

@@ -98,11 +98,11 @@ class _Sides:
     def all(self, spacing: float) -> Iterator[Outline]:
         for number, group in enumerate(self.system.groups):
             if isinstance(group, SolidGroup):
-                for cell, side in surface_sides(group.place.mesh, group.place.boundary):
-                    yield self._solid_side(number, group.place.mesh, cell, side, spacing)
+                for cell, side in surface_sides(group.mesh, group.boundary):
+                    yield self._solid_side(number, group.mesh, cell, side, spacing)
             else:
-                for element in range(len(group.place.chain.segments)):
-                    yield from self._shell_sides(number, group.place.chain, element, spacing)
+                for element in range(len(group.chain.segments)):
+                    yield from self._shell_sides(number, group.chain, element, spacing)
 
     def _shell_sides(self, number: int, chain: Chain, element: int, spacing: float) -> Iterator[Outline]:
         length = chain.breaks[element + 1] - chain.breaks[element]

@@ -28,7 +28,7 @@ from shell.quadrature import Array
 from shell.solution import Constants, Solution, total
 from shell.system import Inertia, ShellGroup, System
 
-STEPS = 60  # of the iteration for rigid motions
+STEPS = 600  # of the iteration beside vectors that are left out
 DONE = 1e-9
 
 
@@ -125,19 +125,27 @@ def settle(system: System, mode: Mode, load: Array) -> Solution:
     shift = 1e-2 * constants[0].wave_speed_squared / mode.resonator.size**2 if rigid else 0.0
     K, M = operators(system, constants, shift)
     factor = Factor(system.pattern, K)
-    f = load[:, None]
     if not rigid:
-        return Solution(system, constants, factor.solve(np.asfortranarray(f))[:, 0])
+        return Solution(system, constants, factor.solve(np.asfortranarray(load[:, None]))[:, 0])
     motions = Iteration(factor, M).converge(rigid, DONE).vectors
-    heavy = M @ motions
-    f = f - heavy @ (motions.T @ f)  # nothing but what quadrature misses
+    u = answer_without(motions, factor, M, load, shift)
+    if u is None:
+        raise ShellError("the static field caused by a mode or a spin did not converge.")
+    return Solution(system, constants, u)
+
+
+def answer_without(vectors: Array, factor: Factor, M: Inertia, load: Array, shift: float) -> Array | None:
+    """(A - shift M)⁻¹ f of a factor of A, M-orthonormal eigenvectors left out: u = A⁻¹ (f + shift M u), again and again."""
+    heavy = M @ vectors
+    f = load[:, None]
+    f = f - heavy @ (vectors.T @ f)
     u = np.zeros_like(f)
     for _ in range(STEPS):
         before, u = u, factor.solve(np.asfortranarray(f + shift * (M @ u)))
-        u = u - motions @ (heavy.T @ u)
+        u = u - vectors @ (heavy.T @ u)
         if np.max(abs(u - before)) <= DONE * np.max(abs(u)):
-            return Solution(system, constants, u[:, 0])
-    raise ShellError("the static field caused by a mode or a spin did not converge.")
+            return np.asarray(u[:, 0])
+    return None
 
 
 def operators(system: System, constants: tuple[Constants, ...], shift: float = 0.0) -> tuple[list[Array], Inertia]:

@@ -108,7 +108,7 @@ def _cut(solutions: list[Solution], level: Level, tolerance: float) -> float:
     for solution in solutions:
         for group, k in zip(solution.system.groups, _wavenumbers(solution), strict=True):
             if isinstance(group, ShellGroup):
-                radians = np.max(2 * group.place.section.ds * k)
+                radians = np.max(2 * group.section.ds * k)
                 longest = min(longest, level.longest * _most(level, tolerance) / max(float(radians), 1e-9))
     return _in_parts(max(longest, level.longest / AT_ONCE))  # waves that are not resolved seem shorter than they are
 
@@ -132,7 +132,7 @@ def _wavenumbers(solution: Solution) -> list[Array]:
     found = []
     for group, c in zip(solution.system.groups, solution.constants, strict=True):
         if isinstance(group, ShellGroup):
-            section = group.place.section
+            section = group.section
             k = np.sqrt(12 * c.rho * (1 - c.nu**2) * solution.eigenvalue / (c.E * section.thickness**2))
             found.append(np.sqrt(np.maximum(k - (solution.system.n / section.r) ** 2, 0.0)))
         else:
@@ -147,7 +147,7 @@ def _is_resolved(solution: Solution) -> bool:
     """
     along = solution.system.level.along
     return all(
-        np.max(k * group.place.section.ds) <= along
+        np.max(k * group.section.ds) <= along
         for group, k in zip(solution.system.groups, _wavenumbers(solution), strict=True)
         if isinstance(group, ShellGroup)
     )

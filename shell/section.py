@@ -38,10 +38,10 @@ def sample_shape(resonator: Resonator, solution: Solution, points: int) -> tuple
         if isinstance(group, ShellGroup):
             found += _shell_patches(resonator, group, solution.system.level.through, q, x)
         else:
-            degree = group.place.mesh.grid.shape[2] - 1
+            degree = group.mesh.grid.shape[2] - 1
             move, (i, j) = hierarchic(degree, x).values, in_order(degree)
             u = np.einsum("xk,yk,ekc->cexy", move[:, i], move[:, j], q.reshape(len(q), -1, 3))
-            found += [ShapePatch(*fields) for fields in zip(*group.place.mesh.place(x, x), *u, strict=True)]
+            found += [ShapePatch(*fields) for fields in zip(*group.mesh.place(x, x), *u, strict=True)]
     return tuple(found)
 
 
@@ -51,7 +51,7 @@ def _shell_patches(
     along = nodal(group.table.along.shape[2] - 1, x).values
     through = [legendre(order, x).values for order in orders]
     splits = np.cumsum([order + 1 for order in orders])[:2]
-    chain, found = group.place.chain, []
+    chain, found = group.chain, []
     for (one, two), segment, unknowns in zip(pairwise(chain.breaks), chain.segments, q, strict=True):
         at = resonator.at((one + two) / 2 + (two - one) / 2 * x, segment)
         amplitudes = along @ unknowns.reshape(along.shape[1], -1)

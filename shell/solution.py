@@ -206,7 +206,7 @@ class Solution:
                 found["membrane"] += membrane
                 found["bending"] += total([elastic]) - shear - membrane
             else:
-                in_stem = np.array([part == "stem" for part in group.place.mesh.parts])
+                in_stem = np.array([part == "stem" for part in group.mesh.parts])
                 found["stem"] += total([elastic[in_stem]])
                 found["root"] += total([elastic[~in_stem]])
                 found["kinetic_stem"] += total([kinetic[in_stem]]) * self.eigenvalue
@@ -222,7 +222,7 @@ class Solution:
             zip(self.system.groups, self.elastic, self.kinetic, self._by_nu, strict=True)
         ):
             if isinstance(group, ShellGroup):
-                width = group.place.section.weight * group.place.section.ds
+                width = group.section.weight * group.section.ds
                 thickness = sum(faces.sum(axis=2) for faces in surface_energies(self, k)) / (2 * U)
                 columns = [group.table.position, width, elastic / U, kinetic / T, nu / (2 * U), thickness]
             else:
@@ -264,7 +264,7 @@ def radial(group: Group, displacement: Array) -> Array:
     """Displacement away from the axis, (elements, stations, points)."""
     if not isinstance(group, ShellGroup):
         return displacement[:, :, 0]
-    section = group.place.section
+    section = group.section
     return np.asarray(
         section.tangent_r[..., None] * displacement[:, :, 0] - section.tangent_z[..., None] * displacement[:, :, 2]
     )
@@ -299,7 +299,7 @@ def face_table(solution: Solution, number: int) -> StrainTable:
     system, group = solution.system, solution.system.groups[number]
     assert isinstance(group, ShellGroup)
     faces = np.array([-1.0, 1.0]), np.ones(2)
-    return shell_table(group.place.section, system.n, system.level.through, faces, Basis(*group.table.along))
+    return shell_table(group.section, system.n, system.level.through, faces, Basis(*group.table.along))
 
 
 def squares_of(displacement: Array) -> tuple[Array, Array]:

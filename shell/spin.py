@@ -22,13 +22,10 @@ from shell.errors import ShellError
 from shell.finite import solved_as_solid
 from shell.loads import along_r, radii
 from shell.modes import Mode
-from shell.prestress import mean_answer, neighbour, operators
+from shell.prestress import answer_without, mean_answer, neighbour, operators
 from shell.quadrature import Array
-from shell.solution import Solution, radial, total
-from shell.system import Group, System
-
-STEPS = 60  # of the iterations for rigid motions and for the other modes
-DONE = 1e-8
+from shell.solution import radial, total
+from shell.system import Group
 
 
 @dataclass(frozen=True)
@@ -66,26 +63,17 @@ def spin_shift(mode: Mode, elastic: Elastic) -> SpinShift:
         forces.append(_pull(group, force))
     load = system.gather(forces)
     g = float(solution.vector @ load) / mass
-    others = _response(system, solution, load, mass)
+    # (K - λ M)⁺ f without the mode itself, which all higher modes let converge
+    K, M = operators(system, solution.constants)
+    moved = answer_without(
+        solution.vector[:, None] / np.sqrt(mass), Factor(system.pattern, K), M, load, solution.eigenvalue
+    )
+    if moved is None:
+        raise ShellError("the next mode lies so near that its share in the effect of spin does not converge.")
+    others = float((load - (M @ solution.vector[:, None])[:, 0] * g) @ moved)
     return SpinShift(
         stiffening / (2 * eigenvalue), -softening / mass / (2 * eigenvalue), g**2 / (2 * eigenvalue) - 2 * others / mass
     )
-
-
-def _response(system: System, solution: Solution, load: Array, mass: float) -> float:
-    """Fᵀ (K - λ M)⁺ f without the mode itself: z = K⁻¹ (f + λ M z), which all higher modes let converge."""
-    K, M = operators(system, solution.constants)
-    factor, own = Factor(system.pattern, K), solution.vector[:, None]
-    heavy = M @ own
-    f = load[:, None] - heavy * (float(own[:, 0] @ load) / mass)
-    z = np.zeros_like(f)
-    for _ in range(STEPS * 10):
-        before = z
-        z = factor.solve(np.asfortranarray(f + solution.eigenvalue * (M @ z)))
-        z = z - own * (float(heavy[:, 0] @ z[:, 0]) / mass)
-        if np.max(abs(z - before)) <= 1e-9 * np.max(abs(z)):
-            return float(f[:, 0] @ z[:, 0])
-    raise ShellError("the next mode lies so near that its share in the effect of spin does not converge.")
 
 
 def _pull(group: Group, force: Array) -> Array:

@@ -231,7 +231,7 @@ def _extend_shell(resonator: Resonator, group: ShellGroup, n: int, level: Level)
     more = (orders[0] + 2, orders[1] + 2, orders[2] + 2) if max(orders) > 1 else orders
     xi, weights = gauss(p + ALONG + 2)
     eta = gauss(max(more) + 2)
-    chain = group.place.chain
+    chain = group.chain
     along = at_gauss(hierarchic, p + ALONG, p + ALONG + 2)
     table = shell_table(sections(resonator, chain, xi, weights), n, more, eta, along)
     is_old = np.concatenate([np.arange(many + 1) <= few for few, many in zip(orders, more, strict=True)])
@@ -286,12 +286,12 @@ def _count(resonator: Resonator, chain: Chain, level: Level) -> float:
 
 
 def _extend_solid(group: SolidGroup, degree: int, is_rounded: bool) -> SolidExtension:
-    mesh = group.place.mesh
+    mesh = group.mesh
     table = tabulate_cells(mesh.grid, _next_functions(degree), group.table.n, group.table.position[0, 0])
     products = table.products(np.ones((len(mesh.edges), table.gradients.shape[3])))
     factor = (degree + 1) / 2 * (1.0 if is_rounded else SINGULAR)
     turned = np.where(mesh.reversed_ & bool((degree + 1) % 2), -1.0, 1.0)[..., None]
-    return SolidExtension(table, products, mesh.edges, turned, open_edges(mesh, group.place.boundary), factor)
+    return SolidExtension(table, products, mesh.edges, turned, open_edges(mesh, group.boundary), factor)
 
 
 @cache

@@ -25,29 +25,13 @@ KEPT = 8_000_000  # numbers that a system may keep for the next material (64 MB)
 
 
 @dataclass(frozen=True, eq=False)
-class ShellPart:
-    """Where the elements of a chain lie: the chain, its sections at the stations, its ends."""
-
-    chain: Chain
-    section: Section
-
-
-@dataclass(frozen=True, eq=False)
-class SolidPart:
-    """Where the cells of a solid part lie, and the signs (cells, functions) that turn their edges the same way."""
-
-    mesh: Mesh
-    boundary: Support
-    signs: Array
-
-
-@dataclass(frozen=True, eq=False)
 class ShellGroup:
     """Elements of one chain: their strain table, their unknowns, where they lie, and `anchors`; see `matrices`."""
 
     table: StrainTable
     unknowns: Index
-    place: ShellPart
+    chain: Chain
+    section: Section  # the middle surface at the stations
     anchors: tuple[tuple[int, int], ...] = ()
 
     def matrices(self, integrate: Callable[[Array, Array], Array], stations: Array, first: int) -> Array:
@@ -111,26 +95,28 @@ class SolidGroup:
 
     table: CellTable
     unknowns: Index
-    place: SolidPart
+    mesh: Mesh
+    boundary: Support
+    signs: Array  # (cells, functions), which turn the cells' edges the same way
 
     def spread(self, raw: Array) -> Array:
         """Unknowns (cells, size) of functions as they are in each cell."""
-        return np.asarray(raw[self.unknowns] * np.repeat(self.place.signs, 3, axis=1))
+        return np.asarray(raw[self.unknowns] * np.repeat(self.signs, 3, axis=1))
 
     def gather(self, loads: Array) -> Array:
         """Loads (cells, functions, 3) of functions as they are in each cell, on the unknowns (cells, size)."""
-        return (loads * self.place.signs[..., None]).reshape(self.unknowns.shape)
+        return (loads * self.signs[..., None]).reshape(self.unknowns.shape)
 
     @cached_property
     def products(self) -> Array:
         """See `CellTable.products`."""
-        return self.table.products(self.place.signs)
+        return self.table.products(self.signs)
 
     def portions(self, keep: bool) -> Iterator[tuple[slice, Array]]:
         """The products of a few cells at a time, kept or fresh."""
         for first in range(0, len(self.unknowns), PORTION):
             here = slice(first, first + PORTION)
-            yield here, self.products[here] if keep else self.table.part(here).products(self.place.signs[here])
+            yield here, self.products[here] if keep else self.table.part(here).products(self.signs[here])
 
 
 Group: TypeAlias = ShellGroup | SolidGroup
@@ -311,18 +297,3 @@ class Inertia:
         for block, rows in zip(self.blocks, np.split(local, self.starts), strict=True):
             rows[:] = (block @ rows.reshape(*block.shape[:2], -1)).reshape(rows.shape)
         return np.asarray(self.choice.T @ local)
-
-    def matrix(self) -> "scipy.sparse.csr_matrix":
-        """M as a sparse matrix."""
-        per_group = np.diff([0, *self.starts, self.choice.shape[0]])
-        blocks = [
-            np.kron(one, np.eye(rows // one.shape[0] // len(block)))  # the same for each component of a solid
-            for block, rows in zip(self.blocks, per_group, strict=True)
-            for one in block
-        ]
-        first, *others = blocks
-        return scipy.sparse.csr_matrix(
-            self.choice.T
-            @ scipy.sparse.block_diag([scipy.sparse.coo_array(first), *others], format="csr")
-            @ self.choice
-        )

@@ -112,7 +112,7 @@ def _stand(mode: Mode, elastic: Elastic | VaryingElastic, base: Elastic | None, 
     standing = replace(root, patches=(*root.patches, *patches), held=held)
     system = assemble(resonator, replace(layout, solids=((standing, tied), *others)), n, level)
     bases = [
-        np.array([part == "base" for part in group.place.mesh.parts])
+        np.array([part == "base" for part in group.mesh.parts])
         if isinstance(group, SolidGroup)
         else np.zeros(len(group.unknowns), dtype=bool)
         for group in system.groups
@@ -123,7 +123,7 @@ def _stand(mode: Mode, elastic: Elastic | VaryingElastic, base: Elastic | None, 
 def _rim(resonator: Resonator, system: System) -> list[Array]:
     """Radial, circumferential and axial motion of the middle surface at the free rim, as rows over the raw unknowns."""
     group = [one for one in system.groups if isinstance(one, ShellGroup)][-1]
-    if group.place.chain.ends[1] != "free":
+    if group.chain.ends[1] != "free":
         raise ShellError("an imbalance of the rim needs a free rim.")
     orders, element = system.level.through, len(group.unknowns) - 1
     width = sum(orders) + 3

@@ -110,7 +110,7 @@ def shell_faces(solution: Solution) -> tuple[FreeFaces, FreeFaces]:
         c, q = solution.constants[number], solution.unknowns[number]
         if not isinstance(group, ShellGroup):
             continue
-        section, table = group.place.section, face_table(solution, number)
+        section, table = group.section, face_table(solution, number)
         strain, moved = table.strains(q), table.displacements(q)
         area = table.volume * (2 / section.thickness)[..., None]
         for k in (0, 1):
@@ -127,9 +127,7 @@ def free_surfaces(solution: Solution, resonator: Resonator) -> tuple[FreeFaces, 
     found: list[FreeFaces] = [*shell_faces(solution)]
     for group, c, q in zip(solution.system.groups, solution.constants, solution.unknowns, strict=True):
         if isinstance(group, ShellGroup):
-            found += [
-                _edge(solution, resonator, group, c, q, end) for end in (0, 1) if group.place.chain.ends[end] == "free"
-            ]
+            found += [_edge(solution, resonator, group, c, q, end) for end in (0, 1) if group.chain.ends[end] == "free"]
         else:
             found += _sides(solution, group, c, q)
     return tuple(found)
@@ -140,7 +138,7 @@ def _edge(solution: Solution, resonator: Resonator, group: ShellGroup, c: Consta
     level = solution.system.level
     element = slice(0, 1) if end == 0 else slice(len(q) - 1, len(q))
     xi, eta = np.array([-1.0 if end == 0 else 1.0]), gauss(max(level.through) + 2)
-    section = sections(resonator, group.place.chain, xi, np.ones(1))
+    section = sections(resonator, group.chain, xi, np.ones(1))
     table = shell_table(section, solution.system.n, level.through, eta, nodal(level.along, xi)).part(element)
     stretch = 1 + section.curvature[element, :, None] * section.thickness[element, :, None] / 2 * eta[0]
     area = table.volume / (section.ds[element, :, None] * stretch)
@@ -150,7 +148,7 @@ def _edge(solution: Solution, resonator: Resonator, group: ShellGroup, c: Consta
 
 def _sides(solution: Solution, group: SolidGroup, c: Constants, q: Array) -> list[FreeFaces]:
     """The open sides of solid cells, without what is held."""
-    mesh, boundary = group.place.mesh, group.place.boundary
+    mesh, boundary = group.mesh, group.boundary
     degree = mesh.grid.shape[2] - 1
     points, weights = gauss(degree + 2)
     a, b = mesh.pairs.T

@@ -48,7 +48,7 @@ def conduct_in_cells(solution: Solution, index: int, x: float) -> float:
     group, c = solution.system.groups[index], solution.constants[index]
     if not isinstance(group, SolidGroup):
         raise ShellError("only a solid part has cells.")
-    mesh, table, n = group.place.mesh, group.table, solution.system.n
+    mesh, table, n = group.mesh, group.table, solution.system.n
     numbers, signs, size = number_functions(mesh, mesh.grid.shape[2] - 1)
     functions = numbers.shape[1]
     products = group.products.reshape(len(numbers), 10, functions, functions)
@@ -63,7 +63,7 @@ def _on_axis(solution: Solution, group: SolidGroup, size: int) -> np.ndarray:
     """Functions that live on the axis, where a temperature that varies as cos nθ vanishes."""
     if solution.system.n == 0:
         return np.zeros(0, dtype=np.intp)
-    mesh, axis = group.place.mesh, group.place.boundary.on_axis
+    mesh, axis = group.mesh, group.boundary.on_axis
     inside = mesh.grid.shape[2] - 2
     a, b = mesh.pairs.T
     edges = np.flatnonzero(axis[a] & axis[b])

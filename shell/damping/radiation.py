@@ -154,7 +154,7 @@ def _matrices(
 
 def _products(group: SolidGroup, base: Mask, layer: Layer) -> Complex:
     """See `CellTable.products`; in the absorbing layer with complex coordinates."""
-    table, grid = group.table, group.place.mesh.grid
+    table, grid = group.table, group.mesh.grid
     degree = grid.shape[2] - 1
     place = at_gauss_points(degree, degree, degree + 2)
     z = (place.along.values @ grid[1] @ place.across.values.T).reshape(len(base), -1)
@@ -163,7 +163,7 @@ def _products(group: SolidGroup, base: Mask, layer: Layer) -> Complex:
     by_z, _ = layer.stretch(np.where(base[:, None], depth, 0.0))
     radius = table.radius + to_r
     scale = np.stack([1 / by_r, 1 / by_z, table.radius / radius], axis=1)[..., None]
-    gradients = table.gradients * scale * group.place.signs[:, None, None]
+    gradients = table.gradients * scale * group.signs[:, None, None]
     volume = table.volume[:, 0] * by_r * by_z * radius / table.radius
     cells, _, _, functions = gradients.shape
     found = np.empty((cells, 10, functions, functions), dtype=complex)

@@ -52,7 +52,7 @@ def _through_wall(solution: Solution, index: int, x: float) -> float:
     degree = len(eta) - 1
     modes = legendre(degree, eta).values * weights[:, None] * (np.arange(degree + 1) + 0.5)
     moments = stress @ modes
-    h = group.place.section.thickness
+    h = group.section.thickness
     volume = np.add.reduce(group.table.volume, axis=2)
     low, high = float(h.min()), float(h.max())
     if high - low < 1e-12 * high:

@@ -86,7 +86,7 @@ def _walls(together: Together, flaw: Imperfection, waves: tuple[int, ...], theta
         table = group.table
         for first in range(0, len(group.unknowns), RUN):
             run = slice(first, min(first + RUN, len(group.unknowns)))
-            section = Section(**{name: value[run] for name, value in vars(group.place.section).items()})
+            section = Section(**{name: value[run] for name, value in vars(group.section).items()})
             here = Stretch(section, c.at(run), run, table.along, orders, table.transverse_shear, theta)
             stiff, heavy = here.values(flaw.modulus, waves), here.values(flaw.density, waves)
             if faces != (None, None):

@@ -85,7 +85,7 @@ class Pair:
         x, c, s = [], [], []
         for number, group in enumerate(self.solution.system.groups):
             if isinstance(group, ShellGroup):
-                half = group.place.section.thickness[..., None] / 2
+                half = group.section.thickness[..., None] / 2
                 cosine, sine = surface_energies(self.solution, number)
                 x.append(group.table.position.ravel())
                 c.append((cosine / half).reshape(-1, 2))

@@ -45,7 +45,7 @@ def fade(resonator: Resonator, system: System) -> Callable[[Array], Array] | Non
     spans: list[tuple[float, float]] = []
     for group in system.groups:
         if isinstance(group, ShellGroup):
-            chain = group.place.chain
+            chain = group.chain
             spans.append((chain.breaks[0] / resonator.length, chain.breaks[-1] / resonator.length))
             for s, inward, end in zip((chain.breaks[0], chain.breaks[-1]), (1, -1), chain.ends, strict=True):
                 if end in ("tied", "clamped"):
@@ -76,14 +76,14 @@ def cut(resonator: Resonator, system: System, position: float, heights: Array) -
     for number, group in enumerate(system.groups):
         if not isinstance(group, ShellGroup):
             continue
-        breaks = np.array(group.place.chain.breaks)
+        breaks = np.array(group.chain.breaks)
         if not breaks[0] - margin <= s <= breaks[-1] + margin:
             continue
         element = int(np.clip(np.searchsorted(breaks, s, side="right") - 1, 0, len(breaks) - 2))
         one, two = breaks[element], breaks[element + 1]
         xi = np.array([np.clip((2 * s - one - two) / (two - one), -1.0, 1.0)])
         along = nodal(group.table.along.shape[2] - 1, xi)
-        section = sections(resonator, group.place.chain.element(element), xi, np.array([2 / (two - one)]))
+        section = sections(resonator, group.chain.element(element), xi, np.array([2 / (two - one)]))
         table = shell_table(section, system.n, system.level.through, (heights, np.ones(len(heights))), along)
         return CrossSection(number, element, np.stack([along.values[0], along.slopes[0]]), section, table)
     raise ShellError(

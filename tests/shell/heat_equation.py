@@ -29,7 +29,7 @@ def conduct(solution: Solution, resonator: Resonator, x: float, through: int = 2
 def _conduct_in_shell(solution: Solution, resonator: Resonator, index: int, x: float, through: int) -> float:
     group, c = solution.system.groups[index], solution.constants[index]
     assert isinstance(group, ShellGroup)
-    level, n, chain = solution.system.level, solution.system.n, group.place.chain
+    level, n, chain = solution.system.level, solution.system.n, group.chain
     xi, eta = gauss(level.along + 2), gauss(through + 2)
     section = sections(resonator, chain, *xi)
     table = shell_table(section, n, level.through, eta, nodal(level.along, xi[0]))

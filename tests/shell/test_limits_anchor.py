@@ -41,7 +41,7 @@ def test_torque_on_a_stiff_half_space(standing: Resonator) -> None:
         if hasattr(table, "radius"):
             radius = table.radius[:, None]
         else:
-            section = group.place.section  # type: ignore[union-attr]
+            section = group.section  # type: ignore[union-attr]
             eta = np.polynomial.legendre.leggauss(table.volume.shape[2])[0]
             radius = section.r[..., None] - section.tangent_z[..., None] * section.thickness[..., None] / 2 * eta
         torque += omega**2 * SILICA.rho * 2 * pi * float(np.sum(radius * displacement[:, :, 1] * table.volume))
