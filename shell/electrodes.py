@@ -19,10 +19,10 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
+from shell.cross_section import cut
 from shell.errors import ShellError
 from shell.imperfection.field import Complex, Field, values_around
 from shell.imperfection.pair import Pair
-from shell.imperfection.place import cut
 from shell.imperfection.split import Split
 from shell.quadrature import Array, gauss
 from shell.system import ShellGroup

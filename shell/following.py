@@ -13,8 +13,8 @@ from functools import lru_cache
 
 import numpy as np
 
+from shell.cross_section import cut
 from shell.errors import ShellError
-from shell.imperfection.place import cut
 from shell.modes import Mode
 from shell.quadrature import Array
 

@@ -19,9 +19,9 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from shell.cross_section import cut
 from shell.errors import ShellError, mm
 from shell.imperfection import Pair
-from shell.imperfection.place import cut
 from shell.quadrature import Array, gauss
 from shell.resonator import Resonator
 from shell.solution import COSINE

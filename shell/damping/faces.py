@@ -10,14 +10,14 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from shell.assembly import sections
 from shell.blocks import surface_sides
 from shell.cells import CellTable, Reference, tabulate_cells
+from shell.cross_section import free_edge
 from shell.errors import ShellError
-from shell.kernel import StrainTable, shell_table
+from shell.kernel import StrainTable
 from shell.material import Material
 from shell.modes import Mode
-from shell.quadrature import Array, gauss, nodal
+from shell.quadrature import Array, gauss
 from shell.resonator import Resonator
 from shell.solution import Constants, Solution, face_table, plane_energies, total
 from shell.system import ShellGroup, SolidGroup
@@ -135,15 +135,9 @@ def free_surfaces(solution: Solution, resonator: Resonator) -> tuple[FreeFaces, 
 
 def _edge(solution: Solution, resonator: Resonator, group: ShellGroup, c: Constants, q: Array, end: int) -> FreeFaces:
     """The face across the thickness where the shell ends."""
-    level = solution.system.level
-    element = slice(0, 1) if end == 0 else slice(len(q) - 1, len(q))
-    xi, eta = np.array([-1.0 if end == 0 else 1.0]), gauss(max(level.through) + 2)
-    section = sections(resonator, group.chain, xi, np.ones(1))
-    table = shell_table(section, solution.system.n, level.through, eta, nodal(level.along, xi)).part(element)
-    stretch = 1 + section.curvature[element, :, None] * section.thickness[element, :, None] / 2 * eta[0]
-    area = table.volume / (section.ds[element, :, None] * stretch)
-    nearest = 0 if end == 0 else -1
-    return _surface("edge", table, c.at(([[nearest]], [[nearest]])), q[element], area)
+    edge, area = free_edge(resonator, solution.system, group.chain.breaks[-end] / resonator.length)
+    area = area / (1 + edge.section.curvature[0, 0] * edge.section.thickness[0, 0] / 2 * gauss(len(area))[0])
+    return _surface("edge", edge.table, c.at(([[-end]], [[-end]])), q[[edge.element]], area[None, None])
 
 
 def _sides(solution: Solution, group: SolidGroup, c: Constants, q: Array) -> list[FreeFaces]:

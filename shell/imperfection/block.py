@@ -12,7 +12,7 @@ from math import pi
 import numpy as np
 import scipy
 
-from shell.imperfection.place import cut
+from shell.cross_section import cut
 from shell.quadrature import Array
 from shell.resonator import Resonator
 from shell.solution import Constants

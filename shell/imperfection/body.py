@@ -5,14 +5,14 @@ from math import pi
 
 import numpy as np
 
+from shell.cross_section import free_edge
 from shell.imperfection.core import Core
 from shell.imperfection.field import values_around
-from shell.imperfection.imperfect import Imperfection
-from shell.imperfection.place import cut, fade
+from shell.imperfection.imperfect import Imperfection, fade
 from shell.imperfection.together import Together
 from shell.imperfection.wall import Stretch, Wall, go_around
 from shell.kernel import Section
-from shell.quadrature import Array, gauss
+from shell.quadrature import Array
 from shell.system import ShellGroup
 
 RUN = 4  # elements that are treated at once: fields that stay in the fast memory
@@ -94,7 +94,7 @@ def _walls(together: Together, flaw: Imperfection, waves: tuple[int, ...], theta
             if flaw.modulus is not None or flaw.density is not None:
                 walls.append(here.change(stiff, heavy))
     if flaw.rim is not None:
-        edge = cut(resonator, system, 1.0, gauss(max(orders) + 2)[0])
+        edge, _ = free_edge(resonator, system, 1.0)
         width = values_around(flaw.rim, flaw.rim.orders, np.ones(1), theta)[0][0]
         c, at = together.constants[edge.group], slice(edge.element, edge.element + 1)
         along, shear = edge.along[:, None], edge.table.transverse_shear

@@ -2,13 +2,15 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
-from math import pi
+from math import pi, sqrt
 
 import numpy as np
 
 from shell.errors import ShellError
 from shell.imperfection.field import Faded, Field, Waves, add, scaled
 from shell.quadrature import Array
+from shell.resonator import Resonator
+from shell.system import ShellGroup, System
 
 
 @dataclass(frozen=True)
@@ -57,7 +59,7 @@ class Imperfection:
     def faces(self, fade: Callable[[Array], Array] | None = None) -> tuple[Field | None, Field | None]:
         """How far the inner and the outer face stand out of the material: thickness, faces and offset together.
 
-        fade : factor along the meridian (shell.imperfection.place).
+        fade : factor along the meridian.
         """
         half = scaled(self.thickness, 0.5)
         inner, outer = add(half, self.inner, scaled(self.offset, -1.0)), add(half, self.outer, self.offset)
@@ -75,6 +77,38 @@ class Imperfection:
         """The waves around that its fields have (point masses have all)."""
         fields_ = [getattr(self, name) for name in FIELDS] + [line.per_length for line in self.lines]
         return tuple(sorted({m for one in fields_ if one is not None for m in one.orders}))
+
+
+def fade(resonator: Resonator, system: System) -> Callable[[Array], Array] | None:
+    """Factor of the departures of the faces along the meridian: 1, falling to 0 at a solid part or clamp.
+
+    Solid roots, corners and clamps keep their shape; the faces of the shell join them smoothly over √(h R). None: nothing held.
+    """
+    edges: list[tuple[float, int, float]] = []
+    spans: list[tuple[float, float]] = []
+    for group in system.groups:
+        if isinstance(group, ShellGroup):
+            chain = group.chain
+            spans.append((chain.breaks[0] / resonator.length, chain.breaks[-1] / resonator.length))
+            for s, inward, end in zip((chain.breaks[0], chain.breaks[-1]), (1, -1), chain.ends, strict=True):
+                if end in ("tied", "clamped"):
+                    h = float(resonator.at([s], chain.segments[0 if inward > 0 else -1]).thickness[0])
+                    edges.append((s / resonator.length, inward, sqrt(h * resonator.size) / resonator.length))
+    if not edges:
+        return None
+
+    def factor(position: Array) -> Array:
+        found = np.zeros(np.shape(position))
+        for one, two in spans:
+            found[(position > one - 1e-9) & (position < two + 1e-9)] = 1.0
+        for place, inward, width in edges:
+            off = (position - place) * inward / width
+            beside = abs(position - place) < width
+            x = np.clip(off, 0.0, 1.0)
+            found = np.where(beside, found * x**3 * (10 - 15 * x + 6 * x**2), found)
+        return found
+
+    return factor
 
 
 FIELDS = tuple(one.name for one in fields(Imperfection) if one.name not in ("masses", "lines"))

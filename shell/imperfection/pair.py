@@ -16,11 +16,12 @@ from functools import cached_property
 
 import numpy as np
 
+from shell.cross_section import CrossSection, cut, free_edge
 from shell.errors import ShellError
 from shell.imperfection.field import Field
-from shell.imperfection.place import CrossSection, cut, fade
+from shell.imperfection.imperfect import fade
 from shell.modes import Mode
-from shell.quadrature import Array, gauss
+from shell.quadrature import Array
 from shell.resonator import Resonator
 from shell.solution import Constants, Solution, squares_of, surface_energies, total
 from shell.system import ShellGroup
@@ -146,9 +147,7 @@ class Pair:
         """The edge of the rim, and the areas per radian that its heights stand for."""
         if self.resonator.support == "clamped-rim" or self.resonator.ends_on_axis:
             raise ShellError("the meridian has no free rim, so no edge that could depart.")
-        eta, weights = gauss(max(self.solution.system.level.through) + 2)
-        edge = cut(self.resonator, self.solution.system, 1.0, eta)
-        return edge, edge.table.volume[0, 0] * weights
+        return free_edge(self.resonator, self.solution.system, 1.0)
 
     def _of_material(self, here: CrossSection, share: Array) -> tuple[float, float]:
         e, d = (find(self.solution.unknowns)[None, None] for find in (here.strains, here.displacements))

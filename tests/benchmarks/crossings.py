@@ -13,9 +13,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from shell.cross_section import cut
 from shell.elastic import Elastic
 from shell.following import follow
-from shell.imperfection.place import cut
 from shell.meridian import cylinder
 from shell.modes import Mode, solve_modes
 

@@ -1,15 +1,13 @@
 """A mode at one position of its shell: strains and displacements on a cross-section."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from math import sqrt
 
 import numpy as np
 
 from shell.assembly import sections
 from shell.errors import ShellError, mm
 from shell.kernel import Section, StrainTable, shell_table
-from shell.quadrature import Array, nodal
+from shell.quadrature import Array, gauss, nodal
 from shell.resonator import Resonator
 from shell.system import ShellGroup, System
 
@@ -36,38 +34,6 @@ class CrossSection:
         return np.asarray(self.table.displacements(q)[0, 0])
 
 
-def fade(resonator: Resonator, system: System) -> Callable[[Array], Array] | None:
-    """Factor of the departures of the faces along the meridian: 1, falling to 0 at a solid part or clamp.
-
-    Solid roots, corners and clamps keep their shape; the faces of the shell join them smoothly over √(h R). None: nothing held.
-    """
-    edges: list[tuple[float, int, float]] = []
-    spans: list[tuple[float, float]] = []
-    for group in system.groups:
-        if isinstance(group, ShellGroup):
-            chain = group.chain
-            spans.append((chain.breaks[0] / resonator.length, chain.breaks[-1] / resonator.length))
-            for s, inward, end in zip((chain.breaks[0], chain.breaks[-1]), (1, -1), chain.ends, strict=True):
-                if end in ("tied", "clamped"):
-                    h = float(resonator.at([s], chain.segments[0 if inward > 0 else -1]).thickness[0])
-                    edges.append((s / resonator.length, inward, sqrt(h * resonator.size) / resonator.length))
-    if not edges:
-        return None
-
-    def factor(position: Array) -> Array:
-        found = np.zeros(np.shape(position))
-        for one, two in spans:
-            found[(position > one - 1e-9) & (position < two + 1e-9)] = 1.0
-        for place, inward, width in edges:
-            off = (position - place) * inward / width
-            beside = abs(position - place) < width
-            x = np.clip(off, 0.0, 1.0)
-            found = np.where(beside, found * x**3 * (10 - 15 * x + 6 * x**2), found)
-        return found
-
-    return factor
-
-
 def cut(resonator: Resonator, system: System, position: float, heights: Array) -> CrossSection:
     """The cross-section at a position of the meridian, at heights η (-1 inner face, 1 outer face)."""
     if not 0 <= position <= 1:
@@ -90,3 +56,10 @@ def cut(resonator: Resonator, system: System, position: float, heights: Array) -
         f"the position {position:g} ({mm(s)} along the meridian) lies in a solid root, corner or clamp, where no mass can be "
         "placed: choose one on the shell, 1 for the rim."
     )
+
+
+def free_edge(resonator: Resonator, system: System, position: float) -> tuple[CrossSection, Array]:
+    """The edge where the meridian ends, at Gauss points through the wall, and the areas per radian that these stand for."""
+    eta, weights = gauss(max(system.level.through) + 2)
+    edge = cut(resonator, system, position, eta)
+    return edge, edge.table.volume[0, 0] * weights
