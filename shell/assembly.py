@@ -10,8 +10,7 @@ from shell.cells import at_gauss_points, tabulate_cells
 from shell.corner import find_kinks, lay_clamped_edge, lay_clamped_face, lay_corner
 from shell.errors import ShellError, mm
 from shell.kernel import Section, shell_table
-from shell.layout import Chain, End, lay_chain
-from shell.levels import Level, Theory
+from shell.layout import Chain, End, Level, lay_chain
 from shell.quadrature import Array, at_gauss, gauss, nodal
 from shell.resonator import Resonator
 from shell.root import lay_root
@@ -29,7 +28,7 @@ class Layout:
     solids: tuple[tuple[Solid, tuple[tuple[int, int], ...]], ...]
 
 
-def lay_system(resonator: Resonator, n: int, theory: Theory, level: Level, alongside: tuple[int, ...] = ()) -> System:
+def lay_system(resonator: Resonator, n: int, level: Level, alongside: tuple[int, ...] = ()) -> System:
     """Lay out, number and tabulate a resonator.
 
     The elements suit the harmonics `alongside` too, and are the same for all of them.
@@ -39,9 +38,9 @@ def lay_system(resonator: Resonator, n: int, theory: Theory, level: Level, along
 
 
 @lru_cache(maxsize=12)
-def build_system(resonator: Resonator, n: int, theory: Theory, level: Level) -> System:
+def build_system(resonator: Resonator, n: int, level: Level) -> System:
     """The system of a resonator, kept for the next material or temperature, since only the material changes with them."""
-    return lay_system(resonator, n, theory, level)
+    return lay_system(resonator, n, level)
 
 
 def assemble(resonator: Resonator, layout: Layout, n: int, level: Level, rigid_motions: int = 0) -> System:

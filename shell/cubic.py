@@ -92,7 +92,7 @@ def solve_cubic(resonator: Resonator, crystal: Cubic, harmonic: int = 2, toleran
     first = harmonic % 4 if harmonic % 2 == 0 else 1
     harmonics = list(range(first, harmonic + REACH + 1, 4 if harmonic % 2 == 0 else 2))
     level = mode.solution.system.level
-    systems = [lay_system(mode.resonator, k, "solid", level, (0, harmonics[-1])) for k in harmonics]
+    systems = [lay_system(mode.resonator, k, level, (0, harmonics[-1])) for k in harmonics]
     if len(systems[0].groups) > 1:
         raise ShellError("a cubic crystal is computed only for plain shells, without stem, clamp or kink.")
     if sum(system.constraint.shape[1] for system in systems) > LARGEST:

@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 from shell.elastic import Elastic
 from shell.errors import ShellError
 from shell.interpolation import Exploration, SparsePolynomial
-from shell.levels import Theory
+from shell.layout import Theory
 from shell.modes import Mode, TheoryRangeWarning, solve_modes
 from shell.resonator import Resonator
 

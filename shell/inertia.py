@@ -7,7 +7,7 @@ from math import pi
 import numpy as np
 
 from shell.assembly import build_system
-from shell.levels import LEVELS, Level
+from shell.layout import LEVELS, Level
 from shell.quadrature import Array, gauss
 from shell.resonator import Resonator
 from shell.system import Group, SolidGroup
@@ -27,7 +27,7 @@ class MassProperties:
 
 def weigh(resonator: Resonator, density: float) -> MassProperties:
     """Integrate over the solver's elements: V = 2π ∫ r dr dz, I_axial = ∫ ρ r² dV, I_transverse = ∫ ρ (r²/2 + (z - z_c)²) dV."""
-    system = build_system(resonator, 2, "solid", LEVELS["solid"][0])
+    system = build_system(resonator, 2, LEVELS["solid"][0])
     places = [_gauss_points(resonator, group, system.level) for group in system.groups]
     r = np.concatenate([place[0].ravel() for place in places])
     z = np.concatenate([place[1].ravel() for place in places])

@@ -4,7 +4,7 @@ A free resonator of one material expands evenly, so by dimensions, for every the
 
     f(T) = √(E(T)/ρ(T)) Φ(ν(T)) / g(T),      g = exp ∫ α dT the growth of lengths since the reference temperature,
 
-and only Φ, a smooth function of one number, needs the solver. Thermal mismatch with the base (shell.mount) adds s ε(T) to ln f,
+and only Φ, a smooth function of one number, needs the solver. Thermal mismatch with the base (shell.material) adds s ε(T) to ln f,
 s by the mode in its stress (shell.prestress). The slope has five parts (HRG paper eq. 15), and s ε' by the base,
 
     d ln f/dT = ½ E'/E + (∂ ln f/∂ν) ν' − ½ ρ'/ρ + (∂ ln f/∂ ln h) h'/h + (∂ ln f/∂ ln r) r'/r,
@@ -24,10 +24,9 @@ from numpy.typing import ArrayLike, NDArray
 from shell.constants import zero_Celsius
 from shell.elastic import Elastic
 from shell.errors import ShellError
-from shell.levels import Theory
-from shell.material import Material
+from shell.layout import Theory
+from shell.material import Material, Mount
 from shell.modes import Mode, solve_modes
-from shell.mount import Mount
 from shell.prestress import Prestress
 from shell.property import coefficient_names, powers
 from shell.resonator import Resonator

@@ -4,6 +4,7 @@
 """
 
 import warnings
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from math import log, pi, sqrt
@@ -16,7 +17,7 @@ from shell.curves import Arc
 from shell.elastic import Elastic, VaryingElastic
 from shell.errors import ShellError
 from shell.fitted import fit_profile
-from shell.levels import Theory
+from shell.layout import Theory
 from shell.refinement import refine
 from shell.resonator import Resonator
 from shell.section import ShapePatch, draw_section, sample_shape
@@ -58,7 +59,7 @@ class Mode:
         """Derivatives of ln f, by energies of the mode at the unchanged shape; closed form for "rayleigh"."""
         if self.solution is None or self.resonator is None:
             raise ShellError("Rayleigh's closed form has its own derivatives: shell.rayleigh.rayleigh_log_derivatives.")
-        thickness = _by_thickness(self.resonator, self.solution, self.theory)
+        thickness = _by_thickness(self.resonator, self.solution)
         return Sensitivities(0.5, self.solution.by_nu, -0.5, thickness, -1 - thickness)
 
     @property
@@ -179,7 +180,25 @@ def solve_modes(
     )
 
 
-def _by_thickness(resonator: Resonator, solution: Solution, theory: Theory) -> float:
+def nearest_mode(
+    solve: Callable[[int, int], Sequence[Mode]], own: Mode, harmonics: Iterable[int] = range(5), least: int = 2
+) -> Mode:
+    """Return the mode nearest in frequency to `own` among some harmonics.
+
+    Every harmonic is solved until a mode lies above `own`: the nearest below and above are then both known.
+    solve(harmonic, count) gives at least the `count` lowest modes of a harmonic, in order of frequency.
+    """
+    others: list[Mode] = []
+    for n in harmonics:
+        count, found = least, solve(n, least)
+        while found[-1].frequency <= own.frequency:
+            count *= 2
+            found = solve(n, count)
+        others += [mode for mode in found if (mode.harmonic, mode.index) != (own.harmonic, own.index)]
+    return min(others, key=lambda mode: abs(mode.frequency - own.frequency))
+
+
+def _by_thickness(resonator: Resonator, solution: Solution) -> float:
     """D ln f / d ln h of the whole profile: change of the Rayleigh quotient with the shape kept (it is stationary)."""
     # what is neglected goes as (step R/h)², 2.5 SMALL² of the slope, and in a stem, which bends far more easily than it
     # stretches, as (step L²/a²)²; a smaller step leaves the digits of thin shells in rounding
@@ -189,7 +208,7 @@ def _by_thickness(resonator: Resonator, solution: Solution, theory: Theory) -> f
         step = min(step, *(SMALL * (resonator.stem.radius / (end - top)) ** 2 for _, end in resonator.stem.roots))
     found: dict[float, float] = {0.0: solution.eigenvalue}
     for change in (-step, step):
-        system = build_system(resonator.thickened(1 + change), solution.system.n, theory, solution.system.level)
+        system = build_system(resonator.thickened(1 + change), solution.system.n, solution.system.level)
         same = [
             a.unknowns.shape == b.unknowns.shape for a, b in zip(system.groups, solution.system.groups, strict=True)
         ]

@@ -16,8 +16,7 @@ from shell.blocks import SIDES, Mesh, surface_sides
 from shell.cells import CellTable, Reference, tabulate_cells
 from shell.errors import ShellError
 from shell.kernel import StrainTable, shell_table
-from shell.layout import Chain
-from shell.levels import LEVELS
+from shell.layout import LEVELS, Chain
 from shell.quadrature import Array, nodal
 from shell.resonator import Resonator
 from shell.solution import Constants, Solution
@@ -71,7 +70,7 @@ def trace_outlines(resonator: Resonator, spacing: float, mode: "Mode | None" = N
     if mode is not None and mode.resonator != resonator:
         raise ShellError("the mode was solved for another resonator than the one to be shown.")
     solution = mode.solution if mode is not None else None
-    system = solution.system if solution else build_system(resonator, 2, "solid", LEVELS["solid"][0])
+    system = solution.system if solution else build_system(resonator, 2, LEVELS["solid"][0])
     lines = _join(list(_Sides(resonator, system, solution).all(spacing)), 1e-9 * resonator.size)
     outlines = [_thin(line, 0.02 * spacing, resonator.size) for line in lines]
     outlines.sort(key=lambda line: -abs(line.area))

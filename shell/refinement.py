@@ -9,8 +9,7 @@ from shell.assembly import build_system
 from shell.eigen import ElementMass, Factor, Iteration, whole_pattern
 from shell.elastic import Elastic, VaryingElastic
 from shell.errors import ShellError
-from shell.layout import crowding
-from shell.levels import FIRST, KINDS, LONGEST, ROUGH, Kind, Level, Theory
+from shell.layout import FIRST, KINDS, LONGEST, ROUGH, Kind, Level, Theory, crowding
 from shell.quadrature import Array
 from shell.resonator import Resonator
 from shell.solution import Constants, Solution, find_constants, total
@@ -46,7 +45,7 @@ def refine(
     before: tuple[list[Solution], Array] | None = None
     raised: set[Kind] = set()
     while True:
-        system = build_system(resonator, n, theory, level)
+        system = build_system(resonator, n, level)
         if before and system.memory > MEMORY:
             break
         if system.memory > MEMORY:

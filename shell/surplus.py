@@ -24,8 +24,7 @@ from shell.cells import CellTable, Reference, at_gauss_points, cell_stiffness, i
 from shell.eigen import Factor, Pattern, find_pattern
 from shell.elastic import Elastic, VaryingElastic
 from shell.kernel import StrainTable, pair_stiffness, shell_table, station_stiffness
-from shell.layout import Chain
-from shell.levels import Level
+from shell.layout import Chain, Level
 from shell.quadrature import Array, at_gauss, gauss, hierarchic, values_to_hierarchic
 from shell.resonator import Resonator
 from shell.solution import Constants, Solution, find_constants, total
@@ -47,7 +46,7 @@ BLUNT = 2.0  # 4 λ of the blunt corner where the slope of the thickness jumps
 
 
 def estimate_errors(resonator: Resonator, elastic: Elastic | VaryingElastic, solutions: Sequence[Solution]) -> Array:
-    """Relative errors of the frequencies of modes of one system, by what they come from (`levels.KINDS`): (kinds, modes)."""
+    """Relative errors of the frequencies of modes of one system, by what they come from (`layout.KINDS`): (kinds, modes)."""
     answers = [
         extension.answer(solutions, part, elastic)
         for part, extension in enumerate(extend(resonator, solutions[0].system))

@@ -12,8 +12,7 @@ from shell.blocks import Mesh, Support
 from shell.cells import CellTable, cell_mass, cell_stiffness
 from shell.eigen import Pattern, find_pattern
 from shell.kernel import Section, StrainTable, integrate_mass, integrate_stiffness, station_mass, station_stiffness
-from shell.layout import Chain
-from shell.levels import Level
+from shell.layout import Chain, Level
 from shell.quadrature import Array
 from shell.sparse import Index
 

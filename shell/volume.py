@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from shell.assembly import build_system
 from shell.blocks import Mesh, Support
 from shell.errors import ShellError
-from shell.levels import Level
+from shell.layout import Level
 from shell.quadrature import Array, nodal
 from shell.resonator import Resonator
 from shell.system import ShellGroup, SolidGroup
@@ -85,7 +85,7 @@ def build_volume(resonator: Resonator, layers: int = 2, around: int = 48, spacin
 
 
 def _cut_section(resonator: Resonator, layers: int, spacing: float) -> Pieces:
-    system = build_system(resonator, 2, "solid", LEVEL)
+    system = build_system(resonator, 2, LEVEL)
     solids = [group for group in system.groups if isinstance(group, SolidGroup)]
     # how many cells of each lie on the cross-section that it shares with the shell
     crossing = [max((np.isfinite(eta).sum() - 1 for eta in place.boundary.heights), default=1) for place in solids]

@@ -31,7 +31,7 @@ from shell.imperfection.field import Field
 from shell.imperfection.imperfect import FIELDS, Imperfection
 from shell.imperfection.split import Split
 from shell.imperfection.together import Together
-from shell.levels import Level, Theory
+from shell.layout import Level
 from shell.modes import Mode
 from shell.quadrature import Array
 from shell.refinement import solve_level
@@ -56,7 +56,6 @@ class CoupledHarmonics:
         self.n = mode.harmonic
         self.highest = highest or self.n + REACH
         self.elastic = elastic
-        self.theory: Theory = mode.theory
         self.level: Level = mode.solution.system.level
         self.resonator: Resonator = mode.resonator
         self._systems: dict[int, System] = {}
@@ -66,7 +65,7 @@ class CoupledHarmonics:
     def system(self, k: int) -> System:
         """The elements of the perfect resonator at one harmonic, the same for all."""
         if k not in self._systems:
-            self._systems[k] = lay_system(self.resonator, k, self.theory, self.level, (0, max(self.highest, self.n)))
+            self._systems[k] = lay_system(self.resonator, k, self.level, (0, max(self.highest, self.n)))
         return self._systems[k]
 
     @cached_property

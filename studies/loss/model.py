@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from shell.damping.faces import Vibration
     from shell.damping.heat import Heat
     from shell.elastic import Elastic
-    from shell.levels import Theory
+    from shell.layout import Theory
     from shell.modes import Mode
     from shell.resonator import Resonator
     from studies.instrument.card import Instrument

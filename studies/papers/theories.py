@@ -8,7 +8,7 @@ import numpy as np
 
 from shell.elastic import Elastic
 from shell.law import build_law
-from shell.levels import Theory
+from shell.layout import Theory
 from shell.materials import find_material
 from shell.meridian import hemisphere
 from shell.modes import TheoryRangeWarning, solve_modes

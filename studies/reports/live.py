@@ -18,8 +18,8 @@ from compensation.arrays import Array
 from shell.constants import zero_Celsius
 from shell.family import Axis, Family, build_family
 from shell.interpolation import leja_points
-from shell.levels import Theory
-from shell.separation import nearest_mode
+from shell.layout import Theory
+from shell.modes import nearest_mode
 from studies.errors import UNUSABLE_INPUT
 from studies.instrument.card import Instrument
 from studies.resonator.law import unknown_slope

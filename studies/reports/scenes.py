@@ -15,7 +15,7 @@ from studies.results import Blocks, Chapter
 
 if TYPE_CHECKING:
     from shell.imperfection import Imperfection, Split
-    from shell.levels import Theory
+    from shell.layout import Theory
     from shell.modes import Mode
     from shell.resonator import Resonator
     from shell.scene import Scene

@@ -70,8 +70,7 @@ def compare(instruments: "Sequence[Instrument]") -> Comparison:
 
 
 def _figures(instrument: "Instrument") -> Iterator[Figure]:
-    from shell.modes import solve_modes
-    from shell.separation import nearest_mode
+    from shell.modes import nearest_mode, solve_modes
     from studies.simulation.heat_path import behind_housing, build_network, slowest_lag
 
     T0, nothing = instrument.reference_temperature, float("nan")

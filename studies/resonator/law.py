@@ -8,7 +8,7 @@ from studies.errors import InputError, naming
 
 if TYPE_CHECKING:
     from shell.law import FrequencyLaw
-    from shell.levels import Theory
+    from shell.layout import Theory
     from studies.instrument.card import Instrument
 
 SLOPE_KEYS = {"youngs_modulus": "log_slope_per_K", "shear_modulus": "log_slope_per_K", "expansion": "value"}

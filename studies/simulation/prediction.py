@@ -24,7 +24,7 @@ from thermal.sensitivity import respond
 
 if TYPE_CHECKING:
     from shell.law import FrequencyLaw
-    from shell.levels import Theory
+    from shell.layout import Theory
     from studies.instrument.card import Instrument
 
 Array = NDArray[np.float64]

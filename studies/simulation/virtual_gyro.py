@@ -21,7 +21,7 @@ from thermal.sweeping import LONGEST_ROW
 
 if TYPE_CHECKING:
     from shell.law import FrequencyLaw
-    from shell.levels import Theory
+    from shell.layout import Theory
     from studies.instrument.card import Instrument
     from studies.instrument.tables.noise import NoiseKeys
 

@@ -12,7 +12,7 @@ from studies.instrument.card import Instrument
 
 if TYPE_CHECKING:
     from shell.elastic import Elastic
-    from shell.levels import Theory
+    from shell.layout import Theory
     from shell.modes import Mode
     from shell.resonator import Resonator
 

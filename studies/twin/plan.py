@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from scipy.interpolate import CubicSpline
 
     from shell.law import FrequencyLaw
-    from shell.levels import Theory
+    from shell.layout import Theory
     from studies.instrument.card import Instrument
     from studies.simulation.drive import Boundary
     from thermal.network import Network

@@ -118,7 +118,7 @@ def finer(level):
 
 def reference(resonator, elastic, n, level):
     """Return frequencies by the finer level."""
-    solutions = solve_level(lay_system(resonator, n, "solid", finer(level)), resonator.size, elastic, MODES, 1e-13)
+    solutions = solve_level(lay_system(resonator, n, finer(level)), resonator.size, elastic, MODES, 1e-13)
     return np.array([sqrt(one.eigenvalue) / (2 * pi) for one in solutions])
 
 

@@ -12,7 +12,7 @@ from scipy.linalg import eigh
 from shell.assembly import build_system
 from shell.curves import Line
 from shell.elastic import Elastic
-from shell.levels import FIRST, KINDS, LEVELS, Level, Theory
+from shell.layout import FIRST, KINDS, LEVELS, Level, Theory
 from shell.meridian import bell, cylinder, hemisphere, meridian
 from shell.modes import TheoryRangeWarning, solve_modes
 from shell.refinement import choose_finer, solve_level
@@ -93,7 +93,7 @@ def test_error_estimate_is_true_for_random_designs(
 
 def frequency(resonator: Resonator, elastic: Elastic, n: int, theory: Theory, level: Level) -> float:
     """Lowest frequency at one level."""
-    (solution,) = solve_level(build_system(resonator, n, theory, level), resonator.size, elastic, 1, 1e-11)
+    (solution,) = solve_level(build_system(resonator, n, level), resonator.size, elastic, 1, 1e-11)
     return sqrt(solution.eigenvalue) / (2 * pi)
 
 
@@ -138,7 +138,7 @@ def test_error_estimate_of_higher_modes_and_of_knots(resonator: Resonator, n: in
     level = mode.solution.system.level
     one, two, three = level.through
     finer = replace(level, through=(one + 4, two + 4, three + 4), along=min(level.along + 6, 22), split=2 * level.split)
-    system = build_system(resonator, n, "solid", finer)
+    system = build_system(resonator, n, finer)
     exact = solve_level(system, resonator.size, SILICA, index + 1, 1e-12)[index]
     error = abs(mode.frequency * 2 * pi / sqrt(exact.eigenvalue) - 1)
     assert error <= mode.relative_error_estimate < 30 * max(error, 1e-10)

@@ -12,10 +12,10 @@ from shell.curves import Line
 from shell.elastic import Elastic
 from shell.errors import ShellError
 from shell.law import build_law
+from shell.material import Mount
 from shell.materials import find_material
 from shell.meridian import cylinder, hemisphere, meridian
 from shell.modes import solve_modes
-from shell.mount import Mount
 from shell.prestress import Prestress, expansion_shares
 from shell.resonator import Stem
 

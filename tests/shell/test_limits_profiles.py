@@ -8,7 +8,7 @@ import pytest
 from shell.assembly import lay_system
 from shell.elastic import Elastic
 from shell.fitted import Fitted, fit_profile
-from shell.levels import LEVELS
+from shell.layout import LEVELS
 from shell.meridian import hemisphere
 from shell.modes import solve_modes
 from shell.refinement import solve_level
@@ -26,7 +26,7 @@ def measured(points: int, noise: float, h: float = 0.9e-3) -> Resonator:
 
 def point_by_point(resonator: Resonator, n: int) -> float:
     """The frequency (Hz) with elements that break at every point of the profile."""
-    (solution,) = solve_level(lay_system(resonator, n, "solid", LEVELS["solid"][0]), R, SILICA, 1, 1e-11)
+    (solution,) = solve_level(lay_system(resonator, n, LEVELS["solid"][0]), R, SILICA, 1, 1e-11)
     return sqrt(solution.eigenvalue) / (2 * pi)
 
 

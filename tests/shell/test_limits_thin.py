@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from shell.elastic import Elastic
-from shell.levels import Theory
+from shell.layout import Theory
 from shell.meridian import cylinder
 from shell.modes import TheoryRangeWarning, solve_modes
 

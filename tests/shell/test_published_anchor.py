@@ -10,7 +10,7 @@ from shell.blocks import Solid, mesh_solid
 from shell.damping.anchor import lay_half_space
 from shell.damping.radiation import assemble_waves, radiating_mode
 from shell.elastic import Elastic
-from shell.levels import LEVELS
+from shell.layout import LEVELS
 from shell.patches import Patch, straight, whole
 from shell.system import System
 

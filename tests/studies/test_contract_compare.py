@@ -49,7 +49,7 @@ def test_nearest_mode_lies_behind_many_lower_ones():
     """Planted: five modes of n = 1 below the drive mode, the fifth nearest."""
     from types import SimpleNamespace
 
-    from shell.separation import nearest_mode
+    from shell.modes import nearest_mode
 
     spectrum = {0: (9000.0,), 1: (100.0, 200.0, 300.0, 400.0, 4990.0, 6000.0), 2: (5000.0, 7000.0)}
     modes = {

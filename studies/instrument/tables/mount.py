@@ -7,7 +7,7 @@ from studies.instrument.registry import CardPlace, CardTable
 from studies.schema.keys import Keys, Note, number
 
 if TYPE_CHECKING:
-    from shell.mount import Mount
+    from shell.material import Mount
 
 FASTEST = 1e-3  # 1/K
 
@@ -49,7 +49,7 @@ class MountKeys(Keys, frozen=True, kw_only=True):
 
 def build(keys: MountKeys, place: CardPlace) -> "Mount | None":
     """The mount in SI units; None where the base expands with the resonator."""
-    from shell.mount import Mount
+    from shell.material import Mount
 
     if keys.expansion_per_K is None:
         return None

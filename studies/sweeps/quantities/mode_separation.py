@@ -2,7 +2,6 @@
 
 from typing import TYPE_CHECKING, Annotated
 
-from shell.separation import nearest_mode
 from studies.schema.keys import number, says
 from studies.sweeps.case import TOLERANCE, Case
 from studies.sweeps.quantity import Column, ModeQuantity, Number
@@ -36,6 +35,8 @@ class ModeSeparation(ModeQuantity, frozen=True, kw_only=True, tag="mode-separati
 
     def evaluate(self, case: Case) -> tuple[Number, ...]:
         """Return distance and harmonic."""
+        from shell.modes import nearest_mode
+
         at = case.temperature(self.temperature_degC)
         case.modes(self.harmonic, self.each, self.theory, at)  # at once, and no less exact than all that is asked of it
         own = case.mode(self.harmonic, 0, self.theory, at)
