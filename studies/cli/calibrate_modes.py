@@ -9,7 +9,6 @@ are known no better than one of them that the modes do not tell; `misfit`: squar
 """
 
 from collections.abc import Sequence
-from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -113,8 +112,7 @@ def _payload(found: ModeCalibration, save: str | None) -> dict[str, Any]:
             for line, mode, f, left, noise, chance, rivals in rows
         ],
         "decided": decided(found),
-        "next_modes": [asdict(one) for one in found.next_modes],
-        **row_of(found, "misfit", inseparable="groups"),
+        **row_of(found, "misfit", "next_modes", inseparable="groups"),
         "warnings": [*found.warnings, *said],
         "calibrated_card": save,
     }

@@ -65,7 +65,7 @@ def _show_values(card: str) -> Result:
         "card": instrument.name,
         "values": entries,
         "correlations": [[*pair, correlation] for pair, correlation in instrument.correlation.items()],
-        "mass_properties": asdict(mass),
+        "mass_properties": mass,
     }
     idle = idle_values(instrument)
     rows = [

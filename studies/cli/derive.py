@@ -10,7 +10,7 @@ With --dynamics: schema hrg.derive-dynamics/1, `equations` and, with --code, `co
 CVG paper on demodulated dynamics.
 """
 
-from dataclasses import asdict, replace
+from dataclasses import replace
 from math import radians
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -139,7 +139,7 @@ def _derive_bell(latex: bool) -> Result:
     printed = Sentence(found.printed or "", "source", "terminal")
     return replace(
         found,
-        payload=found.payload | {"numbers": asdict(theory)},
+        payload=found.payload | {"numbers": theory},
         parts=[printed, Chapter("Against the solver", [table]), *found.parts],
         printed=None,
     )

@@ -1,6 +1,5 @@
 """`hrg fit scale`: bias and scale of a bell-shaped gyro, step by step."""
 
-import dataclasses
 import re
 from typing import Any
 
@@ -71,7 +70,6 @@ def fit_scale(
         }
         for part in model.parts
     }
-    steps = [dataclasses.asdict(figures) for figures in study.figures]
     payload: dict[str, Any] = {
         "records": list(data),
         **row_of(
@@ -79,7 +77,7 @@ def fit_scale(
         ),
         **row_of(study, error_before_deg_per_s="error_before", error_held_out_deg_per_s="error_held_out"),
         "parts": parts,
-        "steps": steps,
+        "steps": study.figures,
         "rate_law": _law_row(study.law),
     }
     rows = [
@@ -87,7 +85,7 @@ def fit_scale(
         for step, found in parts.items()
         for name, one in found.items()
     ]
-    shown = [step for step in steps if step["step"] != "filtered" or len(study.chain.taps)]
+    shown = [one for one in study.figures if one.step != "filtered" or len(study.chain.taps)]
     law = study.law
     return Result(
         payload,

@@ -47,34 +47,32 @@ def card(path: str, *, like: str = "hrg-30mm", name: str | None = None) -> int:
 
 OTHER = Parameter(name="--card", help="The card: a built-in one, or a path relative to the file.")
 OtherCard = Annotated[str | None, OTHER]
+NewFile = Annotated[str, Parameter(help="The file (TOML) to write; an existing one is not overwritten.")]
 
 
-def study(path: str, *, like: str = "dimension-tolerance", card_: OtherCard = None) -> int:
+def study(path: NewFile, *, like: str = "dimension-tolerance", card_: OtherCard = None) -> int:
     """Write a template for the spec of a study.
 
     Args:
-        path: The spec (TOML) to write; an existing file is not overwritten.
         like: A built-in study: frequency-over-temperature, dimension-tolerance, dimension-influence, split-tolerance.
     """
-    _copy(path, find_shipped(like, shipped_specs(), "study"), card_, StudyKeys, "study")
-    say(f"{path}: written as a copy of {like}. Edit it, then run: hrg study run {path} --dry-run")
-    return 0
+    return _copy(path, like, shipped_specs(), card_, StudyKeys, "study", f"hrg study run {path} --dry-run")
 
 
-def design(path: str, *, like: str = "dome-8khz", card_: OtherCard = None) -> int:
+def design(path: NewFile, *, like: str = "dome-8khz", card_: OtherCard = None) -> int:
     """Write a template of a task for hrg optimise.
 
     Args:
-        path: The task (TOML) to write; an existing file is not overwritten.
         like: A worked design: dome-8khz, light-cylinder, robust-dome.
     """
-    _copy(path, find_shipped(like, shipped_tasks(), "design"), card_, DesignKeys, "design")
-    say(f"{path}: written as a copy of {like}. Edit it, then run: hrg optimise {path} --out FOLDER")
-    return 0
+    return _copy(path, like, shipped_tasks(), card_, DesignKeys, "design", f"hrg optimise {path} --out FOLDER")
 
 
-def _copy(path: str, source: Path, card_: str | None, keys: type[Keys], kind: str) -> None:
+def _copy(
+    path: str, like: str, shipped: dict[str, Path], card_: str | None, keys: type[Keys], kind: str, then: str
+) -> int:
     """Write a copy of a shipped file, for another card if one is given, with all entries that it may have as comments."""
+    source = find_shipped(like, shipped, kind)
     _refuse_existing(path)
     text = read_bytes(source).decode("utf-8-sig")
     if card_ is not None:
@@ -83,6 +81,8 @@ def _copy(path: str, source: Path, card_: str | None, keys: type[Keys], kind: st
         text = text.replace(old, new)
     form = [f"All entries of a {kind}, by example:", *write_form([(keys, "")])]
     write_text(path, "\n".join([text.rstrip("\n"), "", *(f"# {line}".rstrip() for line in form)]) + "\n")
+    say(f"{path}: written as a copy of {like}. Edit it, then run: {then}")
+    return 0
 
 
 def _refuse_existing(path: str) -> None:

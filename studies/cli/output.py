@@ -10,7 +10,7 @@ import time
 import tomllib
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import fields, is_dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -126,7 +126,7 @@ def print_json(payload: Mapping[str, Any]) -> None:
 
 
 def dump_json(payload: Mapping[str, Any]) -> str:
-    """Return the text of one JSON object; NaN and infinity become null, numpy values plain numbers."""
+    """Return the text of one JSON object; NaN and infinity become null, numpy values plain numbers, what has fields an object."""
     return json_module.dumps(_plain(payload), indent=2, allow_nan=False, ensure_ascii=False) + "\n"
 
 
@@ -165,6 +165,8 @@ class Told:
 
 
 def _plain(value: Any) -> Any:
+    if is_dataclass(value):
+        return {one.name: _plain(getattr(value, one.name)) for one in fields(value)}
     if isinstance(value, Mapping):
         return {str(key): _plain(item) for key, item in value.items()}
     if hasattr(value, "tolist"):

@@ -49,16 +49,6 @@ class TwinFit:
         return self.training[0] / self.training[1]
 
 
-@dataclass(frozen=True)
-class GyroSpread:
-    """Median and the 5 % and 95 % points over the gyros, and the part of them that got worse."""
-
-    low: float
-    median: float
-    high: float
-    worse: float
-
-
 def draw_tables(generator: np.random.Generator) -> dict[str, Any]:
     """Draw what makes one gyro's bias: tables of a card.
 
@@ -127,12 +117,6 @@ def study_twin(seed: int) -> tuple[TwinFit, ...]:
     return tuple(fits)
 
 
-def spread(gains: Sequence[float]) -> GyroSpread:
-    """Summarise improvements over many gyros."""
-    low, median, high = np.percentile(gains, [5, 50, 95]).tolist()
-    return GyroSpread(low, median, high, float(np.mean(np.asarray(gains) < 1)))
-
-
 @cache
 def _law() -> "FrequencyLaw":
     return simulate_run(load_card(CARD), load_profile(COOLING), 0.01, noise=False).law
@@ -145,7 +129,7 @@ def twin_chapters(twins: Twins) -> list[Chapter]:
     """Return the chapter on figure 6 of the HRG paper for the page of `hrg reproduce`."""
     paper = _fits(twins, "paper", 1)
     before, after = (np.median([fit.training[k] for fit in paper]) for k in (0, 1))
-    cooling = spread([fit.cooling.gain for fit in paper])
+    cooling = float(np.median([fit.cooling.gain for fit in paper]))
     mended = sum(fit.warming.gain < 1 for fit in _fits(twins, "guarded", 3))
     harmed = sum(fit.warming.gain < 1 for fit in paper)
     told = (
@@ -153,7 +137,7 @@ def twin_chapters(twins: Twins) -> list[Chapter]:
         f" {PAPER_AFTER} °/h, a factor of {PAPER_BEFORE / PAPER_AFTER:.2f}. Its data are not published, so {len(twins)} virtual gyros"
         f" with typical loss, gradients, hysteresis and noise replace them; nothing was tuned to the published figures (median"
         f" {before:.2g} → {after:.2g} °/h). On a second cooling run the same models reduce the bias variation by a factor of"
-        f" {cooling.median:.2f} (median). On a warming run they make {harmed} of the {len(twins)} gyros worse than without"
+        f" {cooling:.2f} (median). On a warming run they make {harmed} of the {len(twins)} gyros worse than without"
         f" compensation. Models fitted to three runs (cooling and warming), with terms selected for autocorrelated noise, make"
         f" {mended or 'none'} of the {len(twins)} gyros worse."
     )
@@ -244,6 +228,6 @@ def _fits(twins: Twins, method: str, runs: int) -> list[TwinFit]:
 
 
 def _words(gains: Sequence[float]) -> str:
-    found, harmed = spread(gains), sum(gain < 1 for gain in gains)
+    (low, median, high), harmed = np.percentile(gains, [5, 50, 95]), sum(gain < 1 for gain in gains)
     worse = f"; {harmed} of {len(gains)} worse" if harmed else ""
-    return f"{found.median:.2f} ({found.low:.2f}…{found.high:.2f}{worse})"
+    return f"{median:.2f} ({low:.2f}…{high:.2f}{worse})"

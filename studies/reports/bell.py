@@ -1,7 +1,7 @@
 """Output of the four-step chain of a bell-shaped gyro, and the chapters on the BVG paper's claims for `hrg reproduce`."""
 
 from collections.abc import Sequence
-from dataclasses import asdict, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -9,9 +9,10 @@ from compensation.bell import BellChain, apply_chain
 from compensation.bell_calibration import BellRun
 from compensation.stability import allan_deviation
 from shell.constants import zero_Celsius
+from studies.fits.scale import StepFigures
 from studies.papers.bvg import BellTwin, Claims
 from studies.reports import style
-from studies.results import Chapter, Column, Drawing, Figure, Payload, Table
+from studies.results import Chapter, Column, Drawing, Figure, Table
 
 SOURCES = ("Su Z., Liu N., Li Q., Sensors 2015, 15, 23684–23705, doi:10.3390/s150923684: equations (1)–(36).",)
 NAMES = {
@@ -29,9 +30,10 @@ ALLAN = (
 )
 DEG = float(np.pi / 180)
 STEP_COLUMNS = (
-    "name: After | nonlinearity: Nonlinearity (%) ×100 .4f | at_rest: σ at rest (°/s) .4f"
+    Column(lambda figures: NAMES[figures.step], "After"),
+    "nonlinearity: Nonlinearity (%) ×100 .4f | at_rest: σ at rest (°/s) .4f"
     " | turning: σ at constant rate (°/s) .4f | bias_instability: Bias instability (°/h) .2f"
-    " | random_walk_1s: Random walk at 1 s (°/√h) .3f | random_walk_100s: Random walk at 100 s (°/√h) .3f"
+    " | random_walk_1s: Random walk at 1 s (°/√h) .3f | random_walk_100s: Random walk at 100 s (°/√h) .3f",
 )
 
 
@@ -40,11 +42,12 @@ def bell_chapters(twin: BellTwin) -> list[Chapter]:
     steps, claims = Figure(lambda: draw_steps(twin.chain, twin.runs), ERRORS), _claims_table(twin.claims)
     alt = "Allan deviation over averaging time, three curves."
     allan = Figure(lambda: _draw_allan(twin.chain, twin.runs[1]), ALLAN, alt)
-    held_out = steps_table([asdict(step) for step in twin.held_out], "Held-out runs")
-    fitted = steps_table([asdict(step) for step in twin.fitted], "Fitted runs")
     title = "BVG equations (32)–(36): the compensation chain on a virtual gyro"
     return [
-        Chapter(title, [TWIN, held_out, fitted, steps, allan]),
+        Chapter(
+            title,
+            [TWIN, steps_table(twin.held_out, "Held-out runs"), steps_table(twin.fitted, "Fitted runs"), steps, allan],
+        ),
         Chapter("BVG: check of the published claims", [claims]),
     ]
 
@@ -55,16 +58,15 @@ TWIN = (
 )
 
 
-def steps_table(steps: Sequence[Payload], title: str) -> Table:
+def steps_table(steps: Sequence[StepFigures], title: str) -> Table:
     """Return the figures of merit after every step; a column is left out where the records are too short for it."""
-    rows = [{**step, "name": NAMES[step["step"]]} for step in steps]
     note = (
         "σ: standard deviation over the temperature run. At a constant rate the temperature errors of bias and scale may partly cancel:"
         " σ can then grow when only the bias is compensated, until the scale over temperature is, too."
     )
-    if any(step["bias_instability"] is not None for step in steps):
+    if any(step.bias_instability is not None for step in steps):
         note += " Bias instability: minimum of the Allan deviation divided by 0.664. A filter lowers the random walk at 1 s, not at 100 s."
-    return Table(title, rows, STEP_COLUMNS, note)
+    return Table(title, steps, STEP_COLUMNS, note)
 
 
 def _claims_table(claims: Claims) -> Table:
@@ -88,8 +90,7 @@ def _claims_table(claims: Claims) -> Table:
         "Recomputed from the published coefficients over −45 … 55 °C and ±360 °/s; filter of order 50, cut-off 1 Hz. The bias instability"
         " of 20.5 → 4.67 °/h depends on the length and temperature ramp of an unpublished record and cannot be checked."
     )
-    headings = ("Claim", "Published", "Recomputed", "Verdict")
-    return Table("Published claims", rows, [Column(f"{k}", heading) for k, heading in enumerate(headings)], note)
+    return Table("Published claims", rows, "0: Claim | 1: Published | 2: Recomputed | 3: Verdict", note)
 
 
 def draw_steps(chain: BellChain, runs: tuple[BellRun, BellRun, BellRun]) -> Drawing:

@@ -5,15 +5,9 @@ from studies.diagnosis.table import TableDiagnosis
 from studies.reports.diagnosis import headline, next_step, reason
 from studies.reports.digits import plain, to_error
 from studies.reports.style import BLACK, ORANGE, VERMILION, figure
-from studies.results import Chapter, Column, Drawing, Facts, Figure, Sentence, Table
+from studies.results import Chapter, Drawing, Facts, Figure, Sentence, Table
 
-CANDIDATES = (
-    Column("form", "candidate"),
-    Column("sum_of_squares_Hz2", "sum of squares", "Hz²", digits=3),
-    Column("leave_one_out_Hz", "leave-one-out", "Hz", digits=3),
-    Column("evidence", "evidence", "2 ln odds", digits=3),
-)
-
+CANDIDATES = "0: candidate | 1: sum of squares (Hz²) .3 | 2: leave-one-out (Hz) .3 | 3: evidence (2 ln odds) .3"
 EVIDENCE = (
     "Evidence: twice the logarithm of the Bayes factor: how much more probable the readings are with the candidate, averaged over its size."
     f" A cause is named from {-2.0 * CONSTANTS['log_prior_effect']:.0f}."
@@ -23,7 +17,6 @@ EVIDENCE = (
 def table_parts(found: TableDiagnosis) -> list[Chapter]:
     """Return what people read of a steady-state table: the answer, and the other candidates."""
     verdict = found.verdict
-    candidates = [dict(zip([one.key for one in CANDIDATES], row, strict=True)) for row in found.candidates]
     ratio = ("Curvature", f"{plain(found.curvature_ratio)} times", "measured over predicted")
     facts = [("Verdict", verdict.verdict.replace("-", " "), reason(verdict)), *law_facts(found), ratio]
     return [
@@ -34,7 +27,7 @@ def table_parts(found: TableDiagnosis) -> list[Chapter]:
             *map(Sentence, found.sentences),
             *next_step(verdict),
         ]),
-        Chapter("Candidates", [Table("Candidates added to the baseline", candidates, CANDIDATES, EVIDENCE, "page")]),
+        Chapter("Candidates", [Table("Candidates added to the baseline", found.candidates, CANDIDATES, EVIDENCE, "page")]),
     ]  # fmt: skip
 
 

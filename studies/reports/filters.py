@@ -8,7 +8,6 @@ from studies.papers.cvg_filters import ZETA, Filtered, FilterStudy, K
 from studies.reports import style
 from studies.results import Chapter, Column, Drawing, Figure, Table
 
-MOST_POINTS = 3000
 PAPER = "Demodulated dynamics and optimal noise filtering for Coriolis vibratory gyroscopes"
 SOURCES = (f"Apostolyuk V., {PAPER}: eqs. (1)–(41).",)
 RESPONSES = (
@@ -127,7 +126,7 @@ def map_sentence(error_map: ErrorMap) -> str:
 
 def draw_filtered(case: Filtered) -> Drawing:
     """Draw true rate, noisy output and estimate over time."""
-    rows = slice(None, None, max(len(case.time) // MOST_POINTS, 1))
+    rows = style.few_rows(len(case.time))
     with style.figure(height=3.4, x="time (s)", y="rate (rad/s)") as (made, axes):
         axes.plot(case.time[rows], case.noisy[rows], color="#b8bec6", linewidth=0.6, label="noisy output")
         axes.plot(case.time[rows], case.rate[rows], "--", color=style.BLACK, linewidth=1.0, label="true rate")
@@ -139,7 +138,7 @@ def draw_filtered(case: Filtered) -> Drawing:
 def draw_kalman(study: FilterStudy) -> Drawing:
     """Draw figure 6 (output and its estimate) above figure 7 (true rate, output, estimated rate)."""
     six, seven = study.figure6, study.figure7
-    rows = slice(None, None, max(len(six.time) // MOST_POINTS, 1))
+    rows = style.few_rows(len(six.time))
     with style.figure(2, height=5.4, sharex=True, x="time (s)") as (made, (upper, lower)):
         upper.plot(six.time[rows], six.noisy[rows], color="#b8bec6", linewidth=0.6, label="noisy output")
         upper.plot(six.time[rows], six.output[rows], ":", color=style.BLACK, label="output without noise")

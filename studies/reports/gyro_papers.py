@@ -1,9 +1,8 @@
 """The chapters on the two CVG papers and the BVG paper for the page of `hrg reproduce`, and their numbers."""
 
-import dataclasses
 from typing import Any
 
-from studies.papers.bvg import BellTwin, reproduce_bell
+from studies.papers.bvg import reproduce_bell
 from studies.papers.bvg_theory import compare_bell_theory, read_planted_rate, theory_chapters
 from studies.papers.cvg_cross_damping import PRINTED_IMPROVEMENT, CrossDampingTwin, reproduce_cross_damping
 from studies.papers.cvg_filters import FilterStudy, study_error_map, study_filters
@@ -35,9 +34,9 @@ def reproduce_gyro_papers(seeds: int = 20) -> tuple[list[Chapter], dict[str, Any
     return chapters, {
         "cvg_cross_damping": _summarise_damping(damping),
         "cvg_filters": _summarise_filters(study),
-        "bvg": _summarise_bell(chain),
-        "bvg_theory": {**dataclasses.asdict(theory), "loop": dataclasses.asdict(reading)},
-        "loops": dataclasses.asdict(claims),
+        "bvg": row_of(chain, "claims", "fitted", "held_out"),
+        "bvg_theory": {**vars(theory), "loop": reading},
+        "loops": claims,
     }
 
 
@@ -68,11 +67,6 @@ def _summarise_filters(study: FilterStudy) -> dict[str, Any]:
             kalman_nis_band="nis_band",
         ),
     }
-
-
-def _summarise_bell(twin: BellTwin) -> dict[str, Any]:
-    steps = {name: [dataclasses.asdict(step) for step in getattr(twin, name)] for name in ("fitted", "held_out")}
-    return {"claims": dataclasses.asdict(twin.claims), **steps}
 
 
 def _claims_chapter(found: LoopClaims) -> Chapter:
