@@ -38,11 +38,7 @@ def effects(name: str = "") -> Result:
         f"{effect.summary}.",
         [
             Sentence(f"{effect.name}: {effect.summary}.", where="terminal"),
-            Table(
-                "Parameters of its [[effect]] table",
-                entry["parameters"],
-                "name: key | kind | bounds | meaning",
-            ),
+            Table("Parameters of its [[effect]] table", entry["parameters"], "name: key | kind | bounds | meaning"),
             *(f"{label}: {words}." for label, words in said.items() if words),
         ],
     )

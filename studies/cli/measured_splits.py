@@ -2,13 +2,14 @@
 
 import cmath
 import re
-from json import loads
 from math import radians
+from typing import Literal
+
+import msgspec
 
 from studies.errors import InputError
 from studies.files.reading import read_bytes
 from studies.instrument.card import Instrument
-from studies.schema.reader import read_keys
 
 
 def pair_splits(
@@ -34,34 +35,42 @@ def pair_splits(
     return [(n, s, radians(a), error) for n, s, a in zip(harmonic, split, axis, strict=True)]
 
 
+class _Value(msgspec.Struct):
+    value: float
+
+
+class _Interval(_Value):
+    low: float
+    high: float
+
+
+class _Split(msgspec.Struct):
+    harmonic: int
+    split_Hz: _Interval
+    slow_axis_deg: _Value | None
+
+
+class _Scan(msgspec.Struct):
+    schema: Literal["hrg.scan/1"]
+    splits: list[_Split]
+
+
 def read_scan(path: str, harmonic: tuple[int, ...]) -> list[tuple[int, float, float, float]]:
     """Return the same of the splits of a scan."""
-    refused = InputError(f'{path}: is not output of hrg scan --json (schema "hrg.scan/1").')
-    data = read_bytes(path)
     try:
-        content = loads(data)
-        if content["schema"] != "hrg.scan/1":
-            raise refused
-        entries = {entry["harmonic"]: entry for entry in content["splits"]}
-    except ValueError as error:
-        raise InputError(f"{path}: damaged JSON ({error}); write it again with hrg scan --json.") from None
-    except (KeyError, TypeError, RecursionError):
-        raise refused from None
-    found = []
+        scan = msgspec.json.decode(read_bytes(path), type=_Scan)
+    except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError):
+        raise InputError(f'{path}: is not output of hrg scan --json (schema "hrg.scan/1").') from None
+    entries, found = {entry.harmonic: entry for entry in scan.splits}, []
     for n in harmonic:
         if n not in entries:
-            raise InputError(f"{path}: no split of n = {n}; it contains n = {', '.join(str(k) for k in entries)}.")
-        try:
-            axis, size = entries[n]["slow_axis_deg"], entries[n]["split_Hz"]
-            if axis is None:
-                raise InputError(
-                    f"{path}: the split of n = {n} cannot be distinguished from 0; measure more accurately before cutting."
-                )
-            numbers = [size["value"], axis["value"], size["low"], size["high"]]
-        except (KeyError, TypeError):
-            raise refused from None
-        split, degrees, low, high = (read_keys(x, float, f"{path}: the split of n = {n}") for x in numbers)
-        found.append((n, split, radians(degrees), (high - low) / 3.29))
+            raise InputError(f"{path}: no split of n = {n}; it contains n = {', '.join(map(str, entries))}.")
+        size, axis = entries[n].split_Hz, entries[n].slow_axis_deg
+        if axis is None:
+            raise InputError(
+                f"{path}: the split of n = {n} cannot be distinguished from 0; measure more accurately before cutting."
+            )
+        found.append((n, size.value, radians(axis.value), (size.high - size.low) / 3.29))
     return found
 
 

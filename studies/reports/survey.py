@@ -149,10 +149,6 @@ def _draw_spectra(survey: Survey) -> Drawing:
 
 def tell(survey: Survey) -> dict[str, Any]:
     """Return the payload of one record."""
-
-    def known(value: float) -> float | None:
-        return value if np.isfinite(value) else None
-
     record = survey.record
     columns = []
     for column in survey.columns:
@@ -162,22 +158,20 @@ def tell(survey: Survey) -> dict[str, Any]:
         }  # fmt: skip
         if column.stability is not None:
             noise, (value, low, high) = column.stability.noise, column.stability.allan.bias_instability
-            levels = {
-                "white": noise.noise.white, "white_sd": noise.N_uncertainty,
-                "flicker": noise.noise.flicker, "flicker_sd": FLAT * noise.B_uncertainty,
-                "walk": noise.noise.walk, "walk_sd": noise.K_uncertainty,
-                "instability": value, "instability_low": low, "instability_high": high, "confidence": CONFIDENCE,
-            } if noise.misfit < DRIVEN and noise.N_uncertainty <= max(noise.noise.white, column.white) else {"white": column.white}  # fmt: skip
+            known = noise.misfit < DRIVEN and noise.N_uncertainty <= max(noise.noise.white, column.white)
+            levels = row_of(
+                noise, white="noise.white", white_sd="N_uncertainty", flicker="noise.flicker", flicker_sd=("B_uncertainty", FLAT),
+                walk="noise.walk", walk_sd="K_uncertainty",
+            ) | {"instability": value, "instability_low": low, "instability_high": high, "confidence": CONFIDENCE}  # fmt: skip
+            levels = levels if known else {"white": column.white}
             row["noise"] = {**levels, "misfit": noise.misfit}
         if column.line is not None:
-            row["line"] = {"period_s": column.line.period, "rms": column.line.rms}
+            row["line"] = row_of(column.line, "rms", period_s="period")
         columns.append(row)
     steps = [{"column": c.name, "time_s": step.time, "size": step.size} for c in survey.columns for step in c.steps]
     names = {"start_s": "start", "end_s": "end"}
-    settled = [
-        {key: known(value) for key, value in row_of(s, "temperature_degC", "frequency_Hz", "left_K", **names).items()}
-        for s in survey.settled
-    ]
+    found = (row_of(s, "temperature_degC", "frequency_Hz", "left_K", **names) for s in survey.settled)
+    settled = [{key: value if np.isfinite(value) else None for key, value in row.items()} for row in found]
     correlations = sorted(survey.correlations, key=lambda row: -abs(float(row["changes"] or 0.0)))
     return {
         "path": record.path, "instrument": record.instrument, "start": record.start.isoformat() if record.start else None,
