@@ -8,7 +8,7 @@ import numpy as np
 
 from compensation.arrays import Array
 from shell.constants import zero_Celsius
-from studies.calibration.observed import RESPONSES, UNITS
+from studies.calibration.observed import RESPONSES
 from studies.diagnosis.verdict import NINETY
 from studies.errors import InputError
 from studies.fleet.folder import Device
@@ -16,6 +16,7 @@ from studies.inference.diagnosis import Inference
 from studies.inference.inferred import Inferred
 from studies.inference.model import PRICE, Background, Term
 from studies.instrument.card import load_card
+from studies.instrument.units import unit_of
 from studies.record import read_record
 from studies.simulation.drive import Drive
 from studies.simulation.heat_path import slowest_lag
@@ -108,8 +109,9 @@ def measure(found: Inferred, temperature: float) -> dict[str, Measured]:
         if name not in problem.responses:
             continue
         value, J = here[name]
-        rows[f"{words} {spot} ({UNITS[name]})"] = value, J
-        relative, unit = (1e6 / value, "ppm/K") if name == "frequency_Hz" else (1.0, f"{UNITS[name]}/K")
+        unit = unit_of(name).removeprefix("1")
+        rows[f"{words} {spot}" + (f" ({unit})" if unit else "")] = value, J
+        relative, unit = (1e6 / value, "ppm/K") if name == "frequency_Hz" else (1.0, f"{unit or 1}/K")
         per = relative / (2.0 * APART)
         rows[f"slope of {words} {spot} ({unit})"] = (
             per * (high[name][0] - low[name][0]),
@@ -176,7 +178,7 @@ def _standing(background: Background, term: Term, score: float) -> Standing:
     if len(term.unit) == 1:
         name = term.effect.coefficient_names(term.response)[term.members[0]]
         return Standing(score, size, size / times, float(mean[0]), float(np.sqrt(C[0, 0])), name)
-    return Standing(score, size, size / times, size, size / times, f"rms ({UNITS[term.response]})")
+    return Standing(score, size, size / times, size, size / times, f"rms ({unit_of(term.response)})")
 
 
 def interval(value: float, sd: float) -> dict[str, float]:

@@ -35,9 +35,9 @@ class Lot:
         """Why a device is not like the others; nothing for those that are."""
         out: dict[str, list[str]] = {serial: [] for serial in self.answers}
         for share in self.shares:
-            words = "lacks" if share.kind == "all but" else "alone has" if len(share.odd) == 1 else "has"
+            words = "lacks" if share.kind == "all but" else "it alone has" if len(share.odd) == 1 else "has"
             for serial in share.odd:
-                out[serial].append(f"{words} {' or '.join(share.names)} in {share.response}")
+                out[serial].append(f"{words} {' or '.join(share.names)} in {display_name(share.response)}")
         for one in self.quantities:
             for serial, p in one.odd.items():
                 own = one.of[serial].value
@@ -61,7 +61,9 @@ class Lot:
                 out.setdefault(name, []).append(apart)
         for share in self.shares:
             if share.kind == "batch":
-                out.setdefault(share.batch, []).append(f"has {' or '.join(share.names)} in {share.response}")
+                out.setdefault(share.batch, []).append(
+                    f"has {' or '.join(share.names)} in {display_name(share.response)}"
+                )
         return out
 
     def as_dict(self) -> dict[str, Any]:

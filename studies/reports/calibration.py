@@ -86,6 +86,7 @@ def calibration_parts(found: Calibration, payload: Mapping[str, Any]) -> list[Ch
         if name in runs
     ]
     title = "Values, best known first"
+    groups = "; ".join(spell([display_name(name) for name in group]) for group in found.groups)
     return [
         Chapter("Fit of the card to the data", [
             *(" ".join(one.sentences) for one in found.settled),
@@ -98,7 +99,7 @@ def calibration_parts(found: Calibration, payload: Mapping[str, Any]) -> list[Ch
         Chapter("Values", [
             Table(title, touched, (*VALUES, KEY), WIDTHS, "page", sortable=True),
             Table(title, touched, VALUES, WIDTHS + unchanged, "terminal"),
-            *(f"The data determine only a combination of {spell([display_name(name) for name in group])}." for group in found.groups),
+            f"Correlated by more than 0.9, so that the data determine a combination better than each value: {groups}." if groups else "",
             Figure(lambda: _draw_shifts(found), "Shifts of the values that the data determine at least in part, with 90 % intervals; shaded: 90 % of the prior."),
             Table("Values that the data do not depend on", rest, (*VALUES[:2], KEY), "", "page", sortable=True),
         ]),
@@ -131,8 +132,8 @@ def _predicted(payload: Mapping[str, Any]) -> list[dict[str, Any]]:
 def _held_out_note(payload: Mapping[str, Any]) -> str:
     return (
         f"{(payload['held_out'] or {}).get('record') or 'The run'} was predicted by a calibration without it. The prediction from the"
-        " chamber refits nothing; that from the housing refits the run's offset and initial state. Expected error: from the"
-        " calibrated values, the run's initial state and its turn-on."
+        " chamber refits nothing; that from the housing refits the run's offset and initial state. Expected error: due"
+        " to the uncertainty of the calibrated values, of the run's initial state and of its turn-on."
     )
 
 

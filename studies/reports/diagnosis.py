@@ -137,8 +137,10 @@ def response_table(verdict: Verdict) -> Table:
             + (f" in {one.left_over_input}" if one.left_over_input else ""),
         })  # fmt: skip
     judged = any(row["baseline"] is not None for row in rows)
-    note = "Rms residuals." + (" Baseline and with causes: on rows left out of the fit." if judged else "")
-    note += " Noise: what no model removes, with its white part for each row and its coloured part within a run."
+    note = "Rms residuals." + (
+        " Baseline and with causes: on rows left out of the fit, where these can be predicted." if judged else ""
+    )
+    note += " Noise: the residual that no model removes; white: from row to row, coloured: within a run."
     note += (
         " Explained: share of the structure that the causes remove."
         if any(row["explained_share"] is not None for row in rows)
@@ -175,8 +177,8 @@ def diagnosis_parts(diagnosis: "Inference | Unjudged") -> list[Chapter]:
             *next_step(verdict),
             Sentence(f"Files read: {files}.", where="page"),
         ]),
-        Chapter("The residual, and the next run", list(_residual(diagnosis))),
-        Chapter("Causes and numbers", [
+        Chapter("Residual and next run", list(_residual(diagnosis))),
+        Chapter("Causes and responses", [
             cause_table(verdict), response_table(verdict), *remarks(verdict),
             *(Sentence(f"{cause.effect}: {_summary(cause)}", where="page") for cause in physics),
         ]),

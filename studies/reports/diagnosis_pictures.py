@@ -17,14 +17,14 @@ if TYPE_CHECKING:
 
 
 def ladder(diagnosis: "Inference | Unjudged") -> Drawing:
-    """Draw what is left of every response: as shipped, calibrated, with the named physics, noise; on held-out rows."""
+    """Draw what is left of every response: with the card as given, calibrated, with the named physics, noise; on held-out rows."""
     columns = diagnosis.shown_responses
     with figure(1, len(columns), height=3.0, squeeze=False) as (canvas, axes):
         for axis, column in zip(axes[0], columns, strict=True):
             response, result = RESPONSES[column], diagnosis.verdict.responses[column]
             steps = [(word, value) for word, value in rungs(result) if value]
             values = [value * response.scale for _, value in steps]
-            colours = {"as shipped": BLACK, "calibrated": VERMILION, "with causes": BLUE, "noise": ORANGE}
+            colours = {"as given": BLACK, "calibrated": VERMILION, "with causes": BLUE, "noise": ORANGE}
             axis.bar(range(len(steps)), values, color=[colours[word] for word, _ in steps], width=0.7)
             for k, (_, value) in enumerate(steps):
                 label = f"{plain(value * response.scale)} {response.shown}"
@@ -50,7 +50,7 @@ def rungs(result: ResponseResult) -> list[tuple[str, float | None]]:
         return None if pair is None else (pair[1] if pair[1] is not None else pair[0])
 
     return [
-        ("as shipped", result.shipped),
+        ("as given", result.shipped),
         ("calibrated", best(result.baseline)),
         ("with causes", best(result.extended)),
         ("noise", result.noise),

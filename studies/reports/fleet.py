@@ -157,4 +157,4 @@ def _draw_chart(axis: "Axes", lot: Lot, one: Quantity, by_date: bool) -> None:
         axis.set_xticks(range(len(serials)), serials, rotation=60, fontsize=6)
     axis.tick_params(axis="x", labelrotation=60, labelsize=6)
     axis.ticklabel_format(axis="y", useOffset=False)
-    axis.set_title(_name(one), fontsize=7)
+    axis.set_title(_name(one), fontsize=7, loc="right")  # a power of ten stands on the left
