@@ -20,8 +20,7 @@ from tests.stranger.effects import EFFECTS
 from tests.stranger.noise import FAMILIES
 from tests.stranger.truth import Truth
 
-PAIRS = ("hysteresis+amplitude-frequency", "jump+leak", "rate-bias+periodic", "second-lag+quadrature-leakage",
-         "rate-frequency+radiation")  # fmt: skip
+PAIRS = ("hysteresis+amplitude-frequency", "jump+leak", "rate-frequency+radiation")
 """The last one was once named as a bond with its joint, which imitates both at once."""
 CASES: tuple[tuple[str, str, float | None], ...] = (
     *(("effect", name, 5.0) for name in EFFECTS),

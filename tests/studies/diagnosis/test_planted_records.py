@@ -1,0 +1,167 @@
+"""Planted in records of the tests' own making: a slow mass that is still warm, a narrow dip crossed once, runs that lie apart, a pair that no run separates."""
+
+import datetime
+
+import numpy as np
+import pytest
+from scipy.constants import zero_Celsius
+
+from studies.instrument.card import load_card
+from studies.planning.chamber import Chamber
+from studies.record import Record
+from studies.simulation.drive import drive_by_profile, rows_of
+from studies.simulation.virtual_gyro import simulate_run
+from studies.workbench import diagnose_records
+from tests.studies.diagnosis.bench import STAIRS, Bench
+from thermal.lag import lag
+from thermal.profile import Profile, parse_profile
+
+STEP, RUN, PAUSE = 20.0, 9000.0, 2400.0  # s
+SLOW, SHARE, NOISE = 15000.0, 0.08, 1e-3  # s, –, Hz
+LEVELS = ((55.0, -5.0), (60.0, 35.0), (-15.0, 50.0), (5.0, -20.0))
+
+
+def a_day_in_the_chamber():
+    """Four runs of two levels each, 40 min apart at 20 °C: one solution of the resonator's two paths from the first to the last."""
+    time = np.arange(0.0, len(LEVELS) * (RUN + PAUSE), STEP)
+    place = time % (RUN + PAUSE)
+    housing = np.full(time.size, 20.0)
+    for k, (first, second) in enumerate(LEVELS):
+        own = time // (RUN + PAUSE) == k
+        corners = [0.0, 600.0, 2400.0, 4000.0, 6000.0, 8200.0, RUN]
+        housing[own] = np.interp(place[own], corners, [20.0, 20.0, first, first, second, second, 20.0])
+    resonator = (1.0 - SHARE) * lag(time, housing, 500.0) + SHARE * lag(time, housing, SLOW)
+    x = resonator - 20.0
+    frequency = 4432.0 + 0.35 * x + 4e-5 * x**2 + NOISE * np.random.default_rng(11).standard_normal(time.size)
+    columns = {"time_s": time, "housing_temperature_degC": housing, "frequency_Hz": frequency}
+    records = []
+    for k in range(len(LEVELS)):
+        own = (time // (RUN + PAUSE) == k) & (place < RUN)
+        run = {name: values[own] - (values[own][0] if name == "time_s" else 0.0) for name, values in columns.items()}
+        records.append(Record(run, path=f"run{k}.csv", sha256=str(k)))
+    return records
+
+
+@pytest.mark.slow
+def test_a_slow_mass_that_the_runs_before_have_warmed_is_one_cause():
+    """The second path starts every run with what it has kept; it was once called mounting stress, ageing and a jump."""
+    verdict = diagnose_records(a_day_in_the_chamber()).verdict
+    (cause,) = verdict.causes
+    assert cause.effect == "second-lag"
+    result = verdict.responses["frequency_Hz"]
+    assert result.left_over == "none"
+    assert result.extended[0] == pytest.approx(NOISE, rel=0.05)
+    found = cause.parameters["second_time_constant_s"]
+    assert found.low < SLOW < found.high
+
+
+CENTRE, WIDTH = 3.46747, 0.262176  # °C, K
+PULL = [0.044927, 0.023272, -0.028969, 0.011996, 0.021019, 0.045055]  # Hz
+RATE = 0.05  # Hz
+
+
+def a_run_through_a_dip(card):
+    """One run of a card's gyro between three levels; its frequency is pulled where a spurious mode crosses."""
+    corners = np.array([0.0, 470.0, 5690.0, 6560.0, 9350.0, 11052.0, 17640.0])  # s
+    levels = np.array([20.0, 4.823, 4.823, 21.85, 21.85, -4.068, -4.068])  # °C
+    profile = Profile(corners, levels + zero_Celsius)
+    dip = {
+        "name": "activity-dip",
+        "response": "frequency_Hz",
+        "temperature_degC": CENTRE,
+        "width_K": WIDTH,
+        "pull_Hz": PULL,
+    }
+    record = simulate_run(
+        card.with_table("effect", [dip]), drive_by_profile(profile, rows_of(profile, RATE)), seed=2
+    ).record
+    kept = ("time_s", "housing_temperature_degC", "frequency_Hz")
+    return [Record({name: record[name] for name in kept}, path="run.csv", sha256="1")]
+
+
+@pytest.mark.slow
+def test_a_narrow_dip_that_is_crossed_once_is_not_called_a_jump():
+    """A first look at a grid of dips sees less than half of what it sees of a jump: a hop is sharp and lies between its shapes."""
+    card = load_card("cvg-25mm")
+    verdict = diagnose_records(a_run_through_a_dip(card), card).verdict
+    (cause,) = (cause for cause in verdict.causes if cause.kind == "physics")
+    assert cause.effect == "activity-dip"
+    assert cause.parameters["temperature_degC"].value == pytest.approx(CENTRE, abs=0.3)
+
+
+SCATTER = 1e-3  # Hz
+TIME = np.arange(0.0, 7200.0, 20.0)
+HOUSING = 25.0 + 8.0 * np.sin(2 * np.pi * TIME / 7200.0)
+
+
+def runs(offsets, gap=None):
+    """Runs of one gyro whose frequency is that of a lagging resonator, but for an offset of each (Hz)."""
+    rng, records = np.random.default_rng(3), []
+    resonator = lag(TIME, HOUSING, 300.0)
+    for k, offset in enumerate(offsets):
+        f = 4432.0 + 0.35 * (resonator - 20.0) + offset + SCATTER * rng.standard_normal(TIME.size)
+        columns = {"time_s": TIME, "housing_temperature_degC": HOUSING, "frequency_Hz": f}
+        start = None if gap is None else datetime.datetime(2026, 1, 1) + datetime.timedelta(seconds=k * gap)
+        records.append(Record(columns, start=start, path=f"run{k}.csv", sha256=str(k)))
+    return records
+
+
+def judge(records):
+    return diagnose_records(records).verdict
+
+
+@pytest.mark.slow
+def test_runs_that_lie_apart_are_not_adequate_and_start_times_would_show_why():
+    verdict = judge(runs([0.0, 0.05, -0.03]))
+    result = verdict.responses["frequency_Hz"]
+    assert verdict.verdict == "not-identifiable"
+    assert "(rms) apart" in result.remark
+    assert "start times" in result.remark
+    assert np.ptp(result.run_shifts) == pytest.approx(0.08, rel=0.1)
+    assert result.white == pytest.approx(SCATTER, rel=0.2)
+    timed = judge(runs([0.0, 0.05, -0.03], gap=86400.0)).responses["frequency_Hz"]
+    assert timed.verdict != "adequate"
+    assert "start times" not in timed.remark
+
+
+@pytest.mark.slow
+def test_a_bias_that_differs_from_run_to_run_is_adequate_as_turn_on_and_what_else_it_may_be_is_said():
+    rng, records = np.random.default_rng(5), []
+    for k, offset in enumerate((0.0, 4.0)):
+        bias = 0.2 * (HOUSING - 20.0) + offset + 0.05 * rng.standard_normal(TIME.size)
+        columns = {"time_s": TIME, "housing_temperature_degC": HOUSING, "bias_deg_per_h": bias}
+        records.append(Record(columns, path=f"run{k}.csv", sha256=str(k)))
+    result = judge(records).responses["bias_deg_per_h"]
+    assert result.verdict == "adequate"
+    assert "lie 2 °/h (rms) apart" in result.remark
+    assert "turn-on" in result.remark
+
+
+@pytest.mark.slow
+def test_inseparable_pair_gets_a_measurement_and_no_run():
+    rng = np.random.default_rng(11)
+    records = []
+    for k in range(2):
+        time = np.arange(0.0, 6 * 3600.0, 5.0)
+        housing = lag(time, 20.0 + 25.0 * np.sign(np.sin(2 * np.pi * time / 9000.0 + k)), 600.0)
+        x = lag(time, housing, 2000.0) - 20.0
+        drift = 0.05 * (time + 6 * 3600.0 * k) / 3600.0
+        frequency = 5000.0 + 0.4 * x - 4e-4 * x**2 + drift + 0.01 * rng.standard_normal(time.size)
+        columns = {"time_s": time, "housing_temperature_degC": housing, "frequency_Hz": frequency}
+        records.append(Record({name: values[::4] for name, values in columns.items()}))
+    verdict = diagnose_records(records, chamber=Chamber()).verdict
+    assert {verdict.causes[0].effect, *verdict.causes[0].equivalent} >= {"ageing", "clock-drift"}
+    assert verdict.verdict == "not-identifiable"
+    assert verdict.as_dict()["next_run"] is None
+    assert "reference clock" in verdict.next_experiment
+
+
+@pytest.mark.slow
+def test_suggested_run_is_part_of_the_answer():
+    bench = Bench(STAIRS, sampling=20.0, seed=2)
+    verdict = diagnose_records([bench.record(frequency_Hz=bench.frequency(0.01))], chamber=Chamber()).verdict
+    run = verdict.as_dict()["next_run"]
+    assert set(run) == {"profile", "drives", "expected_evidence", "repeat_evidence", "separates", "narrows", "hours"}
+    assert run["expected_evidence"] > 10.0
+    assert run["profile"].startswith("repeat") or parse_profile(run["profile"]).end > 3 * 3600.0
+    assert run["profile"] in verdict.next_experiment
