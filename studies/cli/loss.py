@@ -89,20 +89,15 @@ def _simulated(instrument: Instrument) -> str:
 
 
 def _describe(model: LossModel, budget: Budget, theory: str) -> dict[str, Any]:
-    low, high = budget.interval
+    part = {"slope_per_K": "slope", "low": "interval.0", "high": "interval.1"}
     return {
         **row_of(model, "harmonic", frequency_Hz="frequency"),
         "theory": theory,
         "temperature_degC": budget.temperatures - zero_Celsius,
-        "inverse_q_low": low,
-        "inverse_q_high": high,
+        **row_of(budget, "inverse_q", inverse_q_low="interval.0", inverse_q_high="interval.1"),
         "q": 1 / budget.inverse_q,
-        **row_of(budget, "inverse_q", slope_per_K="slope", least_known="least_known.name"),
-        "parts": [
-            row_of(part, "name", "inverse_q", "relative_sd", "source", slope_per_K="slope")
-            | dict(zip(("low", "high"), part.interval, strict=True))
-            for part in budget.parts
-        ],
+        **row_of(budget, slope_per_K="slope", least_known="least_known.name"),
+        "parts": [row_of(one, "name", "inverse_q", "relative_sd", "source", **part) for one in budget.parts],
         "attack_first": row_of(budget.first, "advice", part="name") | {"q_without": budget.without(budget.first.name)},
     }
 
@@ -113,9 +108,9 @@ def _parts(
     """What people read: the answer, the parts, their course, where on the wall, around the axis, what is left out."""
     degrees, around = payload["temperature_degC"], payload["anisotropy"]
     low, high = budget.interval
-    over = rows_of({
-        "T": degrees, "inverse_q": budget.inverse_q, "q": payload["q"], "q_low": 1 / high, "q_high": 1 / low, "slope": budget.slope,
-    })  # fmt: skip
+    over = rows_of(
+        {"T": degrees, "q_low": 1 / high, "q_high": 1 / low, **row_of(budget, "inverse_q", "slope"), "q": payload["q"]}
+    )
     rows = []
     for entry, part in zip(payload["parts"], budget.parts, strict=True):
         own, total, rest = part.inverse_q[at], budget.inverse_q[at], float(budget.without(part.name)[at])

@@ -113,16 +113,14 @@ def columns(head: str) -> list[Column]:
 
 def find(row: Any, key: Key) -> Any:
     """Return what a row has under a key; None where it has none."""
-    value = row
-    if callable(key):
-        value = key(row)
-    else:
-        for step in key.split("."):
-            if isinstance(value, Mapping):
-                value = value.get(step)
-            elif value is not None:
-                value = value[int(step)] if step.isdigit() else getattr(value, step)
+    value = key(row) if callable(key) else reduce(_step, key.split("."), row)
     return value.item() if hasattr(value, "item") else value
+
+
+def _step(value: Any, key: str) -> Any:
+    if isinstance(value, Mapping):
+        return value.get(key)
+    return None if value is None else value[int(key)] if key.isdigit() else getattr(value, key)
 
 
 def rows_of(columns: Mapping[str, Iterable[Any]]) -> list[dict[str, Any]]:
@@ -132,14 +130,14 @@ def rows_of(columns: Mapping[str, Iterable[Any]]) -> list[dict[str, Any]]:
 
 
 def row_of(found: Any, *keys: str, **named: str | tuple[str, float]) -> dict[str, Any]:
-    """Return a row of what an object has: attributes by their own names, others under new ones (q="fit.quality", f_mHz=("f", 1e3)).
+    """Return a row of what an object has: attributes by their own names, others under new ones (q="fit.quality", low="interval.0", f_mHz=("f", 1e3)).
 
     A part that has fields, such as an interval, becomes a row of its own. Of nothing (None) it has every key, and None.
     """
     row = {}
     for name, key in (dict(zip(keys, keys, strict=True)) | named).items():
         path, factor = key if isinstance(key, tuple) else (key, 1.0)
-        row[name] = _times(factor, None if found is None else reduce(getattr, path.split("."), found))
+        row[name] = _times(factor, reduce(_step, path.split("."), found))
     return row
 
 
