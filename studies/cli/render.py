@@ -14,20 +14,14 @@ from studies.errors import InputError, MissingEnvironment
 from studies.files.writing import written_whole
 from studies.instrument.card import load_card
 from studies.reports.scenes import Colour, ModeScene, ShellTemperature, read_field, show_mode
-from studies.results import Blocks, Chapter, Column, Result, Sentence, Table, row_of
+from studies.results import Blocks, Chapter, Result, Sentence, Table, row_of
 from studies.results.page import render_result
 
 KINDS = (".png", ".webp", ".gif", ".html", ".glb", ".stl", ".ply")
 View = Literal["oblique", "axis", "side"]
 HIDDEN = Parameter(show_default=False)
 MOST = 4  # resonators in one picture
-COLUMNS = (
-    Column("card", "card"),
-    Column("temperature_degC", "T", "°C", "g"),
-    Column("harmonic", "n"),
-    Column("index", "index"),
-    Column("frequency_Hz", "f", "Hz", ".4f"),
-)
+MODE = "harmonic: n | index | frequency_Hz: f (Hz) .4f"
 
 
 @answers("hrg.render/1")
@@ -87,7 +81,7 @@ def render(
         f"The modes of {out}.",
         [
             Sentence(f"{out}: {'; '.join(one.title.replace(chr(10), ', ') for one in shown)}.", where="terminal"),
-            Table("Modes", modes, COLUMNS, where="page"),
+            Table("Modes", modes, f"card | temperature_degC: T (°C) g | {MODE}", where="page"),
             Blocks(lambda: view_blocks(shown[:1])),
         ],
     )
@@ -130,7 +124,7 @@ def _page(shown: Sequence[ModeScene]) -> bytes:
     first = shown[0]
     rows = [_row(one) | row_of(one.mode, "bryan_factor") for one in shown]
     lead = f"Mode shapes of {first.instrument.name} at {first.temperature - zero_Celsius:g} °C, {first.mode.theory} theory."
-    table = Table("Modes of this page", rows, [*COLUMNS[2:], "bryan_factor: Bryan factor .5f"])
+    table = Table("Modes of this page", rows, f"{MODE} | bryan_factor: Bryan factor .5f")
     chapter = Chapter("Mode shapes", [Blocks(lambda: view_blocks(shown)), table])
     return render_result(Result({}, first.instrument.name, lead, [chapter])).encode()
 
