@@ -58,14 +58,14 @@ def ask(capsys):
 
 @pytest.fixture
 def refuse(capsys):
-    """What a command says that cannot work: exit status 2, and nothing like a fault of the program."""
+    """What a command says that cannot work: exit status 2, nothing on stdout, nothing like a fault of the program."""
     from studies.cli import main
 
     def said(words):
         capsys.readouterr()
         assert main([*map(str, words)]) == 2
-        told = capsys.readouterr().err
-        assert "Traceback" not in told
+        out, told = capsys.readouterr()
+        assert (out, "Traceback" in told) == ("", False)
         return told
 
     return said

@@ -1,37 +1,28 @@
 """`hrg compare`: figures equal those of the other commands, differing keys are named, bad calls refused."""
 
-import json
-
 import pytest
 
-from studies.cli import main
 
-
-def ask(capsys, *words):
-    assert main([*words, "--json"]) == 0
-    return json.loads(capsys.readouterr().out)
-
-
-def test_figures_are_those_of_the_other_commands(tmp_path, capsys):
+def test_figures_are_those_of_the_other_commands(tmp_path, ask):
     card = tmp_path / "thin.toml"
     card.write_text(
         'schema = "hrg.card/1"\nname = "thin"\n[resonator]\nshape = "hemisphere"\nradius_mm = 15.0\nthickness_mm = 0.8\n'
         '[material]\nname = "fused-silica"\n'
     )
-    found = ask(capsys, "compare", "free-dome", str(card))
+    found = ask(["compare", "free-dome", str(card)])
     assert (found["schema"], found["cards"]) == ("hrg.compare/1", ["free-dome", "thin"])
     assert found["differing"] == {"resonator.thickness_mm": [0.9, 0.8]}
     figures = {one["name"]: one for one in found["figures"]}
     for place, name in enumerate(("free-dome", str(card))):
-        (mode,) = ask(capsys, "modes", name)["modes"]
+        (mode,) = ask(["modes", name])["modes"]
         frequency = figures["frequency, n = 2"]
         assert frequency["values"][place] == pytest.approx(mode["frequency_Hz"], rel=1e-9)
         assert frequency["uncertainties"][place] == pytest.approx(mode["material_uncertainty_Hz"], rel=1e-3)
-        point = ask(capsys, "tcf", name, "--from", "20", "--to", "20")["points"][0]
+        point = ask(["tcf", name, "--from", "20", "--to", "20"])["points"][0]
         assert figures["slope"]["values"][place] == pytest.approx(point["slope_ppm_per_degC"], rel=1e-4)
 
 
-def test_hertz_per_micrometre_is_a_difference_of_two_solves(tmp_path, capsys):
+def test_hertz_per_micrometre_is_a_difference_of_two_solves(tmp_path, ask):
     """A wall 1 µm thicker, solved anew."""
     text = (
         'schema = "hrg.card/1"\nname = "x"\n[resonator]\nshape = "hemisphere"\nradius_mm = 15.0\nthickness_mm = {}\n'
@@ -40,7 +31,7 @@ def test_hertz_per_micrometre_is_a_difference_of_two_solves(tmp_path, capsys):
     frequencies = []
     for thickness in (0.9, 0.901):
         (tmp_path / "x.toml").write_text(text.format(thickness))
-        (mode,) = ask(capsys, "modes", str(tmp_path / "x.toml"), "--tolerance", "1e-8")["modes"]
+        (mode,) = ask(["modes", str(tmp_path / "x.toml"), "--tolerance", "1e-8"])["modes"]
         frequencies.append(mode["frequency_Hz"])
     assert mode["frequency_per_thickness_Hz_per_um"] == pytest.approx(frequencies[1] - frequencies[0], rel=1e-3)
 

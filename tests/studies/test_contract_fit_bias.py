@@ -38,7 +38,7 @@ def calibrated(tmp_path_factory):
     for k in range(3):
         write_record(make_record(k, cooling=k != 1), folder / f"run{k}.csv")
     arguments = [str(folder / f"run{k}.csv") for k in range(3)]
-    options = {"save": "m.toml", "emit": "m.c", "report": "page.html"}
+    options = {"save": "m.toml", "report": "page.html"}
     for name, file in options.items():
         arguments += [f"--{name}", str(folder / file)]
     assert main(["fit", "bias", *arguments]) == 0

@@ -1,11 +1,8 @@
 """A card with [mount]: what its commands say, what of it is uncertain, and what is refused."""
 
-import json
-
 import numpy as np
 import pytest
 
-from studies.cli import main
 from studies.instrument.card import load_card, save_card
 from studies.simulation.drive import drive_by_profile
 from studies.simulation.prediction import predict
@@ -39,19 +36,14 @@ def cup(tmp_path):
     return path
 
 
-def told(capsys, *words):
-    assert main([*map(str, words), "--json"]) == 0
-    return json.loads(capsys.readouterr().out)
-
-
-def test_modes_and_tcf_tell_the_same_of_the_base(cup, capsys):
+def test_modes_and_tcf_tell_the_same_of_the_base(cup, ask):
     """The alloy expands by 8.5e-6 per kelvin, the base by 23e-6: in 20 K the base gains 290 ppm."""
-    axial, pair = told(capsys, "modes", cup, "--harmonic", "0", "2")["modes"]
+    axial, pair = ask(["modes", cup, "--harmonic", "0", "2"])["modes"]
     assert "mount" not in axial
     mount = pair["mount"]
     assert mount["strain_ppm"] == pytest.approx(20 * (23 - 8.5), rel=1e-9)
     assert mount["shift_ppm"] == pytest.approx(mount["per_strain"] * mount["strain_ppm"], rel=1e-9)
-    point = told(capsys, "tcf", cup, "--from", "20", "--to", "30")["points"][0]
+    point = ask(["tcf", cup, "--from", "20", "--to", "30"])["points"][0]
     assert point["parts_ppm_per_degC"]["base"] == pytest.approx(mount["slope_ppm_per_degC"], rel=1e-9)
     assert sum(point["parts_ppm_per_degC"].values()) == pytest.approx(point["slope_ppm_per_degC"], rel=1e-9)
     assert point["frequency_Hz"] / pair["frequency_Hz"] - 1 == pytest.approx(1e-6 * mount["shift_ppm"], rel=1e-3)

@@ -24,13 +24,6 @@ def faces(tmp_path_factory):
     return paths
 
 
-def failing(capsys, *words):
-    assert main([str(word) for word in words]) == 2
-    captured = capsys.readouterr()
-    assert captured.out == ""
-    return captured.err
-
-
 @pytest.mark.slow
 def test_a_scan_says_its_noise_and_saves_the_card_that_it_saw(faces, tmp_path, capsys, ask):
     words = ["scan", "free-dome", faces["inner"], faces["outer"], "--harmonic", 2, "--theory", "shell", "--json"]
@@ -71,30 +64,28 @@ def test_a_scan_can_be_trimmed(faces, tmp_path, capsys, ask):
 
 
 @pytest.mark.slow
-def test_scan_refuses_what_it_cannot_use(faces, tmp_path, capsys):
+def test_scan_refuses_what_it_cannot_use(faces, tmp_path, refuse):
     points = np.loadtxt(faces["outer"])
     wrong = tmp_path / "wrong.asc"
     np.savetxt(wrong, 1e3 * points)
-    assert "µm read as mm" in failing(capsys, "scan", "free-dome", "none", wrong)
-    assert "exchange the files" in failing(capsys, "scan", "free-dome", faces["outer"], faces["inner"])
+    assert "µm read as mm" in refuse(["scan", "free-dome", "none", wrong])
+    assert "exchange the files" in refuse(["scan", "free-dome", faces["outer"], faces["inner"]])
     np.savetxt(wrong, points[np.abs(np.arctan2(points[:, 1], points[:, 0])) > 0.6])
-    assert "gaps between the points are too large" in failing(
-        capsys, "scan", "free-dome", "none", wrong, "--harmonic", 2
-    )
+    assert "gaps between the points are too large" in refuse(["scan", "free-dome", "none", wrong, "--harmonic", 2])
     np.savetxt(wrong, points * [1.0, 1.15, 1.0])
-    assert "do not fit the face" in failing(capsys, "scan", "free-dome", "none", wrong, "--harmonic", 2)
+    assert "do not fit the face" in refuse(["scan", "free-dome", "none", wrong, "--harmonic", 2])
     shifted = tmp_path / "shifted.asc"
     np.savetxt(shifted, np.loadtxt(faces["inner"]) + np.array([3.0, 0.0, 2.0]))
-    assert "--frames own" in failing(capsys, "scan", "free-dome", shifted, faces["outer"], "--frames", "common")
-    assert "mm as m" in failing(capsys, "scan", "free-dome", "none", faces["outer"], "--unit", "m")
+    assert "--frames own" in refuse(["scan", "free-dome", shifted, faces["outer"], "--frames", "common"])
+    assert "mm as m" in refuse(["scan", "free-dome", "none", faces["outer"], "--unit", "m"])
     wrong.write_text("x y z\n1 2 three\n")
-    assert "not a table of x y z" in failing(capsys, "scan", "free-dome", "none", wrong)
+    assert "not a table of x y z" in refuse(["scan", "free-dome", "none", wrong])
     wrong.write_text("# nothing\n")
-    assert "has no points" in failing(capsys, "scan", "free-dome", "none", wrong)
-    assert "--highest" in failing(capsys, "scan", "free-dome", faces["inner"], "--harmonic", 7)
+    assert "has no points" in refuse(["scan", "free-dome", "none", wrong])
+    assert "--highest" in refuse(["scan", "free-dome", faces["inner"], "--harmonic", 7])
 
 
-def test_a_table_of_departures_must_close_the_circle(tmp_path, capsys, ask):
+def test_a_table_of_departures_must_close_the_circle(tmp_path, refuse, ask):
     path = tmp_path / "grid.csv"
 
     def write(angles, unit=1.0, gap=0):
@@ -110,13 +101,13 @@ def test_a_table_of_departures_must_close_the_circle(tmp_path, capsys, ask):
     found = ask(["scan", "free-dome", "none", str(path), "--harmonic", "2", "--theory", "shell"])
     assert found["splits"][0]["slow_axis_deg"]["value"] == pytest.approx(np.rad2deg(0.4), abs=0.01)
     write(np.arange(0, 361, 7.5))
-    assert "do not close the circle" in failing(capsys, "scan", "free-dome", "none", path)
+    assert "do not close the circle" in refuse(["scan", "free-dome", "none", path])
     write(np.arange(0, 180, 7.5))
-    assert "do not close the circle" in failing(capsys, "scan", "free-dome", "none", path)
+    assert "do not close the circle" in refuse(["scan", "free-dome", "none", path])
     write(np.arange(0, 360, 7.5), 1e4)
-    assert "cells of the table must be in µm" in failing(capsys, "scan", "free-dome", "none", path)
+    assert "cells of the table must be in µm" in refuse(["scan", "free-dome", "none", path])
     write(np.arange(0, 360, 7.5), gap=20)
-    assert "gaps between the points are too large" in failing(capsys, "scan", "free-dome", "none", path)
+    assert "gaps between the points are too large" in refuse(["scan", "free-dome", "none", path])
 
 
 def test_a_measured_gain_turns_the_cuts_to_the_other_antinodes(capsys):
@@ -137,6 +128,6 @@ def test_the_depth_of_a_cut_of_the_edge_removes_its_mass_through_the_wall(capsys
     assert 0.8 < gain["low"] < gain["value"] < gain["high"] < 1
 
 
-def test_trim_refuses_what_is_no_scan(tmp_path, capsys):
+def test_trim_refuses_what_is_no_scan(tmp_path, refuse):
     (tmp_path / "no.json").write_text("{}")
-    assert "hrg scan --json" in failing(capsys, "trim", "free-dome", "--scan", tmp_path / "no.json")
+    assert "hrg scan --json" in refuse(["trim", "free-dome", "--scan", tmp_path / "no.json"])
