@@ -96,7 +96,8 @@ def read_task(source: str | Path) -> Task:
         "sampling": {"method": "one-at-a-time"},
         "parameter": parameters,
         "derived": content.get("derived", []),
-        "quantity": list(_quantities(keys, content, where)),
+        # the neighbours' modes first: the others then find theirs among them
+        "quantity": sorted(_quantities(keys, content, where), key=lambda table: table["name"] != "mode-separation"),
     }
     study = check_study(spec, instrument, where, str(path.parent.resolve()), path.read_text(encoding="utf-8-sig"))
     if study.functions:
