@@ -1,11 +1,12 @@
 """Ring-down of one resonator: the free part of a record, its decay, nonlinear terms, and the values with intervals."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from compensation.errors import CompensationError
+from compensation.ringdown.answer import Curve, Estimate, RingDown
 from compensation.ringdown.envelope import Envelope
 from compensation.ringdown.fit import DecayFit, drift_shapes
 from compensation.ringdown.model import Decay
@@ -21,31 +22,7 @@ SAID_OF = {
 }
 
 
-@dataclass(frozen=True)
-class Estimate:
-    """A value with the standard deviation that the bound allows, and its 90 % interval; NaN where nothing determines it."""
-
-    value: float
-    sd: float
-    low: float
-    high: float
-
-
-@dataclass(frozen=True)
-class RingDown:
-    """Results of one decay."""
-
-    # mapping, `frequency_1_Hz` (the higher), `frequency_2_Hz`, `q_1`, `q_2`, `frequency_Hz`, `inverse_q`,
-    # `decay_time_s`; of two channels `split_Hz`, `frequency_axis_deg`, `damping_split_per_s`, `damping_axis_deg`; where
-    # they are seen `hardening_Hz`, and `thickening_per_s`, at the first amplitude
-    estimates: Mapping[str, Estimate]
-    fit: DecayFit  # the decay within `window`
-    window: tuple[float, float]  # (float, float), seconds of the record that are free decay above the noise
-    remarks: tuple[str, ...]  # tuple of str, what is not as it should be, a sentence each
-    lines: tuple[float, ...] = ()
-
-
-def analyse_decay(envelope: Envelope, *, harmonic: int = 2, confidence: float = 0.9) -> RingDown:
+def analyse_decay(envelope: Envelope, *, harmonic: int = 2) -> RingDown:
     """Find the free decay in an envelope and return its frequencies, Q and axes with intervals."""
     if len(envelope.values) == 2:
         x, y = envelope.values
@@ -64,10 +41,16 @@ def analyse_decay(envelope: Envelope, *, harmonic: int = 2, confidence: float = 
     fit, left = found.fit, found.left
     _check_decays(fit)
     fit = replace(fit, covariance=fit.covariance * left.widening**2, widening=left.widening)
-    estimates = _estimate(fit, harmonic, confidence)
+    estimates = _estimate(fit, harmonic)
     remarks = (*_remark(given, fit, left, jump), *_undetermined(fit, estimates))
-    window = (float(fit.envelope.time[0]), float(fit.envelope.time[-1]))
-    return RingDown(estimates, fit, window, remarks, tuple(tone / (2 * np.pi) for tone in fit.found.tones))
+    time, carrier = fit.envelope.time, fit.envelope.carrier
+    curves = tuple(
+        Curve(time, 20 * np.log10(np.abs(z)), 20 * np.log10(np.abs(z - r)), np.real(r))
+        for z, r in zip(fit.envelope.values, fit.residual, strict=True)
+    )
+    lines = tuple(carrier + tone / (2 * np.pi) for tone in fit.found.tones)
+    window = (float(time[0]), float(time[-1]))
+    return RingDown(estimates, remarks, tuple(fit.noise.tolist()), fit.widening, curves, window, lines)
 
 
 def _check_decays(fit: DecayFit) -> None:
@@ -115,7 +98,7 @@ def _derive(decay: Decay, fit: DecayFit, harmonic: int) -> dict[str, float]:
     return found
 
 
-def _estimate(fit: DecayFit, harmonic: int, confidence: float) -> dict[str, Estimate]:
+def _estimate(fit: DecayFit, harmonic: int) -> dict[str, Estimate]:
     """Return every derived value with its interval, from draws; axes are cut where they are farthest from the value."""
     best = _derive(fit.decay, fit, harmonic)
     draws = [_derive(one, fit, harmonic) for one in fit.draw(DRAWS, np.random.default_rng(0))]
@@ -126,10 +109,10 @@ def _estimate(fit: DecayFit, harmonic: int, confidence: float) -> dict[str, Esti
             period = 180 / harmonic
             value %= period
             away = (away + period / 2) % period - period / 2
-        low, high = np.quantile(away, [(1 - confidence) / 2, (1 + confidence) / 2])
+        low, high = np.quantile(away, [0.05, 0.95])
         sd = float(np.sqrt(np.mean(away**2)))
         if name in LENGTHS and value < RESOLVED * sd:  # the length of a vector near zero has a limit above alone
-            low, high = -value, float(np.quantile(away, confidence))
+            low, high = -value, float(np.quantile(away, 0.9))
         found[name] = Estimate(float(value), sd, float(value + low), float(value + high))
     for length, axis in zip(LENGTHS, ("frequency_axis_deg", "damping_axis_deg"), strict=True):
         if axis in found and found[length].value < RESOLVED * found[length].sd:  # any azimuth may be the axis

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from compensation.arrays import Array
 from compensation.errors import CompensationError
+from compensation.ringdown.answer import Estimate
 
 Whole = NDArray[np.int64]
 PAYS = 12.0  # least fall of −2 ln L, over the widening², for which time or a bend comes in, beside ln N for each value
@@ -50,26 +51,15 @@ class Rows:
 
 
 @dataclass(frozen=True)
-class Term:
-    """One value of a law with its 90 % interval."""
-
-    name: str
-    value: float
-    sd: float
-    low: float
-    high: float
-
-
-@dataclass(frozen=True)
 class Law:
-    """Terms of a law; steps are named `step 1`, … and stand for the beginning of the sessions at `sessions` (s).
+    """Terms of a law by name; steps are named `step 1`, … and stand for the beginning of the sessions at `sessions` (s).
 
     `level` is the value at the means of the conditions (no pressure, no amplitude, before the first step); `scatter` the rms that is left, relative;
     `fitted` of every row; `left_out` rows at the beginning of every decay follow another law (a launch) and are not used.
     """
 
-    level: Term
-    terms: tuple[Term, ...]
+    level: Estimate
+    terms: Mapping[str, Estimate]
     sessions: tuple[float, ...]
     scatter: float
     fitted: Array
@@ -92,7 +82,7 @@ def fit_law(rows: Rows, *, loss: bool) -> Law:
             {name: x[keep] for name, x in rows.conditions.items()},
         )  # fmt: skip
         rival = _fit(later, loss)
-        one, two = (next(term for term in each.terms if term.name == "energy") for each in (law, rival))
+        one, two = law.terms["energy"], rival.terms["energy"]
         means = np.bincount(place, law.fitted - rows.value) / np.bincount(place)
         usual = 1.4826 * float(np.median(np.abs(means[first:])))
         stands_out = float(np.max(np.abs(means[:first]))) > OUT * usual
@@ -118,13 +108,11 @@ def _fit(rows: Rows, loss: bool) -> Law:
     covariance = _covariance(X, rows.value - fitted, weight * np.sqrt(robust), rows)
     free = max(len(np.unique(rows.decay)) - X.shape[1], 1)
     reach = float(scipy.special.stdtrit(free, 0.95))
-    terms = [
-        Term(name, float(b), sqrt(v), float(b) - reach * sqrt(v), float(b) + reach * sqrt(v))
-        for name, b, v in zip(("level", *columns), found, np.diag(covariance), strict=True)
-    ]
+    spreads = np.sqrt(np.diag(covariance))
+    level, *terms = (Estimate.normal(float(b), float(sd), reach) for b, sd in zip(found, spreads, strict=True))
     left = (rows.value - fitted) / (fitted if loss else 1.0)
     steps = begins if any(name.startswith("step") for name in columns) else ()
-    return Law(terms[0], tuple(terms[1:]), steps, float(np.sqrt(np.mean(left**2))), fitted)
+    return Law(level, dict(zip(columns, terms, strict=True)), steps, float(np.sqrt(np.mean(left**2))), fitted)
 
 
 def find_sessions(rows: Rows) -> tuple[float, ...]:

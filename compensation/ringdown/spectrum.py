@@ -6,7 +6,6 @@ The scatter of a power is taken in proportion to it (a periodogram's is), so the
 errors are the largest of those of such noise, and of the scores themselves, each alone and neighbours together, for other noise.
 """
 
-from dataclasses import dataclass
 from math import exp, log, pi
 
 import numpy as np
@@ -15,32 +14,15 @@ from numpy.typing import ArrayLike
 
 from compensation.arrays import Array
 from compensation.errors import CompensationError
-from compensation.ringdown.analysis import Estimate
+from compensation.ringdown.answer import Curve, Estimate, RingDown
 from compensation.ringdown.laws import long_run
 from compensation.samples import block_means
 
 PAYS = 20.0
-REACH = 1.6449  # standard deviations of the ends of a 90 % interval
 NARROW = 3.0  # points within the width below which the analyser, not the resonator, makes it
 
 
-@dataclass(frozen=True)
-class SpectrumFit:
-    """Results of a spectrum: values by name as of a decay, the fitted powers, and remarks.
-
-    `widening` is the root of the misfit of means of neighbouring points over what their scatter leaves of it.
-    """
-
-    estimates: dict[str, Estimate]
-    frequency: Array
-    power: Array
-    fitted: Array
-    scatter: float
-    widening: float
-    remarks: tuple[str, ...]
-
-
-def fit_spectrum(frequency: ArrayLike, power: ArrayLike) -> SpectrumFit:
+def fit_spectrum(frequency: ArrayLike, power: ArrayLike) -> RingDown:
     """Fit one line, or two where the second pays."""
     f, y = np.asarray(frequency, dtype=np.float64), np.asarray(power, dtype=np.float64)
     keep = np.isfinite(f) & np.isfinite(y) & (y > 0)
@@ -80,23 +62,19 @@ def fit_spectrum(frequency: ArrayLike, power: ArrayLike) -> SpectrumFit:
     for k in range(2 if split else 1):
         f0, width = float(point[2 + 3 * k]), exp(point[3 + 3 * k])
         rel, mark = float(sd[3 + 3 * k]), f"_{k + 1}" if split else ""
-        found[f"frequency{mark}_Hz"] = _estimate(f0, float(sd[2 + 3 * k]))
-        q = f0 / width
+        found[f"frequency{mark}_Hz"] = Estimate.normal(f0, float(sd[2 + 3 * k]))
         if split:
-            found[f"q_{k + 1}"] = Estimate(q, q * rel, q * exp(-REACH * rel), q * exp(REACH * rel))
+            found[f"q_{k + 1}"] = Estimate.relative(f0 / width, rel)
         else:
-            found["inverse_q"] = Estimate(1 / q, rel / q, exp(-REACH * rel) / q, exp(REACH * rel) / q)
-            tau = 1 / (pi * width)
-            found["decay_time_s"] = Estimate(tau, tau * rel, tau * exp(-REACH * rel), tau * exp(REACH * rel))
+            found["inverse_q"] = Estimate.relative(width / f0, rel)
+            found["decay_time_s"] = Estimate.relative(1 / (pi * width), rel)
     if split:
-        found["split_Hz"] = _estimate(float(point[2] - point[5]), float(np.hypot(sd[2], sd[5])))
+        found["split_Hz"] = Estimate.normal(float(point[2] - point[5]), float(np.hypot(sd[2], sd[5])))
     size = max(4, y.size // 40)
     widening = float(np.sqrt(max(1.0, size * float(np.mean(block_means(y / fitted - 1, size) ** 2)) / scatter**2)))
-    return SpectrumFit(found, f, y, fitted, scatter, widening, tuple(_remark(f, point, split, widening)))
-
-
-def _estimate(value: float, sd: float) -> Estimate:
-    return Estimate(value, sd, value - REACH * sd, value + REACH * sd)
+    level, foretold = 10 * np.log10(y), 10 * np.log10(fitted)
+    curve = Curve(f, level, foretold, level - foretold)
+    return RingDown(found, tuple(_remark(f, point, split, widening)), (scatter,), widening, (curve,))
 
 
 def _line_at(f: Array, y: Array) -> tuple[float, float, float]:

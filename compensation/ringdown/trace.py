@@ -6,14 +6,13 @@ v₀ is the scatter of the reading, σ the noise that adds to the amplitude and 
 these weights, so the late record counts for what it tells; it ends where a < 3 σ, because a logarithm of noise is biased.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 import scipy
 from numpy.typing import ArrayLike
 
 from compensation.arrays import Array
 from compensation.errors import CompensationError
+from compensation.ringdown.answer import Curve, Estimate, RingDown
 from compensation.samples import block_means
 
 BINS = 100
@@ -22,26 +21,11 @@ DROP = 0.25
 FLOOR = 3.0
 
 
-@dataclass(frozen=True)
-class TraceDecay:
-    """Decay time of a trace without phase."""
-
-    # decay, sd: 1/s, 1/τ of the amplitude, and its standard deviation with the correlation of the scatter counted
-    decay: float
-    sd: float
-    low: float  # low, high: 90 % interval of 1/τ
-    high: float
-    amplitude: float  # amplitude, noise: a at the start of the window and σ, in the unit of the record
-    noise: float
-    window: tuple[float, float]  # (float, float), seconds that were used
-    bound: float  # standard deviation that the Cramér–Rao bound of uncorrelated scatter allows
-    remarks: tuple[str, ...]
-
-
-def analyse_trace(time: ArrayLike, amplitude: ArrayLike, *, confidence: float = 0.9) -> TraceDecay:
-    """Find the free part of a trace and return its decay."""
+def analyse_trace(time: ArrayLike, amplitude: ArrayLike, frequency: float | None = None) -> RingDown:
+    """Find the free part of a trace and return its decay; with its `frequency` (Hz), 1/Q."""
     t, a = np.asarray(time, dtype=np.float64), np.asarray(amplitude, dtype=np.float64)
     keep = np.isfinite(t) & np.isfinite(a) & (a > 0)
+    whole, level_dB = t, 20 * np.log10(np.where(keep, a, np.nan))
     t, L = t[keep], np.log(a[keep])
     if t.size < 32:
         raise CompensationError(f"a decay needs 32 rows or more with a positive amplitude, not {t.size}.")
@@ -82,7 +66,10 @@ def analyse_trace(time: ArrayLike, amplitude: ArrayLike, *, confidence: float = 
         raise CompensationError(
             f"nothing decays in this trace (1/τ = {-slope:.3g} ± {sd:.2g} 1/s); record a free ring-down, longer."
         )
-    reach = float(scipy.stats.norm.isf((1 - confidence) / 2)) * sd
+    rate = Estimate.normal(-slope, sd)
+    most = 1 / rate.low if rate.low > 0 else np.inf
+    estimates = {"decay_per_s": rate, "decay_time_s": Estimate(1 / rate.value, sd / rate.value**2, 1 / rate.high, most)}
+    estimates |= {"inverse_q": rate.over(np.pi * frequency)} if frequency is not None else {}
     said = []
     if first:
         said.append(f"The first {t[first] - t[0]:.4g} s are not a free decay (drive or release) and are left out.")
@@ -96,17 +83,11 @@ def analyse_trace(time: ArrayLike, amplitude: ArrayLike, *, confidence: float = 
         said.append(
             "The amplitude falls by less than 40 %: a decay that is not exponential is not seen; record longer."
         )
-    return TraceDecay(
-        -slope,
-        sd,
-        -slope - reach,
-        -slope + reach,
-        float(np.exp(level)),
-        noise,
-        (float(t[first]), float(t[last - 1])),
-        bound,
-        tuple(said),
-    )
+    window = (float(t[first]), float(t[last - 1]))
+    fitted = 20 / np.log(10) * (level + slope * (whole - t[first]))
+    fitted[(whole < window[0]) | (whole > window[1])] = np.nan
+    curve = Curve(whole, level_dB, fitted, level_dB - fitted)
+    return RingDown(estimates, tuple(said), (noise,), sd / bound, (curve,), window)
 
 
 def _find_release(t: Array, L: Array) -> int:

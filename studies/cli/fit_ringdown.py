@@ -24,7 +24,7 @@ from studies.resonator.law import law_of
 from studies.results import Chapter, Drawing, Figure, Part, Result, Sentence, Table, row_of
 
 if TYPE_CHECKING:
-    from compensation.ringdown.laws import Law, Term
+    from compensation.ringdown.laws import Law
 
 QUANTITIES = {
     "frequency_1_Hz": "frequency of the upper mode (Hz)",
@@ -155,13 +155,13 @@ def _row(decay: Decay) -> dict[str, Any]:
 
 
 def _draw(decay: Decay) -> Drawing:
-    x, y = "frequency (Hz)" if decay.spectrum else "time (s)", ("level (dB)", "residual")
+    x, y = "frequency (Hz)" if decay.window is None else "time (s)", ("level (dB)", "residual")
     with style.figure(2, 1, height=4.6, sharex=True, x=x, y=y) as (drawn, (top, bottom)):
-        for time, values, fitted, residual in decay.curves():
-            rows = style.few_rows(time.size)
-            top.plot(time[rows], values[rows], ".", markersize=1.5)
-            top.plot(time[rows], fitted[rows], color=style.ORANGE, linewidth=1)
-            bottom.plot(time[rows], np.real(residual[rows]), ".", markersize=1.5)
+        for one in decay.curves:
+            rows = style.few_rows(one.x.size)
+            top.plot(one.x[rows], one.level[rows], ".", markersize=1.5)
+            top.plot(one.x[rows], one.fitted[rows], color=style.ORANGE, linewidth=1)
+            bottom.plot(one.x[rows], one.residual[rows], ".", markersize=1.5)
     return drawn
 
 
@@ -187,7 +187,7 @@ def _law_row(name: str, law: "Law") -> dict[str, Any]:
     return {
         "level": level,
         "level_sd": law.level.sd * (level if name == "frequency_Hz" else 1),
-        "terms": [row_of(term, "value", "sd", "low", "high", term="name") for term in law.terms],
+        "terms": [{"term": term} | row_of(one, "value", "sd", "low", "high") for term, one in law.terms.items()],
         **row_of(law, "scatter", sessions_s="sessions", left_out_rows="left_out"),
     }
 
@@ -209,14 +209,14 @@ def _law_chapter(laws: "dict[str, Law]", decays: "Decays") -> Chapter:
     return Chapter("Over many decays", parts)
 
 
-def _shown(name: str, term: "Term", law: "Law") -> dict[str, Any]:
+def _shown(name: str, term: str, law: "Law") -> dict[str, Any]:
     scale, unit = (1e6, "ppm") if name == "frequency_Hz" else (1.0, "1")
-    if term.name.startswith("step"):
-        day = law.sessions[int(term.name.split()[1]) - 1] / 86400
+    if term.startswith("step"):
+        day = law.sessions[int(term.split()[1]) - 1] / 86400
         words, per = f"step to the session that begins at {day:.4g} d", ""
     else:
-        words, per, _ = WORDS[term.name]
-    values = {"shown": term.value, "shown_sd": term.sd, "shown_low": term.low, "shown_high": term.high}
+        words, per, _ = WORDS[term]
+    values = row_of(law.terms[term], shown="value", shown_sd="sd", shown_low="low", shown_high="high")
     shown_unit = f"{unit}/{per}" if per else unit.replace("1", "")
     return {"words": words, "shown_unit": shown_unit} | {key: scale * x for key, x in values.items()}
 
@@ -227,10 +227,9 @@ def _remarks(law: "Law") -> list[str]:
         said.append(
             f"the first {law.left_out} readings of every decay follow another law (launch or release) and are left out."
         )
-    names = [term.name for term in law.terms]
-    if "step 1" in names:
+    if "step 1" in law.terms:
         said.append("sessions differ by steps that no common ageing explains: mounting, or what was done between them.")
-    elif "time" in names:
+    elif "time" in law.terms:
         said.append(
             "it changes with time beyond what the conditions explain: ageing, or a condition that was not recorded."
         )
@@ -239,7 +238,7 @@ def _remarks(law: "Law") -> list[str]:
 
 def _draw_law(name: str, law: "Law", decays: "Decays") -> Drawing:
     """Draw readings and law over each condition."""
-    over = list(dict.fromkeys(WORDS[t.name][2] for t in law.terms if WORDS.get(t.name, ("", "", ""))[2]))
+    over = list(dict.fromkeys(WORDS[t][2] for t in law.terms if t in WORDS and WORDS[t][2]))
     over = over or ["time_s"]
     labels = {"housing_temperature_degC": "temperature (°C)", "pressure_Pa": "pressure (Pa)", "vibration_amplitude_V": "amplitude", "time_s": "time (d)"}  # fmt: skip
     y, fitted = decays.columns[name], law.fitted

@@ -16,19 +16,18 @@ quartz laboratory with `%` comments and a last comment `time [s], power [dBm]` i
 
 import datetime
 import re
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
-from math import inf, pi
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from compensation.ringdown.analysis import Estimate, RingDown, analyse_decay
-from compensation.ringdown.envelope import Envelope, even_rows, from_lock_in, mix_down
-from compensation.ringdown.spectrum import SpectrumFit, fit_spectrum
-from compensation.ringdown.trace import TraceDecay, analyse_trace
+from compensation.ringdown.analysis import analyse_decay
+from compensation.ringdown.answer import Estimate, RingDown
+from compensation.ringdown.envelope import even_rows, from_lock_in, mix_down
+from compensation.ringdown.spectrum import fit_spectrum
+from compensation.ringdown.trace import analyse_trace
 from studies.errors import InputError, naming
 from studies.files.columns import Columns, read_columns, read_header
 from studies.files.reading import read_bytes
@@ -51,96 +50,25 @@ FOREIGN = {
 
 
 @dataclass(frozen=True)
-class Decay:
-    """One decay: what was read and what it says, with its phase (`phased`), without (`trace`, of `time` and `amplitude`), or as a `spectrum`."""
+class Decay(RingDown):
+    """One decay: what was read, and what it says."""
 
-    path: str
-    notes: Mapping[str, float]
-    phased: "RingDown | None" = None
-    trace: "TraceDecay | None" = None
-    spectrum: "SpectrumFit | None" = None
-    envelope: "Envelope | None" = field(default=None, repr=False)
-    time: NDArray[np.float64] | None = field(default=None, repr=False)
-    amplitude: NDArray[np.float64] | None = field(default=None, repr=False)
-
-    @property
-    def window(self) -> tuple[float, float] | None:
-        """Seconds of the record that are free decay; a spectrum has none."""
-        one = self.phased or self.trace
-        return None if one is None else one.window
-
-    @property
-    def remarks(self) -> tuple[str, ...]:
-        """What is not as it should be, a sentence each."""
-        one = self.phased or self.trace or self.spectrum
-        said = () if one is None else one.remarks
-        lacking = "No reference frequency is given: frequencies are relative to it, and Q is unknown; add --frequency."
-        return (*said, lacking) if self.frequency is None and self.spectrum is None else said
-
-    @property
-    def estimates(self) -> "Mapping[str, Estimate]":
-        """Values by name; those of a trace are its rate and, where the frequency is known, 1/Q."""
-        if (t := self.trace) is None:
-            one = self.phased or self.spectrum
-            return {} if one is None else one.estimates
-        found = {
-            "decay_per_s": Estimate(t.decay, t.sd, t.low, t.high),
-            "decay_time_s": Estimate(1 / t.decay, t.sd / t.decay**2, 1 / t.high, 1 / t.low if t.low > 0 else inf),
-        }
-        if self.frequency is not None:
-            unit = pi * self.frequency
-            found["inverse_q"] = Estimate(t.decay / unit, t.sd / unit, t.low / unit, t.high / unit)
-        return found
+    path: str = ""
+    notes: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def frequency(self) -> float | None:
-        """Mean frequency (Hz); a trace has that of its comments."""
-        if self.trace is not None:
-            return self.notes.get("reference_frequency_Hz")
-        if self.phased is not None and not self.phased.fit.envelope.carrier:
+        """Mean frequency (Hz); a trace has that of its comments, amplitudes without a reference none."""
+        if not {"inverse_q", "q_1"} & self.estimates.keys():
             return None
-        found = [e.value for name, e in self.estimates.items() if re.fullmatch(r"frequency(_[12])?_Hz", name)]
-        return self.estimates["frequency_Hz"].value if "frequency_Hz" in self.estimates else sum(found) / len(found)
+        names = ("frequency_Hz",) if "frequency_Hz" in self.estimates else ("frequency_1_Hz", "frequency_2_Hz")
+        found = [self.estimates[name].value for name in names if name in self.estimates]
+        return sum(found) / len(found) if found else self.notes["reference_frequency_Hz"]
 
     @property
     def inverse_q(self) -> "Estimate | None":
         """1/Q; None where the frequency is not known."""
         return self.estimates.get("inverse_q")
-
-    @property
-    def noise(self) -> list[float]:
-        """Standard deviation of the noise of a row, by channel, in the unit of the record; of a spectrum the relative scatter."""
-        if self.phased is not None:
-            return [float(one) for one in self.phased.fit.noise]
-        return [self.trace.noise] if self.trace else [self.spectrum.scatter] if self.spectrum else []
-
-    @property
-    def widening(self) -> float:
-        """Standard deviations over the Cramér–Rao bound of white noise; of a spectrum its misfit."""
-        if self.trace is not None:
-            return self.trace.sd / self.trace.bound
-        return self.phased.fit.widening if self.phased else self.spectrum.widening if self.spectrum else 1.0
-
-    @property
-    def interference(self) -> list[float]:
-        """Frequencies (Hz) of lines that are no decay."""
-        return [self.phased.fit.envelope.carrier + line for line in self.phased.lines] if self.phased else []
-
-    def curves(self) -> "Iterator[tuple[NDArray[Any], NDArray[Any], NDArray[Any], NDArray[Any]]]":
-        """Yield time (of a spectrum: frequency), level (dB), fitted level and residual of each channel, within the window."""
-        if self.phased is not None:
-            fit = self.phased.fit
-            for z, r in zip(fit.envelope.values, fit.residual, strict=True):
-                yield fit.envelope.time, 20 * np.log10(np.abs(z)), 20 * np.log10(np.abs(z - r)), r
-        elif (s := self.spectrum) is not None:
-            level, fitted = 10 * np.log10(s.power), 10 * np.log10(s.fitted)
-            yield s.frequency, level, fitted, level - fitted
-        elif self.trace is not None and self.time is not None and self.amplitude is not None:
-            level = 20 * np.log10(self.amplitude)
-            start, end = self.trace.window
-            fitted = 20 * np.log10(self.trace.amplitude) - 20 / np.log(10) * self.trace.decay * (self.time - start)
-            fitted[(self.time < start) | (self.time > end)] = np.nan
-            yield self.time, level, fitted, level - fitted
 
 
 def read_decay(
@@ -161,14 +89,13 @@ def read_decay(
     if "time_s" not in columns:
         assert power is not None
         with naming(path):
-            return Decay(str(path), notes, spectrum=fit_spectrum(columns["frequency_Hz"], power))
+            return _told(path, notes, fit_spectrum(columns["frequency_Hz"], power))
     time = columns["time_s"]
     table.check_order("time_s", "time_s does not increase; a decay is one record in order of time.")
     reference = notes.get("reference_frequency_Hz")
     with naming(path):
         if power is not None:
-            amplitude = np.sqrt(power)
-            return Decay(str(path), notes, trace=analyse_trace(time, amplitude), time=time, amplitude=amplitude)
+            return _told(path, notes, analyse_trace(time, np.sqrt(power), reference))
         raw = [columns[name] for name in RAW if name in columns]
         if raw:
             envelope = mix_down(time, np.array(raw), reference)
@@ -178,7 +105,15 @@ def read_decay(
             envelope = from_lock_in(time, np.array(_pairs(path, columns)), reference or 0.0)
         if expected is not None and envelope.carrier:
             _refuse_other(path, envelope.carrier, expected)
-        return Decay(str(path), notes, phased=analyse_decay(envelope, harmonic=harmonic), envelope=envelope)
+        return _told(path, notes, analyse_decay(envelope, harmonic=harmonic))
+
+
+def _told(path: str | Path, notes: Mapping[str, float], found: RingDown) -> Decay:
+    decay = Decay(**vars(found), path=str(path), notes=notes)
+    if decay.frequency is not None:
+        return decay
+    lacking = "No reference frequency is given: frequencies are relative to it, and Q is unknown; add --frequency."
+    return replace(decay, remarks=(*decay.remarks, lacking))
 
 
 def is_decay(path: str | Path) -> bool:
@@ -283,11 +218,11 @@ def _refuse_other(path: str | Path, found: float, expected: float) -> None:
 
 def with_decay(instrument: "Instrument", decay: Decay, harmonic: int = 2) -> "Instrument":
     """Return the card with what a decay of two channels says: split and slow axis, 1/Q, damping split and axis."""
-    if decay.phased is None or "frequency_axis_deg" not in decay.phased.estimates:
+    if "frequency_axis_deg" not in decay.estimates:
         raise InputError(
             f"{decay.path}: a card takes a split with its axis; this decay shows none: record both pick-offs, with both modes excited, for longer."
         )
-    e = decay.phased.estimates
+    e = decay.estimates
     imperfection = dict(instrument.content.get("imperfection", {}))
     imperfection["split"] = {
         "harmonic": harmonic,

@@ -166,8 +166,9 @@ def test_a_trace_of_power_gives_the_decay_that_its_noise_allows(plateau):
         clean = np.where(t < plateau, 3.0, np.exp(-(t - plateau) / tau)) + 0j
         found = analyse_trace(t, np.abs(noisy(clean, 0.02, random)))
         assert found.window[0] == pytest.approx(plateau, abs=3.0)
-        assert abs(found.decay - 1 / tau) < 4.5 * found.sd
-        inside += found.low <= 1 / tau <= found.high
+        rate = found.estimates["decay_per_s"]
+        assert abs(rate.value - 1 / tau) < 4.5 * rate.sd
+        inside += rate.low <= 1 / tau <= rate.high
     assert inside >= 8
 
 
