@@ -49,9 +49,9 @@ def run(
             log-uniform. [[quantity]]: name = bryan-factor, compensation-residual, frequency, loads, loop-drift, loss,
             mass, mode-separation, python, q, split, split-per-wave, tcf or thermal-time-constants, with harmonic,
             index, theory, temperature_degC, label and its own keys. [[requirement]]: column with within (of target), or
-            low, high. [[search]]: kind = worst-case with column, inversion with vary and targets, or tolerance with
-            share (the tolerances with which that share of designs meets the requirements). Example: hrg study new
-            spec.toml.
+            low, high. [[search]]: kind = worst-case with column, or tolerance with share (the
+            tolerances with which that share of designs meets the requirements); hrg optimise finds designs with wanted
+            values. Example: hrg study new spec.toml.
         out: Folder for the results; required except with --dry-run. Run again with the same folder to resume.
         scheduler: Address of a Dask scheduler (tcp://HOST:8786) whose workers compute the study. Use only one that you
             trust: the scheduler and its workers can run code on this machine. A public address needs tls:// and

@@ -66,7 +66,7 @@ def study_result(results: Results) -> Result:
             Chapter("Results", shown),
             Chapter("Influence of the parameters", influence_parts(results)),
             Chapter("Tolerances", tolerance_parts(results)),
-            Chapter("Searches", search_parts(results, "worst-case", "inversion")),
+            Chapter("Searches", search_parts(results, "worst-case")),
             Chapter("Mode shapes", _shapes(results)),
             Chapter("Provenance", _provenance(results)),
         ],

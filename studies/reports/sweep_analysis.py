@@ -1,4 +1,4 @@
-"""Chapters on what a study means: which parameter matters, the yield, worst cases and designs by inversion."""
+"""Chapters on what a study means: which parameter matters, the yield, worst cases."""
 
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -25,7 +25,6 @@ YIELD = (
     "Requirement | from: From .8g | to: To .8g | share: Designs that meet it (%) ×100 .2f"
     " | low … high: 90 % interval (%) ×100 .2f | unknown: Without a result"
 )
-INVERSION = "Column | target: Target .8g | found: Found .8g"
 TOLERANCES = "label: Parameter | asked: Specified | Found"
 
 
@@ -172,19 +171,6 @@ def _parameter(name: str) -> Callable[[Mapping[str, Any]], Any]:
     return lambda row: row["parameters"][name]
 
 
-def _inversion(results: Results, found: Mapping[str, Any]) -> list[Part]:
-    rows = [{"column": c, "target": wanted, "found": found["values"][c]} for c, wanted in found["targets"].items()]
-    design = ", ".join(f"{name} = {number(value)}" for name, value in found["parameters"].items())
-    if found["reached"]:
-        words, kind = f"The targets are met by {design}.", "note"
-    else:
-        limits = f" It is at the limit of {', '.join(found['at_limit'])}." if found["at_limit"] else ""
-        words, kind = f"No design within the ranges meets the targets. The closest is {design}.{limits}", "warning"
-    if found["condition"] and found["condition"] > 1e3:
-        words += f" The targets barely separate the parameters (condition number {found['condition']:.1e})."
-    return [Table("Design by inversion", rows, INVERSION), Sentence(words, kind)]
-
-
 def tolerance_table(results: Results, found: Mapping[str, Any]) -> Table:
     """Return the tolerances that were asked for, and those that were found."""
     asked = {p.name: p for p in results.study.parameters}
@@ -208,7 +194,6 @@ def tolerance_table(results: Results, found: Mapping[str, Any]) -> Table:
 
 SEARCHES: dict[str, Callable[[Results, Mapping[str, Any]], list[Part]]] = {
     "worst-case": _worst_case,
-    "inversion": _inversion,
     "tolerance": lambda results, found: [tolerance_table(results, found)],
 }
 

@@ -161,17 +161,6 @@ class WorstCase(Search, frozen=True, kw_only=True, tag="worst-case"):
     column: Annotated[str, says("of the results", example="frequency_n2_Hz")]
 
 
-class Inversion(Search, frozen=True, kw_only=True, tag="inversion"):
-    """The parameters that give wanted values."""
-
-    vary: Annotated[tuple[str, ...], says("parameters", least=1, example=["resonator.thickness_mm"])]
-    targets: Annotated[dict[str, float], says("column = value", least=1, example={"frequency_n2_Hz": 4432.07})]
-
-    def __post_init__(self) -> None:
-        if not self.targets:
-            raise ValueError("an inversion needs vary = [parameters] and targets = { column = value }.")
-
-
 class ToleranceSearch(Search, frozen=True, kw_only=True, tag="tolerance"):
     """How much wider or narrower all tolerances are with which a share of designs meets the requirements."""
 
@@ -191,6 +180,4 @@ class StudyKeys(Keys, frozen=True, kw_only=True):
     derived: Annotated[tuple[Derived, ...], says("parameters derived by formulas")] = ()
     quantity: Annotated[tuple[AnyQuantity, ...], says("quantities to compute; one or more")] = ()
     requirement: Annotated[tuple[Requirement, ...], says("limits; they may change without a new computation")] = ()
-    search: Annotated[
-        tuple[WorstCase | Inversion | ToleranceSearch, ...], says("searches after the sampled cases")
-    ] = ()
+    search: Annotated[tuple[WorstCase | ToleranceSearch, ...], says("searches after the sampled cases")] = ()

@@ -1,4 +1,4 @@
-"""Searches beyond the sampled designs: the worst case over a box, the design that has wanted values, the tolerances to ask for.
+"""Searches beyond the sampled designs: the worst case over a box, and the tolerances to ask for; `studies.design` looks for designs.
 
 Every design that a search looks at is kept in the store, and the search takes the same path every time:
 resumed, it walks over what is already there.
@@ -14,7 +14,7 @@ import numpy as np
 from studies.sweeps.block import Array, Batch, decode, each_design
 from studies.sweeps.design import draw, nominal_row
 from studies.sweeps.engine import BATCH_VECTORISED, compute
-from studies.sweeps.keys import Inversion, Search, ToleranceSearch, WorstCase
+from studies.sweeps.keys import Search, ToleranceSearch, WorstCase
 from studies.sweeps.progress import Progress
 from studies.sweeps.tolerance import place_limits
 
@@ -88,9 +88,6 @@ def name_search(search: Search) -> str:
     """Return the name under which a search's outcome is kept."""
     if isinstance(search, ToleranceSearch):
         return f"tolerances of {', '.join(search.vary)} that {100 * search.share:g} % keep"
-    if isinstance(search, Inversion):
-        targets = ", ".join(f"{column} = {value:.10g}" for column, value in search.targets.items())
-        return f"{targets} by {', '.join(search.vary)}"
     assert isinstance(search, WorstCase)
     return f"extremes of {search.column}"
 
@@ -128,46 +125,6 @@ def find_worst_case(explorer: Explorer, search: WorstCase) -> dict[str, Any]:
         value_there = float(explorer.values(design, [search.column])[0, 0])
         found[name] = {"value": value_there, "parameters": explorer.name(design[0])}
     return found
-
-
-def invert(explorer: Explorer, search: Inversion) -> dict[str, Any]:
-    """Find the parameters that give target values, by bounded least squares on relative deviations.
-
-    The unit of each deviation is what the column changes over the box, so that Hz and ppm/°C weigh alike.
-    """
-    from scipy.optimize import least_squares
-
-    study, columns = explorer.study, list(search.targets)
-    free = [p for p in study.parameters if p.name in search.vary]
-    wanted = np.array([search.targets[column] for column in columns])
-    middle = np.array([_share(p, float(p.nominal)) for p in free])
-    first = explorer.values(_place(study, free, _moved(middle)), columns)
-    scale = np.maximum(np.abs(first[1:] - first[0]).max(axis=0) / STEP, 1e-12 * np.abs(wanted) + 1e-300)
-
-    def deviation(x: Array) -> Array:
-        return np.asarray((explorer.values(_place(study, free, x[None]), columns)[0] - wanted) / scale)
-
-    def slopes(x: Array) -> Array:
-        around = _moved(x)
-        values = explorer.values(_place(study, free, around), columns)
-        return np.asarray(((values[1:] - values[0]) / np.diag(around[1:] - x)[:, None] / scale).T)
-
-    outcome = least_squares(
-        deviation, np.clip(middle, 1e-6, 1 - 1e-6), slopes, bounds=(0.0, 1.0), xtol=1e-12, max_nfev=40
-    )
-    design = _place(study, free, outcome.x[None])
-    values = explorer.values(design, columns)[0]
-    errors = explorer.cases(design)[0].errors[[explorer.columns.index(column) for column in columns]]
-    allowed = np.fmax(np.nan_to_num(errors), 1e-6 * np.abs(wanted))
-    singular = np.linalg.svd(slopes(outcome.x), compute_uv=False)
-    return {
-        "parameters": explorer.name(design[0]),
-        "targets": dict(search.targets),
-        "values": dict(zip(columns, values.tolist(), strict=True)),
-        "reached": bool((np.abs(values - wanted) <= allowed).all()),
-        "at_limit": [p.name for p, share in zip(free, outcome.x, strict=True) if not 1e-4 < share < 1 - 1e-4],
-        "condition": float(singular[0] / singular[-1]) if singular[-1] > 0 else None,
-    }
 
 
 def find_tolerance(explorer: Explorer, search: ToleranceSearch) -> dict[str, Any]:
@@ -230,7 +187,6 @@ def _tolerance(parameter: "StudyParameter", factor: float) -> dict[str, Any]:
 
 SEARCHES: Mapping[str, Callable[..., dict[str, Any]]] = {
     "worst-case": find_worst_case,
-    "inversion": invert,
     "tolerance": find_tolerance,
 }
 
@@ -255,8 +211,3 @@ def _place(study: "Study", free: "Sequence[StudyParameter]", shares: Array) -> A
 
 def _share(parameter: "StudyParameter", value: float) -> float:
     return (value - parameter.low) / (parameter.high - parameter.low)
-
-
-def _moved(x: Array) -> Array:
-    """Return x, then x with one share after the other moved by a step, inwards at the upper end."""
-    return np.array([x, *(x + np.diag(np.where(x + STEP <= 1, STEP, -STEP)))])

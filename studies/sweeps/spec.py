@@ -11,7 +11,7 @@ from studies.files.reading import find_shipped, list_shipped
 from studies.instrument.card import Instrument, load_card
 from studies.schema.reader import read_keys, read_toml
 from studies.sweeps.definition import Study, StudyParameter
-from studies.sweeps.keys import SCHEMA, Inversion, ParameterKeys, Search, StudyKeys, ToleranceSearch, WorstCase
+from studies.sweeps.keys import SCHEMA, ParameterKeys, Search, StudyKeys, ToleranceSearch, WorstCase
 from studies.sweeps.parameters import find_nominal
 from studies.sweeps.quantity import Quantity
 from studies.sweeps.validity import check_nominal, check_sample
@@ -158,9 +158,7 @@ def _check_search(where: str, search: Search, columns: Sequence[str], numeric: S
     """Return a search whose columns and parameters are there; one for tolerances that names none varies all."""
     if isinstance(search, WorstCase):
         _check_known(where, "column", [search.column], columns)
-    if isinstance(search, Inversion):
-        _check_known(where, "targets", list(search.targets), columns)
-    if isinstance(search, Inversion | ToleranceSearch):
+    if isinstance(search, ToleranceSearch):
         _check_known(where, "vary", search.vary, numeric)
     return replace(search, vary=tuple(numeric)) if isinstance(search, ToleranceSearch) and not search.vary else search
 
