@@ -1,16 +1,14 @@
-"""Start-up and run-down of the primary vibration: acquisition under a limited drive, and free decay."""
+"""Start-up of the primary vibration: acquisition under a limited drive."""
 
 import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from compensation.arrays import Array
 from compensation.controllers import Loops, require_stable
 from compensation.errors import CompensationError
-from compensation.regression import fit_linear
-from compensation.samples import check_time, read_columns
 
 LOCKED = math.radians(5.0)
 SETTLED = 0.01
@@ -96,41 +94,3 @@ def _since(time: Array, holds: NDArray[np.bool_]) -> float:
     if not len(broken):
         return float(time[0])
     return float(time[broken[-1] + 1]) if broken[-1] + 1 < len(time) else math.nan
-
-
-@dataclass(frozen=True)
-class RunDown:
-    """Decay time τ (s) of a free vibration with the ends of its interval, and the misfit of ln a (1)."""
-
-    tau: float
-    low: float
-    high: float
-    misfit: float
-
-
-def fit_run_down(time: ArrayLike, amplitude: ArrayLike, confidence: float = 0.95) -> RunDown:
-    """Fit a = a₀ e^{−t/τ} by least squares on ln a with weights a², the noise being that of the amplitude.
-
-    Neighbouring rows are averaged so that their noise is independent; the interval is Student's.
-    """
-    from scipy import special
-
-    t, a = read_columns(time=time, amplitude=amplitude)
-    check_time(t)
-    if np.any(a <= 0):
-        row = int(np.flatnonzero(a <= 0)[0])
-        raise CompensationError(
-            f"the amplitude is not positive in row {row + 1}; cut the run-down where it ends in noise."
-        )
-    if len(t) < 5:
-        raise CompensationError(f"a run-down needs five rows or more, not {len(t)}.")
-    weight = a / a.max()
-    X = np.stack([weight, weight * (t - t[0])], axis=1)
-    fit = fit_linear(X, weight * np.log(a), ("ln a0", "decay"), constant=False)
-    reach = float(special.stdtrit(fit.degrees_of_freedom, 0.5 + confidence / 2)) * float(fit.standard_errors[1])
-    decay = -float(fit.coefficients[1])
-    if decay - reach <= 0:
-        raise CompensationError(
-            f"the run-down does not decay: ln a changes by {-decay:.3g} ± {reach:.2g} per s; was the drive off?"
-        )
-    return RunDown(1 / decay, 1 / (decay + reach), 1 / (decay - reach), fit.standard_deviation)

@@ -41,7 +41,7 @@ def analyse_trace(time: ArrayLike, amplitude: ArrayLike, frequency: float | None
         weights = weigh(t[first:last] - t[first]) if scatter else np.ones(last - first)
         slope, level = _fit_line(t[first:last] - t[first], L[first:last], weights)
         if not slope < 0:
-            break
+            raise CompensationError("nothing decays in this trace: it rises or stays; record a free ring-down, longer.")
         line = level + slope * (t[first:] - t[first])
         scatter, noise = _fit_scatter(line[: last - first], L[first:last])
         above = np.flatnonzero(line > np.log(FLOOR * noise)) if noise > 0 else np.arange(line.size)

@@ -2,7 +2,7 @@
 
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,8 +13,9 @@ from compensation.decimation import average_blocks
 from compensation.linearity import measure_nonlinearity, same_rate
 from compensation.noise_regression import fit_coloured
 from compensation.regression import LinearFit, fit_linear
+from compensation.ringdown.answer import Estimate
+from compensation.ringdown.trace import analyse_trace
 from compensation.stability import AllanDeviation, NoiseCoefficients
-from compensation.start_up import fit_run_down
 from studies.acceptance.runs import temperature_column
 from studies.errors import InputError, naming
 from studies.fits.ringdown import Decay
@@ -226,30 +227,25 @@ def measure_run_down(record: "Record") -> Found:
     """Decay time of the amplitude with the drive off, and Q = π f τ (12.14)."""
     if "vibration_amplitude_V" not in record:
         raise InputError(f"{record.path}: a run-down needs the column vibration_amplitude_V.")
-    amplitude = record["vibration_amplitude_V"]
-    keep = np.isfinite(amplitude)
+    frequency = float(np.nanmean(record["frequency_Hz"])) if "frequency_Hz" in record else None
     with naming(record.path):
-        fit = fit_run_down(record["time_s"][keep], amplitude[keep], CONFIDENCE)
-    found = {"run_down_time_s": Measured(fit.tau, fit.low, fit.high, (record.path,))}
-    if "frequency_Hz" in record:
-        scale = math.pi * float(np.nanmean(record["frequency_Hz"]))
-        found["quality_factor"] = Measured(fit.tau * scale, fit.low * scale, fit.high * scale, (record.path,))
-    return found
+        found = analyse_trace(record["time_s"], record["vibration_amplitude_V"], frequency)
+    return _run_down(found.estimates, record.path)
 
 
 def measure_decays(decays: "Sequence[Decay]") -> Found:
     """The same of free decays as they were recorded (12.14), of the one that runs down fastest."""
-    found: Found = {}
     for decay in decays:
-        tau = decay.estimates.get("decay_time_s")
-        if tau is None:
+        if "decay_time_s" not in decay.estimates:
             raise InputError(f"{decay.path}: two lines in a spectrum are not a run-down; give a decay over time.")
-        if "run_down_time_s" in found and tau.value > found["run_down_time_s"].value:
-            continue
-        found = {"run_down_time_s": within(tau.value, tau.sd, [decay.path])}
-        if (loss := decay.inverse_q) is not None:
-            found["quality_factor"] = within(1 / loss.value, loss.sd / loss.value**2, [decay.path])
-    return found
+    every = [_run_down(decay.estimates, decay.path) for decay in decays]
+    return min(every, key=lambda found: found["run_down_time_s"].value, default={})
+
+
+def _run_down(estimates: Mapping[str, Estimate], path: str) -> Found:
+    tau, loss = (estimates.get(name) for name in ("decay_time_s", "inverse_q"))
+    found = {"run_down_time_s": within(tau.value, tau.sd, [path])} if tau else {}
+    return found | ({"quality_factor": within(1 / loss.value, loss.sd / loss.value**2, [path])} if loss else {})
 
 
 def measure_seal(records: "Sequence[Record]") -> Found:

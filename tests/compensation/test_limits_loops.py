@@ -10,7 +10,7 @@ from compensation.controllers import Loops, find_margins
 from compensation.electronics import Channels, Electronics, LoopNoise, thermal_noise
 from compensation.errors import CompensationError
 from compensation.rebalance import close_loops, settle_rebalance, simulate_rebalance
-from compensation.start_up import fit_run_down, start_up
+from compensation.start_up import start_up
 from compensation.wave import from_quality
 from compensation.whole_angle import simulate_whole_angle
 from tests.compensation.carrier import simulate_carrier
@@ -211,19 +211,3 @@ def test_start_at_full_drive_takes_what_the_closed_form_says():
     assert run.offset[-1] == pytest.approx(10.0, rel=1e-3)
     with pytest.raises(CompensationError, match="it must exceed 1"):
         start_up(tau, Loops(), headroom=0.9)
-
-
-def test_run_down_is_recovered_and_refused_where_nothing_decays():
-    rng = np.random.default_rng(4)
-    time = np.arange(0.0, 1500.0)
-    covered = 0
-    for _ in range(100):
-        amplitude = np.exp(-time / 718.2) + rng.normal(0, 1e-3, time.size)
-        found = fit_run_down(time, amplitude)
-        covered += found.low <= 718.2 <= found.high
-        assert found.tau == pytest.approx(718.2, rel=0.01)
-    assert covered >= 88
-    with pytest.raises(CompensationError, match="does not decay"):
-        fit_run_down(time, 1 + rng.normal(0, 1e-3, time.size))
-    with pytest.raises(CompensationError, match="not positive in row 2"):
-        fit_run_down([0, 1, 2, 3, 4], [1, -1, 1, 1, 1])
