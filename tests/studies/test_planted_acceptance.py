@@ -135,7 +135,7 @@ def test_a_run_down_that_does_not_decay_is_refused(folder, tmp_path, capsys):
     write_record(Record({"time_s": t, "vibration_amplitude_V": amplitude}), tmp_path / "still.csv")
     status, _, said = judged(capsys, tmp_path, ("still",))
     assert status == 2
-    assert "still.csv: the run-down does not decay" in said
+    assert "still.csv: nothing decays in this trace" in said
 
 
 def test_a_record_that_shows_no_test_is_named(folder, tmp_path, capsys):
