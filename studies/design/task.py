@@ -96,8 +96,7 @@ def read_task(source: str | Path) -> Task:
         "sampling": {"method": "one-at-a-time"},
         "parameter": parameters,
         "derived": content.get("derived", []),
-        # the neighbours' modes first: the others then find theirs among them
-        "quantity": sorted(_quantities(keys, content, where), key=lambda table: table["name"] != "mode-separation"),
+        "quantity": list(_quantities(keys, content, where)),
     }
     study = check_study(spec, instrument, where, str(path.parent.resolve()), path.read_text(encoding="utf-8-sig"))
     if study.functions:
