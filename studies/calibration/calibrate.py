@@ -23,7 +23,7 @@ from studies.calibration.remarks import warn
 from studies.calibration.settled import SettledComparison, compare_settled
 from studies.errors import InputError
 from studies.instrument.display import display_name
-from studies.record import Record, drop_repeats
+from studies.record import Record, drop_repeats, with_bias
 from studies.record.plausible import check_card_frequency, check_one_gyro
 from studies.results.shown import Shown
 from studies.simulation.drive import COLUMN
@@ -126,7 +126,8 @@ def calibrate(
     """
     if not records and not tables:
         raise InputError("no data given; calibration needs a record or a steady-state table.")
-    given, (records, repeated) = records, drop_repeats(records)
+    given = [with_bias(record) for record in records]
+    records, repeated = drop_repeats(given)
     if hold_out is not None:  # the one that a repeated record repeats
         held = given[hold_out % len(given)]
         hold_out = next((k for k, one in enumerate(records) if one is held), len(records) - 1)

@@ -10,7 +10,7 @@ from compensation.spikes import find_spikes
 from studies.calibration.observed import LEAST_ROWS, RESPONSES
 from studies.diagnosis.checks import FEWEST_BINS, check_device, check_units
 from studies.errors import InputError
-from studies.record import Record, drop_repeats, place_in_time
+from studies.record import Record, drop_repeats, place_in_time, with_bias
 from studies.record.rest import LEAST_SPIKE
 from studies.simulation.drive import COMMAND_COLUMNS, RATE
 
@@ -73,7 +73,9 @@ def make_ready(given: Sequence[Record]) -> Campaign:
         raise InputError(f"{kept[0].path or 'record'}: a diagnosis needs frequency_Hz, bias_deg_per_h or inverse_q.")
     _, timed = place_in_time(kept)
     if not timed and len(kept) > 1:
-        notes.append("Not every record states its start; the records are treated as consecutive, with unknown gaps.")
+        notes.append(
+            "The records do not state different starts (# start: …); they are treated as consecutive, with unknown gaps."
+        )
     for name in COMMAND_COLUMNS:
         there = [name in record and np.isfinite(record[name]).all() for record in kept]
         if any(there) and not all(there) and name != RATE:
@@ -114,12 +116,10 @@ def _temperature_source(records: Sequence[Record]) -> str:
 
 
 def _columns(record: Record, source: str) -> dict[str, Array]:
+    record = with_bias(record)
     names = ("time_s", *RESPONSES, *COMMAND_COLUMNS, REFERENCE, *((CHAMBER,) if source == HOUSING else ()))
     table = {name: np.asarray(record[name], dtype=float) for name in names if name in record}
     table["temperature"] = np.asarray(record[source], dtype=float)
-    if "bias_deg_per_h" not in table and "measured_rate_deg_per_s" in record:
-        applied = record.columns.get(RATE, 0.0)
-        table["bias_deg_per_h"] = np.asarray(3600.0 * (record["measured_rate_deg_per_s"] - applied))
     return table
 
 

@@ -120,6 +120,14 @@ class Record:
         return replace(self, columns={**self.columns, **more})
 
 
+def with_bias(record: Record) -> Record:
+    """Return a record with a bias: its own, or else its rate output less the applied rate."""
+    if "bias_deg_per_h" in record or "measured_rate_deg_per_s" not in record:
+        return record
+    applied = record.columns.get("rate_deg_per_s", 0.0)
+    return record.with_columns({"bias_deg_per_h": np.asarray(3600.0 * (record["measured_rate_deg_per_s"] - applied))})
+
+
 def place_in_time(records: Sequence[Record]) -> tuple[list[float], bool]:
     """Return when each run starts (s) since the first of them, and whether the records say so; else one follows the other."""
     starts = [record.start for record in records]

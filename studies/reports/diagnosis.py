@@ -179,7 +179,7 @@ def diagnosis_parts(diagnosis: "Inference | Unjudged") -> list[Chapter]:
         ]),
         Chapter("Residual and next run", list(_residual(diagnosis))),
         Chapter("Causes and responses", [
-            cause_table(verdict), response_table(verdict), *remarks(verdict),
+            *remarks(verdict), cause_table(verdict), response_table(verdict),
             *(Sentence(f"{cause.effect}: {_summary(cause)}", where="page") for cause in physics),
         ]),
         *(Chapter(f"Residual of {spoken(name)}", list(_alternatives(diagnosis, name))) for name in diagnosis.shown_responses),

@@ -118,3 +118,16 @@ def test_a_card_in_metres_or_radians_is_implausible(changed, said, tmp_path):
     text.write_text("\n".join(lines) + "\n", encoding="utf-8")
     with pytest.raises(InputError, match=said):
         load_card(text).resonator  # noqa: B018
+
+
+def test_a_rate_output_at_rest_is_a_bias_for_calibrate_too(card, record, monkeypatch):
+    """A calibration once left out the output of a record that has it in °/s; a diagnosis did not."""
+    given = record.with_columns({"measured_rate_deg_per_s": record["bias_deg_per_h"] / 3600.0})
+    del given.columns["bias_deg_per_h"]
+    asked = []
+    monkeypatch.setattr(
+        "studies.calibration.calibrate.observe", lambda records, *_, **__: asked.extend(records) or 1 / 0
+    )
+    with pytest.raises(ZeroDivisionError):  # what was asked is all that counts
+        calibrate(card, [given])
+    assert asked[0]["bias_deg_per_h"] == pytest.approx(record["bias_deg_per_h"])
