@@ -167,7 +167,7 @@ class Electrodes:
         weight = np.tile(weights * one.width / pieces / 2, pieces)
         gap = np.full((position.size, theta.size), self.gap)
         if self.departure is not None:
-            gap = gap * (1 + values_around(self.departure, self.departure.orders, position, theta)[0])
+            gap = gap * (1 + values_around(self.departure, self.departure.orders, position, theta))
         if np.any(gap <= 0):
             raise ShellError("the gap closes somewhere: its relative departure falls below -1.")
         return area, w, theta, weight, gap

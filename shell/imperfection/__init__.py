@@ -7,25 +7,20 @@
 """
 
 from shell.imperfection.coupled import CoupledHarmonics
-from shell.imperfection.field import Field, Function, Map, Sum, Waves, wave
-from shell.imperfection.imperfect import Imperfection, LineMass, PointMass, holes, teeth
+from shell.imperfection.field import Field, Sum, Waves, wave
+from shell.imperfection.imperfect import Imperfection, PointMass
 from shell.imperfection.pair import Pair
 from shell.imperfection.split import Split, find_split
 
 __all__ = [
     "CoupledHarmonics",
     "Field",
-    "Function",
     "Imperfection",
-    "LineMass",
-    "Map",
     "Pair",
     "PointMass",
     "Split",
     "Sum",
     "Waves",
     "find_split",
-    "holes",
-    "teeth",
     "wave",
 ]

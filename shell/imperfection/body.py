@@ -1,6 +1,6 @@
 """The difference between the imperfect and the perfect resonator: products of δK and δM with vectors, by quadrature."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from math import pi
 
 import numpy as np
@@ -10,7 +10,7 @@ from shell.imperfection.core import Core
 from shell.imperfection.field import values_around
 from shell.imperfection.imperfect import Imperfection, fade
 from shell.imperfection.together import Together
-from shell.imperfection.wall import Stretch, Wall, go_around
+from shell.imperfection.wall import Around, Stretch, Wall, go_around
 from shell.kernel import Section
 from shell.quadrature import Array
 from shell.system import ShellGroup
@@ -35,14 +35,15 @@ class Body:
         for core in cores if flaw.modulus is not None or flaw.density is not None else ():
             x = together.groups[core.number].table.position[:1, 0]
             stiff, heavy = (
-                np.zeros(theta.size) if field is None else values_around(field, waves, x, theta)[0][0]
+                np.zeros(theta.size) if field is None else values_around(field, waves, x, theta)[0]
                 for field in (flaw.modulus, flaw.density)
             )
             self.cores.append((core, stiff * (2 * pi / theta.size), heavy * (2 * pi / theta.size)))
-        self.masses = [
-            (place, masses, go_around(together.harmonics, azimuth))
-            for place, azimuth, masses in _masses(together, flaw, theta)
-        ]
+        self.masses: list[tuple[tuple[float, float], Array, Around]] = []
+        for place in dict.fromkeys((m.position, m.height) for m in flaw.masses):
+            here = [m for m in flaw.masses if (m.position, m.height) == place]
+            azimuths = go_around(together.harmonics, np.array([m.azimuth for m in here]))
+            self.masses.append((place, np.array([m.mass for m in here]), azimuths))
 
     def respond(self, X: Array, value: float) -> tuple[Array, Array]:
         """δK - λ δM, of what is there more, and M, of all, times vectors (unknowns, vectors, 2); λ = value."""
@@ -95,21 +96,9 @@ def _walls(together: Together, flaw: Imperfection, waves: tuple[int, ...], theta
                 walls.append(here.change(stiff, heavy))
     if flaw.rim is not None:
         edge, _ = free_edge(resonator, system, 1.0)
-        width = values_around(flaw.rim, flaw.rim.orders, np.ones(1), theta)[0][0]
+        width = values_around(flaw.rim, flaw.rim.orders, np.ones(1), theta)[0]
         c, at = together.constants[edge.group], slice(edge.element, edge.element + 1)
         along, shear = edge.along[:, None], edge.table.transverse_shear
         strip = Stretch(edge.section, c.at((at, slice(-1, None))), at, along, orders, shear, theta).strip(width)
         found[edge.group].append(strip)
     return found
-
-
-def _masses(together: Together, flaw: Imperfection, theta: Array) -> Iterator[tuple[tuple[float, float], Array, Array]]:
-    """Places (position, height) with azimuths and masses there."""
-    for place in dict.fromkeys((m.position, m.height) for m in flaw.masses):
-        here = [m for m in flaw.masses if (m.position, m.height) == place]
-        yield place, np.array([m.azimuth for m in here]), np.array([m.mass for m in here])
-    for line in flaw.lines:
-        at = together.resonator.at([line.position * together.resonator.length])
-        radius = float(at.at_heights([line.height])[0].item())
-        density = values_around(line.per_length, line.per_length.orders, np.array([line.position]), theta)[0][0]
-        yield (line.position, line.height), theta, density * radius * 2 * pi / theta.size

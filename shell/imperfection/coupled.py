@@ -180,7 +180,7 @@ def _waves_that_count(imperfection: Imperfection) -> set[int]:
     x = np.linspace(0.0, 1.0, 33)
     found: set[int] = set()
     fields: list[Field] = [getattr(imperfection, name) for name in FIELDS if getattr(imperfection, name) is not None]
-    for one in [*fields, *(line.per_length for line in imperfection.lines)]:
+    for one in fields:
         size = {m: float(np.abs(one.wave(m, x)).max()) for m in one.orders}
         found |= {m for m, value in size.items() if value > SMALL * max(size.values())}
     return found

@@ -5,9 +5,7 @@ the meridian starts and 1 at the rim.
 """
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
-from functools import cached_property
-from math import pi
+from dataclasses import dataclass
 from typing import Protocol, TypeAlias
 
 import numpy as np
@@ -18,7 +16,6 @@ from shell.quadrature import Array
 
 Complex: TypeAlias = NDArray[np.complex128]
 Profile: TypeAlias = complex | Callable[[Array], ArrayLike]
-HIGHEST = 16  # wave kept of a function of θ
 
 
 class Field(Protocol):
@@ -69,85 +66,6 @@ def wave(
         raise ShellError(f"the circumferential order of a wave is a whole number from 0 up, not {order!r}.")
     c = complex(amplitude * np.exp(1j * order * azimuth))
     return Waves({order: c if profile is None else _Grown(c, profile)})
-
-
-@dataclass(frozen=True)
-class Function:
-    """A field given as a function p(position, θ) of arrays that broadcast together, sampled at 4 `highest` azimuths."""
-
-    function: Callable[[Array, Array], ArrayLike]
-    highest: int = HIGHEST
-    _kept: dict[bytes, Complex] = field(default_factory=dict, repr=False, compare=False)
-
-    @property
-    def orders(self) -> tuple[int, ...]:
-        """The waves m that it may have."""
-        return tuple(range(self.highest + 1))
-
-    def wave(self, order: int, position: Array) -> Complex:
-        """c_m at positions."""
-        if order > self.highest:
-            return np.zeros(np.shape(position), dtype=complex)
-        x = np.asarray(position, dtype=float)
-        key = x.tobytes()
-        if key not in self._kept:
-            theta = 2 * pi * np.arange(4 * self.highest) / (4 * self.highest)
-            value = np.asarray(self.function(x[..., None], theta), dtype=float)
-            self._kept.clear()  # the waves of one call come in a row
-            self._kept[key] = fourier(np.broadcast_to(value, (*x.shape, theta.size)), self.highest)
-        return np.asarray(self._kept[key][..., order])
-
-
-@dataclass(frozen=True, eq=False)
-class Map:
-    """A field given by a table over positions and equally spaced azimuths; cubic between positions, constant beyond."""
-
-    position: Array  # rising, 0 ... 1, (rows,)
-    azimuth: Array  # of the columns, rad: equal steps that close the circle, (columns,)
-    values: Array  # (rows, columns), no gaps
-
-    def __post_init__(self) -> None:
-        x, theta = np.asarray(self.position, dtype=float), np.asarray(self.azimuth, dtype=float)
-        if np.shape(self.values) != (x.size, theta.size):
-            raise ShellError(
-                f"a map of {x.size} positions and {theta.size} azimuths needs as many rows and columns, "
-                f"not {' x '.join(str(k) for k in np.shape(self.values))}."
-            )
-        if x.size < 1 or np.any(np.diff(x) <= 0) or x.min() < -1e-9 or x.max() > 1 + 1e-9:
-            raise ShellError("the positions of a map must rise within 0 (start of the meridian) ... 1 (rim).")
-        step = 2 * pi / max(theta.size, 1)
-        if theta.size < 4 or np.any(abs(np.diff(theta) - step) > 1e-3 * step):
-            raise ShellError(
-                f"the azimuths of a map must close the circle in equal steps: {theta.size} columns need steps of "
-                f"{np.rad2deg(step):.4g}°, from {np.rad2deg(theta[0]) if theta.size else 0:.4g}° on, without a repeat at 360°."
-            )
-        if not np.all(np.isfinite(self.values)):
-            raise ShellError(
-                f"the map has {int(np.sum(~np.isfinite(self.values)))} empty cells: fit harmonics to the measured "
-                "points (hrg scan), or fill them."
-            )
-
-    @property
-    def orders(self) -> tuple[int, ...]:
-        """The waves m that its columns can tell apart."""
-        return tuple(range((len(self.azimuth) - 1) // 2 + 1))
-
-    def wave(self, order: int, position: Array) -> Complex:
-        """c_m at positions."""
-        if order not in self.orders:
-            return np.zeros(np.shape(position), dtype=complex)
-        x = np.clip(position, self.position[0], self.position[-1])
-        if len(self.position) == 1:
-            return np.broadcast_to(self._waves[0, order], np.shape(x))
-        degree = min(3, len(self.position) - 1)
-        from scipy.interpolate import make_interp_spline
-
-        return np.asarray(make_interp_spline(self.position, self._waves[:, order], degree)(x))
-
-    @cached_property
-    def _waves(self) -> Complex:
-        turned = np.exp(1j * np.arange(self.orders[-1] + 1) * self.azimuth[0])
-        return np.asarray(fourier(np.asarray(self.values, dtype=float), self.orders[-1]) * turned)
 
 
 @dataclass(frozen=True)
@@ -204,13 +122,9 @@ def fourier(values: Array, highest: int) -> Complex:
     return np.asarray(waves)
 
 
-def values_around(one: Field, orders: Iterable[int], position: Array, theta: Array) -> tuple[Array, Array]:
-    """Values p and ∂p/∂θ at positions (first axes) and azimuths (last axis), of the waves in `orders`."""
+def values_around(one: Field, orders: Iterable[int], position: Array, theta: Array) -> Array:
+    """Values at positions (first axes) and azimuths (last axis), of the waves in `orders`."""
     p = np.zeros((*np.shape(position), theta.size))
-    slope = np.zeros_like(p)
     for m in orders:
-        c = one.wave(m, position)[..., None]
-        turned = np.exp(-1j * m * theta)
-        p += (c * turned).real
-        slope += (-1j * m * c * turned).real
-    return p, slope
+        p += (one.wave(m, position)[..., None] * np.exp(-1j * m * theta)).real
+    return p

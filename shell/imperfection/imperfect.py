@@ -1,13 +1,12 @@
 """Deviations of a resonator from the designed body of revolution."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
-from math import pi, sqrt
+from math import sqrt
 
 import numpy as np
 
-from shell.errors import ShellError
-from shell.imperfection.field import Faded, Field, Waves, add, scaled
+from shell.imperfection.field import Faded, Field, add, scaled
 from shell.quadrature import Array
 from shell.resonator import Resonator
 from shell.system import ShellGroup, System
@@ -27,15 +26,6 @@ class PointMass:
 
 
 @dataclass(frozen=True)
-class LineMass:
-    """A mass along a circle at a position and height, kg per metre of the circle, as a field over θ."""
-
-    per_length: Field
-    position: float = 1.0
-    height: float = 0.0
-
-
-@dataclass(frozen=True)
 class Imperfection:
     """Small departures from the body of revolution; lengths in m, densities and moduli relative."""
 
@@ -48,13 +38,12 @@ class Imperfection:
     modulus: Field | None = None
     # how far the edge of the rim stands out along the meridian; its value at position 1 counts
     rim: Field | None = None
-    masses: tuple[PointMass, ...] = ()  # masses, lines: point and line masses
-    lines: tuple[LineMass, ...] = ()
+    masses: tuple[PointMass, ...] = ()
 
     def __add__(self, other: "Imperfection") -> "Imperfection":
         """Both together."""
         joined = {name: add(getattr(self, name), getattr(other, name)) for name in FIELDS}
-        return Imperfection(**joined, masses=self.masses + other.masses, lines=self.lines + other.lines)
+        return Imperfection(**joined, masses=self.masses + other.masses)
 
     def faces(self, fade: Callable[[Array], Array] | None = None) -> tuple[Field | None, Field | None]:
         """How far the inner and the outer face stand out of the material: thickness, faces and offset together.
@@ -71,12 +60,6 @@ class Imperfection:
         """The same with its shape given by the faces, which `fade` along the meridian."""
         inner, outer = self.faces(fade)
         return replace(self, thickness=None, offset=None, inner=inner, outer=outer)
-
-    @property
-    def orders(self) -> tuple[int, ...]:
-        """The waves around that its fields have (point masses have all)."""
-        fields_ = [getattr(self, name) for name in FIELDS] + [line.per_length for line in self.lines]
-        return tuple(sorted({m for one in fields_ if one is not None for m in one.orders}))
 
 
 def fade(resonator: Resonator, system: System) -> Callable[[Array], Array] | None:
@@ -111,34 +94,4 @@ def fade(resonator: Resonator, system: System) -> Callable[[Array], Array] | Non
     return factor
 
 
-FIELDS = tuple(one.name for one in fields(Imperfection) if one.name not in ("masses", "lines"))
-
-
-def teeth(count: int, width: float, height: float, azimuth: float = 0.0, errors: Sequence[float] = ()) -> Waves:
-    """A rim edge of equal teeth as a field for `Imperfection.rim`.
-
-    Tooth j covers `width` around azimuth + 2π j/count and stands out by height (1 + error_j):
-
-        c_m = Σ_j h_j (2/(π m)) sin(m w/2) exp(i m θ_j),  c_0 = Σ_j h_j w/(2π).
-
-    The strain in a tooth is taken as that of the edge, which is small, so it is mostly mass.
-    """
-    if not (count >= 1 and 0 < width * count <= 2 * pi * (1 + 1e-12)):
-        raise ShellError(f"{count} teeth of {np.rad2deg(width):g}° do not fit around the rim.")
-    if errors and len(errors) != count:
-        raise ShellError(f"{len(errors)} errors were given for {count} teeth.")
-    theta = azimuth + 2 * pi * np.arange(count) / count
-    heights = height * (1 + (np.asarray(errors, dtype=float) if len(errors) else np.zeros(count)))
-    m = np.arange(1, max(4 * count, 24) + 1)
-    waves = 2 / (pi * m) * np.sin(m * width / 2) * (np.exp(1j * np.multiply.outer(m, theta)) @ heights)
-    return Waves(
-        {0: complex(heights.sum() * width / (2 * pi)), **{int(k): complex(c) for k, c in zip(m, waves, strict=True)}}
-    )
-
-
-def holes(
-    count: int, radius: float, wall: float, density: float, position: float, azimuth: float = 0.0
-) -> tuple[PointMass, ...]:
-    """Round holes through the wall as masses taken away, ρ π a² h each; their effect on the stiffness is left out."""
-    mass = -density * pi * radius**2 * wall
-    return tuple(PointMass(mass, azimuth + 2 * pi * k / count, position) for k in range(count))
+FIELDS = tuple(one.name for one in fields(Imperfection) if one.name != "masses")

@@ -158,10 +158,6 @@ class Pair:
         norm = 1 / (2 * np.pi * self.scale * float(c.rho[0, 0]))
         return norm * (one + two), norm * (one - two)
 
-    def radius(self, position: float, height: float) -> float:
-        """Distance from the axis of a place of the wall, m."""
-        return float(self.resonator.at([position * self.resonator.length]).at_heights([height])[0].item())
-
     def _material(self, edge: CrossSection) -> Constants:
         return self.solution.constants[edge.group].at((slice(edge.element, edge.element + 1), slice(-1, None)))
 

@@ -76,10 +76,4 @@ def find_split(pair: Pair, imperfection: Imperfection) -> Split:
     for mass in imperfection.masses:
         one, around = pair.mass(mass.position, mass.height)
         mean, z = mean + one * mass.mass, z + around * mass.mass * np.exp(2j * n * mass.azimuth)
-    for line in imperfection.lines:
-        one, around = pair.mass(line.position, line.height)
-        at = np.array([line.position])
-        circle = pi * 2 * pair.radius(line.position, line.height)
-        mean += one * circle * float(line.per_length.wave(0, at)[0].real)
-        z += around * circle / 2 * complex(line.per_length.wave(2 * n, at)[0])
     return Split(n, pair.mode.frequency, mean / 2, complex(z))

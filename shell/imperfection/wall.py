@@ -191,7 +191,7 @@ class Stretch:
         orders = [m for m in field.orders if m in waves] if field is not None else []
         if field is None or not orders:
             return np.zeros((x.size, 1, self.theta.size))
-        return values_around(field, orders, x, self.theta)[0][:, None]
+        return values_around(field, orders, x, self.theta)[:, None]
 
     @property
     def _thickness(self) -> Array:

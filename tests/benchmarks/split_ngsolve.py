@@ -11,9 +11,10 @@ import time
 from math import pi
 
 import numpy as np
+from scipy.special import ive
 
 from shell.elastic import Elastic
-from shell.imperfection import CoupledHarmonics, Function, Imperfection, Pair, find_split, wave
+from shell.imperfection import CoupledHarmonics, Imperfection, Pair, Waves, find_split, wave
 from shell.meridian import hemisphere
 from shell.modes import solve_modes
 
@@ -81,11 +82,14 @@ def main(*steps):
     (mode,) = solve_modes(hemisphere(radius=R, thickness=H), elastic, 2, tolerance=1e-7)
     pair, coupled = Pair(mode), CoupledHarmonics(mode, elastic, highest=14)
     wall = wave(4, EPSILON * H, profile=lambda s: np.sin(s * pi / 2) ** 4)
-    lumps = Function(
-        lambda s, theta: (
-            EPSILON * sum(np.exp(30 * (np.sin(s * pi / 2) * np.cos(theta - k * pi / 2) - 1)) for k in range(4))
+
+    def lump(m):
+        """Wave m of Σ exp(30 (sin φ cos(θ - k π/2) - 1)) over four k, by Bessel functions."""
+        return lambda s: (
+            EPSILON * (8 if m else 4) * ive(m, 30 * np.sin(s * pi / 2)) * np.exp(30 * (np.sin(s * pi / 2) - 1))
         )
-    )
+
+    lumps = Waves({m: lump(m) for m in range(0, 17, 4)})
     cases = {
         "thickness": (Imperfection(thickness=wall), {"thicker": EPSILON}),
         "mass": (Imperfection(density=lumps), {"heavier": EPSILON}),

@@ -1,35 +1,15 @@
 """What is refused, and with which words."""
 
-import numpy as np
 import pytest
 
 from shell.elastic import Elastic
 from shell.errors import ShellError
-from shell.imperfection import CoupledHarmonics, Imperfection, Map, Pair, PointMass, find_split, teeth, wave
+from shell.imperfection import CoupledHarmonics, Imperfection, Pair, PointMass, find_split, wave
 from shell.meridian import hemisphere
 from shell.modes import solve_modes
 from shell.resonator import Stem
 
 SILICA = Elastic(72.7e9, 0.17, 2203.0)
-X, THETA = np.linspace(0, 1, 5), 2 * np.pi * np.arange(24) / 24
-
-
-def test_a_map_must_close_the_circle():
-    with pytest.raises(ShellError, match="close the circle"):
-        Map(X, np.deg2rad(np.arange(24) * 14.0), np.zeros((5, 24)))
-    with pytest.raises(ShellError, match="close the circle"):
-        Map(X, np.deg2rad(np.arange(25) * 15.0), np.zeros((5, 25)))  # 0° and 360° both
-
-
-def test_a_map_has_no_holes_and_the_right_size():
-    holey = np.zeros((5, 24))
-    holey[2, 3] = np.nan
-    with pytest.raises(ShellError, match="1 empty cell"):
-        Map(X, THETA, holey)
-    with pytest.raises(ShellError, match="5 positions and 24 azimuths"):
-        Map(X, THETA, np.zeros((24, 5)))
-    with pytest.raises(ShellError, match="must rise"):
-        Map(X[::-1], THETA, np.zeros((5, 24)))
 
 
 def test_n_0_does_not_split_and_rayleigh_has_no_energies():
@@ -58,10 +38,6 @@ def test_a_clamped_rim_has_no_edge():
         find_split(Pair(mode), Imperfection(rim=wave(4, 1e-6)))
 
 
-def test_waves_and_teeth_are_checked():
+def test_waves_are_checked():
     with pytest.raises(ShellError, match="whole number"):
         wave(-1, 1.0)
-    with pytest.raises(ShellError, match="do not fit"):
-        teeth(40, 0.2, 1e-4)
-    with pytest.raises(ShellError, match="3 errors were given for 4 teeth"):
-        teeth(4, 0.2, 1e-4, errors=(0.1, 0.1, 0.1))

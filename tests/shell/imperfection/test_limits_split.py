@@ -8,16 +8,11 @@ import pytest
 from shell.elastic import Elastic
 from shell.imperfection import (
     CoupledHarmonics,
-    Function,
     Imperfection,
-    LineMass,
-    Map,
     Pair,
     PointMass,
     Sum,
     find_split,
-    holes,
-    teeth,
     wave,
 )
 from shell.meridian import hemisphere
@@ -158,45 +153,3 @@ def test_three_equal_masses_at_120_degrees_do_not_split_in_any_order(coupled):
     whole = coupled.solve(Imperfection(masses=masses))
     assert whole.shift < -3e-3
     assert whole.relative < 1e-12
-
-
-def test_point_masses_around_are_a_line_mass(pair):
-    theta = 2 * pi * np.arange(64) / 64
-    profile = 1e-9 * (1 + 0.3 * np.cos(4 * (theta - 0.2)))
-    points = tuple(PointMass(m, a) for m, a in zip(profile, theta, strict=True))
-    per_metre = 64 / (2 * pi * R) * 1e-9
-    line = LineMass(Sum(((1.0, wave(0, per_metre)), (1.0, wave(4, 0.3 * per_metre, 0.2)))))
-    one = find_split(pair, Imperfection(masses=points))
-    other = find_split(pair, Imperfection(lines=(line,)))
-    assert other.wave == pytest.approx(one.wave, rel=1e-10)
-    assert other.shift == pytest.approx(one.shift, rel=1e-10)
-
-
-def test_functions_and_maps_are_their_harmonics(pair):
-    def shape(x, theta):
-        return H * 1e-3 * x**3 * np.cos(4 * (theta - 0.25)) + 1e-6 * np.cos(3 * theta)
-
-    waves = wave(4, 1e-3 * H, 0.25, lambda x: x**3)
-    x, theta = np.linspace(0, 1, 41), 2 * pi * np.arange(72) / 72 + 0.01
-    expected = find_split(pair, Imperfection(thickness=waves)).wave
-    function = find_split(pair, Imperfection(thickness=Function(shape))).wave
-    table = find_split(pair, Imperfection(thickness=Map(x, theta, shape(x[:, None], theta)))).wave
-    assert function == pytest.approx(expected, rel=1e-12)
-    assert table == pytest.approx(expected, rel=1e-6)
-
-
-def test_equal_teeth_do_not_split_but_a_heavy_one_does(pair):
-    equal = Imperfection(rim=teeth(36, pi / 36, 0.3e-3))
-    assert find_split(pair, equal).relative < 1e-15
-    errors = np.zeros(36)
-    errors[5] = 0.1
-    one = find_split(pair, Imperfection(rim=teeth(36, pi / 36, 0.3e-3, errors=tuple(errors))))
-    assert one.relative > 1e-7
-    assert one.slow_axis == pytest.approx(2 * pi * 5 / 36 % (pi / 2), abs=1e-9)
-
-
-def test_holes_four_waves_apart_make_their_azimuth_light(pair):
-    drilled = Imperfection(masses=holes(4, 0.2e-3, H, SILICA.rho, 0.98, azimuth=0.1))
-    split = find_split(pair, drilled)
-    assert split.fast_axis == pytest.approx(0.1, abs=1e-9)
-    assert split.shift > 0
