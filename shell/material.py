@@ -177,11 +177,6 @@ class Material:
         name, _, coefficient = key.partition(".")
         return self.properties[name].deviation[coefficient_names(name).index(coefficient)]
 
-    def with_number(self, name: str, number: str, value: float) -> "Material":
-        """Return the same material with one number of one property changed."""
-        changed = self.properties[name].with_number(number, value)
-        return replace(self, properties={**self.properties, name: changed})
-
     def rescaled(self, reference: float, **given: float) -> "Material":
         """Return the material with given values at the reference temperature, its laws' shapes kept.
 

@@ -101,10 +101,6 @@ class Property:
         moved = sum(c * power for c, power in zip(self.deviation, powers(T - self.reference), strict=True))
         return np.asarray(values * np.exp(moved) if self.relative else values + moved)
 
-    def with_number(self, name: str, value: float) -> "Property":
-        """Return the same property with one of its numbers changed."""
-        return replace(self, numbers={**self.numbers, name: value})
-
     def scaled(self, factor: float) -> "Property":
         """Return the property times a factor, its relative shape over temperature unchanged."""
         shifted = {**self.uncertainty}

@@ -95,11 +95,13 @@ class Cut:
 
 
 @dataclass(frozen=True)
-class Round:
-    """Cuts that are made without a measurement between them, the share of the splits that they take, and what is left."""
+class TrimPlan:
+    """One round of cuts, made without a measurement between them. The next is planned from what is measured after it."""
 
+    before: tuple[SplitWave, ...]
+    goal: float  # Hz
     cuts: tuple[Cut, ...]
-    share: float
+    share: float  # of the splits, that the cuts take
     after: tuple[SplitWave, ...]
     unbalance: Mapping[int, complex]
 
@@ -108,19 +110,10 @@ class Round:
         """All of it, kg."""
         return sum(cut.mass for cut in self.cuts)
 
-
-@dataclass(frozen=True)
-class TrimPlan:
-    """One round of cuts. The next is planned from what is measured after it."""
-
-    before: tuple[SplitWave, ...]
-    round: Round
-    goal: float
-
     @property
     def is_enough(self) -> bool:
         """Whether the goal is expected to be met, in 95 of 100 cases."""
-        return all(state.most <= self.goal for state in self.round.after)
+        return all(state.most <= self.goal for state in self.after)
 
 
 def plan_trim(
@@ -159,7 +152,7 @@ def plan_trim(
         for a, p, m in zip(sites.azimuth, sites.position, masses, strict=True)
         if m > 1e-6 * masses.max()
     )
-    return TrimPlan(before, Round(cuts, share, tuple(after), known), goal)
+    return TrimPlan(before, goal, cuts, share, tuple(after), known)
 
 
 def _least_mass(

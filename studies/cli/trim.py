@@ -122,7 +122,7 @@ def trim(
         "cut": cut,
         "before": [_state(s) for s in plan.before],
         "rounds": [_round(planned, resonator)],
-        "mass_ug": 1e9 * plan.round.mass,
+        "mass_ug": 1e9 * plan.mass,
         "gains": gains(planned),
         "other_cuts": others,
         "measure": measure_after(planned),
@@ -181,7 +181,7 @@ def gains(planned: CardPlan) -> list[dict[str, float]]:
 
 
 def _round(planned: CardPlan, resonator: Resonator) -> dict[str, Any]:
-    one, cuts = planned.plan.round, planned.cuts
+    one, cuts = planned.plan, planned.cuts
     return {
         **row_of(one, "share", mass_ug=("mass", 1e9)),
         "cuts": [
@@ -210,7 +210,7 @@ def measure_after(planned: CardPlan) -> list[str]:
             found.append(
                 "Stress relief beside the groove is large; wider, shallower cuts (--width-mm) or teeth are more predictable."
             )
-    for state in plan.round.after:
+    for state in plan.after:
         spread_Hz = state.error * state.frequency
         expected = " ± ".join(to_error(1e3 * state.hertz, 1e3 * spread_Hz))
         found.append(
@@ -232,7 +232,7 @@ def _draw_polar(plan: TrimPlan, cuts: Sequence[dict[str, Any]]) -> Drawing:
     theta = np.linspace(0, 2 * np.pi, 721)
     with figure(1, 2, 4.2, subplot_kw={"projection": "polar"}) as (made, axes):
         titles = ("measured, with the cuts", "expected after the cuts")
-        for ax, states, title in zip(axes, (plan.before, plan.round.after), titles, strict=True):
+        for ax, states, title in zip(axes, (plan.before, plan.after), titles, strict=True):
             size = max(s.hertz for s in plan.before)
             ax.plot(theta, np.ones_like(theta), color="#888888", lw=1)
             for state, colour in zip(states, (VERMILION, BLUE, GREEN, "black"), strict=False):

@@ -231,7 +231,7 @@ def plan_for_card(
             for n, w in sites.gain.items()
         }
         plan = plan_with(gains, hypot(gain_error, max((cut.error for cut in cuts.values()), default=0.0)))
-        planned = {x: _typical(plan, sites, x) for x in sorted({cut.position for cut in plan.round.cuts})}
+        planned = {x: _typical(plan, sites, x) for x in sorted({cut.position for cut in plan.cuts})}
         if all(
             x in cuts and max(abs(mass / cuts[x].mass - 1), abs(touching / cuts[x].touching - 1)) < SAME_DEPTH
             for x, (mass, _, touching) in planned.items()
@@ -256,7 +256,7 @@ def plan_for_card(
 
 def _typical(plan: TrimPlan, sites: Sites, position: float) -> tuple[float, float, float]:
     """Mean mass of the cuts at a position, weighted by itself, its relative scatter, and how many touch: (Σ m)²/Σ m² of a run."""
-    there = [cut for cut in plan.round.cuts if cut.position == position]
+    there = [cut for cut in plan.cuts if cut.position == position]
     masses, around = np.array([cut.mass for cut in there]), np.sort([cut.azimuth % (2 * pi) for cut in there])
     step = 2 * pi / np.count_nonzero(sites.position == position)
     apart = np.diff(around, append=around[0] + 2 * pi) > 1.5 * step

@@ -102,7 +102,7 @@ def test_distances_from_a_cylinder_and_a_dome_are_exact():
 def test_four_cuts_null_n_2_and_leave_the_balance(pair):
     f = pair.mode.frequency
     plan = plan_trim([SplitWave.of(2, f, 0.3, 0.4, 1e-4)], rim_sites(DOME, {2: pair}, 2203.0, 0.4), goal=5e-4)
-    first = plan.round
+    first = plan
     flaw = Imperfection(masses=tuple(PointMass(-c.mass, c.azimuth) for c in first.cuts))
     assert find_split(pair, flaw).wave * f == pytest.approx(first.share * 0.3 * np.exp(4j * 0.4), rel=1e-9)
     for k in (1, 2, 3):
@@ -118,10 +118,10 @@ def test_known_unbalance_is_used_and_never_raised(pair):
     sites = rim_sites(DOME, {2: pair}, 2203.0, 0.4)
     plan = plan_trim([SplitWave.of(2, f, 0.3, 0.4, 1e-4)], sites, goal=5e-4, unbalance=u)
     for k in u:
-        assert abs(plan.round.unbalance[k]) <= abs(u[k]) * (1 + 1e-6)
-    assert abs(plan.round.unbalance[1]) < 0.3 * abs(u[1])  # the antinodes on its heavy side give more
+        assert abs(plan.unbalance[k]) <= abs(u[k]) * (1 + 1e-6)
+    assert abs(plan.unbalance[1]) < 0.3 * abs(u[1])  # the antinodes on its heavy side give more
     even = plan_trim([SplitWave.of(2, f, 0.3, 0.4, 1e-4)], sites, goal=5e-4)
-    assert plan.round.mass == pytest.approx(even.round.mass, rel=1e-6)
+    assert plan.mass == pytest.approx(even.mass, rel=1e-6)
 
 
 def test_two_harmonics_and_teeth(pair):
@@ -129,7 +129,7 @@ def test_two_harmonics_and_teeth(pair):
     pairs = {2: pair, 3: Pair(three)}
     readings = [SplitWave.of(2, pair.mode.frequency, 0.2, 0.4, 1e-4), SplitWave.of(3, three.frequency, 0.5, 0.1, 1e-4)]
     plan = plan_trim(readings, tooth_sites(pairs, Teeth(36, 0.05, 200e-9)), goal=5e-4)
-    first = plan.round
+    first = plan
     flaw = Imperfection(masses=tuple(PointMass(-c.mass, c.azimuth) for c in first.cuts))
     for reading, one in zip(readings, (pair, pairs[3]), strict=True):
         assert find_split(one, flaw).wave == pytest.approx(-first.share * reading.wave, rel=1e-6)
@@ -153,7 +153,7 @@ def test_planted_splits_end_below_half_a_millihertz_in_three_rounds(pair):
             plan = plan_trim(
                 [SplitWave.of(2, f, abs(seen) * f, slow, 1e-4)], rim_sites(DOME, {2: pair}, 2203.0, slow), goal=5e-4
             )
-            for cut in plan.round.cuts:
+            for cut in plan.cuts:
                 gone.append(PointMass(-cut.mass * (1 + 0.02 * rng.standard_normal()), cut.azimuth))
         assert coupled.solve(Imperfection(density=density, masses=tuple(gone))).hertz < 5e-4
 
@@ -165,7 +165,7 @@ def test_cuts_side_by_side_are_one_wide_groove(pair):
     (cut,) = plan.cuts.values()
     whole = solve_groove(pair, Groove("edge", 1.0, 5e-3, 1e-3, cut.groove.depth))
     alone = solve_groove(pair, Groove("edge", 1.0, 1e-3, 1e-3, cut.groove.depth))
-    assert len(plan.plan.round.cuts) == 20
+    assert len(plan.plan.cuts) == 20
     assert cut.gain(2) == pytest.approx(whole.wave / (whole.mass * cut.first[2]), rel=0.02)
     assert alone.wave / alone.mass < 0.75 * whole.wave / whole.mass
 
