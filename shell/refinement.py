@@ -6,7 +6,7 @@ from math import ceil, e, exp, hypot, log, pi
 import numpy as np
 
 from shell.assembly import build_system
-from shell.eigen import ElementMass, Factor, Iteration, whole_pattern
+from shell.eigen import ElementMass, Factor, Iteration
 from shell.elastic import Elastic, VaryingElastic
 from shell.errors import ShellError
 from shell.layout import FIRST, KINDS, LONGEST, ROUGH, Kind, Level, Theory, crowding
@@ -184,16 +184,11 @@ def _begin(
 ) -> Iteration:
     """Factor K + shift M; both over ρ where it is the same everywhere."""
     uniform, rho = isinstance(elastic, Elastic), _density(elastic)
-    if uniform and system.is_tiny:
-        trace, shear, mass = system.whole
+    if uniform and system.plain:
+        pattern, units = system.plain
         one, two = (float(field[0, 0]) / rho for field in constants[0].lame)
-        return Iteration(Factor(whole_pattern(len(mass)), [one * trace + two * shear + shift * mass]), mass)
-    if uniform and system.is_plain:
-        one, two = (float(field[0, 0]) / rho for field in constants[0].lame)
-        stiffness = [one * trace + two * shear + shift * mass for trace, shear, mass in system.bare]
-        return Iteration(
-            Factor(system.pattern, stiffness), ElementMass(system.pattern, [mass for _, _, mass in system.bare])
-        )
+        stiffness = [one * trace + two * shear + shift * mass for trace, shear, mass in units]
+        return Iteration(Factor(pattern, stiffness), ElementMass(pattern, [mass for _, _, mass in units]))
     lam, G, density = (
         [field / rho for field in fields] for fields in zip(*((*one.lame, one.rho) for one in constants), strict=True)
     )

@@ -10,7 +10,7 @@ import scipy
 
 from shell.blocks import Mesh, Support
 from shell.cells import CellTable, cell_mass, cell_stiffness
-from shell.eigen import Pattern, find_pattern
+from shell.eigen import Pattern, find_pattern, whole_pattern
 from shell.kernel import Section, StrainTable, integrate_mass, integrate_stiffness, station_mass, station_stiffness
 from shell.layout import Chain, Level
 from shell.quadrature import Array
@@ -181,11 +181,6 @@ class System:
         """Bytes of the element matrices while a system is solved: stiffness, mass, their factors."""
         return 32.0 * float(sum(group.unknowns.size * group.unknowns.shape[1] for group in self.groups))
 
-    @property
-    def is_tiny(self) -> bool:
-        """Whether one dense matrix costs less than the elements one by one."""
-        return len(self.groups) == 1 and self.constraint.shape[1] <= TINY
-
     def operators(
         self, lam: list[Array], G: list[Array], rho: list[Array], uniform: bool, shift: float = 0.0
     ) -> tuple[list[Array], "Inertia"]:
@@ -219,28 +214,21 @@ class System:
         """From the free unknowns to those of all elements."""
         return self.constraint[np.concatenate([group.unknowns.ravel() for group in self.groups])]
 
-    @property
-    def is_plain(self) -> bool:
-        """Whether it is one short chain, whose element matrices are kept on the free unknowns."""
-        return (
-            len(self.groups) == 1 and isinstance(self.groups[0], ShellGroup) and len(self.maps) <= FEW and self.is_small
-        )
-
     @cached_property
-    def bare(self) -> list[tuple[Array, Array, Array]]:
-        """Element matrices of a plain system per unit λ, G and ρ, on the free unknowns in the order of `pattern`."""
-        (group,) = self.groups
-        assert isinstance(group, ShellGroup)
+    def plain(self) -> tuple[Pattern, list[tuple[Array, Array, Array]]] | None:
+        """Of one short chain: pattern, and element matrices per unit λ, G and ρ on free unknowns; a tiny one is one element."""
+        if len(self.groups) > 1 or not isinstance(self.groups[0], ShellGroup) or not self.is_small:
+            return None
+        group, size = self.groups[0], self.constraint.shape[1]
+        if size <= TINY:  # one dense matrix costs less than the elements one by one
+            P = np.asarray(self._choice.toarray()).reshape(*group.unknowns.shape, -1)
+            trace, shear, mass = (np.sum(np.swapaxes(P, 1, 2) @ unit @ P, axis=0) for unit in group.units)
+            return whole_pattern(size), [(trace, shear, mass)]
+        if len(self.maps) > FEW:
+            return None
         trace, shear, mass = group.units
-        return [(at.restrict(trace[k]), at.restrict(shear[k]), at.restrict(mass[k])) for k, at in enumerate(self.maps)]
-
-    @cached_property
-    def whole(self) -> Array:
-        """The units of a small shell without solid parts as of one element, (3, size, size): fewer and larger products."""
-        (group,), P = self.groups, self._choice.toarray()
-        assert isinstance(group, ShellGroup)
-        P = P.reshape(*group.unknowns.shape, -1)
-        return np.stack([np.sum(np.swapaxes(P, 1, 2) @ unit @ P, axis=0) for unit in group.units])
+        units = [(at.restrict(trace[k]), at.restrict(shear[k]), at.restrict(mass[k])) for k, at in enumerate(self.maps)]
+        return self.pattern, units
 
     def spread(self, free: Array) -> list[Array]:
         """Element unknowns (elements, size) of every group from the free unknowns of one vector."""
