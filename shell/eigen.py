@@ -158,72 +158,58 @@ class ElementMass:
         return y
 
 
-@dataclass(frozen=True, eq=False)
-class Pairs:
-    """Eigenvectors as columns, M-orthonormal, lowest first, and what the iteration leaves undone of each eigenvalue, relative."""
+def lowest_pairs(factor: Factor, mass: Mass, count: int, accuracy: float) -> tuple[Array, Array]:
+    """The `count` lowest eigenvectors as columns, M-orthonormal, lowest first, and what is left undone of each eigenvalue, relative.
 
-    vectors: Array
-    undone: Array
-
-
-class Iteration:
-    """Krylov subspaces of K⁻¹ M: block Lanczos with full orthogonalisation.
-
-    Inverse iteration gains the ratio of two eigenvalues at a step; the best combination of its steps gains about
-    exp(4 √(gap)) for the same work, which is what neighbouring modes of a thin shell ask for.
+    Krylov subspaces of K⁻¹ M: block Lanczos with full orthogonalisation. Inverse iteration gains the ratio of two eigenvalues at a
+    step; the best combination of its steps gains about exp(4 √(gap)) for the same work, which is what neighbouring modes of a thin
+    shell ask for. It stops where the relative error of the eigenvalues is `accuracy`: a Ritz vector x of K⁻¹ M with value θ leaves
+    r = K⁻¹ M x - θ x. Its angle to the eigenvector is at most |r| over the distance to the other values, and the error of the
+    eigenvalue the square of that; or simply at most |r|/θ.
     """
+    size = factor.pattern.size
+    wide = min(BLOCK + count // 4, size)
+    most = min(size, MOST + 4 * count)
+    basis, heavy, answers = (np.empty((size, most), order="F") for _ in range(3))
+    T = np.zeros((most, most))
+    block, used = _orthonormal(mass, _random(size, wide))[0], 0
+    while True:
+        first, used = used, used + block[0].shape[1]
+        basis[:, first:used], heavy[:, first:used] = block
+        answers[:, first:used] = factor.solve(block[1])
+        rest = answers[:, first:used]
+        for _ in range(2):  # twice is enough
+            share = heavy[:, :used].T @ rest
+            rest = rest - basis[:, :used] @ share
+            T[:used, first:used] += share
+        block, link = _orthonormal(mass, rest)
+        is_last = not block[0].shape[1] or used + block[0].shape[1] > most
+        if used >= max(count, 2 * wide) or (is_last and used >= count):
+            theta, turn = _eigenpairs((T[:used, :used] + T[:used, :used].T) / 2)
+            theta, turn = theta[::-1], turn[:, ::-1]
+            undone = _undone(theta, np.linalg.norm(link @ turn[first:used, :count], axis=0), count)
+            if is_last or np.max(undone) < accuracy:
+                break
+        elif is_last:
+            raise ShellError(f"the discretisation has {used} modes, fewer than the {count} asked for.")
+        T[used : used + len(link), first:used] = link
+    # K⁻¹ M x instead of x takes what is left of the highest modes down once more
+    vectors = answers[:, :used] @ (turn[:, :count] / theta[:count])
+    return vectors / np.sqrt(np.einsum("ij,ij->j", vectors, mass @ vectors)), undone
 
-    def __init__(self, factor: "Factor", mass: Mass) -> None:
-        self.factor, self.mass = factor, mass
 
-    def converge(self, count: int, accuracy: float) -> Pairs:
-        """The `count` lowest; `accuracy` is the relative error of the eigenvalues at which the iteration stops.
-
-        A Ritz vector x of K⁻¹ M with value θ leaves r = K⁻¹ M x - θ x. Its angle to the eigenvector is at most |r| over the
-        distance to the other values, and the error of the eigenvalue the square of that; or simply at most |r|/θ.
-        """
-        size = self.factor.pattern.size
-        wide = min(BLOCK + count // 4, size)
-        most = min(size, MOST + 4 * count)
-        basis, heavy, answers = (np.empty((size, most), order="F") for _ in range(3))
-        T = np.zeros((most, most))
-        block, used = self._orthonormal(_random(size, wide))[0], 0
-        while True:
-            first, used = used, used + block[0].shape[1]
-            basis[:, first:used], heavy[:, first:used] = block
-            answers[:, first:used] = self.factor.solve(block[1])
-            rest = answers[:, first:used]
-            for _ in range(2):  # twice is enough
-                share = heavy[:, :used].T @ rest
-                rest = rest - basis[:, :used] @ share
-                T[:used, first:used] += share
-            block, link = self._orthonormal(rest)
-            is_last = not block[0].shape[1] or used + block[0].shape[1] > most
-            if used >= max(count, 2 * wide) or (is_last and used >= count):
-                theta, turn = _eigenpairs((T[:used, :used] + T[:used, :used].T) / 2)
-                theta, turn = theta[::-1], turn[:, ::-1]
-                undone = _undone(theta, np.linalg.norm(link @ turn[first:used, :count], axis=0), count)
-                if is_last or np.max(undone) < accuracy:
-                    break
-            elif is_last:
-                raise ShellError(f"the discretisation has {used} modes, fewer than the {count} asked for.")
-            T[used : used + len(link), first:used] = link
-        # K⁻¹ M x instead of x takes what is left of the highest modes down once more
-        vectors = answers[:, :used] @ (turn[:, :count] / theta[:count])
-        return Pairs(vectors / np.sqrt(np.einsum("ij,ij->j", vectors, self.mass @ vectors)), undone)
-
-    def _orthonormal(self, x: Array) -> tuple[tuple[Array, Array], Array]:
-        """An M-orthonormal basis of the columns, and M times it; and the factors, x = basis @ factors."""
-        # one solve leaves little but the inextensional modes of a thin shell (two at most) in every column
-        reflectors, tau, _, _ = scipy.linalg.lapack.dgeqrf(x)
-        right = reflectors[: x.shape[1]] * _upper(x.shape[1])
-        columns = np.asarray(scipy.linalg.lapack.dorgqr(reflectors, tau)[0])
-        loaded = self.mass @ columns
-        squares, axes = _eigenpairs(columns.T @ loaded)
-        kept = squares > 1e-14 * squares[-1]
-        scale = np.sqrt(squares[kept])
-        axes = axes[:, kept]
-        return (columns @ (axes / scale), loaded @ (axes / scale)), (axes * scale).T @ right
+def _orthonormal(mass: Mass, x: Array) -> tuple[tuple[Array, Array], Array]:
+    """An M-orthonormal basis of the columns, and M times it; and the factors, x = basis @ factors."""
+    # one solve leaves little but the inextensional modes of a thin shell (two at most) in every column
+    reflectors, tau, _, _ = scipy.linalg.lapack.dgeqrf(x)
+    right = reflectors[: x.shape[1]] * _upper(x.shape[1])
+    columns = np.asarray(scipy.linalg.lapack.dorgqr(reflectors, tau)[0])
+    loaded = mass @ columns
+    squares, axes = _eigenpairs(columns.T @ loaded)
+    kept = squares > 1e-14 * squares[-1]
+    scale = np.sqrt(squares[kept])
+    axes = axes[:, kept]
+    return (columns @ (axes / scale), loaded @ (axes / scale)), (axes * scale).T @ right
 
 
 def _undone(theta: Array, residual: Array, count: int) -> Array:

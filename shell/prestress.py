@@ -20,7 +20,7 @@ from functools import cached_property
 import numpy as np
 
 from shell.assembly import assemble, lay_resonator
-from shell.eigen import Factor, Iteration
+from shell.eigen import Factor, lowest_pairs
 from shell.errors import ShellError
 from shell.finite import QuadraticForce, solved_as_solid
 from shell.modes import Mode
@@ -127,7 +127,7 @@ def settle(system: System, mode: Mode, load: Array) -> Solution:
     factor = Factor(system.pattern, K)
     if not rigid:
         return Solution(system, constants, factor.solve(np.asfortranarray(load[:, None]))[:, 0])
-    motions = Iteration(factor, M).converge(rigid, DONE).vectors
+    motions, _ = lowest_pairs(factor, M, rigid, DONE)
     u = answer_without(motions, factor, M, load, shift)
     if u is None:
         raise ShellError("the static field caused by a mode or a spin did not converge.")

@@ -6,7 +6,7 @@ from math import ceil, e, exp, hypot, log, pi
 import numpy as np
 
 from shell.assembly import build_system
-from shell.eigen import ElementMass, Factor, Iteration
+from shell.eigen import ElementMass, Factor, Mass, lowest_pairs
 from shell.elastic import Elastic, VaryingElastic
 from shell.errors import ShellError
 from shell.layout import FIRST, KINDS, LONGEST, ROUGH, Kind, Level, Theory, crowding
@@ -169,31 +169,28 @@ def _solve(
     # a small shift factors the rigid motions and leaves the elastic modes in order
     shift = 1e-2 * constants[0].wave_speed_squared / size**2 if system.rigid_motions else 0.0
     wanted = count + system.rigid_motions
-    iteration = _begin(system, elastic, constants, shift)
-    pairs = iteration.converge(wanted, accuracy)
-    found = [
-        (Solution(system, constants, vector), float(undone) / 2)
-        for vector, undone in zip(pairs.vectors.T, pairs.undone, strict=True)
-    ]
+    factor, mass = _begin(system, elastic, constants, shift)
+    vectors, undone = lowest_pairs(factor, mass, wanted, accuracy)
+    found = [(Solution(system, constants, one), float(left) / 2) for one, left in zip(vectors.T, undone, strict=True)]
     elastic_ones = sorted(found, key=lambda one: one[0].eigenvalue)[system.rigid_motions :]
-    return [one for one, _ in elastic_ones], [undone for _, undone in elastic_ones], iteration.factor
+    return [one for one, _ in elastic_ones], [left for _, left in elastic_ones], factor
 
 
 def _begin(
     system: System, elastic: Elastic | VaryingElastic, constants: tuple[Constants, ...], shift: float
-) -> Iteration:
-    """Factor K + shift M; both over ρ where it is the same everywhere."""
+) -> tuple[Factor, Mass]:
+    """Factor K + shift M, and M; both over ρ where it is the same everywhere."""
     uniform, rho = isinstance(elastic, Elastic), _density(elastic)
     if uniform and system.plain:
         pattern, units = system.plain
         one, two = (float(field[0, 0]) / rho for field in constants[0].lame)
         stiffness = [one * trace + two * shear + shift * mass for trace, shear, mass in units]
-        return Iteration(Factor(pattern, stiffness), ElementMass(pattern, [mass for _, _, mass in units]))
+        return Factor(pattern, stiffness), ElementMass(pattern, [mass for _, _, mass in units])
     lam, G, density = (
         [field / rho for field in fields] for fields in zip(*((*one.lame, one.rho) for one in constants), strict=True)
     )
     K, M = system.operators(lam, G, density, uniform, shift)
-    return Iteration(Factor(system.pattern, K), M)
+    return Factor(system.pattern, K), M
 
 
 def _density(elastic: Elastic | VaryingElastic) -> float:
