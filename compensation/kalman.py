@@ -114,16 +114,31 @@ def run_filter(model: LinearModel, measurements: ArrayLike, start: ArrayLike, co
     F, C = model.transition, model.measurement
     settled = False
     for i, row in enumerate(z):
-        if not settled:
-            # The covariance does not depend on the data; once it repeats itself it is not computed again.
-            K, S, after = weigh(model, predict(model, x, P)[1])
-            settled = np.allclose(after, P, rtol=SETTLED, atol=0.0)
-            P = after
-        x = F @ x
-        innovation = row - C @ x
-        x = x + K @ innovation
-        states[i], covariances[i], innovations[i], spreads[i] = x, P, innovation, S
+        K, S, after = weigh(model, predict(model, x, P)[1])
+        settled, P, before = np.allclose(after, P, rtol=SETTLED, atol=0.0), after, F @ x
+        x = before + K @ (row - C @ before)
+        states[i], covariances[i], innovations[i], spreads[i] = x, P, row - C @ before, S
+        if settled:  # the covariance does not depend on the data; once it repeats itself x⁺ = (1 − K C) F x + K z
+            rest = slice(i + 1, None)
+            states[rest] = _follow((np.eye(n) - K @ C) @ F, z[rest] @ K.T, x)
+            covariances[rest], spreads[rest] = P, S
+            innovations[rest] = z[rest] - states[i:-1] @ (C @ F).T
+            break
     return KalmanRun(states, covariances, innovations, spreads)
+
+
+def _follow(A: Array, u: Array, start: Array) -> Array:
+    """Return x_{k+1} = A x_k + u_k, (N, n): triangular by Schur's form A = U T Uᴴ, so that each row is a filter of first order."""
+    from scipy.linalg import schur
+    from scipy.signal import lfilter
+
+    T, U = schur(A, output="complex")
+    begun, driven = start @ U.conj(), u @ U.conj()
+    y = np.empty_like(driven)
+    for k in reversed(range(len(T))):
+        drive = driven[:, k] + np.vstack([begun, y[:-1]])[:, k + 1 :] @ T[k, k + 1 :] if len(u) else driven[:, k]
+        y[:, k] = lfilter([1.0], [1.0, -T[k, k]], drive, zi=[T[k, k] * begun[k]])[0]
+    return np.asarray((y @ U.T).real)
 
 
 def settle(model: LinearModel) -> tuple[Array, Array, Array]:

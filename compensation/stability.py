@@ -188,10 +188,13 @@ def _identify(tau: Array, deviation: Array) -> tuple[NoiseKind, ...]:
     of freedom would give that chance a weight.
     """
     u, v = np.log2(tau), np.log2(np.maximum(deviation, 1e-300))
+    apart = u - u[:, None]
+    near = np.abs(apart) <= 1.0
+    apart -= (apart * near).sum(axis=1, keepdims=True) / near.sum(axis=1, keepdims=True)
+    spread = (near * apart**2).sum(axis=1)
+    slopes = np.where(spread > 0, (near * apart) @ v / np.where(spread > 0, spread, 1.0), -0.5)
     kinds: list[NoiseKind] = []
-    for centre in u:
-        near = np.abs(u - centre) <= 1.0
-        slope = float(np.polyfit(u[near], v[near], 1)[0]) if np.count_nonzero(near) > 1 else -0.5
+    for slope in slopes.tolist():
         nearest = min(SLOPES, key=lambda kind: abs(SLOPES[kind] - slope))
         kinds.append("white" if nearest == "phase" and any(kind != "phase" for kind in kinds) else nearest)
     return tuple(kinds)
