@@ -10,8 +10,8 @@ from studies.errors import InputError
 from studies.fits.scale import ScaleStudy, study_scale
 from studies.models import source_of
 from studies.models.kinds.scale import save_scale
+from studies.papers.bvg import ERRORS, SOURCES, draw_steps, steps_table
 from studies.record import read_record
-from studies.reports.bell import ERRORS, SOURCES, draw_steps, steps_table
 from studies.reports.digits import raised
 from studies.results import Chapter, Facts, Figure, Result, Table, row_of
 

@@ -25,8 +25,7 @@ from studies.errors import naming
 from studies.instrument.card import Instrument
 from studies.loss.films import film_shifts
 from studies.reports.digits import to_numerical_error
-from studies.reports.mode_picture import THEORIES
-from studies.reports.scenes import live_chapter, show_mode
+from studies.reports.scenes import THEORIES, live_chapter, show_mode, view_blocks
 from studies.resonator.law import law_of
 from studies.results import Blocks, Column, Result, Sentence, Table, Where, row_of
 
@@ -230,8 +229,6 @@ def _effect_tables(modes: list[Entry]) -> list[Table]:
 
 def _view(instrument: Instrument, harmonics: list[int], T: float, theory: str) -> "Sequence[Block]":
     """The lowest modes, to be turned."""
-    from studies.reports.mode_picture import view_blocks
-
     drawn: Literal["solid", "shell"] = "solid" if theory == "solid" else "shell"
     words = " Rayleigh's closed form gives the frequencies of the table, not these shapes."
     remark = words if theory == "rayleigh" else ""

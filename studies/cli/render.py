@@ -13,7 +13,7 @@ from studies.cli.output import answers
 from studies.errors import InputError, MissingEnvironment
 from studies.files.writing import written_whole
 from studies.instrument.card import load_card
-from studies.reports.scenes import Colour, ModeScene, ShellTemperature, read_field, show_mode
+from studies.reports.scenes import Colour, ModeScene, ShellTemperature, read_field, show_mode, view_blocks
 from studies.results import Blocks, Chapter, Result, Sentence, Table, row_of
 from studies.results.page import render_result
 
@@ -57,8 +57,6 @@ def render(
         swing_mm: Displacement at the antinode in mesh files; unless given, .stl and .ply are undeformed and .glb moves
             visibly.
     """
-    from studies.reports.mode_picture import view_blocks
-
     kind = ending_of(out, KINDS)
     if len(harmonic) > 1 and kind != ".html":
         raise InputError("several harmonics go together only in an .html page; make one file for each.")
@@ -119,8 +117,6 @@ def _picture(
 
 
 def _page(shown: Sequence[ModeScene]) -> bytes:
-    from studies.reports.mode_picture import view_blocks
-
     first = shown[0]
     rows = [_row(one) | row_of(one.mode, "bryan_factor") for one in shown]
     lead = f"Mode shapes of {first.instrument.name} at {first.temperature - zero_Celsius:g} °C, {first.mode.theory} theory."

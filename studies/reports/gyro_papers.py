@@ -2,12 +2,9 @@
 
 from typing import Any
 
-from studies.papers.bvg import reproduce_bell
+from studies.papers import bvg, cvg_cross_damping, cvg_filters
 from studies.papers.bvg_theory import compare_bell_theory, read_planted_rate, theory_chapters
-from studies.papers.cvg_cross_damping import PRINTED_IMPROVEMENT, CrossDampingTwin, reproduce_cross_damping
-from studies.papers.cvg_filters import FilterStudy, study_error_map, study_filters
 from studies.papers.loop_claims import LoopClaims, study_claims
-from studies.reports import bell, cross_damping, filters
 from studies.results import Chapter, Column, Table, row_of
 
 CLAIMS_SOURCES = (
@@ -16,19 +13,23 @@ CLAIMS_SOURCES = (
     " s41378-025-00872-z (abstract).",
 )
 CLAIMS = ("Verdict", Column(lambda one: f"{one.claim} ({one.source})", "Claim and source"), "twin: Simulation")
-SOURCES = (*cross_damping.SOURCES, *filters.SOURCES, *bell.SOURCES, *CLAIMS_SOURCES)
+SOURCES = (*cvg_cross_damping.SOURCES, *cvg_filters.SOURCES, *bvg.SOURCES, *CLAIMS_SOURCES)
 MAP_POINTS = 31
 
 
 def reproduce_gyro_papers(seeds: int = 20) -> tuple[list[Chapter], dict[str, Any]]:
     """Run the virtual gyros of the three papers, so many for cross-damping; return chapters and the numbers for summary.json."""
-    damping, study, chain = reproduce_cross_damping(seeds), study_filters(), reproduce_bell()
+    damping, study, chain = (
+        cvg_cross_damping.reproduce_cross_damping(seeds),
+        cvg_filters.study_filters(),
+        bvg.reproduce_bell(),
+    )
     claims, theory, reading = study_claims(), compare_bell_theory(), read_planted_rate()
     chapters = [
-        *cross_damping.twin_chapters(damping),
-        *filters.filter_chapters(study, study_error_map(MAP_POINTS)),
+        *cvg_cross_damping.twin_chapters(damping),
+        *cvg_filters.filter_chapters(study, cvg_filters.study_error_map(MAP_POINTS)),
         *theory_chapters(theory, reading),
-        *bell.bell_chapters(chain),
+        *bvg.bell_chapters(chain),
         _claims_chapter(claims),
     ]
     return chapters, {
@@ -40,9 +41,9 @@ def reproduce_gyro_papers(seeds: int = 20) -> tuple[list[Chapter], dict[str, Any
     }
 
 
-def _summarise_damping(twin: CrossDampingTwin) -> dict[str, Any]:
+def _summarise_damping(twin: cvg_cross_damping.CrossDampingTwin) -> dict[str, Any]:
     return {
-        "improvement_printed": PRINTED_IMPROVEMENT,
+        "improvement_printed": cvg_cross_damping.PRINTED_IMPROVEMENT,
         **row_of(twin, improvement_training="study.training.rows.ratio", improvement_held_out="improvement.ratio"),
         **row_of(
             twin, improvement_over_seeds_5_50_95="spread", by_lag_s="lags", by_random_walk_deg_per_sqrt_h="noises"
@@ -51,13 +52,10 @@ def _summarise_damping(twin: CrossDampingTwin) -> dict[str, Any]:
     }
 
 
-def _summarise_filters(study: FilterStudy) -> dict[str, Any]:
-    relative = {"error_of_optimum": "optimum.error", "error_as_printed": "renormalised.error"}
+def _summarise_filters(study: cvg_filters.FilterStudy) -> dict[str, Any]:
+    errors = {"error_of_optimum": "optimum.error", "error_as_printed": "renormalised.error"}
     return {
-        "wiener": [
-            {"noise": case.name} | {key: one / case.rate_variance for key, one in row_of(case, **relative).items()}
-            for case in study.wiener
-        ],
+        "wiener": [row_of(case, noise="name", **errors) for case in study.wiener],
         "figure5_noise_reduction": study.figure5.noise_before / study.figure5.noise_after,
         "figure6_noise_reduction": study.figure6.noise_before / study.figure6.noise_after,
         **row_of(

@@ -14,10 +14,11 @@ from studies.papers.bias_twin import TwinFit, twin_chapters
 from studies.papers.hrg import FrequencyStudy, PhysicsComparison
 from studies.papers.settling import NETWORKS, ROOM_degC, SettlingStudy, settling_chapter
 from studies.papers.theories import theories_chapter
-from studies.reports import gyro_papers, mode_picture, style
+from studies.reports import gyro_papers, style
 from studies.reports.diagnosis import headline
 from studies.reports.diagnosis_table import table_parts
 from studies.reports.frequency import coefficients_table, error_figure, fit_figure, order_parts, order_sentence
+from studies.reports.scenes import mode_blocks
 from studies.results import (
     Blocks,
     Chapter,
@@ -84,7 +85,7 @@ LEAD = (
 def reproduce_result(parts: Reproduction) -> Result:
     """Return the numbers and the whole page."""
     study, physics = parts.study, parts.physics
-    shapes = Blocks(lambda: mode_picture.mode_blocks(physics.instrument))
+    shapes = Blocks(lambda: mode_blocks(physics.instrument))
     chapters = [
         Chapter("Summary", [_facts(parts), *_short(parts)]),
         _first_diagnosis(parts),

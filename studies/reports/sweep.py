@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from studies.errors import UNUSABLE_INPUT, InputError
 from studies.papers.hrg import study_table
-from studies.reports import frequency, mode_picture
+from studies.reports import frequency, scenes
 from studies.reports import sweep_figures as figures
 from studies.reports.sweep_analysis import (
     influence_parts,
@@ -203,7 +203,7 @@ def _shapes(results: Results) -> list[Part]:
         words = ", ".join(f"{figures.label(name, units[name])} = {number(value)}" for name, value in design.items())
         instrument = set_parameters(study.instrument, design, study.derived)
         parts.append(f"{title}: {words or 'as in the card'}.")
-        parts.append(Blocks(lambda shown=instrument: mode_picture.mode_blocks(shown, (n,))))  # type: ignore[misc]
+        parts.append(Blocks(lambda shown=instrument: scenes.mode_blocks(shown, (n,))))  # type: ignore[misc]
     return parts
 
 

@@ -10,8 +10,7 @@ import pytest
 from studies.cli import main
 from studies.errors import InputError
 from studies.instrument.card import load_card
-from studies.reports.mode_picture import mode_blocks
-from studies.reports.scenes import read_field, show_mode
+from studies.reports.scenes import mode_blocks, read_field, show_mode
 from studies.results import Sentence
 from studies.results.page import Embedded
 

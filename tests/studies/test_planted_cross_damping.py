@@ -19,9 +19,9 @@ from studies.papers.cvg_cross_damping import (
     read_shape,
     reproduce_cross_damping,
     simulate_rest,
+    twin_chapters,
 )
 from studies.record import read_record
-from studies.reports.cross_damping import twin_chapters
 from studies.results.page import make_blocks
 from tests.compiled import compile_c
 

@@ -17,9 +17,16 @@ from studies.errors import InputError
 from studies.fits.scale import read_law, settled_rows
 from studies.models import compensate, emit_c, read_model
 from studies.models.kinds.scale import load_scale
-from studies.papers.bvg import DEG, examine_claims, read_printed_chain, reduce_white, reproduce_bell, simulate_runs
+from studies.papers.bvg import (
+    DEG,
+    bell_chapters,
+    examine_claims,
+    read_printed_chain,
+    reduce_white,
+    reproduce_bell,
+    simulate_runs,
+)
 from studies.record import read_record
-from studies.reports.bell import bell_chapters
 from studies.results.page import make_blocks
 from tests.compiled import compile_c
 

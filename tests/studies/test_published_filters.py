@@ -44,7 +44,7 @@ def test_error_map_is_darkest_in_the_middle():
 
 @pytest.mark.slow
 def test_chapters_can_be_drawn(study):
-    from studies.reports.filters import filter_chapters
+    from studies.papers.cvg_filters import filter_chapters
     from studies.results.page import make_blocks
 
     chapters = filter_chapters(study, study_error_map(5))
