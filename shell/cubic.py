@@ -21,7 +21,7 @@ import numpy as np
 from shell.assembly import lay_system
 from shell.crystal import Crystal, hill
 from shell.eigen import Factor, lowest_pairs, whole_pattern
-from shell.elastic import Elastic
+from shell.elastic import Elastic, find_constants
 from shell.errors import ShellError
 from shell.modes import solve_modes
 from shell.quadrature import Array
@@ -115,13 +115,15 @@ def _lowest(systems: list[System], harmonics: list[int], crystal: Cubic, n: int,
     """The lowest frequency with most of its motion in harmonic n; `sign` is 1 for cosines, -1 for sines."""
     sizes = [system.constraint.shape[1] for system in systems]
     ends = np.cumsum([0, *sizes])
+    lam, G = crystal.C12, crystal.C44
+    part = Elastic(G * (3 * lam + 2 * G) / (lam + G), lam / (2 * (lam + G)), crystal.rho)
     K, M = np.zeros((ends[-1], ends[-1])), np.zeros((ends[-1], ends[-1]))
     waves: dict[int, Array] = {}
     for system, k, a, b in zip(systems, harmonics, ends, ends[1:], strict=False):
         # K with λ = C₁₂ and G = C₄₄, and M, of the free unknowns of one harmonic
-        shapes = [group.table.position.shape for group in system.groups]
-        C12, C44, rho = ([np.full(shape, x) for shape in shapes] for x in (crystal.C12, crystal.C44, crystal.rho))
-        elements, mass = system.operators(C12, C44, rho, True)
+        elements, mass = system.operators(
+            [find_constants(group.table.position, part, False) for group in system.groups]
+        )
         elastic = assemble_elements(system.pattern.unknowns, elements, b - a).toarray()
         axial, around, across, shear = _strains(system)
         K[a:b, a:b] = elastic + crystal.excess * (axial.T @ axial + around.T @ around / 2)

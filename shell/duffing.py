@@ -21,7 +21,7 @@ import numpy as np
 from shell.errors import ShellError
 from shell.finite import QuadraticForce, solved_as_solid
 from shell.modes import Mode, TheoryRangeWarning
-from shell.prestress import neighbour, operators, settle
+from shell.prestress import neighbour, settle
 from shell.quadrature import Array
 from shell.solution import Solution, total
 from shell.sparse import assemble_elements, factor_symmetric
@@ -75,7 +75,7 @@ def amplitude_shift(mode: Mode) -> AmplitudeShift:
 def _inertia(z: Solution, force: Array, driven: float) -> tuple[float, float]:
     """Return zᵀ M z_d with (K - Λ M) z_d = f at Λ = `driven`, and its derivative by Λ."""
     system = z.system
-    elements, M = operators(system, z.constants, -driven)
+    elements, M = system.operators(z.constants, -driven)
     solve = factor_symmetric(assemble_elements(system.pattern.unknowns, elements, system.pattern.size), 0.01)
     (heavy,) = (M @ z.vector[:, None]).T
     z_d, other = solve(force), solve(heavy)

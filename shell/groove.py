@@ -20,11 +20,11 @@ import scipy
 from numpy.typing import NDArray
 
 from shell.cross_section import cut
+from shell.elastic import COSINE
 from shell.errors import ShellError, mm
 from shell.imperfection import Pair
 from shell.quadrature import Array, gauss
 from shell.resonator import Resonator
-from shell.solution import COSINE
 from shell.sparse import Index, assemble_elements, dissect, factor_symmetric
 
 Face: TypeAlias = Literal["edge", "inner", "outer"]

@@ -17,7 +17,7 @@ from typing import Literal
 import numpy as np
 
 from shell.cells import CellTable, Reference, tabulate_cells
-from shell.elastic import Elastic
+from shell.elastic import COSINE, SINE, Elastic
 from shell.errors import ShellError
 from shell.finite import displacement_gradients, solved_as_solid, tensor
 from shell.inertia import MassProperties, weigh
@@ -25,7 +25,7 @@ from shell.kernel import StrainTable
 from shell.modes import Mode
 from shell.prestress import expansion_shares, mean_answer, neighbour, settle
 from shell.quadrature import Array, gauss
-from shell.solution import COSINE, SINE, Solution, face_table, total
+from shell.solution import Solution, face_table, total
 from shell.system import Group, ShellGroup, System
 
 Kind = Literal["axial", "lateral", "spin", "pressure", "cooling"]

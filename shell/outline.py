@@ -14,12 +14,13 @@ import numpy as np
 from shell.assembly import build_system, sections
 from shell.blocks import SIDES, Mesh, surface_sides
 from shell.cells import CellTable, Reference, tabulate_cells
+from shell.elastic import Constants
 from shell.errors import ShellError
 from shell.kernel import StrainTable, shell_table
 from shell.layout import LEVELS, Chain
 from shell.quadrature import Array, nodal
 from shell.resonator import Resonator
-from shell.solution import Constants, Solution
+from shell.solution import Solution
 from shell.system import SolidGroup, System
 
 if TYPE_CHECKING:

@@ -25,7 +25,7 @@ from shell.errors import ShellError
 from shell.finite import QuadraticForce, solved_as_solid
 from shell.modes import Mode
 from shell.quadrature import Array
-from shell.solution import Constants, Solution, total
+from shell.solution import Solution, total
 from shell.system import Inertia, ShellGroup, System
 
 STEPS = 600  # of the iteration beside vectors that are left out
@@ -123,7 +123,7 @@ def settle(system: System, mode: Mode, load: Array) -> Solution:
     assert mode.resonator is not None
     rigid = system.rigid_motions
     shift = 1e-2 * constants[0].wave_speed_squared / mode.resonator.size**2 if rigid else 0.0
-    K, M = operators(system, constants, shift)
+    K, M = system.operators(constants, shift)
     factor = Factor(system.pattern, K)
     if not rigid:
         return Solution(system, constants, factor.solve(np.asfortranarray(load[:, None]))[:, 0])
@@ -146,10 +146,3 @@ def answer_without(vectors: Array, factor: Factor, M: Inertia, load: Array, shif
         if np.max(abs(u - before)) <= DONE * np.max(abs(u)):
             return np.asarray(u[:, 0])
     return None
-
-
-def operators(system: System, constants: tuple[Constants, ...], shift: float = 0.0) -> tuple[list[Array], Inertia]:
-    """Stiffness, plus `shift` times mass, of every element, and the mass, of the material at the stations of every group."""
-    lam, G, rho = (list(kind) for kind in zip(*((*c.lame, c.rho) for c in constants), strict=True))
-    uniform = all(np.ptp(field) == 0 for c in constants for field in (c.E, c.nu, c.rho))
-    return system.operators(lam, G, rho, uniform, shift)

@@ -7,12 +7,12 @@ import numpy as np
 
 from shell.assembly import build_system
 from shell.eigen import ElementMass, Factor, Mass, lowest_pairs
-from shell.elastic import Elastic, VaryingElastic
+from shell.elastic import Constants, Elastic, VaryingElastic, find_constants
 from shell.errors import ShellError
 from shell.layout import FIRST, KINDS, LONGEST, ROUGH, Kind, Level, Theory, crowding
 from shell.quadrature import Array
 from shell.resonator import Resonator
-from shell.solution import Constants, Solution, find_constants, total
+from shell.solution import Solution, total
 from shell.surplus import estimate_errors
 from shell.system import ShellGroup, System
 
@@ -186,10 +186,7 @@ def _begin(
         one, two = (float(field[0, 0]) / rho for field in constants[0].lame)
         stiffness = [one * trace + two * shear + shift * mass for trace, shear, mass in units]
         return Factor(pattern, stiffness), ElementMass(pattern, [mass for _, _, mass in units])
-    lam, G, density = (
-        [field / rho for field in fields] for fields in zip(*((*one.lame, one.rho) for one in constants), strict=True)
-    )
-    K, M = system.operators(lam, G, density, uniform, shift)
+    K, M = system.operators(constants, shift, over=rho)
     return Factor(system.pattern, K), M
 
 

@@ -22,7 +22,7 @@ from shell.errors import ShellError
 from shell.finite import solved_as_solid
 from shell.loads import along_r, radii
 from shell.modes import Mode
-from shell.prestress import answer_without, mean_answer, neighbour, operators
+from shell.prestress import answer_without, mean_answer, neighbour
 from shell.quadrature import Array
 from shell.solution import radial, total
 from shell.system import Group
@@ -64,7 +64,7 @@ def spin_shift(mode: Mode, elastic: Elastic) -> SpinShift:
     load = system.gather(forces)
     g = float(solution.vector @ load) / mass
     # (K - λ M)⁺ f without the mode itself, which all higher modes let converge
-    K, M = operators(system, solution.constants)
+    K, M = system.operators(solution.constants)
     moved = answer_without(
         solution.vector[:, None] / np.sqrt(mass), Factor(system.pattern, K), M, load, solution.eigenvalue
     )

@@ -22,12 +22,12 @@ from shell.assembly import sections
 from shell.blocks import open_edges
 from shell.cells import CellTable, Reference, at_gauss_points, cell_stiffness, in_order, tabulate_cells
 from shell.eigen import Factor, Pattern, find_pattern
-from shell.elastic import Elastic, VaryingElastic
+from shell.elastic import Constants, Elastic, VaryingElastic, find_constants
 from shell.kernel import StrainTable, pair_stiffness, shell_table, station_stiffness
 from shell.layout import Chain, Level
 from shell.quadrature import Array, at_gauss, gauss, hierarchic, values_to_hierarchic
 from shell.resonator import Resonator
-from shell.solution import Constants, Solution, find_constants, total
+from shell.solution import Solution, total
 from shell.sparse import Index
 from shell.system import ShellGroup, SolidGroup, System
 

@@ -1,6 +1,6 @@
 """Elements and their matrices: groups of one kind, and the system of all of them on the free unknowns."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TypeAlias
@@ -11,6 +11,7 @@ import scipy
 from shell.blocks import Mesh, Support
 from shell.cells import CellTable, cell_mass, cell_stiffness
 from shell.eigen import Pattern, find_pattern, whole_pattern
+from shell.elastic import Constants, are_uniform
 from shell.kernel import Section, StrainTable, integrate_mass, integrate_stiffness, station_mass, station_stiffness
 from shell.layout import Chain, Level
 from shell.quadrature import Array
@@ -182,13 +183,18 @@ class System:
         return 32.0 * float(sum(group.unknowns.size * group.unknowns.shape[1] for group in self.groups))
 
     def operators(
-        self, lam: list[Array], G: list[Array], rho: list[Array], uniform: bool, shift: float = 0.0
+        self, constants: Sequence[Constants], shift: float = 0.0, once: bool = False, over: float = 1.0
     ) -> tuple[list[Array], "Inertia"]:
-        """Stiffness, plus `shift` (1/s²) times mass, of every element in the order of `pattern`, and the mass."""
+        """Stiffness, plus `shift` (1/s²) times mass, of every element in the order of `pattern`, and the mass, both divided by `over`.
+
+        What costs geometry is kept for the next material unless they are wanted but `once`.
+        """
+        uniform = not once and self.is_small and are_uniform(constants)
         K: list[Array] = []
         M: list[Array] = []
         maps = iter(self.maps)
-        for group, dilation, shear, density in zip(self.groups, lam, G, rho, strict=True):
+        for group, c in zip(self.groups, constants, strict=True):
+            dilation, shear, density = c.lame[0] / over, c.lame[1] / over, c.rho / over
             if isinstance(group, SolidGroup):
                 blocks = np.empty((len(density), *(group.table.gradients.shape[3],) * 2))
                 for here, products in group.portions(self.is_small):
@@ -199,7 +205,7 @@ class System:
                     K += [next(maps).restrict(one) for one in stiffness]
                 M.append(blocks)
                 continue
-            if uniform and self.is_small:
+            if uniform:
                 trace, sheared, mass = group.units
                 stiffness, mass = dilation[0, 0] * trace + shear[0, 0] * sheared, density[0, 0] * mass
             else:

@@ -13,13 +13,14 @@ from numpy.typing import ArrayLike
 from shell.blocks import surface_sides
 from shell.cells import CellTable, Reference, tabulate_cells
 from shell.cross_section import free_edge
+from shell.elastic import Constants
 from shell.errors import ShellError
 from shell.kernel import StrainTable
 from shell.material import Material
 from shell.modes import Mode
 from shell.quadrature import Array, gauss
 from shell.resonator import Resonator
-from shell.solution import Constants, Solution, face_table, plane_energies, total
+from shell.solution import Solution, face_table, plane_energies, total
 from shell.system import ShellGroup, SolidGroup
 
 Kind = Literal["inner", "outer", "edge", "root"]

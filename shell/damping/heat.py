@@ -13,9 +13,10 @@ import numpy as np
 import scipy
 
 from shell.blocks import number_functions
+from shell.elastic import Constants
 from shell.errors import ShellError
 from shell.quadrature import Array
-from shell.solution import Constants, Solution
+from shell.solution import Solution
 from shell.sparse import assemble_elements
 from shell.system import SolidGroup
 

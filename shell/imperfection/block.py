@@ -13,9 +13,9 @@ import numpy as np
 import scipy
 
 from shell.cross_section import cut
+from shell.elastic import Constants
 from shell.quadrature import Array
 from shell.resonator import Resonator
-from shell.solution import Constants
 from shell.sparse import Index, assemble_elements, factor_symmetric
 from shell.system import ShellGroup, System
 
@@ -84,8 +84,7 @@ class Block:
 
 def condense(system: System, constants: tuple[Constants, ...], value: float, pair: Array | None = None) -> Block:
     """One harmonic with its solid parts condensed at λ = value; `pair` is the pair's vector in its own."""
-    lam, G = ([one.lame[which] for one in constants] for which in (0, 1))
-    matrices, mass = system.operators(lam, G, [one.rho for one in constants], False, -value)
+    matrices, mass = system.operators(constants, -value, once=True)
     numbers = system.pattern.unknowns
     around = pi * (2 if system.n == 0 else 1)
     are_shell = [isinstance(group, ShellGroup) for group in system.groups]

@@ -10,11 +10,11 @@ from typing import TypeAlias
 import numpy as np
 
 from shell.cells import CellTable
+from shell.elastic import COSINE, SINE, Constants
 from shell.imperfection.block import Block
 from shell.imperfection.together import Together
 from shell.imperfection.wall import Around
 from shell.quadrature import Array
-from shell.solution import COSINE, SINE, Constants
 from shell.system import SolidGroup
 
 ALONG, AROUND = [0, 2], [1]  # displacements

@@ -21,7 +21,7 @@ from math import pi, sqrt
 import numpy as np
 
 from shell.assembly import lay_system
-from shell.elastic import Elastic, VaryingElastic
+from shell.elastic import Constants, Elastic, VaryingElastic, find_constants
 from shell.errors import ShellError
 from shell.imperfection.basis import PairBasis, products
 from shell.imperfection.block import Block, condense
@@ -36,7 +36,6 @@ from shell.modes import Mode
 from shell.quadrature import Array
 from shell.refinement import solve_level
 from shell.resonator import Resonator
-from shell.solution import Constants, find_constants
 from shell.system import ShellGroup, System
 
 SMALL = 1e-9  # of the largest wave of a field: smaller ones are left out

@@ -17,13 +17,14 @@ from functools import cached_property
 import numpy as np
 
 from shell.cross_section import CrossSection, cut, free_edge
+from shell.elastic import Constants
 from shell.errors import ShellError
 from shell.imperfection.field import Field
 from shell.imperfection.imperfect import fade
 from shell.modes import Mode
 from shell.quadrature import Array
 from shell.resonator import Resonator
-from shell.solution import Constants, Solution, squares_of, surface_energies, total
+from shell.solution import Solution, squares_of, surface_energies, total
 from shell.system import ShellGroup
 
 

@@ -10,11 +10,11 @@ from itertools import pairwise
 import numpy as np
 import scipy
 
+from shell.elastic import Constants
 from shell.imperfection.block import Block
 from shell.kernel import station_mass
 from shell.quadrature import Array
 from shell.resonator import Resonator
-from shell.solution import Constants
 from shell.system import ShellGroup
 
 WORKSPACE = 1 << 19  # numbers that a solve uses and frees again

@@ -22,10 +22,10 @@ from math import ceil, log
 
 import numpy as np
 
+from shell.elastic import Constants
 from shell.imperfection.field import Field, values_around
 from shell.kernel import Section, energy_weights
 from shell.quadrature import Array, gauss, legendre
-from shell.solution import Constants
 
 HEIGHTS = 4  # of a layer, at most: exact to the third power of the height
 MISSED = 1e-8  # what fewer heights may miss: of k of them a layer d of a wall h misses less than (d/h)^k
