@@ -43,7 +43,7 @@ def test_the_pattern_turns_with_the_applied_rate(tmp_path, capsys):
     assert angle[-1] - angle[t == 200][0] == pytest.approx(K * 10 * 800, rel=1e-3)
     assert record["rate_deg_per_s"][-1] == 10
     assert record["measured_rate_deg_per_s"][-1] == pytest.approx(10, rel=1e-9)
-    assert capsys.readouterr().err == ""
+    assert capsys.readouterr().err == f"record: {tmp_path / 'run.csv'}\n"
 
 
 @pytest.mark.slow
