@@ -1,6 +1,5 @@
 """`hrg fleet`: a folder a device, all calibrated and diagnosed, with the lot as prior."""
 
-from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
@@ -43,7 +42,7 @@ def fleet(
     from studies.reports import fleet as parts
     from studies.results.page import render_result
     from studies.sweeps.engine import hire
-    from studies.sweeps.progress import Progress, shown_progress
+    from studies.sweeps.progress import Progress
 
     if Path(out).resolve().is_relative_to(Path(folder).resolve()):
         raise InputError(f"--out {out}: give a folder outside {folder}, where every folder is a device.")
@@ -52,7 +51,7 @@ def fleet(
     if scheduler is not None:  # its workers have other working directories
         folder, out = str(Path(folder).resolve()), str(Path(out).resolve())
     devices = read_lot(folder, card)
-    with nullcontext(Progress()) if quiet else shown_progress(len(devices), 0) as progress:
+    with Progress(len(devices), shown=not quiet) as progress:
         lot = run_lot(devices, out, hire(workers, scheduler), progress)
     for why in lot.failed.values():
         say(f"hrg: {why}")

@@ -1,6 +1,5 @@
 """A task run or resumed in its folder: the store of all its designs, `best.toml` and `evaluations.csv`."""
 
-from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,7 +14,7 @@ from studies.sweeps.engine import hire
 from studies.sweeps.evaluate import WorkPlan
 from studies.sweeps.opening import claim_store
 from studies.sweeps.parameters import set_parameters
-from studies.sweeps.progress import Progress, shown_progress
+from studies.sweeps.progress import Progress
 from studies.sweeps.provenance import describe_environment
 from studies.sweeps.search import Explorer
 from studies.sweeps.store import Store, memory_store
@@ -43,7 +42,7 @@ def optimise(
         _describe(store, task)
         store.begin_run(describe_environment())
         most = task.keys.search.evaluations
-        with shown_progress(most, 0) if show_progress else nullcontext(Progress()) as progress:
+        with Progress(most, shown=show_progress) as progress:
             found = answer(task, Explorer(study, plan, crew, store, progress), plan)
         outcome = "finished"
     finally:

@@ -4,7 +4,6 @@ import json
 import time
 import warnings
 from collections.abc import Mapping
-from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -20,7 +19,7 @@ from studies.sweeps.engine import BATCH, BATCH_VECTORISED, compute, hire, missin
 from studies.sweeps.evaluate import WorkPlan, evaluate_task
 from studies.sweeps.families import Families, choose_solver, why_not
 from studies.sweeps.opening import claim_store
-from studies.sweeps.progress import Progress, shown_progress
+from studies.sweeps.progress import Progress
 from studies.sweeps.provenance import describe_environment
 from studies.sweeps.results import Results, open_results
 from studies.sweeps.search import name_search, run_searches
@@ -239,7 +238,7 @@ def _run(store: Store, study: Study, design: Design, plan: WorkPlan, crew: Worke
     try:
         batches = missing_batches(study, design, store, plan.families is not None)
         done = sum(store.counts().values())
-        with shown_progress(len(design.unique), done) if show_progress else nullcontext(Progress()) as progress:
+        with Progress(len(design.unique), done, show_progress) as progress:
             compute(plan, batches, crew, store, progress)
         run_searches(study, plan, crew, store)
         outcome = "finished"

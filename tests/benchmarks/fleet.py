@@ -18,7 +18,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 from studies.fleet.folder import read_lot
 from studies.fleet.run import run_lot
 from studies.sweeps.engine import hire
-from studies.sweeps.progress import shown_progress
+from studies.sweeps.progress import Progress
 from tests.studies.fleet.lots import CARD, make_lot
 
 BATCH = 20
@@ -42,7 +42,7 @@ def main() -> None:
     begin = time.monotonic()
     out = str(given.folder / "answers") if given.pages else None
     devices = read_lot(str(lot), CARD)
-    with shown_progress(len(devices), 0) as progress:
+    with Progress(len(devices), shown=True) as progress:
         found = run_lot(devices, out, hire(given.workers), progress)
     hours = (time.monotonic() - begin) / 3600.0
     who = resource.RUSAGE_CHILDREN if given.workers > 1 else resource.RUSAGE_SELF

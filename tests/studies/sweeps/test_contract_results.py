@@ -17,7 +17,7 @@ import pytest
 from studies.errors import InputError, MissingEnvironment
 from studies.reports.sweep import study_result
 from studies.results.page import render_result
-from studies.sweeps.progress import Lines
+from studies.sweeps.progress import Progress
 from studies.sweeps.results import export_results
 from studies.sweeps.run import run_study
 from tests.studies.sweeps.processes import environment, rows_of, spec_of, words_of
@@ -107,7 +107,7 @@ def test_template_over_temperature_gives_table_1_and_2_for_any_card(tmp_path, mo
 
 
 def test_progress_says_rate_and_remaining_time():
-    lines = Lines(total=10_000, done=250)
+    lines = Progress(total=10_000, done=250)
     lines.advance(1000, 3)
     text = lines.line(lines.began + 10)
     assert text == "[ 1250/10000] 12.5 % failed=3 rate=100/s eta=00:01:27"
