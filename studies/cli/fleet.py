@@ -4,7 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
-from studies.cli.arguments import COUNT
+from studies.cli.arguments import COUNT, Quiet
 from studies.cli.output import answers, dump_json, say
 from studies.errors import InputError
 from studies.files.writing import write_text
@@ -19,7 +19,7 @@ def fleet(
     card: str | None = None,
     workers: Annotated[int, COUNT] = 1,
     scheduler: str | None = None,
-    quiet: bool = False,
+    quiet: Quiet = False,
 ) -> Result:
     """Calibrate and diagnose all devices of a lot: common causes, odd devices and batches, control charts.
 
@@ -34,7 +34,6 @@ def fleet(
         workers: Devices processed at the same time, some 500 MB each.
         scheduler: Address of a Dask scheduler (tcp://HOST:8786), as for hrg study run, instead of processes here; every
             worker must see both folders under the same paths.
-        quiet: Show no progress.
     """
     from studies.fleet.folder import read_lot
     from studies.fleet.run import run_lot

@@ -9,13 +9,14 @@ from studies.design.answer import Answer, answer
 from studies.design.task import Task, read_task
 from studies.files.writing import write_text
 from studies.instrument.card import Instrument, load_card, save_card
-from studies.sweeps.canonical import PHYSICS_VERSION, digest, spell_material
+from studies.sweeps.canonical import digest
 from studies.sweeps.engine import hire
 from studies.sweeps.evaluate import WorkPlan
 from studies.sweeps.opening import claim_store
 from studies.sweeps.parameters import set_parameters
 from studies.sweeps.progress import Progress
 from studies.sweeps.provenance import describe_environment
+from studies.sweeps.run import describe_study, physics_of
 from studies.sweeps.search import Explorer
 from studies.sweeps.store import Store, memory_store
 
@@ -68,27 +69,12 @@ def _describe(store: Store, task: Task) -> None:
     """Say what the designs in a store depend on: neither objectives nor bounds are part of it."""
     study = task.study
     physics = {
-        "card": {k: v for k, v in study.instrument.content.items() if k not in ("schema", "name", "note")},
-        "material_laws": digest(spell_material(study.instrument.material)),
-        "quantity": study.content["quantity"],
+        **physics_of(study),
         "parameters": list(study.names),
         "start": task.start.tolist(),
         "derived": study.content["derived"],
-        "physics_version": PHYSICS_VERSION,
     }
-    identity = {**physics, "base": digest(physics), "design": ""}
-    store.check_same(identity)
-    instrument = {"name": study.instrument.name, "content": study.instrument.content, "path": study.instrument.path}
-    store.describe(
-        {
-            "identity": identity,
-            "spec": study.content,
-            "instrument": instrument,
-            "folder": study.folder,
-            "cases": 0,
-            "repeats": [],
-        }
-    )
+    describe_study(store, study, {**physics, "base": digest(physics), "design": ""})
 
 
 def _table(found: Answer) -> list[str]:

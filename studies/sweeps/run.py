@@ -77,7 +77,7 @@ def run_study(
         if fresh or not _is_finished(store, study, design, sources):
             if not fresh:
                 families = choose_solver(study, design)
-            _describe(store, study, design, identify(study, design, sources, _describe_families(families)))
+            describe_study(store, study, identify(study, design, sources, _describe_families(families)), design)
             crew = Here() if families else hire(workers, scheduler)
             _run(store, study, design, WorkPlan.of(study, families), crew, show_progress)
     except BaseException:
@@ -157,22 +157,25 @@ def check_functions(study: Study, allowed: bool) -> dict[str, str]:
 
 def identify(study: Study, design: Design, sources: Mapping[str, str], solver: Any) -> dict[str, Any]:
     """Return everything that the results depend on; `base` is the hash of the physics in it."""
-    physics = {
-        "card": {
-            key: value for key, value in study.instrument.content.items() if key not in ("schema", "name", "note")
-        },
-        "reference_temperature": study.instrument.reference_temperature,
-        "material_laws": digest(spell_material(study.instrument.material)),
-        "quantity": study.content["quantity"],
-        "functions": dict(sources),
-        "solver": solver,
-        "physics_version": PHYSICS_VERSION,
-    }
+    physics = {**physics_of(study), "functions": dict(sources), "solver": solver}
     spec = {key: value for key, value in study.content.items() if key not in (*FREE, "card", "quantity")}
     return {**physics, "base": digest(physics), "spec": spec, "design": design.digest}
 
 
-def _describe(store: Store, study: Study, design: Design, identity: Mapping[str, Any]) -> None:
+def physics_of(study: Study) -> dict[str, Any]:
+    """Return what every design's results depend on."""
+    card = study.instrument
+    return {
+        "card": {key: value for key, value in card.content.items() if key not in ("schema", "name", "note")},
+        "reference_temperature": card.reference_temperature,
+        "material_laws": digest(spell_material(card.material)),
+        "quantity": study.content["quantity"],
+        "physics_version": PHYSICS_VERSION,
+    }
+
+
+def describe_study(store: Store, study: Study, identity: Mapping[str, Any], design: Design | None = None) -> None:
+    """Note in a store what it is of; InputError where it is of another study."""
     store.check_same(identity)
     instrument = study.instrument
     store.describe(
@@ -187,8 +190,8 @@ def _describe(store: Store, study: Study, design: Design, identity: Mapping[str,
                 "path": instrument.path,
             },
             "folder": study.folder,
-            "cases": len(design.unique),
-            "repeats": design.inverse.tolist() if len(design.unique) < len(design.values) else [],
+            "cases": 0 if design is None else len(design.unique),
+            "repeats": design.inverse.tolist() if design and len(design.unique) < len(design.values) else [],
         }
     )
 
@@ -202,7 +205,7 @@ def _is_finished(store: Store, study: Study, design: Design, sources: Mapping[st
     identity = identify(study, design, sources, solver)
     if json.loads(spell(identity)) != store.about()["identity"]:
         return False
-    _describe(store, study, design, identity)
+    describe_study(store, study, identity, design)
     return True
 
 
