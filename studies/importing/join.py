@@ -198,14 +198,6 @@ def convert(table: RawTable, column: ColumnMap) -> "Array":
     """Return a raw column in the unit of the record: sign × unit(reading × scale + offset)."""
     reading = np.where(_is_dropout(table, column), np.nan, _reading(table, column))
     values = column.sign * column.conversion.convert(reading, *column.settings)
-    if (
-        column.target.endswith("temperature_degC")
-        and (outside := np.flatnonzero((values < -200) | (values > 200))).size
-    ):
-        raise InputError(
-            f"{table.place(outside[0])}: '{column.source}' becomes {values[outside[0]]:g} °C; check unit, scale and offset"
-            " in the map."
-        )
     check_plausible({column.target: values}, lambda row: f"{table.place(row)}, '{column.source}'")
     return np.asarray(values, dtype=float)
 

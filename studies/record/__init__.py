@@ -46,6 +46,7 @@ COMMANDED = ("chamber_temperature_degC", "rate_deg_per_s", "drive_amplitude_V", 
 RESONATOR = "resonator_temperature_degC"
 LIMITS = {
     # what a column can be, by the end of its name: lowest, highest
+    "_degC": (-200.0, 200.0),
     "_Hz": (1e-6, 1e12),  # 0 is a dropout of the counter
     "_deg_per_h": (-1e10, 1e10),
     "_deg_per_s": (-1e6, 1e6),
@@ -152,7 +153,6 @@ def read_record(path: str | Path) -> Record:
     table = read_columns(path, COLUMNS, required=("time_s",), prefixes=(COMPENSATED,))
     table.refuse(np.isnan(table.values["time_s"]), "time_s is empty; every row needs its time.")
     table.check_order("time_s", "time_s does not increase; sort the rows and remove repeated ones.")
-    _check_temperatures(table)
     check_plausible(table.values, table.place)
     notes = _read_notes(path, table)
     return Record(table.values, str(path), table.sha256, **notes)  # type: ignore[arg-type]
@@ -162,9 +162,8 @@ def read_frequency_table(path: str | Path) -> Columns:
     """Read a steady-state table `temperature_degC,frequency_Hz` (HRG paper, Table 1); no value may be missing."""
     table = read_columns(path, TABLE_COLUMNS, required=TABLE_COLUMNS)
     table.require(TABLE_COLUMNS, "a steady-state table")
-    _check_temperatures(table)
+    check_plausible(table.values, table.place)
     f = table.values["frequency_Hz"]
-    table.refuse(f <= 0, "frequency_Hz must be positive.")
     usual = float(np.median(f))
     far = f"is far from the others (median {usual:.6g} Hz); correct or remove the line."
     table.refuse(np.abs(np.log(f / usual)) > FAR, lambda row: f"frequency_Hz = {f[row]:g} {far}")
@@ -203,7 +202,7 @@ def read_profile(path: str | Path) -> Columns:
     table = read_columns(path, PROFILE_COLUMNS, required=PROFILE_COLUMNS)
     table.require(PROFILE_COLUMNS, "a profile")
     table.check_order("time_s", "time_s does not increase; sort the rows.")
-    _check_temperatures(table)
+    check_plausible(table.values, table.place)
     return table
 
 
@@ -230,21 +229,12 @@ def check_plausible(columns: Mapping[str, Array], where: Callable[[int], str]) -
         wrong = (values < low) | (values > high)
         if wrong.any():
             row = int(wrong.argmax())
+            kelvin = name.endswith("_degC") and 200 < values[row] < 500
+            hint = "it looks like kelvin, subtract 273.15" if kelvin else "check its unit"
             raise InputError(
-                f"{where(row)}: {name} = {values[row]:g} is not a possible reading (allowed: {low:g} to {high:g}); check its"
-                " unit, or leave the cell empty where the value is missing."
+                f"{where(row)}: {name} = {values[row]:g} is not a possible reading (allowed: {low:g} to {high:g}); {hint}, or"
+                " leave the cell empty where the value is missing."
             )
-
-
-def _check_temperatures(table: Columns) -> None:
-    for name, values in table.values.items():
-        if name.endswith("temperature_degC"):
-            table.refuse(np.abs(values) > 200, lambda row: _misread(name, values[row]))  # noqa: B023
-
-
-def _misread(name: str, value: float) -> str:
-    hint = "it looks like kelvin: subtract 273.15" if 200 < value < 500 else "check its unit"
-    return f"{name} = {value:g} cannot be in °C; {hint}."
 
 
 def _read_notes(path: str | Path, table: Columns) -> dict[str, object]:

@@ -163,8 +163,9 @@ def test_recovery_dome_at_8_khz(tmp_path):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["light-cylinder", "robust-dome"])
 def test_recovery_worked_designs(name, tmp_path):
-    """From one start: limits are kept with their margins by full solves, something holds the objective back, and no design seen is better."""
-    task = write(tmp_path, shipped_tasks()[name].read_text(encoding="utf-8") + "\n[search]\nstarts = 1\n")
+    """Limits are kept with their margins by full solves, something holds the objective back, and no design seen is better."""
+    search = "\n[search]\nstarts = 1\n" if name == "robust-dome" else ""  # steps need more than one start
+    task = write(tmp_path, shipped_tasks()[name].read_text(encoding="utf-8") + search)
     found = optimise(task, workers=1)
     assert found.verified == pytest.approx(found.after, rel=1e-9)
     assert all(limit.room - limit.margin > -2e-6 * abs(limit.limit) for limit in found.limits)
