@@ -16,6 +16,7 @@ from compensation.ringdown.window import find_end, find_free, find_jump
 RESOLVED = 3.0  # standard deviations above zero from which a split has an axis
 LENGTHS = ("split_Hz", "damping_split_per_s")
 DRAWS = 2000
+ALIKE = 1e-6  # relative: two pick-offs differ by more, files of nine digits round to less
 SAID_OF = {
     "hardening": "The frequency depends on the amplitude (cubic stiffness)",
     "thickening": "The damping depends on the amplitude",
@@ -26,7 +27,7 @@ def analyse_decay(envelope: Envelope, *, harmonic: int = 2) -> RingDown:
     """Find the free decay in an envelope and return its frequencies, Q and axes with intervals."""
     if len(envelope.values) == 2:
         x, y = envelope.values
-        if np.linalg.norm(y - np.vdot(x, y) / np.vdot(x, x) * x) < 1e-9 * np.linalg.norm(y):
+        if np.linalg.norm(y - np.vdot(x, y) / np.vdot(x, x) * x) < ALIKE * np.linalg.norm(y):
             raise CompensationError("the two channels carry the same signal; give each pick-off its own column.")
     jump = find_jump(envelope)
     given = envelope
