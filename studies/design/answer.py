@@ -172,19 +172,19 @@ def _refuse_infeasible(search: Search, best: int) -> None:
             unit, side = search.task.unit(column), "above" if sign > 0 else "below"
             value = shown(column, values[search.task.columns.index(column)])
             kept = ", its margin for tolerances included," if sign * (value - limit) < over - EXACT * abs(limit) else ""
-            words.append(f"{column} = {value:.6g} {unit} lies{kept} {over:.3g} {side} its limit {limit:.6g}")
+            words.append(f"{column} = {value:.6g} {unit} is{kept} {over:.4g} {side} its limit {limit:.6g}")
     at = ", ".join(
         f"{name} = {value:.6g}"
         for name, value in zip(search.task.study.names, search.low + search.x[best] * search.width, strict=True)
     )
     ends = [
-        f"{p.name} at {'its low' if x < 0.5 else 'its high'} end"
+        f"{p.name} is at its {'low' if x < 0.5 else 'high'} end"
         for p, x in zip(search.task.study.parameters, search.x[best], strict=True)
         if min(x, 1 - x) < BOXES[-1] / 10
     ]
-    bound = f" There {' and '.join(ends)}: wider bounds may help." if ends else ""
+    bound = f" There, {' and '.join(ends)}: wider bounds may help." if ends else ""
     raise InputError(
-        f"no design found meets all constraints. The nearest one, {at}, has {'; '.join(words)}.{bound} Relax one of these"
+        f"no design found meets all constraints. In the nearest one, {at}, {'; '.join(words)}.{bound} Relax one of these"
         " constraints or widen the bounds; the designs computed are kept."
     )
 

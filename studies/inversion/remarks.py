@@ -44,10 +44,11 @@ def unexplained(
     ]
     i = max(range(len(away)), key=lambda i: away[i][0])
     distance, m = away[i]
-    near = (
-        f"; the nearest, n = {every[m].harmonic} at {np.exp(g[m]):.6g} Hz, is {distance:.2g} standard deviations away"
-    )
+    near = "; the card has no such mode near it"
+    if m >= 0:
+        mode = f"n = {every[m].harmonic} at {np.exp(g[m]):.6g} Hz"
+        near = f"; the nearest, {mode}, is {distance:.2g} standard deviations away"
     return (
         f"{readings.path}: no assignment explains all readings within the card's tolerances; line {readings.lines[i]}"
-        f" ({readings.frequency[i]:.6g} Hz) fits least{near if m >= 0 else ''}. Leave it out, or widen the tolerances."
+        f" ({readings.frequency[i]:.6g} Hz) fits least{near}. Leave it out, or widen the tolerances."
     )
