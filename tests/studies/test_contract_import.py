@@ -259,7 +259,7 @@ def test_a_regular_grid(tmp_path):
         (('separator = ";"', 'separator = ","'), "check separator"),
         (('encoding = "cp1252"', 'encoding = "utf-8"'), "cp1252 is common"),
         (('missing = ["---"]', "missing = []"), "line 10: '---'"),
-        (('unit = "degC"', 'unit = "K"'), "check unit"),
+        (('unit = "degC"', 'unit = "K"'), "check its unit"),
         (('unit = "degC"', 'unit = "C"'), "known: degC, mdegC, K, degF"),
         (("housing_temperature_degC", "housing_temp_degC"), "did you mean 'housing_temperature_degC'"),
         (("%d.%m.%Y", "%m.%d.%Y"), "is not a time"),
