@@ -63,8 +63,6 @@ def mix_down(time: ArrayLike, channels: ArrayLike, carrier: float | None = None)
     x = np.atleast_2d(np.asarray(channels, dtype=np.float64))
     if t.size < 64:
         raise CompensationError(f"a decay of raw samples needs 64 rows or more, not {t.size}.")
-    if not np.nanvar(x, axis=1).any():
-        raise CompensationError("the samples are all 0 or alike: nothing was recorded; check the pick-off.")
     step, rows = even_rows(t)
     t = t[0] + step * rows if np.max(np.abs(t - t[0] - step * rows)) < WRITTEN * step else t
     rate = 1 / step
@@ -74,6 +72,8 @@ def mix_down(time: ArrayLike, channels: ArrayLike, carrier: float | None = None)
         raise CompensationError(
             f"the frequency {carrier:.6g} Hz is not below half the sampling rate of {rate:.6g} Hz; sample faster."
         )
+    if not np.nanvar(x, axis=1).any():
+        raise CompensationError("the samples are all 0 or alike: nothing was recorded; check the pick-off.")
     period = rate / carrier  # in samples
     # the block holds a whole number of half periods as nearly as may be
     least = max(t.size / MOST_BLOCKS, 8 * period)
