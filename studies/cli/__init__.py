@@ -31,7 +31,7 @@ CHAPTERS: dict[str, dict[str, str]] = {
         "modes": "Frequencies, Bryan factors and sensitivities of the modes.",
         "tcf": "Temperature coefficient of the frequency and its contributions.",
         "loss": "Q over temperature, with loss contributions and what to reduce first.",
-        "loads": "Frequency shift, stress and tilt by acceleration, rotation, pressure, warmth.",
+        "loads": "Frequency shift, stress and tilt under acceleration, rotation, pressure, gradients.",
         "loop": "Control loops: stability margins, bias and noise by source, start-up, runs.",
         "compare": "Compare designs: differences between cards and their effects.",
         "optimise": "Find dimensions for objectives under constraints, with tolerances.",

@@ -71,7 +71,7 @@ def loads(
         across: Acceleration of the base across the axis in g.
         rotation: Rate of rotation about the axis in °/s.
         pressure: Pressure of the gas around the resonator in kPa.
-        gradient: Temperature of the base less that of the free end in °C, falling evenly along the meridian.
+        gradient: Temperature of the base minus that of the free end in °C, linear along the meridian.
         strength: Strength in MPa that the largest stress is compared with.
     """
     instrument, T = open_card(card, temperature)

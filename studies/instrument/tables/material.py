@@ -27,10 +27,10 @@ GIVEN = {
 
 
 ByValue = Annotated[
-    float, number("a of a + b x + ½ c x², which is added to the property or, as log_value, to its logarithm")
+    float, number("a in a + b x + ½ c x², which is added to the property (log_value: to its logarithm)")
 ]
-BySlope = Annotated[float, number("b of it; x = T − T_ref")]
-ByCurvature = Annotated[float, number("c of it")]
+BySlope = Annotated[float, number("b in a + b x + ½ c x²; x = T − T_ref")]
+ByCurvature = Annotated[float, number("c in a + b x + ½ c x²")]
 
 
 class PropertyFactor(Keys, frozen=True, kw_only=True):
