@@ -65,6 +65,7 @@ class CardProblem:
     runs: tuple[ObservedRun, ...]
     law: "FrequencyLaw"
     tables: tuple[SettledTable, ...] = ()
+    among: tuple[str, ...] = ()  # effects that are looked for; all where none is named
 
     @cached_property
     def parts(self) -> tuple[Part, ...]:

@@ -42,6 +42,11 @@ class Parameter:
         return not self.steady or (self.refined and value > self.low)
 
     @property
+    def is_run(self) -> bool:
+        """Whether it is the place of a run in the campaign, from 0."""
+        return self.name in ("run", "from_run")
+
+    @property
     def unit(self) -> str:
         """The unit that the name ends with."""
         return next((u for u in ("degC", "deg_per_10K", "deg", "K", "s") if self.name.endswith(f"_{u}")), "1")

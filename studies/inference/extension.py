@@ -1,7 +1,6 @@
 """The extended model: the card with the named effects as `[[effect]]` tables, calibrated against the records by the one simulation."""
 
 from collections.abc import Callable
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,7 +9,7 @@ from numpy.typing import NDArray
 from studies.diagnosis.verdict import Interval
 from studies.effects import Parameter
 from studies.inference.diagnosis import Inference
-from studies.inference.model import Background, Term
+from studies.inference.model import Term
 from studies.inference.verdict import parameters_of
 from studies.record import Record
 
@@ -20,8 +19,6 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 WIDER = 3.0
 """Of what a diagnosis knows of an effect, the prior with which a calibration finds it anew beside all other values."""
-SURE = 3.0
-"""Log evidence, twenty to one, by which fewer members of a family must be likelier than all of them."""
 
 
 def extend(found: Inference, progress: Callable[[str], None] = lambda words: None) -> "Calibration":
@@ -29,35 +26,14 @@ def extend(found: Inference, progress: Callable[[str], None] = lambda words: Non
     from studies.calibration.calibrate import calibrate
 
     progress("calibrating the extended card")
-    background = found.background
-    for k in range(len(background.terms)):
-        background = definite(found, background, k)
-    named = [entry_of(found, background, k) for k, term in enumerate(background.terms) if not term.effect.once]
+    named = [entry_of(found, k) for k, term in enumerate(found.final.terms) if not term.effect.once]
     card = found.card.with_table("effect", [*found.card.content.get("effect", []), *named])
     return calibrate(card, without_events(found), profile=False, progress=progress, keep=False)
 
 
-def definite(found: Inference, background: Background, k: int) -> Background:
-    """Return the model with a family cut down to its definite curve, where that is likelier by `SURE`; else the family stays whole."""
-    term = background.terms[k]
-    if len(term.members) == 1:
-        return background
-    count = len(term.members)
-    others = replace(background, terms=(*background.terms[:k], *background.terms[k + 1 :]))
-    one = replace(
-        term,
-        columns={name: np.delete(own, slice(1, count), axis=1) for name, own in term.columns.items()},
-        members=term.members[:1],
-        unit=np.delete(term.unit, slice(1, count)),
-    )
-    whole, single = others.with_term(term), others.with_term(found.search.polish(others, one))
-    kept = single[0] if single[1] > whole[1] + SURE else term
-    return replace(background, terms=(*background.terms[:k], kept, *background.terms[k + 1 :]))
-
-
-def entry_of(found: Inference, background: Background, k: int) -> dict[str, Any]:
+def entry_of(found: Inference, k: int) -> dict[str, Any]:
     """Return the `[[effect]]` table of a term, without the coefficients that are 0; numbers are as uncertain as a prior."""
-    term = background.terms[k]
+    background, term = found.background, found.final.terms[k]
     effect = term.effect
     values = np.zeros(effect.spread.size)
     values[list(term.members)] = background.coefficients(k)[0][: len(term.members)]

@@ -26,6 +26,10 @@ MARGIN, UNSTATED, FURTHER = 4.0, 1.0, 0.06
 NEAR = 0.35, 15.0
 """Part of the best scan, less so much, down to which contenders are refitted."""
 HOPELESS = -3.0
+FORMS = 3
+"""Times that the form of an effect that depends on its own size is computed anew."""
+SURE = 3.0
+"""Log evidence, twenty to one, by which the definite curve of a family must be likelier than all of it."""
 SUSPICIOUS, SUSPECTS = 3.0, 2
 """Slow noise within a run over that of a row, from which on effects are tried with values of their own, and how many."""
 Report = Callable[[str], None]
@@ -116,9 +120,16 @@ class Search:
         """Prior standard deviations of members in a strong case."""
         return np.asarray(effect.spread[list(members)] * self.signatures.size(effect, response))
 
-    def term(self, effect: Effect, response: str, shape: tuple[float, ...], price: float = PRICE) -> Term:
-        """Return a term with all members of the effect that have a prior."""
-        members = tuple(int(k) for k in np.flatnonzero(effect.spread > 0))
+    def term(
+        self,
+        effect: Effect,
+        response: str,
+        shape: tuple[float, ...],
+        price: float = PRICE,
+        members: tuple[int, ...] = (),
+    ) -> Term:
+        """Return a term with some members of the effect, or all that have a prior."""
+        members = members or tuple(int(k) for k in np.flatnonzero(effect.spread > 0))
         starts = self.signatures.remembers(effect, shape)
         columns = self.signatures.of_term(effect, shape, response, members, starts)
         unit = self.unit(effect, response, members)
@@ -176,7 +187,8 @@ class Search:
 
     def moved(self, term: Term, shape: tuple[float, ...]) -> Term:
         """Return a term with another shape."""
-        return replace(self.term(term.effect, term.response, shape, term.price), scale=term.scale, bend=term.bend)
+        own = self.term(term.effect, term.response, shape, term.price, term.members)
+        return replace(own, scale=term.scale, bend=term.bend)
 
     def contenders(self, now: Hypothesis) -> list[Hypothesis]:
         """Return the models with one effect more, best first: each with shape, noise and size of its own where it is near enough."""
@@ -219,16 +231,43 @@ class Search:
                 break
             self.progress(f"{tried[0].terms[-1].effect.name} explains {tried[0].score - now.score:.0f} of log evidence")
             now = self._without_idle(_credited(self.settle(tried[0].terms, tried[0].noise), now), plain)
-        return plain, self._tuned(now)
+        return plain, self._definite(self._tuned(now))
+
+    def _definite(self, now: Hypothesis) -> Hypothesis:
+        """Cut families down to their definite curves, wherever of their shapes these are, where that is likelier by `SURE`."""
+        for k, term in enumerate(now.terms):
+            if len(term.members) == 1:
+                continue
+            others = (*now.terms[:k], *now.terms[k + 1 :])
+            beside, found = Background(self.linear, others, now.noise), []
+            for own in self.shapes_of([(term.effect, term.response)]):
+                if 0 in own.members:
+                    first = own.members.index(0)
+                    columns = {name: one[:, :, first : first + 1] for name, one in own.columns.items()}
+                    gain = self.gains(beside, replace(own, members=(0,), columns=columns)).max(axis=0)
+                    found.append((float(gain.max()), own.shapes[int(np.argmax(gain))]))
+            if not found:
+                continue
+            one = self.polish(beside, self.term(term.effect, term.response, max(found)[1], term.price, (0,)))
+            there = self._with(now, k, replace(beside.with_term(one)[0], brought=term.brought))
+            now = there if there.score > now.score + SURE else now
+        return now
 
     def _tuned(self, now: Hypothesis) -> Hypothesis:
         """Move the shapes to where they are likeliest in the noise that the model leaves, not in that of the model before."""
         for k, term in enumerate(now.terms):
             others = (*now.terms[:k], *now.terms[k + 1 :])
             here = self.polish(Background(self.linear, others, now.noise), term, anew=False)
-            there = self.settle((*now.terms[:k], here, *now.terms[k + 1 :]), now.noise)
+            there = self._with(now, k, here)
             now = there if there.score > now.score else now
+            for _ in range(FORMS if term.effect.sees_heat else 0):  # its form is that of its own size
+                size = float(np.clip(Background(self.linear, now.terms, now.noise).coefficients(k)[0][0], 0.0, 1.0))
+                now = self._with(now, k, self.moved(now.terms[k], (size, *now.terms[k].shape[1:])))
         return now
+
+    def _with(self, now: Hypothesis, k: int, term: Term) -> Hypothesis:
+        """Return a model with another term in one place."""
+        return self.settle((*now.terms[:k], term, *now.terms[k + 1 :]), now.noise)
 
     def needed(self, term: Term, others: Sequence[Term]) -> float:
         """Return the log posterior that a cause must bring beside others."""

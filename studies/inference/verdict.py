@@ -124,13 +124,17 @@ def _cause(found: Inferred, k: int) -> Cause:
     numbers = parameters_of(found.background, found.search.signatures, k)
     own = next(iter([columns for name, columns in term.columns.items() if name == term.response]))
     change = own @ found.background.coefficients(k)[0]
+    told = dict(numbers)
+    for one in term.effect.shape:
+        if one.is_run:
+            told[one.name] = Interval.about(float(found.campaign.numbers[int(numbers[one.name].value)]), 0.0)
     shapes = {rival.terms[-1].effect.name: _shape_of(rival.terms[-1]) for rival in reversed(outcome.rivals[k])}
     return Cause(
         names[0],
         term.response,
         probability,
         tuple(sorted(names[1:])),
-        numbers,
+        told,
         2.0 * max(found.final.score - outcome.without[k].score, 0.0),
         peak=float(np.ptp(change)),
         shapes=shapes | {term.effect.name: numbers},
