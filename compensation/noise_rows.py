@@ -27,6 +27,7 @@ COARSE = 150
 """Most rows of a run from which noise is estimated in a model with many unknowns."""
 LEAST, MOST = -7.0, 8.0  # ln of the rms of slow noise within a run over that of a row's white noise
 KINDS = ("white", "flicker", "walk", "offset")
+WHITE, TOO_QUIET = -0.3, 1.0  # ln of white noise over the scatter of neighbouring rows: where the search begins, and how far below it is odd
 USUAL, SPREAD = -1.0, 3.0  # their weak prior, which keeps a level that the rows say nothing about from running away
 STATED_SPREAD = 0.7  # the same about ln of a level that is stated: a factor of 2
 
@@ -237,7 +238,7 @@ def estimate_noise(
             slopes[0] += 2 * surprise / spread * absolute
         return total, slopes
 
-    first = np.array([-0.3, *[USUAL] * len(free)])
+    first = usual = np.array([WHITE, *[USUAL] * len(free)])
     if near is not None and near.white > 0:
         white = near.white / root
         slow = [max(getattr(near, kind) / unit[kind] / white, float(np.exp(LEAST))) for kind in free]
@@ -254,6 +255,8 @@ def estimate_noise(
     for start in _other_slow(found.x, free):  # what is slow may be of another kind than where the search began
         if objective(start)[0] < found.fun:
             found = min(found, search(start), key=lambda one: one.fun)
+    if found.x[0] < WHITE - TOO_QUIET:  # slow noise that stands for the scatter of rows may only be a lesser optimum
+        found = min(found, search(usual), key=lambda one: one.fun)
     return levels(found.x)
 
 
