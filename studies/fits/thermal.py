@@ -148,8 +148,7 @@ def _of_terms(found: Inference, times: float) -> Iterator[tuple[str, ThermalEsti
     names = [term.effect.name for term in background.terms]
     if RADIATION not in names:
         share_of_form, exchange = 0.0, 1.0
-        own = found.search.term(find_effect(RADIATION), "frequency_Hz", (share_of_form, exchange))
-        term = background.with_term(own)[0]
+        term = found.search.term(find_effect(RADIATION), "frequency_Hz", (share_of_form, exchange))
         background = replace(background, terms=(*background.terms, replace(term, scale=1.0)))
     for k in range(len(background.terms)):
         for key, own in parameters_of(background, signatures, k).items():
