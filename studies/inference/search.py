@@ -26,8 +26,8 @@ MARGIN, UNSTATED, FURTHER = 4.0, 1.0, 0.06
 NEAR = 0.35, 15.0
 """Part of the best scan, less so much, down to which contenders are refitted."""
 HOPELESS = -3.0
-FORMS = 3
-"""Times that the form of an effect that depends on its own size is computed anew."""
+FORMS, TUNED = 3, 0.5
+"""Most times that a shape is moved anew in the noise that it leaves, or the form of an effect that depends on its own size is computed, and the log evidence that another time must bring."""
 SURE = 3.0
 """Log evidence, twenty to one, by which the definite curve of a family must be likelier than all of it."""
 SUSPICIOUS, SUSPECTS = 3.0, 2
@@ -256,10 +256,13 @@ class Search:
     def _tuned(self, now: Hypothesis) -> Hypothesis:
         """Move the shapes to where they are likeliest in the noise that the model leaves, not in that of the model before."""
         for k, term in enumerate(now.terms):
-            others = (*now.terms[:k], *now.terms[k + 1 :])
-            here = self.polish(Background(self.linear, others, now.noise), term, anew=False)
-            there = self._with(now, k, here)
-            now = there if there.score > now.score else now
+            for _ in range(FORMS):  # the noise that a better shape leaves moves the shape again
+                others = (*now.terms[:k], *now.terms[k + 1 :])
+                here = self.polish(Background(self.linear, others, now.noise), now.terms[k], anew=False)
+                there = self._with(now, k, here)
+                gained, now = there.score - now.score, max(there, now, key=lambda one: one.score)
+                if gained < TUNED:
+                    break
             for _ in range(FORMS if term.effect.sees_heat else 0):  # its form is that of its own size
                 size = float(np.clip(Background(self.linear, now.terms, now.noise).coefficients(k)[0][0], 0.0, 1.0))
                 now = self._with(now, k, self.moved(now.terms[k], (size, *now.terms[k].shape[1:])))
