@@ -54,7 +54,7 @@ def fit_thermal(*data: Records, card: str | None = None, lags: int = 2, confiden
             f"{data[0]}: the records determine no time constant. Record steps or ramps of 10 K or more that last"
             " at least five times the resonator's time constant."
         )
-    left, rows = found.inference.left["frequency_Hz"], found.inference.rows["frequency_Hz"]
+    left = found.inference.left["frequency_Hz"]
     estimates = {
         name: row_of(e, "value", "low", "high") | {"determined": e.value is not None}
         for name, e in found.estimates.items()
@@ -63,7 +63,7 @@ def fit_thermal(*data: Records, card: str | None = None, lags: int = 2, confiden
         "data": data,
         **row_of(found, "confidence", "undetermined", initial_departure_K="departures"),
         "estimates": estimates,
-        "residual_rms_Hz": rows.rms,
+        "residual_rms_Hz": found.residual_rms,
         "left_over": left.input if left.significant else None,
         "notes": found.inference.campaign.notes,
     }
@@ -78,7 +78,7 @@ def fit_thermal(*data: Records, card: str | None = None, lags: int = 2, confiden
         "Thermal time constants",
         f"Lag of the resonator behind its housing in {', '.join(data)}.",
         [
-            Table("Thermal constants", table, columns, f"Residual {rows.rms:.2g} Hz rms."),
+            Table("Thermal constants", table, columns, f"Residual {found.residual_rms:.2g} Hz rms."),
             *(Sentence(OPEN.format(words), "warning") for words in groups),
             Sentence(MISFIT.format(left.input), "warning") if left.significant else None,
             Figure(lambda: _draw(found), "Residual of the frequency, all runs in order."),

@@ -58,6 +58,12 @@ class ThermalFit:
     undetermined: tuple[tuple[str, ...], ...]
     departures: tuple[float, ...]
 
+    @property
+    def residual_rms(self) -> float:
+        """Rms of what is left of the rows, Hz, about the mean of each run: slow noise carries the level off."""
+        rows = self.inference.rows["frequency_Hz"].residual
+        return float(np.sqrt(np.mean(np.concatenate([own - own.mean() for own in rows]) ** 2)))
+
 
 def fit_thermal_constants(
     records: Sequence[Record],
