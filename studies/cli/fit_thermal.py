@@ -2,9 +2,10 @@
 
 With --json one object, schema `hrg.fit-thermal/2`: `data`, `confidence`, `estimates` (by name: `value`, null where not
 `determined`, `low`, `high`), `undetermined` (groups of constants that the records cannot separate),
-`initial_departure_K` per run, `residual_rms_Hz`, `left_over`, `notes`.
+`initial_departure_K` per run, `reference_temperature_degC` of the law, `residual_rms_Hz`, `left_over`, `notes`.
 """
 
+from shell.constants import zero_Celsius
 from studies.cli.arguments import Confidence, Records
 from studies.cli.output import Told, answers, say
 from studies.errors import InputError
@@ -54,7 +55,7 @@ def fit_thermal(*data: Records, card: str | None = None, lags: int = 2, confiden
             f"{data[0]}: the records determine no time constant. Record steps or ramps of 10 K or more that last"
             " at least five times the resonator's time constant."
         )
-    left = found.inference.left["frequency_Hz"]
+    left, reference = found.inference.left["frequency_Hz"], found.inference.card.reference_temperature - zero_Celsius
     estimates = {
         name: row_of(e, "value", "low", "high") | {"determined": e.value is not None}
         for name, e in found.estimates.items()
@@ -63,6 +64,7 @@ def fit_thermal(*data: Records, card: str | None = None, lags: int = 2, confiden
         "data": data,
         **row_of(found, "confidence", "undetermined", initial_departure_K="departures"),
         "estimates": estimates,
+        "reference_temperature_degC": reference,
         "residual_rms_Hz": found.residual_rms,
         "left_over": left.input if left.significant else None,
         "notes": found.inference.campaign.notes,
@@ -78,10 +80,15 @@ def fit_thermal(*data: Records, card: str | None = None, lags: int = 2, confiden
         "Thermal time constants",
         f"Lag of the resonator behind its housing in {', '.join(data)}.",
         [
-            Table("Thermal constants", table, columns, f"Residual {found.residual_rms:.2g} Hz rms."),
+            Table(
+                "Thermal constants",
+                table,
+                columns,
+                f"Reference temperature {reference:.4g} °C; residual {found.residual_rms:.2g} Hz rms.",
+            ),
             *(Sentence(OPEN.format(words), "warning") for words in groups),
             Sentence(MISFIT.format(left.input), "warning") if left.significant else None,
-            Figure(lambda: _draw(found), "Residual of the frequency, all runs in order."),
+            Figure(lambda: _draw(found), "Residual of the frequency in each run."),
         ],
     )
 
