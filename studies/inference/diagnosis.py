@@ -54,6 +54,8 @@ FAR = 2.0
 """The same, beyond which the search begins from the card's own values too."""
 STRAIGHT = 1.0
 """The same, up to which further effects are looked for beside one before the model is linearised anew."""
+FAINT = 60.0
+"""Log evidence up to which a cause whose definite coefficients may all be 0 is not named: of 13 such names on 127 judged campaigns all 7 below were wrong, 4 of 6 above right."""
 SAME_PATH = 0.02
 """Part of its range by which the resonator's temperature may move before the columns of all effects are computed anew."""
 
@@ -278,13 +280,14 @@ def _from(start: CardFit, told: Array | None, progress: Report) -> tuple[Search,
 def _confirmed(
     search: Search, outcome: Outcome, plain: Model
 ) -> tuple[Outcome, dict[str, tuple[float | None, float | None]], dict[str, Rows]]:
-    """Leave out causes whose model predicts unseen rows no better than the card alone, the weakest first."""
+    """Leave out faint causes of no definite size, and those whose model predicts unseen rows no better than the card alone, the weakest first."""
     events = any(term.effect.event for term in outcome.final.terms)
     by_record = len(search.linear.problem.runs) > 1 and not events
     alone = plain.residuals(plain.kept(plain.mean()))
     before = plain.held_out(by_record, alone)
     while True:
         final = outcome.final
+        beside = Background(search.linear, final.terms, final.noise)
         model = Model(search.linear, search.signatures, final.terms, final.noise)
         rows = model.residuals(model.kept(model.mean())) if final.terms else alone
         after = model.held_out(by_record, rows) if final.terms else before
@@ -293,6 +296,7 @@ def _confirmed(
             for k, name in enumerate(term.response for term in final.terms)
             if _worse(*before[name].beside(after[name]))
             or rows[name].rms > alone[name].rms
+            or (final.score - outcome.without[k].score < FAINT and not beside.sized(k))
             or only_apart(search, outcome, k)
         ]
         if not weak:

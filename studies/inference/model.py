@@ -295,6 +295,15 @@ class Background:
         spread = self.terms[k].spread
         return mean[own] * spread, covariance[own, own] * np.outer(spread, spread)
 
+    def sized(self, k: int) -> bool:
+        """Whether the definite coefficients of a term are not all 0, by 90 % of what is known of them together: cᵀC⁻¹c against χ²."""
+        term = self.terms[k]
+        firsts = np.cumsum([0, *(len(one.spread) for one in term.effect.coefficients[:-1])])
+        own = [term.members.index(first) for first in firsts if first in term.members]
+        mean, C = self.coefficients(k)
+        c, own_C = mean[own], C[np.ix_(own, own)]
+        return not own or bool(c @ np.linalg.pinv(own_C) @ c > scipy.special.chdtri(len(own), 0.1))
+
     def residual(self, name: str) -> Array:
         """Return what the most probable model leaves of a response."""
         return np.asarray(self._bent.target[name] - self._bent.columns(self.terms, name) @ self.posterior[0])
