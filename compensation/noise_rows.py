@@ -27,10 +27,8 @@ COARSE = 150
 """Most rows of a run from which noise is estimated in a model with many unknowns."""
 LEAST, MOST = -7.0, 8.0  # ln of the rms of slow noise within a run over that of a row's white noise
 KINDS = ("white", "flicker", "walk", "offset")
-WHITE, TOO_QUIET = (
-    -0.3,
-    1.0,
-)  # ln of white noise over the scatter of neighbouring rows: where the search begins, and how far below it is odd
+WHITE = -0.3  # ln of white noise over the scatter of neighbouring rows, where the search begins
+TOO_QUIET = 1.0  # ln by which white noise below that is odd
 USUAL, SPREAD = -1.0, 3.0  # their weak prior, which keeps a level that the rows say nothing about from running away
 STATED_SPREAD = 0.7  # the same about ln of a level that is stated: a factor of 2
 

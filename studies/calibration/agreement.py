@@ -23,7 +23,7 @@ def keep_agreeing(found: CardFit) -> CardFit:
     """Return the fit with the values of each table that the data do not contradict at the card's."""
     problem, priors = found.problem, found.problem.priors
     z = priors.standard(found.point[: len(priors.values)])
-    C = priors.root @ found.covariance[: len(z), : len(z)] @ priors.root.T
+    C = priors.covariance(found.covariance)
     tables: dict[str, list[int]] = {}
     for k, name in enumerate(priors.names):
         tables.setdefault(name.split(".", maxsplit=1)[0], []).append(k)

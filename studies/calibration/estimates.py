@@ -54,7 +54,7 @@ def estimate(fit: CardFit, profile: bool = True) -> tuple[Estimate, ...]:
     polar, best, mean, covariance = _over_the_wave(fit)
     z, bounds, at = priors.standard(best), priors.bound(best), priors.at(best)
     middle = priors.standard(mean)
-    C = priors.root @ covariance @ priors.root.T
+    C = priors.covariance(covariance)
     J, _ = whitened(fit.problem, fit.state, fit.noise, fit.rows)
     bend = find_bend(fit, J) if profile else None
     found = []
@@ -162,8 +162,7 @@ def _profiled(fit: CardFit, k: int, J: Array, ends: tuple[float, float]) -> tupl
 
 def find_groups(priors: Priors, covariance: Array) -> tuple[tuple[str, ...], ...]:
     """Return groups of values that the data ties together but cannot tell apart: |correlation| above 0.9."""
-    count = len(priors.values)
-    C = priors.root @ covariance[:count, :count] @ priors.root.T
+    count, C = len(priors.values), priors.covariance(covariance)
     sd = np.sqrt(np.diag(C))
     tied = np.abs(C / np.outer(sd, sd)) > INSEPARABLE
     groups, left = [], set(range(count))

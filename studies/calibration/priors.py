@@ -46,6 +46,11 @@ class Priors:
         """Coordinates z of unit prior variance from independent ones."""
         return np.asarray(self.root @ u)
 
+    def covariance(self, C: Array) -> Array:
+        """Covariance of these coordinates z from that of the independent ones, which come first."""
+        count = len(self.values)
+        return np.asarray(self.root @ C[:count, :count] @ self.root.T)
+
     def inside(self, u: Array) -> Array:
         """Nearest coordinates whose values respect their bounds."""
         z = self.standard(u)

@@ -29,10 +29,8 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 MOST_JUMPS = 24  # of a run whose times are free, each for itself
-KNOTS, FARTHEST = (
-    5,
-    180.0,
-)  # knots in a block, and their distance (s), at which temperatures are exact to microkelvins, at most
+KNOTS = 5  # in a block
+FARTHEST = 180.0  # s between knots at most: temperatures are exact to microkelvins there
 Progress = Callable[[str], None]
 
 

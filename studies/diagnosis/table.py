@@ -325,7 +325,7 @@ def _beside(
 
     priors = found.fit.problem.priors
     _, _, u, C = base.solve(winner.columns, noise)
-    z, sd = priors.root @ u, np.sqrt(np.diag(priors.root @ C @ priors.root.T))
+    z, sd = priors.standard(u), np.sqrt(np.diag(priors.covariance(C)))
     out = []
     for one in shifts:
         k = priors.names.index(one.parameter)

@@ -15,10 +15,10 @@ from studies.calibration.estimates import TOLD, find_groups
 from studies.calibration.priors import from_standard
 from studies.effects import find_effect
 from studies.errors import InputError
+from studies.inference.causes import parameters_of
 from studies.inference.diagnosis import Inference, infer
 from studies.inference.polynomial_card import polynomial_card
 from studies.inference.records import make_ready
-from studies.inference.verdict import parameters_of
 from studies.record import Record
 
 if TYPE_CHECKING:
@@ -61,8 +61,7 @@ class ThermalFit:
     @property
     def residual_rms(self) -> float:
         """Rms of what is left of the rows, Hz, about the mean of each run: slow noise carries the level off."""
-        rows = self.inference.rows["frequency_Hz"].residual
-        return float(np.sqrt(np.mean(np.concatenate([own - own.mean() for own in rows]) ** 2)))
+        return self.inference.rows["frequency_Hz"].within
 
 
 def fit_thermal_constants(
@@ -137,7 +136,7 @@ def _of_law(found: Inference, times: float) -> Iterator[tuple[str, ThermalEstima
     """Constants of the law and its lag; one that the records narrow by less than half is not determined."""
     priors, (mean, C) = found.search.linear.problem.priors, found.background.posterior
     count = len(priors.values)
-    z, sd = priors.root @ mean[:count], np.sqrt(np.diag(priors.root @ C[:count, :count] @ priors.root.T))
+    z, sd = priors.standard(mean[:count]), np.sqrt(np.diag(priors.covariance(C)))
     at = {value.name: k for k, value in enumerate(priors.values)}
     level = from_standard(priors.values[at["law.f0_Hz"]], float(z[at["law.f0_Hz"]]))
     for key, name in LAW.items():

@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 
 from studies.diagnosis.verdict import Interval
 from studies.effects import Parameter
+from studies.inference.causes import parameters_of
 from studies.inference.diagnosis import Inference
 from studies.inference.model import Term
-from studies.inference.verdict import parameters_of
 from studies.record import Record
 
 if TYPE_CHECKING:

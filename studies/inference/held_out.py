@@ -42,6 +42,11 @@ class Rows:
         """Root mean square."""
         return float(np.sqrt(np.mean(np.concatenate(self.residual) ** 2)))
 
+    @property
+    def within(self) -> float:
+        """The same about the mean of each run."""
+        return float(np.sqrt(np.mean(np.concatenate([own - own.mean() for own in self.residual]) ** 2)))
+
 
 @dataclass(frozen=True)
 class Unseen:

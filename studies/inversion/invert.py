@@ -198,7 +198,7 @@ def _fit(model: ModeModel, modes: Sequence[Which], y: Array, relative: Array, J:
 
 def _estimates(priors: Priors, u: Array, covariance: Array) -> tuple[Estimate, ...]:
     z, at, bounds = priors.standard(u), priors.at(u), priors.bound(u)
-    widths = np.sqrt(np.diag(priors.root @ covariance @ priors.root.T))
+    widths = np.sqrt(np.diag(priors.covariance(covariance)))
     found = []
     for k, value in enumerate(priors.values):
         number, width = at[value.name], float(widths[k])

@@ -1,0 +1,181 @@
+"""Named causes of an inference: its terms with their equals and numbers, a delay that the law has taken, a drift of the clock."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+from studies.diagnosis.constants import CONSTANTS
+from studies.diagnosis.verdict import (
+    NINETY,
+    Cause,
+    Interval,
+    same_cause,
+    weigh,
+)
+from studies.effects import library
+from studies.inference.clock import settle
+from studies.inference.inferred import Inferred
+from studies.inference.model import Background, Term
+from studies.inference.records import REFERENCE
+from studies.inference.signatures import Signatures
+
+Array = NDArray[np.float64]
+DELAY = "law.delay_s"
+SURE_DELAY = 3.0
+"""Standard deviations from which on a delay is said."""
+STEP, WORTH = 0.03, 0.5
+"""Of a shape parameter (of its logarithm): first step to see its curvature, and fall of the evidence that a step should cost."""
+
+
+def causes_of(found: Inferred) -> list[Cause]:
+    """Return the effects that were found, a delay and a drift of the clock, one entry a physical cause."""
+    terms = (_cause(found, k) for k in range(len(found.final.terms)))
+    return _merged([*terms, *_delay_cause(found), *_clock_cause(found)])
+
+
+def _merged(causes: Sequence[Cause]) -> list[Cause]:
+    """Return one entry a physical cause, under the response where its evidence is largest."""
+    kept: list[Cause] = []
+    for cause in sorted(causes, key=lambda one: -one.evidence):
+        if not any(same_cause(cause, other) for other in kept):
+            kept.append(cause)
+    return kept
+
+
+def _cause(found: Inferred, k: int) -> Cause:
+    """Return one term as a cause, with the effects that these data cannot tell from it."""
+    outcome, term = found.outcome, found.final.terms[k]
+    best: dict[str, float] = {}
+    for rival in outcome.rivals[k]:
+        name = rival.terms[-1].effect.name
+        best[name] = max(best.get(name, -np.inf), rival.score)
+    members, probability = weigh(list(best), list(best.values()), outcome.without[k].score, found.unknown[k])
+    left = found.left[term.response]
+    if left.significant and 0.0 < left.share < CONSTANTS["believed"]:
+        probability *= left.share  # whatever made the larger rest may have made this too
+    exact = term.effect.equivalents.get(term.response, ())
+    names = list(dict.fromkeys([term.effect.name, *members, *exact]))
+    for judge in (one for one in library().values() if one.judge == REFERENCE and term.response in one.sizes):
+        names = settle(names, judge.name, judge.equivalents.get(term.response, ()), found.clock_drifts)
+    numbers = parameters_of(found.background, found.search.signatures, k)
+    own = next(iter([columns for name, columns in term.columns.items() if name == term.response]))
+    change = own @ found.background.coefficients(k)[0]
+    told = dict(numbers)
+    for one in term.effect.shape:
+        if one.is_run:
+            told[one.name] = Interval.about(float(found.campaign.numbers[int(numbers[one.name].value)]), 0.0)
+    shapes = {rival.terms[-1].effect.name: _shape_of(rival.terms[-1]) for rival in reversed(outcome.rivals[k])}
+    return Cause(
+        names[0],
+        term.response,
+        probability,
+        tuple(sorted(names[1:])),
+        told,
+        2.0 * max(found.final.score - outcome.without[k].score, 0.0),
+        peak=float(np.ptp(change)),
+        shapes=shapes | {term.effect.name: numbers},
+    )
+
+
+def _shape_of(term: Term) -> dict[str, Interval]:
+    return {p.name: Interval.about(v, 0.0) for p, v in zip(term.effect.shape, term.shape, strict=True)}
+
+
+def parameters_of(background: Background, signatures: Signatures, k: int) -> dict[str, Interval]:
+    """Return shape and definite coefficients of a term with 90 % intervals.
+
+    What is not known of the shape is part of what is not known of the coefficients: Σ = Σ_c + Σ_s (∂c/∂s)² σ_s².
+    """
+    term, out = background.terms[k], {}
+    mean, C = background.coefficients(k)
+    variance = np.diag(C).copy()
+    for place, parameter in enumerate(term.effect.shape):
+        value, sd = term.shape[place], 0.0
+        if parameter.moves(value):
+            sd, slope = _shape_spread(background, signatures, k, place)
+            variance = variance + (slope * sd) ** 2
+        if parameter.logarithmic and sd > 0:
+            half = NINETY * sd
+            out[parameter.name] = Interval(value, value * float(np.exp(-half)), value * float(np.exp(half)))
+        else:
+            out[parameter.name] = Interval.about(value, sd)
+    begin = 0
+    names = term.effect.coefficient_names(term.response)
+    for name, coefficient in zip(names, term.effect.coefficients, strict=True):
+        at = term.members.index(begin) if begin in term.members else -1
+        if at >= 0 and any(own[:, at].any() for own in term.columns.values()):  # what no row shows is left out
+            out[name] = Interval.about(float(mean[at]), float(np.sqrt(variance[at])))
+        begin += len(coefficient.spread)
+    return out
+
+
+def _shape_spread(background: Background, signatures: Signatures, k: int, place: int) -> tuple[float, Array]:
+    """Return the standard deviation of a shape parameter (of its logarithm where it has one) and how coefficients go with it."""
+    term = background.terms[k]
+    parameter, value = term.effect.shape[place], term.shape[place]
+    step = STEP if parameter.logarithmic else max(0.01 * abs(value), 0.05)
+
+    def moved(by: float) -> Background:
+        there = value * float(np.exp(by)) if parameter.logarithmic else value + by
+        shape = (*term.shape[:place], there, *term.shape[place + 1 :])
+        columns = signatures.of_term(term.effect, shape, term.response, term.members, term.starts)
+        own = replace(term, shape=shape, columns=columns)
+        return replace(background, terms=(*background.terms[:k], own, *background.terms[k + 1 :]))
+
+    for _ in range(6):
+        below, above = moved(-step), moved(step)
+        fall = background.evidence - 0.5 * (below.evidence + above.evidence)
+        if 0.1 * WORTH < fall < 10 * WORTH:
+            break
+        step *= float(np.clip(np.sqrt(WORTH / max(fall, 1e-6)), 0.02, 5.0))
+    sd = step / float(np.sqrt(2.0 * fall)) if fall > 0 else 10.0 * step
+    slope = (above.coefficients(k)[0] - below.coefficients(k)[0]) / (2.0 * step)
+    return sd, slope
+
+
+def _within(z: float) -> float:
+    """Probability that a normal number is within so many standard deviations."""
+    return float(scipy.special.erf(abs(z) / np.sqrt(2.0)))
+
+
+def delay_of(found: Inferred) -> tuple[float, float, float]:
+    """A delay that a polynomial law has taken and its standard deviation, in parts of what sensors and clocks usually have, and that, s."""
+    priors = found.search.linear.problem.priors
+    if DELAY not in priors.names:
+        return 0.0, 0.0, 0.0
+    k = priors.names.index(DELAY)
+    mean, C = found.background.posterior
+    return float(mean[k]), float(np.sqrt(C[k, k])), priors.values[k].sd
+
+
+def _delay_cause(found: Inferred) -> list[Cause]:
+    """Return a delay that a polynomial law has taken, as the causes that look like one, when it is more than sensors and clocks have."""
+    name = found.search.linear.responses[0]
+    z, sd, usual = delay_of(found)
+    if name != "frequency_Hz" or abs(z) < SURE_DELAY:
+        return []
+    alike = sorted((e for e in library().values() if e.delay is not None), key=lambda e: -(e.delay or 0) * z)
+    delay = Interval.about(abs(z) * usual, sd * usual)
+    return [
+        Cause(
+            alike[0].name,
+            name,
+            _within(z),
+            tuple(sorted(effect.name for effect in alike[1:])),
+            dict.fromkeys(alike[0].coefficient_names(name), delay) if z < 0 else {},
+            z**2,
+        )
+    ]
+
+
+def _clock_cause(found: Inferred) -> list[Cause]:
+    """Return a drift of the clock that a reference shows, however small it is beside the noise of the frequency."""
+    if found.clock is None or not found.clock_drifts:
+        return []
+    (slope, sd), effect = found.clock, next(one for one in library().values() if one.judge == REFERENCE)
+    (response,) = effect.sizes
+    (name,) = effect.coefficient_names(response)
+    return [Cause(effect.name, response, _within(slope / sd), (), {name: Interval.about(slope, sd)}, (slope / sd) ** 2)]

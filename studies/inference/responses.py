@@ -1,0 +1,181 @@
+"""Verdict of each response: what is left of it, what slow noise may hide, and the words beside it."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from compensation.noise import Noise, white_rms
+from studies.calibration.fit import LASTING, stated_noise
+from studies.calibration.ladder import noise_rms
+from studies.diagnosis.constants import CONSTANTS
+from studies.diagnosis.response import RESPONSES
+from studies.diagnosis.verdict import (
+    Cause,
+    ResponseResult,
+)
+from studies.inference.causes import SURE_DELAY, delay_of
+from studies.inference.inferred import Inferred
+from studies.inference.lack_of_fit import doubt_of
+
+Array = NDArray[np.float64]
+FEWEST_LAGS = 3.0
+"""Time constants that the records must cover before they confirm a law whose lag is free."""
+BRIEF, MINUTES = 300.0, 5.0
+"""Seconds, and times the change within them up to which slow noise is usual where no card states it: a random walk of a day."""
+SLOW_THAN = {True: "what the card states of its noise", False: "what noise usually makes of its changes within minutes"}
+LEAST_DELAY = 0.5
+"""Part of what sensors and clocks usually have, from which on a delay is said."""
+ODD = 5.0
+"""Times the scatter of the other runs from which on one is odd."""
+NARROW_RANGE = 1.0
+"""Kelvin below which a temperature does not vary."""
+
+
+def result_of(found: Inferred, name: str, causes: Sequence[Cause]) -> ResponseResult:
+    """Return what was found about one response beside the causes that are named."""
+    left, plain, rows = found.left[name], found.plain[name], found.rows[name]
+    before, after = found.held_out[name]
+    terms = [term for term in found.final.terms if term.response == name]
+    mine = [cause for cause in causes if cause.response == name and cause.kind == "physics"]
+    values = any(cause.kind == "value" and cause.response == name for cause in causes)
+    share = (left.share if left.significant else 1.0) if terms else None
+    slow = _slow(found, name)
+    verdict, remark = _judge(found, name, bool(terms), mine, values, slow, share)
+    remark = "; ".join(word for word in (remark, _delayed(found, name), _turned_on(found, name, verdict)) if word)
+    noise = min(value for value in (rows.rms, after if terms else before) if value is not None)
+    white = white_rms(*rows.residual)
+    return ResponseResult(
+        verdict,
+        noise,
+        (plain.rms, before),
+        (rows.rms, after) if terms else None,
+        "structure" if left.significant else "none",
+        left.input if left.doubtful else "",
+        2.0 * max(left.evidence, 0.0),
+        share,
+        remark,
+        white=white,
+        wander=float(np.sqrt(max(rows.rms**2 - white**2, 0.0))),
+        shipped=found.shipped[name].rms,
+        run_shifts=_run_shifts(found, name),
+    )
+
+
+def _judge(
+    found: Inferred, name: str, terms: bool, mine: Sequence[Cause], values: bool, slow: float, share: float | None
+) -> tuple[str, str]:
+    left = found.left[name]
+    clean = share is None or share >= CONSTANTS["share_explained"]
+    patched = bool(mine) and max(cause.probability for cause in mine) < CONSTANTS["believed"]
+    if left.significant and (share is None or not clean or patched):
+        return "unexplained", ""
+    apart = _apart(found, name)
+    if apart and not terms and not mine:
+        return "not-identifiable", apart
+    if slow > CONSTANTS["wander_usual"]:
+        return "not-identifiable", (
+            f"the slow part of the residual is {slow:.2g} times {SLOW_THAN[found.card.polynomial is None]}: these records cannot"
+            " distinguish slow noise from a cause that acts slowly"
+        )
+    if terms or mine:
+        return ("not-identifiable" if any(cause.equivalent for cause in mine) else "explained"), apart
+    if values:
+        return "explained", ""
+    paths = found.search.signatures.paths
+    if found.card.polynomial is not None:
+        lasts = sum(float(np.ptp(path.time)) for path in paths)
+        lag = max(path.states.tau for path in paths)
+        if lasts < FEWEST_LAGS * lag:
+            return (
+                "not-identifiable",
+                f"too short to judge: {lasts:.0f} s, and the resonator may follow the housing with {lag:.0f} s or more",
+            )
+    resonator = np.concatenate([path.states.resonator for path in found.search.signatures.paths])
+    if np.ptp(resonator) < NARROW_RANGE:
+        return (
+            "not-identifiable",
+            f"too short to judge: the resonator's temperature changes by {np.ptp(resonator):.2g} K only",
+        )
+    return ("not-identifiable", doubt_of(left.input, left.evidence)) if left.doubtful else ("adequate", "")
+
+
+def _delayed(found: Inferred, name: str) -> str:
+    """Return the sentence on a delay that a polynomial law has taken: it tolerates what sensors and clocks may have."""
+    z, sd, usual = delay_of(found)
+    if name != found.search.linear.responses[0] or abs(z) < max(SURE_DELAY * sd, LEAST_DELAY):
+        return ""
+    delay = z * usual
+    return (
+        f"it follows the temperature {abs(delay):.2g} s {'later' if delay > 0.0 else 'earlier'} than one lag predicts, as sensors and"
+        " clocks may; a thermometer lag or a rate effect of this size looks the same"
+    )
+
+
+def _turned_on(found: Inferred, name: str, verdict: str) -> str:
+    """Return the sentence on offsets of runs far beyond what is left within them."""
+    if name in LASTING or verdict != "adequate":
+        return ""
+    shifts, within = _shifts_and_rest(found, name)
+    response = RESPONSES[name]
+    far = int(np.argmax(np.abs(shifts - np.median(shifts))))
+    others = np.delete(shifts, far)
+    if len(others) > 1 and abs(odd := shifts[far] - others.mean()) > ODD * max(float(np.std(others, ddof=1)), within):
+        record = found.campaign.records[far].path or f"run {far + 1}"
+        return (
+            f"{record}: its bias lies {odd * response.scale:+.3g} {response.shown} from that of the other runs, which agree to"
+            f" {np.std(others, ddof=1) * response.scale:.2g} {response.shown}: one turn-on, or something done between the runs"
+        )
+    apart = float(np.sqrt(np.mean(shifts**2)))
+    if apart <= CONSTANTS["wander_usual"] * within or found.card.polynomial is None:
+        return ""
+    return (
+        f"the runs lie {apart * response.scale:.3g} {response.shown} (rms) apart, which is treated as a turn-on offset; ageing or a jump"
+        " between runs would look the same. A saved model states it as turn-on; a card with bias_turn_on_deg_per_h distinguishes them"
+    )
+
+
+def _apart(found: Inferred, name: str) -> str:
+    """Return the sentence on runs of a response without turn-on that lie farther apart than what is left within them."""
+    if name not in LASTING or found.card.polynomial is None:
+        return ""
+    shifts, within = _shifts_and_rest(found, name)
+    apart = float(np.sqrt(np.mean(shifts**2)))
+    if apart <= CONSTANTS["wander_usual"] * within:
+        return ""
+    response = RESPONSES[name]
+    text = (
+        f"the runs lie {apart * response.scale:.3g} {response.shown} (rms) apart, {apart / within:.0f} times the residual within them:"
+        " ageing, clock error, handling, or drift between runs"
+    )
+    return text if found.campaign.timed else text + "; start times ('# start' in the records) would show which of these"
+
+
+def _slow(found: Inferred, name: str) -> float:
+    """What is left of a response over the scatter of neighbouring rows and what the card states of slow noise."""
+    rows = found.rows[name]
+    if found.card.polynomial is not None:  # nothing is stated: over the changes within minutes
+        level = found.search.linear.rows[name]
+        rest = found.background.residual(name)
+        apart = max(1, round(BRIEF / level.span))
+        changes = np.concatenate([rest[own][apart:] - rest[own][:-apart] for own in level.slices])
+        change = float(np.mean(changes**2)) if len(changes) else 0.0
+        brief = float(np.hypot(white_rms(*rows.residual), np.sqrt(change / 2.0)))
+        return rows.rms / max(MINUTES * brief, 1e-300)
+    stated = stated_noise(found.card.noise, name) or Noise(0.0)
+    slow = noise_rms(found.fit, name, replace(stated, white=0.0, offset=0.0))
+    return rows.rms / max(float(np.hypot(white_rms(*rows.residual), slow)), 1e-300)
+
+
+def _shifts_and_rest(found: Inferred, name: str) -> tuple[Array, float]:
+    """Means of the runs about their mean, and the rms of what is left within the runs."""
+    return np.array(_run_shifts(found, name)), found.rows[name].within
+
+
+def _run_shifts(found: Inferred, name: str) -> tuple[float, ...]:
+    """Mean of what is left of each run, about their mean."""
+    level = found.search.linear.rows[name]
+    rest = found.background.residual(name)
+    means = np.array([rest[own].mean() for own in level.slices])
+    return tuple(float(value) for value in means - means.mean())
