@@ -63,7 +63,6 @@ class CardProblem:
     runs: tuple[ObservedRun, ...]
     law: "FrequencyLaw"
     tables: tuple[SettledTable, ...] = ()
-    among: tuple[str, ...] = ()  # effects that are looked for; all where none is named
 
     @cached_property
     def parts(self) -> tuple[Part, ...]:

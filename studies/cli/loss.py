@@ -133,7 +133,7 @@ def _parts(
         Chapter(f"Contributions at {degrees[at]:g} °C", [
             Table("Contributions", rows,
                 f"name: contribution | share: share (%) .3g | {values} | low.{at} … high.{at}: 90 % interval (1e-9) ×1e9 .2"
-                f" | slope_per_K.{at}: slope (%/°C) ×100 +.2g | half: Q if it is halved .3 | without: Q without it .3", "Largest first; all columns except 1/Q are at the temperature above."),
+                f" | slope_per_K.{at}: slope (%/°C) ×100 +.2g | half: Q with it halved .3 | without: Q without it .3", "Largest first; all columns except 1/Q are at the temperature above."),
             Table("Remedies and sources", rows,
                 "name: contribution | relative_sd: standard uncertainty (%) ×100 .0f | advice: remedy | source"),
         ]),
@@ -145,7 +145,7 @@ def _parts(
         Chapter("Along the meridian", [
             Sentence(WALL, where="page"),
             Sentence(f"Thermoelastic participation {trace_share(model.vibration.solution):.3g}: {SQUEEZE}", where="page"),
-            Figure(lambda: _draw_along(model), "Energy, area strain and normal motion of the faces, each per area over its mean."),
+            Figure(lambda: _draw_along(model), "Energy, area strain and normal motion of the faces, each normalised to its mean over the surface."),
         ]),
         Chapter("Around the axis", [
             Table("Damping anisotropy", damped,

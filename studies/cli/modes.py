@@ -77,7 +77,7 @@ ENERGY = (
     " | energy_fractions.shear: transverse shear ×100 .3f | energy_fractions.root: root ×100 .3f"
     " | energy_fractions.stem: stem ×100 .3f"
 )
-DERIVED = "ν at constant E; ln r scales every length but the thickness. Modal mass: for a maximum displacement of 1."
+DERIVED = "ν at constant E; ln r: all lengths except the wall thickness. Modal mass: for a maximum displacement of 1."
 
 
 @answers("hrg.modes/1")

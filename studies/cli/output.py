@@ -47,8 +47,8 @@ def answers(schema: str, page: bool = True) -> Callable[[Callable[..., Result]],
         @functools.wraps(command)
         def run(*arguments: Any, json: bool = False, **options: Any) -> int:
             report = options.pop("report", None)
-            if report is not None and not report.lower().endswith((".html", ".htm", "/dev/null")):
-                raise InputError(f"--report {report}: a report is an HTML page; give a name that ends in .html.")
+            if report is not None:
+                check_ending("--report", report, "a report is an HTML page", ".html", ".htm")
             with guarded({**own.bind(*arguments, **options).arguments, "report": report}) as read:
                 result = command(*arguments, **options)
                 result = replace(result, payload=usual | result.payload)
@@ -74,6 +74,12 @@ def answers(schema: str, page: bool = True) -> Callable[[Callable[..., Result]],
         return run
 
     return give
+
+
+def check_ending(option: str, path: str, what: str, *endings: str) -> None:
+    """Refuse the name of an output that is not of its kind: it may be that of something else."""
+    if not path.lower().endswith((*endings, "/dev/null")):
+        raise InputError(f"{option} {path}: {what}; give a name that ends in {endings[0]}.")
 
 
 def _caveats_of(paths: Iterable[Path]) -> list[str]:

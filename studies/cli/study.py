@@ -7,7 +7,7 @@ from typing import Annotated, Any
 from cyclopts import Parameter
 
 from studies.cli.arguments import Folder, Quiet, Workers
-from studies.cli.output import answers, say
+from studies.cli.output import answers, check_ending, say
 from studies.errors import InputError
 from studies.files.writing import write_text
 from studies.reports.sweep_analysis import tolerance_table
@@ -117,6 +117,8 @@ def report(folder: Folder, *, out: Annotated[str | None, Parameter(name=("--repo
     from studies.results.page import render_result
 
     results = open_results(folder)
+    if out is not None:
+        check_ending("--report", out, "a report is an HTML page", ".html", ".htm")
     page = Path(out) if out else Path(folder) / "report.html"
     say("writing the page, with mode shapes if the study has modes ...")
     found = study_result(results)
@@ -134,6 +136,8 @@ def export(folder: Folder, *, out: str | None = None) -> Result:
         out: The CSV file; default: results.csv in the folder.
     """
     results = open_results(folder)
+    if out is not None:
+        check_ending("--out", out, "an export is a CSV file", ".csv")
     path = Path(out) if out else Path(folder) / "results.csv"
     units = export_results(results, path)
     payload = {"table": str(path), "units_file": str(units), "rows": len(results)}

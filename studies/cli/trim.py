@@ -42,7 +42,7 @@ STATES = (
 )
 
 CELLS = {"azimuth_deg": ".4f", "position": ".6f", "height_mm": ".4f", "mass_ug": ".5f", "depth_um": ".4f"}  # of --out
-LIMIT = "Upper limit: the split is the length of a vector with this standard error in each component; it lies below with 95 % probability."
+LIMIT = "Upper limit: the split is the length of a vector with this standard error in each component; the limit is exceeded with 5 % probability."
 
 
 @answers("hrg.trim/1")
@@ -215,7 +215,7 @@ def measure_after(planned: CardPlan) -> list[str]:
         expected = " ± ".join(to_error(1e3 * state.hertz, 1e3 * spread_Hz))
         found.append(
             f"After the cuts, measure the split of n = {state.harmonic} to ± {1e3 * min(plan.goal / 4, max(spread_Hz / 5, plan.goal / 10)):.2g} mHz, and its axis. "
-            f"Expected: {expected} mHz. If it is off by more than twice that error, plan the next round with --gain, the measured over the predicted change "
+            f"Expected: {expected} mHz. If the measured split differs from it by more than twice that error, plan the next round with --gain, the measured over the predicted change "
             "(negative if the split changed in the opposite direction)."
         )
     still = "Let the shell return to thermal equilibrium before each reading, and measure the same mode with the same electrodes."

@@ -145,13 +145,11 @@ class Inference(Inferred, Shown):
         )  # fmt: skip
 
 
-def build_problem(
-    card: "Instrument", records: Sequence[Record], housing: bool = True, among: tuple[str, ...] = ()
-) -> CardProblem:
+def build_problem(card: "Instrument", records: Sequence[Record], housing: bool = True) -> CardProblem:
     """Return the problem of a card's values and the starts of runs, driven by the measured temperature; a card explains its `housing` too."""
     named = (*RESPONSES, HOUSING) if housing and card.polynomial is None else RESPONSES
     runs = tuple(run.explaining(named) for run in observe(records, blocks=blocks_of(records)))
-    return CardProblem(card, gather_priors(card), runs, wide_law(card, runs), among=among)
+    return CardProblem(card, gather_priors(card), runs, wide_law(card, runs))
 
 
 def blocks_of(records: Sequence[Record]) -> int:
@@ -167,12 +165,10 @@ def blocks_of(records: Sequence[Record]) -> int:
     return count
 
 
-def infer(
-    card: "Instrument", campaign: Campaign, progress: Report = lambda _: None, among: tuple[str, ...] = ()
-) -> Inference:
-    """Find what records say of a card and of effects that it lacks, all of them or those named."""
+def infer(card: "Instrument", campaign: Campaign, progress: Report = lambda _: None) -> Inference:
+    """Find what records say of a card and of effects that it lacks."""
     progress("calibration without effects")
-    found, told = set_housing_apart(fit(build_problem(card, campaign.records, among=among), progress=progress))
+    found, told = set_housing_apart(fit(build_problem(card, campaign.records), progress=progress))
     problem = found.problem
     search, outcome = _from(found, told, progress)
     values = len(problem.priors.values)

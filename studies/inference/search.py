@@ -229,7 +229,9 @@ class Search:
             tried = self.contenders(now)
             if not tried or tried[0].score - now.score < self.needed(tried[0].terms[-1], now.terms):
                 break
-            self.progress(f"{tried[0].terms[-1].effect.name} explains {tried[0].score - now.score:.0f} of log evidence")
+            self.progress(
+                f"{tried[0].terms[-1].effect.name} improves the log evidence by {tried[0].score - now.score:.0f}"
+            )
             now = self._without_idle(_credited(self.settle(tried[0].terms, tried[0].noise), now), plain)
         return plain, self._definite(self._tuned(now))
 

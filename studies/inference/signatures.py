@@ -211,8 +211,7 @@ class Signatures:
 
     def applicable(self, effects: "Mapping[str, Effect] | None" = None) -> Iterator[tuple[Effect, str]]:
         """Yield the effects that can act here, with the response where each counts: drives that vary, shapes that fit."""
-        among = self.problem.among or library()
-        for effect in ({name: library()[name] for name in among} if effects is None else effects).values():
+        for effect in (library() if effects is None else effects).values():
             if not all(self._varies(name) for name in effect.needs):
                 continue
             for response in effect.sizes:

@@ -45,7 +45,7 @@ DRIVEN = "The measured housing drives the other responses where there is one."
 ROWS = "Settled frequency: rms over the rows of the tables; its noise is their scatter about the calibrated card."
 WIDTHS = (
     "Shift: change in prior standard deviations. Width: posterior over prior standard deviation; the data determine a value up to 0.5,"
-    " from 0.95 it stays at its prior. Material properties: deviation from the law, relative where no unit is given."
+    " a value above 0.95 remains at its prior. Material properties: deviation from the law, relative where no unit is given."
 )
 
 

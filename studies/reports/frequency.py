@@ -146,7 +146,7 @@ def _extrapolation(study: FrequencyStudy, other: FrequencyFit) -> Figure:
             return made
 
     caption = (
-        f"Error of the temperature if it is read with one polynomial and the other is true. Outside the measured range they differ by up to {differ(low - BEYOND)}"
+        f"Difference of the temperatures that the two polynomials give. Outside the measured range they differ by up to {differ(low - BEYOND)}"
         f" at {low - BEYOND:.3g} °C and up to {differ(high + BEYOND)} at {high + BEYOND:.3g} °C: do not extrapolate either."
     )
     return Figure(draw, caption, "Difference of two fits: small inside the measured range, large outside.")

@@ -35,7 +35,7 @@ NOISE = (
     Column("column", "Column", spell=display_name),
     "Unit | noise.white ± noise.white_sd: White, at 1 s | noise.flicker ± noise.flicker_sd: Flicker, flat part"
     " | noise.walk ± noise.walk_sd: Random walk, in 1 s | noise.misfit: Misfit .2 | noise.instability_low …"
-    " noise.instability_high: Minimum / 0.664, 90 % .3 | line.period_s: Period of a line (s) | line.rms: Its rms .2",
+    " noise.instability_high: Minimum / 0.664 (bias instability), 90 % .3 | line.period_s: Period of a line (s) | line.rms: Its rms .2",
 )
 NOISE_NOTE = (
     "White noise, flicker and random walk have the Allan deviations N/√τ, a flat part and K √(τ/3), fitted together. Where they do not explain"
@@ -46,7 +46,7 @@ USES = "Command | Gives | ready: Possible | Missing"
 STEPS = (Column("column", "Column", spell=display_name), "time_s: At (s) .1f | Size")
 SETTLED = (
     "start_s: From (s) .0f | end_s: To (s) .0f | temperature_degC: Temperature (°C) .3f"
-    " | frequency_Hz: Frequency (Hz) .6f | left_K: Still to settle, at most (K) .2"
+    " | frequency_Hz: Frequency (Hz) .6f | left_K: Remaining settling, at most (K) .2"
 )
 CORRELATIONS = (
     Column("one", "Column", spell=display_name),

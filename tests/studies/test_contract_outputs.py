@@ -94,6 +94,9 @@ def test_the_folder_of_a_study_keeps_its_store_its_lock_and_what_its_spec_names(
         for command in ("export", "report"):
             assert main(["study", command, "study", "--out", name]) == 2, name
             assert "destroy" in capsys.readouterr().err
+    for command, kind in (("export", ".csv"), ("report", ".html")):  # the spec, which the store does not know
+        assert main(["study", command, "study", "--out", "spec.toml"]) == 2
+        assert f"ends in {kind}" in capsys.readouterr().err
     assert contents(folder) == before
     for _ in range(2):  # a table of before may be written anew
         assert main(["study", "export", "study"]) == 0

@@ -76,4 +76,4 @@ def test_the_accident_of_a_start_up_does_not_make_a_lag(ask):
     found = ask(["fit", "thermal", str(DATA / "voltmeter_sweep.csv"), "--lags", "1"])
     tau = found["estimates"]["time_constant_1"]
     assert 1000 < tau["value"] < 20000
-    assert found["residual_rms_Hz"] / 1e4 < 0.6e-6  # 0.33 ppm is known for one lag, of averages; these are rows
+    assert found["residual_rms_Hz"] / 1e4 < 0.6e-6  # 0.33 ppm is known for one lag, of averages

@@ -73,5 +73,5 @@ EFFECT = Effect(
     steady_grid=lambda low, high: [
         (float(c), float(w)) for c in np.linspace(low, high, 25) for w in np.array([0.05, 0.1, 0.2, 0.4]) * (high - low)
     ],
-    steady_words="one spurious mode, {0:+.0f} K from the reference temperature",
+    steady_words="frequency crossing with a spurious mode, {0:+.0f} K from the reference temperature",
 )

@@ -4,17 +4,20 @@ import datetime
 
 import numpy as np
 import pytest
-from scipy.constants import zero_Celsius
+from scipy.constants import Stefan_Boltzmann, zero_Celsius
 
+from studies.inference.model import Background
 from studies.instrument.card import load_card
 from studies.planning.chamber import Chamber
 from studies.record import Record
 from studies.simulation.drive import drive_by_profile, rows_of
 from studies.simulation.virtual_gyro import simulate_run
 from studies.workbench import diagnose_records
-from tests.studies.diagnosis.bench import STAIRS, Bench
+from tests.studies.diagnosis.bench import STAIRS, Bench, searched
 from thermal.lag import lag
+from thermal.network import Boundary, Conductor, Node, Radiator, assemble
 from thermal.profile import Profile, parse_profile
+from thermal.radiative import integrate
 
 STEP, RUN, PAUSE = 20.0, 9000.0, 2400.0  # s
 SLOW, SHARE, NOISE = 15000.0, 0.08, 1e-3  # s, –, Hz
@@ -53,6 +56,34 @@ def test_a_slow_mass_that_the_runs_before_have_warmed_is_one_cause():
     assert result.extended[0] == pytest.approx(NOISE, rel=0.05)
     found = cause.parameters["second_time_constant_s"]
     assert found.low < SLOW < found.high
+
+
+def a_resonator_behind(housing_words, follow):
+    """One run of a resonator that follows a housing with a lag of its own, with the law of the HRG paper's Table 1."""
+    profile = parse_profile(housing_words)
+    t = np.arange(0.0, profile.end, 60.0)
+    before = np.concatenate([[-60.0], t])
+    housing = lag(before, np.concatenate([profile.value[:1], profile.at(t)]), 600.0)[1:]
+    x = follow(t, housing) - 293.15
+    f = 4432.07 + 0.3716 * x - 9.7e-4 * x**2 + 3e-3 * np.random.default_rng(11).standard_normal(t.size)
+    columns = {"time_s": t, "housing_temperature_degC": housing - zero_Celsius, "frequency_Hz": f}
+    return Record(columns, path="run.csv", sha256="0")
+
+
+@pytest.mark.slow
+def test_radiation_takes_the_form_of_its_own_size():
+    """A lump with 40 % of its conductance by radiation over 100 K."""
+
+    def radiating(t, T):
+        exchange = Radiator("housing", "shell", 0.4 / 1500.0 / (4 * Stefan_Boltzmann * 293.15**3))
+        own = assemble([Boundary("housing"), Node("shell", 1.0), Conductor("housing", "shell", 0.6 / 1500.0), exchange])
+        return integrate(own, {"housing": Profile(t, T)}, relative_tolerance=1e-9).node("shell", t)
+
+    run = a_resonator_behind("step 20 -40 4h then step -40 60 4h", radiating)
+    search, _ = searched([run], "radiation")
+    _, final = search.grow()
+    size = Background(search.linear, final.terms, final.noise).coefficients(0)[0][0]
+    assert size == pytest.approx(0.4, abs=0.004)  # 0.42 to first order
 
 
 CENTRE, WIDTH = 3.46747, 0.262176  # °C, K
