@@ -9,9 +9,9 @@ wave that arrives there through the drives (over the amplitude that the pick-off
 about the turn of 2 n θ within their response, is left out; `whole_angle` has it.
 """
 
-import cmath
 import math
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,11 +20,12 @@ from compensation.arrays import Array, Complex
 from compensation.electronics import Electronics
 from compensation.errors import CompensationError
 from compensation.rebalance import LoopRun, settle_rebalance
-from compensation.wave import PHYSICAL, StandingWave
+from compensation.wave import StandingWave
 
 TURN = 0.3  # largest turn of 2 n θ (rad) in one step
 AZIMUTHS, HARMONICS = 16, 5  # azimuths at which B, g and c are taken, and terms of e^{2 i n θ} that are kept of them
-TIMES = 200  # times at which B is taken; it is linear between them
+WINDOW = 0.25  # how far, over the steps that are solved at once, a change of the azimuth can come back to itself
+SETTLED, MOST = 1e-14, 60  # rad, of the azimuth from one round to the next; rounds
 
 
 def turn_settled(
@@ -84,7 +85,7 @@ def _pickoff(electronics: Electronics, n: int) -> Array:
 
 
 def _channels(electronics: Electronics, n: int) -> tuple[Complex, Complex]:
-    """Of g, and of g c: the terms over e^{2 i n θ}, from those at even measured azimuths."""
+    """Of g − 1, and of g c − 1: the terms over e^{2 i n θ}, from those at even measured azimuths."""
     psi = np.pi * np.arange(AZIMUTHS) / AZIMUTHS
     ahead, across = np.array([np.cos(psi), np.sin(psi)]), np.array([-np.sin(psi), np.cos(psi)])
     pickoff = _pickoff(electronics, n)
@@ -93,7 +94,22 @@ def _channels(electronics: Electronics, n: int) -> tuple[Complex, Complex]:
     drive = (electronics.drive.matrix(n) * np.exp(1j * electronics.pickoff.phase)) @ across
     # of a force, over the amplitude that the pick-offs show as the commanded one
     arrives = (true[0] * drive[1] - true[1] * drive[0]).real / (true**2).sum(axis=0)
-    return _terms(g), _terms(g * arrives)
+    return _terms(g - 1), _terms(g * arrives - 1)
+
+
+def _drifts(rows: StandingWave, electronics: Electronics) -> Complex:
+    """Of B at the rows: the terms, array (N, HARMONICS). B is linear in 1/τ and in both parts of ½Δ(1/τ) and of ½Δω."""
+    n, quarter = rows.harmonic, np.pi / (4 * rows.harmonic)
+    one, axis = np.repeat(np.eye(5), AZIMUTHS, axis=0)[:, 1:].T, np.tile(np.pi * np.arange(AZIMUTHS) / AZIMUTHS / n, 5)
+    unit = StandingWave(
+        1.0, 1.0, one[0] + one[1], quarter * one[1], one[2] + one[3], quarter * one[3], n, rows.bryan_factor
+    )
+    found = _terms(settle_rebalance(unit, electronics, 0.0, axis).rate.reshape(5, AZIMUTHS))
+    found[1:] = 2 * (found[1:] - found[0])
+    damped, detuned = rows.damped(), rows.detuned()
+    return np.asarray(
+        np.stack([1 / np.asarray(rows.tau), damped.real, damped.imag, detuned.real, detuned.imag], axis=1) @ found
+    )
 
 
 def _terms(values: Array) -> Complex:
@@ -103,64 +119,58 @@ def _terms(values: Array) -> Complex:
     return np.asarray(found)
 
 
-def _value(terms: Complex, e: Complex) -> Array:
-    return np.asarray(np.real(sum(c * e**j for j, c in enumerate(terms))))
-
-
 def _integrate(
     rows: StandingWave, electronics: Electronics, t: Array, rate: Array, command: Array, angle: float
 ) -> Array:
-    """The azimuth at the rows: Runge-Kutta steps of what departs from the turn that rate and command would make alone."""
-    from scipy.interpolate import CubicHermiteSpline
+    """The azimuth at the rows: what departs from the turn that rate and command would make alone.
 
+    Rates, commands and B are straight lines between rows; the steps, one or more between two rows, are those of Simpson
+    collocation,  x_m = x + h/24 (5 ẋ + 8 ẋ_m − ẋ'),  x' = x + h/6 (ẋ + 4 ẋ_m + ẋ'),  many of them solved at once in rounds.
+    """
     k, n = rows.bryan_factor, rows.harmonic
     shown, arriving = _channels(electronics, n)
-    picked = np.unique(np.linspace(0, len(t) - 1, min(len(t), TIMES)).round().astype(int))
-    azimuths = np.pi * np.arange(AZIMUTHS) / AZIMUTHS / n
-    many = {name: np.repeat(np.asarray(getattr(rows, name))[picked], AZIMUTHS) for name in PHYSICAL}
-    there = StandingWave(harmonic=n, bryan_factor=k, **many)
-    held = settle_rebalance(there, electronics, 0.0, np.tile(azimuths, len(picked)))
-    drift = _terms(held.rate.reshape(-1, AZIMUTHS))
-    known = k * rate + command
-    swept = np.concatenate([[0.0], np.cumsum((known[1:] + known[:-1]) / 2 * np.diff(t))])
-    strayed = k * float(np.abs(drift).sum(axis=1).max())
-    speed = 2 * n * (np.abs(k * rate) + np.abs(command) + strayed)
-    phase = np.concatenate([[0.0], np.cumsum(np.maximum(speed[1:], speed[:-1]) * np.diff(t))])
-    count = max(math.ceil(phase[-1] / TURN), min(len(t) - 1, TIMES))
-    # even in the phase, and in time where nothing turns
-    measure = phase / (phase[-1] or 1.0) + 1e-3 * (t - t[0]) / (t[-1] - t[0])
-    steps = np.interp(np.linspace(0.0, measure[-1], count + 1), measure, t)
-    halves = np.sort(np.concatenate([steps, (steps[1:] + steps[:-1]) / 2]))
-    at = [np.interp(halves, t, values).tolist() for values in (rate, command, swept)]
-    parts = [np.interp(halves, t[picked], one.real) + 1j * np.interp(halves, t[picked], one.imag) for one in drift.T]
-    drifts = np.array(parts).T.tolist()
-    g, gc = shown.tolist(), arriving.tolist()
-    pure = abs(g[0] - 1) + sum(map(abs, g[1:])) + abs(gc[0] - 1) + sum(map(abs, gc[1:])) < 1e-12
-
-    def stray(place: int, departed: float) -> float:
-        """Of the departure: its rate of change."""
-        e = cmath.exp(2j * n * (angle + at[2][place] + departed))
-        b = _series(drifts[place], e)
-        if pure:
-            return k * b
-        omega, p = at[0][place], at[1][place]
-        return float(_series(g, e) * k * (omega + b) + _series(gc, e) * p - k * omega - p)
-
-    departed, slopes = [0.0], [stray(0, 0.0)]
-    for step in range(count):
-        place, h, y = 2 * step, steps[step + 1] - steps[step], departed[-1]
-        one = slopes[-1]
-        two = stray(place + 1, y + h / 2 * one)
-        three = stray(place + 1, y + h / 2 * two)
-        four = stray(place + 2, y + h * three)
-        departed.append(y + h / 6 * (one + 2 * two + 2 * three + four))
-        slopes.append(stray(place + 2, departed[-1]))
-    return np.asarray(angle + swept + CubicHermiteSpline(steps, departed, slopes)(t))
+    drift = _drifts(rows, electronics)
+    order = np.arange(HARMONICS)
+    known = np.abs(k * rate) + np.abs(command)
+    speed = 2 * n * (known + k * np.abs(drift).sum(axis=1))
+    pieces = np.maximum(np.ceil(np.maximum(speed[1:], speed[:-1]) * np.diff(t) / TURN), 1.0).astype(int)
+    first = np.concatenate([[0], np.cumsum(pieces)])
+    # nodes and middles of the steps, in rows
+    place = np.interp(np.arange(2 * first[-1] + 1), 2 * first, np.arange(len(t)))
+    time, turning, commanded = (np.interp(place, np.arange(len(t)), x) for x in (t, k * rate, command))
+    swept = angle + np.concatenate([[0.0], np.cumsum(np.diff(time) * _between(turning + commanded))])
+    answers = 2 * n * (k * (np.abs(drift) @ order) + known * float((np.abs(shown) + np.abs(arriving)) @ order))
+    window = np.cumsum(np.diff(time)[::2] * np.interp(place[1::2], np.arange(len(t)), answers)) // WINDOW
+    edges = 2 * np.concatenate([[0], np.flatnonzero(np.diff(window)) + 1, [first[-1]]])
+    departed, h = np.zeros(len(time)), time[2::2] - time[:-2:2]
+    for begin, end in pairwise(edges):
+        here, steps = slice(begin, end + 1), h[begin // 2 : end // 2]
+        row = place[here].astype(int)
+        part, later = place[here] - row, np.minimum(row + 1, len(t) - 1)
+        b = (drift[row] + part[:, None] * (drift[later] - drift[row])).T * k
+        x = np.full(end + 1 - begin, departed[begin])
+        for _ in range(MOST):
+            e = np.exp(2j * n * (swept[here] + x))
+            g, feigned = _series(shown, e), _series(b, e)
+            f = feigned + g * (feigned + turning[here]) + _series(arriving, e) * commanded[here]
+            f0, fm, f1 = f[:-2:2], f[1::2], f[2::2]
+            before, x = x, np.empty_like(x)
+            x[::2] = departed[begin] + np.concatenate([[0.0], np.cumsum(steps / 6 * (f0 + 4 * fm + f1))])
+            x[1::2] = x[:-2:2] + steps / 24 * (5 * f0 + 8 * fm - f1)
+            if np.abs(x - before).max() < SETTLED:
+                break
+        departed[here] = x
+    return np.asarray((swept + departed)[2 * first])
 
 
-def _series(terms: list[complex], e: complex) -> float:
-    """Re Σ c_j e^j by Horner's rule."""
-    found = 0j
-    for c in reversed(terms):
+def _between(values: Array) -> Array:
+    return np.asarray((values[1:] + values[:-1]) / 2)
+
+
+def _series(terms: Complex, e: Complex) -> Array:
+    """Re Σ c_j e^j by Horner's rule, without the terms that vanish."""
+    size = np.abs(terms).reshape(HARMONICS, -1).max(axis=1)
+    found = np.zeros_like(e)
+    for c in terms[: np.count_nonzero(np.cumsum(size[::-1]) > 1e-17 * size.sum())][::-1]:
         found = found * e + c
-    return float(found.real)
+    return np.asarray(found.real)

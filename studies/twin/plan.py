@@ -31,6 +31,7 @@ FIXED = ("thermal.cells", "thermal.stem_radius_mm", "thermal.stem_length_mm")
 """Numbers of those tables that have become part of the network."""
 OF_LOOPS = ("gain", "phase_d", "phase_deg", "skew", "misalignment", "split", "axis", "per_Hz", "range", "headroom")
 """Parts of the names of those keys of [loop] that act on settled loops."""
+PRECESSION = "loop.self_precession_deg_per_s"
 MEMORY = 16  # numbers that one effect may remember
 CAPACITY_STEP = 0.25  # K, of the knots of a heat capacity that varies
 
@@ -68,6 +69,11 @@ class Plan:
     constants: dict[str, float]  # mapping from macro to number
     splines: dict[str, Spline]  # mapping of "law", "heat_capacity", "loss" and the two parts of "wave"
     effects: tuple[EffectRow, ...]
+
+    @property
+    def turns_freely(self) -> bool:
+        """Whether the azimuth of the wave is an output."""
+        return self.instrument.loop is not None and self.instrument.loop.mode == "whole-angle"
 
     @property
     def key_of(self) -> dict[str, str]:
@@ -122,11 +128,6 @@ def plan_twin(instrument: "Instrument", boundary: "Boundary" = "chamber", theory
 
 def _refuse(instrument: "Instrument") -> None:
     """Raise for what the C code does not hold."""
-    if instrument.loop is not None and instrument.loop.mode == "whole-angle":
-        raise InputError(
-            f'{instrument.path} [loop]: mode = "whole-angle" is not available in a twin, whose wave is held; set mode ='
-            ' "force-rebalance", or use the records of hrg simulate.'
-        )
     for effect in instrument.effects:
         if effect.name.replace("-", "_") not in EFFECTS:
             raise InputError(
@@ -150,7 +151,7 @@ def _card_numbers(instrument: "Instrument") -> Iterator[tuple[str, float]]:
             continue
         for name in keys.__struct_fields__:
             value, key = getattr(keys, name), f"{table}.{name}"
-            wanted = table != "loop" or any(part in name for part in OF_LOOPS)
+            wanted = table != "loop" or any(part in name for part in OF_LOOPS) or key == PRECESSION
             if isinstance(value, bool | str) or key in FIXED or not wanted:
                 continue
             yield key, math.nan if value is None else float(value)
@@ -248,12 +249,12 @@ def symbol(name: str) -> str:
 def input_starts(plan: Plan) -> dict[str, float]:
     """Return the inputs of an FMU by name, with their values at the start."""
     card: Any = plan.instrument
-    return {
+    found = {
         f"{plan.boundary}_temperature_degC": card.reference_temperature - zero_Celsius,
         f"{plan.boundary}_temperature_slope_K_per_s": 0.0,
         "rate_deg_per_s": 0.0,
         "commanded_drive_amplitude_V": 0.0,
         "commanded_electrode_bias_V": math.sqrt(plan.constants["VOLTAGE_SQUARED"]),
         "commanded_quadrature_V": 0.0,
-        "commanded_pattern_angle_deg": card.bias.pattern_angle_deg,
     }
+    return found if plan.turns_freely else {**found, "commanded_pattern_angle_deg": card.bias.pattern_angle_deg}

@@ -10,7 +10,7 @@ import numpy as np
 
 from studies.simulation.heat_path import LEAST_LAG, SENSOR, SENSOR_SHARE
 from studies.simulation.virtual_gyro import COMMAND_DIGITS, DIGITS
-from studies.twin.plan import EFFECTS, MEMORY, Spline, input_starts
+from studies.twin.plan import EFFECTS, MEMORY, PRECESSION, Spline, input_starts
 from thermal.constants import Stefan_Boltzmann
 
 if TYPE_CHECKING:
@@ -59,6 +59,7 @@ def card_header(plan: "Plan") -> str:
     }
     switches = {
         "LOOPS": int(card.loop is not None),
+        "FREE": int(plan.turns_freely),
         "LINEAR": int(not card.thermal.radiation),
         "STIFF": int(card.loop is not None and card.loop.quadrature_control == "stiffness"),
     }
@@ -146,7 +147,7 @@ def card_body(plan: "Plan") -> str:
 def exposed(plan: "Plan", key: str) -> str:
     """Return the name of a parameter that may be changed; "" of one that is no key of the card, or does not act."""
     value = plan.parameters[key]
-    idle = "loss" in plan.splines and key.startswith("loss.")
+    idle = ("loss" in plan.splines and key.startswith("loss.")) or (key == PRECESSION and not plan.turns_freely)
     return "" if key.startswith(".") or value != value or idle else key
 
 

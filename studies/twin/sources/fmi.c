@@ -36,7 +36,7 @@ static const double starts[INPUTS] = TWIN_INPUT_STARTS;
 
 static void clear(Instance *one) {
     twin_defaults(&one->twin);
-    one->twin.noise = 1;
+    one->twin.noise = one->twin.held = 1;
     memcpy(one->in, starts, sizeof starts);
     one->seed = one->running = 0;
 }
@@ -50,7 +50,7 @@ static TwinInput commands(const Instance *one) {
     TwinInput in;
     for (int k = 0; k < TWIN_COMMANDS; ++k) {
         in.value[k] = one->in[2 + k];
-        in.given[k] = 1;
+        in.given[k] = !(TWIN_FREE && k == IN_ANGLE);
     }
     return in;
 }

@@ -36,24 +36,50 @@ static void observe(Twin *w, double span) {
     }
     out[OUT_frequency_Hz] = rounded(out[OUT_frequency_Hz] + twin_draw(w, &w->of_frequency, p[P_noise_frequency_white_Hz],
         p[P_noise_frequency_flicker_Hz], p[P_noise_frequency_walk_Hz], 0.0, span), p[P_noise_frequency_resolution_Hz]);
-    out[OUT_bias_deg_per_h] = rounded(out[OUT_bias_deg_per_h] + twin_draw(w, &w->of_bias, 60 * p[P_noise_bias_white_deg_per_rt_h],
-        p[P_noise_bias_flicker_deg_per_h], p[P_noise_bias_walk_deg_per_h_per_rt_h] / 60, p[P_noise_bias_turn_on_deg_per_h], span),
-        p[P_noise_bias_resolution_deg_per_h]);
+    const double wander = twin_draw(w, &w->of_bias, 60 * p[P_noise_bias_white_deg_per_rt_h], p[P_noise_bias_flicker_deg_per_h],
+        p[P_noise_bias_walk_deg_per_h_per_rt_h] / 60, p[P_noise_bias_turn_on_deg_per_h], span);
+    out[OUT_bias_deg_per_h] = rounded(out[OUT_bias_deg_per_h] + wander, p[P_noise_bias_resolution_deg_per_h]);
     out[OUT_inverse_q] *= 1 + p[P_noise_inverse_q_white] / sqrt(span) * twin_normal(w);
 #if TWIN_LOOPS
     out[OUT_quadrature_V] += p[P_noise_quadrature_white_V] / sqrt(span) * twin_normal(w);
 #endif
+#if TWIN_FREE /* what scatters as a rate has turned the wave */
+    w->wandered += w->row_time < 0 ? 0.0 : TWIN_BRYAN * span / 3600 * wander;
+    out[OUT_pattern_angle_deg] += w->wandered + p[P_noise_pattern_angle_white_deg] / sqrt(span) * twin_normal(w);
+#endif
 }
+
+/* The columns of what was said: frequency (Hz), zero-rate output (deg/h), 1/Q, quadrature (1/s). */
+static void say(Twin *w, const double *said, double span) {
+    w->out[OUT_frequency_Hz] = said[0];
+    w->out[OUT_bias_deg_per_h] = said[1];
+    w->out[OUT_inverse_q] = said[2];
+#if TWIN_LOOPS
+    w->out[OUT_quadrature_V] = w->p[P_loop_quadrature_V_per_Hz] * said[3] / PI;
+#endif
+    if (w->noise) observe(w, span);
+    w->out[OUT_measured_rate_deg_per_s] = w->applied * 180 / PI + w->out[OUT_bias_deg_per_h] / 3600;
+}
+
+#if TWIN_FREE
+void twin_last_row(Twin *w) { say(w, w->said, w->step); }
+#endif
+
+#if !TWIN_FREE
+static double azimuth_of(const Twin *w, const TwinInput *in) {
+    return radians(in->given[IN_ANGLE] ? in->value[IN_ANGLE] : w->p[P_bias_pattern_angle_deg]);
+}
+#endif
 
 const char *twin_row(Twin *w, const TwinInput *in) {
     const double *p = w->p, span = w->row_time < 0 ? w->step : w->time - w->row_time;
     const double housing = TWIN_SENSOR >= 0 ? w->T[TWIN_HOUSING] : w->boundary;
-    double warming[TWIN_NODES], mean[5] = {0}, rate[5] = {0}, change[TARGETS] = {0}, slope;
+    double warming[TWIN_NODES], warm[5] = {0}, rate[5] = {0}, change[TARGETS] = {0}, slope;
     if (!(span > 0)) return NULL; /* this moment has been read */
     twin_warming(w, warming);
     for (int k = 0; k < 5; ++k)
         for (int i = 0; i < TWIN_NODES; ++i) {
-            mean[k] += twin_rows[k][i] * w->T[i];
+            warm[k] += twin_rows[k][i] * w->T[i];
             rate[k] += twin_rows[k][i] * warming[i];
         }
     for (int stage = 0; stage < 3; ++stage) { /* on the temperature; on what these leave of it; on the responses */
@@ -62,16 +88,16 @@ const char *twin_row(Twin *w, const TwinInput *in) {
         for (int k = 0; k < TWIN_EFFECTS; ++k) {
             const TwinEffect *e = &twin_effects[k];
             if (e->kind == E_none || stage != (e->target != TARGET_TEMPERATURE ? 2 : e->kind == E_radiation)) continue;
-            change[e->target] += twin_effect(w, e, in, span, housing, mean[0] + (stage ? warmed : 0.0), turning);
+            change[e->target] += twin_effect(w, e, in, span, housing, warm[0] + (stage ? warmed : 0.0), turning);
         }
     }
-    const double T = mean[0] + change[TARGET_TEMPERATURE], excess = T - TWIN_REFERENCE;
+    const double T = warm[0] + change[TARGET_TEMPERATURE], excess = T - TWIN_REFERENCE;
     if (w->row_time >= 0) rate[0] += (change[TARGET_TEMPERATURE] - w->last_change) / span;
     w->last_change = change[TARGET_TEMPERATURE];
     if (!(T >= TWIN_LOWEST - 1e-6 && T <= TWIN_HIGHEST + 1e-6)) return "the resonator has left the temperatures for which the card's frequency is known.";
     double logarithm = twin_spline(&twin_law, T, &slope), uneven = 0.0;
     for (int k = 0; k < 4; ++k) {
-        logarithm += twin_uneven[k] * mean[k + 1];
+        logarithm += twin_uneven[k] * warm[k + 1];
         uneven += twin_uneven[k] * rate[k + 1];
     }
     const double thermal = exp(logarithm), gap = 1 + TWIN_GAP_EXPANSION * excess, volts = in->value[IN_VOLTAGE];
@@ -84,26 +110,34 @@ const char *twin_row(Twin *w, const TwinInput *in) {
     const double axis = 2 * HARMONIC * radians(p[P_bias_damping_axis_deg]);
     double wave[2] = {p[P_bias_damping_anisotropy] * loss * cos(axis), p[P_bias_damping_anisotropy] * loss * sin(axis)};
     for (int k = 0; k < 2 && twin_wave[0].count; ++k) wave[k] = twin_spline(&twin_wave[k], T, NULL);
-    const double angle = radians(in->given[IN_ANGLE] ? in->value[IN_ANGLE] : p[P_bias_pattern_angle_deg]);
     const double applied = radians(in->given[IN_RATE] ? in->value[IN_RATE] : 0.0);
-    double felt = polynomial(p, thermal - TWIN_REFERENCE_FREQUENCY, thermal * (slope * rate[0] + uneven)) + change[TARGET_BIAS];
-    double *out = w->out, said[4] = {frequency, 0.0, loss, 0.0};
-#if TWIN_LOOPS
+    const double felt = polynomial(p, thermal - TWIN_REFERENCE_FREQUENCY, thermal * (slope * rate[0] + uneven)) + change[TARGET_BIAS];
+    double *out = w->out, said[TWIN_SAID] = {frequency, 0.0, loss, 0.0};
+#if TWIN_FREE /* the wave turns with all that feigns a rate */
+    const double turned_by = applied + felt / DEG_PER_H, before = w->turning.rate + (w->held ? applied - w->applied : 0.0);
+    twin_turn_freely(w, frequency, loss, wave, before, turned_by, span, said);
+    said[1] = (said[1] - applied) * DEG_PER_H;
+    out[OUT_pattern_angle_deg] = w->azimuth * 180 / PI;
+#elif TWIN_LOOPS
+    const double angle = azimuth_of(w, in);
     twin_settle_loops(w, frequency, loss, wave, applied, angle, said);
-    felt += (said[1] - applied) * DEG_PER_H;
-    out[OUT_quadrature_V] = p[P_loop_quadrature_V_per_Hz] * said[3] / PI;
+    said[1] = felt + (said[1] - applied) * DEG_PER_H;
     out[OUT_pattern_angle_deg] = angle / PI * 180;
 #else
-    const double across = 2 * HARMONIC * angle; /* D(1/tau) sin 2n(theta - axis) over 2 n k */
-    felt += DEG_PER_H * PI * frequency * (wave[0] * sin(across) - wave[1] * cos(across)) / (2 * HARMONIC * TWIN_BRYAN);
+    const double across = 2 * HARMONIC * azimuth_of(w, in); /* D(1/tau) sin 2n(theta - axis) over 2 n k */
+    said[1] = felt + DEG_PER_H * PI * frequency * (wave[0] * sin(across) - wave[1] * cos(across)) / (2 * HARMONIC * TWIN_BRYAN);
 #endif
     out[OUT_housing_temperature_degC] = housing - ZERO;
     out[OUT_resonator_temperature_degC] = T - ZERO;
-    out[OUT_frequency_Hz] = said[0];
-    out[OUT_bias_deg_per_h] = felt;
-    out[OUT_inverse_q] = said[2];
-    if (w->noise) observe(w, span);
-    out[OUT_measured_rate_deg_per_s] = applied * 180 / PI + out[OUT_bias_deg_per_h] / 3600;
+    w->applied = applied;
+#if TWIN_FREE
+    double mean[TWIN_SAID];
+    for (int k = 0; k < TWIN_SAID; ++k) mean[k] = w->row_time < 0 ? said[k] : (w->said[k] + said[k]) / 2;
+    memcpy(w->said, said, sizeof said);
+    say(w, mean, span);
+#else
+    say(w, said, span);
+#endif
     w->row_time = w->time;
     return NULL;
 }

@@ -92,11 +92,35 @@ static const char *heat_to(Twin *twin, Profile *profile, double start, double ti
 /* Commands whose columns stand among those of the loops. */
 static int said_by_loops(int command) { return TWIN_LOOPS && (command == IN_QUADRATURE || command == IN_ANGLE); }
 
+typedef struct { double time, boundary, out[TWIN_OUTPUTS]; TwinInput in; } Row;
+
+static void print_row(FILE *out, const Row *row, int full) {
+    fprintf(out, "%.*f", full ? 17 : 9, row->time);
+    if (TWIN_SENSOR >= 0) fprintf(out, full ? ",%.17g" : ",%.6f", row->boundary);
+    for (int k = 0; k < TWIN_OUTPUTS - 1; ++k)
+        full ? fprintf(out, ",%.17g", row->out[k]) : fprintf(out, ",%.*f", twin_digits[k], row->out[k]);
+    for (int c = 1; c < TWIN_COMMANDS; ++c)
+        if (row->in.given[c] && !said_by_loops(c)) fprintf(out, full ? ",%.17g" : ",%.9f", row->in.value[c]);
+    if (row->in.given[IN_RATE]) fprintf(out, full ? ",%.17g,%.17g" : ",%.9f,%.9f", row->in.value[IN_RATE], row->out[TWIN_OUTPUTS - 1]);
+    fputc('\n', out);
+}
+
+#if TWIN_FREE
+/* A row of a wave that turns freely has the means of the time that follows it, and the temperatures and the azimuth of its own. */
+static void print_means(FILE *out, Row *row, const Twin *twin, int full) {
+    static const int means[] = {OUT_frequency_Hz, OUT_bias_deg_per_h, OUT_inverse_q, OUT_quadrature_V};
+    for (int k = 0; k < 4; ++k)
+        if (means[k] != OUT_quadrature_V || !row->in.given[IN_QUADRATURE]) row->out[means[k]] = twin->out[means[k]];
+    row->out[OUT_measured_rate_deg_per_s] = row->in.value[IN_RATE] + row->out[OUT_bias_deg_per_h] / 3600;
+    print_row(out, row, full);
+}
+#endif
+
 static int write_rows(Twin *twin, Profile *profile, FILE *out, double row, int full) {
     const double start = profile->rows[0][TIME], end = profile->rows[profile->count - 1][TIME];
     const long count = (long)floor((end - start) / row * (1 + 1e-12)) + 1;
     const char *fault = twin_settle(twin, profile->rows[0][BOUNDARY] + 273.15);
-    TwinInput in = {{0}, {0}};
+    Row here = {0};
     double now = start;
     twin->step = row;
     fprintf(out, "# instrument: %s\n# source: simulated\ntime_s%s", TWIN_NAME, TWIN_SENSOR >= 0 ? "," TWIN_BOUNDARY : "");
@@ -111,24 +135,28 @@ static int write_rows(Twin *twin, Profile *profile, FILE *out, double row, int f
         fault = heat_to(twin, profile, now, time);
         twin->time = time - start;
         now = time;
+        TwinInput in = {{0}, {0}};
         for (int c = 0; c < TWIN_COMMANDS; ++c) {
             in.given[c] = profile->has[FIRST_COMMAND + c];
             in.value[c] = value_at(profile, time, FIRST_COMMAND + c);
         }
-        if (n == 0) twin->boundary = value_at(profile, time, BOUNDARY) + 273.15;
+        const double boundary = value_at(profile, time, BOUNDARY);
+        if (n == 0) twin->boundary = boundary + 273.15;
         if (!fault) fault = twin_row(twin, &in);
         if (!fault && twin->actuator_use > 1) fault = "the settled loops need more than the actuators give; lower the rate or raise the ranges of [loop].";
         if (fault) break;
-        fprintf(out, "%.*f", full ? 17 : 9, time);
-        if (TWIN_SENSOR >= 0) fprintf(out, full ? ",%.17g" : ",%.6f", value_at(profile, time, BOUNDARY));
-        if (TWIN_LOOPS && in.given[IN_QUADRATURE]) twin->out[TWIN_QUADRATURE] = in.value[IN_QUADRATURE];
-        for (int k = 0; k < TWIN_OUTPUTS - 1; ++k)
-            full ? fprintf(out, ",%.17g", twin->out[k]) : fprintf(out, ",%.*f", twin_digits[k], twin->out[k]);
-        for (int c = 1; c < TWIN_COMMANDS; ++c)
-            if (in.given[c] && !said_by_loops(c)) fprintf(out, full ? ",%.17g" : ",%.9f", in.value[c]);
-        if (in.given[IN_RATE]) fprintf(out, full ? ",%.17g,%.17g" : ",%.9f,%.9f", in.value[IN_RATE], twin->out[TWIN_OUTPUTS - 1]);
-        fputc('\n', out);
+#if TWIN_FREE
+        if (n > 0) print_means(out, &here, twin, full);
+#endif
+        here = (Row){.time = time, .boundary = boundary, .in = in};
+        memcpy(here.out, twin->out, sizeof here.out);
+        if (TWIN_LOOPS && in.given[IN_QUADRATURE]) here.out[TWIN_QUADRATURE] = in.value[IN_QUADRATURE];
+        if (!TWIN_FREE) print_row(out, &here, full);
     }
+#if TWIN_FREE
+    twin_last_row(twin);
+    if (!fault) print_means(out, &here, twin, full);
+#endif
     return fault ? (fprintf(stderr, "at %g s: %s\n", now, fault), 2) : 0;
 }
 
@@ -140,6 +168,8 @@ int main(int argc, char **argv) {
     Twin *twin = malloc(sizeof *twin);
     FILE *out = NULL;
     int status = twin ? load(argv[1], &profile) : 2;
+    if (!status && TWIN_FREE && profile.has[FIRST_COMMAND + IN_ANGLE])
+        status = complain(argv[1], 1, "the wave of this card turns freely; leave out the column pattern_angle_deg.");
     if (!status) {
         out = fopen(argv[2], "w");
         if (!out) status = complain(argv[2], 0, "cannot be written.");

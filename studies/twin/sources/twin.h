@@ -17,7 +17,7 @@
 
 enum { IN_RATE, IN_AMPLITUDE, IN_VOLTAGE, IN_QUADRATURE, IN_ANGLE, TWIN_COMMANDS };
 enum { TARGET_TEMPERATURE, TARGET_FREQUENCY, TARGET_BIAS, TARGET_LOSS, TARGETS };
-enum { FLICKER_TIMES = 18 };
+enum { FLICKER_TIMES = 18, TWIN_TERMS = 5, TWIN_SAID = 4 };
 
 typedef struct { int one, other, parameter; double factor; } TwinLink; /* conductance or exchange area = p * factor */
 typedef struct { int parameter; double factor; } TwinCapacity;         /* p * factor; of shell and stem over T besides */
@@ -28,6 +28,9 @@ typedef struct { double first, step; int count; const double *coefficients; } Tw
 typedef struct { double value[TWIN_COMMANDS]; int given[TWIN_COMMANDS]; } TwinInput;
 
 typedef struct { double markov[FLICKER_TIMES], walk, offset; int begun; } TwinNoise;
+
+typedef struct { double re, im; } TwinComplex;
+typedef struct { double rate; TwinComplex drift[TWIN_TERMS]; } TwinTurning; /* at a row: rad/s, and the rate that azimuths feign */
 
 typedef struct {
     double p[TWIN_PARAMETERS];
@@ -45,6 +48,12 @@ typedef struct {
     double spare;
     int has_spare;
     TwinNoise of_frequency, of_bias;
+    /* Of a wave that turns freely: its measured azimuth (rad), what turns it, what its channels make of that, how far noise has
+     * turned it (deg); what was said of the last row; whether an input is held from a row to the next, or a straight line. */
+    double azimuth, wandered, said[TWIN_SAID], applied;
+    TwinTurning turning;
+    TwinComplex shown[TWIN_TERMS], arriving[TWIN_TERMS];
+    int held;
 } Twin;
 
 extern const double twin_start[TWIN_PARAMETERS];
@@ -64,10 +73,15 @@ void twin_seed(Twin *twin, uint64_t seed);
 const char *twin_settle(Twin *twin, double boundary);
 const char *twin_heat(Twin *twin, double h, double from, double to);
 const char *twin_row(Twin *twin, const TwinInput *in);
+#if TWIN_FREE
+void twin_last_row(Twin *twin); /* the outputs at this moment itself: those of a free wave are means since the row before */
+#endif
 
 /* Of the parts. */
 double twin_effect(Twin *twin, const TwinEffect *effect, const TwinInput *in, double h, double housing, double resonator, double rate);
-#if TWIN_LOOPS
+#if TWIN_FREE
+void twin_turn_freely(Twin *w, double frequency, double loss, const double *wave, double before, double rate, double span, double *said);
+#elif TWIN_LOOPS
 void twin_settle_loops(Twin *twin, double frequency, double loss, const double *wave, double rate, double angle, double *said);
 #endif
 void twin_warming(const Twin *twin, double *rate);

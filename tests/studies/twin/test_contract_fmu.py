@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from studies.cli import main
-from studies.instrument.card import load_card, save_card
+from studies.instrument.card import load_card
 from studies.simulation.drive import drive_by_profile, rows_of
 from studies.simulation.virtual_gyro import simulate_run
 from studies.twin import fmu as fmus
-from studies.twin.plan import plan_twin
+from studies.twin.plan import input_starts, plan_twin
 from tests.studies.twin.building import needs_compiler
 from thermal.profile import Profile
 
@@ -21,7 +21,7 @@ COLUMNS = ["housing_temperature_degC", "resonator_temperature_degC", "frequency_
 TIME, LEVEL = np.array([0.0, 600.0, 2400.0, 5400.0]), np.array([20.0, 20.0, 35.0, 35.0])
 
 
-def simulate_fmpy(path, start):
+def simulate_fmpy(path, start, *more):
     fmpy = pytest.importorskip("fmpy", reason="fmpy is not installed; it is in the extra 'test'")
     pytest.importorskip("lxml")
     slopes = np.append(np.diff(LEVEL) / np.diff(TIME), 0.0)
@@ -32,7 +32,7 @@ def simulate_fmpy(path, start):
     inputs = np.rec.fromarrays([*given.values()], names=[*given])
     with zipfile.ZipFile(path) as archive:
         text = archive.read("modelDescription.xml").decode()
-    options = {"input": inputs, "output": [*COLUMNS, "measured_rate_deg_per_s"], "start_values": start}
+    options = {"input": inputs, "output": [*COLUMNS, "measured_rate_deg_per_s", *more], "start_values": start}
     options |= {"stop_time": TIME[-1], "step_size": 1.0, "output_interval": 1.0}
     return fmpy.simulate_fmu(str(path), validate=True, fmi_type="CoSimulation", **options), text
 
@@ -96,14 +96,26 @@ def test_contract_failure_keeps_the_old_file(tmp_path, monkeypatch):
     assert [one.name for one in tmp_path.iterdir()] == ["twin.fmu"]
 
 
-def test_contract_bad_input(tmp_path, refuse):
-    """A part of the card that cannot be carried."""
-    turning = tmp_path / "turning.toml"
-    save_card(load_card("hrg-30mm-loops").with_table("loop", {"mode": "whole-angle"}), turning)
-    error = refuse(["twin", str(turning), "--c", str(tmp_path / "c")])
-    assert "turning.toml [loop]" in error
-    assert "force-rebalance" in error
-    assert not (tmp_path / "c").exists()
+@pytest.mark.slow
+@needs_compiler
+def test_limits_turning_wave_in_fmpy(tmp_path):
+    """Whole angle under a rate that moves in steps: an FMU holds its inputs, the simulation is a straight line between its rows."""
+    path = tmp_path / "twin.fmu"
+    loop = {"mode": "whole-angle", "self_precession_deg_per_s": 0.1, "pickoff_gain_ratio": 0.01}
+    instrument = load_card("hrg-30mm-loops").with_table("loop", loop)
+    plan = plan_twin(instrument)
+    assert "commanded_pattern_angle_deg" not in input_starts(plan)
+    fmus.write_fmu(plan, path, "3.0")
+    found, _ = simulate_fmpy(path, {"noise": False, "loop.drive_gain_ratio": -0.02}, "pattern_angle_deg")
+    profile = Profile(TIME, LEVEL + 273.15)
+    drive = drive_by_profile(profile, rows_of(profile, 1.0))
+    drive = type(drive)(drive.time, "chamber", profile, rate=np.full(drive.time.size, np.radians(0.01)))
+    expected = simulate_run(
+        instrument.with_values({"loop.drive_gain_ratio": -0.02}), drive, noise=False
+    ).prediction.columns
+    assert np.abs(found["pattern_angle_deg"] - expected["pattern_angle_deg"]).max() < 1e-9 * 540
+    bias = expected["bias_deg_per_h"]
+    assert np.abs(found["bias_deg_per_h"][1:] - (bias[1:] + bias[:-1]) / 2).max() < 1e-9 * np.abs(bias).max()
 
 
 @pytest.mark.slow

@@ -12,6 +12,7 @@ from studies.cli import main
 from studies.effects import library
 from studies.instrument.card import load_card, save_card, shipped_cards
 from studies.record import read_record
+from studies.twin.plan import plan_twin
 from tests.studies.twin.building import (
     SANITIZED,
     STRICT,
@@ -119,21 +120,59 @@ def test_limits_effect(effects, bare, folder):
     )
 
 
+ERRORS = {f"{side}_{key}": 0.01 for side in ("pickoff", "drive") for key in ("gain_ratio", "phase_deg", "skew_mrad")}
+ERRORS |= {"frequency_split_mHz": 2.0, "frequency_axis_deg": 7.0, "misalignment_mrad": 0.3}
+ERRORS |= {"drive_phase_difference_deg": 0.02}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("precession", "control"), [(0.0, "force"), (0.5, "force"), (-0.05, "stiffness")])
+def test_limits_wave_that_turns_freely(precession, control, folder):
+    """Whole angle with every error of the electronics, ten hours, at a rate and by its command: up to fifty turns."""
+    loop = {**ERRORS, "mode": "whole-angle", "self_precession_deg_per_s": precession, "quadrature_control": control}
+    instrument = load_card("hrg-30mm-loops").with_table("loop", loop)
+    program = compile_twin(instrument, folder / "free", (*STRICT, "-O2"))
+    ten = TEN_HOURS | {"time_s": [0.0, 600.0, *TEN_HOURS["time_s"][2:]]}
+    rate = {"rate_deg_per_s": [0.0, 0.01, -0.01, 0.02, 0.0]}
+    for columns, row in ((ten, 12.0), (ten | rate, 12.0), ({k: RAMPS[k] for k in (*ten, *rate)}, 2.0)):
+        profile = write_profile(folder / "free.csv", columns)
+        found, expected = run_twin(program, profile, row), simulated(instrument, profile, row)
+        assert np.ptp(expected["pattern_angle_deg"]) > 0.9 * abs(precession) * columns["time_s"][-1]
+        assert np.ptp(expected["pattern_angle_deg"]) > 0.3
+        assert {name: error for name, error in worst(found, expected).items() if error > 1e-9} == {}
+    held = write_profile(folder / "held.csv", TEN_HOURS | {"pattern_angle_deg": [0.0] * 5})
+    done = subprocess.run([program, held, folder / "no.csv"], capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert "turns freely" in done.stderr
+
+
+@pytest.mark.slow
+def test_limits_noise_turns_the_free_wave(folder):
+    """What is read as a rate has turned the azimuth by the Bryan factor times its integral; the rest is the angle's own white noise."""
+    noise = {"bias_white_deg_per_rt_h": 1.0, "bias_flicker_deg_per_h": 0.0, "bias_walk_deg_per_h_per_rt_h": 0.0}
+    noise |= {"pattern_angle_white_deg": 1e-3, "bias_resolution_deg_per_h": 0.0}
+    instrument = load_card("hrg-30mm-loops").with_table("loop", {"mode": "whole-angle"}).with_table("noise", noise)
+    program = compile_twin(instrument, folder / "wander")
+    profile = write_profile(folder / "still.csv", {"time_s": [0.0, 7200.0], "chamber_temperature_degC": [20.0, 20.0]})
+    noisy, plain = run_twin(program, profile, 2.0, 5), run_twin(program, profile, 2.0)
+    wander = noisy["bias_deg_per_h"] - plain["bias_deg_per_h"]
+    turned = plan_twin(instrument).constants["BRYAN"] * np.cumsum(np.append(0.0, wander[:-1])) * 2.0 / 3600
+    off = noisy["pattern_angle_deg"] - plain["pattern_angle_deg"]
+    assert np.std(wander) == pytest.approx(60.0 / np.sqrt(2.0), rel=0.06)
+    assert np.std(turned) > 5e-3
+    assert np.std(off - turned) == pytest.approx(1e-3 / np.sqrt(2.0), rel=0.06)
+
+
 @pytest.mark.slow
 def test_limits_everything_at_once(folder):
     """Loops with every error of their electronics, electrodes, a polynomial bias and a linear heat path."""
-    errors = {
-        f"{side}_{key}": 0.01 for side in ("pickoff", "drive") for key in ("gain_ratio", "phase_deg", "skew_mrad")
-    }
-    loop = errors | {"frequency_split_mHz": 2.0, "frequency_axis_deg": 7.0, "misalignment_mrad": 0.3}
-    loop |= {"drive_phase_difference_deg": 0.02}
     bias = {"offset_deg_per_h": 0.3, "k1_deg_per_h_per_Hz": 0.1, "k4_deg_per_h_s_per_Hz": 30.0}
     bias |= {"k9_deg_per_h_s2_per_Hz3": 5.0}
     profile = write_profile(folder / "ramps.csv", {k: v for k, v in RAMPS.items() if k != "quadrature_V"})
     for control, radiates in (("force", True), ("stiffness", False)):
         instrument = (
             load_card("hrg-30mm-loops")
-            .with_table("loop", {**loop, "quadrature_control": control})
+            .with_table("loop", {**ERRORS, "quadrature_control": control})
             .with_table("bias", bias)
         )
         instrument = instrument.with_table("thermal", {"radiation": radiates, "drive_power_mW": 2.0, "cells": 8})
@@ -168,11 +207,13 @@ def test_limits_imposed_housing(folder):
 
 
 @pytest.mark.slow
-def test_contract_record_of_the_program(folder, capsys):
+@pytest.mark.parametrize("mode", ["force-rebalance", "whole-angle"])
+def test_contract_record_of_the_program(mode, folder, capsys):
     """Columns, order and digits of `hrg simulate --noiseless`, which reads what the twin writes."""
     card = folder / "card.toml"
-    save_card(load_card("hrg-30mm-loops"), card)
-    profile = write_profile(folder / "short.csv", {k: v for k, v in RAMPS.items() if k != "electrode_bias_V"})
+    save_card(load_card("hrg-30mm-loops").with_table("loop", {"mode": mode}), card)
+    without = ("electrode_bias_V", "pattern_angle_deg" if mode == "whole-angle" else "")
+    profile = write_profile(folder / "short.csv", {k: v for k, v in RAMPS.items() if k not in without})
     assert (
         main(["simulate", str(card), str(profile), "--out", str(folder / "python.csv"), "--noiseless", "--row", "10"])
         == 0
@@ -230,6 +271,10 @@ def test_limits_draws_are_normal_and_seeded(folder):
 @pytest.mark.slow
 def test_limits_sanitizers(folder):
     """All effects at once, loops and noise, and an FMU's life, under the address and undefined-behaviour sanitizers."""
+    free = load_card("hrg-30mm-loops").with_table("loop", {**ERRORS, "mode": "whole-angle"})
+    turning = write_profile(folder / "turning.csv", {k: v for k, v in RAMPS.items() if k != "pattern_angle_deg"})
+    found = run_twin(compile_twin(free, folder / "turning", SANITIZED), turning, 5.0, 7)
+    assert all(np.isfinite(column).all() for column in found.values())
     entries = [one_effect(name, library()[name].responses[0]) for name in sorted(library())]
     entries = [entry | {"share_of_form": 1.0} if entry["name"] == "radiation" else entry for entry in entries]
     instrument = load_card("hrg-30mm-loops").with_table("effect", entries)
