@@ -6,14 +6,15 @@ from typing import Annotated, Any
 
 from cyclopts import Parameter
 
-from studies.cli.arguments import Folder, Quiet, Workers
+from studies.cli.arguments import COUNT, Folder, Quiet, Workers
 from studies.cli.output import answers, check_ending, say
 from studies.errors import InputError
 from studies.files.writing import write_text
 from studies.reports.sweep_analysis import tolerance_table
 from studies.results import Result, Table, row_of
+from studies.sweeps.export import export_results
 from studies.sweeps.opening import is_running
-from studies.sweeps.results import Results, export_results, open_results
+from studies.sweeps.results import Results, open_results
 from studies.sweeps.run import Effort, check_functions, estimate_study, run_study
 from studies.sweeps.spec import read_study
 from studies.sweeps.validity import find_invalid
@@ -129,17 +130,19 @@ def report(folder: Folder, *, out: Annotated[str | None, Parameter(name=("--repo
 
 
 @answers("hrg.study-export/1", page=False)
-def export(folder: Folder, *, out: str | None = None) -> Result:
-    """Write the results as CSV, and the unit of every column to a JSON file.
+def export(folder: Folder, *, out: str | None = None, part_rows: Annotated[int, COUNT] = 1_000_000) -> Result:
+    """Write the results as CSV or Parquet, and the unit of every column to a JSON file.
 
     Args:
-        out: The CSV file; default: results.csv in the folder.
+        out: A .csv or .parquet file, or, a name without an ending, a folder for a data set of Parquet files; default:
+            results.csv in the folder.
+        part_rows: Designs in each file of a data set.
     """
     results = open_results(folder)
-    if out is not None:
-        check_ending("--out", out, "an export is a CSV file", ".csv")
+    if out is not None and Path(out).suffix:
+        check_ending("--out", out, "an export is a CSV or Parquet file, or a folder", ".csv", ".parquet")
     path = Path(out) if out else Path(folder) / "results.csv"
-    units = export_results(results, path)
+    units = export_results(results, path, part_rows)
     payload = {"table": str(path), "units_file": str(units), "rows": len(results)}
     payload |= row_of(results, "done", cases="total", columns="units")
     _say_unfinished(results)

@@ -14,7 +14,6 @@ from studies.reports.sweep_analysis import (
     influence_parts,
     main_columns,
     number,
-    numbers_of,
     search_parts,
     statistics_table,
     summarise,
@@ -76,7 +75,7 @@ def study_result(results: Results) -> Result:
 def _short(results: Results) -> list[Part]:
     facts = [("Designs", str(results.done), f"of {results.total}; {len(results.failed)} failed")]
     for column in main_columns(results)[:2]:
-        n = numbers_of(results, column)
+        n = results.numbers[column.name]
         unit = "" if column.unit == "1" else f" {column.unit}"
         least, greatest, nominal = (to_digits(n[key], n["deviation"] / 3) for key in ("least", "greatest", "nominal"))
         facts.append((column.label, f"{least} … {greatest}{unit}", f"nominal {nominal}{unit}"))
@@ -121,24 +120,25 @@ def _failures(results: Results) -> list[Part]:
     if not results.failed.size:
         return []
     reasons = [{"cases": count, "reason": reason} for reason, count in results.store.reasons()]
-    columns = (*_design_columns(results), Column(results.remark, "Reason"))
+    places = results.failed[:MOST_ROWS].tolist()
+    columns = (*_design_columns(results, places), Column(results.remark, "Reason"))
     return [
         Sentence("These designs have no result and are excluded from all figures on this page.", "warning"),
         Table("Reasons", reasons, ("Cases", "Reason")),
-        Table("Failed designs", results.failed[:MOST_ROWS].tolist(), columns, sortable=True),
+        Table("Failed designs", places, columns, sortable=True),
     ]
 
 
-def _design_columns(results: Results) -> list[Column]:
+def _design_columns(results: Results, places: Sequence[int]) -> list[Column]:
     return [
-        Column(_at(results.parameter(p.name)), figures.label(p.name, p.unit), form=".8g")
+        Column(_at(results.parameter(p.name), places), figures.label(p.name, p.unit), form=".8g")
         for p in results.study.parameters
     ]
 
 
-def _at(values: NDArray[Any]) -> Callable[[int], Any]:
-    """Return what shows the value of a design, whose place is the row."""
-    return lambda place: values[place]
+def _at(values: NDArray[Any], places: Sequence[int]) -> Callable[[int], Any]:
+    """Return what shows the value of a design, whose place is the row; the other designs are not kept."""
+    return {place: values[place] for place in places}.__getitem__
 
 
 def _designs(results: Results) -> Table:
@@ -150,9 +150,9 @@ def _designs(results: Results) -> Table:
         order = order[np.isfinite(results.column(columns[0].name)[order])]
         places = [*order[:ENDS].tolist(), *order[-ENDS:].tolist()]
         note += f" Of {len(results)} designs, the {ENDS} with the lowest and the {ENDS} with the highest {columns[0].label} are shown; hrg study export writes all."
-    shown = [Column(_at(results.column(c.name)), figures.column_label(c), form=".8g") for c in columns]
+    shown = [Column(_at(results.column(c.name), places), figures.column_label(c), form=".8g") for c in columns]
     case = Column(lambda place: place, "Case")
-    return Table("Designs", places, (case, *_design_columns(results), *shown), note, sortable=True)
+    return Table("Designs", places, (case, *_design_columns(results, places), *shown), note, sortable=True)
 
 
 def _pictures(results: Results) -> list[Part]:

@@ -213,7 +213,7 @@ def summarise(results: Results) -> dict[str, Any]:
         "cases": len(results),
         **row_of(results, "done", "total"),
         "failed": len(results.failed),
-        "columns": {c.name: {"unit": c.unit, **numbers_of(results, c)} for c in results.study.columns},
+        "columns": {c.name: {"unit": c.unit, **results.numbers[c.name]} for c in results.study.columns},
         "searches": results.store.findings,
     }
     for key, analyse in (("sobol", sobol_indices), ("slopes", local_slopes), ("linear", linear_shares)):
@@ -230,19 +230,6 @@ def _data(analyse: Any, results: Results, column: str) -> Any:
     except InputError:
         return None
     return [vars(one) for one in found] if isinstance(found, list) else None if found is None else vars(found)
-
-
-def numbers_of(results: Results, column: Output) -> dict[str, float]:
-    """Return a column at the nominal design and over all designs, with its largest numerical error."""
-    y = results.column(column.name)
-    y = y[np.isfinite(y)]
-    place = [c.name for c in results.study.columns].index(column.name)
-    nominal = results.nominal.values[place] if results.nominal is not None else np.nan
-    errors = results.error(column.name)
-    error = float(np.nanmax(errors)) if np.isfinite(errors).any() else np.nan
-    numbers: dict[str, Any] = {"mean": np.mean, "deviation": np.std, "least": np.min, "greatest": np.max}
-    over_all = {name: float(function(y)) if y.size else np.nan for name, function in numbers.items()}
-    return {"nominal": nominal, **over_all, "error": error}
 
 
 def yield_of(results: Results) -> Yield | None:
@@ -266,7 +253,7 @@ def statistics_table(results: Results) -> Table:
     """Return every column over all designs that have a result."""
     rows: list[dict[str, Any]] = []
     for column in results.study.columns:
-        n = numbers_of(results, column)
+        n = results.numbers[column.name]
         deviation, mean, error = n["deviation"], n["mean"], n["error"]
         to = error if np.isfinite(error) else deviation / 3
         scatter = plain(deviation) if deviation > 1e-12 * abs(mean) else "0"

@@ -1,8 +1,5 @@
 """The results of a study: a table with units, columns as arrays, failures, outcomes of searches."""
 
-import csv
-import io
-import json
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -12,7 +9,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from studies.files.writing import write_text, written_whole
 from studies.instrument.card import build_instrument
 from studies.results.shown import Shown
 from studies.sweeps.block import Array, decode
@@ -24,6 +20,8 @@ from studies.sweeps.store import Store, Stored
 
 if TYPE_CHECKING:
     import pandas as pd
+
+KEPT_BYTES = 4e7  # of columns
 
 
 class Chunk(NamedTuple):
@@ -109,6 +107,21 @@ class Results(Shown):
         """The nominal design, None before it has been computed."""
         return self.store.find(nominal_row(self.study))
 
+    @cached_property
+    def numbers(self) -> Mapping[str, Mapping[str, float]]:
+        """Every column at the nominal design and over all designs, with its largest numerical error; NaN where there is none."""
+        found = {}
+        for place, column in enumerate(self.study.columns):
+            y, errors = self.column(column.name), self.error(column.name)
+            y, errors = y[np.isfinite(y)], errors[np.isfinite(errors)]
+            nominal = float(self.nominal.values[place]) if self.nominal is not None else np.nan
+            over_all: dict[str, Any] = {"mean": np.mean, "deviation": np.std, "least": np.min, "greatest": np.max}
+            found[column.name] = {"nominal": nominal} | {
+                name: float(of(y)) if y.size else np.nan for name, of in over_all.items()
+            }
+            found[column.name]["error"] = float(errors.max()) if errors.size else np.nan
+        return found
+
     def chunks(self) -> Iterator[Chunk]:
         """Give all cases, some thousand at a time."""
         d, w = len(self.study.names), len(self.study.columns)
@@ -181,11 +194,15 @@ class Results(Shown):
         return [column.name for column in self.study.columns].index(name)
 
     def _column(self, k: int) -> Array:
-        if k not in self._read:
-            found = [columns[0] for _, columns in self.store.read([k])]
-            whole = np.concatenate(found) if found else np.empty(0)
-            self._read[k] = whole if self._repeats is None else whole[self._repeats]
-        return self._read[k]
+        """One column of the store; those that were read last are kept, as many as memory is meant for."""
+        found = self._read.pop(k, None)
+        if found is None:
+            whole = np.concatenate([np.empty(0), *(columns[0] for _, columns in self.store.read([k]))])
+            found = whole if self._repeats is None else whole[self._repeats]
+        self._read[k] = found
+        while len(self._read) > 1 and len(self._read) * found.nbytes > KEPT_BYTES:
+            del self._read[next(iter(self._read))]
+        return found
 
     @cached_property
     def _repeats(self) -> NDArray[np.intp] | None:
@@ -215,25 +232,3 @@ def open_results(folder: str | Path) -> Results:
     given = about["instrument"]
     instrument = build_instrument(given["content"], given["path"])
     return Results(check_study(about["spec"], instrument, str(folder), about["folder"], about["spec_text"]), store)
-
-
-def export_results(results: Results, path: str | Path) -> Path:
-    """Write the table as CSV and, beside it, `NAME.units.json`, whose path is returned; floats keep every digit."""
-    with written_whole(path) as file:
-        text = io.TextIOWrapper(file, "utf-8", newline="")
-        csv.writer(text, lineterminator="\n").writerow(map(_harmless, results.header))
-        for frame in results.frames():
-            for name in frame.select_dtypes(exclude="number"):
-                frame[name] = frame[name].map(_harmless)
-            frame.to_csv(text, header=False, index=False, lineterminator="\n")
-        text.flush()
-        text.detach()
-    beside = Path(path).with_suffix(".units.json")
-    attributes = {"study": results.study.name, "units": results.units}
-    write_text(beside, json.dumps(attributes, indent=2, ensure_ascii=False) + "\n")
-    return beside
-
-
-def _harmless(cell: str) -> str:
-    """Return a text that no spreadsheet takes for a formula."""
-    return f"'{cell}" if cell.startswith(("=", "+", "-", "@", "\t")) else cell

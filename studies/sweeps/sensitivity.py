@@ -135,19 +135,27 @@ def linear_shares(results: "Results", column: str) -> LinearShares | None:
 
     study = results.study
     numeric = [p.name for p in study.parameters if not isinstance(p.nominal, str)]
-    X = np.column_stack([results.parameter(name).astype(float) for name in numeric]) if numeric else np.empty((0, 0))
     y = results.column(column)
     there = np.isfinite(y)
-    X, y = X[there], y[there]
+    y = y[there]
     free = len(y) - len(numeric) - 1
-    if not numeric or free < 2 or np.ptp(y) == 0 or not (np.ptp(X, axis=0) > 0).all():
+    if not numeric or free < 2 or np.ptp(y) == 0:
         return None
-    scaled = (X - X.mean(axis=0)) / X.std(axis=0)
-    slopes = np.linalg.lstsq(scaled, y - y.mean(), rcond=None)[0]
-    residual = y - y.mean() - scaled @ slopes
-    deviation = np.sqrt(residual @ residual / free * np.diag(np.linalg.pinv(scaled.T @ scaled)))
+    X = np.empty((len(numeric), len(y)))
+    for row, name in zip(X, numeric, strict=True):
+        row[:] = results.parameter(name)[there]
+    if not (np.ptp(X, axis=1) > 0).all():
+        return None
+    spread = np.array([row.std() for row in X])
+    X -= X.mean(axis=1, keepdims=True)
+    X /= spread[:, None]
+    inverse, residual, slopes = np.linalg.pinv(X @ X.T), y - y.mean(), np.zeros(len(X))
+    for _ in range(2):  # the second takes what rounding has left
+        step = inverse @ (X @ residual)
+        residual -= step @ X
+        slopes += step
+    deviation = np.sqrt(residual @ residual / free * np.diag(inverse))
     half = t.ppf(0.95, free) * deviation
-    spread = X.std(axis=0)
     share = slopes**2 / y.var()
     return LinearShares(tuple(numeric), slopes / spread, half / spread, share, float(1 - residual.var() / y.var()))
 

@@ -109,10 +109,10 @@ def place_limits(values: NDArray[np.float64], nominal: float, low: float, high: 
 
 def _judge(results: "Results", limits: tuple[RequirementLimits, ...]) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """Return which cases meet all limits, and of which that is unknown: no known value fails, but one lacks."""
-    values = np.array([results.column(limit.column) for limit in limits])
-    known = np.isfinite(values)
-    low, high = (np.array([getattr(limit, end) for limit in limits])[:, None] for end in ("low", "high"))
-    inside = known & (values >= low) & (values <= high)
-    good = inside.all(axis=0)
-    fails = (known & ~inside).any(axis=0)
+    good, fails = np.ones(len(results), dtype=bool), np.zeros(len(results), dtype=bool)
+    for limit in limits:
+        values = results.column(limit.column)
+        inside = (values >= limit.low) & (values <= limit.high)
+        good &= inside
+        fails |= np.isfinite(values) & ~inside
     return good, ~good & ~fails

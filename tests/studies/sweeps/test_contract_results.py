@@ -17,8 +17,8 @@ import pytest
 from studies.errors import InputError, MissingEnvironment
 from studies.reports.sweep import study_result
 from studies.results.page import render_result
+from studies.sweeps.export import export_results
 from studies.sweeps.progress import Progress
-from studies.sweeps.results import export_results
 from studies.sweeps.run import run_study
 from tests.studies.sweeps.processes import environment, rows_of, spec_of, words_of
 
@@ -54,6 +54,24 @@ def test_no_cell_of_an_export_is_a_formula(tmp_path):
         SimpleNamespace(header=list(frame), frames=lambda: [frame], study=study, units={}), tmp_path / "t.csv"
     )
     assert (tmp_path / "t.csv").read_text() == "'=1+1,remark\n-1.0,'@SUM(A1)\n"
+
+
+def test_parquet_has_the_digits_and_the_units(results, tmp_path):
+    """One file, and a data set of parts of three designs, in order; a folder with old parts is refused."""
+    import pandas as pd
+
+    parquet = pytest.importorskip("pyarrow.parquet")
+    export_results(results, tmp_path / "one.parquet")
+    export_results(results, tmp_path / "many", 3)
+    table = results.table()
+    one, many = pd.read_parquet(tmp_path / "one.parquet"), pd.read_parquet(tmp_path / "many")
+    for column in table:
+        assert one[column].tolist() == many[column].tolist() == table[column].tolist()
+    assert sorted(path.name for path in (tmp_path / "many").iterdir()) == [f"part-0000{k}.parquet" for k in range(3)]
+    schema = parquet.read_schema(tmp_path / "many" / "part-00002.parquet")
+    assert schema.field("frequency_n2_Hz").metadata == {b"unit": b"Hz"}
+    with pytest.raises(InputError, match="no old part"):
+        export_results(results, tmp_path / "many", 3)
 
 
 def test_values_are_those_of_the_solver(results):

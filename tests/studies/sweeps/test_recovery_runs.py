@@ -19,8 +19,9 @@ from studies.errors import InputError
 from studies.instrument.card import load_card
 from studies.sweeps.block import Batch, Cases, Remark
 from studies.sweeps.child import Child
+from studies.sweeps.export import export_results
 from studies.sweeps.opening import claim_store
-from studies.sweeps.results import export_results, open_results
+from studies.sweeps.results import open_results
 from studies.sweeps.run import run_study
 from tests.studies.sweeps.processes import environment, rows_of, spec_of, words_of
 
