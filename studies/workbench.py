@@ -105,7 +105,7 @@ def diagnose_records(
     progress: Progress | None = None,
 ) -> "Inference | Unjudged":
     """Return what a campaign shows and the simulation lacks: the joint inference of all responses beside a card, or beside a polynomial card made from the records; with a `chamber`, the run that should come next in it."""
-    from studies.calibration.misreading import bias_of_opposite_sign, check_readings
+    from studies.calibration.misreading import check_readings
     from studies.inference.diagnosis import infer
     from studies.inference.polynomial_card import polynomial_card
     from studies.inference.records import driving, make_ready
@@ -127,8 +127,6 @@ def diagnose_records(
             if "frequency_Hz" in record:
                 check_card_frequency(card, record["frequency_Hz"], record.path, law)
         check_readings(card, campaign.records, law)
-        turned = [bias_of_opposite_sign(card, record, law) for record in campaign.records]
-        campaign = campaign.noting(said for said in turned if said is not None)
     tell = progress or (lambda words: None)
     found = infer(card, campaign, tell)
     return found if chamber is None else replace(found, advice=suggest(found, found.verdict, chamber, tell))

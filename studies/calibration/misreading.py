@@ -35,10 +35,11 @@ LIKE = 10.0
 
 
 def check_readings(instrument: "Instrument", records: "Sequence[Record]", law: "FrequencyLaw | None" = None) -> None:
-    """Refuse records whose frequency follows the temperatures only if these are read otherwise, and a bias in °/s."""
+    """Refuse records whose frequency follows the temperatures only if these are read otherwise, and a bias in °/s or of the opposite sign."""
     law = law or law_of(instrument)
     for record in records:
         _check_unit(instrument, record)
+        _check_sign(instrument, record, law)
         names = [name for name in COLUMN.values() if name in record]
         if FREQUENCY not in record or not names:
             continue
@@ -60,22 +61,20 @@ def check_readings(instrument: "Instrument", records: "Sequence[Record]", law: "
                 )
 
 
-def bias_of_opposite_sign(instrument: "Instrument", record: "Record", law: "FrequencyLaw | None" = None) -> str | None:
-    """Return a sentence where a bias follows what the card predicts with the opposite sign; else None."""
+def _check_sign(instrument: "Instrument", record: "Record", law: "FrequencyLaw") -> None:
+    """Refuse a bias that follows what the card predicts with the opposite sign."""
     if BIAS not in record:
-        return None
-    law = law or law_of(instrument)
+        return
     white = white_rms(record[BIAS][np.isfinite(record[BIAS])])
     changes, left, rest = (
         float(np.sqrt(max(rms**2 - white**2, 0.0)))
         for rms in (float(np.nanstd(record[BIAS])), *_left(instrument, record, law, BIAS, (1.0, -1.0)))
     )
-    if not white < changes or not rest < min(FOLLOWED * changes, left / 3):
-        return None
-    return (
-        f"{record.path}: {BIAS} follows the card's prediction with the opposite sign: {rest:.2g} °/h of its {changes:.2g} °/h (rms, white noise left out) then"
-        " remain. Check the sign of the output."
-    )
+    if white < changes and rest < min(FOLLOWED * changes, left / 3):
+        raise InputError(
+            f"{record.path}: {BIAS} has the opposite sign to the card's prediction: with its sign changed, {rest:.2g} °/h of its {changes:.2g} °/h"
+            " (rms, white noise left out) remain. Change the sign of the column or, if the output is right, that of the card's bias."
+        )
 
 
 def _check_unit(instrument: "Instrument", record: "Record") -> None:

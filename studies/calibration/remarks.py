@@ -10,7 +10,6 @@ from studies.calibration.ahead import BIAS
 from studies.calibration.estimates import SILENT, TOLD, Estimate
 from studies.calibration.fit import CardFit, stated_noise
 from studies.calibration.ladder import Rung, noise_rms, usual_mean
-from studies.calibration.misreading import bias_of_opposite_sign
 from studies.calibration.observed import UNITS, WORDS
 from studies.calibration.problem import CardProblem
 from studies.instrument.display import display_name
@@ -29,8 +28,6 @@ def warn(found: CardFit, estimates: Sequence[Estimate], ladder: Mapping[str, Run
     if not found.converged:
         warnings.append(f"the fit did not converge in {found.steps} steps; its values are not final.")
     for run in found.problem.runs:
-        said = bias_of_opposite_sign(found.problem.instrument, run.record, found.problem.law)
-        warnings += [] if said is None else [said]
         warnings += [f"{run.record.path}: {idle}" for idle in idle_effects(found.problem.instrument, run.inner)]
     misfit = _misfit(found, ladder)
     warnings += [*_moved(estimates), *([] if misfit else _unsettled(found)), *misfit]

@@ -19,11 +19,14 @@ from studies.results import Drawing, Figure, Part, Result, Sentence, Table
 AVERAGE = 100.0  # s
 NOISE = 0.02  # relative: what the noise of a model's inputs may add to a record that has nothing to compensate
 WORSE = (
-    "{} is worse than the record: the standard deviation of {:g} s averages goes from {:.4g} to {:.4g}. Use it only if the model"
-    " is of this gyro and this sign of the output."
+    "{} is worse than the record: the standard deviation of {:g} s averages increases from {:.4g} to {:.4g}. Use it only if the model"
+    " is of this gyro."
 )
 OPPOSITE = 0.5  # of the record's deviation: what a correction of the opposite sign leaves where the output's is changed
-SIGN = " With the opposite sign the correction would leave {:.4g}: check the sign of the output."
+SIGN = (
+    "{}: {} has the opposite sign to the output that the model was fitted to: the compensation would increase the standard deviation of"
+    " {:g} s averages from {:.4g} to {:.4g}, and with the sign changed leave {:.4g}. Change the sign of the column."
+)
 OWN_THERMOMETER = (
     "{1} has no thermometer, so {0} has the resonator's temperature, found from the frequency, instead of a compensated frequency."
     " To compensate other outputs over this temperature, use hrg fit bias --over temperature."
@@ -65,9 +68,11 @@ def compensate(
         say(f"reading {run}")
         record = read_record(run)
         result = models.compensate(loaded, record, extrapolate=extrapolate)
-        keep_record(result, out)
         added = [name for name in result.columns if name not in record]
         columns = {name: _judge(record, result, name) for name in added if name.startswith(COMPENSATED)}
+        for name, one in columns.items():
+            _check_sign(record, result, name, one)
+        keep_record(result, out)
         parts = _show(record, result, columns)
         if RESONATOR in added:
             parts.append(OWN_THERMOMETER.format(out, run))
@@ -97,23 +102,38 @@ def _judge(record: Record, result: Record, name: str) -> dict[str, Any]:
     }
 
 
+def _is_worse(one: dict[str, Any]) -> bool:
+    was, now = one["stability_before"], one["stability_after"]
+    return was is not None and now is not None and now > was * (1 + NOISE)
+
+
+def _check_sign(record: Record, result: Record, name: str, one: dict[str, Any]) -> None:
+    """Refuse a record of which the model makes the output worse, and with its sign changed much better."""
+    if _is_worse(one):
+        output = name.removeprefix(COMPENSATED)
+        was, now = one["stability_before"], one["stability_after"]
+        turned = _stability(record["time_s"], 2 * record[output] - result[name])
+        if turned is not None and turned < OPPOSITE * was:
+            raise InputError(SIGN.format(record.path, output, AVERAGE, was, now, turned))
+
+
 def _show(record: Record, result: Record, columns: dict[str, dict[str, Any]]) -> list[Part]:
     rows = [{"name": name, "unit": unit_of(name).removeprefix("1") or ""} | one for name, one in columns.items()]
     note = f"Before, after: standard deviation of {AVERAGE:g} s averages."
     if any(one["rows_not_compensated"] for one in rows):
         note += " Empty rows: an input is missing, or there are too few earlier samples for its rate."
-    parts: list[Part] = [Table("Compensated columns", rows, COLUMNS, note)]
+    worse = [
+        WORSE.format(name, AVERAGE, one["stability_before"], one["stability_after"])
+        for name, one in columns.items()
+        if _is_worse(one)
+    ]
+    for words in worse:
+        say(f"warning: {words}")
+    parts: list[Part] = [*(Sentence(words, "warning", "page") for words in worse)]
+    parts.append(Table("Compensated columns", rows, COLUMNS, note))
     for name, one in columns.items():
-        was, now = one["stability_before"], one["stability_after"]
-        if now is None:
+        if one["stability_after"] is None:
             parts.append(f"{name}: too few rows for {AVERAGE:g} s averages.")
-        elif was is not None and now > was * (1 + NOISE):
-            words = WORSE.format(name, AVERAGE, was, now)
-            before = record[name.removeprefix(COMPENSATED)]
-            turned = _stability(record["time_s"], 2 * before - result[name])
-            words += SIGN.format(turned) if turned is not None and turned < OPPOSITE * was else ""
-            say(f"warning: {words}")
-            parts.append(Sentence(words, "warning", "page"))
         parts.append(Figure(lambda name=name: _draw(record, result, name), f"{name} over time."))  # type: ignore[misc]
     return parts
 

@@ -1,6 +1,6 @@
 """Records of one gyro made ready for a diagnosis: checked, each once, with the columns that can be used and why others cannot."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -39,10 +39,6 @@ class Campaign:
     skipped: dict[str, str] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     timed: bool = False
-
-    def noting(self, said: Iterable[str]) -> "Campaign":
-        """Return it with further sentences."""
-        return replace(self, notes=(*self.notes, *said))
 
 
 def driving(record: Record) -> Array:

@@ -325,7 +325,7 @@ def test_time_in_hours_is_said_and_not_judged(tmp_path, capsys):
     assert "nan" not in captured.out
 
 
-def test_a_compensation_that_does_harm_is_said(calibrated, tmp_path, capsys):
+def test_a_compensation_of_the_opposite_sign_is_refused(calibrated, tmp_path, capsys):
     """The model's terms with their signs turned double the error that they should take away."""
     run, out = calibrated / "run0.csv", tmp_path / "out.csv"
     assert main(["compensate", str(calibrated / "m.toml"), str(run), "--out", str(out)]) == 0
@@ -333,10 +333,10 @@ def test_a_compensation_that_does_harm_is_said(calibrated, tmp_path, capsys):
     flipped = tmp_path / "flipped.csv"
     record = read_record(run)
     write_record(record.with_columns({"bias_deg_per_h": -record["bias_deg_per_h"]}), flipped)
-    assert main(["compensate", str(calibrated / "m.toml"), str(flipped), "--out", str(out)]) == 0
-    said = capsys.readouterr().err
-    assert "is worse than the record" in said
-    assert "With the opposite sign the correction would leave" in said
+    out.unlink()
+    assert main(["compensate", str(calibrated / "m.toml"), str(flipped), "--out", str(out)]) == 2
+    assert "bias_deg_per_h has the opposite sign to the output that the model was fitted to" in capsys.readouterr().err
+    assert not out.exists()
 
 
 @pytest.mark.parametrize("turned", [None, 1, 2])
@@ -345,5 +345,8 @@ def test_a_run_with_the_opposite_sign_is_named(tmp_path, ask, turned):
         record = make_record(k, cooling=k != 1)
         sign = -1.0 if k == turned else 1.0
         write_record(record.with_columns({"bias_deg_per_h": sign * record["bias_deg_per_h"]}), tmp_path / f"{k}.csv")
-    named = ask(["fit", "bias", *(str(tmp_path / f"{k}.csv") for k in range(3))])["opposite_sign"]
+    runs, saved = [str(tmp_path / f"{k}.csv") for k in range(3)], tmp_path / "m.toml"
+    named = ask(["fit", "bias", *runs])["opposite_sign"]
     assert named == (None if turned is None else str(tmp_path / f"{turned}.csv"))
+    assert main(["fit", "bias", *runs, "--save", str(saved)]) == (0 if turned is None else 2)
+    assert saved.exists() == (turned is None)

@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 
 from studies.calibration.calibrate import calibrate
-from studies.calibration.misreading import bias_of_opposite_sign, check_readings
+from studies.calibration.misreading import check_readings
 from studies.calibration.observed import observe, read_settled
 from studies.errors import InputError
 from studies.inference.records import make_ready
 from studies.instrument.card import load_card, save_card
 from studies.simulation.chamber import load_profile
 from studies.simulation.virtual_gyro import simulate_run
+from studies.workbench import diagnose
 
 TEMPERATURES = ("housing_temperature_degC", "chamber_temperature_degC")
 
@@ -68,15 +69,20 @@ def test_a_bias_in_degrees_per_second_is_refused_before_the_fit(card, record):
         calibrate(card, [spoilt(record, bias_deg_per_h=lambda b: b / 3600.0)])
 
 
-def test_a_bias_of_the_opposite_sign_is_told(card):
+@pytest.mark.parametrize("work", [lambda own, run: calibrate(own, [run]), lambda own, run: diagnose(run, card=own)])
+def test_a_bias_of_the_opposite_sign_is_refused_before_the_fit(card, work):
+    """Only a warning once: the card was saved with a bias of no gyro, and a diagnosis called the sign an ageing."""
     own = card.with_table("bias", {"k1_deg_per_h_per_Hz": 0.2, "k4_deg_per_h_s_per_Hz": 300.0})
     made = simulate_run(own, load_profile("cycle 20 -15 40 0.5 30min 1"), 1 / 60, 1).record
-    assert bias_of_opposite_sign(own, made) is None
-    said = bias_of_opposite_sign(own, spoilt(made, bias_deg_per_h=lambda b: -b))
-    assert said is not None
-    assert "bias_deg_per_h follows the card's prediction with the opposite sign" in said
+    check_readings(own, [made])
+    turned = spoilt(made, bias_deg_per_h=lambda b: -b)
+    with pytest.raises(
+        InputError,
+        match=r"bias_deg_per_h has the opposite sign to the card's prediction: with its sign changed, ",
+    ):
+        work(own, turned)
     quiet = spoilt(made, bias_deg_per_h=lambda b: np.random.default_rng(1).standard_normal(b.size))
-    assert bias_of_opposite_sign(own, quiet) is None
+    check_readings(own, [quiet])
 
 
 @pytest.mark.slow
