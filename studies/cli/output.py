@@ -30,10 +30,13 @@ if TYPE_CHECKING:
 PATIENCE = 2.0  # seconds of silence that nobody minds
 
 
-def answers(schema: str, page: bool = True) -> Callable[[Callable[..., Result]], Callable[..., int]]:
+def answers(
+    schema: str, page: bool = True, **endings: tuple[str, ...]
+) -> Callable[[Callable[..., Result]], Callable[..., int]]:
     """Make a command of a function that returns a `Result`: give it --json and --report, and keep its inputs from its outputs.
 
     Its JSON object begins with the first of `schema`, unless it states another. Without `page` there is no --report: the command writes a page of its own, or computes nothing.
+    `save=("-inner.csv",)`: with --save NAME.toml, NAME-inner.csv is written too.
     """
     flag = Annotated[bool, Parameter(help=f"Print one JSON object (schema {schema}) instead of text.")]
     html = Annotated[str | None, Parameter(help="Write a page (HTML).")]
@@ -46,10 +49,10 @@ def answers(schema: str, page: bool = True) -> Callable[[Callable[..., Result]],
 
         @functools.wraps(command)
         def run(*arguments: Any, json: bool = False, **options: Any) -> int:
-            report = options.pop("report", None)
+            report = options.pop("report", None) if page else None
             if report is not None:
                 check_ending("--report", report, "a report is an HTML page", ".html", ".htm")
-            with guarded({**own.bind(*arguments, **options).arguments, "report": report}) as read:
+            with guarded({"report": report, **own.bind(*arguments, **options).arguments}, endings) as read:
                 result = command(*arguments, **options)
                 result = replace(result, payload=usual | result.payload)
                 if caveats := _caveats_of(read):

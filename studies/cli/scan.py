@@ -17,14 +17,16 @@ from shell.constants import zero_Celsius
 from studies.cli.arguments import COUNT, MANY, Card, Temperature, Theory, open_resonator
 from studies.cli.output import answers, say
 from studies.errors import InputError
+from studies.files.paths import beside
 from studies.files.writing import write_csv
 from studies.instrument.card import Instrument, save_card
 from studies.reports.digits import plain, to_interval
 from studies.reports.style import BLUE, ORANGE, figure
-from studies.resonator.scan import Scan, scan_faces
+from studies.resonator.scan import SIDES, Scan, scan_faces
 from studies.results import Chapter, Drawing, Facts, Figure, Result, Sentence, Table, row_of
 
 NONE = "none"
+TABLE = "-{}.csv"  # of a face, beside the saved card
 
 
 SPLITS = (
@@ -45,7 +47,7 @@ FACES = (
 ROUNDNESS = "face | position: position .3f | peak_to_valley_um: peak to valley (µm) .3f | rms_um: rms (µm) .3f"
 
 
-@answers("hrg.scan/1")
+@answers("hrg.scan/1", save=tuple(TABLE.format(face) for face in SIDES))
 def scan(
     card: Card,
     inner: str,
@@ -176,7 +178,7 @@ def _save(path: str, instrument: Instrument, found: Scan) -> None:
     target, maps = Path(path).resolve(), []
     for name in found.faces:
         x, theta, values = found.map_of(name, columns=72)
-        own = target.with_name(f"{target.stem}-{name}.csv")
+        own = beside(target, TABLE.format(name))
         rows = ([f"{at:.9g}", *(f"{1e6 * cell:.7g}" for cell in row)] for at, row in zip(x, values, strict=True))
         write_csv(own, ["position", *(f"{angle:g}" for angle in np.rad2deg(theta))], rows)
         maps.append({"of": name, "file": str(own)})

@@ -12,7 +12,7 @@ from studies.errors import InputError
 from studies.files.writing import write_text
 from studies.reports.sweep_analysis import tolerance_table
 from studies.results import Result, Table, row_of
-from studies.sweeps.export import export_results
+from studies.sweeps.export import UNITS, export_results
 from studies.sweeps.opening import is_running
 from studies.sweeps.results import Results, open_results
 from studies.sweeps.run import Effort, check_functions, estimate_study, run_study
@@ -108,19 +108,25 @@ def status(folder: Folder) -> Result:
 
 
 @answers("hrg.study-report/1", page=False)
-def report(folder: Folder, *, out: Annotated[str | None, Parameter(name=("--report", "--out"))] = None) -> Result:
+def report(
+    folder: Folder, *, report: str | None = None, out: Annotated[str | None, Parameter(show=False)] = None
+) -> Result:
     """Write a self-contained HTML page: definition, results, figures, sensitivities, yield and provenance.
 
     Args:
-        out: The page; default: report.html in the folder.
+        report: The page; default: report.html in the folder.
+        out: The same.
     """
     from studies.reports.sweep import study_result
     from studies.results.page import render_result
 
     results = open_results(folder)
-    if out is not None:
-        check_ending("--report", out, "a report is an HTML page", ".html", ".htm")
-    page = Path(out) if out else Path(folder) / "report.html"
+    if report is not None and out is not None:
+        raise InputError("--report and --out cannot be combined: they name the same page.")
+    for option, name in (("--report", report), ("--out", out)):
+        if name is not None:
+            check_ending(option, name, "a report is an HTML page", ".html", ".htm")
+    page = Path(report or out or Path(folder) / "report.html")
     say("writing the page, with mode shapes if the study has modes ...")
     found = study_result(results)
     write_text(page, render_result(found))
@@ -129,7 +135,7 @@ def report(folder: Folder, *, out: Annotated[str | None, Parameter(name=("--repo
     return replace(found, payload={**found.payload, "report": str(page)}, printed=told)
 
 
-@answers("hrg.study-export/1", page=False)
+@answers("hrg.study-export/1", page=False, out=(UNITS,))
 def export(folder: Folder, *, out: str | None = None, part_rows: Annotated[int, COUNT] = 1_000_000) -> Result:
     """Write the results as CSV or Parquet, and the unit of every column to a JSON file.
 

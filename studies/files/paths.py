@@ -8,10 +8,12 @@ be known here.
 import json
 import os
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from importlib.resources import files
+from itertools import chain
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from studies.errors import InputError
@@ -34,9 +36,21 @@ _read: dict[object, str] = {}
 _written: set[str] | None = None  # while a command runs; from Python a file may be written again and again
 
 
+def beside(path: str | Path, ending: str) -> Path:
+    """Return the path of a file that is named after another: run.csv and -inner.csv give run-inner.csv."""
+    return Path(path).with_name(f"{Path(path).stem}{ending}")
+
+
 @contextmanager
-def guarded(arguments: Mapping[str, Any]) -> Iterator[list[Path]]:
-    """Keep what a command reads from being overwritten by what it writes, while it runs; gives what it reads."""
+def guarded(
+    arguments: Mapping[str, Any], endings: Mapping[str, Iterable[str]] = MappingProxyType({})
+) -> Iterator[list[Path]]:
+    """Keep what a command reads from being overwritten by what it writes, while it runs; gives what it reads.
+
+    Args:
+        arguments: Of the command, by name.
+        endings: By name of an output, those of the files that are written `beside` it.
+    """
     outputs = {name: value for name, value in arguments.items() if name in OUTPUTS and isinstance(value, str)}
     words = [word for name, value in arguments.items() if name not in OUTPUTS for word in _words(value)]
     global _written
@@ -51,13 +65,18 @@ def guarded(arguments: Mapping[str, Any]) -> Iterator[list[Path]]:
                 )
         seen: dict[object, str] = {}
         for name, value in outputs.items():
-            given = f"{OUTPUTS[name]} {value}".strip()
+            given = f"{OUTPUTS[name]} {value}"
             _check_folder(Path(value), given)
-            _spare_read(Path(value), given)
-            if not _is_special(Path(value)) and seen.setdefault(_identity(Path(value)), given) != given:
-                raise InputError(
-                    f"{seen[_identity(Path(value))]} and {given}: two outputs would be one file; name two files."
-                )
+            more = (
+                (beside(value, one), f"{given} (which also writes {beside(value, one)})")
+                for one in endings.get(name, ())
+            )
+            for path, said in () if _is_special(Path(value)) else chain([(Path(value), given)], more):
+                _spare_read(path, said)
+                if seen.setdefault(_identity(path), said) != said:
+                    raise InputError(
+                        f"{seen[_identity(path)]} and {said}: two outputs would be one file; name two files."
+                    )
         yield read
     finally:
         _read.clear()

@@ -10,10 +10,12 @@ from typing import Any
 
 from studies.errors import InputError
 from studies.files.parquet import is_parquet
+from studies.files.paths import beside
 from studies.files.reading import load_library
 from studies.files.writing import check_folder, write_text, written_whole
 from studies.sweeps.results import Results
 
+UNITS = ".units.json"  # of a table of results, beside it
 GROUP = 32_768  # cases in a row group of a Parquet file
 
 
@@ -34,10 +36,10 @@ def export_results(results: Results, path: str | Path, part_rows: int = 1_000_00
         tables = _tables(results, path, -(-part_rows // groups))
         for number, first in enumerate(tables):
             _write_parquet(chain([first], islice(tables, groups - 1)), folder / f"part-{number:05d}.parquet")
-    beside = Path(path).with_suffix(".units.json")
+    units = beside(path, UNITS)
     attributes = {"study": results.study.name, "units": results.units}
-    write_text(beside, json.dumps(attributes, indent=2, ensure_ascii=False) + "\n")
-    return beside
+    write_text(units, json.dumps(attributes, indent=2, ensure_ascii=False) + "\n")
+    return units
 
 
 def _tables(results: Results, path: str | Path, rows: int) -> Iterator[Any]:

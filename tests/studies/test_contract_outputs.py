@@ -40,9 +40,12 @@ def folder(tmp_path, monkeypatch):
     shutil.copytree(INPUTS, tmp_path, dirs_exist_ok=True)
     (tmp_path / "mapped.toml").write_text(MAPPED)
     (tmp_path / "spec.toml").write_text(STUDY)
+    for name in ("points.xyz", "scanned-outer.csv"):
+        (tmp_path / name).write_text("no points: reading them would be work\n")
     (tmp_path / "scanned-inner.csv").write_text((tmp_path / "inner.csv").read_text())
     (tmp_path / "model.toml").write_text("")
     (tmp_path / "link.csv").symlink_to(tmp_path / "run1.csv")
+    (tmp_path / "dangling.csv").symlink_to(tmp_path / "zz-inner.csv")
     monkeypatch.chdir(tmp_path)
     return tmp_path
 
@@ -62,6 +65,9 @@ def contents(folder):
         "simulate hrg-30mm run1.csv --out ../{name}/run1.csv",
         "scan free-dome inner.csv outer.csv --theory shell --map inner.csv",
         "scan free-dome none scanned-inner.csv --theory shell --save outer.csv --map outer.csv",
+        "scan free-dome points.xyz --save zz.toml --map zz-inner.csv",
+        "scan free-dome points.xyz --save zz.toml --map ./dangling.csv",
+        "scan free-dome none scanned-outer.csv --save scanned.toml",
         "diagnose run1.csv --card mapped.toml --report outer.csv",
         "calibrate hrg-30mm run1.csv --save run1.csv",
         "import raw.csv --map map.toml --out map.toml",
@@ -84,31 +90,28 @@ def test_an_output_onto_an_input_or_another_output_is_refused_before_any_work(fo
     told = capsys.readouterr()
     assert told.out == ""
     assert told.err.startswith("hrg: ")
+    assert "points.xyz, line" not in told.err
+    assert told.err.endswith((" choose another name.\n", " name two files.\n", " ends in .html.\n"))
 
 
 @pytest.mark.slow
 def test_the_folder_of_a_study_keeps_its_store_its_lock_and_what_its_spec_names(folder, capsys):
     assert main(["study", "run", "spec.toml", "--out", "study", "--workers", "1", "--quiet"]) == 0
     before = contents(folder)
-    for name in ("study/study.store", "study/lock", "mapped.toml", "outer.csv"):
-        for command in ("export", "report"):
-            assert main(["study", command, "study", "--out", name]) == 2, name
-            assert "destroy" in capsys.readouterr().err
-    for command, kind in (("export", ".csv"), ("report", ".html")):  # the spec, which the store does not know
-        assert main(["study", command, "study", "--out", "spec.toml"]) == 2
-        assert f"ends in {kind}" in capsys.readouterr().err
+    ways = (("export", "--out", ".csv"), ("report", "--out", ".html"), ("report", "--report", ".html"))
+    for command, option, kind in ways:
+        for name in ("study/study.store", "study/lock", "mapped.toml", "outer.csv"):
+            assert main(["study", command, "study", option, name]) == 2, name
+            said = capsys.readouterr().err
+            assert said.startswith(f"hrg: {option} {name}: ")
+            assert "destroy" in said
+        assert main(["study", command, "study", option, "spec.toml"]) == 2  # the spec, which the store does not know
+        said = capsys.readouterr().err
+        assert said.startswith(f"hrg: {option} spec.toml: ")
+        assert f"ends in {kind}" in said
     assert contents(folder) == before
     for _ in range(2):  # a table of before may be written anew
         assert main(["study", "export", "study"]) == 0
-
-
-def test_a_table_beside_a_saved_card_does_not_replace_the_points_that_it_was_made_from(folder, refuse):
-    """`scan --save scanned.toml` writes scanned-outer.csv too."""
-    shutil.copy("outer.csv", "scanned-outer.csv")
-    before = contents(folder)
-    words = "scan free-dome none scanned-outer.csv --theory shell --harmonic 2 --highest 6 --save scanned.toml"
-    assert "scanned-outer.csv" in refuse(words.split())
-    assert contents(folder) == before
 
 
 @pytest.mark.parametrize("option", ["nowhere/out.csv", "outer.csv/out.csv"])
