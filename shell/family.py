@@ -173,8 +173,8 @@ def build_family(
         if errors[0] > AMPLIFIED * solve.jumps or left <= 0:
             break  # where it is not for the jumps, finer solves would be no smoother
     raise ShellError(
-        f"{count} full solves interpolate the frequency only to {reached:.2g} within these ranges; {tolerance:.2g} is asked: narrow the"
-        " ranges, allow a larger error, or solve each design in full."
+        f"the interpolation error of the frequency within these ranges is {reached:.2g} after {count} full solves; {tolerance:.2g} is asked."
+        " Narrow the ranges, allow a larger error, or solve each design in full."
     )
 
 
@@ -252,7 +252,7 @@ def _interpolate(solve: _Solve, tolerance: float, most: int, left: float | None)
         polynomial = grid.polynomial()
         errors = SAFETY * abs(polynomial(unseen) - truth).max(axis=0) + NOISE
         errors[0] += solve.jumps
-        if errors[0] <= tolerance or not within:
+        if errors[0] <= tolerance or not within or solve.jumps > tolerance / 2:  # finer solves leave more to the grid
             return polynomial, errors
         if len(polynomial.indices) > WORTH * before[1]:
             if errors[0] > before[0] / 2:

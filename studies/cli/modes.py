@@ -133,9 +133,15 @@ def modes(
             *_effect_tables(entries),
             *_all_orders(entries),
             Table("Derivatives of ln f", shown, SLOPES, DERIVED, where),
-            Table("Strain energy (%)", shown, ENERGY, "Root: the solid cap, fillet or corner.", where),
+            Table(
+                "Strain energy (%)",
+                shown,
+                ENERGY,
+                "Root: the solid joint of the shell with its stem or bottom, fillet included.",
+                where,
+            ),
             Blocks(lambda: _view(instrument, sorted(set(harmonic)), T, theory)),
-            live_chapter(instrument, harmonic[0], theory),
+            live_chapter(instrument, min(harmonic, key=lambda n: abs(n - 2)), theory),
         ],
     )
 

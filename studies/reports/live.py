@@ -36,7 +36,7 @@ DIMENSIONS = ("thickness_mm", "radius_mm", "height_mm", "stem.radius_mm", "botto
 MOST_AXES = 3
 RANGES = (0.05, 0.02)  # of a dimension to both sides; the narrower where the wider takes too many solves
 TOLERANCE = 3e-5  # of the interpolated frequency
-MOST_SOLVES = 150  # of a family
+MOST_SOLVES = 300  # of a family
 COLDEST, WARMEST = -40.0, 80.0  # °C
 DEGREE = 32  # of the series over temperature
 MARGIN = 1e-3  # of ν beyond its range over temperature
@@ -50,7 +50,7 @@ def live_blocks(
     try:
         data = describe_family(instrument, harmonic, theory, names, derived)
     except UNUSABLE_INPUT as error:
-        return [Sentence(f"There are no sliders for the dimensions: {error}", "note")]
+        return [Sentence(f"No sliders: {error}", "note")]
     identity = "live-" + hashlib.sha256(repr(data).encode()).hexdigest()[:12]
     worst = max(one["error"] for one in data["modes"])
     caption = (

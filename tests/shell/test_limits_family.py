@@ -197,7 +197,7 @@ def kinked(v):
         (
             dome,
             {"axes": [Axis("h", 0.5, 1.5)], "most": 14},
-            "full solves interpolate the frequency only to .* solve each design in full",
+            "the interpolation error of the frequency .* solve each design in full",
         ),
         (kinked, {"axes": [Axis("v", -1.0, 1.0)], "nu": (0.17, 0.17)}, "solve each design in full"),
     ],
