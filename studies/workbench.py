@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from studies.calibration.calibrate import Calibration
     from studies.diagnosis.table import TableDiagnosis
     from studies.inference.diagnosis import Inference
-    from studies.inference.unjudged import Unjudged
     from studies.planning.chamber import Chamber
     from studies.resonator.comparison import Comparison
 
@@ -78,7 +77,7 @@ def calibrate(
     return find_values(open_card(card), records, settled, left, exact, progress=progress or (lambda _: None))
 
 
-def diagnose(*runs: Run, card: Card | None = None) -> "Inference | Unjudged | TableDiagnosis":
+def diagnose(*runs: Run, card: Card | None = None) -> "Inference | TableDiagnosis":
     """Return what a campaign shows and the simulation lacks, with its causes: `hrg diagnose`; `.verdict` is the outcome.
 
     Args:
@@ -103,20 +102,17 @@ def diagnose_records(
     card: Instrument | None = None,
     chamber: "Chamber | None" = None,
     progress: Progress | None = None,
-) -> "Inference | Unjudged":
+) -> "Inference":
     """Return what a campaign shows and the simulation lacks: the joint inference of all responses beside a card, or beside a polynomial card made from the records; with a `chamber`, the run that should come next in it."""
     from studies.calibration.misreading import check_readings
     from studies.inference.diagnosis import infer
     from studies.inference.polynomial_card import polynomial_card
     from studies.inference.records import driving, make_ready
-    from studies.inference.unjudged import Unjudged
     from studies.planning.next_run import suggest
     from studies.record.plausible import check_card_frequency
     from studies.resonator.law import law_of
 
     campaign = make_ready(records)
-    if not campaign.records:
-        return Unjudged(campaign, card is not None)
     if card is None:
         card = polynomial_card(campaign.records)
     else:

@@ -33,6 +33,7 @@ from studies.diagnosis.verdict import (
 )
 from studies.effects import library
 from studies.effects.states import FloatArray
+from studies.errors import InputError
 from studies.instrument.display import display_name
 from studies.results.shown import Shown
 
@@ -51,6 +52,8 @@ WANDERING = 3.0
 """Residual over white noise from which a table is not called adequate."""
 TOUCHED = 0.05
 """Prior standard deviations, and part of the prior width, by which data must move a value to be said to know of it."""
+TIE = 0.1
+"""Evidence within which two forms explain a table equally."""
 UNNAMED = 2.0
 """Evidence from which on it is said how far a form falls short of being named."""
 DEFAULT_LAW = "hrg-30mm"
@@ -117,12 +120,15 @@ def diagnose_table(path: str, card: "Instrument | str | None" = None) -> TableDi
     Raises
     ------
     InputError
-        With a card: a table whose level or slope is further than six standard deviations from it.
+        With a card: a table whose level or slope is further than six standard deviations from it. Without one: fewer than
+        five temperatures.
     """
     from studies.instrument.card import load_card
     from studies.resonator.law import law_of
 
     table = read_settled(path)
+    if card is None and (distinct := np.unique(table.temperature).size) < FEWEST_POINTS:
+        raise InputError(f"{path}: {distinct} temperatures are too few for a diagnosis; {MORE}")
     instrument = load_card(card or DEFAULT_LAW) if card is None or isinstance(card, str) else card
     instrument.material.check(table.temperature)
     if card is None:
@@ -237,17 +243,7 @@ def _study(
             verdict, T, fits.law_left, left, extended, fits.law_rms, fits.ratio, forms, sentences, found is not None
         )
 
-    distinct = np.unique(T).size
     base_rms, lone = rms(left), rms(fits.lone)
-    if distinct < FEWEST_POINTS and found is None:
-        remark = f"{distinct} temperatures are too few: testing a baseline of three parameters needs five or more"
-        sentences[:] = [remark + "."]
-        return answer(
-            "not-identifiable",
-            (),
-            ResponseResult("not-identifiable", None, (base_rms, None), None, "none", remark=remark),
-            MORE,
-        )
     sentences += table_sentences(T, f, rounding)
     scale = make_scale(base, rounding, fits.scatter, float(np.ptp(f)))
     nothing = scale.log_evidence(np.empty((T.size, 0)))
@@ -265,31 +261,32 @@ def _study(
     prior = CONSTANTS["log_prior_effect"]
     ranked = sorted(best.values(), key=lambda c: -c.log_evidence)
     forms = [(c.words, c.ssq, c.loo, 2.0 * (c.log_evidence - nothing)) for c in best_by_words(every)]
-    if not ranked or ranked[0].log_evidence + prior < nothing:
-        white = scale.white()
-        short = 2.0 * (ranked[0].log_evidence - nothing) if ranked else 0.0
-        wanders = base_rms > WANDERING * white
-        # noise that has a shape beyond rounding is not called noise
-        shaped = short > UNNAMED and base_rms > WANDERING * rounding and bends_beyond_a_cubic(T, f, rounding)
+    short = 2.0 * (ranked[0].log_evidence - nothing) if ranked else 0.0
+    nearest = " and ".join(c.words for c in ranked if 2.0 * (c.log_evidence - nothing) > short - TIE)
+    # noise that has a shape beyond rounding is not called noise
+    shaped = short > UNNAMED and base_rms > WANDERING * rounding and bends_beyond_a_cubic(T, f, rounding)
+    white = scale.white()
+    wanders = base_rms > WANDERING * white
+    if short < -2.0 * prior and (wanders or not shaped):
         values = doubted(wrong_values(shifts))
-        state = "not-identifiable" if wanders or shaped else "explained" if values else "adequate"
+        state = "unexplained" if wanders else "explained" if values else "adequate"
         if wanders:
             sentences.append(
                 f"The rows drift: the residual is {base_rms:.3g} Hz rms, but neighbouring rows agree to {white:.2g} Hz. One table"
                 " cannot distinguish a drift between the rows from a slow effect of temperature."
             )
         elif short > UNNAMED:
-            times = f"{base_rms / rounding:.0f} times what rounding leaves" if shaped else "treated as noise"
-            ending = "no cause reaches the evidence needed" if shaped else "no cause is named"
             sentences.append(
-                f"The remaining residual of {base_rms:.3g} Hz rms is {times}; {ending}: the best candidate, {ranked[0].words}, has"
-                f" evidence {short:.1f}; a cause needs {-2.0 * prior:.0f}."
+                f"The remaining residual of {base_rms:.3g} Hz rms is treated as noise: the evidence of {nearest} is {short:.1f}; a cause"
+                f" needs {-2.0 * prior:.0f}."
             )
-        left_over = "structure" if wanders or shaped else "none"
-        result = ResponseResult(
-            state, base_rms, (base_rms, lone), None, left_over, left_over_evidence=max(short, 0.0) if shaped else 0.0
+        result = ResponseResult(state, base_rms, (base_rms, lone), None, "structure" if wanders else "none")
+        return answer(state, values, result, next_table(T) if wanders else None, forms=forms)
+    if short < -2.0 * prior:
+        sentences.append(
+            f"The remaining residual of {base_rms:.3g} Hz rms is {base_rms / rounding:.0f} times what rounding leaves, but no cause reaches"
+            f" the evidence of {-2.0 * prior:.0f} that would make it likely by itself; nearest, with {short:.1f}: {nearest}."
         )
-        return answer(state, values, result, next_table(T) if wanders or shaped else None, forms=forms)
     winner = ranked[0]
     members, probability = weigh([c.effect.name for c in ranked], [c.log_evidence + prior for c in ranked], nothing)
     # in a steady state a scale error of the thermometer and a curvature of the frequency are the same data

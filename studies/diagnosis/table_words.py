@@ -10,7 +10,7 @@ DOUBTFUL = 0.05
 """p of the fourth order below which a cubic is said not to be sufficient."""
 TURN = 0.1
 """Part of the covered range that a table must go back for its order to show a direction."""
-MORE = "Measure at five temperatures or more, from below and from above."
+MORE = "measure at five or more, from below and from above."
 SOAK = "the soak time shows whether the resonator had settled, the thermometer distinguishes a scale error from a curvature of f"
 
 
@@ -50,10 +50,10 @@ def table_sentences(T: FloatArray, f: FloatArray, rounding: float) -> list[str]:
     out.append(
         f"{T.size} rows, "
         + (
-            "approached from both sides: they show hysteresis, but not ageing or a linear scale error."
+            "rising and falling in temperature: in the order of the file they would show hysteresis, but not ageing or a linear scale error."
             if both
-            else "approached from one side: they cannot distinguish hysteresis from curvature or show ageing or a linear scale error, and"
-            " incomplete settling biases the slope."
+            else "listed in one direction of temperature: they cannot distinguish hysteresis from curvature or show ageing or a linear scale"
+            " error, and incomplete settling would bias the slope. The file does not say how each temperature was approached."
         )
     )
     return out

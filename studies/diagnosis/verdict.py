@@ -242,10 +242,10 @@ def weigh(
     """
     values = np.array(scores, dtype=float)
     order = np.argsort(-values)
-    lead = max(float(values.max()) - nothing, 0.0)
+    lead = float(values.max()) - nothing
     temper = temper_of(lead)
     weight = np.exp((values - values.max()) / temper)
-    chance = np.exp(-max(lead - CONSTANTS["margin"] / 2.0, 0.0) / CONSTANTS["chance"])
+    chance = np.exp(max(-lead, 0.0) / temper - max(lead - CONSTANTS["margin"] / 2.0, 0.0) / CONSTANTS["chance"])
     # a generic form must be the better one by as much as the named form may be inexact before it counts for more
     strange = np.exp(np.clip(unknown / (temper if unknown > 0 else CONSTANTS["temper"]), -50.0, 50.0))
     members: list[str] = []

@@ -83,8 +83,6 @@ def diagnose_device(
         raise InputError(f"device {device.serial}: its folder has no records (*.csv).")
     records = [read_record(path) for path in device.records]
     found = diagnose_records(records, None if device.card is None else load_card(device.card), progress=progress)
-    if not isinstance(found, Inferred):
-        raise InputError(f"device {device.serial}: its records say too little to be judged.")
     at = USUAL + zero_Celsius if device.card is None else found.card.reference_temperature
     levels = [float(np.nanmedian(record["frequency_Hz"])) for record in records if "frequency_Hz" in record]
     level = float(np.median(levels)) if levels else None

@@ -87,15 +87,13 @@ def make_ready(given: Sequence[Record]) -> Campaign:
         out.append(replace(record, columns=columns | {place: table["temperature"]}))
     numbers = [1 + next(k for k, one in enumerate(given) if one is record) for record in kept]
     long = [any(name in own and np.isfinite(own[name]).sum() >= LEAST_ROWS for name in RESPONSES) for own in out]
-    if not any(long):
-        skipped |= {name: "too few rows in every run" for name in RESPONSES if any(name in own for own in out)}
-    notes += [
-        f"{own.path}: too few rows; it is left out."
-        for own, enough in zip(out, long, strict=True)
-        if not enough and any(long)
-    ]
-    chosen = [k for k, enough in enumerate(long) if enough]
     paths = tuple(record.path or f"run {number}" for record, number in zip(kept, numbers, strict=True))
+    if not any(long):
+        short = {name: "too few rows in every run" for name in RESPONSES if any(name in own for own in out)}
+        why = "; ".join(f"{name}: {words}" for name, words in (skipped | short).items())
+        raise InputError(f"{', '.join(paths)}: too little for a diagnosis: {why}. Give longer records.")
+    notes += [f"{own.path}: too few rows; it is left out." for own, enough in zip(out, long, strict=True) if not enough]
+    chosen = [k for k, enough in enumerate(long) if enough]
     return Campaign(
         paths, tuple(out[k] for k in chosen), tuple(numbers[k] for k in chosen), skipped, tuple(notes), timed
     )

@@ -14,7 +14,6 @@ from studies.results import Chapter, Facts, Figure, Part, Sentence, Table
 
 if TYPE_CHECKING:
     from studies.inference.diagnosis import Inference
-    from studies.inference.unjudged import Unjudged
 
 NAMES = {column: response.word for column, response in RESPONSES.items()}
 WORDS = {
@@ -24,6 +23,7 @@ WORDS = {
     "unexplained": "Unexplained: no known effect explains the structure in the residual.",
 }
 UNDECIDED = "Not decided: these data neither confirm the simulation nor name a cause."
+EVIDENCE = "Evidence: twice the logarithm of the Bayes factor against no effect."
 CAUSES = (
     "cause | or: or equally | response | peak: peak to peak | probability: probability .2f | name: parameter"
     " | value in low … high: value | low … high: 90 % interval .0"
@@ -164,7 +164,7 @@ def next_step(verdict: Verdict) -> list[Sentence]:
     return [Sentence(f"Next experiment: {verdict.next_experiment}", "note")] if verdict.next_experiment else []
 
 
-def diagnosis_parts(diagnosis: "Inference | Unjudged") -> list[Chapter]:
+def diagnosis_parts(diagnosis: "Inference") -> list[Chapter]:
     """Return what people read of the diagnosis of a campaign."""
     verdict = diagnosis.verdict
     files = ", ".join(diagnosis.labels)
@@ -187,7 +187,7 @@ def diagnosis_parts(diagnosis: "Inference | Unjudged") -> list[Chapter]:
     ]  # fmt: skip
 
 
-def _residual(diagnosis: "Inference | Unjudged") -> Iterator[Part]:
+def _residual(diagnosis: "Inference") -> Iterator[Part]:
     main, run = _main_response(diagnosis.verdict), diagnosis.verdict.next_run
     if main is not None and main in diagnosis.shown_responses:
         when = " before and after the named causes are added" if diagnosis.seen(main).named else ""
@@ -196,14 +196,14 @@ def _residual(diagnosis: "Inference | Unjudged") -> Iterator[Part]:
         yield Figure(lambda: pictures.next_run_picture(run), f"Suggested next run: {run.profile}.")
 
 
-def _alternatives(diagnosis: "Inference | Unjudged", response: str) -> Iterator[Part]:
+def _alternatives(diagnosis: "Inference", response: str) -> Iterator[Part]:
     seen = diagnosis.seen(response)
     caption = f"Baseline residual of {spoken(response)} (averages over {seen.step:.0f} s) against its inputs."
     yield Figure(lambda: pictures.residual_views(diagnosis, response), caption)
     for rivals in seen.alternatives:
         rows = [{"name": name, "evidence": evidence} for name, evidence in rivals]
-        columns = "name: effect | evidence: evidence (2 ln odds) .1f"
-        yield Table(f"Alternatives to {rivals[0][0]}", rows, columns, where="page")
+        columns = "name: effect | evidence: evidence .1f"
+        yield Table(f"Alternatives to {rivals[0][0]}", rows, columns, note=EVIDENCE, where="page")
     if seen.left is not None:
         words = f"Lack of fit: strongest against {seen.left[0]}, evidence {seen.left[1]:.0f}."
         yield Sentence(words, where="page")

@@ -12,11 +12,10 @@ from studies.results import Drawing
 
 if TYPE_CHECKING:
     from studies.inference.diagnosis import Inference
-    from studies.inference.unjudged import Unjudged
     from studies.planning.programme import NextRun
 
 
-def ladder(diagnosis: "Inference | Unjudged") -> Drawing:
+def ladder(diagnosis: "Inference") -> Drawing:
     """Draw what is left of every response: with the card as given, calibrated, with the named physics, noise; on held-out rows."""
     columns = diagnosis.shown_responses
     with figure(1, len(columns), height=3.0, squeeze=False) as (canvas, axes):
@@ -57,7 +56,7 @@ def rungs(result: ResponseResult) -> list[tuple[str, float | None]]:
     ]
 
 
-def as_temperature(diagnosis: "Inference | Unjudged", column: str, value: float) -> str | None:
+def as_temperature(diagnosis: "Inference", column: str, value: float) -> str | None:
     """Return the error of temperature that a residual of the frequency amounts to; None for the others."""
     if not RESPONSES[column].thermometer:
         return None
@@ -71,7 +70,7 @@ def as_temperature(diagnosis: "Inference | Unjudged", column: str, value: float)
     )
 
 
-def before_and_after(diagnosis: "Inference | Unjudged", response: str) -> Drawing:
+def before_and_after(diagnosis: "Inference", response: str) -> Drawing:
     """Draw the residual over the campaign before and, if anything is named, after the extension; the noise as a band."""
     seen, unit = diagnosis.seen(response), RESPONSES[response]
     noise = (diagnosis.verdict.responses[response].noise or 0.0) * unit.scale
@@ -100,7 +99,7 @@ def _thinned(time: np.ndarray, values: np.ndarray, most: int = 500) -> tuple[np.
     return time[::step], values[::step]
 
 
-def residual_views(diagnosis: "Inference | Unjudged", response: str) -> Drawing:
+def residual_views(diagnosis: "Inference", response: str) -> Drawing:
     """Draw the baseline's residual against temperature (heating and cooling), rate, frequency and the drives."""
     seen, unit = diagnosis.seen(response), RESPONSES[response]
     inputs, rest, runs = seen.inputs, seen.rest * unit.scale, seen.run

@@ -7,9 +7,10 @@ from studies.reports.digits import plain, to_error
 from studies.reports.style import BLACK, ORANGE, VERMILION, figure
 from studies.results import Chapter, Drawing, Facts, Figure, Sentence, Table
 
-CANDIDATES = "0: candidate | 1: sum of squares (Hz²) .3 | 2: leave-one-out (Hz) .3 | 3: evidence (2 ln odds) .3"
+CANDIDATES = "0: candidate | 1: sum of squares (Hz²) .3 | 2: leave-one-out (Hz) .3 | 3: evidence .3"
 EVIDENCE = (
-    "Evidence: twice the logarithm of the Bayes factor: how much more probable the readings are with the candidate, averaged over its size."
+    "Evidence: twice the logarithm of the Bayes factor, the ratio of the probabilities of the readings with and without the candidate,"
+    " averaged over its size."
     f" A cause is named from {-2.0 * CONSTANTS['log_prior_effect']:.0f}."
 )
 

@@ -37,6 +37,8 @@ NAMES = {
     "skewed axes": "axis skew",
     "all": "total",
 }
+TIE = 0.01  # relative: effects on the bias that are called equal
+UNIT = {"1": "", "°": "°"}
 SMALLEST = 1e-4  # of the largest effect on the bias: smaller ones are not listed
 
 
@@ -125,13 +127,17 @@ def _facts(study: LoopStudy, payload: dict[str, Any]) -> list[tuple[str, str, st
 def _largest(slopes: tuple[BiasSlope, ...], sd: float) -> list[str]:
     if not slopes or slopes[0].effect == 0:
         return []
-    first, share = slopes[0], (slopes[0].effect / sd) ** 2 if sd > 0 else 0.0
-    name, unit = f"{display_name(first.key)} ({first.key})", unit_of(first.key)
-    unit = {"1": "", "°": "°"}.get(unit, f" {unit}")
+    effect = slopes[0].effect
+    equal = [one for one in slopes if one.effect > (1 - TIE) * effect]
+    names = " and ".join(
+        f"{display_name(one.key)} ({one.key}, ± {one.sd:.3g}{UNIT.get(unit := unit_of(one.key), f' {unit}')})"
+        for one in equal
+    )
+    share, each = 100 * (effect / sd) ** 2 if sd > 0 else 0.0, " each" * (len(equal) > 1)
     return [
-        f"Largest contribution to the uncertainty of the bias: {name}. Its standard deviation of {first.sd:.3g}{unit} contributes"
-        f" {first.effect:.3g} °/h, {100 * share:.0f} % of the variance. A constant bias can be calibrated out; drift of these"
-        " values with age or temperature changes the bias in proportion to the slopes."
+        f"Largest contribution{'s' * (len(equal) > 1)} to the uncertainty of the bias: {names}, {effect:.3g} °/h{each}, {share:.0f} % of the"
+        f" variance{each}. A constant bias can be calibrated out; drift of these values with age or temperature changes the bias in"
+        " proportion to the slopes."
     ]
 
 

@@ -121,3 +121,14 @@ def test_range_in_use_is_stated(card, ask):
         assert found["quadrature"] == pytest.approx(split, rel=3e-3)
         assert found["across"] == pytest.approx(across, rel=1e-2)
         assert found["drive"] == pytest.approx(1 / 20, rel=1e-2)
+
+
+def test_two_equal_contributions_are_both_named(capsys):
+    """Errors of phase of the pick-off and of the drive act alike; the first of them alone was the largest."""
+    assert main(["loop", "hrg-30mm-loops"]) == 0
+    said = capsys.readouterr().out
+    assert (
+        "Largest contributions to the uncertainty of the bias: pick-off phase error (loop.pickoff_phase_deg, ± 0.5°) and"
+        in said
+    )
+    assert "drive phase error (loop.drive_phase_deg, ± 0.5°), 10 °/h each, 48 % of the variance each" in said
