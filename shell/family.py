@@ -240,7 +240,7 @@ class _Solve:
 def _interpolate(solve: _Solve, tolerance: float, most: int, left: float | None) -> tuple[SparsePolynomial, Array]:
     """Refine until the stated errors hold the tolerance, or until more solves do not help or no work is left for them."""
     grid = Exploration(solve, solve.dimensions)
-    unseen = _unseen(solve.dimensions)
+    unseen = unseen_points(solve.dimensions)
     truth = np.array([solve(point) for point in unseen])
     threshold, before = tolerance, (np.inf, 1)
     if left is not None:
@@ -261,8 +261,8 @@ def _interpolate(solve: _Solve, tolerance: float, most: int, left: float | None)
         threshold /= FINER
 
 
-def _unseen(dimensions: int) -> Array:
-    """Points that judge the interpolant, the same every time: of the inside, of the faces, and the corners or some of them."""
+def unseen_points(dimensions: int) -> Array:
+    """Return points of the cube that judge an interpolant, the same every time: of the inside, the faces, and the corners or some of them."""
     rng = np.random.default_rng(20)
     inside = rng.uniform(-1, 1, (2 + dimensions // 2, dimensions))
     faces = np.clip(rng.uniform(-2, 2, (2 + dimensions, dimensions)), -1, 1)

@@ -21,6 +21,7 @@ from studies.loss.account import StatedLoss, damping_around, stated_loss
 from studies.loss.model import LossModel, loss_model
 from studies.reports import style
 from studies.reports.digits import plain
+from studies.reports.scenes import live_chapter
 from studies.results import Chapter, Drawing, Facts, Figure, Result, Sentence, Table, row_of, rows_of
 
 DEG = float(np.degrees(1))
@@ -72,7 +73,11 @@ def loss(
         payload,
         f"Loss budget of {instrument.name}",
         f"1/Q of the mode n = {harmonic} at {model.frequency:.1f} Hz as a sum of contributions, each computed from the mode ({theory} theory).",
-        [*_parts(payload, model, budget, stated, at), Chapter("In a simulation", [_simulated(instrument)])],
+        [
+            *_parts(payload, model, budget, stated, at),
+            Chapter("In a simulation", [_simulated(instrument)]),
+            live_chapter(instrument, harmonic, theory),
+        ],
     )
 
 

@@ -8,7 +8,6 @@ Where the card has films ([[loss.film]]), modes have `films`: `film`, `shift_ppm
 a crystal, the lowest pairs of n = 2, 3, 5, 6, 7, 9 … have `crystal`: `antinode_along_100_Hz`, `other_Hz`, `split_Hz`, `relative_split`.
 """
 
-from collections.abc import Sequence
 from math import degrees
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -27,7 +26,7 @@ from studies.loss.films import film_shifts
 from studies.reports.digits import to_numerical_error
 from studies.reports.scenes import THEORIES, live_chapter, show_mode, view_blocks
 from studies.resonator.law import law_of
-from studies.results import Blocks, Column, Result, Sentence, Table, Where, row_of
+from studies.results import Column, Result, Sentence, Table, Where, row_of
 
 if TYPE_CHECKING:
     from shell.imperfection import Split
@@ -122,6 +121,7 @@ def modes(
         entries.append(entry | effects)
     shown = entries if detailed else []
     where: Where = "everywhere" if sensitivities else "page"
+    operating = min(harmonic, key=lambda n: abs(n - 2))
     head = {"card": instrument.name, "temperature_degC": T - zero_Celsius, "theory": theory}
     name = f"{instrument.name} at {T - zero_Celsius:g} °C, {THEORIES[theory]}"
     return Result(
@@ -140,8 +140,7 @@ def modes(
                 "Root: the solid joint of the shell with its stem or bottom, fillet included.",
                 where,
             ),
-            Blocks(lambda: _view(instrument, sorted(set(harmonic)), T, theory)),
-            live_chapter(instrument, min(harmonic, key=lambda n: abs(n - 2)), theory),
+            live_chapter(instrument, operating, theory, lambda: _view(instrument, sorted(set(harmonic)), T, theory)),
         ],
     )
 
@@ -233,7 +232,7 @@ def _effect_tables(modes: list[Entry]) -> list[Table]:
     ]
 
 
-def _view(instrument: Instrument, harmonics: list[int], T: float, theory: str) -> "Sequence[Block]":
+def _view(instrument: Instrument, harmonics: list[int], T: float, theory: str) -> "list[Block]":
     """The lowest modes, to be turned."""
     drawn: Literal["solid", "shell"] = "solid" if theory == "solid" else "shell"
     words = " Rayleigh's closed form gives the frequencies of the table, not these shapes."

@@ -9,7 +9,6 @@ columns; `tolerances`: rows of `column`, `value`, `worst_case` (±, first order)
 """
 
 from collections import Counter
-from collections.abc import Sequence
 from operator import itemgetter
 from pathlib import Path
 from typing import Any
@@ -23,7 +22,7 @@ from studies.design.run import CARD, TABLE, best_instrument
 from studies.design.run import optimise as find_best
 from studies.reports import style
 from studies.reports.digits import plain
-from studies.reports.scenes import show_mode
+from studies.reports.scenes import moving_mode, show_mode
 from studies.results import Blocks, Chapter, Column, Drawing, Facts, Figure, Result, Table, row_of
 from studies.results.page import Block
 
@@ -165,13 +164,11 @@ def _parts(found: Answer, payload: dict[str, Any]) -> list[Any]:
     ]  # fmt: skip
 
 
-def _live(found: Answer) -> Sequence[Block]:
-    """Sliders of the free dimensions about the best design."""
-    from studies.reports.live import live_blocks
-
+def _live(found: Answer) -> list[Block]:
+    """The best design's mode, with sliders of the free dimensions."""
     study = found.task.study
     names = [name for name in study.names[: found.task.free] if name.startswith("resonator.")]
-    return live_blocks(best_instrument(found), names=names, derived=study.derived)
+    return moving_mode(best_instrument(found), names=names, derived=study.derived)
 
 
 def _number(count: int, what: str) -> str:

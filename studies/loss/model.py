@@ -67,7 +67,7 @@ def loss_model(
     from shell.damping.faces import Vibration
 
     T0, material = instrument.reference_temperature, instrument.material
-    mode = _solve(instrument.resonator, material.elastic(T0), harmonic, theory)
+    mode = solve_lowest(instrument.resonator, material.elastic(T0), harmonic, theory)
     vibration = Vibration.of(mode, material, T0)
     parts: LossParts = instrument.part("loss", "loss_parts")
     spread = _relative_sds(instrument)
@@ -185,7 +185,7 @@ def _surface_ripple(parts: "LossParts", vibration: "Vibration", causes: "Sequenc
 
 
 @lru_cache(maxsize=8)
-def _solve(resonator: "Resonator", elastic: "Elastic", harmonic: int, theory: "Theory") -> "Mode":
+def solve_lowest(resonator: "Resonator", elastic: "Elastic", harmonic: int, theory: "Theory") -> "Mode":
     """The lowest mode; kept, since many values of a card leave it as it is."""
     from shell.modes import solve_modes
 
@@ -197,7 +197,7 @@ def _unbalance(resonator: "Resonator", elastic: "Elastic") -> "Unbalance":
     """What an unbalanced rim costs the mode n = 2."""
     from shell.damping.anchor import unbalance_loss
 
-    return unbalance_loss(_solve(resonator, elastic, 2, "solid"), elastic)
+    return unbalance_loss(solve_lowest(resonator, elastic, 2, "solid"), elastic)
 
 
 def _others(

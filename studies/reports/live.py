@@ -1,15 +1,18 @@
-"""A page that computes: frequency, spacing, Bryan factor and TCF over dimensions and temperature, by sliders, without a network.
+"""A page that computes: a mode, its neighbours, TCF, Q, split and picture over dimensions and temperature, by sliders, offline.
 
 The page carries the interpolant of a family (`shell.family`), Newton's form on a sparse grid, and Chebyshev series of what the
 material adds over temperature, m(T) = ½ ln(E/ρ) − ln g, and of ν(T):
 
     ln f = ln F(dimensions, ν(T)) + m(T),      d ln f/dT = m' + ∂ ln F/∂ν ν'.
+
+Loss, split and outline have an interpolant of their own (`studies.reports.live_fields`).
 """
 
 import hashlib
 import re
-from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.polynomial import Chebyshev
@@ -19,9 +22,10 @@ from shell.constants import zero_Celsius
 from shell.family import Axis, Family, build_family
 from shell.interpolation import leja_points
 from shell.layout import Theory
-from shell.modes import nearest_mode
+from shell.modes import Mode, nearest_mode
 from studies.errors import UNUSABLE_INPUT
 from studies.instrument.card import Instrument
+from studies.reports.live_fields import explore_fields
 from studies.resonator.law import unknown_slope
 from studies.results import Sentence, row_of
 from studies.results.page import Block, Embedded, fill_template
@@ -29,13 +33,11 @@ from studies.sweeps.case import Case
 from studies.sweeps.expressions import Derived
 from studies.sweeps.parameters import find_nominal, set_parameters
 
-if TYPE_CHECKING:
-    from shell.resonator import Resonator
-
 DIMENSIONS = ("thickness_mm", "radius_mm", "height_mm", "stem.radius_mm", "bottom_thickness_mm", "cylinder_height_mm")
 MOST_AXES = 3
 RANGES = (0.05, 0.02)  # of a dimension to both sides; the narrower where the wider takes too many solves
-TOLERANCE = 3e-5  # of the interpolated frequency
+TOLERANCE, ROUGH = 3e-5, 1e-3  # of the interpolated frequency, and of those of other modes
+HIGHEST = 4  # harmonic among which the nearest modes are sought
 MOST_SOLVES = 300  # of a family
 COLDEST, WARMEST = -40.0, 80.0  # °C
 DEGREE = 32  # of the series over temperature
@@ -46,61 +48,109 @@ def live_blocks(
     instrument: Instrument, harmonic: int = 2, theory: Theory = "solid", names: Sequence[str] = (),
     derived: Sequence[Derived] = (),
 ) -> list[Block]:  # fmt: skip
-    """Return sliders for keys of the card (main dimensions unless given) and temperature; one sentence where they cannot be had."""
+    """Return sliders for keys of the card (main dimensions unless given) and temperature; one sentence where they cannot be had.
+
+    They move the view of the mode that stands above them in the page.
+    """
     try:
-        data = describe_family(instrument, harmonic, theory, names, derived)
+        data, missing = describe_live(instrument, harmonic, theory, names, derived)
     except UNUSABLE_INPUT as error:
         return [Sentence(f"No sliders: {error}", "note")]
     identity = "live-" + hashlib.sha256(repr(data).encode()).hexdigest()[:12]
-    worst = max(one["error"] for one in data["modes"])
+    f, *others = (one["error"] for one in data["modes"])
+    words = {
+        "loss": "1/Q to {:.2g} %",
+        "wave": "the split to {:.2g} % of its largest",
+        "outline": "the picture to {:.2g} % of the swing",
+    }
+    errors = [f"f to {1e6 * f:.2g} ppm", f"the other modes to {100 * max(others):.2g} %"]
+    errors += [words[name].format(100 * error) for name, error in data["fields"]["errors"].items()]
     caption = (
-        f"Interpolated between full solves ({theory} theory) within the ranges of the sliders; f agrees within {1e6 * worst:.2g} ppm of"
-        " a full solve there. Imperfection, electrodes and mount stress are not included."
+        f"Interpolated between full solves ({theory} theory) and checked against others within the sliders' ranges: {', '.join(errors)}."
+        " f: without imperfection, electrodes and mount stress. The picture shows the reference temperature. Other modes: of n = 0 …"
+        f" {HIGHEST}, those nearest to f at the card's values or at an end of a slider. {' '.join(missing)}"
     )
     return [Embedded(fill_template("live.html", id=identity, data=data), caption)]
 
 
-def describe_family(
-    instrument: Instrument, harmonic: int, theory: Theory, names: Sequence[str] = (), derived: Sequence[Derived] = ()
-) -> dict[str, Any]:
-    """Return what the page computes with: axes, the mode and the nearest other one, the material over temperature."""
+def describe_live(
+    instrument: Instrument, harmonic: int, theory: Theory, names: Sequence[str] = (), derived: Sequence[Derived] = (),
+) -> tuple[dict[str, Any], tuple[str, ...]]:  # fmt: skip
+    """Return what the page computes with (axes, modes, material, loss, split and outline), and what it does not have."""
     keys = list(names) or [f"resonator.{key}" for key in DIMENSIONS]
     nominal = [(key, _number(instrument, key)) for key in keys]
     varied = [(key, value) for key, value in nominal if value][:MOST_AXES]
     T = _temperatures(instrument)
-    nu = instrument.material.value("poisson_ratio", np.linspace(*T, 33))
-    at = instrument.reference_temperature
-    case = Case(instrument, {})
-    own = case.modes(harmonic, 1, theory, at)[0]
-    other = nearest_mode(lambda n, count: case.modes(n, count, theory, at), own)
     for part in RANGES:
-        axes = [Axis(key, value * (1 - part), value * (1 + part)) for key, value in varied]
+        axes = [Axis(key, *sorted((value * (1 - part), value * (1 + part)))) for key, value in varied]
         try:
-            build = _builder(instrument, [key for key, _ in varied], derived)
-            nus = float(nu.min()) - MARGIN, float(nu.max()) + MARGIN
-            families = [
-                build_family(
-                    build, axes, nu=nus, harmonic=mode.harmonic, index=mode.index, theory=theory, tolerance=TOLERANCE, most=MOST_SOLVES
-                )
-                for mode in (own, other)
-            ]  # fmt: skip
+            designs = Designs(instrument, tuple(axes), tuple(derived))
+            families = _families(designs, harmonic, theory, T)
             break
         except UNUSABLE_INPUT:
             if part == RANGES[-1]:
                 raise
+    fields = explore_fields(designs.at_point, len(axes), harmonic, theory, T, instrument)
     labels = [re.sub("[_.]", " ", key.removeprefix("resonator.").replace("_mm", "")) for key, _ in varied]
-    return {
+    indices = [index for one in (*(one.polynomial for one in families), fields.polynomial) for index in one.indices]
+    data = {
         "axes": [
             {"key": axis.name, "label": label, "low": axis.low, "high": axis.high, "value": value}
             for axis, label, (_, value) in zip(axes, labels, varied, strict=True)
         ],
         "nu": families[0].nu,
-        "temperature": {"low": T[0], "high": T[1], "value": at, "zero": zero_Celsius},
-        "points": leja_points()[: 1 + max(max(index) for one in families for index in one.polynomial.indices)].tolist(),
+        "temperature": {"low": T[0], "high": T[1], "value": instrument.reference_temperature, "zero": zero_Celsius},
+        "points": leja_points()[: 1 + max((j for index in indices for j in index), default=0)].tolist(),
         "modes": [_spell(family) for family in families],
         "material": _series(instrument, T),
         "slope": not unknown_slope(instrument),
+        "fields": fields.spell(),
     }
+    return data, fields.missing
+
+
+@dataclass(frozen=True)
+class Designs:
+    """The designs within the ranges of the sliders."""
+
+    instrument: Instrument
+    axes: tuple[Axis, ...]
+    derived: tuple[Derived, ...]
+
+    def make(self, values: Array) -> Instrument:
+        """Return the instrument of values of the axes."""
+        return set_parameters(
+            self.instrument, {a.name: float(v) for a, v in zip(self.axes, values, strict=True)}, self.derived
+        )
+
+    def at_point(self, unit: Array) -> Instrument:
+        """Return the instrument at a point of the cube -1 ... 1."""
+        return self.make(
+            np.array([(a.low + a.high + (a.high - a.low) * x) / 2 for a, x in zip(self.axes, unit, strict=True)])
+        )
+
+
+def _families(designs: Designs, harmonic: int, theory: Theory, T: tuple[float, float]) -> list[Family]:
+    """Return the families of the lowest mode of a harmonic and of those that come nearest to it; of others than it roughly."""
+    nu = designs.instrument.material.value("poisson_ratio", np.linspace(*T, 33))
+    ends = [end for unit in np.eye(len(designs.axes)) for end in (unit, -unit)]
+    near: dict[tuple[int, int], None] = {}
+    for point in (np.zeros(len(designs.axes)), *ends):
+        case, at = Case(designs.at_point(point), {}), designs.instrument.reference_temperature
+
+        def solve(n: int, count: int, case: Case = case) -> Sequence[Mode]:
+            return case.modes(n, count, theory, at, TOLERANCE if n == harmonic else ROUGH)  # noqa: B023 of this turn
+
+        own = solve(harmonic, 1)[0]
+        other = nearest_mode(solve, own, range(HIGHEST + 1))
+        near[other.harmonic, other.index] = None
+    return [
+        build_family(
+            lambda values: designs.make(values).resonator, designs.axes, nu=(float(nu.min()) - MARGIN, float(nu.max()) + MARGIN),
+            harmonic=n, index=index, theory=theory, tolerance=ROUGH if k else TOLERANCE, most=MOST_SOLVES,
+        )
+        for k, (n, index) in enumerate([(harmonic, 0), *near])
+    ]  # fmt: skip
 
 
 def _number(instrument: Instrument, key: str) -> float | None:
@@ -109,13 +159,6 @@ def _number(instrument: Instrument, key: str) -> float | None:
     except UNUSABLE_INPUT:
         return None
     return found if isinstance(found, float) else None
-
-
-def _builder(instrument: Instrument, keys: Sequence[str], derived: Sequence[Derived]) -> "Callable[[Array], Resonator]":
-    def build(values: Array) -> "Resonator":
-        return set_parameters(instrument, dict(zip(keys, values.tolist(), strict=True)), derived).resonator
-
-    return build
 
 
 def _temperatures(instrument: Instrument) -> tuple[float, float]:

@@ -1,6 +1,6 @@
 """Pictures of an instrument's mode: the solved mode, its surface and colour, and the view to turn that a page shows of it."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from math import degrees
 from pathlib import Path
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from shell.scene import Scene
     from shell.surface import Surface
     from studies.results.page import Block
+    from studies.sweeps.expressions import Derived
 
 Colour = Literal["displacement", "energy", "temperature"]
 FIELD_COLUMNS = ("position", "temperature_degC")
@@ -143,15 +144,24 @@ def _show_split(
     return replace(scene, surface=surface, exaggeration=factor)
 
 
-def live_chapter(instrument: Instrument, harmonic: int, theory: "Theory") -> Chapter | None:
-    """Return sliders that move the lowest mode of a card and its neighbour; none of Rayleigh's closed form."""
+def live_chapter(
+    instrument: Instrument, harmonic: int, theory: "Theory", view: "Callable[[], list[Block]] | None" = None
+) -> Chapter:
+    """Return a mode that swings and sliders that move it; of Rayleigh's closed form the `view` alone, where there is one."""
+    live = Blocks(lambda: moving_mode(instrument, harmonic, theory, view=view))  # type: ignore[arg-type]
+    still = Blocks(view) if view else None
+    return Chapter("Mode shape over dimensions and temperature", [still if theory == "rayleigh" else live])
 
-    def blocks() -> "Sequence[Block]":
-        from studies.reports.live import live_blocks
 
-        return live_blocks(instrument, harmonic, theory)
+def moving_mode(
+    instrument: Instrument, harmonic: int = 2, theory: "Literal['solid', 'shell']" = "solid", names: Sequence[str] = (),
+    derived: "Sequence[Derived]" = (), view: "Callable[[], list[Block]] | None" = None,
+) -> "list[Block]":  # fmt: skip
+    """Return the view of the lowest mode of a harmonic, or the `view` that a page has of it and others, and sliders that move it."""
+    from studies.reports.live import live_blocks
 
-    return None if theory == "rayleigh" else Chapter("Effect of dimensions and temperature", [Blocks(blocks)])
+    shown = view() if view else view_blocks([show_mode(instrument, harmonic, theory=theory)])
+    return [*shown, *live_blocks(instrument, harmonic, theory, names, derived)]
 
 
 def read_field(path: str | Path) -> ShellTemperature:

@@ -191,19 +191,23 @@ def _shapes(results: Results) -> list[Part]:
     modal = [one for one in study.asked if "harmonic" in one.options]
     if not modal:
         return []
-    n, column = modal[0].options["harmonic"], modal[0].columns[0]
+    n, theory, column = modal[0].options["harmonic"], modal[0].options["theory"], modal[0].columns[0]
     designs = {"Nominal design": nominal_design(study)}
     y = results.column(column.name)
     if np.isfinite(y).any() and any(name.startswith("resonator.") for name in study.names):
         designs[f"Minimum {column.label}"] = results.design(int(np.nanargmin(y)))
         designs[f"Maximum {column.label}"] = results.design(int(np.nanargmax(y)))
     units = {parameter.name: parameter.unit for parameter in study.parameters}
+    names = [name for name in study.names if name.startswith("resonator.")]
     parts: list[Part] = []
     for title, design in designs.items():
         words = ", ".join(f"{figures.label(name, units[name])} = {number(value)}" for name, value in design.items())
         instrument = set_parameters(study.instrument, design, study.derived)
         parts.append(f"{title}: {words or 'as in the card'}.")
-        parts.append(Blocks(lambda shown=instrument: scenes.mode_blocks(shown, (n,))))  # type: ignore[misc]
+        if len(parts) > 1 or theory == "rayleigh":
+            parts.append(Blocks(lambda shown=instrument: scenes.mode_blocks(shown, (n,))))  # type: ignore[misc]
+            continue
+        parts.append(Blocks(lambda shown=instrument: scenes.moving_mode(shown, n, theory, names, study.derived)))  # type: ignore[misc]
     return parts
 
 

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from compensation.arrays import Array
 from shell.imperfection import Imperfection, Split
 from shell.imperfection.surface import find_departures
 from shell.modes import Mode
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     Members = np.ndarray[Any, np.dtype[np.int64]]
 
 HIGHEST = 12  # wave of the departures that is drawn
+SPACING = 40  # points of the outline along the radius
 KINK = np.radians(35.0)  # where the outline turns by more than this, the shading breaks
 
 
@@ -68,7 +70,7 @@ def view_modes(
 
 
 def _describe(resonator: "Resonator", mode: "Mode", size: float, drawn: Drawn | None) -> dict[str, Any]:
-    outlines = trace_outlines(resonator, size / 40, mode)
+    outlines = trace_outlines(resonator, size / SPACING, mode)
     runs = [run for line in outlines for run in _split_at_kinks(line)]
     points = np.concatenate([_columns(line, members, size) for line, members in runs])
     energy = np.concatenate([line.energy.max(axis=0) for line in outlines])
@@ -82,6 +84,12 @@ def _describe(resonator: "Resonator", mode: "Mode", size: float, drawn: Drawn | 
         **(_imperfect(resonator, runs, size, drawn) if drawn else {}),
         "energy_legend": f"{most * 1e-12:.3g} J/m³ strain-energy density for 1 µm at the antinode",
     }
+
+
+def outline_rows(resonator: "Resonator", mode: "Mode", size: float) -> list[Array]:
+    """Return the runs of a mode's outline as the view draws them, each (points, 12), lengths over `size`."""
+    lines = trace_outlines(resonator, resonator.size / SPACING, mode)
+    return [_columns(line, members, size) for one in lines for line, members in _split_at_kinks(one)]
 
 
 def _imperfect(
@@ -109,7 +117,7 @@ def _imperfect(
     return found
 
 
-def _columns(line: "Outline", members: "np.ndarray[Any, np.dtype[np.int64]]", size: float) -> "np.ndarray[Any, Any]":
+def _columns(line: "Outline", members: "Members", size: float) -> Array:
     """One row for each point: r, z and their slopes, the displacement and its slope, the two parts of the energy."""
     r, z = line.r[members] / size, line.z[members] / size
     shift = line.displacement[:, members]
@@ -118,7 +126,7 @@ def _columns(line: "Outline", members: "np.ndarray[Any, np.dtype[np.int64]]", si
     return np.column_stack([r, z, *slopes[:2], *shift, *slopes[2:], *line.energy[:, members]])
 
 
-def _split_at_kinks(line: "Outline") -> "list[tuple[Outline, np.ndarray[Any, np.dtype[np.int64]]]]":
+def _split_at_kinks(line: "Outline") -> "list[tuple[Outline, Members]]":
     """Runs of points without a kink; neighbouring runs share their end point."""
     closing = np.arange(len(line.r)) if line.on_axis else np.append(np.arange(len(line.r)), 0)
     heading = np.unwrap(np.arctan2(np.diff(line.z[closing]), np.diff(line.r[closing])))
@@ -129,6 +137,6 @@ def _split_at_kinks(line: "Outline") -> "list[tuple[Outline, np.ndarray[Any, np.
 
 def _bounds(resonator: "Resonator") -> tuple[float, float]:
     """Height of the middle of the resonator and the radius of the sphere around it, m."""
-    line = trace_outlines(resonator, resonator.size / 40)[0]
+    line = trace_outlines(resonator, resonator.size / SPACING)[0]
     middle = float(line.z.max() + line.z.min()) / 2
     return middle, float(np.hypot(line.r, line.z - middle).max())

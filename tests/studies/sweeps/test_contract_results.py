@@ -93,6 +93,7 @@ def test_two_workers_give_the_same_bits(results):
 
 def test_page_is_self_contained_and_escapes(results, monkeypatch):
     monkeypatch.setattr("studies.reports.scenes.mode_blocks", lambda *_: [])  # pictures have their own tests
+    monkeypatch.setattr("studies.reports.scenes.moving_mode", lambda *_: [])
     hostile = replace(results, study=replace(results.study, name="<script>alert(1)</script>"))
     page = render_result(study_result(hostile))
     assert "<script>alert" not in page
@@ -106,6 +107,7 @@ def test_page_of_a_study_of_which_nothing_is_computed_yet(results, monkeypatch):
     from studies.sweeps.store import memory_store
 
     monkeypatch.setattr("studies.reports.scenes.mode_blocks", lambda *_: [])
+    monkeypatch.setattr("studies.reports.scenes.moving_mode", lambda *_: [])
     empty = memory_store()
     empty.describe(results.store.about() | {"cases": 8})
     page = render_result(study_result(Results(results.study, empty)))
@@ -115,6 +117,7 @@ def test_page_of_a_study_of_which_nothing_is_computed_yet(results, monkeypatch):
 
 def test_template_over_temperature_gives_table_1_and_2_for_any_card(tmp_path, monkeypatch):
     monkeypatch.setattr("studies.reports.scenes.mode_blocks", lambda *_: [])
+    monkeypatch.setattr("studies.reports.scenes.moving_mode", lambda *_: [])
     found = run_study("frequency-over-temperature", tmp_path / "out", card="cvg-25mm", workers=1)
     assert found.study.instrument.name == "cvg-25mm"
     assert found.parameter("temperature_degC").tolist() == [-20, -10, 0, 10, 20, 30, 40]
