@@ -20,12 +20,14 @@ from studies.calibration.calibrate import Calibration
 from studies.calibration.observed import UNITS
 from studies.cli.arguments import Card
 from studies.cli.calibrate_modes import calibrate_modes
-from studies.cli.output import answers, keep_card, say
+from studies.cli.output import Told, answers, keep_card, say
 from studies.errors import InputError
 from studies.instrument.card import load_card
 from studies.inversion.readings import is_mode_table
 from studies.reports import calibration as parts
 from studies.results import Result, row_of
+
+STAGES = {"step 1:": 0.05, "held-out run": 0.2, "computing the intervals": 0.55}
 
 
 @answers("hrg.calibration/1; hrg.mode-calibration/1 for a table of modes")
@@ -63,7 +65,8 @@ def calibrate(
     if not 0 <= hold_out <= records:
         there = "is 1 record" if records == 1 else f"are {records} records"
         raise InputError(f"--hold-out {hold_out}: there {there}, numbered from 1.")
-    found = workbench.calibrate(instrument, *data, hold_out=hold_out or None, exact=exact, progress=say)
+    with Told("calibration", STAGES) as told:
+        found = workbench.calibrate(instrument, *data, hold_out=hold_out or None, exact=exact, progress=told)
     for warning in found.warnings:
         say(f"warning: {warning}")
     refused = save is not None and found.unsaved is not None

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from studies.cli.output import keep_card, say
+from studies.cli.output import Told, keep_card, say
 from studies.instrument.card import Instrument
 from studies.instrument.display import display_name
 from studies.inversion.invert import EXCLUDED, ModeCalibration, decided, invert
@@ -21,6 +21,7 @@ from studies.inversion.readings import read_modes
 from studies.reports.calibration import KEY, TOLD, VALUE, VALUES
 from studies.results import Column, Result, Sentence, Table, row_of
 
+STAGES = {"assignment 1": 0.2, "the mode to measure next": 0.9}
 MODES = (
     "line | harmonic: n | index | frequency_Hz: measured (Hz) .9 | predicted_Hz: calibrated (Hz) .9"
     " | residual_ppm: residual (ppm) +.2g | sd_ppm: noise (ppm) .2g | chance: probability (%) ×100 .3g"
@@ -42,7 +43,8 @@ MEASURE = "For each value, the unmeasured mode that would reduce its variance mo
 
 def calibrate_modes(instrument: Instrument, path: str, save: str | None, exact: Sequence[str]) -> Result:
     """Calibrate a card by a table of modes, and save it."""
-    found = invert(instrument, read_modes(path), exact, say)
+    with Told("calibration", STAGES) as told:
+        found = invert(instrument, read_modes(path), exact, told)
     refused = save is not None and unsaved(found)
     if refused:
         say(f"{save} not saved: {refused}.")

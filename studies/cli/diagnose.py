@@ -15,6 +15,14 @@ from studies.results import Result
 
 PLANNED = "hrg-30mm"
 """Card of a plan without --card."""
+STAGES = {
+    "step 1:": 0.05,
+    "all effects in all shapes": 0.2,
+    "what could stand in the place of": 0.6,
+    "held-out rows": 0.93,
+    "lack of fit": 0.96,
+    "calibrating the extended card": 0.97,
+}
 
 
 @answers("hrg.diagnosis/1, with --plan hrg.plan/2")
@@ -64,7 +72,7 @@ def _plan(profiles: list[str], card: str | None, limits: Chamber | None) -> Resu
 
     if card is None:
         say(f"no --card given: planning with the card {PLANNED}.")
-    with Told("plan") as told:
+    with Told("plan", {"all effects in all shapes": 0.3, "what would be answered": 0.7}) as told:
         plan = plan_campaign(load_card(card or PLANNED), profiles, limits, told)
     return Result(plan.as_dict(), "Planned campaign", parts.headline(plan), parts.plan_parts(plan, profiles))
 
@@ -83,7 +91,7 @@ def _campaign(runs: tuple[str, ...], card: str | None, limits: Chamber | None, s
     from studies.reports.diagnosis import diagnosis_parts
 
     instrument, records = None if card is None else load_card(card), workbench.open_records(runs)
-    with Told("diagnosis") as told:
+    with Told("diagnosis", STAGES) as told:
         ask = workbench.diagnose_records
         found = ask(records, instrument, limits, told)
         extended = extend(found, told) if save is not None and isinstance(found, Inference) else None

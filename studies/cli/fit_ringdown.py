@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from studies.cli.arguments import Harmonic
-from studies.cli.output import answers, keep_card, say
+from studies.cli.output import Told, answers, keep_card, say
 from studies.errors import InputError
 from studies.fits.ringdown import Decay, read_decay, with_decay
 from studies.instrument.card import load_card
@@ -94,9 +94,10 @@ def fit_ringdown(
     if tables and (len(data) > 1 or save is not None):
         raise InputError(f"{tables[0]}: a table of decays must be fitted alone, without --save; leave out the rest.")
     decays = []
-    for path in data if not tables else ():
-        say(f"fitting {path}")
-        decays.append(read_decay(path, frequency=frequency, harmonic=harmonic, expected=expected))
+    with Told("ring-downs") as told:
+        for number, path in enumerate(data if not tables else ()):
+            told(path, number / len(data))
+            decays.append(read_decay(path, frequency=frequency, harmonic=harmonic, expected=expected))
     table = read_table(tables[0]) if tables else table_of(decays)
     laws = fit_laws(table)
     if tables and not laws:

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from studies.cli.output import answers, dump_json, say
+from studies.cli.output import Told, answers, dump_json
 from studies.files.writing import check_folder, write_text
 from studies.results import Result
 
@@ -55,18 +55,19 @@ def _reproduce() -> "Reproduction":
     from studies.reports.gyro_papers import reproduce_gyro_papers
     from studies.reports.reproduce import Reproduction
 
-    say("1/5 modes over temperature and a first diagnosis of Table 1 ...")
+    told = Told("reproduction")
+    told("modes over temperature and a first diagnosis of Table 1", 0.0)
     instrument = load_card(hrg.CARD)
     study = hrg.study_table(*hrg.printed_table1(), resolution=hrg.RESOLUTION)
     physics = hrg.compare_physics(study, instrument)
     diagnosis = diagnose_table(str(hrg.table1_path()))
-    say("2/5 settling after a temperature step (figure 3) ...")
+    told("settling after a temperature step (figure 3)", 0.1)
     settling = study_settling(instrument)
-    say(f"3/5 {GYROS} virtual gyros: bias compensation (figure 6) ...")
+    told(f"{GYROS} virtual gyros: bias compensation (figure 6)", 0.2)
     twins = [bias_twin.study_twin(seed) for seed in range(GYROS)]
-    say("4/5 the CVG and BVG papers ...")
+    told("the CVG and BVG papers", 0.5)
     chapters, summary = reproduce_gyro_papers(GYROS)
-    say("5/5 writing the page ...")
+    told("writing the page", 0.9)
     return Reproduction(study, physics, diagnosis, settling, twins, chapters, summary)
 
 

@@ -283,6 +283,7 @@ class Search:
         """Return a model with what could stand in the place of each of its terms."""
         rivals, without = [], []
         for k, term in enumerate(final.terms):
+            self.progress(f"what could stand in the place of {term.effect.name}")
             others = (*final.terms[:k], *final.terms[k + 1 :])
             base = self.settle(others, final.noise) if others else plain
             same = replace(final, terms=(*others, term))
