@@ -11,15 +11,19 @@ from studies.errors import InputError
 from studies.files.reading import read_bytes
 from studies.instrument.card import Instrument
 
+READING_ERROR = 1e-4  # Hz
+
 
 def pair_splits(
-    split: tuple[float, ...], axis: tuple[float, ...], harmonic: tuple[int, ...], error: float, card: Instrument
+    split: tuple[float, ...], axis: tuple[float, ...], harmonic: tuple[int, ...], error: float | None, card: Instrument
 ) -> list[tuple[int, float, float, float]]:
     """Return (harmonic, split in Hz, azimuth in rad, reading error in Hz) of the splits given as options, or of the card."""
     if not split and not axis:
         own = card.content.get("imperfection", {}).get("split")
         if own is not None:
+            error = (float(own.get("split_error_Hz", 0.0)) or READING_ERROR) if error is None else error
             return [(int(own["harmonic"]), float(own["split_Hz"]), radians(own["slow_axis_deg"]), error)]
+    error = READING_ERROR if error is None else error
     if not split:
         raise InputError(
             "--split is missing: give the measured splits (Hz), each with its --axis (degrees), or a card with a measured split ('hrg fit ringdown --save')."

@@ -52,7 +52,7 @@ def trim(
     split: Annotated[tuple[float, ...], MANY] = (),
     axis: Annotated[tuple[float, ...], MANY] = (),
     harmonic: Annotated[tuple[int, ...], MANY] = (2,),
-    reading_error: float = 1e-4,
+    reading_error: float | None = None,
     scan: str | None = None,
     goal: float = 5e-4,
     cut: Literal["mass", "edge", "inner", "outer"] = "mass",
@@ -82,7 +82,7 @@ def trim(
             writes it.
         axis: Azimuth in degrees of an antinode of the slower mode, one for each split.
         harmonic: Harmonic n of each split.
-        reading_error: Standard error of the splits in Hz.
+        reading_error: Standard error of the splits in Hz; by default that of the ring-down in the card, else 0.0001.
         scan: Output of hrg scan --json, instead of --split and --axis: the splits of --harmonic and their intervals.
         goal: Largest acceptable split in Hz.
         cut: mass (unstrained mass, such as teeth or lumps), edge (from the rim edge, through the wall), inner or outer (from

@@ -223,11 +223,13 @@ def with_decay(instrument: "Instrument", decay: Decay, harmonic: int = 2) -> "In
             f"{decay.path}: a card takes a split with its axis; this decay shows none: record both pick-offs, with both modes excited, for longer."
         )
     e = decay.estimates
+    split, axis = e["split_Hz"], e["frequency_axis_deg"]
     imperfection = dict(instrument.content.get("imperfection", {}))
     imperfection["split"] = {
         "harmonic": harmonic,
-        "split_Hz": e["split_Hz"].value,
-        "slow_axis_deg": (e["frequency_axis_deg"].value + 90 / harmonic) % (180 / harmonic),
+        "split_Hz": split.value,
+        "slow_axis_deg": (axis.value + 90 / harmonic) % (180 / harmonic),
+        "split_error_Hz": max(split.sd, split.value * 2 * harmonic * float(np.radians(axis.sd))),
     }
     instrument = instrument.with_table("imperfection", imperfection)
     tau = e["decay_time_s"].value

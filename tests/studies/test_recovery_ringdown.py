@@ -51,6 +51,8 @@ def test_a_lock_in_file_gives_split_axes_and_q_and_a_card_that_has_them(lock_in,
     split = load_card(str(card)).content["imperfection"]["split"]
     assert split["split_Hz"] == pytest.approx(0.12, abs=1e-3)
     assert split["slow_axis_deg"] == pytest.approx(76.0, abs=0.5)
+    sd = found["split_Hz"]["sd"], 4 * 0.12 * np.radians(found["frequency_axis_deg"]["sd"])
+    assert split["split_error_Hz"] == pytest.approx(max(sd), rel=0.01)
     assert "Axis of the upper mode".lower() in page.read_text().lower()
     bare = Path(lock_in).with_name("bare.csv")
     bare.write_text(
@@ -75,6 +77,12 @@ def test_from_a_raw_decay_to_acceptance_in_five_commands(lock_in, tmp_path, caps
     assert main(["fit", "ringdown", lock_in, "--card", "free-dome", "--save", measured]) == 0
     plan = ask(["trim", measured])
     assert plan["before"][0]["split_Hz"] == pytest.approx(0.12, abs=1e-3)
+    assert (
+        0
+        < plan["before"][0]["error_Hz"]
+        == pytest.approx(load_card(measured).content["imperfection"]["split"]["split_error_Hz"])
+    )
+    assert ask(["trim", measured, "--reading-error", "3e-4"])["before"][0]["error_Hz"] == pytest.approx(3e-4)
     cuts = plan["rounds"][0]["cuts"]
     pull = sum(cut["mass_ug"] * np.exp(4j * np.radians(cut["azimuth_deg"])) for cut in cuts)
     assert np.degrees(np.angle(pull)) / 4 % 90 == pytest.approx(76.0, abs=0.5)  # mass off where the slow mode moves

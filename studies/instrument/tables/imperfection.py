@@ -67,6 +67,9 @@ class SplitKeys(Keys, frozen=True, kw_only=True):
         float, number("at the reference temperature, of any cause, in addition to the above", least=0.0, example=0.12)
     ]
     slow_axis_deg: Annotated[float, number("azimuth of an antinode of the slower mode", example=31.0)]
+    split_error_Hz: Annotated[
+        float, number("standard error of the measurement, along the axis and across", least=0.0)
+    ] = 0.0
 
 
 WavePart = Annotated[float, number("of the wall, Σ c cos mθ + s sin mθ, in addition to the waves: for studies")]
