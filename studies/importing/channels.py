@@ -115,7 +115,7 @@ class ChannelTable(RawTable):
 
     channels: tuple[dict[str, Channel], ...]
     files: contextlib.ExitStack = field(repr=False)
-    _last: dict[str, "Array"] = field(default_factory=dict, repr=False)
+    _last: dict[str, "tuple[Array, int]"] = field(default_factory=dict, repr=False)
 
     def close(self) -> None:
         """Close the files."""
@@ -134,14 +134,15 @@ class ChannelTable(RawTable):
             for word in self.missing:
                 with contextlib.suppress(ValueError):
                     values[values == float(word)] = np.nan
-            self._last[column] = values
-        values = self._last[column]
-        return np.where(np.abs(values) >= OVERLOAD, np.nan, values)
+            beyond = (values >= OVERLOAD) | (values <= -OVERLOAD)
+            values[beyond] = np.nan
+            self._last[column] = values, int(np.count_nonzero(beyond))
+        return self._last[column][0]
 
     def count_overloads(self, column: str) -> int:
         """Return how many readings of a channel stand for an overload of the instrument."""
         self.numbers(column)
-        return int(np.count_nonzero(np.abs(self._last[column]) >= OVERLOAD))
+        return self._last[column][1]
 
     def own_clock(self) -> "tuple[Array, datetime.datetime | None]":
         """Return the seconds of every row by the file's own clock, and when the first file started."""

@@ -175,13 +175,19 @@ def _name_clock(file: FileMap) -> str:
 
 def _report_empty(table: RawTable, file: FileMap) -> list[str]:
     """Say which readings of the instruments are no values: overloads, and zeros of what cannot be zero."""
-    overloads = {column.source: table.count_overloads(column.source) for column in file.columns}
-    zeros = {column.source: int(np.count_nonzero(_is_dropout(table, column))) for column in file.columns}
+    kinds = "an instrument's overload", "0, a dropout"
+    counts = {
+        column.source: (
+            table.count_overloads(column.source),
+            int(np.count_nonzero(_reading(table, column) == 0)) if column.conversion.never_zero else 0,
+        )
+        for column in file.columns
+    }
     return [
-        f"{count} readings of '{name}' are {what}: left empty"
-        for what, counts in (("an instrument's overload", overloads), ("0, a dropout", zeros))
+        f"{count[kind]} readings of '{name}' are {what}: left empty"
+        for kind, what in enumerate(kinds)
         for name, count in counts.items()
-        if count
+        if count[kind]
     ]
 
 
@@ -189,14 +195,11 @@ def _reading(table: RawTable, column: ColumnMap) -> "Array":
     return np.asarray(table.numbers(column.source) * column.scale + column.offset)
 
 
-def _is_dropout(table: RawTable, column: ColumnMap) -> "NDArray[np.bool_]":
-    """Tell which readings are 0 where 0 cannot be: a counter without a signal."""
-    return np.asarray((_reading(table, column) == 0) & column.conversion.never_zero)
-
-
 def convert(table: RawTable, column: ColumnMap) -> "Array":
     """Return a raw column in the unit of the record: sign × unit(reading × scale + offset)."""
-    reading = np.where(_is_dropout(table, column), np.nan, _reading(table, column))
+    reading = _reading(table, column)
+    if column.conversion.never_zero:
+        reading[reading == 0] = np.nan
     values = column.sign * column.conversion.convert(reading, *column.settings)
     check_plausible({column.target: values}, lambda row: f"{table.place(row)}, '{column.source}'")
     return np.asarray(values, dtype=float)

@@ -52,9 +52,10 @@ def find_gaps(time: Array, values: Array) -> Array:
     rows = np.flatnonzero(np.isfinite(values))
     if rows.size < 2:
         return np.array([[time[0], time[-1]]]) if time.size > 1 else np.empty((0, 2))
-    steps = np.diff(time[rows])
+    steps = np.diff(time[rows] if rows.size < time.size else time)
     usual = float(np.median(steps))
-    at = np.flatnonzero((steps > LONG * usual) | ((np.diff(rows) > 1) & (steps > SKIPPED * usual)))
+    at = np.flatnonzero(steps > min(LONG, SKIPPED) * usual)
+    at = at[(steps[at] > LONG * usual) | ((rows[at + 1] - rows[at] > 1) & (steps[at] > SKIPPED * usual))]
     inner = np.column_stack([time[rows[at]], time[rows[at + 1]]])
     ends = [(time[0], time[rows[0]]), (time[rows[-1]], time[-1])]
     outer = [end for end in ends if end[1] - end[0] > usual / 2]
