@@ -27,6 +27,8 @@ PACKAGES = ("numpy", "scipy", "sympy", "pandas", "pyvista", "trimesh")
 OPEN_HEIGHT = 4600  # px: chapters that would end below, on a screen 1280 px wide or on a phone, are folded
 LONG_TABLE = 15  # rows; longer tables are folded, except in the first chapter, which is the answer
 LONG_ANSWER = 40  # rows of a table in the first chapter
+LONG_WORD = 15  # letters
+DENSE = 7  # columns; tables of more stand closer
 PAPER_ROWS = 40  # of a table; the others are on the screen only
 CONTENTS_FROM = 4  # chapters
 PHONE = 364.0  # px for a table on a phone
@@ -110,6 +112,7 @@ def render_page(title: str, lead: str, chapters: Sequence[Chapter], sources: Seq
         script=script if any(isinstance(b, Picture) and b.curves for _, blocks in made for b in blocks) else "",
         long_table=LONG_TABLE,
         long_answer=LONG_ANSWER,
+        dense=DENSE,
         paper_rows=PAPER_ROWS,
         sources=sources,
         provenance=_provenance(),
@@ -122,7 +125,7 @@ def fill_template(name: str, **values: Any) -> str:
 
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     environment.filters.update(typeset=typeset, prose=_prose, cell=_cell)
-    environment.tests.update(kind=lambda block, kind: isinstance(block, KINDS[kind]), stacked=_stacked)
+    environment.tests.update(kind=lambda block, kind: isinstance(block, KINDS[kind]), stacked=_stacked, worded=_worded)
     text = (files("studies.reports") / "templates" / name).read_text(encoding="utf-8")
     return environment.from_string(text).render(**values)
 
@@ -159,7 +162,17 @@ def _cell(text: str) -> "Markup":
         text.endswith(".html") and "/" in text and ":" not in text and not text.startswith("/")
     ):  # a page beside this one
         return Markup('<a href="{}">{}</a>').format(quote(text), shown)
-    return Markup(shown)
+    # a long key of a card may be divided after its dots and underscores, so that its column fits the page
+    return Markup(
+        re.sub(r"(?<=\w[._])(?=[^\W\d])", "<wbr>", shown)
+        if len(max(text.split(), key=len, default="")) > LONG_WORD
+        else shown
+    )
+
+
+def _worded(text: str) -> bool:
+    """Return whether a cell is words, which may be divided, and not a number: 1/Q at some temperature is."""
+    return re.match(r"[^-−+.\d±<>]|\d+/[A-Z]", text) is not None
 
 
 def _stacked(table: Cells) -> bool:
@@ -167,7 +180,7 @@ def _stacked(table: Cells) -> bool:
 
     def least(text: str) -> int:
         whole = re.match(r"[-+±<> ]*[.\d]", text) or len(text) <= 12
-        return len(text) if whole else max(map(len, re.split(r"[\s-]+", text)))
+        return len(text) if whole else max(map(len, re.split(r"[\s._-]+", text)))
 
     columns = [
         max([least(str(row[k])) for row in table.rows] + [max(map(len, str(head).split()), default=0)])

@@ -17,7 +17,7 @@ from studies.instrument.card import load_card
 from studies.reports import style
 from studies.reports.webgl import view_modes
 from studies.results import Chapter, Sentence
-from studies.results.page import draw, render_page
+from studies.results.page import Cells, draw, render_page
 
 BROWSER = next(
     (found for name in ("chromium", "chromium-browser", "google-chrome", "chrome") if (found := shutil.which(name))),
@@ -125,6 +125,42 @@ def test_a_figure_shows_values_under_the_pointer_and_a_part_of_it_enlarged(tmp_p
         at, value = (float(number.replace("−", "-")) for number in found.groups())
         assert value == pytest.approx(3.0 + at**3, abs=2e-3)
     assert seen["whole"] == seen["again"]
+
+
+MEASURE = """
+<script>
+addEventListener("load", () => {
+  const table = document.querySelector("table");
+  document.title = JSON.stringify({table: table.scrollWidth, room: table.parentElement.clientWidth});
+});
+</script>
+"""
+
+
+def test_nine_columns_with_a_key_of_the_card_fit_a_screen_of_1280_px(tmp_path):
+    """The last column of a calibration, the key of the card, was cut off."""
+    head = [
+        "quantity",
+        "unit",
+        "card",
+        "calibrated",
+        "90 % interval",
+        "shift (sd)",
+        "width",
+        "determined by",
+        "key of the card",
+    ]
+    key = "material.deviation.shear_modulus.log_curvature_per_K2"
+    numbers = ["1.0000e-7", "1.00000e-7", "9.9966e-8 … 1.00052e-7", "+0.00", "0.000", "data and prior"]
+    rows = [
+        ["1/Q at the reference temperature", "J/(kg K)", *numbers, "loss.inverse_q_at_reference"],
+        ["temperature curvature of the shear modulus", "1/K²", *numbers, key],
+    ]
+    text = render_page("T", "lead", [Chapter("C", [Cells("Values", head, rows, sortable=True)])])
+    path = tmp_path / "page.html"
+    path.write_text(text.replace("</body>", MEASURE + "</body>"))
+    seen = browse(path, "--window-size=1280,900")
+    assert seen["table"] <= seen["room"] <= 1280
 
 
 @pytest.fixture(scope="module")

@@ -75,7 +75,7 @@ def test_wide_tables_are_stacked_on_a_phone_and_long_ones_end_on_paper():
     wide = Cells("T", [f"Quantity {k}" for k in range(9)], [["1234.5678"] * 9] * 50)
     narrow = Cells("T", ["Name", "Value"], [["f", "1"]])
     text = render_page("A page", "lead", [Chapter("One", [wide, narrow, Sentence("run `step 20 -10 5h`")])])
-    assert text.count('class="stack paged"') == 1
+    assert text.count('class="stack dense paged"') == 1
     assert text.count('data-head="Quantity 8"') == 50
     assert 'class="remark onpaper">40 of 50 rows' in text
     assert "<code>step 20 -10 5h</code>" in text
