@@ -7,7 +7,7 @@ import numpy as np
 
 from compensation.noise import Noise
 from studies.calibration.ahead import BIAS
-from studies.calibration.estimates import SILENT, TOLD, Estimate
+from studies.calibration.estimates import TOLD, Estimate
 from studies.calibration.fit import CardFit, stated_noise
 from studies.calibration.ladder import Rung, noise_rms, usual_mean
 from studies.calibration.observed import UNITS, WORDS
@@ -47,12 +47,9 @@ def warn(found: CardFit, estimates: Sequence[Estimate], ladder: Mapping[str, Run
             warnings.append(
                 f"{count} {'block' if count == 1 else 'blocks'} of the {WORDS[name]} {'is an outlier and was' if count == 1 else 'are outliers and were'} given less weight."
             )
-    stayed = sum(one.width >= SILENT for one in estimates)
     told = sum(rows[name].count for name in rows)
     if len(estimates) > told:
-        warnings.append(
-            f"{told} data points cannot determine {len(estimates)} uncertain values: {stayed} stay at their prior."
-        )
+        warnings.append(f"{told} data points cannot determine {len(estimates)} uncertain values.")
     return tuple(warnings)
 
 

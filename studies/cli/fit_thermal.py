@@ -65,7 +65,7 @@ def fit_thermal(
     }
     rows = [
         e | dict(zip(("constant", "unit"), _name(name), strict=True)) | {"shown": "not determined" if e["value"] is None else e["value"]}
-        for name, e in estimates.items()
+        for name, e in sorted(estimates.items(), key=lambda one: [*NAMES].index(one[0]) if one[0] in NAMES else -1)
     ]  # fmt: skip
     combined = [
         [f"{share:+.2f} × {(word := _name(key)[0])[:1].lower()}{word[1:]}" for key, share in one.parts.items()]

@@ -143,7 +143,7 @@ def _facts(payload: dict[str, Any]) -> list[tuple[str, str, str]]:
     return [
         (f"Split of n = {main['harmonic']}", f"{split} mHz", f"90 %: {low} … {high} mHz"),
         ("Slow axis", f"{axis['value']:.1f}°" if axis else "undetermined", "antinode of the slower mode: remove mass there" if axis else ""),
-        ("Noise of a point", ", ".join(f"{one:.0f} nm" for one in noise), " and ".join(payload["faces"])),
+        ("Noise per point", ", ".join(f"{one:.0f} nm" for one in noise), " and ".join(payload["faces"])),
     ]  # fmt: skip
 
 

@@ -50,7 +50,7 @@ def show(*runs: Records) -> Result:
     lead = f"{', '.join(runs)} as recorded, without fitting or editing."
     return Result(
         payload,
-        f"Record {Path(runs[0]).name}" if len(runs) == 1 else f"{len(runs)} records",
+        _title([Path(run).name for run in runs]),
         lead,
         [
             *(part for survey, one in pairs for part in (Facts(_facts(survey)), parts.columns_table(survey, one))),
@@ -61,6 +61,11 @@ def show(*runs: Records) -> Result:
     )  # fmt: skip
 
 
+def _title(names: list[str]) -> str:
+    more = f" and {len(names) - 3} more" if len(names) > 4 else ""
+    return f"Record{'s' * (len(names) > 1)} {', '.join(names[: 3 if more else 4])}{more}"
+
+
 def _facts(survey: "Survey") -> list[tuple[str, str, str]]:
     record, time = survey.record, survey.record["time_s"]
     even = "regular" if survey.even else "irregular or with gaps"
@@ -68,7 +73,7 @@ def _facts(survey: "Survey") -> list[tuple[str, str, str]]:
     return [
         (record.path, f"{len(record):,} rows", about),
         ("Duration", f"{plain((time[-1] - time[0]) / 3600, 4)} h", ""),
-        ("Usual step", f"{plain(survey.step, 4)} s", even),
+        ("Sample interval", f"{plain(survey.step, 4)} s", even),
     ]
 
 

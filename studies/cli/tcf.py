@@ -52,7 +52,7 @@ def tcf(
     T = instrument.material.check(temperatures)
     law = law_of(instrument, float(T[0]), float(T[-1]), theory, harmonic)
     points, moves = _points(law, T), _moves(law, T)
-    local = _measured_slopes(instrument.name, measured)
+    local, source = _measured_slopes(instrument.name, measured)
     payload = {
         "card": instrument.name,
         "theory": theory,
@@ -64,7 +64,7 @@ def tcf(
         "measured": local,
     }
     parts = [name for name in PARTS if name != "base" or law.mount]
-    note = f"Slopes in ppm/°C; ±: one standard deviation, from the prior of law '{instrument.material.law}'."
+    note = f"Slopes in ppm/°C; ±: one standard deviation, from the stated uncertainty of the material law ({instrument.material.law})."
     if law.mount:
         note += " Base: stress from the thermal mismatch of the card's [mount]."
     columns = [
@@ -86,7 +86,7 @@ def tcf(
             Table("Uncertainty of the law: change of the slope by one standard deviation (ppm/°C)", uncertain,
                 [Column("coefficient", "quantity", spell=display_name), "coefficient: key | sd: standard deviation .2g", *moved]),
             Table("Measured slope between adjacent points", local,
-                "temperature_degC: T (°C) .1f | slope_ppm_per_degC: slope (ppm/°C) .2f"),
+                "temperature_degC: T (°C) .1f | slope_ppm_per_degC: slope (ppm/°C) .2f", source),
             live_chapter(instrument, harmonic, theory),
         ],
     )  # fmt: skip
@@ -131,14 +131,15 @@ def _moves(law: FrequencyLaw, T: NDArray[np.float64]) -> list[dict[str, Any]]:
     ]
 
 
-def _measured_slopes(card: str, path: str | None) -> list[dict[str, float]]:
-    """Return the slope between neighbouring points of a table; empty without one."""
+def _measured_slopes(card: str, path: str | None) -> tuple[list[dict[str, float]], str]:
+    """Return the slope between neighbouring points of a table, and of which gyro; empty without one."""
     if path is not None:
         table = read_frequency_table(path)
         T, f = table.values["temperature_degC"], table.values["frequency_Hz"]
     elif card == hrg.CARD:
         T, f = hrg.printed_table1()
     else:
-        return []
+        return [], ""
     at, slopes = hrg.local_slopes(T, f)
-    return rows_of({"temperature_degC": at, "slope_ppm_per_degC": slopes})
+    source = path or "the gyro of the HRG paper (Sensors 2012, 12, 6434, Table 1)"
+    return rows_of({"temperature_degC": at, "slope_ppm_per_degC": slopes}), f"Measured on {source}."

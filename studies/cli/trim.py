@@ -137,7 +137,7 @@ def trim(
     return Result(
         payload,
         f"Trimming plan for {instrument.name}",
-        "Make these cuts, let the shell return to thermal equilibrium, measure, and plan the next round from the measurement.",
+        "The cuts of this round, what to measure after them, and the split expected. The next round is planned from that measurement.",
         _parts(planned, payload),
     )
 
@@ -160,7 +160,7 @@ def _parts(planned: CardPlan, payload: dict[str, Any]) -> list[Chapter]:
         Chapter("Cuts", [
             Facts([
                 ("Measured split", ", ".join(f"{plain(1e3 * one['split_Hz'], 4)} mHz" for one in payload["before"]), f"slow axis of {axes}"),
-                ("Mass to remove", f"{first['mass_ug']:.3g} µg", f"{len(cuts)} cuts, {100 * first['share']:.0f} % of the split" + ("; the rest guards against overshoot" if first["share"] < 1 else "")),
+                ("Mass to remove", f"{first['mass_ug']:.3g} µg", f"{len(cuts)} cuts, {100 * first['share']:.0f} % of the split" + (", to avoid overshoot" if first["share"] < 1 else "")),
                 ("Expected split", limit, f"95 % limit; {goal}"),
             ]),
             Table("Cuts of this round", cuts, CUTS, f"Total {first['mass_ug']:.4g} µg."),
@@ -215,7 +215,7 @@ def measure_after(planned: CardPlan) -> list[str]:
         expected = " ± ".join(to_error(1e3 * state.hertz, 1e3 * spread_Hz))
         found.append(
             f"After the cuts, measure the split of n = {state.harmonic} to ± {1e3 * min(plan.goal / 4, max(spread_Hz / 5, plan.goal / 10)):.2g} mHz, and its axis. "
-            f"Expected: {expected} mHz. If the measured split differs from it by more than twice that error, plan the next round with --gain, the measured over the predicted change "
+            f"Expected: {expected} mHz. If the measured split differs from it by more than twice that error, plan the next round with --gain, the ratio of measured to predicted change "
             "(negative if the split changed in the opposite direction)."
         )
     still = "Let the shell return to thermal equilibrium before each reading, and measure the same mode with the same electrodes."

@@ -192,7 +192,7 @@ def study_calibrated_table(found: "Calibration") -> TableDiagnosis:
         most = ", ".join(
             f"{display_name(one.parameter)} ({one.shift_sd:+.2f} standard deviations)" for one in shifts[:2]
         )
-        said.append(f"The calibration changes most: {most}.")
+        said.append(f"Largest changes in the calibration: {most}.")
     said.append(
         f"Residual with the card as given, rms over the rows: {rms(shipped):.3f} Hz; calibrated: {rms(left):.3f} Hz; rounding alone would give {rounding:.4f} Hz."
     )
@@ -308,8 +308,6 @@ def _study(
         shifts = _beside(found, base, winner, noise, shifts)
     causes = sorted((named, *wrong_values(shifts)), key=lambda one: -one.evidence)
     state = "not-identifiable" if len(names) > 1 else "explained"
-    if len(names) > 1:
-        sentences.append(f"The table cannot distinguish between {', '.join(names)}.")
     result = ResponseResult(state, noise, (base_rms, lone), (rms(winner.residual), winner.loo), "none")
     return answer(state, doubted(causes), result, next_table(T), winner.residual, forms)
 

@@ -44,7 +44,8 @@ def table_sentences(T: FloatArray, f: FloatArray, rounding: float) -> list[str]:
             out.append("A cubic fits within the rounding of the readings; a cubic is sufficient.")
         else:
             out.append(
-                f"Cubic against quartic: {cubic:.3g} and {quartic:.3g} Hz², F(1, {T.size - 5}) = {ratio:.3g}, p = {chance:.2g}; {said}."
+                f"Sum of squares left by a cubic and by a quartic: {cubic:.3g} and {quartic:.3g} Hz²; F(1, {T.size - 5}) = {ratio:.3g},"
+                f" p = {chance:.2g}: {said}."
             )
     both = _turns(T)
     out.append(

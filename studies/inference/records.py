@@ -70,7 +70,7 @@ def make_ready(given: Sequence[Record]) -> Campaign:
     _, timed = place_in_time(kept)
     if not timed and len(kept) > 1:
         notes.append(
-            "The records do not state different starts (# start: …); they are treated as consecutive, with unknown gaps."
+            "The records have no distinct start times (# start: …); they are treated as consecutive, with unknown gaps."
         )
     for name in COMMAND_COLUMNS:
         there = [name in record and np.isfinite(record[name]).all() for record in kept]

@@ -99,7 +99,7 @@ def loss_model(
             causes += through_stem
             ripples += unequal
         elif instrument.resonator.stem is not None and parts.anchor_inverse_q is None:
-            left_out.append("anchor: --anchor computes the loss from the stem into its base.")
+            left_out.append("anchor: give --anchor to compute the loss through the stem into the base.")
     if not causes:
         raise InputError(f"{instrument.path} [loss]: it states no loss of energy. {' '.join(left_out)}")
     return LossModel(vibration, tuple(causes), tuple(left_out), tuple(ripples), mode.bryan_factor, mode.frequency)

@@ -226,7 +226,7 @@ def _facts(verdict: Verdict) -> list[tuple[str, str, str]]:
             facts.append(
                 ("Gain", f"{plain(result.gain)} times", f"smaller residual of {spoken(main)} on held-out rows")
             )
-        facts.append(("Noise", shown(main, result.noise), f"rms of {spoken(main)} that no model removes"))
+        facts.append(("Noise", shown(main, result.noise), f"rms residual of {spoken(main)} that no model removes"))
     return facts  # fmt: skip
 
 

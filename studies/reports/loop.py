@@ -114,12 +114,17 @@ def _facts(study: LoopStudy, payload: dict[str, Any]) -> list[tuple[str, str, st
     largest = max(study.sources[:-1], key=lambda one: one.sd).name
     single = [one for one in noise if one["source"] != "all"]
     loudest = max(single, key=lambda one: one["deg_per_h_over_1s"])["source"] if single else ""
-    phase, gain = (min(payload["margins"], key=lambda m: m[key]) for key in ("phase_margin_deg", "gain_margin_dB"))
-    loops = " and ".join(dict.fromkeys((phase["loop"], gain["loop"])))
+    margins = payload["margins"]
+    phase, gain = (min(m[key] for m in margins) for key in ("phase_margin_deg", "gain_margin_dB"))
+    near = [
+        m["loop"]
+        for m in margins
+        if m["phase_margin_deg"] < phase * (1 + TIE) or m["gain_margin_dB"] < gain * (1 + TIE)
+    ]
     return [
-        ("Bias", f"{' ± '.join(to_error(total.bias, total.sd))} °/h", f"least certain: {NAMES.get(largest, largest)}"),
+        ("Bias", f"{' ± '.join(to_error(total.bias, total.sd))} °/h", f"largest uncertainty: {NAMES.get(largest, largest)}"),
         ("Angle random walk", f"{noise[-1]['deg_per_rt_h']:.3g} °/√h", f"largest source over 1 s: {NAMES.get(loudest, 'none')}"),
-        ("Smallest margins", f"{phase['phase_margin_deg']:.0f}°, {gain['gain_margin_dB']:.0f} dB", f"{loops} loop"),
+        ("Smallest margins", f"{phase:.0f}°, {gain:.0f} dB", f"{' and '.join(near)} loop{'s' * (len(near) > 1)}"),
         ("Start-up", f"{study.start.ready:.3g} s", f"phase locked after {study.start.locked:.2g} s"),
     ]  # fmt: skip
 

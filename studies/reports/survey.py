@@ -30,7 +30,7 @@ COLUMNS: Head = (
     _count("longest_gap_s", "s"),
     *(_count(key) for key in ("spikes", "stuck", "zeros", "steps")),
 )
-COLUMNS_NOTE = "Missing values, gaps, spikes, stuck readings, dropouts to 0 and steps are counted where there are any."
+COLUMNS_NOTE = "Missing values, gaps, spikes, stuck readings, dropouts to 0 and steps are listed if there are any."
 NOISE = (
     Column("column", "Column", spell=display_name),
     "Unit | noise.white ± noise.white_sd: White, at 1 s | noise.flicker ± noise.flicker_sd: Flicker, flat part"

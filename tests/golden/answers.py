@@ -50,7 +50,9 @@ def answer(name: str) -> tuple[dict[str, Any], str]:
             assert main(words) == 0, (words, told.getvalue())
         reader = _Text()
         if case.get("page"):
-            reader.feed(Path("page.html").read_text(encoding="utf-8").replace(str(folder), "FOLDER"))
+            reader.feed(
+                Path("page.html").read_text(encoding="utf-8").replace("<wbr>", "").replace(str(folder), "FOLDER")
+            )
     home = str(HERE.parents[1])
     found = json.loads(out.getvalue().replace(str(folder), "FOLDER").replace(home, "HOME"))
     return rounded(found, (*LOOSE, *case.get("loose", ()))), "\n".join(reader.lines) + "\n"

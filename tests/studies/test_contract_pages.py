@@ -2,6 +2,9 @@
 
 import re
 
+import pytest
+
+from studies.cli import main
 from studies.reports.diagnosis import spell_parameter
 from studies.reports.digits import plain, to_error, to_interval
 from studies.results import Chapter, Sentence
@@ -79,3 +82,18 @@ def test_wide_tables_are_stacked_on_a_phone_and_long_ones_end_on_paper():
     assert text.count('data-head="Quantity 8"') == 50
     assert 'class="remark onpaper">40 of 50 rows' in text
     assert "<code>step 20 -10 5h</code>" in text
+
+
+@pytest.mark.parametrize(
+    ("words", "once"),
+    [
+        ("tcf hrg-30mm --theory shell", "Measured on the gyro of the HRG paper (Sensors 2012, 12, 6434, Table 1)."),
+        ("trim free-dome --split 0.12 --axis 31", "thermal equilibrium"),
+        ("loop hrg-30mm-loops", "phase and rate loops"),
+        ("loss hrg-30mm", "1.46 times this loss"),
+    ],
+)
+def test_a_page_says_of_what_its_numbers_are_and_says_it_once(words, once, tmp_path):
+    page = tmp_path / "page.html"
+    assert main([*words.split(), "--report", str(page)]) == 0
+    assert page.read_text().count(once) == 1
