@@ -5,10 +5,10 @@ temperature follow exactly. Its error is judged by full solves that it has not s
 more solves than half the designs, every design is solved in full. No result depends on the other designs of its batch.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,6 +47,7 @@ class Families:
     instrument: Instrument
     asked: tuple[Quantity, ...]
     members: Mapping[tuple[int, int, str], Family]
+    nodes: "_Nodes | None" = None
 
     def evaluate(self, designs: Designs, count: int) -> tuple[Array, Array]:
         """Evaluate designs together: values and errors, arrays (designs, columns)."""
@@ -56,7 +57,7 @@ class Families:
 
     def modes(self, asked: ModeQuantity, designs: Designs, count: int) -> "tuple[Family, FamilyResult, _Bodies]":
         """Return the family that a quantity asks for, what it gives, and what the designs are made of."""
-        bodies = _describe(self.instrument, designs, count, asked.temperature_degC)
+        bodies = _describe(self.instrument, designs, count, asked.temperature_degC, self.nodes)
         family = self.members[_key(asked)]
         values = np.empty((len(bodies.T), len(family.axes)))
         for k, axis in enumerate(family.axes):
@@ -67,14 +68,68 @@ class Families:
 
 @dataclass(frozen=True)
 class _Bodies:
-    """What designs are made of, arrays (m,): T (K), growth of lengths, E (Pa), ν, ρ (kg/m³); each material and its places."""
+    """What designs are made of, arrays (m,): T (K), growth of lengths, E (Pa), ν, ρ (kg/m³); each material, its places and its weights there."""
 
     T: Array
     growth: Array
     E: Array
     nu: Array
     rho: Array
-    materials: "list[tuple[Material, Any]]"
+    materials: "list[_Part]"
+
+
+_Part: TypeAlias = "tuple[Material, Any, Array | float]"
+
+
+@dataclass(frozen=True)
+class _Nodes:
+    """Materials at Chebyshev nodes of their parameters, between which those of the designs are interpolated (Lagrange)."""
+
+    names: tuple[str, ...]
+    low: Array
+    high: Array
+    materials: "tuple[Material, ...]"
+
+    def parts(self, designs: Designs) -> "tuple[list[_Part], NDArray[np.bool_]]":
+        """Return the materials with their weights, and the designs that lie within the nodes' ranges."""
+        at = np.array([designs[name] for name in self.names], dtype=float)
+        inside = np.asarray(((at.T >= self.low) & (at.T <= self.high)).all(axis=1))
+        x = (2 * at.T[inside] - self.low - self.high) / (self.high - self.low)
+        basis = [np.prod([(x - p) / (q - p) for p in NODES if p != q], axis=0) for q in NODES]
+        weights = (np.prod([basis[j][:, k] for k, j in enumerate(one)], axis=0) for one in _choices(len(self.names)))
+        return [(m, inside, w) for m, w in zip(self.materials, weights, strict=True)], inside
+
+
+NODES = np.cos(np.pi * (np.arange(6) + 0.5) / 6)
+MOST_AXES = 3  # material parameters that are interpolated
+SAME = 1e-10  # relative, of E, ν and ρ between nodes and at designs that are no nodes
+
+
+def _choices(count: int) -> Iterator[tuple[int, ...]]:
+    return product(range(len(NODES)), repeat=count)
+
+
+def _build_nodes(study: "Study", design: "Design") -> "_Nodes | None":
+    """Return materials at nodes where many designs have one of their own; None where these are few, or not followed."""
+    places = [k for k, p in enumerate(study.parameters) if p.name.startswith(MATERIAL)]
+    if not 0 < len(places) <= MOST_AXES or any(isinstance(study.parameters[k].nominal, str) for k in places):
+        return None
+    if len(np.unique(design.values[:, places], axis=0)) < FEWEST * len(NODES) ** len(places):
+        return None
+    names = tuple(study.parameters[k].name for k in places)
+    low, high = np.array([_range(study, design, k) for k in places]).T
+    try:
+        at = ((low + high + NODES[list(one)] * (high - low)) / 2 for one in _choices(len(places)))
+        nodes = _Nodes(names, low, high, tuple(
+            set_parameters(study.instrument, dict(zip(names, map(float, one), strict=True))).material for one in at
+        ))  # fmt: skip
+        some = design.values[:: -(-len(design.values) // FEWEST)]
+        columns = {p.name: some[:, k] for k, p in enumerate(study.parameters) if p.name in (*names, TEMPERATURE)}
+        exact, found = (_describe(study.instrument, columns, len(some), None, one) for one in (None, nodes))
+    except UNUSABLE_INPUT:
+        return None
+    close = (np.allclose(getattr(found, n), getattr(exact, n), rtol=SAME, atol=0) for n in ("E", "nu", "rho", "growth"))
+    return nodes if all(close) else None
 
 
 def why_not(study: "Study") -> str:
@@ -131,7 +186,7 @@ def build_families(study: "Study", design: "Design", most: int = MOST_SOLVES) ->
                 )
     except UNUSABLE_INPUT as error:
         return str(error).rstrip(".")
-    return Families(study.instrument, study.asked, members)
+    return Families(study.instrument, study.asked, members, _build_nodes(study, design))
 
 
 def choose_solver(study: "Study", design: "Design") -> "Families | None":
@@ -161,12 +216,13 @@ def _bryan_factor(families: Families, asked: ModeQuantity, designs: Designs, cou
 def _tcf(families: Families, asked: ModeQuantity, designs: Designs, count: int) -> tuple[Array, Array]:
     """Return the five parts of d ln f/dT (HRG paper eq. 15) and their sum."""
     family, found, bodies = families.modes(asked, designs, count)
-    parts, scale = np.empty((count, 5)), np.empty((count, 2))
-    for material, places in bodies.materials:
+    parts, scale = np.zeros((5, count)), np.zeros((2, count))
+    for material, places, weight in bodies.materials:
         T = bodies.T[places]
         found_parts = slope_parts(material, T, found.by_nu[places], found.by_thickness[places])
-        parts[places] = np.stack([getattr(found_parts, name) for name in PARTS], axis=1)
-        scale[places] = abs(np.stack([material.slope("poisson_ratio", T), material.value("expansion", T)], axis=1))
+        parts[:, places] += weight * np.array([getattr(found_parts, name) for name in PARTS])
+        scale[:, places] += weight * np.array([material.slope("poisson_ratio", T), material.value("expansion", T)])
+    parts, scale = parts.T, abs(scale.T)
     level, nothing = STEEPEST * family.theory_error, np.zeros(count)
     of_nu, of_h = (family.error.by_nu + level) * scale[:, 0], (family.error.by_thickness + level) * scale[:, 1]
     # the parts of h and r add up to −alpha whatever the slope by h
@@ -186,26 +242,29 @@ def _key(asked: Quantity) -> tuple[int, int, Any]:
     return options["harmonic"], options.get("index", 0), options["theory"]
 
 
-def _describe(instrument: Instrument, designs: Designs, count: int, temperature_degC: float | None) -> _Bodies:
-    """Return what designs are made of; one material for all that share its parameters."""
+def _describe(
+    instrument: Instrument, designs: Designs, count: int, temperature_degC: float | None, nodes: _Nodes | None = None
+) -> _Bodies:
+    """Return what designs are made of; one material for all that share its parameters, or those of nodes that many share."""
     reference = instrument.reference_temperature
     given = designs.get(TEMPERATURE, reference - zero_Celsius) if temperature_degC is None else temperature_degC
     T = np.broadcast_to(np.asarray(given, dtype=float), (count,)) + zero_Celsius
     names = [name for name in designs if name.startswith(MATERIAL)]
+    materials, inside = nodes.parts(designs) if nodes is not None else ([], np.zeros(count, dtype=bool))
     groups: dict[tuple[Any, ...], Any] = {}
     if names:
-        for place, values in enumerate(zip(*(designs[name].tolist() for name in names), strict=True)):
-            groups.setdefault(values, []).append(place)
+        for place in np.flatnonzero(~inside).tolist():
+            groups.setdefault(tuple(designs[name][place].item() for name in names), []).append(place)
     else:
         groups[()] = slice(None)
-    constants = np.empty((4, count))
-    materials: list[tuple[Material, Any]] = []
     for values, places in groups.items():
-        material = set_parameters(instrument, dict(zip(names, values, strict=True))).material
+        materials.append((set_parameters(instrument, dict(zip(names, values, strict=True))).material, places, 1.0))
+    constants = np.zeros((4, count))
+    for material, places, weight in materials:
         there = T[places]
-        constants[:3, places] = [material.value(name, there) for name in PROPERTIES]
-        constants[3, places] = material.growth(there, reference)
-        materials.append((material, places))
+        own = [*(material.value(name, there) for name in PROPERTIES), material.growth(there, reference)]
+        for row, value in zip(constants, own, strict=True):
+            row[places] += weight * value
     E, nu, rho, growth = constants
     return _Bodies(T, growth, E, nu, rho, materials)
 

@@ -1,5 +1,7 @@
 """Studies through families: every design within its stated error of the full solve, alone or among others."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -80,6 +82,27 @@ def test_a_design_that_cannot_be_computed_fails_alone(results):
     (found,) = evaluate_task(plan, [Batch(np.arange(5), designs)])
     assert [(remark.status, list(remark.rows)) for remark in found.remarks] == [("failed", [1])]
     assert np.isfinite(found.values).all(axis=1).tolist() == [True, False, True, True, True]
+
+
+def test_materials_between_nodes_are_those_of_every_design(spec):
+    """Density, shear modulus and temperature drawn at random: as with a material for each design, inside the ranges and outside."""
+    material = [
+        {"name": "material.density_kg_m3", "low": 2190.0, "high": 2215.0},
+        {"name": "material.deviation.shear_modulus.log_value", "low": -0.01, "high": 0.01},
+        {"name": "temperature_degC", "low": 0.0, "high": 40.0},
+    ]
+    study = read_study({**spec, "sampling": {**spec["sampling"], "cases": 3000}, "parameter": material}, None)
+    design = draw(study)
+    families = choose_solver(study, design)
+    assert families.nodes is not None
+    some = design.values[:90].copy()
+    some[5, 0] = 2230.0
+    columns = dict(zip(study.names, some.T, strict=True))
+    found, exact = (one.evaluate(columns, len(some))[0] for one in (families, replace(families, nodes=None)))
+    np.testing.assert_allclose(found, exact, rtol=1e-11, atol=1e-8)  # what rounding leaves of slopes (ppm/°C)
+    assert found[5].tobytes() == exact[5].tobytes()
+    few = read_study({**spec, "parameter": material}, None)
+    assert choose_solver(few, draw(few)).nodes is None
 
 
 def vary(card):
