@@ -20,6 +20,7 @@ from compensation.polynomial import fit_polynomial
 from compensation.samples import own_columns, read_columns, require_regular
 
 Fitted = TypeVar("Fitted")
+NEAR = 0.5  # K from a run within which what it tells is taken to hold
 
 
 @dataclass(frozen=True)
@@ -74,8 +75,8 @@ def fit_scale_over_temperature(
 
 def fit_chain(
     rates: BellRun,
-    rest: BellRun,
-    turning: BellRun,
+    rest: BellRun | None = None,
+    turning: BellRun | None = None,
     *,
     rough: BellRun | None = None,
     cutoff: float | None = 1.0,
@@ -85,22 +86,34 @@ def fit_chain(
     """Fit all steps in the paper's order.
 
     `rates` has several at one temperature, eq. (35); `rest` is over temperature (34), `turning` one rate over temperature
-    (36), `rough` a run at rest and turning (33), or `rates`. `cutoff` (Hz), None for no filter, and `order` of the FIR filter
-    are for an output with the step `sampling` (s), that of `rest` when left out.
+    (36), `rough` a run at rest and turning (33), or `rates`. Without `rest` or `turning` that step changes nothing, and holds
+    at the temperatures of `rates` alone. `cutoff` (Hz), None for no filter, and `order` of the FIR filter
+    are for an output with the step `sampling` (s), that of `rest` or `rates` when left out.
     """
     null, scale, covariance = _step("rough null and scale (33)", fit_rough, rates if rough is None else rough)
-    bias = _step("bias over temperature (34)", fit_bias, rest.temperature, scale * (rest.output - null))
+    bias = _nothing(rates, 0.0)
+    if rest is not None:
+        bias = _step("bias over temperature (34)", fit_bias, rest.temperature, scale * (rest.output - null))
     straight = scale * (rates.output - null) - bias.value(rates.temperature)
     over_rate = _step("scale over rate (35)", fit_scale_over_rate, straight, rates.rate)
-    constant = over_rate.value(scale * (turning.output - null) - bias.value(turning.temperature))
-    over_temperature = _step(
-        "scale over temperature (36)", fit_scale_over_temperature, turning.temperature, constant, turning.rate
-    )
+    over_temperature = _nothing(rates, 1.0)
+    if turning is not None:
+        constant = over_rate.value(scale * (turning.output - null) - bias.value(turning.temperature))
+        over_temperature = _step(
+            "scale over temperature (36)", fit_scale_over_temperature, turning.temperature, constant, turning.rate
+        )
     step, taps = 0.0, np.empty(0)
     if cutoff is not None:
-        step = require_regular(rest.time, "the FIR filter") if sampling is None else sampling
+        step = require_regular((rest or rates).time, "the FIR filter") if sampling is None else sampling
         taps = design_smoother(step, cutoff, order)
     return BellChain(null, scale, covariance, bias, over_rate, over_temperature, taps, step)
+
+
+def _nothing(run: BellRun, value: float) -> PolynomialCurve:
+    """Return the curve of a step for which there is no run: it changes nothing, where the temperature of another run is."""
+    T = run.temperature
+    ends = float(T.min()) - NEAR, float(T.max()) + NEAR
+    return PolynomialCurve(np.array([value, 0.0, 0.0]), np.zeros((3, 3)), zero_Celsius, *ends)
 
 
 def _fit_curve(x: ArrayLike, y: ArrayLike, order: int, name: str, reference: float) -> PolynomialCurve:

@@ -4,6 +4,7 @@ import re
 from typing import Any
 
 from compensation.rate_law import SURE, RateLaw
+from shell.constants import zero_Celsius
 from studies.cli.arguments import Records, SaveModel
 from studies.cli.output import answers, keep_model
 from studies.errors import InputError
@@ -13,7 +14,7 @@ from studies.models.kinds.scale import save_scale
 from studies.papers.bvg import ERRORS, SOURCES, draw_steps, steps_table
 from studies.record import read_record
 from studies.reports.digits import raised
-from studies.results import Chapter, Facts, Figure, Result, Table, row_of
+from studies.results import Chapter, Facts, Figure, Result, Sentence, Table, row_of
 
 STEPS = {
     "rough": "null and scale (33)",
@@ -42,21 +43,22 @@ def fit_scale(
 ) -> Result:
     """Fit null, bias over temperature, and scale over rate and over temperature (BVG paper, equations 32 to 36).
 
-    Give three records in any order, each with time_s, rate_deg_per_s (the applied rate), a temperature, and output_counts or
-    measured_rate_deg_per_s: several rates at one temperature; at rest over temperature; at one rate over temperature. A fourth
-    record at one temperature, first at rest and then at one rate (the paper: five minutes of rest, then +100 °/s), gives the
-    rough null and scale (33); without it they are found from the record with several rates. Further records with several rates, also
-    while the temperature changes, give the law over rate, temperature, warming and cooling.
+    Give the paper's three records in any order, each with time_s, rate_deg_per_s (the applied rate), a temperature, and
+    output_counts or measured_rate_deg_per_s: several rates at one temperature; at rest over temperature; at one rate over
+    temperature. Of these the first is enough, or a rate table over temperature in place of any; what lacks then is told, and the
+    model holds at the temperatures of the first only. A record at one temperature, first at rest and then at one rate (the paper:
+    five minutes of rest, then +100 °/s), gives the rough null and scale (33); without it they are found from the record with
+    several rates. Further records with several rates, also while the temperature changes, give the law over rate, temperature,
+    warming and cooling.
 
     Args:
         cutoff: Cut-off frequency of the FIR filter in Hz; below half the output rate.
         order: Order of the FIR filter; the paper uses 50.
         no_filter: Omit the FIR filter; the record may then have gaps.
     """
-    if len(data) < 3:
+    if not data:
         raise InputError(
-            "name three records (CSV): several rates, at rest over temperature, one rate over temperature; a fourth at rest and then"
-            " at one rate is optional."
+            "name a record (CSV) with several rates, best also one at rest and one at one rate, over temperature."
         )
     records = [read_record(path) for path in data]
     study = study_scale(records, None if no_filter else cutoff, order)
@@ -78,6 +80,7 @@ def fit_scale(
         **row_of(study, error_before_deg_per_s="error_before", error_held_out_deg_per_s="error_held_out"),
         "parts": parts,
         "steps": study.figures,
+        "undetermined": [what for what, there in _undetermined(study)],
         "rate_law": _law_row(study.law),
     }
     rows = [
@@ -139,21 +142,43 @@ def _facts(study: ScaleStudy) -> Facts:
     if first.nonlinearity is not None and last.nonlinearity is not None:
         change = f"{100 * first.nonlinearity:.3f} → {100 * last.nonlinearity:.3f} %"
         facts.append(("Nonlinearity", change, "largest deviation from a line, of full scale"))
-    rest = f"{first.at_rest:.4f} → {last.at_rest:.4f} °/s"
-    facts.append(("Output at rest", rest, "standard deviation over temperature"))
+    if first.at_rest is not None and last.at_rest is not None:
+        rest = f"{first.at_rest:.4f} → {last.at_rest:.4f} °/s"
+        facts.append(("Output at rest", rest, "standard deviation over temperature"))
     if len(study.chain.taps):
         facts.append(("Filter delay", f"{study.chain.delay:.2f} s", f"FIR with {len(study.chain.taps)} taps"))
     return Facts(facts)
 
 
-def _remarks(study: ScaleStudy) -> list[str]:
-    """Say how the records were used."""
+def _undetermined(study: ScaleStudy) -> list[tuple[str, str]]:
+    """Return the steps for which there is no run, and the record that would give each."""
+    _, rest, turning = study.runs
+    steps = (
+        (rest, "bias over temperature", "at rest over temperature"),
+        (turning, "scale over temperature", "at one rate over temperature"),
+    )
+    return [(what, record) for run, what, record in steps if run is None]
+
+
+def _remarks(study: ScaleStudy) -> list[str | Sentence]:
+    """Say how the records were used, and what they do not tell."""
+    ends = (f"{T - zero_Celsius:.1f}" for T in (study.runs[0].temperature.min(), study.runs[0].temperature.max()))
+    where = " … ".join(dict.fromkeys(ends))
+    lacks: list[str | Sentence] = [
+        Sentence(
+            f"The {what} is not determined: the model holds near {where} °C. Add a record {record}.",
+            "warning",
+        )
+        for what, record in _undetermined(study)
+    ]
     said = {
         f"{study.left_out} rows with an empty cell or an outlier were left out.": study.left_out,
         "The rough null and scale are from the record at rest and then at one rate.": study.rough_run,
         "Long records were averaged in blocks before the fit; the held-out error is that of the blocks.": study.averaged,
     }
-    return [sentence for sentence, true in said.items() if true]
+    if study.from_table:
+        said[f"Runs taken from the rate table over temperature, without a filter: {', '.join(study.from_table)}."] = 1
+    return [*lacks, *(sentence for sentence, true in said.items() if true)]
 
 
 def _spell_unit(unit: str) -> str:

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,14 +29,18 @@ SHORT, LONG = 1.0, 100.0  # s, at which the random walk is read: a filter of 5 s
 BLOCKS = 5
 
 
+Runs: TypeAlias = tuple[BellRun, BellRun | None, BellRun | None]
+"""Of several rates at one temperature; at rest, and at one rate, over temperature."""
+
+
 @dataclass(frozen=True)
 class StepFigures:
     """One step of the chain judged; None where a run is too short."""
 
     step: str
     nonlinearity: float | None
-    at_rest: float  # °/s, standard deviation
-    turning: float  # °/s, the same
+    at_rest: float | None  # °/s, standard deviation
+    turning: float | None  # °/s, the same
     bias_instability: float | None  # °/h at rest, the lowest Allan deviation over 0.664
     random_walk_1s: float | None  # °/√h at rest, read at 1 s
     random_walk_100s: float | None
@@ -46,7 +51,7 @@ class ScaleStudy:
     """The chain, its runs, its figures on them, and rms error (°/s) before and after on blocks left out of the fit."""
 
     chain: BellChain
-    runs: tuple[BellRun, BellRun, BellRun]
+    runs: Runs
     output: str
     temperature_column: str
     left_out: int
@@ -56,23 +61,31 @@ class ScaleStudy:
     averaged: bool  # a run was long: the fit and this error are of its block averages
     rough_run: bool = False  # the rough null and scale have a run of their own
     law: RateLaw | None = None
+    from_table: tuple[str, ...] = ()  # the kinds of runs that were taken out of a rate table over temperature
 
 
-def judge_steps(chain: BellChain, rates: BellRun, rest: BellRun, turning: BellRun) -> list[StepFigures]:
-    """Return the figures of merit after each step, on any three runs; after the filter only where rows are even."""
+def judge_steps(
+    chain: BellChain, rates: BellRun, rest: BellRun | None = None, turning: BellRun | None = None
+) -> list[StepFigures]:
+    """Return the figures of merit after each step, on any runs; after the filter only where rows are even."""
     runs = (rates, rest, turning)
-    even = all(is_regular(run.time) for run in runs)
+    even = all(is_regular(run.time) for run in runs if run is not None)
     static = chain if even else replace(chain, taps=np.empty(0))
-    outputs = [apply_chain(static, run.time, run.output, run.temperature, extrapolate=True) for run in runs]
+    outputs = [
+        None if run is None else apply_chain(static, run.time, run.output, run.temperature, extrapolate=True)
+        for run in runs
+    ]
     figures = []
     for step in STEPS if even else STEPS[:-1]:
-        at_rates, at_rest, at_turning = (np.asarray(getattr(output, step), dtype=float) for output in outputs)
-        steady = settled_rows(rates.rate, len(chain.taps) if step == "filtered" else 0)
-        enough = len(np.unique(same_rate(rates.rate)[steady])) > 2
-        wander, short, long = _read_allan((rest.time[-1] - rest.time[0]) / (len(rest.time) - 1), at_rest)
-        nonlinearity = measure_nonlinearity(rates.rate[steady], at_rates[steady]) if enough else None
-        rest_sd, turning_sd = (float(np.std(one)) / DEG for one in (at_rest, at_turning))
-        figures.append(StepFigures(step, nonlinearity, rest_sd, turning_sd, wander, short, long))
+        at_rates, at_rest, at_turning = (None if one is None else np.asarray(getattr(one, step)) for one in outputs)
+        steady, nonlinearity = settled_rows(rates.rate, len(chain.taps) if step == "filtered" else 0), None
+        if at_rates is not None and len(np.unique(same_rate(rates.rate)[steady])) > 2:
+            nonlinearity = measure_nonlinearity(rates.rate[steady], at_rates[steady])
+        spreads = (None if one is None else float(np.std(one)) / DEG for one in (at_rest, at_turning))
+        allan: tuple[float | None, ...] = (None, None, None)
+        if rest is not None and at_rest is not None:
+            allan = _read_allan((rest.time[-1] - rest.time[0]) / (len(rest.time) - 1), at_rest)
+        figures.append(StepFigures(step, nonlinearity, *spreads, *allan))
     return figures
 
 
@@ -100,35 +113,68 @@ def study_scale(records: "Sequence[Record]", cutoff: float | None, order: int) -
         if kind in sorted_runs:
             raise InputError(f"{record.path} and {sorted_runs[kind][1]} are both runs {kind}; give only one of them.")
         sorted_runs[kind] = (run, record.path)
-    for kind, equation in KINDS.items():
-        if kind not in sorted_runs:
-            raise InputError(f"no record is a run {kind}, which {equation} needs; add one.")
-    rates, rest, turning = (sorted_runs[kind][0] for kind in KINDS)
+    from_table = []
+    for table in (run for run in tables if np.ptp(run.temperature) > SWEPT):
+        for kind, run in _parts_of(table).items():
+            if kind not in sorted_runs:
+                sorted_runs[kind] = (run, "the rate table over temperature")
+                from_table.append(kind)
+    several = next(iter(KINDS))
+    if several not in sorted_runs:
+        raise InputError(
+            f"no record is a run {several}, which {KINDS[several]} needs, nor a rate table over temperature; add one."
+        )
+    rates, rest, turning = (sorted_runs[kind][0] if kind in sorted_runs else None for kind in KINDS)
+    assert rates is not None
     rough = _thin(sorted_runs[ROUGH][0]) if ROUGH in sorted_runs else None
-    sampling = float(np.median(np.diff(rest.time)))
     runs = (rates, rest, turning)
-    shortest = min(len(run.time) for run in runs)
+    there = [run for run in runs if run is not None]
+    sampling = float(np.median(np.diff((rest or rates).time)))
+    if from_table:
+        cutoff = None  # parts of a table are no even rows
+    shortest = min(len(run.time) for run in there)
     if cutoff is not None and order >= shortest:
         raise InputError(f"a FIR filter of order {order} is longer than a run of {shortest} rows; lower --order.")
-    thin = (_thin(rates), _thin(rest), _thin(turning))
+    thin = (_thin(rates), rest and _thin(rest), turning and _thin(turning))
     with naming(", ".join(path for _, path in sorted_runs.values())):
         chain = fit_chain(*thin, rough=rough, cutoff=cutoff, order=order, sampling=sampling)
         before, after = _hold_out(thin, rough)
         figures = judge_steps(chain, rates, rest, turning)
-    averaged = any(len(less.time) < len(run.time) for less, run in zip(thin, runs, strict=True))
-    judged = (figures, before, after, averaged, rough is not None, read_law([rates, *tables]))
+    averaged = sum(len(run.time) for run in thin if run is not None) < sum(len(run.time) for run in there)
+    own = [] if several in from_table else [rates]
+    judged = (figures, before, after, averaged, rough is not None, read_law([*own, *tables]), tuple(from_table))
     return ScaleStudy(chain, runs, output, column, left_out, *judged)
 
 
 ROUGH = "at rest and then at one rate"
 """The paper's run for the rough null and scale, equation (33); without one they come from the run of several rates."""
 TABLES = "of several rates over temperature"  # for the law over rate and temperature only, as are further ones at one temperature
+FEWEST = 20  # rows of a table that make a run
 PLATEAU = 0.05  # part of a run's rows from which an applied rate counts as a plateau
 KINDS = {
     "of several rates at one temperature": "equation (35)",
     "at rest over temperature": "equation (34)",
     "at one rate over temperature": "equation (36)",
 }
+
+
+def _parts_of(table: BellRun) -> dict[str, BellRun]:
+    """Return what a rate table over temperature has of the three runs: near its middle temperature, at rest, at its fastest rate."""
+    level = same_rate(table.rate)
+    held, counts = np.unique(level, return_counts=True)
+    held = held[counts > PLATEAU * level.size / len(held)]
+    at_rest = np.abs(level) <= LARGEST_REST * DEG
+    middle = np.abs(table.temperature - np.median(table.temperature)) < SWEPT / 2
+    kinds = dict(zip(KINDS, (middle, at_rest, level == held[np.argmax(np.abs(held))]), strict=True))
+    found = {}
+    for kind, rows in kinds.items():
+        part = BellRun(*(values[rows] for values in (table.time, table.output, table.temperature, table.rate)))
+        spread = (
+            len(np.unique(level[rows])) > 2 if rows is middle else len(part.time) and np.ptp(part.temperature) > SWEPT
+        )
+        if spread and len(part.time) > FEWEST:
+            found[kind] = part
+    return found
 
 
 def read_law(runs: Sequence[BellRun]) -> RateLaw | None:
@@ -208,13 +254,14 @@ def _thin(run: BellRun) -> BellRun:
     return BellRun(*(values[steady] for values in (blocks.time, mean["output"], mean["temperature"], mean["rate"])))
 
 
-def _hold_out(runs: tuple[BellRun, BellRun, BellRun], rough: BellRun | None = None) -> tuple[float, float]:
+def _hold_out(runs: Runs, rough: BellRun | None = None) -> tuple[float, float]:
     """Rms error (°/s) of the rough and of the compensated rate on held-out fifths of every run."""
     before, after = [], []
     for block in range(BLOCKS):
-        seen, unseen = zip(*(_cut(run, block) for run in runs), strict=True)
-        chain = fit_chain(*seen, rough=rough, cutoff=None)
-        for run in unseen:
+        (first, one), *rest = [(None, None) if run is None else _cut(run, block) for run in runs]
+        assert first is not None
+        chain = fit_chain(first, *(seen for seen, _ in rest), rough=rough, cutoff=None)
+        for run in (unseen for unseen in (one, *(own for _, own in rest)) if unseen is not None):
             result = apply_chain(chain, run.time, run.output, run.temperature, extrapolate=True)
             before.append(result.rough - run.rate)
             after.append(result.temperature_compensated - run.rate)

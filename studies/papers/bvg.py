@@ -17,7 +17,7 @@ from compensation.fir import design_smoother
 from compensation.linearity import measure_nonlinearity
 from compensation.stability import allan_deviation
 from shell.constants import zero_Celsius
-from studies.fits.scale import StepFigures, judge_steps
+from studies.fits.scale import Runs, StepFigures, judge_steps
 from studies.reports import style
 from studies.results import Chapter, Column, Drawing, Figure, Table
 
@@ -229,17 +229,18 @@ def _claims_table(claims: Claims) -> Table:
     return Table("Published claims", rows, "0: Claim | 1: Published | 2: Recomputed | 3: Verdict", note)
 
 
-def draw_steps(chain: BellChain, runs: tuple[BellRun, BellRun, BellRun]) -> Drawing:
+def draw_steps(chain: BellChain, runs: Runs) -> Drawing:
     """Draw the error of the rate before and after: at rest and turning over temperature, and over the applied rate."""
     rates, rest, turning = runs
     unfiltered = replace(chain, taps=np.empty(0))
-    panels = (
-        ("at rest", rest, rest.temperature - zero_Celsius, "temperature (°C)"),
-        ("several rates", rates, rates.rate / DEG, "applied rate (°/s)"),
-        ("constant rate", turning, turning.temperature - zero_Celsius, "temperature (°C)"),
-    )
-    with style.figure(1, 3, height=3.2, y="rate error (°/s)") as (made, axes):
-        for panel, (title, run, x, label) in zip(axes, panels, strict=True):
+    named = (("at rest", rest), ("several rates", rates), ("constant rate", turning))
+    panels = [(title, run) for title, run in named if run is not None]
+    with style.panels(len(panels), 3, 3.2, sharey=True) as (made, axes):
+        axes[0].set_ylabel("rate error (°/s)")
+        for panel, (title, run) in zip(axes, panels, strict=True):
+            over_rate = run is rates
+            x = run.rate / DEG if over_rate else run.temperature - zero_Celsius
+            label = "applied rate (°/s)" if over_rate else "temperature (°C)"
             result = apply_chain(unfiltered, run.time, run.output, run.temperature, extrapolate=True)
             rows = style.few_rows(len(run.time))
             for values, colour, name in (

@@ -4,12 +4,13 @@ import contextlib
 import ctypes
 import io
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from compensation.bell import apply_chain
+from compensation.bell import apply_chain, invert_chain
 from compensation.bell_calibration import BellRun, fit_chain
 from compensation.rate_law import fit_rate_law
 from studies.cli import main
@@ -275,10 +276,45 @@ def test_settled_rows():
 
 
 @pytest.mark.parametrize(
-    ("files", "words"), [([0, 1], "one rate over temperature"), ([0, 1, 1], "both runs at rest"), ([], "three records")]
+    ("files", "words"), [([1, 2], "of several rates"), ([0, 1, 1], "both runs at rest"), ([], "name a record")]
 )
 def test_missing_runs_are_named(records, files, words, refuse):
     assert words in refuse(["fit", "scale", *(records[i] for i in files)])
+
+
+@pytest.mark.parametrize("files", [[0], [0, 1], [0, 2]])
+def test_fewer_records_tell_less(records, files, tmp_path, ask, refuse):
+    """The scale over rate is there; what lacks is named, and the model is refused beyond the temperatures of the record of rates."""
+    model = str(tmp_path / "model.toml")
+    found = ask(["fit", "scale", *(records[i] for i in files), "--save", model])
+    lacking = [("bias over temperature", 1), ("scale over temperature", 2)]
+    assert found["undetermined"] == [what for what, file in lacking if file not in files]
+    whole = read_printed_chain()
+    share = found["parts"]["rough"]["scale"]["value"] / 0.0242
+    at_25 = float(whole.scale_over_temperature.value(298.15))
+    c1 = found["parts"]["scale_over_rate"]["c1"]["value"] * share
+    assert c1 == pytest.approx(0.99 * at_25, rel=5e-3)
+    assert found["parts"]["bias"]["c2"]["value"] == 0.0 or 1 in files
+    error = refuse(["compensate", model, records[1], "--out", str(tmp_path / "out.csv")])
+    assert "°C" in error or "temperature" in error
+    assert ask(["compensate", model, records[0], "--out", str(tmp_path / "out.csv")])["columns"]
+
+
+def test_a_rate_table_over_temperature_is_enough(tmp_path, ask):
+    """Nineteen rates again and again while the chamber warms: every step from the one record, as the planted chain."""
+    chain, rng = read_printed_chain(), np.random.default_rng(8)
+    time = 0.1 * np.arange(60_000)
+    rate = np.repeat(np.tile(np.linspace(-270.0, 270.0, 19), 32), 99)[: time.size] * DEG
+    rate = np.pad(rate, (0, time.size - rate.size), "edge")
+    T = 273.15 - 20 + 60 * time / time[-1]
+    output = invert_chain(replace(chain, taps=np.empty(0)), rate, T) + 0.2 * rng.standard_normal(time.size)
+    path = tmp_path / "table.csv"
+    rows = zip(time, T - 273.15, output, rate / DEG, strict=True)
+    head = "time_s,housing_temperature_degC,output_counts,rate_deg_per_s\n"
+    path.write_text(head + "".join(f"{t:.1f},{c:.6f},{a:.6f},{r:.9g}\n" for t, c, a, r in rows))
+    found = ask(["fit", "scale", str(path)])
+    assert found["undetermined"] == []
+    assert found["error_held_out_deg_per_s"] < 0.1 * found["error_before_deg_per_s"]
 
 
 def test_impossible_cut_off_is_refused(records, refuse):
