@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from shell.rayleigh import rayleigh_integrals
 from studies.cli.output import answers, say
 from studies.errors import InputError
+from studies.files.writing import write_text
 from studies.papers.bvg_theory import compare_bell_theory
 from studies.results import Chapter, Result, Sentence, Table
 
@@ -41,6 +42,7 @@ def derive(
     harmonic: int = 2,
     pole_angle_deg: float = 0.0,
     rim_angle_deg: float = 90.0,
+    out: str | None = None,
 ) -> Result:
     """Derive the frequency of the inextensional spherical shell, HRG paper equations (1)-(15).
 
@@ -58,6 +60,7 @@ def derive(
         harmonic: Circumferential harmonic n of the closed forms and of the code, at least 2.
         pole_angle_deg: Polar angle where the shell starts; above 0 the pole is open.
         rim_angle_deg: Polar angle where the shell ends.
+        out: Write the equations, the LaTeX fragment or the code to this file instead of printing them.
     """
     from shell.derivation.chain import DerivedCase, steps
     from shell.derivation.design_code import emit_code
@@ -73,7 +76,7 @@ def derive(
             raise InputError(f"{which} holds for any harmonic and shape; leave out --harmonic and the angles.")
         if bell and code is not None:
             raise InputError("--bell has equations and numbers but no design code; leave out --code.")
-        return _derive_bell(latex) if bell else _derive_dynamics(latex, code)
+        return _keep(_derive_bell(latex) if bell else _derive_dynamics(latex, code), out)
     if not 0 <= pole_angle_deg < rim_angle_deg < 180:
         raise InputError(
             f"a dome from {pole_angle_deg:g} to {rim_angle_deg:g} degrees has no inextensional mode: the pole angle must "
@@ -103,9 +106,21 @@ def derive(
     say("deriving the equations ...")
     lead = f"HRG paper, equations (1) to (15), closed forms for n = {harmonic} from {pole_angle_deg:g}° to {rim_angle_deg:g}°."
     emitted = {"language": code, "text": emit_code(case, code)} if code else None
-    return _answer(
-        payload, read_chain(steps(case)), HRG_TITLE, latex, "Frequency of the inextensional shell", lead, emitted
+    title = "Frequency of the inextensional shell"
+    return _keep(_answer(payload, read_chain(steps(case)), HRG_TITLE, latex, title, lead, emitted), out)
+
+
+def _keep(found: Result, out: str | None) -> Result:
+    """Write what would be printed to a file, where one is named."""
+    if out is None:
+        return found
+    (shown,) = (
+        [found.printed]
+        if found.printed is not None
+        else [part.text for part in found.parts if isinstance(part, Sentence)]
     )
+    write_text(out, shown)
+    return replace(found, printed=f"wrote {out}\n")
 
 
 def _derive_dynamics(latex: bool, code: Literal["python", "c"] | None) -> Result:

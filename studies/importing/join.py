@@ -184,7 +184,7 @@ def _report_empty(table: RawTable, file: FileMap) -> list[str]:
         for column in file.columns
     }
     return [
-        f"{count[kind]} readings of '{name}' are {what}: left empty"
+        f"{count[kind]} {'reading' if count[kind] == 1 else 'readings'} of '{name}' {'is' if count[kind] == 1 else 'are'} {what}: left empty"
         for kind, what in enumerate(kinds)
         for name, count in counts.items()
         if count[kind]

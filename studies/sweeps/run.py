@@ -13,6 +13,7 @@ import numpy as np
 from studies.errors import InputError
 from studies.sweeps.block import Batch
 from studies.sweeps.canonical import PHYSICS_VERSION, digest, spell, spell_material
+from studies.sweeps.cluster import check_private
 from studies.sweeps.definition import FREE, Study
 from studies.sweeps.design import Design, draw, nominal_row
 from studies.sweeps.engine import BATCH, BATCH_VECTORISED, compute, hire, missing_batches
@@ -65,6 +66,8 @@ def run_study(
         InputError: An unusable spec, another study's store, a damaged store, a second runner.
         MissingEnvironment: The disk is full or cannot be written, the scheduler cannot be reached or was lost.
     """
+    if scheduler is not None:
+        check_private(scheduler)
     study = read_study(source, card)
     sources = check_functions(study, allow_python)
     design = draw(study)
@@ -78,6 +81,8 @@ def run_study(
             if not fresh:
                 families = choose_solver(study, design)
             describe_study(store, study, identify(study, design, sources, _describe_families(families)), design)
+            if families and scheduler is not None:
+                warnings.warn(f"{scheduler} is not used: the designs are interpolated in this process.", stacklevel=2)
             crew = Here() if families else hire(workers, scheduler)
             _run(store, study, design, WorkPlan.of(study, families), crew, show_progress)
     except BaseException:

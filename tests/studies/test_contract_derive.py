@@ -230,3 +230,12 @@ def test_both_languages_agree(tmp_path, capsys):
 def test_latex_is_plain_ascii(capsys):
     """Letters that pdflatex does not know end the run of the document that reads the fragment."""
     assert speak(capsys, "--dynamics", "--latex")[1].out.isascii()
+
+
+@pytest.mark.parametrize("form", [["--code", "c"], ["--latex"], []])
+def test_a_file_holds_what_would_be_printed(form, tmp_path, capsys):
+    assert main(["derive", *form]) == 0
+    printed = capsys.readouterr().out
+    assert main(["derive", *form, "--out", str(tmp_path / "derived")]) == 0
+    assert (tmp_path / "derived").read_text(encoding="utf-8") == printed
+    assert capsys.readouterr().out.startswith("wrote ")
