@@ -20,10 +20,11 @@ from studies.calibration.calibrate import Calibration
 from studies.calibration.observed import UNITS
 from studies.cli.arguments import Card
 from studies.cli.calibrate_modes import calibrate_modes
-from studies.cli.output import Told, answers, keep_card, say
+from studies.cli.output import answers, keep_card, say
 from studies.errors import InputError
 from studies.instrument.card import load_card
 from studies.inversion.readings import is_mode_table
+from studies.progress import Told
 from studies.reports import calibration as parts
 from studies.results import Result, row_of
 

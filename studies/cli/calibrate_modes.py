@@ -13,11 +13,12 @@ from typing import Any
 
 import numpy as np
 
-from studies.cli.output import Told, keep_card, say
+from studies.cli.output import keep_card, say
 from studies.instrument.card import Instrument
 from studies.instrument.display import display_name
 from studies.inversion.invert import EXCLUDED, ModeCalibration, decided, invert
 from studies.inversion.readings import read_modes
+from studies.progress import Told
 from studies.reports.calibration import KEY, TOLD, VALUE, VALUES
 from studies.results import Column, Result, Sentence, Table, row_of
 

@@ -6,10 +6,11 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from studies import workbench
-from studies.cli.output import Told, answers, say
+from studies.cli.output import answers, say
 from studies.errors import InputError
 from studies.instrument.card import load_card, save_card
 from studies.planning.chamber import Chamber, parse_chamber
+from studies.progress import Told
 from studies.reports.diagnosis import headline
 from studies.results import Result
 

@@ -14,10 +14,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from studies.cli.arguments import Harmonic
-from studies.cli.output import Told, answers, keep_card, say
+from studies.cli.output import answers, keep_card, say
 from studies.errors import InputError
 from studies.fits.ringdown import Decay, read_decay, with_decay
 from studies.instrument.card import load_card
+from studies.progress import Told
 from studies.record.decays import Decays, fit_laws, is_table, read_table, table_of, write_decays
 from studies.reports import style
 from studies.resonator.law import law_of

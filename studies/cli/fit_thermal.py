@@ -8,9 +8,10 @@ With --json one object, schema `hrg.fit-thermal/1`: `data`, `confidence`, `estim
 from studies.calibration.lags.identification import Identification
 from studies.calibration.lags.records import fit_thermal_constants
 from studies.cli.arguments import Confidence, Records
-from studies.cli.output import Told, answers, say
+from studies.cli.output import answers, say
 from studies.errors import InputError
 from studies.instrument.card import load_card
+from studies.progress import Told
 from studies.record import read_record
 from studies.reports import style
 from studies.results import Drawing, Figure, Result, Sentence, Table, row_of

@@ -38,10 +38,10 @@ def fleet(
     from studies.fleet.folder import read_lot
     from studies.fleet.run import run_lot
     from studies.instrument.card import load_card
+    from studies.progress import Progress
     from studies.reports import fleet as parts
     from studies.results.page import render_result
     from studies.sweeps.engine import hire
-    from studies.sweeps.progress import Progress
 
     if Path(out).resolve().is_relative_to(Path(folder).resolve()):
         raise InputError(f"--out {out}: give a folder outside {folder}, where every folder is a device.")

@@ -6,13 +6,11 @@ import json as json_module
 import math
 import re
 import sys
-import time
 import tomllib
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from dataclasses import fields, is_dataclass, replace
 from pathlib import Path
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
@@ -26,9 +24,6 @@ if TYPE_CHECKING:
     from studies.instrument.card import Instrument
     from studies.models import Model
     from studies.record import Record
-
-
-PATIENCE = 2.0  # seconds of silence that nobody minds
 
 
 def answers(
@@ -145,44 +140,6 @@ def say(message: str) -> None:
     from studies.files.given import printable
 
     print(printable(message), file=sys.stderr)
-
-
-class Told:
-    """A line of words, percent and the time left: over itself on a terminal, a line every few seconds elsewhere; nothing for what is quick."""
-
-    def __init__(self, what: str, stages: Mapping[str, float] = MappingProxyType({})) -> None:
-        """Begin to count the time of `what`.
-
-        Args:
-            stages: The words with which a stage begins, and the part of the time that is usually behind then.
-        """
-        self.what, self.stages, self.begin, self.last = what, stages, time.monotonic(), time.monotonic()
-        self.part, self.shown = 0.0, False
-
-    def __call__(self, words: str, part: float | None = None) -> None:
-        """Say what comes next; within a stage each word is a third of the rest of it."""
-        now = time.monotonic()
-        behind = max((of for start, of in self.stages.items() if words.startswith(start)), default=part or 0.0)
-        following = min((of for of in self.stages.values() if of > self.part), default=1.0)
-        self.part = max(behind, self.part if part is not None else self.part + (following - self.part) / 3)
-        told = f"{self.what}: {words}"
-        if now - self.begin > PATIENCE and (self.stages or part is not None) and self.part > 0:
-            left = (now - self.begin) * (1 - self.part) / self.part
-            told += f", {100 * self.part:.0f} %, about {f'{left / 60:.0f} min' if left > 99 else f'{left:.0f} s'} left"
-        if sys.stderr.isatty():
-            print(f"\r\x1b[2K{told} …", end="", file=sys.stderr, flush=True)
-            self.shown = True
-        elif now - self.last > PATIENCE:
-            print(f"{told} ({now - self.begin:.0f} s)", file=sys.stderr, flush=True)
-            self.last = now
-
-    def __enter__(self) -> "Told":
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        """Clear the line."""
-        if self.shown:
-            print("\r\x1b[2K", end="", file=sys.stderr, flush=True)
 
 
 def _plain(value: Any) -> Any:

@@ -4,8 +4,9 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from studies.cli.output import Told, answers, dump_json
+from studies.cli.output import answers, dump_json
 from studies.files.writing import check_folder, write_text
+from studies.progress import Told
 from studies.results import Result
 
 if TYPE_CHECKING:

@@ -13,8 +13,8 @@ from studies.files.writing import write_text
 from studies.fleet.device import SCHEMA, Answer, diagnose_device
 from studies.fleet.folder import Device
 from studies.fleet.lot import Lot, gather
+from studies.progress import Progress
 from studies.sweeps.engine import LOOK_EVERY, MOST_TASKS
-from studies.sweeps.progress import Progress
 from studies.sweeps.workers import Here, Workers, say_gone
 from thermal.errors import ThermalError
 

@@ -22,9 +22,9 @@ from studies.sweeps.evaluate import WorkPlan, evaluate_task, failed_cases
 from studies.sweeps.workers import Here, Pool, cores, say_gone
 
 if TYPE_CHECKING:
+    from studies.progress import Progress
     from studies.sweeps.definition import Study
     from studies.sweeps.design import Design
-    from studies.sweeps.progress import Progress
     from studies.sweeps.store import Store
     from studies.sweeps.workers import Workers
 

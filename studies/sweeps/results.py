@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,15 +22,6 @@ if TYPE_CHECKING:
     import pandas as pd
 
 KEPT_BYTES = 4e7  # of columns
-
-
-class Chunk(NamedTuple):
-    """Some thousand cases in order: parameters by name, values and errors (m, columns), status and remark by row."""
-
-    parameters: Mapping[str, NDArray[Any]]
-    values: Array
-    errors: Array
-    remarks: Mapping[int, tuple[str, str]]
 
 
 @dataclass(frozen=True, repr=False)
@@ -122,34 +113,26 @@ class Results(Shown):
             found[column.name]["error"] = float(errors.max()) if errors.size else np.nan
         return found
 
-    def chunks(self) -> Iterator[Chunk]:
-        """Give all cases, some thousand at a time."""
-        d, w = len(self.study.names), len(self.study.columns)
-        columns = range(1, 1 + d + 2 * w)
-        remarks: Mapping[int, tuple[str, str]]
-        streams: Iterator[tuple[NDArray[Any], Array]]
-        if self._repeats is not None:
-            streams = iter([(np.arange(len(self)), np.array([self._column(k) for k in columns]))])
-            remarks = self._remarks
-        else:
-            streams, remarks = self.store.read(columns), self.store.remarks
-        for places, found in streams:
-            there = {row: remarks[k] for row, k in enumerate(places.tolist()) if k in remarks} if remarks else {}
-            yield Chunk(decode(coding(self.study), found[:d].T), found[d : d + w].T, found[d + w :].T, there)
-
     def frames(self) -> "Iterator[pd.DataFrame]":
         """Give one row a case, some thousand at a time: parameters, results, numerical errors, status, remark."""
         import pandas as pd
 
-        for chunk in self.chunks():
-            columns: dict[str, Any] = dict(chunk.parameters)
-            for k, (column, judged) in enumerate(zip(self.study.columns, self.judged, strict=True)):
-                columns[column.name] = chunk.values[:, k]
-                if judged:
-                    columns[f"{column.name}_error"] = chunk.errors[:, k]
-            status, remark = ["ok"] * len(chunk.values), [""] * len(chunk.values)
-            for row, (found, text) in chunk.remarks.items():
-                status[row], remark[row] = "ok" if found == "ok" else "failed", text
+        d, w = len(self.study.names), len(self.study.columns)
+        wanted, remarks = range(1, 1 + d + 2 * w), self.store.remarks
+        streams = self.store.read(wanted)
+        if self._repeats is not None:
+            streams = iter([(np.arange(len(self)), np.array([self._column(k) for k in wanted]))])
+            remarks = self._remarks
+        for places, found in streams:
+            columns: dict[str, Any] = dict(decode(coding(self.study), found[:d].T))
+            for column, judged, value, error in zip(
+                self.study.columns, self.judged, found[d : d + w], found[d + w :], strict=True
+            ):
+                columns |= {column.name: value} | ({f"{column.name}_error": error} if judged else {})
+            status, remark = ["ok"] * len(places), [""] * len(places)
+            for row, place in enumerate(places.tolist() if remarks else ()):
+                if place in remarks:
+                    status[row], remark[row] = "ok" if remarks[place][0] == "ok" else "failed", remarks[place][1]
             yield pd.DataFrame({**columns, "status": status, "remark": remark})
 
     @property

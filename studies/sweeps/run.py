@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from studies.errors import InputError
+from studies.progress import Progress
 from studies.sweeps.block import Batch
 from studies.sweeps.canonical import PHYSICS_VERSION, digest, spell, spell_material
 from studies.sweeps.cluster import check_private
@@ -20,7 +21,6 @@ from studies.sweeps.engine import BATCH, BATCH_VECTORISED, compute, hire, missin
 from studies.sweeps.evaluate import WorkPlan, evaluate_task
 from studies.sweeps.families import Families, choose_solver, why_not
 from studies.sweeps.opening import claim_store
-from studies.sweeps.progress import Progress
 from studies.sweeps.provenance import describe_environment
 from studies.sweeps.results import Results, open_results
 from studies.sweeps.search import name_search, run_searches

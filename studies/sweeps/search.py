@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from studies.progress import Progress
 from studies.sweeps.block import Array, Batch, decode, each_design
 from studies.sweeps.design import draw, nominal_row
 from studies.sweeps.engine import BATCH_VECTORISED, compute
 from studies.sweeps.keys import Search, ToleranceSearch, WorstCase
-from studies.sweeps.progress import Progress
 from studies.sweeps.tolerance import place_limits
 
 if TYPE_CHECKING:

@@ -17,8 +17,8 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 from studies.fleet.folder import read_lot
 from studies.fleet.run import run_lot
+from studies.progress import Progress
 from studies.sweeps.engine import hire
-from studies.sweeps.progress import Progress
 from tests.studies.fleet.lots import CARD, make_lot
 
 BATCH = 20

@@ -5,16 +5,17 @@ from pathlib import Path
 
 import pytest
 
-from studies.cli import calibrate, calibrate_modes, diagnose, output
-from studies.cli.output import Told
+from studies import progress
+from studies.cli import calibrate, calibrate_modes, diagnose
+from studies.progress import Progress, Told
 
-ROOT = Path(output.__file__).parents[1]
+ROOT = Path(progress.__file__).parent
 
 
 @pytest.fixture
 def clock(monkeypatch):
     now = [100.0]
-    monkeypatch.setattr(output.time, "monotonic", lambda: now[0])
+    monkeypatch.setattr(progress.time, "monotonic", lambda: now[0])
     return now
 
 
@@ -32,7 +33,7 @@ def test_percent_and_time_left(clock, capsys):
     assert parts[0] == 10
     assert 50 <= parts[3] < parts[-1] < 100
     assert "about 9 s left" not in lines[0]
-    assert lines[3] == "work: second, 50 %, about 12 s left (12 s)"
+    assert lines[3] == "work: second, 50 %, about 12 s left"
 
 
 def test_counted_work(clock, capsys):
@@ -41,8 +42,16 @@ def test_counted_work(clock, capsys):
         told(f"file {k}", k / 4)
         clock[0] += 2.5
     lines = capsys.readouterr().err.splitlines()
-    assert lines == ["files: file 1, 25 %, about 8 s left (2 s)", "files: file 2, 50 %, about 5 s left (5 s)",
-                     "files: file 3, 75 %, about 2 s left (8 s)"]  # fmt: skip
+    assert lines == ["files: file 1, 25 %, about 8 s left", "files: file 2, 50 %, about 5 s left",
+                     "files: file 3, 75 %, about 2 s left"]  # fmt: skip
+
+
+def test_cases_of_a_study_that_goes_on(clock, capsys):
+    """What an earlier run has done counts for the percent, not for the rate."""
+    with Progress(total=10_000, done=250, shown=True) as lines:
+        clock[0] += 10.0
+        lines.advance(1000, 3)
+    assert capsys.readouterr().err == "done: 1250 of 10000, 3 failed, 12 %, about 88 s left\n"
 
 
 def test_nothing_of_what_is_quick(clock, capsys):

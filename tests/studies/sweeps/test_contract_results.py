@@ -18,7 +18,6 @@ from studies.errors import InputError, MissingEnvironment
 from studies.reports.sweep import study_result
 from studies.results.page import render_result
 from studies.sweeps.export import export_results
-from studies.sweeps.progress import Progress
 from studies.sweeps.run import run_study
 from tests.studies.sweeps.processes import environment, rows_of, spec_of, words_of
 
@@ -125,13 +124,6 @@ def test_template_over_temperature_gives_table_1_and_2_for_any_card(tmp_path, mo
     assert "Temperature from frequency" in page
     assert "Coefficients about T0" in page
     found.close()
-
-
-def test_progress_says_rate_and_remaining_time():
-    lines = Progress(total=10_000, done=250)
-    lines.advance(1000, 3)
-    text = lines.line(lines.began + 10)
-    assert text == "[ 1250/10000] 12.5 % failed=3 rate=100/s eta=00:01:27"
 
 
 def free_port() -> int:
