@@ -42,7 +42,9 @@ def block_means(values: NDArray[Any], size: int) -> NDArray[Any]:
 def check_time(time: NDArray[np.float64]) -> None:
     """Raise unless `time` (s) has two rows or more, all finite, and increases strictly."""
     if len(time) < 2:
-        raise CompensationError(f"'time' has {len(time)} rows; a time series needs two or more.")
+        raise CompensationError(
+            f"'time' has {len(time)} {'row' if len(time) == 1 else 'rows'}; a time series needs two or more."
+        )
     if not np.all(np.isfinite(time)):
         row = int(np.flatnonzero(~np.isfinite(time))[0])
         raise CompensationError(f"'time' is missing or infinite in row {row + 1}; every row needs its time.")

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from compensation.decimation import average_blocks
 from compensation.errors import CompensationError
 from compensation.noise import white_rms
+from compensation.samples import check_time
 from studies.errors import InputError
 from studies.record import Record
 
@@ -156,6 +157,7 @@ def _see(record: Record) -> _Seen | None:
     column = next((name for name in TEMPERATURES if name in record), TEMPERATURES[0])
     drive = TEMPERATURES[1] if TEMPERATURES[1] in record else column
     try:
+        check_time(record["time_s"])
         blocks = average_blocks(
             record["time_s"],
             {column: record[column], "frequency_Hz": record["frequency_Hz"], drive: record[drive]},

@@ -49,6 +49,8 @@ REFUSED = {
     "acceptance hrg-30mm none.csv": "there is no such file",
     "fit frequency HRG --order 7": "order",
     "fit frequency none.csv": "no such file",
+    "fit frequency ROW": "'time' has 1 row;",
+    "show ROW": "'time' has 1 row;",
     "fit thermal": "name at least one record",
     "fit thermal HRG --confidence 90": "--confidence 90",
     "keys card --table los": "did you mean 'loss'",
@@ -140,11 +142,13 @@ def given(tmp_path_factory, pytestconfig):
     for place in (folder, folder / "lot" / "a", folder / "lot" / "b"):
         place.mkdir(parents=True, exist_ok=True)
         (place / "run.csv").write_text("time_s,housing_temperature_degC,frequency_Hz\n" + rows, encoding="utf-8")
+    (folder / "row.csv").write_text("time_s,housing_temperature_degC,frequency_Hz\n0,20.0,4432.0\n", encoding="utf-8")
     files = {
         "TYPO": folder / "typo.toml",
         "STUDY": folder / "study.toml",
         "RUN": folder / "run.csv",
         "LOT": folder / "lot",
+        "ROW": folder / "row.csv",
     }
     return {name: str(path) for name, path in files.items()} | {
         "HRG": str(pytestconfig.rootpath / "studies/papers/hrg_table1.csv")
