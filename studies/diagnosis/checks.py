@@ -8,13 +8,12 @@ from studies.effects.states import FloatArray
 from studies.errors import InputError
 from studies.record import Record
 from studies.record.plausible import check_one_gyro
+from studies.record.rest import check_seconds
 
 FEWEST_BINS = 24
 """Values from which on the noise of a response can be told."""
 MOST_LOSS = 30.0
 """Times by which 1/Q of one gyro may differ from record to record."""
-FASTEST = 1.0
-"""Mean rate of temperature over a record, K/s, beyond which its time cannot be in seconds."""
 
 
 def check_units(records: Sequence[Record], tables: Sequence[dict[str, FloatArray]]) -> None:
@@ -29,15 +28,7 @@ def check_units(records: Sequence[Record], tables: Sequence[dict[str, FloatArray
             raise InputError(
                 f"{where}: inverse_q is about {value:g}; it must be 1/Q, between 0 and 0.1. Is it Q itself?"
             )
-        temperature = table["temperature"][np.isfinite(table["temperature"])]
-        if not temperature.size:
-            continue
-        lasts = float(np.ptp(table["time_s"]))
-        if np.subtract(*np.percentile(temperature, [95, 5])) > FASTEST * max(lasts, 1e-9):
-            raise InputError(
-                f"{where}: the temperature changes by {np.ptp(temperature):.3g} K within {lasts:.3g} s, faster than any "
-                "chamber. time_s must be in seconds: is it in minutes or hours?"
-            )
+        check_seconds(where, table["time_s"], table["temperature"])
 
 
 def _level(table: dict[str, FloatArray], name: str, none: float) -> float:

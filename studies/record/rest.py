@@ -17,6 +17,7 @@ from studies.record import Record
 TEMPERATURES = ("housing_temperature_degC", "resonator_temperature_degC", "chamber_temperature_degC")
 MOST_ROWS = 20_000  # beyond which a run is averaged in blocks before a fit: temperature is slow, and noise averages
 LEAST_SPIKE = 1e-3  # of a column's span, by which a spike stands out: a smooth column has no noise to measure it by
+FASTEST = 1.0  # K/s over a record, beyond which its time cannot be in seconds
 LARGEST_REST = 0.01  # applied rate in °/s that still counts as rest: somewhat more than the earth's, 0.0042 °/s
 
 
@@ -87,3 +88,14 @@ def gather_rest(records: "Sequence[Record]", outputs: "dict[str, float]") -> Res
             widest = max(widest, width)
         runs.append(RestRun(time, values * outputs[output], temperature + zero_Celsius))
     return RestData(tuple(runs), output, column, left_out, widest)
+
+
+def check_seconds(where: str, time: NDArray[np.float64], temperature: NDArray[np.float64]) -> None:
+    """Refuse a record whose temperature changes as no chamber's does: its time is in another unit."""
+    known = temperature[np.isfinite(temperature)]
+    lasts = float(np.ptp(time))
+    if known.size and np.subtract(*np.percentile(known, [95, 5])) > FASTEST * max(lasts, 1e-9):
+        raise InputError(
+            f"{where}: the temperature changes by {np.ptp(known):.3g} K within {lasts:.3g} s, faster than any chamber."
+            " time_s must be in seconds: is it in minutes or hours?"
+        )

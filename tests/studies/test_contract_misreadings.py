@@ -6,12 +6,14 @@ import numpy as np
 import pytest
 
 from studies.calibration.calibrate import calibrate
+from studies.calibration.lags.records import fit_thermal_constants
 from studies.calibration.misreading import check_readings
 from studies.calibration.observed import observe, read_settled
 from studies.errors import InputError
 from studies.inference.records import make_ready
 from studies.instrument.card import load_card, save_card
 from studies.simulation.chamber import load_profile
+from studies.simulation.drive import drive_by_record
 from studies.simulation.virtual_gyro import simulate_run
 from studies.workbench import diagnose
 
@@ -137,3 +139,20 @@ def test_a_rate_output_at_rest_is_a_bias_for_calibrate_too(card, record, monkeyp
     with pytest.raises(ZeroDivisionError):  # what was asked is all that counts
         calibrate(card, [given])
     assert asked[0]["bias_deg_per_h"] == pytest.approx(record["bias_deg_per_h"])
+
+
+@pytest.mark.parametrize(
+    "work",
+    [
+        lambda own, run: calibrate(own, [run]),
+        lambda own, run: diagnose(run, card=own),
+        lambda own, run: fit_thermal_constants([run]),
+        lambda own, run: drive_by_record(run),
+    ],
+)
+def test_a_time_in_hours_is_the_cause_and_not_what_it_leads_to(card, record, work):
+    """The calibration ended in a profile that reaches 0 K, and time constants of a second were fitted."""
+    with pytest.raises(
+        InputError, match=r"faster than any chamber\. time_s must be in seconds: is it in minutes or hours"
+    ):
+        work(card, spoilt(record, time_s=lambda t: t / 3600.0))

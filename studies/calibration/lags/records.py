@@ -12,7 +12,7 @@ from studies.calibration.lags.housing_run import HousingRun
 from studies.calibration.lags.identification import FrequencyPolynomial, Identification, identify, identify_lags
 from studies.errors import InputError, naming
 from studies.record import Record
-from studies.record.rest import LEAST_SPIKE
+from studies.record.rest import LEAST_SPIKE, check_seconds
 
 if TYPE_CHECKING:
     from studies.instrument.card import Instrument
@@ -56,6 +56,7 @@ def _run(record: Record) -> HousingRun:
             f"{record.path}: thermal constants need frequency_Hz and {SENSORS[0]} (or {SENSORS[1]});"
             f" it has {', '.join(record.columns)}."
         )
+    check_seconds(record.path, record["time_s"], record[sensor])
     frequency, housing = (
         np.where(find_spikes(record[name], LEAST_SPIKE), np.nan, record[name]) for name in ("frequency_Hz", sensor)
     )
