@@ -62,7 +62,7 @@ def fit_bias(
         f"Bias over {variable} and its rate",
         f"Zero-rate output of {', '.join(data)}, with terms selected from the nine of the HRG paper's equation (21).",
         [
-            parts.facts(study, method), parts.verdict(study, method), *parts.doubts(study),
+            *parts.doubts(study), parts.facts(study, method), parts.verdict(study, method),
             Chapter("Before and after", [parts.runs_figure(study, method), parts.gain_table(study)]),
             Chapter("Selection of terms", [
                 parts.path_table(judged), parts.path_table(other, "page"), Sentence(parts.PATH_NOTE, "note", "page"),
