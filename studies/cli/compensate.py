@@ -24,8 +24,8 @@ WORSE = (
 )
 OPPOSITE = 0.5  # of the record's deviation: what a correction of the opposite sign leaves where the output's is changed
 SIGN = (
-    "{}: {} has the opposite sign to the output that the model was fitted to: the compensation would increase the standard deviation of"
-    " {:g} s averages from {:.4g} to {:.4g}, and with the sign changed leave {:.4g}. Change the sign of the column."
+    "{}: the correction of {} has the wrong sign for this record: it would increase the standard deviation of {:g} s averages from {:.4g}"
+    " to {:.4g}, and with the opposite sign leave {:.4g}. Correct the sign of the column, or of the temperature if the model takes one."
 )
 OWN_THERMOMETER = (
     "{1} has no thermometer, so {0} has the resonator's temperature, found from the frequency, instead of a compensated frequency."
@@ -70,10 +70,9 @@ def compensate(
         result = models.compensate(loaded, record, extrapolate=extrapolate)
         added = [name for name in result.columns if name not in record]
         columns = {name: _judge(record, result, name) for name in added if name.startswith(COMPENSATED)}
-        for name, one in columns.items():
-            _check_sign(record, result, name, one)
+        worse = _find_worse(record, result, columns)
         keep_record(result, out)
-        parts = _show(record, result, columns)
+        parts = _show(record, result, columns, worse)
         if RESONATOR in added:
             parts.append(OWN_THERMOMETER.format(out, run))
             if empty := int(np.count_nonzero(np.isnan(result[RESONATOR]))):
@@ -102,31 +101,26 @@ def _judge(record: Record, result: Record, name: str) -> dict[str, Any]:
     }
 
 
-def _is_worse(one: dict[str, Any]) -> bool:
-    was, now = one["stability_before"], one["stability_after"]
-    return was is not None and now is not None and now > was * (1 + NOISE)
-
-
-def _check_sign(record: Record, result: Record, name: str, one: dict[str, Any]) -> None:
-    """Refuse a record of which the model makes the output worse, and with its sign changed much better."""
-    if _is_worse(one):
-        output = name.removeprefix(COMPENSATED)
+def _find_worse(record: Record, result: Record, columns: dict[str, dict[str, Any]]) -> list[str]:
+    """Return a sentence on each output that the model makes worse; refuse one of the opposite sign."""
+    found = []
+    for name, one in columns.items():
         was, now = one["stability_before"], one["stability_after"]
+        if was is None or now is None or now <= was * (1 + NOISE):
+            continue
+        output = name.removeprefix(COMPENSATED)
         turned = _stability(record["time_s"], 2 * record[output] - result[name])
         if turned is not None and turned < OPPOSITE * was:
             raise InputError(SIGN.format(record.path, output, AVERAGE, was, now, turned))
+        found.append(WORSE.format(name, AVERAGE, was, now))
+    return found
 
 
-def _show(record: Record, result: Record, columns: dict[str, dict[str, Any]]) -> list[Part]:
+def _show(record: Record, result: Record, columns: dict[str, dict[str, Any]], worse: list[str]) -> list[Part]:
     rows = [{"name": name, "unit": unit_of(name).removeprefix("1") or ""} | one for name, one in columns.items()]
     note = f"Before, after: standard deviation of {AVERAGE:g} s averages."
     if any(one["rows_not_compensated"] for one in rows):
         note += " Empty rows: an input is missing, or there are too few earlier samples for its rate."
-    worse = [
-        WORSE.format(name, AVERAGE, one["stability_before"], one["stability_after"])
-        for name, one in columns.items()
-        if _is_worse(one)
-    ]
     for words in worse:
         say(f"warning: {words}")
     parts: list[Part] = [*(Sentence(words, "warning", "page") for words in worse)]

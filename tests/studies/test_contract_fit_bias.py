@@ -335,7 +335,7 @@ def test_a_compensation_of_the_opposite_sign_is_refused(calibrated, tmp_path, ca
     write_record(record.with_columns({"bias_deg_per_h": -record["bias_deg_per_h"]}), flipped)
     out.unlink()
     assert main(["compensate", str(calibrated / "m.toml"), str(flipped), "--out", str(out)]) == 2
-    assert "bias_deg_per_h has the opposite sign to the output that the model was fitted to" in capsys.readouterr().err
+    assert "the correction of bias_deg_per_h has the wrong sign for this record" in capsys.readouterr().err
     assert not out.exists()
 
 
