@@ -85,7 +85,7 @@ class CardProblem:
         between these two rows is free too: it has a kink there, and a straight line between its rows is not it.
         """
         away = [start_spread(run, self.instrument, self.law) for run in self.runs]
-        absent = ("base", "stem") if self.instrument.polynomial is not None else ()
+        absent = () if self.instrument.polynomial is None else self.instrument.polynomial.absent
         found = [
             (k, f"initial.{lump}", away[part.run])
             for k, part in enumerate(self.parts)

@@ -208,13 +208,14 @@ def overall(verdicts: Sequence[str]) -> str:
 def doubted(causes: Sequence[Cause]) -> tuple[Cause, ...]:
     """Return the causes, the strongest first, with probabilities lowered by how often such names were wrong all the same.
 
-    A further name may only patch what the form of the first leaves.
+    A further name may only patch what the form of the first leaves; what was found in one with it shares its evidence.
     """
     first = next((cause for cause in causes if cause.kind == "physics"), None)
     share = {True: CONSTANTS["doubt"], False: CONSTANTS["doubt_further"]}
+    alike = [cause.kind == "value" or (first is not None and cause.evidence == first.evidence) for cause in causes]
     return tuple(
-        replace(cause, probability=cause.probability * (1.0 - share[cause is first or cause.kind == "value"]))
-        for cause in causes
+        replace(cause, probability=cause.probability * (1.0 - share[one]))
+        for cause, one in zip(causes, alike, strict=True)
     )
 
 

@@ -17,6 +17,7 @@ from studies.diagnosis.verdict import (
 )
 from studies.effects import library
 from studies.inference.clock import settle
+from studies.inference.heat_path import LAGS, SHARE
 from studies.inference.inferred import Inferred
 from studies.inference.model import Background, Term
 from studies.inference.records import REFERENCE
@@ -26,6 +27,8 @@ Array = NDArray[np.float64]
 DELAY = "law.delay_s"
 SURE_DELAY = 3.0
 """Standard deviations from which on a delay is said."""
+SURE_SHARE = 3.0
+"""Standard deviations from which on a radiated share is named."""
 STEP, WORTH = 0.03, 0.5
 """Of a shape parameter (of its logarithm): first step to see its curvature, and fall of the evidence that a step should cost."""
 
@@ -33,7 +36,7 @@ STEP, WORTH = 0.03, 0.5
 def causes_of(found: Inferred) -> list[Cause]:
     """Return the effects that were found, a delay and a drift of the clock, one entry a physical cause."""
     terms = (_cause(found, k) for k in range(len(found.final.terms)))
-    return _merged([*terms, *_delay_cause(found), *_clock_cause(found)])
+    return _merged([*terms, *_path_causes(found), *_delay_cause(found), *_clock_cause(found)])
 
 
 def _merged(causes: Sequence[Cause]) -> list[Cause]:
@@ -149,6 +152,23 @@ def delay_of(found: Inferred) -> tuple[float, float, float]:
     k = priors.names.index(DELAY)
     mean, C = found.background.posterior
     return float(mean[k]), float(np.sqrt(C[k, k])), priors.values[k].sd
+
+
+def _path_causes(found: Inferred) -> list[Cause]:
+    """Return a second lag, and radiation, of a heat path that stands in place of one lag."""
+    if found.path is None:
+        return []
+    name, path = found.search.linear.responses[0], found.path
+    probability, causes = 1.0 / (1.0 + float(np.exp(-path.lead))), []
+    if path.lags > 1:
+        numbers = {key: Interval.about(*path.value(f"law.{key}")) for key in LAGS[: path.lags]}
+        causes.append(Cause("second-lag", name, probability, (), numbers, 2.0 * path.evidence))
+    share, sd = path.value(SHARE)
+    if share > SURE_SHARE * sd:
+        numbers = {"radiated_share": Interval.about(share, sd)}
+        evidence = (share / sd) ** 2 if causes else 2.0 * path.evidence
+        causes.append(Cause("radiation", name, probability, (), numbers, min(evidence, 2.0 * path.evidence)))
+    return causes
 
 
 def _delay_cause(found: Inferred) -> list[Cause]:

@@ -21,6 +21,7 @@ from studies.calibration.problem import CardProblem, wide_law
 from studies.diagnosis.constants import CONSTANTS
 from studies.diagnosis.seen import SeenResponse
 from studies.inference.apart import only_apart, with_levels
+from studies.inference.heat_path import HeatPath, evidence_of, find_heat_path, residual_of, slow_share
 from studies.inference.held_out import Kept, Model, Rows
 from studies.inference.housing import set_housing_apart
 from studies.inference.inferred import Inferred
@@ -28,7 +29,7 @@ from studies.inference.lack_of_fit import generic_bank, look
 from studies.inference.model import Background, Linear, Term
 from studies.inference.records import Campaign
 from studies.inference.relinearise import IMPOSSIBLE, columns_of, relinearise
-from studies.inference.search import Hypothesis, Outcome, Search, Shapes
+from studies.inference.search import MARGIN, SUSPICIOUS, Hypothesis, Outcome, Search, Shapes
 from studies.inference.sharp import RESOLVED, fast_line, longest_resolved
 from studies.inference.signatures import Signatures
 from studies.inference.verdict import judge
@@ -54,8 +55,13 @@ FAR = 2.0
 """The same, beyond which the search begins from the card's own values too."""
 STRAIGHT = 1.0
 """The same, up to which further effects are looked for beside one before the model is linearised anew."""
+THERMOMETER = "frequency_Hz"
 FAINT = 60.0
 """Log evidence up to which a cause whose definite coefficients may all be 0 is not named: of 13 such names on 127 judged campaigns all 7 below were wrong, 4 of 6 above right."""
+FOLLOWS = 0.1
+"""Part of what one lag leaves."""
+BEATEN = 100.0
+"""Log evidence behind another heat path, from which on a search is given up."""
 SAME_PATH = 0.02
 """Part of its range by which the resonator's temperature may move before the columns of all effects are computed anew."""
 
@@ -170,7 +176,11 @@ def infer(card: "Instrument", campaign: Campaign, progress: Report = lambda _: N
     progress("calibration without effects")
     found, told = set_housing_apart(fit(build_problem(card, campaign.records), progress=progress))
     problem = found.problem
-    search, outcome = _from(found, told, progress)
+    path = None
+    if card.polynomial is None:
+        search, outcome = _from(found, told, progress)
+    else:
+        path, search, outcome = _with_heat_path(found, told, progress)
     values = len(problem.priors.values)
     if card.polynomial is None and np.abs(problem.priors.standard(found.point[:values])).max(initial=0.0) > FAR:
         # values may have gone far to do what an effect does: look from the card as shipped too
@@ -182,20 +192,50 @@ def infer(card: "Instrument", campaign: Campaign, progress: Report = lambda _: N
     plain = Model(Linear.of(found, told), Signatures.at(problem, found.point), (), outcome.plain.noise)
     shipped = plain.residuals(Kept(np.zeros(problem.count), ()))
     calibrated = plain.residuals(Kept(found.point, ()))
+    if path is not None:
+        card, found = path.card, path.fit
     progress("held-out rows")
-    outcome, held, rows = _confirmed(search, outcome, plain)
+    outcome, held, rows = _confirmed(search, outcome, plain, path is not None)
     progress("lack of fit")
     without, levelled = outcome.plain, outcome.final
     for name in search.linear.responses:
         without, levelled = (with_levels(search, one, name) for one in (without, levelled))
     bank = generic_bank(search)
-    left = look(search, bank, without, levelled, rows)
+    left = look(search, bank, without if path is None else plain, levelled, rows)
     unknown = []
     for base in outcome.without:
         seen = search.scan(base, bank)
         best = max((one.gain for one in seen), default=-np.inf)
         unknown.append(base.score + best + CONSTANTS["log_prior_unknown"] - outcome.final.score)
-    return Inference(card, found, search, outcome, left, shipped, calibrated, rows, held, tuple(unknown), campaign)
+    return Inference(
+        card, found, search, outcome, left, shipped, calibrated, rows, held, tuple(unknown), campaign, path
+    )
+
+
+def _with_heat_path(found: CardFit, told: Array | None, progress: Report) -> tuple[HeatPath | None, Search, Outcome]:
+    """Search beside one lag, and beside several in series where one leaves slow noise: those stand for the strongest cause in the frequency.
+
+    Where these follow nearly all that one lag does not, they are searched first, and one lag only as long as it may be the likelier one.
+    """
+    path = find_heat_path(found, progress=progress) if slow_share(found) > SUSPICIOUS else None
+    if path is None:
+        return (None, *_from(found, told, progress))
+    alone = evidence_of(found)
+
+    def beside() -> tuple[Search, Outcome, float]:
+        progress(f"effects beside a heat path with {path.lags} time constants")
+        there, grown = _from(path.fit, told, progress)
+        return there, grown, _on_all_rows(there, grown.final) + path.price
+
+    first = beside() if residual_of(path.fit) < FOLLOWS * residual_of(found) else None
+    search, outcome = _from(found, told, progress, first[2] - BEATEN if first else None)
+    one_lag = _on_all_rows(search, outcome.final)
+    brought = [term.brought for term in outcome.final.terms if term.response == THERMOMETER]
+    if first is None and brought and path.evidence > alone + max(brought):
+        first = beside()
+    if first is None or first[2] < one_lag + MARGIN:
+        return None, search, outcome
+    return replace(path, evidence=first[2] - alone, lead=first[2] - one_lag), *first[:2]
 
 
 def _on_all_rows(search: Search, final: Hypothesis) -> float:
@@ -204,8 +244,8 @@ def _on_all_rows(search: Search, final: Hypothesis) -> float:
     return Background(linear, final.terms, final.noise).evidence + sum(term.price for term in final.terms)
 
 
-def _from(start: CardFit, told: Array | None, progress: Report) -> tuple[Search, Outcome]:
-    """Search with the values linearised at a start, and again where they are most probable beside the effects."""
+def _from(start: CardFit, told: Array | None, progress: Report, least: float | None = None) -> tuple[Search, Outcome]:
+    """Search with the values linearised at a start, and again where they are most probable beside the effects; given up below a `least` score."""
     progress("all effects in all shapes")
     problem, point = start.problem, start.point
     search = Search(Linear.of(start, told), Signatures.at(problem, point), start.noise, progress=progress)
@@ -246,7 +286,7 @@ def _from(start: CardFit, told: Array | None, progress: Report) -> tuple[Search,
     def straightened(plain: Hypothesis, final: Hypothesis) -> tuple[Hypothesis, Hypothesis]:
         nonlocal search, point
         for left in range(AGAIN, 0, -1):
-            if holds(final) or not (final.terms or left == AGAIN):
+            if holds(final) or not (final.terms or left == AGAIN) or beaten(final):
                 break
             progress("linearised anew beside the effects")
             search, point, terms = linearise(final.terms, final.noise)
@@ -256,7 +296,12 @@ def _from(start: CardFit, told: Array | None, progress: Report) -> tuple[Search,
                 plain, final = search.grow(terms, most=0)
         return plain, final
 
+    def beaten(final: Hypothesis) -> bool:
+        return least is not None and _on_all_rows(search, final) < least
+
     plain, final = straightened(*search.grow(near=near))
+    if beaten(final):
+        return search, Outcome(plain, final, (), ())
     if problem.instrument.polynomial is None:
         return search, search.compare(plain, final)
     tried = []
@@ -274,7 +319,7 @@ def _from(start: CardFit, told: Array | None, progress: Report) -> tuple[Search,
 
 
 def _confirmed(
-    search: Search, outcome: Outcome, plain: Model
+    search: Search, outcome: Outcome, plain: Model, longer: bool
 ) -> tuple[Outcome, dict[str, tuple[float | None, float | None]], dict[str, Rows]]:
     """Leave out faint causes of no definite size, and those whose model predicts unseen rows no better than the card alone, the weakest first."""
     events = any(term.effect.event for term in outcome.final.terms)
@@ -285,8 +330,9 @@ def _confirmed(
         final = outcome.final
         beside = Background(search.linear, final.terms, final.noise)
         model = Model(search.linear, search.signatures, final.terms, final.noise)
-        rows = model.residuals(model.kept(model.mean())) if final.terms else alone
-        after = model.held_out(by_record, rows) if final.terms else before
+        more = bool(final.terms) or longer
+        rows = model.residuals(model.kept(model.mean())) if more else alone
+        after = model.held_out(by_record, rows) if more else before
         weak = [
             k
             for k, name in enumerate(term.response for term in final.terms)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from studies.calibration.fit import CardFit
 from studies.inference.clock import CLEAR, drift_of
+from studies.inference.heat_path import HeatPath
 from studies.inference.held_out import Kept, Model, Rows
 from studies.inference.lack_of_fit import Leftover
 from studies.inference.model import Background
@@ -29,6 +30,7 @@ class Inferred:
     outcome : Outcome
     left : response -> Leftover
     held_out : response -> (without effects, with them)
+    path : the heat path of several lags that stands in place of one, with the log evidence that it brought
     """
 
     card: "Instrument"
@@ -42,6 +44,7 @@ class Inferred:
     held_out: Mapping[str, tuple[float | None, float | None]]
     unknown: tuple[float, ...]
     campaign: Campaign
+    path: HeatPath | None = None
 
     @property
     def final(self) -> Hypothesis:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from compensation.lines import Line
 from studies.diagnosis.constants import CONSTANTS
 from studies.inference.generic_forms import BUMP, STEP, generic_forms
-from studies.inference.held_out import Rows
+from studies.inference.held_out import Model, Rows
 from studies.inference.model import Background, Term
 from studies.inference.search import LESS, SUSPICIOUS, Hypothesis, Search, Shapes
 from studies.inference.sharp import brief_events, fast_line, intermittent, tails_of
@@ -53,18 +53,19 @@ def generic_bank(search: Search) -> list[Shapes]:
 
 
 def look(
-    search: Search, bank: Sequence[Shapes], plain: Hypothesis, final: Hypothesis, rows: Mapping[str, Rows]
+    search: Search, bank: Sequence[Shapes], plain: "Hypothesis | Model", final: Hypothesis, rows: Mapping[str, Rows]
 ) -> dict[str, Leftover]:
     """Return what a model leaves of every response.
 
     Parameters
     ----------
-    plain, final : the models without effects and with the named ones
+    plain, final : the models without effects, or of another heat path, and with the named ones
     rows : response -> what the final model leaves on the rows of the records
     """
     seen = search.scan(final, bank, less=())
     own = Background(search.linear, final.terms, final.noise)
-    before = Background(search.linear, plain.terms, final.noise)
+    longer = isinstance(plain, Model)
+    before = Background(plain.linear if isinstance(plain, Model) else search.linear, plain.terms, final.noise)
     found = {}
     for name in search.linear.responses:
         best = max((one for one in seen if one.term.response == name), key=lambda one: one.gain)
@@ -87,9 +88,9 @@ def look(
             word = f"time: a line of {fast.period:.3g} s, too fast for steps of {_step(search, name):.3g} s"
             evidence, line = fast.evidence, fast
         named = [term for term in final.terms if term.response == name or term.effect.thermal]
-        share = _share(search, name, before, own, best.term) if named else 0.0
-        if evidence > smooth and named:
-            gained = max(final.score - plain.score, 0.0)
+        share = _share(search, name, before, own, best.term) if named or longer else 0.0
+        if evidence > smooth and (named or longer):
+            gained = max(own.evidence - before.evidence, 0.0)
             share = min(share, gained / max(gained + evidence, 1e-9))
         found[name] = Leftover(word, float(evidence), share, line)
     return found

@@ -37,12 +37,14 @@ def result_of(found: Inferred, name: str, causes: Sequence[Cause]) -> ResponseRe
     """Return what was found about one response beside the causes that are named."""
     left, plain, rows = found.left[name], found.plain[name], found.rows[name]
     before, after = found.held_out[name]
-    terms = [term for term in found.final.terms if term.response == name]
+    terms = any(term.response == name for term in found.final.terms) or (
+        found.path is not None and name == found.search.linear.responses[0]
+    )
     mine = [cause for cause in causes if cause.response == name and cause.kind == "physics"]
     values = any(cause.kind == "value" and cause.response == name for cause in causes)
     share = (left.share if left.significant else 1.0) if terms else None
     slow = _slow(found, name)
-    verdict, remark = _judge(found, name, bool(terms), mine, values, slow, share)
+    verdict, remark = _judge(found, name, terms, mine, values, slow, share)
     remark = "; ".join(word for word in (remark, _delayed(found, name), _turned_on(found, name, verdict)) if word)
     noise = min(value for value in (rows.rms, after if terms else before) if value is not None)
     white = white_rms(*rows.residual)
@@ -108,8 +110,8 @@ def _delayed(found: Inferred, name: str) -> str:
         return ""
     delay = z * usual
     return (
-        f"it follows the temperature {abs(delay):.2g} s {'later' if delay > 0.0 else 'earlier'} than one lag predicts, as sensors and"
-        " clocks may; a thermometer lag or a rate effect of this size looks the same"
+        f"it follows the temperature {abs(delay):.2g} s {'later' if delay > 0.0 else 'earlier'} than"
+        f" {'one lag predicts' if found.path is None else 'its lags predict'}, as sensors and clocks may; a thermometer lag or a rate effect of this size looks the same"
     )
 
 

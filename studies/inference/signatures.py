@@ -16,6 +16,7 @@ from shell.constants import zero_Celsius
 from studies.calibration.problem import CardProblem
 from studies.effects import Effect, Span, library
 from studies.effects.states import States, remembered
+from studies.inference.heat_path import SHARE
 from studies.simulation.drive import Drive
 from studies.simulation.heat_path import slowest_lag
 from studies.simulation.prediction import Prediction, predict
@@ -212,12 +213,17 @@ class Signatures:
     def applicable(self, effects: "Mapping[str, Effect] | None" = None) -> Iterator[tuple[Effect, str]]:
         """Yield the effects that can act here, with the response where each counts: drives that vary, shapes that fit."""
         for effect in (library() if effects is None else effects).values():
-            if not all(self._varies(name) for name in effect.needs):
+            if not all(self._varies(name) for name in effect.needs) or effect.name in self._taken:
                 continue
             for response in effect.sizes:
                 there = response in self.problem.responses
                 if there and not (effect.thermal and response != "frequency_Hz"):
                     yield effect, response
+
+    @property
+    def _taken(self) -> tuple[str, ...]:
+        """Effects for which the law has values: of lags in series."""
+        return ("second-lag", "radiation") if SHARE in self.problem.priors.names else ()
 
     def _varies(self, drive: str) -> bool:
         parts = [getattr(path.states, drive) for path in self.paths]

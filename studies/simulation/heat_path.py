@@ -6,9 +6,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from studies.effects.effect import AROUND
 from studies.errors import naming
+from studies.instrument.tables.law import BETWEEN
+from thermal.constants import Stefan_Boltzmann
 from thermal.meridian import cell_names
-from thermal.network import Boundary, Conductor, Network, Node, Part, assemble, linearise
+from thermal.network import Boundary, Conductor, Network, Node, Part, Radiator, assemble, linearise
 from thermal.relaxation import find_relaxation
 from thermal.resonator import describe_resonator, describe_shell_and_stem
 
@@ -29,7 +32,8 @@ def build_network(instrument: "Instrument", radiation: bool | None = None, bound
         boundary: "chamber" or "housing"
     """
     if instrument.polynomial is not None:
-        network = one_lag(instrument.polynomial.lag, instrument.polynomial.chamber_lag)
+        law = instrument.polynomial
+        network = lags_in_series(law.lags, law.chamber_lag, law.radiated_share if radiation is not False else 0.0)
         return behind_housing(network) if boundary == "housing" else network
     with naming(f"{instrument.path} [thermal]"):
         network = assemble(describe_resonator(instrument.heat_path))
@@ -48,11 +52,22 @@ def behind_housing(network: Network) -> Network:
     return assemble(parts)
 
 
-def one_lag(lag: float, chamber_lag: float) -> Network:
-    """Return a resonator that takes no heat behind a housing behind a chamber, by two time constants (s)."""
+def lags_in_series(lags: Sequence[float], chamber_lag: float, radiated_share: float = 0.0) -> Network:
+    """Return lumps behind a housing behind a chamber that take no heat from what they follow, by their time constants (s).
+
+    Of the heat exchange at 20 °C the share is radiated.
+    """
     (cell,) = cell_names(1)
     parts: list[Part] = [Boundary("chamber"), Node("housing", 1.0), Conductor("chamber", "housing", 1.0 / chamber_lag)]
-    return assemble([*parts, Node(cell, SENSOR_SHARE), Conductor("housing", cell, SENSOR_SHARE / lag)])
+    before, capacity = "housing", 1.0
+    for name, lag in zip([*BETWEEN[: len(lags) - 1], cell], lags, strict=True):
+        capacity *= SENSOR_SHARE
+        whole = capacity / lag
+        parts += [Node(name, capacity), Conductor(before, name, (1.0 - radiated_share) * whole)]
+        if radiated_share:
+            parts.append(Radiator(before, name, radiated_share * whole / (4.0 * Stefan_Boltzmann * AROUND**3)))
+        before = name
+    return assemble(parts)
 
 
 def with_sensor(network: Network, time_constant: float) -> Network:

@@ -1,6 +1,9 @@
-"""`[law]`: a gyro without geometry, its frequency a polynomial of the temperature that follows the housing through one lag.
+"""`[law]`: a gyro without geometry, its frequency a polynomial of the temperature that follows the housing through lags in series.
 
-    f = f₀ (1 + a₁ x + a₂ x² + a₃ x³),   x = T − T_ref,   T(t) = T_r(t − delay),   lag dT_r/dt = T_housing − T_r
+    f = f₀ (1 + a₁ x + a₂ x² + a₃ x³),   x = T − T_ref,   T(t) = T_r(t − delay),
+    lag_j dT_j/dt = (1 − ρ + ρ g_j) (T_{j−1} − T_j),   g_j = (T_{j−1} + T_j)(T_{j−1}² + T_j²)/(4 T₀³),   T₀ = 20 °C,
+
+from the housing, j = 0, to the resonator: one lag, unless `second_lag_s` and `third_lag_s` are given; ρ of the heat is radiated.
 
 It stands in place of `[resonator]`, `[material]` and `[thermal]`.
 """
@@ -16,6 +19,8 @@ from studies.instrument.registry import CardPlace, CardTable
 from studies.schema.keys import Keys, Note, number
 
 Array = NDArray[np.float64]
+BETWEEN = ("base", "stem")
+"""What lies between the housing and the resonator where there are two lags and more."""
 LEAST = 1e-3
 """Of f over f₀: a polynomial is no law down to 0."""
 
@@ -28,6 +33,11 @@ class LawKeys(Keys, frozen=True, kw_only=True):
     a2_per_K2: Annotated[float, number("of x²", sd=2e-7)] = 0.0
     a3_per_K3: Annotated[float, number("of x³", sd=2e-9)] = 0.0
     lag_s: Annotated[float, number("of the resonator behind its housing", above=0.0, relative_sd=1.0)] = 1500.0
+    second_lag_s: Annotated[float, number("in series with it", above=0.0, relative_sd=1.0)] | None = None
+    third_lag_s: Annotated[float, number("in series with both", above=0.0, relative_sd=1.0)] | None = None
+    radiated_share: Annotated[float, number("of the heat exchange at 20 °C", least=0.0, most=0.95, sd=0.3)] | None = (
+        None
+    )
     chamber_lag_s: Annotated[float, number("of the housing behind its chamber", above=0.0, relative_sd=1.0)] = 600.0
     delay_s: Annotated[float, number("of the resonator beside its lag, less that of the housing's sensor", sd=10.0)] = (
         0.0
@@ -51,8 +61,9 @@ class PolynomialLaw:
     coefficients: tuple[float, float, float]  # of x, x², x³, 1/Kⁿ
     # reference_temperature, lowest, highest: K
     reference_temperature: float
-    # lag, chamber_lag, delay: float, s
-    lag: float
+    lags: tuple[float, ...]  # in series, from the housing to the resonator, s
+    radiated_share: float
+    # chamber_lag, delay: s
     chamber_lag: float
     delay: float = 0.0
     bias_bend: float = 1.0  # part of its bend that the bias follows
@@ -84,6 +95,11 @@ class PolynomialLaw:
         """Return the change of frequency (Hz) that the bias follows: f₀ a₁ x, and its part of the rest."""
         straight = self.f0 * self.coefficients[0] * (temperature - self.reference_temperature)
         return np.asarray(straight + self.bias_bend * (change - straight))
+
+    @property
+    def absent(self) -> tuple[str, ...]:
+        """Lumps of a heat path with a geometry that its lags do not have."""
+        return BETWEEN[len(self.lags) - 1 :]
 
     @property
     def uneven(self) -> Array:
@@ -118,7 +134,8 @@ def build(keys: LawKeys, place: CardPlace) -> PolynomialLaw | None:
         keys.f0_Hz,
         coefficients,
         place.reference_temperature,
-        keys.lag_s,
+        tuple(lag for lag in (keys.lag_s, keys.second_lag_s, keys.third_lag_s) if lag is not None),
+        keys.radiated_share or 0.0,
         keys.chamber_lag_s,
         keys.delay_s,
         keys.bias_bend,

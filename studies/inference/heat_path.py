@@ -1,0 +1,113 @@
+"""A heat path longer than one lag, for a gyro of which only records are known: lags in series, part of whose heat is radiated.
+
+One lag is the baseline; effects on it that are small corrections are columns (`second-lag`, `radiation`). Where lumps follow one another
+they are not small, and the longer path is a card of its own, whose lags and radiated share are values like all others.
+"""
+
+from collections.abc import Callable
+from copy import deepcopy
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from studies.calibration.fit import CardFit, fit
+from studies.calibration.priors import gather_priors
+from studies.inference.model import PRICE, Background, Linear
+
+if TYPE_CHECKING:
+    from studies.instrument.card import Instrument
+
+LAGS = ("lag_s", "second_lag_s", "third_lag_s")
+SHARE = "law.radiated_share"
+PARTS = ((1.0,), (0.7, 0.3), (0.65, 0.3, 0.05))
+"""Lags in series over the one lag that stood for them, where their priors are centred."""
+LAG_WIDTH = 0.7
+"""Standard deviation of the logarithm of each."""
+RADIATED = {"value": 0.2, "sd": 0.2, "low": 0.0, "high": 0.95}
+"""What is known of the radiated share."""
+WORTH = 10.0
+"""Log evidence that one more lag must bring."""
+
+
+@dataclass(frozen=True)
+class HeatPath:
+    """A card with lags in series, its most probable values, and their log evidence, choices paid for.
+
+    Attributes
+    ----------
+    card, fit
+    evidence : of the calibrated card; once effects are beside it, what both bring to one lag without effects
+    lead : log evidence ahead of one lag with other effects
+    """
+
+    card: "Instrument"
+    fit: CardFit
+    evidence: float = 0.0
+    lead: float = 0.0
+
+    @property
+    def lags(self) -> int:
+        """How many there are."""
+        law = self.card.polynomial
+        assert law is not None
+        return len(law.lags)
+
+    @property
+    def price(self) -> float:
+        """Log prior of the choice: one for each lag beyond the first, and one for radiation."""
+        return PRICE * self.lags
+
+    def value(self, name: str) -> tuple[float, float]:
+        """Return a value of the card and its standard deviation."""
+        priors, count = self.fit.problem.priors, len(self.fit.problem.priors.values)
+        slope = priors.slopes(self.fit.point[:count])
+        own = slope[priors.names.index(name)]
+        sd = float(np.sqrt(own @ self.fit.covariance[:count, :count] @ own))
+        return priors.at(self.fit.point[:count])[name], sd
+
+
+def with_lags(card: "Instrument", lag: float, lags: int) -> "Instrument":
+    """Return a polynomial card with so many lags in series where one of `lag` s stood, and a radiated share."""
+    from studies.instrument.card import build_instrument
+
+    content = deepcopy(dict(card.content))
+    given = {
+        key: {"value": part * lag, "sd": LAG_WIDTH * part * lag}
+        for key, part in zip(LAGS, PARTS[lags - 1], strict=False)
+    }
+    content["law"] = {**content["law"], **given, "radiated_share": dict(RADIATED)}
+    return build_instrument(content, card.path)
+
+
+def find_heat_path(baseline: CardFit, most: int = 3, progress: Callable[[str], None] = lambda _: None) -> HeatPath:
+    """Return the likeliest path of up to so many lags, each further one paid for, for a gyro calibrated with one."""
+    problem = baseline.problem
+    lag = problem.priors.at(baseline.point[: len(problem.priors.values)])["law.lag_s"]
+    best: HeatPath | None = None
+    for lags in range(1, most + 1):
+        progress(f"a heat path of {lags} {'lag' if lags == 1 else 'lags in series'}, part of the heat radiated")
+        card = with_lags(problem.instrument, lag, lags)
+        found = fit(replace(problem, instrument=card, priors=gather_priors(card)))
+        path = HeatPath(card, found)
+        path = replace(path, evidence=evidence_of(found) + path.price)
+        if best is not None and lags > 2 and path.evidence < best.evidence + WORTH:
+            break
+        best = path if best is None or path.evidence > best.evidence else best
+    assert best is not None
+    return best
+
+
+def evidence_of(found: CardFit) -> float:
+    """Log evidence of a calibrated card, no row taken for an outlier."""
+    return Background(replace(Linear.of(found), rows=found.problem.rows), (), found.noise).evidence
+
+
+def slow_share(found: CardFit, name: str = "frequency_Hz") -> float:
+    """Rms of the slow noise of a response within a usual run over that of a row; 0 where it is not measured."""
+    return found.rows[name].slow_share(found.noise[name]) if name in found.noise else 0.0
+
+
+def residual_of(found: CardFit, name: str = "frequency_Hz") -> float:
+    """Rms of what a calibration leaves of a response that is measured."""
+    return float(np.sqrt(np.mean(found.state.residual[name] ** 2)))
