@@ -1,15 +1,15 @@
 """`hrg fit thermal`: time constants of the resonator behind its housing, from records.
 
-With --json one object, schema `hrg.fit-thermal/1`: `data`, `confidence`, `estimates` (by name: `value`, null where not
-`determined`, `low`, `high`), `undetermined` (combinations of relative changes that the records leave open),
-`initial_departure_K` per run, `residual_rms_Hz`, `row_step_s` of the averaged rows, `warnings`.
+With --json one object, schema `hrg.fit-thermal/2`: `data`, `confidence`, `estimates` (by name: `value`, null where not
+`determined`, `low`, `high`), `undetermined` (groups of constants that the records cannot separate),
+`initial_departure_K` per run (lumps between housing and resonator first), `reference_temperature_degC` of the law, `residual_rms_Hz`, `notes`.
 """
 
-from studies.calibration.lags.identification import Identification
-from studies.calibration.lags.records import fit_thermal_constants
+from shell.constants import zero_Celsius
 from studies.cli.arguments import Confidence, Records
 from studies.cli.output import answers, say
 from studies.errors import InputError
+from studies.fits.thermal import ThermalFit, fit_thermal_constants
 from studies.instrument.card import load_card
 from studies.progress import Told
 from studies.record import read_record
@@ -17,16 +17,21 @@ from studies.reports import style
 from studies.results import Drawing, Figure, Result, Sentence, Table, row_of
 
 NAMES = {
+    **{f"time_constant_{k}": (f"Time constant {k}", "s") for k in (1, 2, 3)},
     "radiated_share": ("Radiated share of the heat exchange at 20 °C", ""),
-    "offset": ("Frequency at the middle temperature", "Hz"),
+    "offset": ("Frequency at the reference temperature", "Hz"),
     "slope": ("Slope of the frequency", "Hz/K"),
     "curvature": ("Second-order coefficient", "Hz/K²"),
-    "cubic": ("Third-order coefficient", "Hz/K³"),
 }
-COLOURED = 3.0  # residual over its white part, above which the chain of lags is in doubt
+DRIFTS = 5.0  # slow noise over that of a row, above which the chain of lags is in doubt
+OPEN = "The records cannot separate {}."
+MISFIT = (
+    "Slow noise of the residual is {:.1f} times that of a row. Either the noise drifts or the gyro is not a chain of this many lags; in the"
+    " second case the constants are effective values and may lie outside their intervals."
+)
 
 
-@answers("hrg.fit-thermal/1")
+@answers("hrg.fit-thermal/2")
 def fit_thermal(
     *data: Records, card: str | None = None, lags: int | None = None, confidence: Confidence = 0.9
 ) -> Result:
@@ -34,45 +39,43 @@ def fit_thermal(
 
     The records need time_s, frequency_Hz and housing_temperature_degC (or chamber_temperature_degC). The model is a series of
     lags with heat exchange by conduction and radiation. The initial temperatures of each run are fitted, and the noise may
-    drift. The intervals hold only for a gyro that fits this model; a residual well above the white noise shows a misfit.
+    drift. The intervals hold only for a gyro that fits this model; slow noise well above that of a row shows a misfit.
 
     Args:
         card: A card whose law gives the curvature of frequency over temperature; without it the curvature is fitted.
-        lags: Number of lags; by default as many as the records support.
+        lags: Number of lags, 1 to 3; by default as many as the records support.
     """
     if not data:
         raise InputError("name at least one record (CSV) with a step, a ramp or a cycle of temperature.")
     records = [read_record(path) for path in data]
-    with Told("lags") as told:
+    with Told("heat path") as told:
         found = fit_thermal_constants(records, load_card(card) if card else None, lags, confidence, told)
-    for warning in found.warnings:
-        say(f"warning: {warning}")
-    if all(e.value is None for e in found.estimates.values()):
+    for note in found.notes:
+        say(f"note: {note}")
+    if found.estimates["time_constant_1"].value is None:
         raise InputError(
-            f"{data[0]}: the records determine none of the thermal constants. Record steps or ramps of 10 K or more that last"
+            f"{data[0]}: the records determine no time constant. Record steps or ramps of 10 K or more that last"
             " at least five times the resonator's time constant."
         )
-    rms, white = float(found.residual.std()), found.noise.innovation
+    reference = found.path.card.reference_temperature - zero_Celsius
     estimates = {
         name: row_of(e, "value", "low", "high") | {"determined": e.value is not None}
         for name, e in found.estimates.items()
     }
     payload = {
         "data": data,
-        **row_of(found, "confidence", "warnings", row_step_s="row_step", initial_departure_K="departures"),
+        **row_of(found, "confidence", "undetermined", initial_departure_K="departures"),
         "estimates": estimates,
-        "undetermined": [direction.parts for direction in found.undetermined],
-        "residual_rms_Hz": rms,
+        "reference_temperature_degC": reference,
+        "residual_rms_Hz": found.residual_rms,
+        "notes": found.notes,
     }
-    rows = [
-        e | dict(zip(("constant", "unit"), _name(name), strict=True)) | {"shown": "not determined" if e["value"] is None else e["value"]}
-        for name, e in sorted(estimates.items(), key=lambda one: [*NAMES].index(one[0]) if one[0] in NAMES else -1)
+    table = [
+        e | dict(zip(("constant", "unit"), NAMES[name], strict=True)) | {"shown": "not determined" if e["value"] is None else e["value"]}
+        for name, e in estimates.items()
     ]  # fmt: skip
-    combined = [
-        [f"{share:+.2f} × {(word := _name(key)[0])[:1].lower()}{word[1:]}" for key, share in one.parts.items()]
-        for one in found.undetermined
-    ]
-    note = f"Fitted to averages over {found.row_step:g} s; rms residual {rms:.2g} Hz."
+    columns = f"Constant | shown in low … high: Value | low … high: {100 * confidence:g} % interval .0 | Unit"
+    groups = (" and ".join(_lower(NAMES[name][0]) for name in group) for group in found.undetermined if len(group) > 1)
     return Result(
         payload,
         "Thermal time constants",
@@ -80,29 +83,23 @@ def fit_thermal(
         [
             Table(
                 "Thermal constants",
-                rows,
-                f"Constant | shown in low … high: Value | low … high: {100 * confidence:g} % interval .0 | Unit",
-                note,
+                table,
+                columns,
+                f"Reference temperature {reference:.4g} °C; residual {found.residual_rms:.2g} Hz rms.",
             ),
-            *(Sentence(OPEN.format(" ".join(words)), "warning") for words in combined),
-            Sentence(MISFIT.format(rms / white), "warning") if rms > COLOURED * white else None,
-            Figure(lambda: _draw(found), "Residual of the frequency, all runs in order."),
+            *(Sentence(OPEN.format(words), "warning") for words in groups),
+            Sentence(MISFIT.format(found.slow), "warning") if found.slow > DRIFTS else None,
+            Figure(lambda: _draw(found), "Residual of the frequency in each run."),
         ],
     )
 
 
-OPEN = "The records do not determine this combination of relative changes: {}."
-MISFIT = (
-    "The residual is {:.1f} times its white part. Either the noise drifts or the gyro is not a chain of this many lags; in the"
-    " second case the constants are effective values and may lie outside their intervals."
-)
+def _lower(words: str) -> str:
+    return words[:1].lower() + words[1:]
 
 
-def _name(key: str) -> tuple[str, str]:
-    return NAMES.get(key) or (key.replace("_", " ").capitalize(), "s" if key.startswith("time_constant") else "")
-
-
-def _draw(found: Identification) -> Drawing:
-    with style.figure(height=2.8, x=f"row ({found.row_step:g} s each)", y="residual (mHz)") as (made, axes):
-        axes.plot(1e3 * found.residual, ".", markersize=2, color=style.BLUE)
+def _draw(found: ThermalFit) -> Drawing:
+    with style.figure(height=2.8, x="time (h)", y="residual (mHz)") as (made, axes):
+        for time, rest in found.left:
+            axes.plot(time / 3600.0, 1e3 * rest, ".", markersize=2)
         return made

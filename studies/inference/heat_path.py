@@ -24,7 +24,7 @@ PARTS = ((1.0,), (0.7, 0.3), (0.65, 0.3, 0.05))
 """Lags in series over the one lag that stood for them, where their priors are centred."""
 LAG_WIDTH = 0.7
 """Standard deviation of the logarithm of each."""
-RADIATED = {"value": 0.2, "sd": 0.2, "low": 0.0, "high": 0.95}
+RADIATED = {"value": 0.2, "sd": 0.2}
 """What is known of the radiated share."""
 WORTH = 10.0
 """Log evidence that one more lag must bring."""
@@ -80,20 +80,22 @@ def with_lags(card: "Instrument", lag: float, lags: int) -> "Instrument":
     return build_instrument(content, card.path)
 
 
-def find_heat_path(baseline: CardFit, most: int = 3, progress: Callable[[str], None] = lambda _: None) -> HeatPath:
-    """Return the likeliest path of up to so many lags, each further one paid for, for a gyro calibrated with one."""
+def find_heat_path(
+    baseline: CardFit, lags: int | None = None, progress: Callable[[str], None] = lambda _: None
+) -> HeatPath:
+    """Return the path of so many lags, else the likeliest one, each further lag paid for, of a gyro calibrated with one."""
     problem = baseline.problem
     lag = problem.priors.at(baseline.point[: len(problem.priors.values)])["law.lag_s"]
     best: HeatPath | None = None
-    for lags in range(1, most + 1):
-        progress(f"a heat path of {lags} {'lag' if lags == 1 else 'lags in series'}, part of the heat radiated")
-        card = with_lags(problem.instrument, lag, lags)
-        found = fit(replace(problem, instrument=card, priors=gather_priors(card)))
-        path = HeatPath(card, found)
-        path = replace(path, evidence=evidence_of(found) + path.price)
-        if best is not None and lags > 2 and path.evidence < best.evidence + WORTH:
+    for number in (lags,) if lags else range(1, len(LAGS) + 1):
+        progress(f"a heat path with {number} {'lag' if number == 1 else 'lags in series'} and radiation")
+        card = with_lags(problem.instrument, lag, number)
+        path = HeatPath(card, fit(replace(problem, instrument=card, priors=gather_priors(card))))
+        path = replace(path, evidence=evidence_of(path.fit) + path.price)
+        if best is None or path.evidence > best.evidence + WORTH:
+            best = path
+        elif number > 2:
             break
-        best = path if best is None or path.evidence > best.evidence else best
     assert best is not None
     return best
 

@@ -1,6 +1,7 @@
 """Networks of an instrument's heat path, from the boundary "chamber", "housing" or "base" to the cells of the shell."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -48,26 +49,26 @@ def behind_housing(network: Network) -> Network:
     parts: list[Part] = [Boundary("housing"), *network.sources]
     parts += [node for node in network.nodes if node.name != "housing"]
     parts += [link for link in network.conductors if "chamber" not in (link.one, link.other)]
-    parts += network.radiators
-    return assemble(parts)
+    return replace(assemble(parts), radiators=network.radiators)
 
 
 def lags_in_series(lags: Sequence[float], chamber_lag: float, radiated_share: float = 0.0) -> Network:
     """Return lumps behind a housing behind a chamber that take no heat from what they follow, by their time constants (s).
 
-    Of the heat exchange at 20 °C the share is radiated.
+    Of the heat exchange at 20 °C the share is radiated; a negative one is no radiator, but as good a number.
     """
     (cell,) = cell_names(1)
     parts: list[Part] = [Boundary("chamber"), Node("housing", 1.0), Conductor("chamber", "housing", 1.0 / chamber_lag)]
+    radiators: list[Radiator] = []
     before, capacity = "housing", 1.0
     for name, lag in zip([*BETWEEN[: len(lags) - 1], cell], lags, strict=True):
         capacity *= SENSOR_SHARE
         whole = capacity / lag
         parts += [Node(name, capacity), Conductor(before, name, (1.0 - radiated_share) * whole)]
         if radiated_share:
-            parts.append(Radiator(before, name, radiated_share * whole / (4.0 * Stefan_Boltzmann * AROUND**3)))
+            radiators.append(Radiator(before, name, radiated_share * whole / (4.0 * Stefan_Boltzmann * AROUND**3)))
         before = name
-    return assemble(parts)
+    return replace(assemble(parts), radiators=tuple(radiators))
 
 
 def with_sensor(network: Network, time_constant: float) -> Network:

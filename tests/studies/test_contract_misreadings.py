@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from studies.calibration.calibrate import calibrate
-from studies.calibration.lags.records import fit_thermal_constants
+from studies.fits.thermal import fit_thermal_constants
 from studies.calibration.misreading import check_readings
 from studies.calibration.observed import observe, read_settled
 from studies.errors import InputError

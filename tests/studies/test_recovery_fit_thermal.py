@@ -1,67 +1,123 @@
-"""hrg fit thermal finds the lags that a record was made with, and refuses a record that has none."""
+"""hrg fit thermal finds the heat path that a record was made with inside its intervals, and says what a record cannot tell.
+
+Records: a housing with a lag of its own, a resonator behind it by closed lags or by the implicit integrator of thermal networks, the law
+of the HRG paper's Table 1, white noise, a random walk, noise of the sensor.
+"""
 
 import numpy as np
 import pytest
+from scipy.constants import Stefan_Boltzmann
 
-from studies.calibration.lags.records import fit_thermal_constants
 from studies.cli import main
 from studies.errors import InputError
+from studies.fits.thermal import fit_thermal_constants
 from studies.instrument.card import load_card
 from studies.record import Record, write_record
 from studies.resonator.law import law_of
 from studies.simulation.virtual_gyro import simulate_run
 from thermal.lag import lag
-from thermal.profile import parse_profile
+from thermal.network import Boundary, Conductor, Node, Radiator, assemble
+from thermal.profile import Profile, parse_profile
+from thermal.radiative import integrate
+
+ROOM = 293.15
+SLOPE, CURVATURE = 0.3716, -9.7e-4
+STEPS = "step 20 -10 4h then step -10 40 4h"
 
 
-def record(words, **columns):
+def housing(words, step=60.0):
     profile = parse_profile(words)
-    t = np.arange(0.0, profile.end, 60.0)
-    rng = np.random.default_rng(1)
-    before = np.concatenate([[-60.0], t])
-    housing = lag(before, np.concatenate([profile.value[:1], profile.at(t)]), 600.0)[1:] - 273.15
-    resonator = lag(t, housing, 1800.0)
-    f = 4432.0 + 0.37 * (resonator - 20) - 1e-3 * (resonator - 20) ** 2 + 2e-3 * rng.normal(size=t.size)
-    return Record({"time_s": t, "housing_temperature_degC": housing, "frequency_Hz": f} | columns, path="run.csv")
+    t = np.arange(0.0, profile.end, step)
+    return t, lag(np.concatenate([[-step], t]), np.concatenate([profile.value[:1], profile.at(t)]), 600.0)[1:]
 
 
-def test_one_lag_without_radiation_is_found_with_its_interval(tmp_path, capsys, ask):
+def record(t, T_h, T_r, seed=1, white=3e-3, walk=0.0, sensor=0.01):
+    rng, x = np.random.default_rng(seed), T_r - ROOM
+    f = 4432.07 + SLOPE * x + CURVATURE * x**2 + white * rng.normal(size=t.size)
+    f += walk * np.cumsum(rng.normal(size=t.size))
+    columns = {
+        "time_s": t,
+        "housing_temperature_degC": T_h - 273.15 + sensor * rng.normal(size=t.size),
+        "frequency_Hz": f,
+    }
+    return Record(columns, path="run.csv")
+
+
+def one_lag(words=STEPS, tau=1800.0, departure=1.5, **noise):
+    t, T_h = housing(words)
+    return record(t, T_h, lag(t, T_h, tau) + departure * np.exp(-t / tau), **noise)
+
+
+def test_one_lag_without_radiation_is_found_with_its_interval(tmp_path, ask):
     path = tmp_path / "run.csv"
-    write_record(record("step 20 -20 4h then step -20 40 4h"), path)
+    write_record(one_lag(), path)
     answer = ask(["fit", "thermal", str(path), "--lags", "1"])
-    assert answer["schema"] == "hrg.fit-thermal/1"
+    assert answer["schema"] == "hrg.fit-thermal/2"
     tau, share = answer["estimates"]["time_constant_1"], answer["estimates"]["radiated_share"]
     assert tau["low"] < 1800.0 < tau["high"]
-    assert tau["value"] == pytest.approx(1800.0, rel=0.01)
-    assert share["low"] < 0.0 < share["high"]
+    assert share["value"] == pytest.approx(0.0, abs=0.01)
     assert answer["undetermined"] == []
-    assert main(["fit", "thermal", str(path), "--lags", "1"]) == 0
-    assert "Time constant 1" in capsys.readouterr().out
+    assert answer["initial_departure_K"] == [pytest.approx([1.5], abs=0.05)]
 
 
-@pytest.mark.parametrize("row", [0, 1, 200, -1])
+@pytest.mark.slow
+@pytest.mark.parametrize("walk", [0.0, 2e-4], ids=["white", "random walk"])
+def test_ninety_percent_intervals_cover_about_nine_in_ten(walk):
+    """Of 12 seeds, 7 or fewer hits have a probability of 0.4 % if the coverage is 90 %.
+
+    Not of the radiated share in a random walk beside the noise of the housing's sensor: 18 of 24 there, by the noise that is estimated.
+    """
+    fits = [fit_thermal_constants([one_lag(seed=seed, walk=walk)], lags=1).estimates for seed in range(12)]
+    share = () if walk else (("radiated_share", 0.0),)
+    for name, truth in (("time_constant_1", 1800.0), ("curvature", CURVATURE), *share):
+        assert sum(one[name].low <= truth <= one[name].high for one in fits) > 7
+
+
+@pytest.mark.parametrize("row", [0, 200])
 @pytest.mark.parametrize("column", ["frequency_Hz", "housing_temperature_degC"])
 def test_one_accidental_reading_does_not_move_the_lag(row, column):
     """A start-up accident of a real voltmeter's record made a lag of 1.4e6 s out of 6 649 s."""
-    clean = record("step 20 -20 4h then step -20 40 4h")
+    clean = one_lag()
     spoilt = clean[column].copy()
     spoilt[row] *= 4.7
     found = fit_thermal_constants([clean.with_columns({column: spoilt})], lags=1).estimates["time_constant_1"]
     assert found.value == pytest.approx(1800.0, rel=1e-3)
-    assert found.high - found.low < 20.0
 
 
-def test_unusable_records_are_refused(tmp_path, capsys):
-    path = tmp_path / "still.csv"
-    write_record(record("soak 20 5h"), path)
-    assert main(["fit", "thermal", str(path), "--lags", "1"]) == 2
-    answer = capsys.readouterr()
-    assert "still.csv: nothing can be identified" in answer.err
-    assert answer.out == ""
-    with pytest.raises(InputError, match=r"run.csv: thermal constants need frequency_Hz and housing_temperature_degC"):
-        fit_thermal_constants([Record({"time_s": np.arange(9.0), "frequency_Hz": np.ones(9)}, path="run.csv")])
-    with pytest.raises(InputError, match="--lags 9"):
-        fit_thermal_constants([record("soak 20 5h")], lags=9)
+@pytest.mark.slow
+def test_two_lags_in_series_are_found_and_a_second_is_not_made_up():
+    t, T_h = housing(STEPS, 30.0)
+    series = 1.2 * lag(t, T_h, 1800.0) - 0.2 * lag(t, T_h, 300.0) + 1.5 * np.exp(-t / 1800.0)
+    found = fit_thermal_constants([record(t, T_h, series)]).estimates
+    assert found["time_constant_1"].value == pytest.approx(1800.0, rel=0.01)
+    assert found["time_constant_2"].value == pytest.approx(300.0, rel=0.03)
+    assert "time_constant_3" not in found
+    assert "time_constant_2" not in fit_thermal_constants([one_lag()]).estimates
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("taus", [(1500.0,), (1500.0, 400.0)], ids=["one lump", "two in series"])
+def test_the_radiated_share_of_lumps_is_found(taus):
+    """Lumps in a row with 40 % of their conductance by radiation at 20 °C over 100 K, by the implicit integrator."""
+    t, T_h = housing("step 20 -40 4h then step -40 60 4h")
+    parts, before = [Boundary("housing")], "housing"
+    for k, tau in enumerate(taus):  # each too small to load the one before
+        g, name = 1e-6**k / tau, f"lump {k}"
+        parts += [Node(name, 1e-6**k), Conductor(before, name, 0.6 * g)]
+        parts.append(Radiator(before, name, 0.4 * g / (4 * Stefan_Boltzmann * ROOM**3)))
+        before = name
+    T_r = integrate(assemble(parts), {"housing": Profile(t, T_h)}, relative_tolerance=1e-9).node(before, t)
+    found = fit_thermal_constants([record(t, T_h, T_r, sensor=0.0)]).estimates
+    assert f"time_constant_{len(taus) + 1}" not in found
+    for k, tau in enumerate(taus, 1):
+        assert found[f"time_constant_{k}"].value == pytest.approx(tau, rel=0.02)
+    assert found["radiated_share"].value == pytest.approx(0.4, abs=0.008)
+
+
+def test_a_relaxation_tells_the_time_constant_and_not_the_radiated_share():
+    found = fit_thermal_constants([one_lag("soak 20 5h", departure=5.0)]).estimates
+    assert found["time_constant_1"].low < 1800.0 < found["time_constant_1"].high
+    assert found["radiated_share"].value is None
 
 
 @pytest.mark.slow
@@ -72,8 +128,28 @@ def test_a_heat_path_of_several_lumps_is_followed_to_its_noise():
         simulate_run(card, parse_profile(words), 10.0, seed).record
         for seed, words in enumerate(("step 40 -20 5h", "step -20 40 5h"))
     ]
-    estimates = (found := fit_thermal_constants(runs)).estimates
-    law, middle = law_of(card, 233.15, 333.15), found.problem.reference_temperature
+    found = fit_thermal_constants(runs)
+    law, middle = law_of(card, 233.15, 333.15), found.path.card.reference_temperature
     f = law.frequency(np.array([middle - 10.0, middle, middle + 10.0]))
-    assert estimates["curvature"].value == pytest.approx((f[0] - 2 * f[1] + f[2]) / 200.0, rel=0.3)
-    assert found.residual.std() < 5.0 * found.noise.innovation
+    assert found.estimates["curvature"].value == pytest.approx((f[0] - 2 * f[1] + f[2]) / 200.0, rel=0.3)
+    assert found.residual_rms < 2e-3
+
+
+def test_several_runs_share_the_constants_and_not_the_initial_state():
+    fit = fit_thermal_constants([one_lag("step 20 -10 4h", departure=d, seed=int(d)) for d in (1.5, 4.0)], lags=1)
+    assert [lump for (lump,) in fit.departures] == pytest.approx([1.5, 4.0], abs=0.1)
+
+
+def test_unusable_records_are_refused(tmp_path, capsys):
+    path = tmp_path / "still.csv"
+    write_record(one_lag("soak 20 5h", departure=0.0), path)
+    assert main(["fit", "thermal", str(path)]) == 2
+    answer = capsys.readouterr()
+    assert "determine no time constant" in answer.err
+    assert answer.out == ""
+    with pytest.raises(InputError, match=r"run.csv: thermal constants need frequency_Hz and housing_temperature_degC"):
+        fit_thermal_constants(
+            [Record({"time_s": np.arange(9.0), "housing_temperature_degC": np.ones(9)}, path="run.csv")]
+        )
+    with pytest.raises(InputError, match="--lags 9"):
+        fit_thermal_constants([one_lag("soak 20 5h")], lags=9)

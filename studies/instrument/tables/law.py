@@ -35,9 +35,18 @@ class LawKeys(Keys, frozen=True, kw_only=True):
     lag_s: Annotated[float, number("of the resonator behind its housing", above=0.0, relative_sd=1.0)] = 1500.0
     second_lag_s: Annotated[float, number("in series with it", above=0.0, relative_sd=1.0)] | None = None
     third_lag_s: Annotated[float, number("in series with both", above=0.0, relative_sd=1.0)] | None = None
-    radiated_share: Annotated[float, number("of the heat exchange at 20 °C", least=0.0, most=0.95, sd=0.3)] | None = (
-        None
-    )
+    radiated_share: (
+        Annotated[
+            float,
+            number(
+                "of the heat exchange at 20 °C; below 0 where conductance falls with temperature",
+                least=-0.5,
+                most=0.95,
+                sd=0.3,
+            ),
+        ]
+        | None
+    ) = None
     chamber_lag_s: Annotated[float, number("of the housing behind its chamber", above=0.0, relative_sd=1.0)] = 600.0
     delay_s: Annotated[float, number("of the resonator beside its lag, less that of the housing's sensor", sd=10.0)] = (
         0.0
