@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from studies.calibration.calibrate import calibrate
-from studies.fits.thermal import fit_thermal_constants
 from studies.calibration.misreading import check_readings
 from studies.calibration.observed import observe, read_settled
 from studies.errors import InputError
+from studies.fits.thermal import fit_thermal_constants
 from studies.inference.records import make_ready
 from studies.instrument.card import load_card, save_card
 from studies.simulation.chamber import load_profile

@@ -196,3 +196,16 @@ def test_suggested_run_is_part_of_the_answer():
     assert run["expected_evidence"] > 10.0
     assert run["profile"].startswith("repeat") or parse_profile(run["profile"]).end > 3 * 3600.0
     assert run["profile"] in verdict.next_experiment
+
+
+@pytest.mark.slow
+def test_the_heat_path_of_a_real_gyro_is_no_effect_of_its_law():
+    """Several lumps that radiate, of a card with a geometry, are told as a second lag and radiation and nothing else."""
+    card, kept = load_card("hrg-30mm"), ("time_s", "housing_temperature_degC", "frequency_Hz")
+    runs = []
+    for seed, words in enumerate(("step 40 -20 5h", "step -20 40 5h"), 1):
+        record = simulate_run(card, parse_profile(words), 0.05, seed).record
+        runs.append(Record({name: record[name] for name in kept}, path=f"run{seed}.csv", sha256=str(seed)))
+    verdict = diagnose_records(runs).verdict
+    assert {cause.effect for cause in verdict.causes} == {"second-lag", "radiation"}
+    assert verdict.responses["frequency_Hz"].extended[0] < 3e-3  # of a swing of 20 Hz
