@@ -1,7 +1,7 @@
 """The engine: evaluate the designs that a store lacks, batch by batch, on any workers, in any order.
 
 The spec fixes the batches. How many of them travel as one task is decided by how long they take, and changes no result.
-A task that comes back is committed whole. When a worker is lost, what it had is tried again, alone and in pieces, so
+A task that comes back is committed in blocks of whole batches. When a worker is lost, what it had is tried again, alone and in pieces, so
 that a design that kills its worker is found and does not stop the rest. The loss of a worker is no result: such a case
 is noted as lost and tried again by the next run. Workers that end before any of them has computed anything stop the run.
 """
@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 
 TASK_SECONDS = 1.0  # a task should last so long: long against its cost, short against what kill -9 may lose
 BATCH, BATCH_VECTORISED = 8, 16384  # cases, where the spec says nothing
+BLOCK = 65536  # cases that are kept together, and read together
 TRIES_ALONE = 2  # of a case whose worker is lost
 STILLBORN = 3  # losses before anything was computed, after which the workers cannot be started
 LOOK_EVERY = 2.0  # s without an answer, after which the workers are looked after
@@ -136,9 +137,11 @@ def _submit(task: _Task, plan: WorkPlan, workers: "Workers", running: dict[Futur
 
 
 def _keep(found: Sequence[Cases], store: "Store", progress: "Progress") -> None:
-    cases = join(found)
-    store.add(cases)
-    progress.advance(len(cases.batch), cases.failed)
+    together = max(1, BLOCK // max(len(cases.batch) for cases in found))
+    for first in range(0, len(found), together):
+        cases = join(found[first : first + together])
+        store.add(cases)
+        progress.advance(len(cases.batch), cases.failed)
 
 
 def _divide(task: _Task, plan: WorkPlan, suspects: deque[_Task], store: "Store", progress: "Progress") -> None:

@@ -56,7 +56,8 @@ def _tables(results: Results, path: str | Path, rows: int) -> Iterator[Any]:
         while count >= rows:
             whole = arrow.concat_tables(kept)
             yield whole.slice(0, rows)
-            kept, count = [whole.slice(rows)], count - rows
+            count -= rows
+            kept = [whole.slice(rows)] if count else []  # an empty one would keep all rows before it
     if schema is None:
         raise InputError(f"{path}: nothing to export: no design of the study has been computed.")
     if count:
