@@ -1,6 +1,8 @@
 """FMUs in FMPy, what the archive holds, and what is said of a card that cannot be carried or of a missing compiler."""
 
 import json
+import shutil
+import subprocess
 import zipfile
 from dataclasses import replace
 from xml.etree import ElementTree
@@ -57,6 +59,34 @@ def test_limits_fmu_in_fmpy(version, tmp_path):
     for name in COLUMNS:
         assert np.abs(found[name] - expected[name]).max() < 1e-9 * np.abs(expected[name]).max(), name
     assert 'unit="W/K"' in text
+
+
+CHECKERS = [("fmuCheck.linux64", "2.0", ["-h", "1", "-s", "600"]), *(
+    ("fmusim", version, ["--interface-type", "cs", "--stop-time", "600", "--output-interval", "1", "--output-file", "out.csv"])
+    for version in ("2.0", "3.0")
+)]  # fmt: skip
+"""The FMI project's own: FMUChecker 2.0.4 and fmusim of the Reference FMUs; neither is a package, both are built from source."""
+
+
+@needs_compiler
+@pytest.mark.slow
+@pytest.mark.parametrize("mode", ["force-rebalance", "whole-angle"])
+@pytest.mark.parametrize(("checker", "version", "words"), CHECKERS, ids=lambda one: one if isinstance(one, str) else "")
+def test_contract_official_checkers(checker, version, words, mode, tmp_path):
+    """No error and no warning, and every row is there."""
+    if (program := shutil.which(checker)) is None:
+        pytest.skip(f"{checker} is not on the path")
+    path = tmp_path / "twin.fmu"
+    assert fmus.write_fmu(plan_twin(load_card("hrg-30mm-loops").with_table("loop", {"mode": mode})), path, version)
+    done = subprocess.run([program, *words, path], cwd=tmp_path, capture_output=True, text=True, check=False)
+    said = done.stdout + done.stderr
+    assert done.returncode == 0, said
+    if checker == "fmusim":
+        assert "rror" not in said
+        assert len((tmp_path / "out.csv").read_text().splitlines()) == 602
+    else:
+        assert "0 Warning(s)" in said
+        assert "0 Error(s)" in said
 
 
 @needs_compiler
