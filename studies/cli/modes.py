@@ -122,6 +122,7 @@ def modes(
     shown = entries if detailed else []
     where: Where = "everywhere" if sensitivities else "page"
     operating = min(harmonic, key=lambda n: abs(n - 2))
+    seen = sorted(set(harmonic), key=lambda n: (n != operating, n))  # first the mode that the sliders move
     head = {"card": instrument.name, "temperature_degC": T - zero_Celsius, "theory": theory}
     name = f"{instrument.name} at {T - zero_Celsius:g} °C, {THEORIES[theory]}"
     return Result(
@@ -140,7 +141,7 @@ def modes(
                 "Root: the solid joint of the shell with its stem or bottom, fillet included.",
                 where,
             ),
-            live_chapter(instrument, operating, theory, lambda: _view(instrument, sorted(set(harmonic)), T, theory)),
+            live_chapter(instrument, operating, theory, lambda: _view(instrument, seen, T, theory)),
         ],
     )
 

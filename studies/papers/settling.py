@@ -31,7 +31,6 @@ ROOM_degC = 20.0
 STEPS_degC = (-10.0, 40.0)
 POINTS_degC = np.arange(-20.0, 41.0, 10.0)
 FAST, SETTLED = 9000.0, 15000.0
-REMAINING = 0.05
 END = 18000.0
 PROTOCOLS = ("from room", "upwards")
 NETWORKS = ("radiative", "linear", "shell and stem alone")

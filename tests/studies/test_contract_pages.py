@@ -90,6 +90,7 @@ def test_wide_tables_are_stacked_on_a_phone_and_long_ones_end_on_paper():
         ("tcf hrg-30mm --theory shell", "Measured on the gyro of the HRG paper (Sensors 2012, 12, 6434, Table 1)."),
         ("trim free-dome --split 0.12 --axis 31", "thermal equilibrium"),
         ("loop hrg-30mm-loops", "phase and rate loops"),
+        ("modes free-dome --harmonic 0 2 --theory shell", "bent into 4 lobes"),  # the mode that the sliders move
         ("loss hrg-30mm", "1.46 times this loss"),
     ],
 )
