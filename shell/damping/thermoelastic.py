@@ -15,6 +15,8 @@ flow through a wall of thickness h they are cosines, d_j = (jπ/h)², and for tr
 of a shell κ_φ + κ_θ = 0, and a bare dome warms only near its free edge.
 """
 
+from functools import lru_cache
+
 import numpy as np
 import scipy
 
@@ -23,6 +25,7 @@ from shell.quadrature import Array, legendre
 from shell.solution import Solution, total
 from shell.system import ShellGroup
 
+MOST_PARTS = 40_000  # of the heat across a wall
 NODES = 9  # thicknesses at which the heat flow through a wall of varying thickness is computed
 
 
@@ -71,13 +74,19 @@ def _wall(degree: int, h: float, x: float) -> Array:
 
     c_j^l = (1/√2) ∫ P_l(η) cos(jπ (η + 1)/2) dη = √2 cos((j - l) π/2) j_l(jπ/2), which vanishes where j and l differ in parity.
     """
-    count = int(max(60, 30 * h * np.sqrt(x / 2)))
-    j = np.arange(1, min(count, 40_000) + 1)
-    parts = np.array(
+    count = int(min(max(60, 30 * h * np.sqrt(x / 2)), MOST_PARTS))
+    parts = _parts(degree, 1 << (count - 1).bit_length())[:, :count]
+    d = (np.arange(1, count + 1) * np.pi / h) ** 2
+    return np.asarray((parts * (x * d / (x**2 + d**2))) @ parts.T)
+
+
+@lru_cache(maxsize=16)
+def _parts(degree: int, count: int) -> Array:
+    """c_j^l of `_wall`, (degree + 1, count): the same for every wall."""
+    j = np.arange(1, count + 1)
+    return np.array(
         [
             np.sqrt(2) * np.cos((j - l) * np.pi / 2) * scipy.special.spherical_jn(l, j * np.pi / 2)
             for l in range(degree + 1)
         ]
     )
-    d = (j * np.pi / h) ** 2
-    return np.asarray((parts * (x * d / (x**2 + d**2))) @ parts.T)

@@ -205,10 +205,11 @@ def _foretell(search: Search, best: int) -> Array:
 def _prices(search: Search, scalar: Scalar, best: int) -> list[float | None]:
     """Return the multiplier of every limit: ∇t + Σ λ ∇g + Σ μ ∇bound = 0 with λ, μ ≥ 0, by least squares."""
     goals, task = search.goals, search.task
-    z, slopes, free = goals.count(search.values[best]), search.slopes(best, BOXES[-1]), slice(0, task.free)
+    free = slice(0, task.free)
+    z, slopes = search.local(search.x[best], BOXES[-1])(search.x[best][free])
     pieces = goals.pieces(scalar, z, search.margins)
     value = np.array([one.slope * z[one.column] + one.offset for one in pieces])
-    slope = np.array([one.slope * slopes[one.column][free] for one in pieces])
+    slope = np.array([one.slope * slopes[one.column] for one in pieces])
     aims = np.array([one.of >= 0 for one in pieces])
     top = aims & (value > value[aims].max() - ACTIVE)
     held = ~aims & (value > -ACTIVE)

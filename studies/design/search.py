@@ -22,12 +22,14 @@ Array = NDArray[np.float64]
 TOGETHER = 4  # designs that are computed together
 ROUNDS = 6  # over the whole box, at most
 BOXES = (0.15, 0.04, 0.01)  # half widths of the trust region, in parts of the ranges
-WIDER = 2.0  # half widths of a second step, computed beside the first
+WIDER = 2.0  # half widths of a second step, computed beside the first; as many times more after each time that it is the better
+PATIENCE = 3  # times without a gain end the steps within a box; before the last, a new star
 REFINED = 8  # steps within boxes of one size, at most
 DRAWN = 100  # of which one is looked at because it is far off
 ENOUGH = 3  # regions that lead to one place
 STARTS = 24  # of every step on the interpolant over the whole box
 NEAR = 6.0  # half widths within which designs make the interpolant of a trust region
+PENALTY = 100.0  # of the excess over limits, in spreads, against the objective's
 GAIN = 1e-5  # of an objective's spread: less is none
 ASIDE = 0.05  # step of a parameter that is not free, in parts of its range
 MOST_CORNERS = 256  # of the grid of steps about a design
@@ -102,7 +104,7 @@ class Search:
                 if other and np.abs(x - self.x).max(axis=1).min() > BOXES[-1]:
                     chosen.append(x)
             self.look([*chosen[: TOGETHER - 1], self._far_off(surface, scalar)])
-            idle = 0 if self._gained(before, scalar) else idle + 1
+            idle = 0 if self._is_better(self._merit(self.rank(scalar)[0], scalar), before) else idle + 1
             if idle == 2 or self.spent or not chosen:
                 break
         regions: list[int] = []
@@ -123,22 +125,27 @@ class Search:
 
         It ends where it comes to one of the designs `known` before.
         """
+        first = best
         for half in boxes:
-            centre, idle = np.full_like(self.start, np.inf), 0
+            strict = half == BOXES[-1]
+            centre, idle, reach = np.full_like(self.start, np.inf), 0, WIDER * half
             for _ in range(REFINED):
-                if np.abs(self.x[best] - centre).max() > half and (idle or not (known or np.isfinite(centre).all())):
+                if np.abs(self.x[best] - centre).max() > half and (
+                    idle == PATIENCE - 1 or not (known or np.isfinite(centre).all())
+                ):
                     centre = self.x[best]  # steps that keep what the interpolant said need no new star
                     self.margins = self.goals.margins(self.values[best], self.slopes(best, half))
                 surface = self.local(self.x[best], half)
-                best = self._best_near(best, half, scalar)
-                before = self._merit(best, scalar)
-                boxes_here = (self._box(self.x[best], reach) for reach in (half, WIDER * half))
-                self.look([self._step(surface, scalar, self.x[best], *box)[1] for box in boxes_here])
-                best = self._best_near(best, WIDER * half, scalar)
-                idle = 0 if self._gained(before, scalar, best) else idle + 1
-                if self.spent or idle == 2 or any(np.abs(self.x[best] - self.x[k]).max() < half for k in known):
+                best = self._best_near(best, half, scalar, strict)
+                before, here = self._worth(best, scalar, strict), self.x[best]
+                self.look([self._step(surface, scalar, here, *self._box(here, far))[1] for far in (half, reach)])
+                best = self._best_near(best, reach, scalar, strict)
+                idle = 0 if self._is_better(self._worth(best, scalar, strict), before) else idle + 1
+                far_off = np.abs(self.x[best] - here).max() > half
+                reach = min(WIDER * reach, BOXES[0]) if far_off and not idle else WIDER * half
+                if self.spent or idle == PATIENCE or any(np.abs(self.x[best] - self.x[k]).max() < half for k in known):
                     break
-        return best
+        return best if self._merit(best, scalar) <= self._merit(first, scalar) or not strict else first
 
     def best(self, scalar: Scalar) -> int:
         """Return the best design that is found from several regions, each descended into at first, the best to the end.
@@ -151,11 +158,24 @@ class Search:
             apart = np.abs(self.x[found] - self.x[found[-1]]).max(axis=1)
             if (apart < BOXES[0]).sum() == ENOUGH or self.spent:
                 break
-        return self.descend(scalar, min(found, key=lambda k: self._merit(k, scalar)), BOXES[1:])
+        best = self.descend(scalar, min(found, key=lambda k: self._worth(k, scalar, False)), BOXES[1:])
+        first = self.rank(scalar)[0]
+        return (
+            best if self._merit(best, scalar) <= self._merit(first, scalar) else self.descend(scalar, first, BOXES[-1:])
+        )
 
-    def _best_near(self, best: int, half: float, scalar: Scalar) -> int:
+    def _best_near(self, best: int, half: float, scalar: Scalar, strict: bool) -> int:
         near = np.flatnonzero(self._is_plain() & (np.abs(self.x - self.x[best]).max(axis=1) <= half + 1e-9))
-        return int(min(near, key=lambda k: self._merit(int(k), scalar)))
+        return int(min(near, key=lambda k: self._worth(int(k), scalar, strict)))
+
+    def _worth(self, k: int, scalar: Scalar, strict: bool) -> tuple[float, float]:
+        """Return what designs are compared by on the way: limits first where `strict`, else a little beyond a limit for a gain."""
+        over, t = self._merit(k, scalar)
+        return (over, t) if strict else (0.0, t + PENALTY * over)
+
+    @staticmethod
+    def _is_better(now: tuple[float, float], before: tuple[float, float]) -> bool:
+        return now[0] < 0.9 * before[0] or (now[0] == before[0] == 0 and now[1] < before[1] - GAIN)
 
     def settle(self, scalar: Scalar, best: int) -> int:
         """Return the best design whose parameters are whole steps, where the task asks for steps."""
@@ -242,10 +262,6 @@ class Search:
 
     def _merit(self, k: int, scalar: Scalar) -> tuple[float, float]:
         return self.goals.violation(self.values[k], self.margins), scalar(self.goals.objectives(self.values[k]))
-
-    def _gained(self, before: tuple[float, float], scalar: Scalar, now: int | None = None) -> bool:
-        over, t = self._merit(self.rank(scalar)[0] if now is None else now, scalar)
-        return over < 0.9 * before[0] or (over == before[0] == 0 and t < before[1] - GAIN)
 
     def _box(self, centre: Array, half: float) -> tuple[Array, Array]:
         """Return a box about a design within the bounds; what is not free stays."""

@@ -9,14 +9,13 @@ from typing import TYPE_CHECKING, Any
 from shell.constants import zero_Celsius
 from studies.errors import InputError
 from studies.instrument.card import Instrument
+from studies.sweeps.quantity import TOLERANCE
 
 if TYPE_CHECKING:
     from shell.elastic import Elastic
     from shell.layout import Theory
     from shell.modes import Mode
     from shell.resonator import Resonator
-
-TOLERANCE = 1e-5  # relative error of a frequency
 
 
 @dataclass
@@ -28,6 +27,8 @@ class Case:
     # the instrument at a place 0 ... 1 of the way from the start of a search to this design, where modes keep their
     # names by their shapes; None where they have them by their order
     on_the_way: "Callable[[float], Instrument] | None" = None
+    # of a harmonic and theory the number of modes and the tolerance that suffice for all quantities
+    wanted: "Mapping[tuple[int, str], tuple[int, float]]" = field(default_factory=dict)
     _solved: dict[tuple[int, str, float], tuple[float, "tuple[Mode, ...]"]] = field(default_factory=dict, repr=False)
 
     def temperature(self, given: float | None) -> float:
@@ -45,6 +46,8 @@ class Case:
         key = (harmonic, theory, temperature)
         within, found = self._solved.get(key, (inf, ()))
         if len(found) < count or within > tolerance:
+            most, finest = self.wanted.get((harmonic, theory), (count, tolerance))
+            count, tolerance = max(count, most), min(tolerance, finest)
             resonator, elastic = self.instrument.at(temperature)
             found = solve_modes(resonator, elastic, harmonic, count, theory, tolerance)
             self._solved[key] = tolerance, found

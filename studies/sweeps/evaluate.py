@@ -5,6 +5,7 @@ import time
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -16,7 +17,7 @@ from studies.sweeps.case import Case
 from studies.sweeps.child import FunctionFailed, FunctionLost
 from studies.sweeps.design import coding
 from studies.sweeps.parameters import set_parameters
-from studies.sweeps.quantity import Number, Quantity
+from studies.sweeps.quantity import HarmonicQuantity, Number, Quantity
 
 if TYPE_CHECKING:
     from studies.sweeps.definition import Study
@@ -52,6 +53,17 @@ class WorkPlan:
     def of(cls, study: "Study", families: "Families | None" = None) -> "WorkPlan":
         """Return the plan of a study."""
         return cls(study.instrument, coding(study), study.asked, families, study.derived)
+
+    @cached_property
+    def wanted(self) -> dict[tuple[int, str], tuple[int, float]]:
+        """Number and tolerance of the modes of each harmonic and theory that all quantities together need."""
+        found: dict[tuple[int, str], tuple[int, float]] = {}
+        for one in self.asked:
+            if isinstance(one, HarmonicQuantity):
+                for n, count, tolerance in one.list_modes():
+                    most, finest = found.get((n, one.theory), (count, tolerance))
+                    found[n, one.theory] = max(count, most), min(tolerance, finest)
+        return found
 
     @property
     def width(self) -> int:
@@ -139,7 +151,7 @@ def _make_case(plan: WorkPlan, parameters: Mapping[str, Any]) -> Case:
         return set_parameters(plan.instrument, between, plan.derived)
 
     instrument = set_parameters(plan.instrument, parameters, plan.derived)
-    return Case(instrument, parameters, None if start is None else on_the_way)
+    return Case(instrument, parameters, None if start is None else on_the_way, plan.wanted)
 
 
 def failed_row(plan: WorkPlan, status: str, reason: str) -> Row:

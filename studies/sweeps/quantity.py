@@ -1,6 +1,6 @@
 """Form of what a study can ask of a design: a class in a file of `quantities/` declares its keys, its columns and its value."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from math import nan
 from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
 
@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from shell.modes import Mode
     from studies.sweeps.case import Case
 
+TOLERANCE = 1e-5  # relative error of a frequency
 SUFFIXES = {
     "Hz": "_Hz", "ppm/°C": "_ppm_per_degC", "°C": "_degC", "s": "_s", "°": "_deg", "g": "_g", "mm": "_mm",
     "°/h": "_deg_per_h", "°/√h": "_deg_per_rt_h", "Hz/µm": "_Hz_per_um", "ppb/g": "_ppb_per_g", "µrad/g": "_urad_per_g",
@@ -80,6 +81,10 @@ class HarmonicQuantity(Quantity, frozen=True, kw_only=True):
         says("solid (three-dimensional), shell (Naghdi) or rayleigh (closed form)"),
     ] = "solid"
 
+    def list_modes(self) -> "Iterable[tuple[int, int, float]]":
+        """Return what it solves at least: harmonic, number of modes, tolerance."""
+        return [(self.harmonic, 1, TOLERANCE)]
+
     def stem(self, what: str) -> str:
         """Return such as frequency_n2."""
         return f"{what}_n{self.harmonic}"
@@ -105,6 +110,10 @@ class OvertoneQuantity(ModeQuantity, frozen=True, kw_only=True):
     """A quantity of one of the modes of a harmonic."""
 
     index: Annotated[int, number("0 for the lowest mode of the harmonic", least=0, most=20)] = 0
+
+    def list_modes(self) -> "Iterable[tuple[int, int, float]]":
+        """Return what it solves at least."""
+        return [(self.harmonic, self.index + 1, TOLERANCE)]
 
     def stem(self, what: str) -> str:
         """Return such as frequency_n2, or frequency_n2_1 for a higher mode."""

@@ -1,10 +1,11 @@
 """How far the nearest other mode is from a mode, in Hz: parasitic modes close by couple under vibration."""
 
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, Annotated
 
 from studies.schema.keys import number, says
-from studies.sweeps.case import TOLERANCE, Case
-from studies.sweeps.quantity import Column, ModeQuantity, Number
+from studies.sweeps.case import Case
+from studies.sweeps.quantity import TOLERANCE, Column, ModeQuantity, Number
 
 if TYPE_CHECKING:
     from shell.modes import Mode
@@ -33,12 +34,18 @@ class ModeSeparation(ModeQuantity, frozen=True, kw_only=True, tag="mode-separati
             *each,
         )
 
+    def list_modes(self) -> "Iterable[tuple[int, int, float]]":
+        """Return its own harmonic, and the others as exactly as asked."""
+        return [
+            (n, self.each, TOLERANCE if n == self.harmonic else self.tolerance)
+            for n in {*range(self.highest + 1), self.harmonic}
+        ]
+
     def evaluate(self, case: Case) -> tuple[Number, ...]:
         """Return distance and harmonic."""
         from shell.modes import nearest_mode
 
         at = case.temperature(self.temperature_degC)
-        case.modes(self.harmonic, self.each, self.theory, at)  # at once, and no less exact than all that is asked of it
         own = case.mode(self.harmonic, 0, self.theory, at)
 
         def solve(n: int, count: int) -> "tuple[Mode, ...]":
