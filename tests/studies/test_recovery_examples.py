@@ -32,8 +32,8 @@ def numbers(pattern, text):
 
 
 def test_examples_use_the_public_door_only():
-    """Ten of them, and of the workbench each imports `hrg` and nothing else."""
-    assert len(NAMES) == 10
+    """Eleven of them, and of the workbench each imports `hrg` and nothing else."""
+    assert len(NAMES) == 11
     ours = {"shell", "thermal", "compensation", "studies"}
     for name in NAMES:
         (spec,) = (module for module in iter_modules(examples.__path__) if module.name == name)
@@ -52,6 +52,23 @@ def test_the_door_has_every_public_name_and_says_what_it_lacks():
     assert all(hasattr(hrg, name) for name in dir(hrg))
     with pytest.raises(AttributeError, match="no attribute 'nonsense'"):
         hrg.nonsense  # noqa: B018
+
+
+def test_published_designs_beside_ours(printed):
+    """Q of the birdbath as printed; the slope of the HRG by two standard deviations of the law; its Q, bare, at the lower end of what is told."""
+    text = printed("published_designs")
+    hrg30, birdbath = text.split("birdbath-5mm")
+    for part in (hrg30, birdbath):
+        f, known = numbers(r"f ([\d.]+) Hz \(printed ([\d.]+)\)", part)
+        assert f == pytest.approx(known, rel=1e-4)
+    interval = r"90 % from ([\d.e+]+) to ([\d.e+]+) \(printed ([\d.e+]+) to ([\d.e+]+)\)"
+    low, high, q, _ = numbers(interval, birdbath)
+    assert low < q < high
+    low, high, least, most = numbers(interval, hrg30)
+    assert low < most
+    assert high > least
+    slope, sd, least, most = numbers(r"slope ([\d.]+) ± ([\d.]+) ppm/K \(printed ([\d.]+) to ([\d.]+)\)", hrg30)
+    assert least - 2 * sd < slope < most + 2 * sd
 
 
 def test_modes_of_a_cup_in_the_order_of_thin_cups(printed):

@@ -1,0 +1,63 @@
+"""Published resonators beside the same ones computed: frequency, Q with its 90 % interval, and temperature slope.
+
+Frequencies agree by choice: of each design one dimension is not printed, and its card says how it was chosen. Q and slope are predictions.
+"""
+
+from dataclasses import dataclass
+
+import hrg
+
+ROOM = 293.15  # K
+
+
+@dataclass(frozen=True)
+class Published:
+    """What is printed of a resonator, `q` and `slope` (ppm/K) from … to; None where nothing is."""
+
+    card: str
+    frequency: float  # Hz
+    q: tuple[float, float]
+    slope: tuple[float, float] | None
+    source: str
+
+
+DESIGNS = (
+    Published(
+        "hrg-30mm", 4432.07, (30e6, 50e6), (78.8, 79.3),
+        "f and, from its differences at 15 and 25 °C, slope: Sensors 2012, 12, 6434, Table 1; Q of bare shells of silica: Wikipedia, Hemispherical resonator gyroscope",
+    ),
+    Published(
+        "birdbath-5mm", 8800.0, (1.2e6, 1.2e6), None,
+        "Fused Silica Micro Birdbath Shell Resonators With 1.2 Million Q and 43 Second Decay Time Constant, Hilton Head Workshop 2014",
+    ),
+)  # fmt: skip
+
+
+def beside(design: Published) -> dict[str, float]:
+    """Return our frequency (Hz), Q with its interval, and slope (ppm/K) with its standard deviation."""
+    card = hrg.load_card(design.card)
+    model = hrg.loss_model(card)
+    budget, law = model.budget(ROOM), hrg.law_of(card, ROOM, ROOM)
+    low, high = (1 / float(end[0]) for end in reversed(budget.interval))
+    return {
+        "frequency": model.frequency,
+        "q": 1 / float(budget.inverse_q[0]),
+        "low": low,
+        "high": high,
+        "slope": 1e6 * float(law.slope([ROOM])[0]),
+        "sd": 1e6 * float(law.slope_uncertainty([ROOM])[0]),
+    }
+
+
+if __name__ == "__main__":
+    for design in DESIGNS:
+        ours, printed = (
+            beside(design),
+            "nothing printed" if design.slope is None else f"printed {design.slope[0]:g} to {design.slope[1]:g}",
+        )
+        print(f"{design.card}: f {ours['frequency']:.1f} Hz (printed {design.frequency:g})")
+        print(
+            f"  Q {ours['q']:.3g}, 90 % from {ours['low']:.3g} to {ours['high']:.3g} (printed {design.q[0]:.3g} to {design.q[1]:.3g})"
+        )
+        print(f"  slope {ours['slope']:.1f} ± {ours['sd']:.1f} ppm/K ({printed})")
+        print(f"  {design.source}")
