@@ -81,7 +81,8 @@ class CardProblem:
         """What is free of each run, with its prior standard deviation: departures (K), and the chamber's clock (s).
 
         Of a set point that jumped between two rows, the time of each jump is free: it was up to a row earlier. A jump at
-        the first row is not: what it did before the record began is in the departures. What the measured housing did
+        the first row is not: what it did before the record began is in the departures. A chamber that never jumps is known between
+        its rows; another clock is an effect. What the measured housing did
         between these two rows is free too: it has a kink there, and a straight line between its rows is not it.
         """
         away = [start_spread(run, self.instrument, self.law) for run in self.runs]
@@ -100,7 +101,7 @@ class CardProblem:
                 jumps, begin = part.drive.profile.jumps, part.drive.profile.start
                 if 0 < len(jumps) <= MOST_JUMPS:
                     found += [(k, f"{JUMP}{i}", row / np.sqrt(3)) for i, at in enumerate(jumps) if at > begin]
-                else:
+                elif len(jumps):
                     found.append((k, SHIFT, 0.5 * row))
         return tuple(found)
 

@@ -25,7 +25,7 @@ from studies.inference.heat_path import HeatPath, evidence_of, find_heat_path, r
 from studies.inference.held_out import Kept, Model, Rows
 from studies.inference.housing import set_housing_apart
 from studies.inference.inferred import Inferred
-from studies.inference.lack_of_fit import generic_bank, look
+from studies.inference.lack_of_fit import generic_bank, is_rounding, look
 from studies.inference.model import Background, Linear, Term
 from studies.inference.records import Campaign
 from studies.inference.relinearise import IMPOSSIBLE, columns_of, relinearise
@@ -339,6 +339,7 @@ def _confirmed(
             if _worse(*before[name].beside(after[name]))
             or rows[name].rms > alone[name].rms
             or (final.score - outcome.without[k].score < FAINT and not beside.sized(k))
+            or is_rounding(search.linear.problem, name, alone[name])
             or only_apart(search, outcome, k)
         ]
         if not weak:

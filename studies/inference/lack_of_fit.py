@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from compensation.lines import Line
+from studies.calibration.problem import CardProblem
 from studies.diagnosis.constants import CONSTANTS
 from studies.inference.generic_forms import BUMP, STEP, generic_forms
 from studies.inference.held_out import Model, Rows
@@ -17,6 +18,9 @@ from studies.inference.sharp import brief_events, fast_line, intermittent, tails
 Array = NDArray[np.float64]
 ENOUGH = CONSTANTS["margin"] - CONSTANTS["log_prior_unknown"]
 """Log evidence from which on structure is no chance."""
+
+REPEATED, ROUNDING = 0.5, 1.3
+"""Part of the readings that differ from the one before, up to which they are rounded to more than their noise; the rms of that, in its own parts."""
 
 
 @dataclass(frozen=True)
@@ -92,8 +96,17 @@ def look(
         if evidence > smooth and (named or longer):
             gained = max(own.evidence - before.evidence, 0.0)
             share = min(share, gained / max(gained + evidence, 1e-9))
+        if name in rows and is_rounding(search.linear.problem, name, rows[name]):
+            word, evidence, line = "the last digit of the readings", min(evidence, 0.0), None
         found[name] = Leftover(word, float(evidence), share, line)
     return found
+
+
+def is_rounding(problem: CardProblem, name: str, rest: Rows) -> bool:
+    """Whether what is left of readings that mostly repeat is what a step of q leaves, q/√12: it follows the level as structure does."""
+    steps = np.concatenate([np.diff(problem.runs[part.run].own_rows[name][1]) for part in problem.members(name)])
+    moves = np.abs(steps[steps != 0.0])
+    return len(moves) < REPEATED * len(steps) and rest.rms < ROUNDING * float(moves.min(initial=np.inf)) / 12**0.5
 
 
 def _instead_of_noise(search: Search, bank: Sequence[Shapes], final: Hypothesis, name: str) -> Hypothesis | None:

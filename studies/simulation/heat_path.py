@@ -77,7 +77,7 @@ def with_sensor(network: Network, time_constant: float) -> Network:
     capacity = SENSOR_SHARE * housing.capacity_at(0.0)
     joint = Conductor("housing", SENSOR, capacity / max(time_constant, LEAST_LAG))
     parts: list[Part] = [*network.nodes, Node(SENSOR, capacity), *network.boundaries, *network.sources]
-    return assemble([*parts, *network.conductors, joint, *network.radiators])
+    return replace(assemble([*parts, *network.conductors, joint]), radiators=network.radiators)
 
 
 def build_shell_and_stem(instrument: "Instrument") -> Network:

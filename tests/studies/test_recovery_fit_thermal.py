@@ -153,3 +153,11 @@ def test_unusable_records_are_refused(tmp_path, capsys):
         )
     with pytest.raises(InputError, match="--lags 9"):
         fit_thermal_constants([one_lag("soak 20 5h")], lags=9)
+
+
+def test_a_chamber_stands_for_the_housing_that_nobody_measured():
+    run = one_lag()
+    columns = {name.replace("housing", "chamber"): own for name, own in run.columns.items()}
+    found = fit_thermal_constants([Record(columns, path="run.csv")], lags=1).estimates
+    assert found["time_constant_1"].value == pytest.approx(1800.0, rel=2e-3)
+    assert found["radiated_share"].value == pytest.approx(0.0, abs=0.005)

@@ -209,3 +209,34 @@ def test_the_heat_path_of_a_real_gyro_is_no_effect_of_its_law():
     verdict = diagnose_records(runs).verdict
     assert {cause.effect for cause in verdict.causes} == {"second-lag", "radiation"}
     assert verdict.responses["frequency_Hz"].extended[0] < 3e-3  # of a swing of 20 Hz
+
+
+def test_a_chamber_logged_by_another_clock_in_one_run_is_found():
+    """30 s in one of three runs whose rows are 20 s apart: the chamber moves smoothly, so its clock is known better than its rows."""
+    made = []
+    for k, period in enumerate((9000.0, 12000.0, 7000.0)):
+        t = np.arange(0.0, 5 * 3600.0, 20.0)
+        chamber = lag(t, 20.0 + 25.0 * np.sin(2.0 * np.pi * t / period), 300.0)
+        x = lag(t, chamber, 1500.0) - 20.0
+        f = 4432.0 + 0.37 * x - 1e-3 * x**2 + 1.5e-3 * np.random.default_rng(k).standard_normal(t.size)
+        read = np.interp(t - 30.0, t, chamber) if k == 1 else chamber
+        columns = {"time_s": t, "chamber_temperature_degC": read, "frequency_Hz": f}
+        made.append(Record(columns, path=f"run{k}.csv", sha256=str(k)))
+    (cause,) = diagnose_records(made).verdict.causes
+    assert cause.effect == "clock-offset"
+    assert cause.parameters["run"].value == 2.0
+
+
+@pytest.mark.parametrize(("step", "noise"), [(0.25, 0.005), (0.5, 0.02)])
+def test_what_rounding_leaves_is_no_structure(step, noise):
+    """A bias that follows the temperature, read in steps far above its noise: it was unexplained, or had a cross-damping."""
+    t = np.arange(0.0, 8 * 3600.0, 20.0)
+    housing = lag(t, 20.0 + 25.0 * np.sin(2.0 * np.pi * t / 9000.0), 300.0)
+    x, rng = lag(t, housing, 1500.0) - 20.0, np.random.default_rng(4)
+    columns = {
+        "time_s": t,
+        "housing_temperature_degC": housing,
+        "frequency_Hz": 4432.0 + 0.37 * x + 2e-3 * rng.standard_normal(t.size),
+        "bias_deg_per_h": np.round((0.05 * x + noise * rng.standard_normal(t.size)) / step) * step,
+    }
+    assert diagnose_records([Record(columns, path="run.csv", sha256="1")]).verdict.verdict == "adequate"
