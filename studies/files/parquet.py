@@ -61,8 +61,8 @@ def write_table(file: IO[bytes], columns: "Table", comments: Sequence[str], path
     """Write columns of numbers and comment lines."""
     arrow, parquet = load_library("pyarrow", path, "Parquet"), load_library("pyarrow.parquet", path, "Parquet")
     table = arrow.table(dict(columns)).replace_schema_metadata({COMMENTS: json.dumps(list(comments)).encode()})
-    # the bytes of equal weight beside each other; readings repeat too seldom for a dictionary
-    parquet.write_table(table, file, compression="zstd", use_dictionary=False, use_byte_stream_split=True)
+    # readings repeat too seldom for a dictionary; other encodings are smaller, but not every program reads them
+    parquet.write_table(table, file, compression="zstd", use_dictionary=False)
 
 
 def _open(path: str | Path) -> Any:
