@@ -9,13 +9,14 @@ from typing import TYPE_CHECKING, Any
 from shell.constants import zero_Celsius
 from studies.errors import InputError
 from studies.instrument.card import Instrument
-from studies.sweeps.quantity import TOLERANCE
 
 if TYPE_CHECKING:
     from shell.elastic import Elastic
     from shell.layout import Theory
     from shell.modes import Mode
     from shell.resonator import Resonator
+
+TOLERANCE = 1e-5  # relative error of a frequency
 
 
 @dataclass

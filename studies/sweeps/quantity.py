@@ -7,12 +7,11 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
 import msgspec
 
 from studies.schema.keys import Keys, number, says
+from studies.sweeps.case import TOLERANCE, Case
 
 if TYPE_CHECKING:
     from shell.modes import Mode
-    from studies.sweeps.case import Case
 
-TOLERANCE = 1e-5  # relative error of a frequency
 SUFFIXES = {
     "Hz": "_Hz", "ppm/°C": "_ppm_per_degC", "°C": "_degC", "s": "_s", "°": "_deg", "g": "_g", "mm": "_mm",
     "°/h": "_deg_per_h", "°/√h": "_deg_per_rt_h", "Hz/µm": "_Hz_per_um", "ppb/g": "_ppb_per_g", "µrad/g": "_urad_per_g",
@@ -49,7 +48,7 @@ class Quantity(Keys, frozen=True, kw_only=True, tag_field="name"):
         """Return the columns that it fills, without its label."""
         raise NotImplementedError
 
-    def evaluate(self, case: "Case") -> Sequence[Number]:
+    def evaluate(self, case: Case) -> Sequence[Number]:
         """Return one number for every column."""
         raise NotImplementedError
 
@@ -124,6 +123,6 @@ class OvertoneQuantity(ModeQuantity, frozen=True, kw_only=True):
         """Such as "n = 2", or "n = 2, mode 1" for a higher mode."""
         return f"n = {self.harmonic}" + (f", mode {self.index}" if self.index else "")
 
-    def mode(self, case: "Case") -> "Mode":
+    def mode(self, case: Case) -> "Mode":
         """Return the mode of a design."""
         return case.mode(self.harmonic, self.index, self.theory, case.temperature(self.temperature_degC))

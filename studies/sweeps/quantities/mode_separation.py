@@ -4,8 +4,8 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING, Annotated
 
 from studies.schema.keys import number, says
-from studies.sweeps.case import Case
-from studies.sweeps.quantity import TOLERANCE, Column, ModeQuantity, Number
+from studies.sweeps.case import TOLERANCE, Case
+from studies.sweeps.quantity import Column, ModeQuantity, Number
 
 if TYPE_CHECKING:
     from shell.modes import Mode
