@@ -15,7 +15,7 @@ from studies.files.writing import check_folder, write_text
 from studies.instrument.card import load_card
 from studies.results import Result, Sentence, Table
 from studies.twin.fmu import write_fmu
-from studies.twin.plan import input_starts, plan_twin, symbol
+from studies.twin.plan import idle_input, input_starts, plan_twin, symbol
 from studies.twin.source import PROGRAM, exposed, outputs_of, sources
 
 NO_BINARY = (
@@ -66,7 +66,11 @@ def twin(
             sentences.append(Sentence(NO_BINARY, "warning"))
     exposed_ones = ((key, value) for key, value in plan.parameters.items() if exposed(plan, key))
     parameters = [{"name": key, "unit": symbol(key), "start": value} for key, value in exposed_ones]
-    inputs = [{"name": name, "unit": symbol(name), "start": start} for name, start in input_starts(plan).items()]
+    inputs = [
+        {"name": name, "unit": symbol(name), "start": start}
+        for name, start in input_starts(plan).items()
+        if name != idle_input(plan)
+    ]
     outputs = [{"name": name, "unit": symbol(name)} for name in outputs_of(plan)]
     payload = {
         "card": plan.instrument.name,

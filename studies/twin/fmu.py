@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Literal
 from xml.sax.saxutils import quoteattr
 
 from studies.files.writing import written_whole
-from studies.twin.plan import input_starts, symbol
+from studies.twin.plan import idle_input, input_starts, symbol
 from studies.twin.source import CORE, FMI, exposed, one_line, outputs_of, sources
 
 if TYPE_CHECKING:
@@ -137,7 +137,8 @@ def _variables(plan: "Plan") -> Iterator[Row]:
     taken = set(outputs_of(plan))
     for k, (name, start) in enumerate(input_starts(plan).items()):
         assert name not in taken or plan.boundary == "housing"
-        yield IN + k, f"imposed_{name}" if name in taken else name, "input", symbol(name), start
+        if name != idle_input(plan):
+            yield IN + k, f"imposed_{name}" if name in taken else name, "input", symbol(name), start
     for k, (key, value) in enumerate(plan.parameters.items()):
         if exposed(plan, key):
             yield PARAMETER + k, key, "parameter", symbol(key), value

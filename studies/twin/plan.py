@@ -247,14 +247,20 @@ def symbol(name: str) -> str:
 
 
 def input_starts(plan: Plan) -> dict[str, float]:
-    """Return the inputs of an FMU by name, with their values at the start."""
+    """Return the inputs of an FMU by name, with their values at the start; `idle_input` names one that is none."""
     card: Any = plan.instrument
-    found = {
+    return {
         f"{plan.boundary}_temperature_degC": card.reference_temperature - zero_Celsius,
         f"{plan.boundary}_temperature_slope_K_per_s": 0.0,
         "rate_deg_per_s": 0.0,
         "commanded_drive_amplitude_V": 0.0,
         "commanded_electrode_bias_V": math.sqrt(plan.constants["VOLTAGE_SQUARED"]),
         "commanded_quadrature_V": 0.0,
+        "commanded_pattern_angle_deg": card.bias.pattern_angle_deg,
+        "commanded_precession_deg_per_s": 0.0 if card.loop is None else card.loop.self_precession_deg_per_s,
     }
-    return found if plan.turns_freely else {**found, "commanded_pattern_angle_deg": card.bias.pattern_angle_deg}
+
+
+def idle_input(plan: Plan) -> str:
+    """Return the input that does not act: a held wave is not turned, a free one has the azimuth to which it has turned."""
+    return "commanded_pattern_angle_deg" if plan.turns_freely else "commanded_precession_deg_per_s"

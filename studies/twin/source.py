@@ -147,7 +147,7 @@ def card_body(plan: "Plan") -> str:
 def exposed(plan: "Plan", key: str) -> str:
     """Return the name of a parameter that may be changed; "" of one that is no key of the card, or does not act."""
     value = plan.parameters[key]
-    idle = ("loss" in plan.splines and key.startswith("loss.")) or (key == PRECESSION and not plan.turns_freely)
+    idle = ("loss" in plan.splines and key.startswith("loss.")) or key == PRECESSION  # a command
     return "" if key.startswith(".") or value != value or idle else key
 
 

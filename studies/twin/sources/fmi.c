@@ -50,7 +50,7 @@ static TwinInput commands(const Instance *one) {
     TwinInput in;
     for (int k = 0; k < TWIN_COMMANDS; ++k) {
         in.value[k] = one->in[2 + k];
-        in.given[k] = !(TWIN_FREE && k == IN_ANGLE);
+        in.given[k] = k != (TWIN_FREE ? IN_ANGLE : IN_PRECESSION);
     }
     return in;
 }

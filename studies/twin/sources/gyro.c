@@ -115,7 +115,8 @@ const char *twin_row(Twin *w, const TwinInput *in) {
     double *out = w->out, said[TWIN_SAID] = {frequency, 0.0, loss, 0.0};
 #if TWIN_FREE /* the wave turns with all that feigns a rate */
     const double turned_by = applied + felt / DEG_PER_H, before = w->turning.rate + (w->held ? applied - w->applied : 0.0);
-    twin_turn_freely(w, frequency, loss, wave, before, turned_by, span, said);
+    const double command = radians(in->given[IN_PRECESSION] ? in->value[IN_PRECESSION] : p[P_loop_self_precession_deg_per_s]);
+    twin_turn_freely(w, frequency, loss, wave, before, turned_by, command, span, said);
     said[1] = (said[1] - applied) * DEG_PER_H;
     out[OUT_pattern_angle_deg] = w->azimuth * 180 / PI;
 #elif TWIN_LOOPS

@@ -167,9 +167,8 @@ static void turn(Twin *w, const TwinTurning *a, const TwinTurning *b, double com
 }
 
 /* Whole angle: what the rows before have made of the azimuth, and what the loops say there. `before` is the rate that acted when
- * the span since the last row began. */
-void twin_turn_freely(Twin *w, double frequency, double loss, const double *wave, double before, double rate, double span, double *said) {
-    const double command = radians(w->p[P_loop_self_precession_deg_per_s]);
+ * the span since the last row began, `command` the commanded turn (rad/s) since then. */
+void twin_turn_freely(Twin *w, double frequency, double loss, const double *wave, double before, double rate, double command, double span, double *said) {
     double held[AZIMUTHS], still[4], moving[4];
     TwinTurning now;
     for (int k = 0; k < AZIMUTHS; ++k) {

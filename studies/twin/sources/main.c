@@ -11,7 +11,7 @@
 
 #include "twin.h"
 
-enum { TIME, BOUNDARY, FIRST_COMMAND, COLUMNS = FIRST_COMMAND + TWIN_COMMANDS, LONGEST_LINE = 4096 };
+enum { OFFERED = IN_PRECESSION, TIME = 0, BOUNDARY, FIRST_COMMAND, COLUMNS = FIRST_COMMAND + OFFERED, LONGEST_LINE = 4096 };
 static const char *const names[COLUMNS] = {"time_s", TWIN_BOUNDARY, "rate_deg_per_s", "drive_amplitude_V", "electrode_bias_V", "quadrature_V", "pattern_angle_deg"};
 
 typedef struct { double (*rows)[COLUMNS]; long count, place; int has[COLUMNS]; } Profile;
@@ -99,7 +99,7 @@ static void print_row(FILE *out, const Row *row, int full) {
     if (TWIN_SENSOR >= 0) fprintf(out, full ? ",%.17g" : ",%.6f", row->boundary);
     for (int k = 0; k < TWIN_OUTPUTS - 1; ++k)
         full ? fprintf(out, ",%.17g", row->out[k]) : fprintf(out, ",%.*f", twin_digits[k], row->out[k]);
-    for (int c = 1; c < TWIN_COMMANDS; ++c)
+    for (int c = 1; c < OFFERED; ++c)
         if (row->in.given[c] && !said_by_loops(c)) fprintf(out, full ? ",%.17g" : ",%.9f", row->in.value[c]);
     if (row->in.given[IN_RATE]) fprintf(out, full ? ",%.17g,%.17g" : ",%.9f,%.9f", row->in.value[IN_RATE], row->out[TWIN_OUTPUTS - 1]);
     fputc('\n', out);
@@ -136,7 +136,7 @@ static int write_rows(Twin *twin, Profile *profile, FILE *out, double row, int f
         twin->time = time - start;
         now = time;
         TwinInput in = {{0}, {0}};
-        for (int c = 0; c < TWIN_COMMANDS; ++c) {
+        for (int c = 0; c < OFFERED; ++c) {
             in.given[c] = profile->has[FIRST_COMMAND + c];
             in.value[c] = value_at(profile, time, FIRST_COMMAND + c);
         }

@@ -15,7 +15,7 @@
 
 #include "card.h"
 
-enum { IN_RATE, IN_AMPLITUDE, IN_VOLTAGE, IN_QUADRATURE, IN_ANGLE, TWIN_COMMANDS };
+enum { IN_RATE, IN_AMPLITUDE, IN_VOLTAGE, IN_QUADRATURE, IN_ANGLE, IN_PRECESSION, TWIN_COMMANDS };
 enum { TARGET_TEMPERATURE, TARGET_FREQUENCY, TARGET_BIAS, TARGET_LOSS, TARGETS };
 enum { FLICKER_TIMES = 18, TWIN_TERMS = 5, TWIN_SAID = 4 };
 
@@ -24,7 +24,7 @@ typedef struct { int parameter; double factor; } TwinCapacity;         /* p * fa
 typedef struct { int kind, target, memory, shape, weights; } TwinEffect; /* places in the memory and, of shape and weights, in p */
 typedef struct { double first, step; int count; const double *coefficients; } TwinSpline; /* 4 rows, highest power first */
 
-/* deg/s, V, V, V, deg; a command that is not given does not act, and the azimuth is the card's. */
+/* deg/s, V, V, V, deg, deg/s; a command that is not given does not act; the azimuth, and the precession of a free wave, are the card's. */
 typedef struct { double value[TWIN_COMMANDS]; int given[TWIN_COMMANDS]; } TwinInput;
 
 typedef struct { double markov[FLICKER_TIMES], walk, offset; int begun; } TwinNoise;
@@ -80,7 +80,7 @@ void twin_last_row(Twin *twin); /* the outputs at this moment itself: those of a
 /* Of the parts. */
 double twin_effect(Twin *twin, const TwinEffect *effect, const TwinInput *in, double h, double housing, double resonator, double rate);
 #if TWIN_FREE
-void twin_turn_freely(Twin *w, double frequency, double loss, const double *wave, double before, double rate, double span, double *said);
+void twin_turn_freely(Twin *w, double frequency, double loss, const double *wave, double before, double rate, double command, double span, double *said);
 #elif TWIN_LOOPS
 void twin_settle_loops(Twin *twin, double frequency, double loss, const double *wave, double rate, double angle, double *said);
 #endif

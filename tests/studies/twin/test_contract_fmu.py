@@ -15,7 +15,7 @@ from studies.instrument.card import load_card
 from studies.simulation.drive import drive_by_profile, rows_of
 from studies.simulation.virtual_gyro import simulate_run
 from studies.twin import fmu as fmus
-from studies.twin.plan import input_starts, plan_twin
+from studies.twin.plan import idle_input, plan_twin
 from tests.studies.twin.building import needs_compiler
 from thermal.profile import Profile
 
@@ -129,21 +129,21 @@ def test_contract_failure_keeps_the_old_file(tmp_path, monkeypatch):
 @pytest.mark.slow
 @needs_compiler
 def test_limits_turning_wave_in_fmpy(tmp_path):
-    """Whole angle under a rate that moves in steps: an FMU holds its inputs, the simulation is a straight line between its rows."""
+    """Whole angle at a rate, the precession commanded by an input in place of the card's, and a parameter changed."""
     path = tmp_path / "twin.fmu"
     loop = {"mode": "whole-angle", "self_precession_deg_per_s": 0.1, "pickoff_gain_ratio": 0.01}
     instrument = load_card("hrg-30mm-loops").with_table("loop", loop)
     plan = plan_twin(instrument)
-    assert "commanded_pattern_angle_deg" not in input_starts(plan)
+    assert idle_input(plan) == "commanded_pattern_angle_deg"
     fmus.write_fmu(plan, path, "3.0")
-    found, _ = simulate_fmpy(path, {"noise": False, "loop.drive_gain_ratio": -0.02}, "pattern_angle_deg")
+    start = {"noise": False, "loop.drive_gain_ratio": -0.02, "commanded_precession_deg_per_s": 0.3}
+    found, _ = simulate_fmpy(path, start, "pattern_angle_deg")
     profile = Profile(TIME, LEVEL + 273.15)
     drive = drive_by_profile(profile, rows_of(profile, 1.0))
     drive = type(drive)(drive.time, "chamber", profile, rate=np.full(drive.time.size, np.radians(0.01)))
-    expected = simulate_run(
-        instrument.with_values({"loop.drive_gain_ratio": -0.02}), drive, noise=False
-    ).prediction.columns
-    assert np.abs(found["pattern_angle_deg"] - expected["pattern_angle_deg"]).max() < 1e-9 * 540
+    moved = {"loop.drive_gain_ratio": -0.02, "loop.self_precession_deg_per_s": 0.3}
+    expected = simulate_run(instrument.with_values(moved), drive, noise=False).prediction.columns
+    assert np.abs(found["pattern_angle_deg"] - expected["pattern_angle_deg"]).max() < 1e-9 * 1620
     bias = expected["bias_deg_per_h"]
     assert np.abs(found["bias_deg_per_h"][1:] - (bias[1:] + bias[:-1]) / 2).max() < 1e-9 * np.abs(bias).max()
 
