@@ -149,6 +149,23 @@ class Electrodes:
                     best = min(best, float(np.max((stiffness * travel / force)[force > 0])))
         return float(np.sqrt(best))
 
+    def ohmic_loss(self, resistance: float) -> float:
+        """1/Q by the bias currents through a resistance (Ω) in series with every electrode, mean over the pattern's azimuths.
+
+        The moving face changes the capacitance C by c' = ∫ ε₀ w cos(nθ)/g² dA per displacement; the current i ω V c'/(1 + i ω R C)
+        heats R (transduction: Senturia, Microsystem Design, 2001, ch. 6):
+
+            1/Q = Σ_j ω R V_j² c'_j²/(1 + (ω R C_j)²) / (ω² ∫ ρ |u|² dV).
+        """
+        n, omega, found = self.pair.mode.harmonic, 2 * pi * self.pair.mode.frequency, 0.0
+        for one in self.electrodes:
+            area, w, theta, weight, gap = self._patch(one)
+            patch = VACUUM * area[:, None] * weight
+            change = complex((patch * w[:, None] / gap**2 * np.exp(1j * n * theta)).sum())
+            delay = omega * resistance * float((patch / gap).sum())
+            found += omega * resistance * one.voltage**2 * abs(change) ** 2 / 2 / (1 + delay**2)
+        return found / (pi * self.pair.scale)
+
     def per_volt(self) -> float:
         """df/dV when all voltages change together by the same volts, over f, 1/V."""
         return float(2 * self.per_square_volt[0] @ self.voltages)

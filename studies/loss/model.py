@@ -93,6 +93,7 @@ def loss_model(
             ripples += waves
         ripples += _surface_ripple(parts, vibration, causes)
         causes += _others(vibration, parts, spread, left_out)
+        causes += _ohmic(instrument, mode)
         first, third = _rim_harmonics(instrument, parts)
         if anchor or first or third:
             through_stem, unequal = _anchor(instrument, mode, (first, third), spread, anchor)
@@ -175,6 +176,19 @@ def _of_material(
     return causes
 
 
+def _ohmic(instrument: "Instrument", mode: "Mode") -> "list[LossCause]":
+    """What the bias currents of charged electrodes lose in the resistances of [electrodes]."""
+    from shell.damping.budget import constant_cause
+    from shell.imperfection import Pair
+
+    card = instrument.part("electrodes")
+    if not (card.are_charged and card.keys.resistance_ohm and mode.harmonic):
+        return []
+    value = card.on(Pair(mode), instrument.reference_temperature).ohmic_loss(card.keys.resistance_ohm)
+    source = "bias currents through resistance_ohm of [electrodes], as given in the card"
+    return [constant_cause("electrodes", value, GAP_SD, source, "less bias, a wider gap or a smaller resistance")]
+
+
 def _surface_ripple(parts: "LossParts", vibration: "Vibration", causes: "Sequence[LossCause]") -> "list[Ripple]":
     from shell.damping.anisotropy import Ripple, surface_weight
 
@@ -224,6 +238,7 @@ def _others(
     return causes
 
 
+GAP_SD = 0.2  # relative, of the loss by electrodes: it goes as 1/g⁴, and a gap is known to 5 %
 MOUNT_ADVICE = "a longer or thinner stem, a stiffer joint, balance of the rim's first and third harmonic"
 
 

@@ -1,4 +1,4 @@
-"""1/Q of a mode and its parts: heat, bulk, surface, films, gas, activated losses, and what leaves through the mount."""
+"""1/Q of a mode and its parts: heat, bulk, surface, films, gas, activated losses, electrodes, and what leaves through the mount."""
 
 from typing import TYPE_CHECKING, Annotated
 
@@ -18,6 +18,7 @@ PARTS = {
     "mount": "the mount",
     "films": "films",
     "activated": "activated losses",
+    "electrodes": "bias currents of electrodes",
 }
 MOUNT = ("mount", "anchor", "imbalance")
 

@@ -73,7 +73,7 @@ def test_a_wrong_key_is_named_with_the_mend(tmp_path, refuse, old, new, words):
     "column",
     [
         *("frequency_n2_Hz", "bryan_factor_n2", "tcf_n2_ppm_per_degC", "mass_g", "time_constant_shell_s"),
-        *(f"inverse_q_n2_{part}" for part in ("mount", "films", "gas", "surface", "thermoelastic")),
+        *(f"inverse_q_n2_{part}" for part in ("mount", "films", "gas", "surface", "thermoelastic", "electrodes")),
         *("split_n2_wall_3_Hz_per_um", "split_n2_rim_4_Hz_per_um", "loop_bias_deg_per_h"),
         *("acceleration_shift_n2_ppb_per_g", "rim_tilt_urad_per_g", "shock_stress_MPa"),
     ],
