@@ -12,7 +12,7 @@ import hashlib
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.polynomial import Chebyshev
@@ -32,6 +32,9 @@ from studies.results.page import Block, Embedded, fill_template
 from studies.sweeps.case import Case
 from studies.sweeps.expressions import Derived
 from studies.sweeps.parameters import find_nominal, set_parameters
+
+if TYPE_CHECKING:
+    from shell.resonator import Resonator
 
 DIMENSIONS = ("thickness_mm", "radius_mm", "height_mm", "stem.radius_mm", "bottom_thickness_mm", "cylinder_height_mm")
 MOST_AXES = 3
@@ -63,7 +66,7 @@ def live_blocks(
         "wave": "the split to {:.2g} % of its largest",
         "outline": "the picture to {:.2g} % of the swing",
     }
-    errors = [f"f to {1e6 * f:.2g} ppm", f"the other modes to {100 * max(others):.2g} %"]
+    errors = [f"f to {1e6 * f:.2g} ppm", f"the other modes to {100 * max(others, default=0.0):.2g} %"]
     errors += [words[name].format(100 * error) for name, error in data["fields"]["errors"].items()]
     caption = (
         f"Interpolated between full solves ({theory} theory) and checked against others within the sliders' ranges: {', '.join(errors)}."
@@ -85,7 +88,7 @@ def describe_live(
         axes = [Axis(key, *sorted((value * (1 - part), value * (1 + part)))) for key, value in varied]
         try:
             designs = Designs(instrument, tuple(axes), tuple(derived))
-            families = _families(designs, harmonic, theory, T)
+            families, lost = _families(designs, harmonic, theory, T)
             break
         except UNUSABLE_INPUT:
             if part == RANGES[-1]:
@@ -106,7 +109,7 @@ def describe_live(
         "slope": not unknown_slope(instrument),
         "fields": fields.spell(),
     }
-    return data, fields.missing
+    return data, (*fields.missing, *lost)
 
 
 @dataclass(frozen=True)
@@ -130,8 +133,10 @@ class Designs:
         )
 
 
-def _families(designs: Designs, harmonic: int, theory: Theory, T: tuple[float, float]) -> list[Family]:
-    """Return the families of the lowest mode of a harmonic and of those that come nearest to it; of others than it roughly."""
+def _families(
+    designs: Designs, harmonic: int, theory: Theory, T: tuple[float, float]
+) -> tuple[list[Family], list[str]]:
+    """Return the families of the lowest mode of a harmonic and, roughly, of those that come nearest to it, and which are left out."""
     nu = designs.instrument.material.value("poisson_ratio", np.linspace(*T, 33))
     ends = [end for unit in np.eye(len(designs.axes)) for end in (unit, -unit)]
     near: dict[tuple[int, int], None] = {}
@@ -144,13 +149,30 @@ def _families(designs: Designs, harmonic: int, theory: Theory, T: tuple[float, f
         own = solve(harmonic, 1)[0]
         other = nearest_mode(solve, own, range(HIGHEST + 1))
         near[other.harmonic, other.index] = None
-    return [
-        build_family(
-            lambda values: designs.make(values).resonator, designs.axes, nu=(float(nu.min()) - MARGIN, float(nu.max()) + MARGIN),
-            harmonic=n, index=index, theory=theory, tolerance=ROUGH if k else TOLERANCE, most=MOST_SOLVES,
+    span = float(nu.min()) - MARGIN, float(nu.max()) + MARGIN
+
+    def build(n: int, index: int, tolerance: float) -> Family:
+        def resonator(values: Array) -> "Resonator":
+            return designs.make(values).resonator
+
+        return build_family(
+            resonator,
+            designs.axes,
+            nu=span,
+            harmonic=n,
+            index=index,
+            theory=theory,
+            tolerance=tolerance,
+            most=MOST_SOLVES,
         )
-        for k, (n, index) in enumerate([(harmonic, 0), *near])
-    ]  # fmt: skip
+
+    families, lost = [build(harmonic, 0, TOLERANCE)], []
+    for n, index in near:
+        try:
+            families.append(build(n, index, ROUGH))
+        except UNUSABLE_INPUT as error:
+            lost.append(f"n = {n}, index {index} is left out: {error}")
+    return families, lost
 
 
 def _number(instrument: Instrument, key: str) -> float | None:
