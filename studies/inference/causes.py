@@ -16,6 +16,7 @@ from studies.diagnosis.verdict import (
     weigh,
 )
 from studies.effects import library
+from studies.inference.apart import with_levels
 from studies.inference.clock import settle
 from studies.inference.heat_path import LAGS, SHARE
 from studies.inference.inferred import Inferred
@@ -81,6 +82,23 @@ def _cause(found: Inferred, k: int) -> Cause:
         peak=float(np.ptp(change)),
         shapes=shapes | {term.effect.name: numbers},
     )
+
+
+def candidates_of(found: Inferred, name: str) -> list[Cause]:
+    """Return what may be behind a response of which nothing was named: the set that gains most, if it gains anything, as likely as it is."""
+    best: dict[str, float] = {}
+    for one in found.search.scan(found.final):
+        if one.term.response == name and one.gain > 0.0:
+            best[one.term.effect.name] = max(best.get(one.term.effect.name, 0.0), one.gain + one.term.price)
+    if not best:
+        return []
+    apart = with_levels(found.search, found.final, name).score - found.final.score
+    unknown = max(found.left[name].evidence + CONSTANTS["log_prior_unknown"], apart)
+    (first, *others), probability = weigh(list(best), list(best.values()), 0.0, unknown)
+    probability *= 1.0 - CONSTANTS["doubt_further"]
+    if probability < CONSTANTS["member"]:
+        return []
+    return [Cause(first, name, probability, tuple(sorted(others)), {}, 2.0 * max(best[first], 0.0))]
 
 
 def _shape_of(term: Term) -> dict[str, Interval]:

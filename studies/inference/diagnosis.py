@@ -233,7 +233,8 @@ def _with_heat_path(found: CardFit, told: Array | None, progress: Report) -> tup
     brought = [term.brought for term in outcome.final.terms if term.response == THERMOMETER]
     if first is None and brought and path.evidence > alone + max(brought):
         first = beside()
-    if first is None or first[2] < one_lag + MARGIN:
+    levels = with_levels(search, outcome.plain, THERMOMETER).score - outcome.plain.score
+    if first is None or first[2] < one_lag + MARGIN or levels > first[2] - alone + MARGIN:
         return None, search, outcome
     return replace(path, evidence=first[2] - alone, lead=first[2] - one_lag), *first[:2]
 

@@ -96,11 +96,12 @@ def _judge(
             )
     resonator = np.concatenate([path.states.resonator for path in found.search.signatures.paths])
     if np.ptp(resonator) < NARROW_RANGE:
-        return (
-            "not-identifiable",
-            f"too short to judge: the resonator's temperature changes by {np.ptp(resonator):.2g} K only",
+        remark = (
+            f"the resonator's temperature changes by {np.ptp(resonator):.2g} K only: what depends on it cannot show"
         )
-    return ("not-identifiable", doubt_of(left.input, left.evidence)) if left.doubtful else ("adequate", "")
+    else:
+        remark = ""
+    return ("not-identifiable", doubt_of(left.input, left.evidence)) if left.doubtful else ("adequate", remark)
 
 
 def _delayed(found: Inferred, name: str) -> str:

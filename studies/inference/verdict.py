@@ -21,7 +21,7 @@ from studies.diagnosis.verdict import (
     wrong_values,
 )
 from studies.effects import find_effect
-from studies.inference.causes import causes_of
+from studies.inference.causes import candidates_of, causes_of
 from studies.inference.inferred import Inferred
 from studies.inference.records import Campaign
 from studies.inference.responses import result_of
@@ -36,6 +36,10 @@ def judge(found: Inferred) -> Verdict:
     results |= skipped_results(found.campaign)
     verdict = overall([result.verdict for result in results.values()])
     named = tuple(cause for cause in doubted(causes) if cause.probability >= CONSTANTS["member"])
+    told = {cause.response for cause in named}
+    for name in found.search.linear.responses:
+        if results[name].verdict == "not-identifiable" and name not in told:
+            named += tuple(candidates_of(found, name))
     return Verdict(
         verdict,
         named,
