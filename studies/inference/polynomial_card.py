@@ -166,9 +166,15 @@ def _likeliest_lag(runs: Sequence[ObservedRun], column: str, x0: float) -> float
         return _fit(runs, column, float(np.exp(logarithm)), x0, True)[1] + float(unusual) ** 2
 
     grid = np.log(LAGS[LAGS <= most])
-    best = int(np.argmin([left(one) for one in grid]))
-    ends = grid[max(best - 1, 0)], grid[min(best + 1, len(grid) - 1)]
-    return float(np.exp(scipy.optimize.minimize_scalar(left, bounds=ends, method="bounded", options={"maxiter": 15}).x))
+    seen = np.array([left(one) for one in grid])
+    walled = np.concatenate([[np.inf], seen, [np.inf]])
+    found = []
+    for k in map(
+        int, np.flatnonzero((seen <= walled[:-2]) & (seen <= walled[2:]))
+    ):  # a narrow valley may be the deeper one
+        ends = grid[max(k - 1, 0)], grid[min(k + 1, len(grid) - 1)]
+        found.append(scipy.optimize.minimize_scalar(left, bounds=ends, method="bounded", options={"maxiter": 15}))
+    return float(np.exp(min(found, key=lambda one: float(one.fun)).x))
 
 
 def _levels(runs: Sequence[ObservedRun], column: str, tau: float, x0: float) -> tuple[float, Array, float]:

@@ -1,12 +1,14 @@
 """A card of a polynomial law: simulated, made from records alone, calibrated, written and read."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from studies.calibration.calibrate import calibrate
 from studies.cli import main
 from studies.errors import InputError
-from studies.inference.polynomial_card import polynomial_card
+from studies.inference.polynomial_card import _likeliest_lag, polynomial_card
 from studies.instrument.card import build_instrument, load_card, save_card
 from studies.simulation.chamber import load_profile
 from studies.simulation.virtual_gyro import simulate_run
@@ -82,3 +84,16 @@ def test_recovery_of_a_hidden_effect_without_a_card_and_of_an_unseen_run(tmp_pat
     for column, size in (("frequency_Hz", 2e-3), ("bias_deg_per_h", noise)):
         rest = true[column] - own[column]
         assert np.std(rest) < size, column
+
+
+def test_the_deeper_of_two_valleys_is_the_lag_where_the_grid_stands_on_the_wall_of_a_narrow_one(monkeypatch):
+    """An independent simulator's record had a broad valley at 2550 s, and at its lag of 1139 s a deeper one that the grid misses."""
+
+    def left(runs, column, tau, x0, apart):
+        narrow, broad = 1500.0 * np.log(tau / 1139.0) ** 2, 5.0 + 30.0 * np.log(tau / 2550.0) ** 2
+        return np.zeros(1), min(narrow, broad)
+
+    monkeypatch.setattr("studies.inference.polynomial_card._fit", left)
+    monkeypatch.setattr("studies.inference.polynomial_card.USUAL_SPREAD", 1e6)
+    run = SimpleNamespace(inner=SimpleNamespace(time=np.array([0.0, 3e4])))
+    assert _likeliest_lag([run], "frequency_Hz", 283.15) == pytest.approx(1139.0, rel=1e-3)
