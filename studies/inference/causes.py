@@ -28,8 +28,6 @@ Array = NDArray[np.float64]
 DELAY = "law.delay_s"
 SURE_DELAY = 3.0
 """Standard deviations from which on a delay is said."""
-SURE_SHARE = 3.0
-"""Standard deviations from which on a radiated share is named."""
 STEP, WORTH = 0.03, 0.5
 """Of a shape parameter (of its logarithm): first step to see its curvature, and fall of the evidence that a step should cost."""
 
@@ -177,15 +175,19 @@ def _path_causes(found: Inferred) -> list[Cause]:
     if found.path is None:
         return []
     name, path = found.search.linear.responses[0], found.path
-    probability, causes = 1.0 / (1.0 + float(np.exp(-path.lead))), []
+    probability, evidence = 1.0 / (1.0 + float(np.exp(-path.lead))), 2.0 * path.evidence
+    pairs = zip(found.plain[name].residual, found.rows[name].residual, strict=True)
+    peak = float(np.ptp(np.concatenate([before - after for before, after in pairs])))
+    causes = []
     if path.lags > 1:
         numbers = {key: Interval.about(*path.value(f"law.{key}")) for key in LAGS[: path.lags]}
-        causes.append(Cause("second-lag", name, probability, (), numbers, 2.0 * path.evidence))
-    share, sd = path.value(SHARE)
-    if share > SURE_SHARE * sd:
-        numbers = {"radiated_share": Interval.about(share, sd)}
-        evidence = (share / sd) ** 2 if causes else 2.0 * path.evidence
-        causes.append(Cause("radiation", name, probability, (), numbers, min(evidence, 2.0 * path.evidence)))
+        causes.append(Cause("second-lag", name, probability, (), numbers, evidence, peak=peak))
+    if path.radiates:
+        share, sd = path.value(SHARE)
+        own = min((share / sd) ** 2, evidence) if causes else evidence
+        causes.append(
+            Cause("radiation", name, probability, (), {"radiated_share": Interval.about(share, sd)}, own, peak=peak)
+        )
     return causes
 
 

@@ -218,7 +218,7 @@ def _with_heat_path(found: CardFit, told: Array | None, progress: Report) -> tup
     Where these follow nearly all that one lag does not, they are searched first, and one lag only as long as it may be the likelier one.
     """
     path = find_heat_path(found, progress=progress) if slow_share(found) > SUSPICIOUS else None
-    if path is None:
+    if path is None or not (path.lags > 1 or path.radiates):
         return (None, *_from(found, told, progress))
     alone = evidence_of(found)
 

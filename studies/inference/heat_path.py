@@ -29,6 +29,9 @@ RADIATED = {"value": 0.2, "sd": 0.2}
 WORTH = 10.0
 """Log evidence that one more lag must bring."""
 
+SURE_SHARE = 3.0
+"""Standard deviations from which on a radiated share is named."""
+
 
 @dataclass(frozen=True)
 class HeatPath:
@@ -57,6 +60,12 @@ class HeatPath:
     def price(self) -> float:
         """Log prior of the choice: one for each lag beyond the first, and one for radiation."""
         return PRICE * self.lags
+
+    @property
+    def radiates(self) -> bool:
+        """Whether the share is above 0 beyond its error."""
+        share, sd = self.value(SHARE)
+        return share > SURE_SHARE * sd
 
     def value(self, name: str) -> tuple[float, float]:
         """Return a value of the card and its standard deviation."""
