@@ -136,7 +136,7 @@ class Inference(Inferred, Shown):
             time=plain.time,
             plain=plain.residual,
             final=final.residual,
-            named=any(response in term.columns for term in self.final.terms),
+            named=any(response in term.columns for term in self.final.terms) or self.path is not None,
             step=float(np.median(np.concatenate([b.span for b in blocks]))),
             rest=np.concatenate(rest),
             run=np.concatenate([np.full(len(b.time), k) for k, b in enumerate(blocks)]),
