@@ -200,6 +200,12 @@ class Verdict:
         }
 
 
+def spell_structure(input_: str) -> str:
+    """Return what is left over in words, from "temperature: a narrow feature": a narrow feature in temperature."""
+    place, _, what = input_.partition(": ")
+    return what if what and place == "time" else f"{what or 'structure'} in {place}"
+
+
 def overall(verdicts: Sequence[str]) -> str:
     """Return the first verdict, in the contract's order, that any response has."""
     return next((v for v in VERDICTS if v in verdicts), "not-identifiable")

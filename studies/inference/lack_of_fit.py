@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from compensation.lines import Line
 from studies.calibration.problem import CardProblem
 from studies.diagnosis.constants import CONSTANTS
+from studies.diagnosis.verdict import spell_structure
 from studies.inference.generic_forms import BUMP, STEP, generic_forms
 from studies.inference.held_out import Model, Rows
 from studies.inference.model import Background, Term
@@ -46,7 +47,10 @@ class Leftover:
 def doubt_of(input_: str, evidence: float) -> str:
     """Return the sentence on structure that is more than noise leaves and less than it takes to name it."""
     needed = 2.0 * (CONSTANTS["margin"] - CONSTANTS["log_prior_unknown"])
-    return f"something may be left ({input_}): evidence {2.0 * evidence:.3g}, more than noise leaves, but structure needs {needed:g}"
+    return (
+        f"the residual may hold {spell_structure(input_)}: its evidence of {2.0 * evidence:.3g} is more than noise leaves,"
+        f" but less than the {needed:g} that proves it"
+    )
 
 
 def generic_bank(search: Search) -> list[Shapes]:

@@ -18,6 +18,7 @@ from studies.diagnosis.verdict import (
     Verdict,
     doubted,
     overall,
+    spell_structure,
     wrong_values,
 )
 from studies.effects import find_effect
@@ -90,7 +91,7 @@ def next_step(
                     " where it is resolved, or record its spectrum."
                 )
             return (
-                f"The {word} has structure in {result.left_over_input} that no known effect explains: repeat a run unchanged to see"
+                f"The {word} has {spell_structure(result.left_over_input)} that no known effect explains: repeat a run unchanged to see"
                 " whether it recurs, then vary that input alone."
             )
     return None

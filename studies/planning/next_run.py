@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from shell.material import spell
 from studies.diagnosis.constants import CONSTANTS
+from studies.diagnosis.verdict import spell_structure
 from studies.effects import find_effect, library
 from studies.inference.inferred import Inferred
 from studies.inference.model import Background, Term
@@ -186,6 +187,6 @@ def _look_again(found: Inferred, verdict: "Verdict", chamber: Chamber) -> Advice
     needs = ("voltage_squared", "amplitude_squared", "quadrature", "pattern_angle") if kind == "quiet" else ()
     programmes = candidates(found.search.linear.problem.runs, chamber, needs)
     best = next(one for one in programmes if one.kind == kind)
-    text = f"{name} has structure in {seen} that no known effect explains: run a {programmes[0].profile} unchanged to see whether it recurs"
+    text = f"{name} has {spell_structure(seen)} that no known effect explains: run a {programmes[0].profile} unchanged to see whether it recurs"
     text += "." if best.repeats else f", then {best.name} ({best.hours:.2g} h), which varies only that."
     return text, NextRun.of(best)

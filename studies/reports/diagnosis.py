@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 from studies.diagnosis.response import RESPONSES
-from studies.diagnosis.verdict import Cause, Verdict
+from studies.diagnosis.verdict import Cause, Verdict, spell_structure
 from studies.effects import find_effect
 from studies.instrument.display import display_name
 from studies.instrument.units import split_unit, unit_of
@@ -80,8 +80,8 @@ def spoken(response: str) -> str:
 
 def name_cause(cause: Cause) -> str:
     """Return a cause, or its set, with response and probability."""
-    *others, last = cause.names
-    names = f"one of {', '.join(others)} and {last}" if len(others) > 1 else " or ".join([*others, last])
+    *others, last = map(display_name, cause.names) if cause.kind == "value" else cause.names
+    names = f"{'one of ' if len(others) > 1 else ''}{', '.join(others)}{' or ' if others else ''}{last}"
     return f"{names} in {spoken(cause.response)} (probability {cause.probability:.2f})"
 
 
@@ -133,8 +133,8 @@ def response_table(verdict: Verdict) -> Table:
             "verdict": one.verdict,
             "gain": one.gain,
             "explained_share": one.explained_share,
-            "left": ("undecided" if one.left_over == "none" and one.left_over_input else one.left_over)
-            + (f" in {one.left_over_input}" if one.left_over_input else ""),
+            "left": ("perhaps " if one.left_over == "none" and one.left_over_input else "")
+            + (spell_structure(one.left_over_input) if one.left_over_input else one.left_over),
         })  # fmt: skip
     judged = any(row["baseline"] is not None for row in rows)
     note = "Rms residuals." + (
