@@ -79,7 +79,10 @@ class Calibration(Shown):
 
     @property
     def unsaved(self) -> str | None:
-        """Why it makes no card: it has not converged, has learnt nothing, or needs values that the card all but excludes."""
+        """Why it makes no card: rows of a table follow no law, it has not converged, has learnt nothing, or needs values that the card all but excludes."""
+        for one in self.settled:
+            if one.scatter is not None:
+                return f"the rows of {one.path} follow no law of temperature"
         if not self.fit.converged:
             return "the fit did not converge. Keep more values fixed (--exact), or leave out the run that differs most"
         if all(one.told_by == "prior" for one in self.estimates):
@@ -170,7 +173,7 @@ def calibrate(
         find_groups(problem.priors, found.covariance),
         ladder,
         held_out,
-        (*repeated, *warn(found, estimates, ladder)),
+        (*repeated, *(one.scatter.sentence for one in settled if one.scatter), *warn(found, estimates, ladder)),
         settled,
     )
 

@@ -5,7 +5,7 @@ reference temperature are weighted sums of the rows, and so are their derivative
 """
 
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from shell.constants import zero_Celsius
 from studies.calibration.observed import SETTLED, SettledTable
+from studies.calibration.scatter import Scatter, find_scatter, largest_scatter
 from studies.errors import InputError
 
 if TYPE_CHECKING:
@@ -60,6 +61,7 @@ class SettledComparison:
     level_Hz: Compared
     slope_ppm_per_degC: Compared | None
     bridges: tuple[str, ...] = ()  # what would take up the difference of the level alone
+    scatter: Scatter | None = None  # of rows that follow no law; a single such row is left out of level and slope
 
     def as_dict(self) -> dict[str, Any]:
         """Return the numbers, with the distances in standard deviations."""
@@ -73,8 +75,10 @@ class SettledComparison:
         """The comparison in words."""
         level, slope = self.level_Hz, self.slope_ppm_per_degC
         share = 100.0 * (level.measured / level.predicted - 1.0)
-        first = f"Measured at {self.temperature_degC:.4g} °C: {level.measured:.2f} Hz" + (
-            "" if slope is None else f", {slope.measured:.1f} ppm/°C"
+        row = None if self.scatter is None else self.scatter.row
+        first = (
+            f"Measured at {self.temperature_degC:.4g} °C{'' if row is None else f', without row {row + 1}'}: {level.measured:.2f} Hz"
+            + ("" if slope is None else f", {slope.measured:.1f} ppm/°C")
         )
         first += f". {self.card} predicts {level.predicted:.2f} ± {level.sd:.2g} Hz" + (
             "." if slope is None else f", {slope.predicted:.1f} ± {slope.sd:.1f} ppm/°C."
@@ -101,20 +105,29 @@ def compare_settled(problem: "CardProblem") -> tuple[SettledComparison, ...]:
     state = problem.evaluate(np.zeros(problem.count))
     found = []
     for table, rows in zip(problem.tables, problem.rows[SETTLED].slices, strict=True):
-        one = _compare(problem, table, table.temperature, state.slope[SETTLED][rows])
+        slopes = state.slope[SETTLED][rows]
+        scatter = find_scatter(table, problem.law.frequency(table.temperature, extrapolate=True))
+        if scatter is not None and (k := scatter.row) is not None:
+            T, f = np.delete(table.temperature, k), np.delete(table.frequency, k)
+            table, slopes = replace(table, temperature=T, frequency=f), np.delete(slopes, k, axis=0)
+        one = replace(_compare(problem, table, table.temperature, slopes), scatter=scatter)
         slope = one.slope_ppm_per_degC
-        if slope is not None and abs(slope.away) > NEAR:
-            words = _read_otherwise(problem, table, state.slope[SETTLED][rows])
-            if words or abs(slope.away) > FOREIGN:
+        if slope is not None and abs(slope.away) > NEAR and scatter is None:
+            words, other = _read_otherwise(problem, table, slopes)
+            if abs(slope.away) > FOREIGN:
                 raise InputError(
                     f"{table.path}: frequency_Hz changes by {slope.measured:.1f} ppm/°C at {one.temperature_degC:.4g} °C, where the"
                     f" card {one.card} predicts {slope.predicted:.1f} ± {slope.sd:.1f}: {abs(slope.away):.0f} standard deviations. "
                     + (
-                        f"If the temperatures are read {words}, the table agrees with the card; correct temperature_degC."
+                        f"If the temperatures are read {words}, the table agrees with the card ({other:.1f} standard deviations);"
+                        " correct temperature_degC."
                         if words
                         else "This table is of another gyro; give the card of the gyro that was measured."
                     )
                 )
+            if words:
+                note = f"If the temperatures were {words}, the slope would be {other:.1f} standard deviations away: check their unit."
+                one = replace(one, bridges=(*one.bridges, note))
         found.append(one)
     return tuple(found)
 
@@ -126,7 +139,7 @@ def _compare(problem: "CardProblem", table: SettledTable, temperature: Array, sl
     degree = min(DEGREE, len(np.unique(temperature)) - 1)
     width = max(float(np.ptp(temperature)), 1.0)
     weights = np.linalg.pinv(np.vander((temperature - middle) / width, degree + 1))
-    read = table.scatter
+    read = min(table.scatter, largest_scatter(table, predicted))
     at, f = weights[-1], float(weights[-1] @ predicted)
     row = at @ slopes
     level = Compared(float(at @ table.frequency), f, float(np.linalg.norm(row)), read * float(np.linalg.norm(at)))
@@ -174,12 +187,12 @@ def _bridges(problem: "CardProblem", level: Compared, row: Array) -> tuple[str, 
     return tuple(text)
 
 
-def _read_otherwise(problem: "CardProblem", table: SettledTable, slopes: Array) -> str:
-    """Return the reading of the temperatures with which a table agrees with the card; empty where none does."""
+def _read_otherwise(problem: "CardProblem", table: SettledTable, slopes: Array) -> tuple[str, float]:
+    """Return the reading of the temperatures with which a table agrees with the card, and its slope's standard deviations; empty where none does."""
     for words, read in READ_AS.items():
         other = _compare(problem, table, read(table.temperature), slopes)
         near, level = other.slope_ppm_per_degC, other.level_Hz
         alike = abs(level.measured / level.predicted - 1.0) < NEAR_LEVEL or abs(level.away) < NEAR
         if near is not None and abs(near.away) < NEAR and alike:
-            return words
-    return ""
+            return words, abs(near.away)
+    return "", 0.0

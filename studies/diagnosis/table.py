@@ -15,7 +15,8 @@ import numpy as np
 
 from compensation.decimation import average_groups
 from shell.constants import zero_Celsius
-from studies.calibration.observed import SETTLED, read_settled
+from studies.calibration.observed import SETTLED, SettledTable, read_settled
+from studies.calibration.scatter import Scatter, find_scatter
 from studies.diagnosis.constants import CONSTANTS
 from studies.diagnosis.table_forms import Candidate, best_by_words, rms, span_alike, weigh_forms
 from studies.diagnosis.table_noise import TableBaseline, make_scale
@@ -165,7 +166,8 @@ def study_steady_table(
         f"({rms(lone):.3f} Hz leave-one-out); rounding alone would give {rounding:.4f} Hz.",
     ]
     scatter = float(np.linalg.norm(left)) / np.sqrt(max(T.size - 3, 1))
-    fits = _Fits(T, f, rounding, scatter, law_left, left, lone, law_rms, ratio)
+    loose = find_scatter(SettledTable("the table", T + zero_Celsius, f, resolution), law_values)
+    fits = _Fits(T, f, rounding, scatter, law_left, left, lone, law_rms, ratio, loose)
     return _study(base, fits, said, (), None)
 
 
@@ -188,15 +190,15 @@ def study_calibrated_table(found: "Calibration") -> TableDiagnosis:
     moved.sort(key=lambda one: -abs(one.shift_sd))
     shifts = tuple(Shift(m.parameter, m.card, m.value, m.low, m.high, m.shift_sd) for m in moved)
     said = list(compared.sentences)
-    if shifts:
-        most = ", ".join(
-            f"{display_name(one.parameter)} ({one.shift_sd:+.2f} standard deviations)" for one in shifts[:2]
-        )
+    if far := [one for one in shifts[:2] if abs(one.shift_sd) > TOUCHED]:
+        most = ", ".join(f"{display_name(one.parameter)} ({one.shift_sd:+.2f} standard deviations)" for one in far)
         said.append(f"Largest changes in the calibration: {most}.")
     said.append(
         f"Residual with the card as given, rms over the rows: {rms(shipped):.3f} Hz; calibrated: {rms(left):.3f} Hz; rounding alone would give {rounding:.4f} Hz."
     )
-    fits = _Fits(T, f, rounding, max(table.scatter, rounding), shipped, left, lone, rms(shipped), ratio)
+    fits = _Fits(
+        T, f, rounding, max(table.scatter, rounding), shipped, left, lone, rms(shipped), ratio, compared.scatter
+    )
     return _study(base, fits, said, shifts, found)
 
 
@@ -213,6 +215,7 @@ class _Fits:
     lone: FloatArray
     law_rms: float
     ratio: float
+    loose: Scatter | None
 
 
 def _study(
@@ -244,7 +247,8 @@ def _study(
         )
 
     base_rms, lone = rms(left), rms(fits.lone)
-    sentences += table_sentences(T, f, rounding)
+    loose = fits.loose
+    sentences += [] if loose else table_sentences(T, f, rounding)
     scale = make_scale(base, rounding, fits.scatter, float(np.ptp(f)))
     nothing = scale.log_evidence(np.empty((T.size, 0)))
     x = T - float(0.5 * (T.min() + T.max()))
@@ -259,15 +263,21 @@ def _study(
         for name in dict.fromkeys(c.effect.name for c in every)
     }
     prior = CONSTANTS["log_prior_effect"]
+    needed = -2.0 * prior
     ranked = sorted(best.values(), key=lambda c: -c.log_evidence)
     forms = [(c.words, c.ssq, c.loo, 2.0 * (c.log_evidence - nothing)) for c in best_by_words(every)]
     short = 2.0 * (ranked[0].log_evidence - nothing) if ranked else 0.0
     nearest = " and ".join(c.words for c in ranked if 2.0 * (c.log_evidence - nothing) > short - TIE)
+    # one row cannot tell a mistake from an effect; of others a cause must leave what rows may scatter
+    if loose and (short < needed or loose.row is not None or rms(ranked[0].residual) > loose.limit):
+        sentences.insert(0, loose.sentence)
+        result = ResponseResult("unexplained", base_rms, (base_rms, lone), None, "structure")
+        return answer("unexplained", (), result, next_table(T, loose), forms=forms)
     # noise that has a shape beyond rounding is not called noise
     shaped = short > UNNAMED and base_rms > WANDERING * rounding and bends_beyond_a_cubic(T, f, rounding)
     white = scale.white()
     wanders = base_rms > WANDERING * white
-    if short < -2.0 * prior and (wanders or not shaped):
+    if short < needed and (wanders or not shaped):
         values = doubted(wrong_values(shifts))
         state = "unexplained" if wanders else "explained" if values else "adequate"
         if wanders:
@@ -278,14 +288,15 @@ def _study(
         elif short > UNNAMED:
             sentences.append(
                 f"The remaining residual of {base_rms:.3g} Hz rms is treated as noise: the evidence of {nearest} is {short:.1f}; a cause"
-                f" needs {-2.0 * prior:.0f}."
+                f" needs {needed:.0f}."
             )
         result = ResponseResult(state, base_rms, (base_rms, lone), None, "structure" if wanders else "none")
         return answer(state, values, result, next_table(T) if wanders else None, forms=forms)
-    if short < -2.0 * prior:
+    if short < needed:
         sentences.append(
-            f"The remaining residual of {base_rms:.3g} Hz rms is {base_rms / rounding:.0f} times what rounding leaves, but no cause reaches"
-            f" the evidence of {-2.0 * prior:.0f} that would make it likely by itself; nearest, with {short:.1f}: {nearest}."
+            f"The remaining residual of {base_rms:.3g} Hz rms is {base_rms / rounding:.0f} times what rounding leaves, so something is missing."
+            f" What comes nearest, {nearest}, has an evidence of {short:.1f}: less than the {needed:.0f} that proves a cause, so the set of causes"
+            " is given with its probability and none of them is proven."
         )
     winner = ranked[0]
     members, probability = weigh([c.effect.name for c in ranked], [c.log_evidence + prior for c in ranked], nothing)

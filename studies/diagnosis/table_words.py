@@ -1,10 +1,15 @@
 """What a steady-state table says in words: its own shape, how it was approached, what to measure next."""
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 import scipy
 
 from compensation.decimation import average_groups
 from studies.effects.states import FloatArray
+
+if TYPE_CHECKING:
+    from studies.calibration.scatter import Scatter
 
 DOUBTFUL = 0.05
 """p of the fourth order below which a cubic is said not to be sufficient."""
@@ -14,8 +19,13 @@ MORE = "measure at five or more, from below and from above."
 SOAK = "the soak time shows whether the resonator had settled, the thermometer distinguishes a scale error from a curvature of f"
 
 
-def next_table(T: FloatArray) -> str:
-    """Return what to measure next, which is not what the table has already."""
+def next_table(T: FloatArray, loose: "Scatter | None" = None) -> str:
+    """Return what to measure next, which is not what the table has already; rows that follow no law first."""
+    if loose is not None:
+        again = "two of the temperatures again: readings that repeat are right, and of this gyro"
+        return (
+            f"Measure {again if loose.row is None else f'row {loose.row + 1} again, and close to it on either side'}."
+        )
     if _turns(T):
         return f"Repeat the table with two soak times and a second thermometer: {SOAK}."
     return (

@@ -11,7 +11,7 @@ CANDIDATES = "0: candidate | 1: sum of squares (Hz²) .3 | 2: leave-one-out (Hz)
 EVIDENCE = (
     "Evidence: twice the logarithm of the Bayes factor, the ratio of the probabilities of the readings with and without the candidate,"
     " averaged over its size."
-    f" A cause is named from {-2.0 * CONSTANTS['log_prior_effect']:.0f}."
+    f" From {-2.0 * CONSTANTS['log_prior_effect']:.0f} it proves a cause; with less, causes are given only for a residual that is no noise."
 )
 
 

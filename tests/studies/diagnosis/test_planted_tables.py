@@ -1,11 +1,20 @@
 """Tables of settled readings with a known truth: loops, wandering rows, repeated temperatures, other laws than silica's."""
 
+import re
+
 import numpy as np
 import pytest
 
+from shell.constants import zero_Celsius
+from studies.calibration.observed import SettledTable
+from studies.calibration.scatter import find_scatter
+from studies.cli import main
 from studies.diagnosis.table import diagnose_table, study_steady_table
+from studies.diagnosis.verdict import spell_structure
 from studies.errors import InputError
+from studies.inference.lack_of_fit import doubt_of
 from studies.instrument.card import load_card
+from studies.reports.diagnosis import headline
 from studies.resonator.law import law_of
 
 WIDEST = 3
@@ -170,3 +179,77 @@ def test_the_papers_slope_is_shown_to_the_digits_of_the_cards_uncertainty():
     ]
     assert slope[1] == "79.2 ppm/°C"
     assert "88.7 ± 6.3" in slope[2]
+
+
+PAPER = (4416.97, 4421.05, 4424.90, 4428.56, 4432.07, 4435.56, 4439.20)
+"""Wang et al. 2012, Table 1, Hz at -20 to 40 °C."""
+SCRAMBLED = {
+    "one row mistyped": ((*PAPER[:3], 4482.56, *PAPER[4:]), r"Row 4 \(10 °C, 4482.56 Hz\) alone makes it"),
+    "shuffled": ([PAPER[k] for k in (3, 0, 5, 1, 6, 2, 4)], "No single row makes it. Are the rows mixed up, or of two"),
+    "two gyros": ([f * (1.004 if k % 2 == 0 else 1.0) for k, f in enumerate(PAPER)], "No single row .* of two gyros"),
+    "2 Hz of noise": (
+        (4417.16, 4423.55, 4423.04, 4430.54, 4431.55, 4435.04, 4443.00),
+        "2.21 Hz .* 9.3 % of the 23.8 Hz",
+    ),
+}
+
+
+@pytest.mark.parametrize(("f", "said"), SCRAMBLED.values(), ids=SCRAMBLED)
+@pytest.mark.parametrize("card", [CARD, None], ids=["card", "no card"])
+def test_rows_that_follow_no_law_are_unexplained(f, said, card, tmp_path):
+    """Beside the card each was `adequate`, 20 Hz off: the noise took it all, and the slope was judged by that noise."""
+    found = beside_card(tmp_path, np.arange(-20.0, 41.0, 10.0), f, card)
+    assert (found.verdict.verdict, found.verdict.causes) == ("unexplained", ()), found.verdict
+    assert re.search(said, found.sentences[0]), found.sentences[0]
+    if card and "mistyped" in found.sentences[0]:  # level and slope are of the other rows
+        slope = found.verdict.details["settled"]["slope_ppm_per_degC"]
+        assert slope["measured"] == pytest.approx(79.2, abs=0.3)
+        assert slope["away_sd"] == pytest.approx(-1.5, abs=0.1)
+
+
+def test_a_slope_is_judged_by_the_card_and_clean_rows(tmp_path):
+    """A slope of two gyros, 28 ppm/°C off where the card knows it to 6.3, was 0.3 standard deviations away."""
+    found = beside_card(tmp_path, np.arange(-20.0, 41.0, 10.0), SCRAMBLED["two gyros"][0])
+    slope = found.verdict.details["settled"]["slope_ppm_per_degC"]
+    assert abs(slope["away_sd"]) == pytest.approx(abs(slope["measured"] - slope["predicted"]) / slope["sd"], rel=0.1)
+
+
+@pytest.mark.parametrize("part", [0.002, 0.005])
+def test_rows_that_scatter_like_measured_ones_are_not_questioned(part):
+    """The paper's table leaves 0.4 % of its changes, and a thermometer of 0.3 K as much."""
+    T = np.arange(-20.0, 41.0, 10.0) + zero_Celsius
+    law = law_of(load_card(CARD)).frequency(T)
+    for seed in range(20):
+        f = law + np.random.default_rng(seed).normal(0, part * np.ptp(law), T.size)
+        assert find_scatter(SettledTable("t.csv", T, f, 0.01), law) is None
+
+
+def test_a_slope_within_six_standard_deviations_is_a_value_before_it_is_fahrenheit(tmp_path):
+    """0.7 times the slope, 5.3 standard deviations, was refused as °F; it is a value, in words, and the unit a question."""
+    f = 4432.07 + 0.7 * (np.array(PAPER) - 4432.07)
+    found = beside_card(tmp_path, np.arange(-20.0, 41.0, 10.0), f)
+    text = " ".join(found.sentences)
+    assert text.index("5.3 standard deviations") < text.index("If the temperatures were in °F, the slope would be 1.0")
+    assert "Temperature slope of the shear modulus in the frequency" in headline(found.verdict)
+    with pytest.raises(InputError, match=r"6 standard deviations[.] If the temperatures are read in °F"):
+        beside_card(tmp_path, 1.8 * np.arange(-20.0, 41.0, 10.0) + 32.0, PAPER)
+
+
+def test_a_card_of_rows_that_follow_no_law_is_not_saved(tmp_path, capsys):
+    """It was saved, with exit status 0."""
+    path, card = tmp_path / "typo.csv", tmp_path / "card.toml"
+    f = SCRAMBLED["one row mistyped"][0]
+    path.write_text("temperature_degC,frequency_Hz\n" + "".join(f"{10 * k - 20},{v}\n" for k, v in enumerate(f)))
+    assert main(["calibrate", CARD, str(path), "--save", str(card)]) == 2
+    said = capsys.readouterr().err
+    assert said.startswith(f"warning: The rows of {path} scatter by 22.1 Hz (rms)")
+    assert f"card.toml not saved: the rows of {path} follow no law of temperature" in said
+    assert not card.exists()
+
+
+def test_what_is_left_over_is_said_in_words():
+    assert "the residual may hold a narrow feature in temperature: its evidence of 9.91 is more than noise leaves" in (
+        doubt_of("temperature: a narrow feature", 4.955)
+    )
+    assert spell_structure("time: brief events") == "brief events"
+    assert spell_structure("history of the temperature") == "structure in history of the temperature"

@@ -11,6 +11,7 @@ import pytest
 import studies.papers
 from studies.diagnosis.table import diagnose_table
 from studies.errors import InputError
+from studies.reports.diagnosis import headline
 
 TABLE = str(Path(studies.papers.__file__).parent / "hrg_table1.csv")
 
@@ -49,8 +50,15 @@ def test_table1_beside_the_papers_card_says_what_an_engineer_asks_first():
     text = " ".join(found.sentences)
     # `adequate` may not stand beside a quartic at p = 0.009 and a residual of thirty times the rounding
     assert "a cubic is not sufficient" in text
-    assert "30 times what rounding leaves, but no cause reaches the evidence of 8" in text
-    assert "nearest, with 7.4: curvature up to order 4 and thermometer error up to order 4." in text  # the same data
+    # one truth: the headline gives the set with its probability, and the text says that none of it is proven
+    assert "30 times what rounding leaves, so something is missing" in text
+    assert (
+        "nearest, curvature up to order 4 and thermometer error up to order 4, has an evidence of 7.4" in text
+    )  # the same data
+    assert "less than the 8 that proves a cause" in text
+    assert headline(found.verdict).endswith(
+        "One of curvature, activity-dip, mounting-stress, radiation or thermometer-scale in the frequency (probability 0.54)."
+    )
     assert "approached from one side" not in text  # the file does not say so
     assert found.verdict.verdict == "not-identifiable"
     assert "79.2 ppm/°C. hrg-30mm predicts" in text

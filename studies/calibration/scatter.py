@@ -1,0 +1,70 @@
+"""Rows of a steady-state table that follow no law: mixed up, of two gyros, or one of them mistyped.
+
+Readings less the card's law, with level, slope and curvature free: the rms r of what is left is set against what temperature
+changes over the range. Without row k, of leverage h, Σr² falls by r_k² / (1 − h).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shell.constants import zero_Celsius
+from studies.calibration.observed import LEAST_SCATTER, THERMOMETER, SettledTable
+
+Array = NDArray[np.float64]
+PART = 0.01  # of what temperature changes: measured tables leave a quarter to a half of it
+ROUNDINGS = 10.0
+CLEARLY = 3.0  # times less that is left without one row than without any other
+
+
+@dataclass(frozen=True)
+class Scatter:
+    """Rows that scatter by more than a thermometer and the law's shape explain (Hz)."""
+
+    path: str
+    rms: float
+    limit: float
+    swing: float
+    row: int | None  # that alone makes it, with its reading
+    reading: str
+    without: float
+
+    @property
+    def sentence(self) -> str:
+        """The scatter, and what makes it."""
+        if self.row is not None:
+            why = f"Row {self.row + 1} ({self.reading}) alone makes it: without it {self.without:.2g} Hz remain. Is it mistyped?"
+        else:
+            why = "No single row makes it. Are the rows mixed up, or of two gyros? Until then level and slope say little of the gyro."
+        return (
+            f"The rows of {self.path} scatter by {self.rms:.3g} Hz (rms) about the law with level, slope and curvature free:"
+            f" {100 * self.rms / max(self.swing, 1e-9):.2g} % of the {self.swing:.3g} Hz that temperature changes over their range. {why}"
+        )
+
+
+def largest_scatter(table: SettledTable, predicted: Array) -> float:
+    """Return what rows of a table may scatter, Hz: part of what temperature changes, and the errors of their readings."""
+    swing, width = float(np.ptp(predicted)), max(float(np.ptp(table.temperature)), 1e-9)
+    least = max(LEAST_SCATTER * float(np.median(table.frequency)), ROUNDINGS * table.rounding)
+    return max(PART * swing, THERMOMETER * swing / width, least)
+
+
+def find_scatter(table: SettledTable, predicted: Array) -> Scatter | None:
+    """Return the scatter of rows about a law (Hz, of the rows); None where there is none to speak of or too few rows show it."""
+    T, limit = table.temperature, largest_scatter(table, predicted)
+    free = len(T) - 3
+    if free < 2 or len(np.unique(T)) < 3:
+        return None
+    own = np.linalg.qr(np.vander((T - T.mean()) / np.ptp(T), 3)).Q
+    away = table.frequency - predicted
+    rest = away - own @ (own.T @ away)
+    rms = float(np.sqrt(rest @ rest / free))
+    if rms <= limit:
+        return None
+    square = rest @ rest - rest**2 / np.maximum(1.0 - np.sum(own**2, axis=1), 1e-9)
+    without = np.sqrt(np.maximum(square, 0.0) / (free - 1))
+    k = int(np.argmin(without))
+    alone = without[k] < limit and without[k] * CLEARLY < np.delete(without, k).min()
+    reading = f"{T[k] - zero_Celsius:.4g} °C, {table.frequency[k]:.2f} Hz"
+    return Scatter(table.path, rms, limit, float(np.ptp(predicted)), k if alone else None, reading, float(without[k]))
