@@ -100,7 +100,7 @@ def cause_table(verdict: Verdict) -> Table:
     rows: list[dict[str, Any]] = []
     for cause in verdict.causes:
         head: dict[str, Any] = {
-            "cause": cause.effect,
+            "cause": display_name(cause.effect) if cause.kind == "value" else cause.effect,
             "or": ", ".join(cause.equivalent),
             "response": NAMES[cause.response],
             "peak": shown(cause.response, cause.peak),
