@@ -15,7 +15,7 @@ from studies.calibration.observed import LEAST_SCATTER, THERMOMETER, SettledTabl
 Array = NDArray[np.float64]
 PART = 0.01  # of what temperature changes: measured tables leave a quarter to a half of it
 ROUNDINGS = 10.0
-CLEARLY = 3.0  # times less that is left without one row than without any other
+CLEARLY = 2.0  # times less that is left without one row than without any other
 
 
 @dataclass(frozen=True)
