@@ -36,7 +36,7 @@ ACROSS = np.linspace(-1.0, 1.0, 9) * (1 - 1e-9)  # of a cell; its edges, but not
 
 @dataclass(frozen=True)
 class Peak:
-    """Largest stress: `tension` the largest principal one, `mises` after von Mises, Pa; each in its part (wall, root or stem)."""
+    """Largest stress: `tension` the largest principal one, `mises` the largest von Mises stress, Pa; each in its part (wall, root or stem)."""
 
     tension: float
     mises: float

@@ -138,7 +138,7 @@ def thermoelastic_cause(
             found.append(now.expansion**2 * temperature / now.capacity * flow / vibration.strain_energy)
         return np.array(found)
 
-    advice = "a wall thickness farther from the thermal diffusion length, or a material with less expansion"
+    advice = "a wall much thinner or much thicker than the thermal diffusion length, or a material with a lower expansion coefficient"
     return LossCause("thermoelastic", inverse_q, float(np.hypot(sd, 0.02)), source, advice)
 
 

@@ -24,6 +24,7 @@ from shell.scan.projection import CHUNK, Projector
 from shell.scan.waves import WaveBasis
 
 ROWS, COLUMNS = 72, 288  # cells along the meridian and around
+DEGREE = 7  # of the polynomials along the meridian
 SAMPLE = 25_000  # points of the first fit
 RIGID = 1e-6  # of the largest: a motion that moves the face along itself shows nothing
 HOLE = 25.0  # growth of a variance by gaps from which on the waves are not told
@@ -150,8 +151,19 @@ class _Profile:
         return np.asarray(self.face.waves.along(position) @ self.face.coefficients[self.order])
 
 
+def most_waves(count: int) -> int:
+    """The highest wave around that so many points, averaged in cells, can tell: an unknown needs a point."""
+    return min((COLUMNS - 1) // 2, max(count // (DEGREE + 1) - 1, 0) // 2)
+
+
 def survey(
-    points: Array, side: int, motion: RigidMotion, projector: Projector, name: str, highest: int = 12, degree: int = 7
+    points: Array,
+    side: int,
+    motion: RigidMotion,
+    projector: Projector,
+    name: str,
+    highest: int = 12,
+    degree: int = DEGREE,
 ) -> Face:
     """The waves of a face from its points (count, 3), m, in their own frame."""
 
@@ -177,7 +189,7 @@ def survey(
 
 
 def survey_map(
-    position: Array, azimuth: Array, values: Array, side: int, name: str, highest: int = 12, degree: int = 7
+    position: Array, azimuth: Array, values: Array, side: int, name: str, highest: int = 12, degree: int = DEGREE
 ) -> Face:
     """The waves of a face from a table (positions, azimuths) of how far it stands out of the material, m; NaN for gaps."""
     low, high = float(position.min()), float(position.max())

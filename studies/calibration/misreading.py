@@ -72,8 +72,9 @@ def _check_sign(instrument: "Instrument", record: "Record", law: "FrequencyLaw")
     )
     if white < changes and rest < min(FOLLOWED * changes, left / 3):
         raise InputError(
-            f"{record.path}: {BIAS} has the opposite sign to the card's prediction: with its sign changed, {rest:.2g} °/h of its {changes:.2g} °/h"
-            " (rms, white noise left out) remain. Change the sign of the column or, if the output is right, that of the card's bias."
+            f"{record.path}: {BIAS} has the opposite sign to the card's prediction: the prediction leaves {rest:.2g} °/h of its"
+            f" {changes:.2g} °/h with the sign changed and {left:.2g} °/h as it is (rms without white noise). Change the sign of the"
+            " column or, if the output is right, that of the card's bias."
         )
 
 

@@ -118,7 +118,8 @@ def _find_worse(record: Record, result: Record, columns: dict[str, dict[str, Any
 
 def _show(record: Record, result: Record, columns: dict[str, dict[str, Any]], worse: list[str]) -> list[Part]:
     rows = [{"name": name, "unit": unit_of(name).removeprefix("1") or ""} | one for name, one in columns.items()]
-    note = f"Before, after: standard deviation of {AVERAGE:g} s averages."
+    which = "Before, after" if any(one["stability_before"] is not None for one in rows) else "After"
+    note = f"{which}: standard deviation of {AVERAGE:g} s averages."
     if any(one["rows_not_compensated"] for one in rows):
         note += " Empty rows: an input is missing, or there are too few earlier samples for its rate."
     for words in worse:

@@ -45,8 +45,8 @@ def fit_scale(
 
     Give the paper's three records in any order, each with time_s, rate_deg_per_s (the applied rate), a temperature, and
     output_counts or measured_rate_deg_per_s: several rates at one temperature; at rest over temperature; at one rate over
-    temperature. Of these the first is enough, or a rate table over temperature in place of any; what lacks then is told, and the
-    model holds at the temperatures of the first only. A record at one temperature, first at rest and then at one rate (the paper:
+    temperature. The first alone is enough, and a rate table over temperature can replace any of them; the answer then says which steps
+    could not be fitted. A model from the first alone is valid only at its temperatures. A record at one temperature, first at rest and then at one rate (the paper:
     five minutes of rest, then +100 °/s), gives the rough null and scale (33); without it they are found from the record with
     several rates. Further records with several rates, also while the temperature changes, give the law over rate, temperature,
     warming and cooling.

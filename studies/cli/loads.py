@@ -35,9 +35,10 @@ from studies.instrument.card import Instrument
 from studies.resonator.loads import STANDARD_GRAVITY, bias_by_tilt, loads_of, shift_per_kelvin
 from studies.results import Facts, Result, Table, row_of
 
+LINEAR = 0.1  # strain and relative shift of f: no solid bears so much (ideal strength E/10), nor is it a small change
 ABROAD = (
     "Shift of the mean frequency of the pair, in the frame of the resonator. An acceleration across the axis shifts it only in second order."
-    " Stresses: the largest tension and that after von Mises, in the wall{root}; at sharp corners and at the clamp a linear elastic"
+    " Stresses: the largest tensile and the largest von Mises stress in the wall{root}; at sharp corners and at the clamp a linear elastic"
     " stress is not finite, so they are not counted."
 )
 COLUMNS = (
@@ -102,11 +103,14 @@ def loads(
 
         every: dict[Kind, float] = {kind: units for kind, _, _, units in given.values()}
         shifts = {kind: shift(kind, units) for kind, units in every.items()}
+        _check_small("relative shift of f", sum(map(abs, shifts.values())), LINEAR, "")
         rows = [
             {"load": name, "amount": amount, "unit": unit} | _under(found, {kind: units}, shifts[kind])
             for name, (kind, amount, unit, units) in given.items()
         ]
         whole = _under(found, every, sum(shifts.values()))
+        most = 1e-6 * LINEAR * elastic.E
+        _check_small("stress", max(whole["tension_MPa"], whole["mises_MPa"]), most, " MPa")
         if len(rows) > 1:
             rows.append({"load": "all together", "amount": None, "unit": ""} | whole)
         stem, tilted = found.beam(g * along, g * across), bias_by_tilt(instrument, found, T)
@@ -168,6 +172,14 @@ NONLINEAR = (
     "Geometric nonlinearity of a standing wave: the static part stiffens, the inertia of the motion at twice the frequency softens. Third-order"
     " elastic constants, which may matter as much in thick shells, and electrostatic springs are not included."
 )
+
+
+def _check_small(what: str, found: float, most: float, unit: str) -> None:
+    """Refuse loads beyond the first order, where the answers are proportional to them."""
+    if not found < most:
+        raise InputError(
+            f"these loads would cause a {what} of {found:.3g}{unit}; the theory is linear and does not hold from {most:.3g}{unit} up. Lower them."
+        )
 
 
 def _waves(mode: Mode, spin: SpinShift, omega: float) -> dict[str, float]:

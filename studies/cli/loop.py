@@ -24,9 +24,9 @@ from studies.record import Record
 from studies.reports.loop import describe, loop_parts
 from studies.resonator.law import law_of
 from studies.results import Result, row_of
-from studies.simulation.chamber import load_profile
-from studies.simulation.drive import MOST_ROWS
-from studies.simulation.loop import columns_of, require_loop, run_loops, without_loop
+from studies.simulation.chamber import load_schedule
+from studies.simulation.drive import MOST_ROWS, RATE
+from studies.simulation.loop import columns_of, find_range_use, require_loop, require_range, run_loops, without_loop
 from studies.simulation.loop_study import LoopStudy, study_loops
 from studies.simulation.state_space import write_state_space
 from studies.simulation.virtual_gyro import simulate_run
@@ -60,7 +60,8 @@ def loop(
             .mat file.
         hours: Length of the run; 1 unless --hours or --profile is given.
         row: Time between rows of the run in s; 1 unless given.
-        profile: Chamber profile of the run, as for hrg simulate; frequency and loss follow the temperature.
+        profile: Chamber profile of the run, in words or as a file with time_s, chamber_temperature_degC and optionally
+            rate_deg_per_s, which is applied; frequency and loss follow the temperature.
         both_ways: Reverse the self-precession halfway through the run (whole-angle cards only).
         noiseless: Run without noise.
     """
@@ -133,27 +134,37 @@ def _run(
     study: LoopStudy, temperature: float, out: str, hours: float, row: float, rate: float, profile: str | None,
     both_ways: bool, seed: int | None,
 ) -> Record:  # fmt: skip
-    instrument, damping = study.instrument, None
+    instrument, damping, applied = study.instrument, None, np.asarray(rate)
     f, loss = np.array(study.frequency), np.array(study.inverse_q)
     if profile is not None:
-        thermal = simulate_run(without_loop(instrument), load_profile(profile), 1 / row, noise=False).record
+        chamber, commands = load_schedule(profile)
+        if others := [name for name in commands if name != RATE]:
+            raise InputError(f"{profile}: hrg loop applies no {', '.join(others)}; remove it, or use hrg simulate.")
+        if commands and rate:
+            raise InputError(f"--rate: the column {RATE} of {profile} is applied; leave out one of them.")
+        thermal = simulate_run(without_loop(instrument), chamber, 1 / row, noise=False).record
         time, f, loss = thermal["time_s"], thermal["frequency_Hz"], thermal["inverse_q"]
         names = ("chamber_temperature_degC", "housing_temperature_degC", "resonator_temperature_degC")
         columns = {name: thermal[name] for name in names if name in thermal}
         T = thermal["resonator_temperature_degC"] + zero_Celsius
         law = damping_law(instrument, float(T.min()), float(T.max()))
         damping = law.wave(T) if law is not None and law.wave is not None else None
+        if commands:
+            turning = np.radians(applied := np.interp(time, chamber.time, commands[RATE]))
+            use = find_range_use(instrument, study.wave, turning)
+            require_range(instrument, use, turning, study.wave.coupling, profile)
     else:
         time = np.asarray(row * np.arange(int(hours * 3600 / row * (1 + 1e-12)) + 1), dtype=float)
         columns = {"chamber_temperature_degC": np.full(len(time), temperature - zero_Celsius)}
     generator = None if seed is None else np.random.default_rng(seed)
     run = run_loops(
-        instrument, time, f, loss, study.bryan_factor, rate=np.radians(rate), both_ways=both_ways, damping=damping, generator=generator
+        instrument, time, f, loss, study.bryan_factor, rate=np.radians(applied), both_ways=both_ways, damping=damping, generator=generator
     )  # fmt: skip
     keys = require_loop(instrument)
     columns = {"time_s": time, **columns, **columns_of(keys, run)}
-    if rate:
-        columns["rate_deg_per_s"] = np.full(len(time), rate)
+    if applied.any():
+        applied = np.broadcast_to(applied, len(time))
+        columns[RATE] = (applied + np.append(applied[1:], applied[-1])) / 2  # its mean over the row, as the output is
         columns["measured_rate_deg_per_s"] = columns.pop("bias_deg_per_h") / 3600
     if run.limited:
         say(f"warning: an actuator saturated in {run.limited} of {len(time)} rows.")

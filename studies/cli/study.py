@@ -101,6 +101,8 @@ def status(folder: Folder) -> Result:
     """Show the progress of a study and the failed cases with their reasons, also while it runs."""
     results = open_results(folder)
     found = _status(results, folder, is_running(folder))
+    if found["state"] == "unfinished":
+        _say_unfinished(results, folder)
     rows = [{"item": key.replace("_", " "), "value": found[key]} for key in STATUS]
     columns = "item | value: value .3"
     table = Table(results.study.name, rows, columns, results.study.note)
@@ -130,7 +132,7 @@ def report(
     say("writing the page, with mode shapes if the study has modes ...")
     found = study_result(results)
     write_text(page, render_result(found))
-    _say_unfinished(results)
+    _say_unfinished(results, folder)
     told = f"report on {_done(results)} cases: {page}\n"
     return replace(found, payload={**found.payload, "report": str(page)}, printed=told)
 
@@ -148,10 +150,12 @@ def export(folder: Folder, *, out: str | None = None, part_rows: Annotated[int, 
     if out is not None and Path(out).suffix:
         check_ending("--out", out, "an export is a CSV or Parquet file, or a folder", ".csv", ".parquet")
     path = Path(out) if out else Path(folder) / "results.csv"
+    if path.resolve() == Path(folder).resolve():
+        raise InputError(f"--out {out}: this is the folder of the study; name another one, such as {path / 'table'}.")
     units = export_results(results, path, part_rows)
     payload = {"table": str(path), "units_file": str(units), "rows": len(results)}
     payload |= row_of(results, "done", cases="total", columns="units")
-    _say_unfinished(results)
+    _say_unfinished(results, folder)
     return Result(payload, "Export", "", [f"{_done(results)} cases: {path}; units: {units}"])
 
 
@@ -159,8 +163,12 @@ def _done(results: Results) -> str:
     return str(len(results)) if results.done == results.total else f"{results.done} of {results.total}"
 
 
-def _say_unfinished(results: Results) -> None:
+def _say_unfinished(results: Results, folder: str) -> None:
     if results.done < results.total:
+        if not is_running(folder) and results.store.runs and results.store.runs[-1]["outcome"] is None:
+            say(
+                f"warning: the end of the last run is missing in {results.store.path}: it was killed, or the file was truncated."
+            )
         counts = f"{results.done} of {results.total} cases are done"
         say(f"note: the study is not finished: {counts}. Run it again to resume.")
 

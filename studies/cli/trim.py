@@ -169,7 +169,7 @@ def _parts(planned: CardPlan, payload: dict[str, Any]) -> list[Chapter]:
                 " Negative: the split changes in the opposite direction.", "note", "page"),
         ]),
         Chapter("Position of the cuts", [Figure(lambda: _draw_polar(plan, cuts),
-            "Rim against azimuth. Curves bulge where the slower mode has its antinodes (dashed); black bars: the cuts of the table, by mass.")]),
+            "The rim seen along the axis. Coloured curves: the split of each mode, outermost at the antinodes of the slower mode (dashed). Black bars: the cuts of the table, length by mass.")]),
         Chapter("Expected result", [Table("Splits before and after the cuts", states, STATES, LIMIT)]),
     ]  # fmt: skip
 

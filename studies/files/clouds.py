@@ -100,6 +100,9 @@ def _read_mesh(path: Path) -> "Array":
     return points
 
 
+FEWEST = 8  # azimuths of a table
+
+
 def _read_grid(path: Path, skipped: int) -> FaceGrid:
     import numpy as np
     import pandas as pd
@@ -118,7 +121,9 @@ def _read_grid(path: Path, skipped: int) -> FaceGrid:
             f"{path}: the positions must lie between 0 (start of the meridian) and 1 (rim), each only once."
         )
     step = 2 * np.pi / max(len(azimuth), 1)
-    if len(azimuth) < 8 or np.any(abs(np.diff(azimuth) - step) > 0.01 * step):
+    if len(azimuth) < FEWEST:
+        raise InputError(f"{path}: {len(azimuth)} azimuths are too few for harmonics; a table needs {FEWEST} or more.")
+    if np.any(abs(np.diff(azimuth) - step) > 0.01 * step):
         raise InputError(
             f"{path}: the azimuths do not close the circle: {len(azimuth)} columns need steps of {np.rad2deg(step):.4g}°; "
             "remove a column that repeats the first at 360°, or add missing columns with empty cells."

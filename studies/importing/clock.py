@@ -158,9 +158,9 @@ def _mend(table: RawTable, file: "FileMap", row: int) -> str:
     winter = (
         ""
         if file.timezone or file.time_format in SECONDS
-        else ", or a change to winter time: then name 'timezone' in the map"
+        else ", or a change to winter time: then give 'timezone' in its [[file]] of the map"
     )
-    return f"Is it a restart{winter}? Split the file there, or end it with last_line in the map."
+    return f"Is it a restart{winter}? Split the file there, or end it with last_line in its [[file]] of the map."
 
 
 def seconds_between(one: datetime.datetime, two: datetime.datetime, path: str) -> float:

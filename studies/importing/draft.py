@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from studies.errors import InputError
 from studies.importing.channels import is_container, open_channels, sort_groups
 from studies.importing.look import Look, as_number, is_stamp, look_at, look_at_group
-from studies.importing.mapping import SCHEMA, TABLE_TARGETS, FileMap, ImportMap
+from studies.importing.mapping import NUMERIC_TIMES, SCHEMA, TABLE_TARGETS, FileMap, ImportMap
 from studies.importing.meaning import Meaning, find_meanings, find_unit
 from studies.importing.offset import estimate_offset
 from studies.importing.stated import find_nominal, find_period
@@ -221,6 +221,8 @@ def _draft_look(path: str, look: Look, taken: Sequence[str]) -> tuple[list[str],
     if time:
         lines.append(f"time = {spell_value(time[0] if len(time) == 1 else time)}")
         lines.append(f"time_format = {spell_value(form)}{f'    # CHECK: {unsure}' if unsure else ''}")
+        if form not in NUMERIC_TIMES and "%z" not in form:
+            lines.append('# timezone = "Europe/Berlin"    # of local times that change between summer and winter')
     elif own:
         lines.append('time_format = "own"    # the clock of the file itself')
     else:

@@ -289,7 +289,7 @@ def _from(start: CardFit, told: Array | None, progress: Report, least: float | N
         for left in range(AGAIN, 0, -1):
             if holds(final) or not (final.terms or left == AGAIN) or beaten(final):
                 break
-            progress("linearised anew beside the effects")
+            progress("linearising the model again with the effects found")
             search, point, terms = linearise(final.terms, final.noise)
             if left > SETTLING:
                 plain, final = search.grow(terms, near if left > SETTLING + 1 else lambda _: True)
@@ -312,7 +312,7 @@ def _from(start: CardFit, told: Array | None, progress: Report, least: float | N
         tried.append((_on_all_rows(there, grown), there, at, grown))
     best = max(tried, key=lambda one: one[0], default=None)
     if best is not None and best[0] > _on_all_rows(search, final) + STRAYED:
-        progress("another valley")
+        progress("a better minimum found elsewhere; continuing there")
         _, there, point, grown = best
         search = Search(there.linear, there.signatures, grown.noise, None, progress)
         plain, final = straightened(*search.grow(grown.terms, near, grown.noise))

@@ -158,6 +158,12 @@ def read_record(path: str | Path) -> Record:
     return Record(table.values, str(path), table.sha256, **notes)  # type: ignore[arg-type]
 
 
+def place_of_largest(path: str, name: str) -> str:
+    """Return file and line of the largest magnitude in a column of a record or profile, for a message."""
+    table = read_columns(path, COLUMNS, required=(name,), prefixes=(COMPENSATED,))
+    return table.place(int(np.nanargmax(np.abs(table.values[name]))))
+
+
 def read_frequency_table(path: str | Path) -> Columns:
     """Read a steady-state table `temperature_degC,frequency_Hz` (HRG paper, Table 1); no value may be missing."""
     table = read_columns(path, TABLE_COLUMNS, required=TABLE_COLUMNS)

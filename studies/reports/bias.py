@@ -107,9 +107,10 @@ def how_rows_were_made(study: BiasStudy) -> str:
     run, variable = study.runs[0], study.runs[0].variable
     missing, spikes = sum(r.missing for r in study.runs), sum(r.spikes for r in study.runs)
     rows = ", ".join(str(r.time.size) for r in study.runs)
+    late = f"lags by {run.lag:g} s, half of that" if run.lag else "is centred on its row, without lag"
     return (
-        f"Each row is an average over {run.width:g} s ({rows} rows); {missing} samples with missing values and {spikes} spikes were"
-        f" left out. The rate is the slope of a line through {run.window:g} s of averages and lags by {run.lag:g} s. Changes of"
+        f"Each row is an average over {run.width:g} s ({rows} rows). Samples left out: {missing} with missing values, {spikes} as"
+        f" spikes. The rate is the slope of a line through {run.window:g} s of averages; it {late}. Changes of"
         f" {variable.name} are relative to {study.by('guarded').fit.reference:.4f} {variable.unit}."
         + memory_sentence(run.memory)
     )

@@ -42,7 +42,7 @@ PREDICTED = (
 LEVELS = "response | unit | white: white .3 | flicker: flicker .3 | walk: walk .3 | offset: offset .3"
 OFFSETS = "Rms of block averages about the mean of each run; run offset: rms of these means after the calibration."
 DRIVEN = "The measured housing drives the other responses where there is one."
-ROWS = "Settled frequency: rms over the rows of the tables; its noise is their scatter about the calibrated card."
+ROWS = "Settled frequency: rms residual over the rows of the tables; noise: the scatter of these rows about the calibrated card."
 WIDTHS = (
     "Shift: change in prior standard deviations. Width: posterior over prior standard deviation; the data determine a value up to 0.5,"
     " a value above 0.95 remains at its prior. Material properties: deviation from the law, relative where no unit is given."

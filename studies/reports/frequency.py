@@ -147,7 +147,7 @@ def _extrapolation(study: FrequencyStudy, other: FrequencyFit) -> Figure:
 
     caption = (
         f"Difference of the temperatures that the two polynomials give. Outside the measured range they differ by up to {differ(low - BEYOND)}"
-        f" at {low - BEYOND:.3g} °C and up to {differ(high + BEYOND)} at {high + BEYOND:.3g} °C: do not extrapolate either."
+        f" at {low - BEYOND:.3g} °C and up to {differ(high + BEYOND)} at {high + BEYOND:.3g} °C: use neither outside the measured range."
     )
     return Figure(draw, caption, "Difference of two fits: small inside the measured range, large outside.")
 

@@ -63,8 +63,8 @@ def live_blocks(
     f, *others = (one["error"] for one in data["modes"])
     words = {
         "loss": "1/Q to {:.2g} %",
-        "wave": "the split to {:.2g} % of its largest",
-        "outline": "the picture to {:.2g} % of the swing",
+        "wave": "the split to {:.2g} % of its largest value",
+        "outline": "the displacements shown to {:.2g} % of the largest",
     }
     errors = [f"f to {1e6 * f:.2g} ppm", f"the other modes to {100 * max(others, default=0.0):.2g} %"]
     errors += [words[name].format(100 * error) for name, error in data["fields"]["errors"].items()]

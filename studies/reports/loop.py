@@ -67,7 +67,7 @@ def loop_parts(study: LoopStudy, payload: dict[str, Any], run: Record | None) ->
         ]),
         Chapter("Bias", [
             Table("Bias by source, settled", named("bias"), "name: source | deg_per_h ± sd_deg_per_h: bias (°/h)",
-                "± one standard deviation, from the card's uncertain values. Total: including split and axis angles, which several sources share."),
+                "± one standard deviation, from the card's uncertain values. The total includes the uncertainty of the splits and their axes, which affect several sources at once."),
             Figure(lambda: _around(study), "Bias by source over the azimuth of the standing wave; removing an error removes its curve."),
             Table("Sensitivity of the bias to the card's values", moving, [
                 Column("key", "quantity", spell=display_name),

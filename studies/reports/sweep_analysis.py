@@ -121,7 +121,7 @@ def tolerance_parts(results: Results) -> list[Part]:
         reached = ", ".join(_reach(p, reach.part) for p in study.parameters if not isinstance(p.nominal, str))
         words = (
             f"The largest box around the nominal design without a failed design covers {100 * reach.part:.3g} % of every range"
-            f" ({reach.inside} designs inside): {reached}. This is based on the sampled designs only; confirm it with a worst-case search."
+            f" ({reach.inside} sampled design{'s' * (reach.inside != 1)} inside it): {reached}. This is based on the sampled designs only; confirm it with a worst-case search."
         )
     return [*search_parts(results, "tolerance"), Table("Yield", rows, YIELD, note), Sentence(words, "note")]
 

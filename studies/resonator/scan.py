@@ -15,7 +15,7 @@ from shell.modes import solve_modes
 from shell.resonator import Resonator
 from shell.scan.alignment import RigidMotion, align
 from shell.scan.projection import Projector, check_unit
-from shell.scan.survey import Face, rigid_shapes, survey, survey_map
+from shell.scan.survey import Face, most_waves, rigid_shapes, survey, survey_map
 from studies.errors import InputError
 from studies.files.clouds import FaceGrid, Unit, read_cloud
 
@@ -121,6 +121,10 @@ def scan_faces(
     faces: dict[str, Face] = {}
     for name, points in clouds.items():
         check_unit(points, resonator, files[name])
+        if highest > (most := most_waves(len(points))):
+            raise InputError(
+                f"--highest {highest}: {len(points)} points of {files[name]} allow harmonics up to {most}; lower it."
+            )
     if clouds and projector is not None:
         say("aligning the faces")
         together = [list(clouds)] if frames == "common" else [[name] for name in clouds]

@@ -1,6 +1,7 @@
 """A chamber profile from words (`thermal.profile`) or from a file `time_s,chamber_temperature_degC`; a record as a drive."""
 
 import os
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -75,7 +76,7 @@ def load_drive(text: str, boundary: "Boundary | None" = None, rate: float = 1.0)
     if boundary == "housing":
         raise InputError(f"{text}: only a record has a housing column to impose; leave out --boundary housing.")
     chamber, commands = load_schedule(text)
-    return drive_by_schedule(chamber, commands, rate) if commands else chamber
+    return replace(drive_by_schedule(chamber, commands, rate), source=text) if commands else chamber
 
 
 def check_profile(profile: "Profile", instrument: "Instrument") -> None:

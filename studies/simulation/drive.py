@@ -54,6 +54,7 @@ class Drive:
     shift: float = 0.0  # how much later than its profile says the boundary changes: the clock of a chamber
     start: float = 0.0  # since the start of the first run of the campaign
     rate: Array | None = None  # array (N,), rad/s, or None: That is applied, at the rows
+    source: str = ""  # file that the commands and the rate are from
     # How much later (s) single jumps of the profile are, in their order from 0: between which two rows they were is all
     # that is known.
     jumps: Mapping[int, float] = field(default_factory=dict)
@@ -149,14 +150,14 @@ def rows_of(profile: Profile, rate: float) -> Array:
     """Return the times (s) of the rows of a run through a profile, `rate` per second."""
     if not (np.isfinite(rate) and rate > 0):
         raise InputError("the time between rows must be positive and finite.")
-    count = int(np.floor((profile.end - profile.start) * rate * (1 + 1e-12))) + 1
+    count = np.floor((profile.end - profile.start) * rate * (1 + 1e-12)) + 1
     if count > MOST_ROWS:
         raise InputError(
-            f"rows every {1 / rate:g} s make {count / 1e6:,.0f} million rows, more than the {MOST_ROWS / 1e6:.0f} million allowed; raise --row."
+            f"rows every {1 / rate:g} s make {count / 1e6:.3g} million rows, more than the {MOST_ROWS / 1e6:.0f} million allowed; raise --row."
         )
     if count < 2:
         raise InputError(f"rows every {1 / rate:g} s make a single row of this profile; lower --row.")
-    return np.minimum(profile.start + np.arange(count) / rate, profile.end)
+    return np.minimum(profile.start + np.arange(int(count)) / rate, profile.end)
 
 
 def drive_by_record(record: Record, boundary: Boundary | None = None, time: Array | None = None) -> Drive:
@@ -196,7 +197,9 @@ def drive_by_record(record: Record, boundary: Boundary | None = None, time: Arra
     turned = None
     if RATE in record and np.isfinite(record[RATE]).all():
         turned = np.radians(record[RATE] if time is None else np.interp(time, rows, record[RATE]))
-    return Drive(rows if time is None else time, boundary, Profile(t, T), commands=commands, rate=turned)
+    return Drive(
+        rows if time is None else time, boundary, Profile(t, T), commands=commands, rate=turned, source=record.path
+    )
 
 
 def _settled_at(record: Record) -> float | None:

@@ -14,6 +14,7 @@ from compensation.settled_turn import read_turning, turn_settled
 from compensation.wave import StandingWave
 from compensation.whole_angle import WITHOUT_RATE, simulate_whole_angle
 from studies.errors import InputError, naming
+from studies.record import place_of_largest
 from studies.resonator.splitting import reference_split
 
 if TYPE_CHECKING:
@@ -111,7 +112,7 @@ def find_range_use(
     return electronics.actuators.use(wave.coupling * run.rate, run.quadrature, run.decay)
 
 
-def require_range(instrument: "Instrument", use: RangeUse, rate: ArrayLike, coupling: float) -> None:
+def require_range(instrument: "Instrument", use: RangeUse, rate: ArrayLike, coupling: float, source: str = "") -> None:
     """Raise naming the key of the actuator that the settled loops overload, and what it can hold."""
     loop = require_loop(instrument)
     if use.worst <= 1:
@@ -119,8 +120,9 @@ def require_range(instrument: "Instrument", use: RangeUse, rate: ArrayLike, coup
     where, held = f"{instrument.path} [loop]", np.degrees(float(np.max(np.abs(rate))))
     across, quadrature, drive = (float(np.max(x)) for x in (use.across, use.quadrature, use.drive))
     if loop.mode == "force-rebalance" and held > loop.rate_range_deg_per_s:
+        place = place_of_largest(source, "rate_deg_per_s") if source else "--rate"
         raise InputError(
-            f"{where}: the rate of {held:.4g} °/s (--rate) is beyond rate_range_deg_per_s = {loop.rate_range_deg_per_s:g}; apply a"
+            f"{where}: the rate of {held:.4g} °/s ({place}) is beyond rate_range_deg_per_s = {loop.rate_range_deg_per_s:g}; apply a"
             " lower rate, or raise the range."
         )
     if drive > 1:
@@ -137,8 +139,8 @@ def require_range(instrument: "Instrument", use: RangeUse, rate: ArrayLike, coup
             else f"rate_range_deg_per_s = {loop.rate_range_deg_per_s:g}"
         )
         raise InputError(
-            f"{where}: the quadrature of the frequency split takes {100 * quadrature:.0f} % of the range that {key} sets, which nulls a"
-            f" split of {1e3 * held_split:.4g} mHz; trim the split, or raise the range"
+            f"{where}: the quadrature of the frequency split needs {100 * quadrature:.0f} % of the available range: {key} can null a"
+            f" split of at most {1e3 * held_split:.4g} mHz; trim the split, or raise the range"
             + ("." if stiff else ', or set quadrature_control = "stiffness".')
         )
     turned = "the rate" if loop.mode == "force-rebalance" else "the self-precession"

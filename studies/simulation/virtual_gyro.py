@@ -90,7 +90,7 @@ def simulate_run(
         wave = wave_of(instrument, true["frequency_Hz"], true["inverse_q"], law.bryan_factor)
         turned = 0.0 if drive.rate is None else drive.rate
         use = find_range_use(instrument, wave, turned, drive.commands.get("pattern_angle"))
-        require_range(instrument, use, turned, wave.coupling)
+        require_range(instrument, use, turned, wave.coupling, drive.source)
     free = instrument.loop is not None and instrument.loop.mode == "whole-angle"
     if free:  # its rate is what the azimuth does from row to row, and its other columns are means over the same time
         for name in ("frequency_Hz", "bias_deg_per_h", "inverse_q", "quadrature_V"):

@@ -106,7 +106,9 @@ class Child:
         stopped = -(self.process.returncode or 0)
         if stopped in STOPPED:
             self.kill()
-            raise FunctionLost(f"{signal.Signals(stopped).name} from outside ended the process of {self.function}")
+            raise FunctionLost(
+                f"the process of {self.function} was killed from outside ({signal.Signals(stopped).name})"
+            )
         self.fail("ended its process")
 
     def fail(self, how: str) -> NoReturn:

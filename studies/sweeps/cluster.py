@@ -6,13 +6,14 @@ reach or imitate them can run code on this machine and on each other. So an addr
 elsewhere `tls://` is needed, with the certificates that Dask's configuration names (`distributed.comm.tls`).
 """
 
+import asyncio
 import ipaddress
 import logging
 import socket
 import time
 import warnings
 from collections.abc import Callable
-from concurrent.futures import CancelledError, Future
+from concurrent.futures import CancelledError, Future, ThreadPoolExecutor
 from contextlib import suppress
 from importlib import import_module
 from typing import Any
@@ -20,7 +21,8 @@ from typing import Any
 from studies.errors import InputError, MissingEnvironment
 from studies.sweeps.workers import Workers
 
-PATIENCE = 20.0  # s to find the scheduler, its first worker, and another after the last one has ended
+GREETING = 10.0  # s for the scheduler to answer
+PATIENCE = 20.0  # s for its first worker, and another after the last one has ended
 GLANCE = 3.0  # s for the scheduler to say which workers it has
 ENCRYPTED = ("tls", "wss")
 
@@ -43,6 +45,7 @@ class Cluster(Workers):
         for name in list(logging.root.manager.loggerDict):
             if name.partition(".")[0] in ("distributed", "tornado", "asyncio"):
                 logging.getLogger(name).setLevel(logging.CRITICAL)
+        greeted = False
         security = distributed.Security(require_encryption=True) if is_encrypted(address) else None
 
         class Client(distributed.Client):  # type: ignore[misc]
@@ -57,13 +60,20 @@ class Cluster(Workers):
                     raise
 
         try:
-            with dask.config.set({"distributed.comm.timeouts.connect": f"{PATIENCE} s"}):
-                self.client = Client(address, timeout=PATIENCE, set_as_default=False, security=security)
-        except (OSError, TimeoutError, ValueError, TypeError, RuntimeError) as error:
+            with dask.config.set({"distributed.comm.timeouts.connect": f"{GREETING} s"}):
+                with ThreadPoolExecutor(1) as aside:  # a notebook has a loop of its own in this thread
+                    aside.submit(asyncio.run, greet(distributed, address, security)).result()
+                greeted = True
+                self.client = Client(address, timeout=GREETING, set_as_default=False, security=security)
+        except (OSError, TimeoutError, ValueError, TypeError, RuntimeError, MemoryError) as error:
             if isinstance(error, TypeError):  # no context of TLS
                 raise MissingEnvironment(
                     f"{address}: encryption needs certificates: distributed.comm.tls.ca-file, .client.cert and .client.key in"
                     " Dask's configuration."
+                ) from error
+            if not greeted and is_open(address):
+                raise MissingEnvironment(
+                    f"{address}: this is no Dask scheduler: a server listens there but does not answer as one; correct --scheduler."
                 ) from error
             raise MissingEnvironment(
                 f"{address}: no scheduler with a worker answers ({error}); start both, or correct --scheduler."
@@ -117,6 +127,13 @@ class Cluster(Workers):
             )
 
 
+async def greet(distributed: Any, address: str, security: Any) -> None:
+    """Shake hands with a server of Dask; its own client would wait for ever for one that is silent."""
+    given = security.get_connection_args("client") if security else {}
+    comm = await asyncio.wait_for(distributed.core.connect(address, timeout=GREETING, **given), GREETING)
+    await comm.close()
+
+
 def leave(client: Any) -> None:
     """Close a client, also one whose scheduler is lost."""
     with suppress(OSError, TimeoutError, RuntimeError, CancelledError):
@@ -130,16 +147,39 @@ def is_encrypted(address: str) -> bool:
 
 def check_private(address: str) -> None:
     """Refuse a public address without encryption: who reaches or imitates the scheduler there could run code here."""
-    host = address.rpartition("://")[2].rpartition(":")[0].strip("[]")
+    host = host_of(address)
     try:
         found = socket.getaddrinfo(host, None) if host and not is_encrypted(address) else []
     except OSError:  # the client says that it cannot be found
         found = []
-    if any(ipaddress.ip_address(str(one[4][0]).partition("%")[0]).is_global for one in found):
+    if any(is_public(str(one[4][0])) for one in found):
         raise InputError(
             f"--scheduler {address}: a public address without encryption; whoever reaches or imitates it can run code here."
             " Use tls:// with certificates (distributed.comm.tls in Dask's configuration), or a private network."
         )
+
+
+def host_of(address: str) -> str:
+    """Return the host of an address [PROTOCOL://][USER@]HOST[:PORT]; an IPv6 address may stand in brackets."""
+    place = address.rpartition("://")[2].rpartition("@")[2].partition("/")[0]
+    host = place[1:].partition("]")[0] if place.startswith("[") else place.rpartition(":")[0] or place
+    return host.rstrip(".")
+
+
+def is_open(address: str) -> bool:
+    """Return whether something listens at an address."""
+    port = address.rpartition(":")[2].partition("/")[0]
+    try:
+        socket.create_connection((host_of(address), int(port)), GLANCE).close()
+    except (OSError, ValueError):
+        return False
+    return True
+
+
+def is_public(number: str) -> bool:
+    """Return whether an IP address is reached from everywhere; ::ffff:8.8.8.8 is 8.8.8.8."""
+    one = ipaddress.ip_address(number.partition("%")[0])
+    return (getattr(one, "ipv4_mapped", None) or one).is_global
 
 
 def call_if_same(code: str, function: Callable[..., Any], *arguments: Any) -> Any:

@@ -139,13 +139,15 @@ def test_units_mixed_up_are_named(tmp_path, line, part):
         load_card(card)
 
 
-def test_lengths_a_thousand_times_too_large_are_named(tmp_path):
+@pytest.mark.parametrize("stem", ["", 'support = "stem"\n[resonator.stem]\nradius_mm = 2.5\nend_mm = 2.0\n'])
+def test_lengths_a_thousand_times_too_large_are_named(tmp_path, stem):
     card = tmp_path / "card.toml"
     card.write_text(
         'schema = "hrg.card/1"\nname = "x"\n[resonator]\nshape = "hemisphere"\nradius_mm = 15000.0\nthickness_mm = 900.0\n'
+        f"{stem}"
         '[material]\nname = "fused-silica"\n'
     )
-    with pytest.raises(InputError, match="in mm, not in µm"):
+    with pytest.raises(InputError, match="radius_mm = 15000 looks 1000 × too large: lengths are in mm, not in µm"):
         load_card(card)
 
 

@@ -195,6 +195,8 @@ def test_times_that_repeat_or_go_back(tmp_path):
     assert first["frequency_Hz"].tolist() == [1, 3, 5]
     with pytest.raises(InputError, match=r"line 4: the time goes backwards \(by up to 1 s"):
         simple(tmp_path, ["0,1", "1,2", "0,3"])
+    with pytest.raises(InputError, match=r"change to winter time: then give 'timezone' in its \[\[file\]\]"):
+        simple(tmp_path, ["2026-10-25 02:59,1", "2026-10-25 02:00,2"], 'time_format = "iso"')
 
 
 @pytest.mark.parametrize("target", TARGETS)
@@ -577,6 +579,8 @@ def test_days_that_were_rotated_at_midnight_are_one_record(tmp_path, capsys, clo
     draft, run = tmp_path / "map.toml", tmp_path / "run.csv"
     assert hrg_import(*files, "--draft", draft) == 0
     assert tomllib.loads(draft.read_text())["file"][0]["parts"] == len(files) == 3
+    offered = draft.read_text().replace('# timezone = "', 'timezone = "')
+    assert tomllib.loads(offered)["file"][0]["timezone"] == "Europe/Berlin"
     assert hrg_import(*files, "--map", draft, "--out", run) == 0, capsys.readouterr().err
     record = read_record(run)
     assert np.allclose(record["time_s"], np.array(rows) - rows[0])

@@ -97,7 +97,7 @@ def test_a_reversal_of_what_does_not_precess_is_refused(card, refuse, lines):
     ("lines", "words", "said"),
     [
         ("", ["--rate", "300"], "the rate of 300 °/s (--rate) is beyond rate_range_deg_per_s = 100"),
-        ("frequency_split_mHz = 5000.0\n", [], "nulls a split of 306"),
+        ("frequency_split_mHz = 5000.0\n", [], "can null a split of at most 306"),
         ('quadrature_control = "stiffness"\nfrequency_split_mHz = 5000.0\n', [], "quadrature_range_Hz = 1"),
         ('mode = "whole-angle"\nself_precession_deg_per_s = 60.0\n', [], "the self-precession of 60 °/s takes 217.7 %"),
     ],
@@ -109,6 +109,26 @@ def test_what_the_actuators_cannot_hold_is_refused_with_their_range(card, tmp_pa
     assert said in refuse(["loop", path, *words])
     if not words:
         assert said in refuse(["simulate", path, "soak 20 10min", "--out", str(tmp_path / "run.csv")])
+
+
+def test_the_rate_of_a_profile_is_applied_and_one_beyond_the_range_is_named_by_its_line(card, tmp_path, refuse, ask):
+    path, profile, out = card(""), tmp_path / "rates.csv", str(tmp_path / "run.csv")
+
+    def write(last):
+        profile.write_text(f"time_s,chamber_temperature_degC,rate_deg_per_s\n0,20,0\n300,20,50\n600,20,{last}\n")
+        return str(profile)
+
+    for words in (["loop", path, "--profile", write(-150)], ["simulate", path, write(-150)]):
+        assert "the rate of 150 °/s (" + str(profile) + ", line 4)" in refuse([*words, "--out", out])
+    ask(["loop", path, "--profile", write(-60), "--row", "10", "--out", out, "--noiseless"])
+    record = read_record(out)
+    assert record["rate_deg_per_s"][[0, 59]] == pytest.approx([5 / 6, -60 + 11 / 6])
+    assert record["measured_rate_deg_per_s"] == pytest.approx(
+        record["rate_deg_per_s"], abs=0.02
+    )  # °/s; a row is 3.7 °/s
+    assert "leave out one of them" in refuse(["loop", path, "--profile", str(profile), "--rate", "9", "--out", out])
+    profile.write_text(profile.read_text().replace("rate_deg_per_s", "drive_amplitude_V"))
+    assert "applies no drive_amplitude_V" in refuse(["loop", path, "--profile", str(profile), "--out", out])
 
 
 def test_range_in_use_is_stated(card, ask):

@@ -80,7 +80,7 @@ def test_a_bias_of_the_opposite_sign_is_refused_before_the_fit(card, work):
     turned = spoilt(made, bias_deg_per_h=lambda b: -b)
     with pytest.raises(
         InputError,
-        match=r"bias_deg_per_h has the opposite sign to the card's prediction: with its sign changed, ",
+        match=r"bias_deg_per_h has the opposite sign to the card's prediction: the prediction leaves .* with the sign changed and ",
     ):
         work(own, turned)
     quiet = spoilt(made, bias_deg_per_h=lambda b: np.random.default_rng(1).standard_normal(b.size))

@@ -83,6 +83,8 @@ def test_scan_refuses_what_it_cannot_use(faces, tmp_path, refuse):
     wrong.write_text("# nothing\n")
     assert "has no points" in refuse(["scan", "free-dome", "none", wrong])
     assert "--highest" in refuse(["scan", "free-dome", faces["inner"], "--harmonic", 7])
+    assert " points of " in (said := refuse(["scan", "free-dome", faces["inner"], "--highest", 100000]))
+    assert 12 < int(said.partition("allow harmonics up to ")[2].partition(";")[0]) < 144
 
 
 def test_a_table_of_departures_must_close_the_circle(tmp_path, refuse, ask):
@@ -102,6 +104,8 @@ def test_a_table_of_departures_must_close_the_circle(tmp_path, refuse, ask):
     assert found["splits"][0]["slow_axis_deg"]["value"] == pytest.approx(np.rad2deg(0.4), abs=0.01)
     write(np.arange(0, 361, 7.5))
     assert "do not close the circle" in refuse(["scan", "free-dome", "none", path])
+    write(np.arange(0, 360, 90))
+    assert "4 azimuths are too few" in refuse(["scan", "free-dome", "none", path])
     write(np.arange(0, 180, 7.5))
     assert "do not close the circle" in refuse(["scan", "free-dome", "none", path])
     write(np.arange(0, 360, 7.5), 1e4)

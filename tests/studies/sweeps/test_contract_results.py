@@ -6,8 +6,9 @@ import shutil
 import socket
 import subprocess
 import sys
+import threading
 import time
-from contextlib import contextmanager, nullcontext
+from contextlib import ExitStack, contextmanager, nullcontext, suppress
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -211,7 +212,8 @@ def test_two_dask_workers_give_the_same_bits_and_a_lost_scheduler_is_resumable(c
     [
         ("tcp://8.8.8.8:8786", True), ("8.8.8.8:8786", True), ("tcp://[2001:4860:4860::8888]:8786", True), ("ws://1.1.1.1:80", True),
         ("tls://8.8.8.8:8786", False), ("tcp://127.0.0.1:8786", False), ("tcp://192.168.1.7:8786", False), ("[::1]:8786", False),
-        ("tcp://10.0.0.9:8786", False), ("tcp://nowhere.invalid:8786", False),
+        ("tcp://10.0.0.9:8786", False), ("tcp://8.8.8.8.:8786", True), ("tcp://user@0x08080808:8786", True),
+        ("tcp://8.8.8.8", True), ("tcp://[::ffff:8.8.8.8]:8786", True), ("tcp://user@127.0.0.1.:8786", False), ("tcp://nowhere.invalid:8786", False),
     ],
 )  # fmt: skip
 def test_a_public_scheduler_needs_encryption(address, public):
@@ -219,6 +221,27 @@ def test_a_public_scheduler_needs_encryption(address, public):
 
     with pytest.raises(InputError, match="public address without encryption") if public else nullcontext():
         check_private(address)
+
+
+@pytest.mark.parametrize("greeting", [b"", b"SSH-2.0-OpenSSH_9.2p1 Debian-2\r\n"], ids=["silent", "ssh"])
+def test_a_server_that_is_no_scheduler_is_named(greeting, monkeypatch):
+    """A silent one kept the study waiting for ever; the greeting of another was taken for a length that no memory holds."""
+    pytest.importorskip("distributed")
+    from studies.sweeps import cluster
+
+    def serve():
+        with suppress(OSError), ExitStack() as kept:
+            while True:
+                kept.enter_context(server.accept()[0]).sendall(greeting)
+
+    monkeypatch.setattr(cluster, "GREETING", 2.0)
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        thread = threading.Thread(target=serve)
+        thread.start()
+        with pytest.raises(MissingEnvironment, match="this is no Dask scheduler"):
+            cluster.Cluster(f"tcp://127.0.0.1:{server.getsockname()[1]}")
+        server.shutdown(socket.SHUT_RDWR)
+        thread.join()
 
 
 @pytest.mark.slow

@@ -257,9 +257,17 @@ def test_a_torn_store_holds_what_was_whole(tmp_path, functions, capsys, ask):
     said = ask(["study", "export", str(tmp_path / "out")])
     assert (said["rows"], said["done"], said["cases"]) == (done, done, 400)
     assert main(["study", "export", str(tmp_path / "out")]) == 0
-    assert f"{done} of 400 cases are done" in capsys.readouterr().err
+    assert f"{done} of 400 cases are done" in (said := capsys.readouterr().err)
+    assert "the end of the last run is missing" in said
+    assert main(["study", "status", str(tmp_path / "out")]) == 0
+    assert "it was killed, or the file was truncated" in capsys.readouterr().err
+    assert main(["study", "export", str(tmp_path / "out"), "--out", str(tmp_path / "out")]) == 2
+    assert "this is the folder of the study" in capsys.readouterr().err
     with contextlib.closing(run_study(spec, tmp_path / "out", workers=1, allow_python=True)) as results:
         assert results.column("square").tolist() == [x**2 for x in np.linspace(0, 1, 400).tolist()]
+    path.write_bytes(b"")
+    with pytest.raises(InputError, match="or the file was truncated"):
+        open_results(tmp_path / "out").study  # noqa: B018
 
 
 def test_a_store_of_an_earlier_version_is_named_and_left_alone(tmp_path, functions):
