@@ -151,6 +151,8 @@ def test_the_records_of_the_fit_are_compensated(tmp_path, capsys):
         assert main(["compensate", str(model), record, "--out", str(tmp_path / "out.csv")]) == 0, (
             capsys.readouterr().err
         )
+    assert "After: standard deviation of" in (said := capsys.readouterr().out)  # counts have no rate before
+    assert "Before" not in said
     far = read_record(records[2])
     hot = far.with_columns({"housing_temperature_degC": far["housing_temperature_degC"] + 20})
     with pytest.raises(InputError, match="extrapolate"):
