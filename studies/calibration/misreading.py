@@ -4,6 +4,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from compensation.arrays import Array
 from compensation.noise import white_rms
 from shell.constants import zero_Celsius
 from shell.errors import ShellError
@@ -39,26 +40,37 @@ def check_readings(instrument: "Instrument", records: "Sequence[Record]", law: "
     law = law or law_of(instrument)
     for record in records:
         _check_unit(instrument, record)
+        _check_temperatures(instrument, record, law)
         _check_sign(instrument, record, law)
-        names = [name for name in COLUMN.values() if name in record]
-        if FREQUENCY not in record or not names:
-            continue
-        known = record[FREQUENCY][np.isfinite(record[FREQUENCY])]
-        changes = float(np.std(known)) if known.size > 2 else 0.0
-        if changes <= CLEAR * white_rms(known):
-            continue
-        (left,) = _left(instrument, record, law)
-        if left < REFUSED * changes:
-            continue
-        whole = law_of(instrument)
-        for words, read in READ_AS.items():
-            columns = {name: read(record[name] + zero_Celsius) - zero_Celsius for name in names}
-            (other,) = _left(instrument, record.with_columns(columns), whole)
-            if other < min(FOLLOWED * changes, left / 3):
-                raise InputError(
-                    f"{record.path}: frequency_Hz does not follow the temperatures as the card predicts, unless they are read {words}:"
-                    f" {other:.2g} Hz of its {changes:.2g} Hz (rms) then remain. Correct {' and '.join(names)}."
-                )
+
+
+def _check_temperatures(instrument: "Instrument", record: "Record", law: "FrequencyLaw") -> None:
+    """Refuse temperatures that the frequency follows only if they are read otherwise."""
+    names = [name for name in COLUMN.values() if name in record]
+    if FREQUENCY not in record or not names:
+        return
+    known = record[FREQUENCY][np.isfinite(record[FREQUENCY])]
+    changes = float(np.std(known)) if known.size > 2 else 0.0
+    if changes <= CLEAR * white_rms(known):
+        return
+    (left,) = _left(instrument, record, law)
+    if left < REFUSED * changes:
+        return
+    whole = law_of(instrument)
+    for words, read in READ_AS.items():
+        columns = {name: read(record[name] + zero_Celsius) - zero_Celsius for name in names}
+        (other,) = _left(instrument, record.with_columns(columns), whole)
+        if other < min(FOLLOWED * changes, left / 3):
+            right = columns[COLUMN["housing"] if COLUMN["housing"] in names else names[0]]
+            wrong = [one for one in names if _apart(columns[one], right) <= _apart(record[one], right)]
+            raise InputError(
+                f"{record.path}: frequency_Hz does not follow the temperatures as the card predicts, unless they are read {words}:"
+                f" {other:.2g} Hz of its {changes:.2g} Hz (rms) then remain. Correct {' and '.join(wrong)}."
+            )
+
+
+def _apart(one: Array, two: Array) -> float:
+    return float(np.nanmedian(np.abs(one - two)))
 
 
 def _check_sign(instrument: "Instrument", record: "Record", law: "FrequencyLaw") -> None:

@@ -83,6 +83,13 @@ def test_a_bias_of_the_opposite_sign_is_refused_before_the_fit(card, work):
         match=r"bias_deg_per_h has the opposite sign to the card's prediction: the prediction leaves .* with the sign changed and ",
     ):
         work(own, turned)
+    cold = with_temperatures(made, lambda T: -T)
+    with pytest.raises(
+        InputError, match=r"read with the opposite sign.* Correct chamber_temperature_degC and housing_"
+    ):
+        work(own, dataclasses.replace(cold, path="cold.csv"))  # once laid to the bias, which was right
+    with pytest.raises(InputError, match=r"read with the opposite sign.* Correct housing_temperature_degC"):
+        work(own, spoilt(made, housing_temperature_degC=lambda T: -T))
     quiet = spoilt(made, bias_deg_per_h=lambda b: np.random.default_rng(1).standard_normal(b.size))
     check_readings(own, [quiet])
 
