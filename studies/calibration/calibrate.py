@@ -25,6 +25,7 @@ from studies.errors import InputError
 from studies.instrument.display import display_name
 from studies.record import Record, drop_repeats, with_bias
 from studies.record.plausible import check_card_frequency, check_one_gyro
+from studies.record.rest import check_seconds
 from studies.results.shown import Shown
 from studies.simulation.drive import COLUMN
 from studies.simulation.variations import JUMP, SHIFT
@@ -131,6 +132,7 @@ def calibrate(
         raise InputError("no data given; calibration needs a record or a steady-state table.")
     given = [with_bias(record) for record in records]
     records, repeated = drop_repeats(given)
+    doubts = [doubt for doubt in map(check_seconds, records) if doubt]
     if hold_out is not None:  # the one that a repeated record repeats
         held = given[hold_out % len(given)]
         hold_out = next((k for k, one in enumerate(records) if one is held), len(records) - 1)
@@ -173,7 +175,12 @@ def calibrate(
         find_groups(problem.priors, found.covariance),
         ladder,
         held_out,
-        (*repeated, *(one.scatter.sentence for one in settled if one.scatter), *warn(found, estimates, ladder)),
+        (
+            *repeated,
+            *doubts,
+            *(one.scatter.sentence for one in settled if one.scatter),
+            *warn(found, estimates, ladder),
+        ),
         settled,
     )
 

@@ -16,8 +16,8 @@ MOST_LOSS = 30.0
 """Times by which 1/Q of one gyro may differ from record to record."""
 
 
-def check_units(records: Sequence[Record], tables: Sequence[dict[str, FloatArray]]) -> None:
-    """Raise InputError when a column can hardly be in the unit that its name says."""
+def check_units(records: Sequence[Record], tables: Sequence[dict[str, FloatArray]]) -> list[str]:
+    """Raise InputError when a column can hardly be in the unit that its name says; return the doubts about the time."""
     for record, table in zip(records, tables, strict=True):
         where = record.path or "record"
         if not 100.0 < (value := _level(table, "frequency_Hz", 1e3)) < 1e9:
@@ -28,7 +28,7 @@ def check_units(records: Sequence[Record], tables: Sequence[dict[str, FloatArray
             raise InputError(
                 f"{where}: inverse_q is about {value:g}; it must be 1/Q, between 0 and 0.1. Is it Q itself?"
             )
-        check_seconds(where, table["time_s"], table["temperature"])
+    return [doubt for doubt in map(check_seconds, records) if doubt]
 
 
 def _level(table: dict[str, FloatArray], name: str, none: float) -> float:

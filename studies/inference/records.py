@@ -61,7 +61,7 @@ def make_ready(given: Sequence[Record]) -> Campaign:
     notes = list(repeated)
     source = _temperature_source(kept)
     tables = [_columns(record, source) for record in kept]
-    check_units(kept, tables)
+    notes += check_units(kept, tables)
     check_device(kept, tables)
     outliers = sum(_remove_outliers(table) for table in tables)
     skipped = _unusable(kept, tables)

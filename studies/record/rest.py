@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from compensation.cross_damping import RestRun
 from compensation.decimation import average_blocks
+from compensation.memory import follow_lag
 from compensation.spikes import find_spikes
 from shell.constants import zero_Celsius
 from studies.errors import InputError
@@ -17,7 +18,13 @@ from studies.record import Record
 TEMPERATURES = ("housing_temperature_degC", "resonator_temperature_degC", "chamber_temperature_degC")
 MOST_ROWS = 20_000  # beyond which a run is averaged in blocks before a fit: temperature is slow, and noise averages
 LEAST_SPIKE = 1e-3  # of a column's span, by which a spike stands out: a smooth column has no noise to measure it by
+DRIVING = (TEMPERATURES[0], TEMPERATURES[2], TEMPERATURES[1])
+BLOCKS, LAG_ROWS = 100, 1000  # by which a rate, and rows by which a lag are told
 FASTEST = 1.0  # K/s over a record, beyond which its time cannot be in seconds
+DOUBTFUL, FAST, SLOWEST = 0.1, 0.15, 1e-4  # K/s held for a tenth of a record: 6 and 9 K/min, 0.36 K/h
+LEAST_SPREAD, LONG = 10.0, 1e6  # K that a record covers, and s it lasts, before a slow one is doubted
+SHORT_LAG, LONG_LAG = 200.0, 2e5  # s: between them lie resonators behind their housing, in vacuum
+CLEAR, APART = 0.5, 30.0  # of what lags so many times shorter leave of a frequency: left by a lag that is there
 LARGEST_REST = 0.01  # applied rate in °/s that still counts as rest: somewhat more than the earth's, 0.0042 °/s
 
 
@@ -90,12 +97,65 @@ def gather_rest(records: "Sequence[Record]", outputs: "dict[str, float]") -> Res
     return RestData(tuple(runs), output, column, left_out, widest)
 
 
-def check_seconds(where: str, time: NDArray[np.float64], temperature: NDArray[np.float64]) -> None:
-    """Refuse a record whose temperature changes as no chamber's does: its time is in another unit."""
-    known = temperature[np.isfinite(temperature)]
-    lasts = float(np.ptp(time))
-    if known.size and np.subtract(*np.percentile(known, [95, 5])) > FASTEST * max(lasts, 1e-9):
+def check_seconds(record: "Record") -> str:
+    """Refuse a record whose temperatures, and the lag of its frequency behind them, no chamber and no resonator has; else return a doubt, if any.
+
+    In minutes a housing changes by tens of kelvin per minute and the resonator follows within seconds; in milliseconds it lags by days.
+    """
+    name = next((one for one in DRIVING if one in record and np.isfinite(record[one]).sum() > 1), None)
+    if name is None:
+        return ""
+    where, known = record.path or "record", np.isfinite(record[name])
+    time, T = record["time_s"][known], record[name][known]
+    time = time - time[0]
+    lasts, spread = max(float(np.ptp(time)), 1e-9), float(np.subtract(*np.percentile(T, [95, 5])))
+    if spread > FASTEST * lasts:
         raise InputError(
-            f"{where}: the temperature changes by {np.ptp(known):.3g} K within {lasts:.3g} s, faster than any chamber."
+            f"{where}: the temperature changes by {np.ptp(T):.3g} K within {lasts:.3g} s, faster than any chamber."
             " time_s must be in seconds: is it in minutes or hours?"
         )
+    if spread < LEAST_SPREAD:
+        return ""
+    held = _held_rate(time, T, lasts)
+    unit = "minutes" if held > DOUBTFUL else "milliseconds" if held < SLOWEST and lasts > LONG else ""
+    if not unit:
+        return ""
+    lag = None
+    if "frequency_Hz" in record and name != TEMPERATURES[1]:
+        lag = _lag_of(time, T, record["frequency_Hz"][known])
+    part = "faster than {:.2g} K/min for a tenth" if unit == "minutes" else "slower than {:.2g} K/min for nine tenths"
+    said = f"{where}: {name} changes {part.format(60 * held)} of its {lasts:.3g} s"
+    if lag is not None:
+        said += f", and the frequency follows it by {lag:.2g} s"
+        if (held > FAST and lag < SHORT_LAG) if unit == "minutes" else lag > LONG_LAG:
+            raise InputError(f"{said}, as in no chamber and no resonator: time_s must be in seconds: is it in {unit}?")
+        if unit == "minutes" and lag > SHORT_LAG:
+            return ""
+    return f"{said}: if time_s is in {unit}, convert it to seconds ('hrg import')."
+
+
+def _held_rate(time: NDArray[np.float64], T: NDArray[np.float64], lasts: float) -> float:
+    """Rate (K/s) that a temperature exceeds during a tenth of the record: the few jumps of a set point do not count."""
+    block = np.minimum(BLOCKS * time / lasts, BLOCKS - 1).astype(int)
+    count = np.bincount(block, minlength=BLOCKS)
+    at, mean = (np.bincount(block, own, BLOCKS)[count > 0] / count[count > 0] for own in (time, T))
+    return float(np.percentile(np.abs(np.diff(mean) / np.diff(at)), 90))
+
+
+def _lag_of(time: NDArray[np.float64], T: NDArray[np.float64], f: NDArray[np.float64]) -> float | None:
+    """Lag τ (s) with which f = c₀ + c₁ x + c₂ x² + c₃ e^(−t/τ), τ ẋ + x = T, leaves least; None where no lag is clear."""
+    known = np.flatnonzero(np.isfinite(f))
+    known = known[:: max(1, known.size // LAG_ROWS)]
+    if known.size < BLOCKS // 4:
+        return None
+    time, T, f = time[known], (T[known] - T[known].mean()) / np.ptp(T[known]), f[known]
+
+    def left(lag: float) -> float:
+        x = follow_lag(time, T, lag)
+        terms = np.column_stack([np.ones_like(x), x, x**2, np.exp(-time / lag) if lag else 0 * x])
+        return float(np.std(f - terms @ np.linalg.lstsq(terms, f, rcond=None)[0]))
+
+    rest = {lag: left(lag) for lag in (0.0, *np.logspace(0, 7, 29))}
+    best = min(rest, key=rest.__getitem__)
+    shorter = [own for lag, own in rest.items() if lag < best / APART]
+    return best if shorter and rest[best] < CLEAR * min(shorter) else None

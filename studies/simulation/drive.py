@@ -178,7 +178,7 @@ def drive_by_record(record: Record, boundary: Boundary | None = None, time: Arra
     known = np.isfinite(values)
     if np.count_nonzero(known) < 2:
         raise InputError(f"{record.path}: {COLUMN[boundary]} has fewer than two values.")
-    check_seconds(record.path, rows, values)
+    check_seconds(record)
     t, T = rows[known], values[known] + zero_Celsius
     if boundary == "chamber":
         t, T = _with_jumps(t, T, _settled_at(record))

@@ -1,17 +1,22 @@
-"""Mistakes of the person at the bench end in their cause: °F, a turned sign, °/s, a file given twice, two gyros, metres and radians."""
+"""Mistakes of the person at the bench end in their cause: °F, a turned sign, °/s, a time in minutes, a file given twice, two gyros, metres and radians."""
 
 import dataclasses
 
 import numpy as np
 import pytest
 
+from compensation.memory import follow_lag
 from studies.calibration.calibrate import calibrate
 from studies.calibration.misreading import check_readings
 from studies.calibration.observed import observe, read_settled
 from studies.errors import InputError
+from studies.fits.bias import study_bias
 from studies.fits.thermal import fit_thermal_constants
 from studies.inference.records import make_ready
 from studies.instrument.card import load_card, save_card
+from studies.record import Record
+from studies.record.plausible import records_of_one_gyro
+from studies.record.rest import check_seconds
 from studies.simulation.chamber import load_profile
 from studies.simulation.drive import drive_by_record
 from studies.simulation.virtual_gyro import simulate_run
@@ -149,17 +154,50 @@ def test_a_rate_output_at_rest_is_a_bias_for_calibrate_too(card, record, monkeyp
 
 
 @pytest.mark.parametrize(
+    ("factor", "said"),
+    [
+        (1 / 3600.0, r"faster than any chamber\. time_s must be in seconds: is it in minutes or hours"),
+        (1 / 60.0, r"as in no chamber and no resonator: time_s must be in seconds: is it in minutes"),
+        (1e3, r"as in no chamber and no resonator: time_s must be in seconds: is it in milliseconds"),
+    ],
+    ids=["hours", "minutes", "milliseconds"],
+)
+@pytest.mark.parametrize(
     "work",
     [
         lambda own, run: calibrate(own, [run]),
         lambda own, run: diagnose(run, card=own),
+        lambda own, run: diagnose(run),
         lambda own, run: fit_thermal_constants([run]),
         lambda own, run: drive_by_record(run),
+        lambda own, run: study_bias([run]),
     ],
 )
-def test_a_time_in_hours_is_the_cause_and_not_what_it_leads_to(card, record, work):
-    """The calibration ended in a profile that reaches 0 K, and time constants of a second were fitted."""
-    with pytest.raises(
-        InputError, match=r"faster than any chamber\. time_s must be in seconds: is it in minutes or hours"
-    ):
-        work(card, spoilt(record, time_s=lambda t: t / 3600.0))
+def test_a_time_in_another_unit_is_the_cause_and_not_what_it_leads_to(card, record, work, factor, said):
+    """The calibration ended in a profile that reaches 0 K, time constants of a second were fitted, five effects invented."""
+    with pytest.raises(InputError, match=said):
+        work(card, spoilt(record, time_s=lambda t: t * factor))
+
+
+@pytest.mark.parametrize(("factor", "unit"), [(1 / 60.0, "minutes"), (1e3, "milliseconds")])
+def test_a_time_that_only_the_thermometer_tells_of_is_a_doubt(record, factor, unit):
+    """Without a frequency no lag is seen: such a chamber is unusual and not impossible."""
+    alone = {name: own for name, own in record.columns.items() if name != "frequency_Hz"}
+    assert check_seconds(record) == check_seconds(dataclasses.replace(record, columns=alone)) == ""
+    odd = dataclasses.replace(record, columns=alone | {"time_s": record["time_s"] * factor})
+    assert f"if time_s is in {unit}, convert it" in check_seconds(odd)
+    said = []
+    assert records_of_one_gyro([odd], said.append) == [odd]
+    assert said == [check_seconds(odd)]
+
+
+@pytest.mark.parametrize(
+    ("rate", "lasts", "lag"), [(0.02, 9e3, 5.0), (0.02, 9e3, 300.0), (0.4, 450.0, 300.0), (3e-6, 3e7, 3e4)]
+)
+def test_a_resonator_however_quick_or_slow_in_seconds_is_not_refused(rate, lasts, lag):
+    """A quick one in a usual chamber, a slow one in a quick chamber, and a slow one through a season."""
+    time = np.linspace(0.0, lasts, 600)
+    T = rate * (lasts / 2 - np.abs(time - lasts / 2))
+    f = 4432.0 + 0.4 * follow_lag(time, T, lag) + 1e-4 * np.random.default_rng(1).standard_normal(time.size)
+    said = check_seconds(Record({"time_s": time, "housing_temperature_degC": T, "frequency_Hz": f}))
+    assert ("milliseconds" in said) == (lasts > 1e6)
