@@ -23,7 +23,7 @@ from studies.calibration.remarks import warn
 from studies.calibration.settled import SettledComparison, compare_settled
 from studies.errors import InputError
 from studies.instrument.display import display_name
-from studies.record import Record, drop_repeats, with_bias
+from studies.record import Record, drop_repeats, repeats, with_bias
 from studies.record.plausible import check_card_frequency, check_one_gyro
 from studies.record.rest import check_seconds
 from studies.results.shown import Shown
@@ -135,7 +135,7 @@ def calibrate(
     doubts = [doubt for doubt in map(check_seconds, records) if doubt]
     if hold_out is not None:  # the one that a repeated record repeats
         held = given[hold_out % len(given)]
-        hold_out = next((k for k, one in enumerate(records) if one is held), len(records) - 1)
+        hold_out = next((k for k, one in enumerate(records) if repeats(one, held)), 0)
     tables = [one for k, one in enumerate(tables) if not any(one.repeats(other) for other in tables[:k])]
     loop = instrument.loop
     named = RESPONSES if loop is None else (*RESPONSES, QUADRATURE)

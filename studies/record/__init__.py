@@ -40,6 +40,8 @@ COLUMNS = {
     "quadrature_V": "quadrature-control effort",
     "pattern_angle_deg": "azimuth of the standing wave",
 }
+REPEATED = 0.5  # part of the rows of a record that stand in another of the same run
+PICKED = 500  # rows that are compared
 FAR = 0.7  # of ln f from the median of a table: a factor of two
 COMPENSATED = "compensated_"
 COMMANDED = ("chamber_temperature_degC", "rate_deg_per_s", "drive_amplitude_V", "electrode_bias_V")  # may stand still
@@ -183,24 +185,44 @@ def reading_resolution(values: Array) -> float:
 
 
 def drop_repeats(records: "Sequence[Record]") -> tuple[list[Record], list[str]]:
-    """Return the records without those that repeat another, whatever the file's name, and a sentence for each that was left out."""
+    """Return the records without those that repeat another, whatever the file's name, and a sentence for each that was left out.
+
+    Of two that share most of their rows the longer is kept.
+    """
     kept: list[Record] = []
     said = []
     for record in records:
-        twin = next((other for other in kept if _same(record, other)), None)
+        twin = next((other for other in kept if repeats(record, other)), None)
         if twin is None:
             kept.append(record)
-        else:
-            said.append(f"{record.path or 'a record'} repeats {twin.path or 'another'} and is left out.")
+            continue
+        if len(record) > len(twin):
+            place = next(k for k, one in enumerate(kept) if one is twin)
+            kept[place], record, twin = record, twin, record
+        said.append(f"{record.path or 'a record'} repeats {twin.path or 'another'} and is left out.")
     return kept, said
 
 
-def _same(one: Record, two: Record) -> bool:
+def repeats(one: Record, two: Record) -> bool:
+    """Whether two records are of one run: of the shorter, most rows stand in the other too, whatever their time, as noise never repeats itself."""
     if one.sha256 and one.sha256 == two.sha256:
         return True
-    return set(one.columns) == set(two.columns) and all(
-        np.array_equal(one.columns[key], two.columns[key], equal_nan=True) for key in one.columns
-    )
+    short, long = (dict(own.columns) for own in sorted((one, two), key=len))
+    if not set(short) <= set(long):
+        return False
+    if len(one) == len(two) and all(np.array_equal(short[name], long[name], equal_nan=True) for name in short):
+        return True
+    names = [name for name in short if name != "time_s"]
+    picked = np.unique(np.linspace(0, min(len(one), len(two)) - 1, PICKED).astype(int))
+    wanted = {name: short[name][picked] for name in names}
+    busiest = max(names, key=lambda name: np.unique(wanted[name]).size, default="time_s")
+    found = np.isin(long[busiest], short[busiest][picked])
+    rows, there = (_rows_of(own, names) for own in (wanted, {name: long[name][found] for name in names}))
+    return len(rows & there) > REPEATED * len(picked)
+
+
+def _rows_of(columns: Mapping[str, Array], names: Sequence[str]) -> set[tuple[float, ...]]:
+    return set(zip(*(np.nan_to_num(columns[name], nan=np.inf).tolist() for name in names), strict=True))
 
 
 def read_profile(path: str | Path) -> Columns:

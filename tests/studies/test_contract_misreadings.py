@@ -14,7 +14,7 @@ from studies.fits.bias import study_bias
 from studies.fits.thermal import fit_thermal_constants
 from studies.inference.records import make_ready
 from studies.instrument.card import load_card, save_card
-from studies.record import Record
+from studies.record import Record, drop_repeats
 from studies.record.plausible import records_of_one_gyro
 from studies.record.rest import check_seconds
 from studies.simulation.chamber import load_profile
@@ -201,3 +201,23 @@ def test_a_resonator_however_quick_or_slow_in_seconds_is_not_refused(rate, lasts
     f = 4432.0 + 0.4 * follow_lag(time, T, lag) + 1e-4 * np.random.default_rng(1).standard_normal(time.size)
     said = check_seconds(Record({"time_s": time, "housing_temperature_degC": T, "frequency_Hz": f}))
     assert ("milliseconds" in said) == (lasts > 1e6)
+
+
+@pytest.mark.parametrize(
+    "copied",
+    [
+        lambda run: spoilt(run, frequency_Hz=lambda f: f + 1e-4 * (np.arange(f.size) == 7)),
+        lambda run: spoilt(run, time_s=lambda t: t + 1000.0),
+        lambda run: dataclasses.replace(run, columns={name: own[::2] for name, own in run.columns.items()}),
+    ],
+    ids=["one cell", "later", "every second row"],
+)
+def test_a_near_copy_is_the_same_run_and_the_longer_one_is_kept(card, record, copied):
+    """Each once counted as a held-out run, on which a bias model was 5.28 times better."""
+    copy = dataclasses.replace(copied(record), path="copy.csv")
+    assert drop_repeats([record, copy]) == ([record], ["copy.csv repeats run.csv and is left out."])
+    kept, said = drop_repeats([copy, record])
+    assert len(said) == 1
+    assert len(kept[0]) == len(record)
+    other = simulate_run(card, load_profile("cycle 20 -15 40 0.5 30min 1"), 1 / 60, 2).record
+    assert drop_repeats([record, other]) == ([record, other], [])
