@@ -155,12 +155,10 @@ def drop_repeated(
 def _mend(table: RawTable, file: "FileMap", row: int) -> str:
     if row in table.starts():
         return "Give consecutive files in the order of their times; import files whose clocks restart one by one."
-    winter = (
-        ""
-        if file.timezone or file.time_format in SECONDS
-        else ", or a change to winter time: then give 'timezone' in its [[file]] of the map"
-    )
-    return f"Is it a restart{winter}? Split the file there, or end it with last_line in its [[file]] of the map."
+    restart = "If its clock restarted, split the file there, or end it with last_line in its [[file]] of the map."
+    if file.timezone or file.time_format in SECONDS:
+        return restart
+    return f"{restart} If clocks changed to winter time, give 'timezone' in that [[file]]."
 
 
 def seconds_between(one: datetime.datetime, two: datetime.datetime, path: str) -> float:

@@ -195,7 +195,7 @@ def test_times_that_repeat_or_go_back(tmp_path):
     assert first["frequency_Hz"].tolist() == [1, 3, 5]
     with pytest.raises(InputError, match=r"line 4: the time goes backwards \(by up to 1 s"):
         simple(tmp_path, ["0,1", "1,2", "0,3"])
-    with pytest.raises(InputError, match=r"change to winter time: then give 'timezone' in its \[\[file\]\]"):
+    with pytest.raises(InputError, match=r"changed to winter time, give 'timezone' in that \[\[file\]\]"):
         simple(tmp_path, ["2026-10-25 02:59,1", "2026-10-25 02:00,2"], 'time_format = "iso"')
 
 
