@@ -62,6 +62,8 @@ class Cause:
     """Largest less smallest change of the response that the effect makes in this campaign, in its unit."""
     shapes: Mapping[str, Mapping[str, Interval]] = field(default_factory=dict)
     """Where and when each of its equals would be: shape parameters by name."""
+    together: bool = False
+    """Whether it was found in one with others."""
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -218,7 +220,8 @@ def doubted(causes: Sequence[Cause]) -> tuple[Cause, ...]:
     """
     first = next((cause for cause in causes if cause.kind == "physics"), None)
     share = {True: CONSTANTS["doubt"], False: CONSTANTS["doubt_further"]}
-    alike = [cause.kind == "value" or (first is not None and cause.evidence == first.evidence) for cause in causes]
+    one = first is not None and first.together
+    alike = [cause is first or cause.kind == "value" or (cause.together and one) for cause in causes]
     return tuple(
         replace(cause, probability=cause.probability * (1.0 - share[one]))
         for cause, one in zip(causes, alike, strict=True)

@@ -114,6 +114,7 @@ class Effect:
     sensor: str = ""
     shape: tuple[Parameter, ...] = ()  # parameters that enter nonlinearly
     acts_on: str = "response"  # "temperature" or "response"
+    law_key: str = ""  # key of [law] that takes its place in a heat path of several lags
     needs: tuple[str, ...] = ()  # drives (fields of `States`) that must be measured and must vary
     # mapping from response to names: Effects that no record of that response alone can tell from this one, whatever
     # their evidence.

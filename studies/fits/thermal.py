@@ -17,7 +17,7 @@ from studies.calibration.fit import fit
 from studies.calibration.priors import from_standard
 from studies.errors import InputError
 from studies.inference.diagnosis import build_problem
-from studies.inference.heat_path import LAGS, SHARE, HeatPath, find_heat_path, residual_of, slow_share
+from studies.inference.heat_path import LAGS, SHARE, HeatPath, find_heat_path, slow_share
 from studies.inference.polynomial_card import polynomial_card
 from studies.inference.records import driving, make_ready
 from studies.record import Record
@@ -63,8 +63,8 @@ class ThermalFit:
 
     @property
     def residual_rms(self) -> float:
-        """Rms of what is left of the block averages, Hz."""
-        return residual_of(self.path.fit)
+        """Rms of what is left of the block averages about the mean of each run, Hz: slow noise carries the level off."""
+        return float(np.sqrt(np.mean(np.concatenate([rest - rest.mean() for _, rest in self.left]) ** 2)))
 
     @property
     def slow(self) -> float:

@@ -178,15 +178,24 @@ def _path_causes(found: Inferred) -> list[Cause]:
     probability, evidence = 1.0 / (1.0 + float(np.exp(-path.lead))), 2.0 * path.evidence
     pairs = zip(found.plain[name].residual, found.rows[name].residual, strict=True)
     peak = float(np.ptp(np.concatenate([before - after for before, after in pairs])))
-    causes = []
+    causes, names = [], {effect.law_key: effect.name for effect in library().values()}
     if path.lags > 1:
         numbers = {key: Interval.about(*path.value(f"law.{key}")) for key in LAGS[: path.lags]}
-        causes.append(Cause("second-lag", name, probability, (), numbers, evidence, peak=peak))
+        causes.append(Cause(names[LAGS[1]], name, probability, (), numbers, evidence, peak=peak, together=True))
     if path.radiates:
         share, sd = path.value(SHARE)
         own = min((share / sd) ** 2, evidence) if causes else evidence
         causes.append(
-            Cause("radiation", name, probability, (), {"radiated_share": Interval.about(share, sd)}, own, peak=peak)
+            Cause(
+                names[SHARE.removeprefix("law.")],
+                name,
+                probability,
+                (),
+                {"radiated_share": Interval.about(share, sd)},
+                own,
+                peak=peak,
+                together=True,
+            )
         )
     return causes
 

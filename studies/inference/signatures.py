@@ -223,7 +223,8 @@ class Signatures:
     @property
     def _taken(self) -> tuple[str, ...]:
         """Effects for which the law has values: of lags in series."""
-        return ("second-lag", "radiation") if SHARE in self.problem.priors.names else ()
+        own = (effect.name for effect in library().values() if effect.law_key)
+        return tuple(own) if SHARE in self.problem.priors.names else ()
 
     def _varies(self, drive: str) -> bool:
         parts = [getattr(path.states, drive) for path in self.paths]
