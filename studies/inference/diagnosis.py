@@ -55,7 +55,7 @@ FAR = 2.0
 """The same, beyond which the search begins from the card's own values too."""
 STRAIGHT = 1.0
 """The same, up to which further effects are looked for beside one before the model is linearised anew."""
-THERMOMETER = "frequency_Hz"
+FREQUENCY = "frequency_Hz"
 FAINT = 60.0
 """Log evidence up to which a cause whose definite coefficients may all be 0 is not named: of 13 such names on 127 judged campaigns all 7 below were wrong, 4 of 6 above right."""
 FOLLOWS = 0.1
@@ -230,19 +230,21 @@ def _with_heat_path(found: CardFit, told: Array | None, progress: Report) -> tup
     first = beside() if residual_of(path.fit) < FOLLOWS * residual_of(found) else None
     search, outcome = _from(found, told, progress, first[2] - BEATEN if first else None)
     one_lag = _on_all_rows(search, outcome.final)
-    brought = [term.brought for term in outcome.final.terms if term.response == THERMOMETER]
+    brought = [term.brought for term in outcome.final.terms if term.response == FREQUENCY]
     if first is None and brought and path.evidence > alone + max(brought):
         first = beside()
-    levels = with_levels(search, outcome.plain, THERMOMETER).score - outcome.plain.score
-    if first is None or first[2] < one_lag + MARGIN or levels > first[2] - alone + MARGIN:
+    if first is None or first[2] < one_lag + MARGIN:
+        return None, search, outcome
+    levels = with_levels(search, outcome.plain, FREQUENCY).score - outcome.plain.score
+    if levels > first[2] - alone + MARGIN:
         return None, search, outcome
     return replace(path, evidence=first[2] - alone, lead=first[2] - one_lag), *first[:2]
 
 
 def _on_all_rows(search: Search, final: Hypothesis) -> float:
     """Log posterior of a model, no row taken for an outlier."""
-    linear = replace(search.linear, rows=search.linear.problem.rows)
-    return Background(linear, final.terms, final.noise).evidence + sum(term.price for term in final.terms)
+    alone = Background(search.linear.on_all_rows, final.terms, final.noise).evidence
+    return alone + sum(term.price for term in final.terms)
 
 
 def _from(start: CardFit, told: Array | None, progress: Report, least: float | None = None) -> tuple[Search, Outcome]:

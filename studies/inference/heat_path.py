@@ -5,7 +5,6 @@ they are not small, and the longer path is a card of its own, whose lags and rad
 """
 
 from collections.abc import Callable
-from copy import deepcopy
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -78,15 +77,11 @@ class HeatPath:
 
 def with_lags(card: "Instrument", lag: float, lags: int) -> "Instrument":
     """Return a polynomial card with so many lags in series where one of `lag` s stood, and a radiated share."""
-    from studies.instrument.card import build_instrument
-
-    content = deepcopy(dict(card.content))
     given = {
         key: {"value": part * lag, "sd": LAG_WIDTH * part * lag}
         for key, part in zip(LAGS, PARTS[lags - 1], strict=False)
     }
-    content["law"] = {**content["law"], **given, "radiated_share": dict(RADIATED)}
-    return build_instrument(content, card.path)
+    return card.with_table("law", {**card.content["law"], **given, "radiated_share": dict(RADIATED)})
 
 
 def find_heat_path(
@@ -111,7 +106,7 @@ def find_heat_path(
 
 def evidence_of(found: CardFit) -> float:
     """Log evidence of a calibrated card, no row taken for an outlier."""
-    return Background(replace(Linear.of(found), rows=found.problem.rows), (), found.noise).evidence
+    return Background(Linear.of(found).on_all_rows, (), found.noise).evidence
 
 
 def slow_share(found: CardFit, name: str = "frequency_Hz") -> float:

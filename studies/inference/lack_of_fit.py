@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from compensation.lines import Line
+from compensation.spikes import find_step
 from studies.calibration.problem import CardProblem
 from studies.diagnosis.constants import CONSTANTS
 from studies.diagnosis.verdict import spell_structure
@@ -21,7 +22,7 @@ ENOUGH = CONSTANTS["margin"] - CONSTANTS["log_prior_unknown"]
 """Log evidence from which on structure is no chance."""
 
 REPEATED, ROUNDING = 0.5, 1.3
-"""Part of the readings that differ from the one before, up to which they are rounded to more than their noise; the rms of that, in its own parts."""
+"""Part of the readings that are as the one before, from which on they are rounded to more than their noise; the rms of that, in its own parts."""
 
 
 @dataclass(frozen=True)
@@ -108,9 +109,9 @@ def look(
 
 def is_rounding(problem: CardProblem, name: str, rest: Rows) -> bool:
     """Whether what is left of readings that mostly repeat is what a step of q leaves, q/√12: it follows the level as structure does."""
-    steps = np.concatenate([np.diff(problem.runs[part.run].own_rows[name][1]) for part in problem.members(name)])
-    moves = np.abs(steps[steps != 0.0])
-    return len(moves) < REPEATED * len(steps) and rest.rms < ROUNDING * float(moves.min(initial=np.inf)) / 12**0.5
+    readings = [problem.runs[part.run].own_rows[name][1] for part in problem.members(name)]
+    repeats = np.concatenate([np.diff(own) == 0.0 for own in readings])
+    return repeats.mean() > REPEATED and rest.rms < ROUNDING * find_step(np.concatenate(readings)) / 12**0.5
 
 
 def _instead_of_noise(search: Search, bank: Sequence[Shapes], final: Hypothesis, name: str) -> Hypothesis | None:

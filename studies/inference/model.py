@@ -121,6 +121,11 @@ class Linear:
         target = {name: own + more[name][:, -1] if name in more else own for name, own in self.target.items()}
         return replace(self, slope=slope, target=target)
 
+    @property
+    def on_all_rows(self) -> "Linear":
+        """It, with no row taken for an outlier."""
+        return replace(self, rows=self.problem.rows)
+
     def stated(self, name: str) -> Noise | None:
         """Return what the card states of the slow noise of a response."""
         return stated_noise(self.problem.instrument.noise, name)
