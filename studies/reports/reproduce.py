@@ -183,7 +183,7 @@ def _short(parts: Reproduction) -> list[Part]:
             f" these temperatures is uncertain: the sources allow {physics.curvature_law:.2f} ± {physics.curvature_uncertainty:.2f}"
             f" ppm/°C², and the measured {physics.curvature_measured:.2f} ppm/°C² is {away_curvature:.1f} standard deviations away."
             " No constant curvature describes a slope that falls up to 25 °C and then rises."
-            " Seven points, each approached once, cannot show whether the cause is the glass, the thermometer, the mounting or"
+            " Seven points, each measured once, cannot show whether the cause is the glass, the thermometer, the mounting or"
             " the soak; a staircase up and down with a second thermometer could.",
             "note",
         ),
