@@ -18,6 +18,7 @@ from itertools import pairwise
 import numpy as np
 import scipy
 from numpy.typing import NDArray
+from scipy.linalg import lapack
 
 from compensation.errors import CompensationError
 from compensation.noise import SLOW_TIMES, Noise, flicker, random_walk
@@ -114,7 +115,7 @@ class NoiseRows:
         """Covariance of the rows of one run."""
         F, W = next((F, W) for F, W, runs in self._groups if run in runs)
         total: Array = noise.flicker**2 * F + noise.walk**2 * W + noise.offset**2
-        total[np.diag_indices_from(total)] += noise.white**2 * self.stretch[run] / self.spans[run]
+        np.einsum("ii->i", total)[:] += noise.white**2 * self.stretch[run] / self.spans[run]
         return total
 
     def whiten(self, columns: Array, noise: Noise) -> Array:
@@ -123,8 +124,7 @@ class NoiseRows:
 
     def whitener(self, noise: Noise) -> "Whitener":
         """Factor the covariance of every distinct set of rows once."""
-        own = [(np.asarray(np.linalg.cholesky(self.covariance(runs[0], noise))), runs) for _, _, runs in self._groups]
-        return Whitener(self.slices, tuple(own))
+        return Whitener(self.slices, tuple((cholesky(self.covariance(r[0], noise)), r) for _, _, r in self._groups))
 
     def kept(self, masks: Sequence[NDArray[np.bool_]]) -> "NoiseRows":
         """Return the rows that a mask of each run keeps; a run without any is left out."""
@@ -145,24 +145,40 @@ class NoiseRows:
         X, r = white[:, :-1], white[:, -1]
         about = np.zeros(X.shape[1]) if mean is None else mean
         A = X.T @ X
-        root = np.linalg.cholesky(A + np.diag(precision + 1e-12 * (1 + A.diagonal())))
-        beside = scipy.linalg.solve_triangular(root, X.T, lower=True).T
-        found = scipy.linalg.solve_triangular(root, scipy.linalg.solve_triangular(root, X.T @ r + precision * about, lower=True), lower=True, trans="T")  # fmt: skip
+        root = cholesky(A + np.diag(precision + 1e-12 * (1 + A.diagonal())))
+        beside = solve_lower(root, X.T).T
+        found = solve_lower(root, solve_lower(root, X.T @ r + precision * about), transposed=True)
         rest = r - X @ found
         total += float(rest @ rest + (found - about) @ (precision * (found - about)))
         total += 2 * float(np.log(np.diag(root)).sum())
         both, slopes = np.column_stack([beside, rest]), dict.fromkeys(KINDS, 0.0)
         for (L, runs), (F, W, _) in zip(whitener.roots, self._groups, strict=True):
-            inverse = np.tril(scipy.linalg.lapack.dpotri(L, lower=1)[0])
-            S = len(runs) * (inverse + np.tril(inverse, -1).T)
+            lower = len(runs) * lapack.dpotri(L, lower=1)[0]
+            S = lower + lower.T
+            np.einsum("ii->i", S)[:] -= lower.diagonal()
             for run in runs:
-                U = scipy.linalg.solve_triangular(L, both[self.slices[run]], lower=True, trans="T", check_finite=False)
+                U = solve_lower(L, both[self.slices[run]], transposed=True)
                 S -= U @ U.T
             slopes["white"] += 2 * noise.white**2 * float(S.diagonal() @ (self.stretch[runs[0]] / self.spans[runs[0]]))
             for kind, level, own in (("flicker", noise.flicker, F), ("walk", noise.walk, W)):
                 slopes[kind] += 2 * level**2 * float(np.vdot(S, own)) if level else 0.0
             slopes["offset"] += 2 * noise.offset**2 * float(S.sum()) if noise.offset else 0.0
         return total, slopes
+
+
+def cholesky(matrix: Array) -> Array:
+    """Lower root of a symmetric matrix straight from LAPACK: of small ones, checks cost as much as the work."""
+    root, failed = lapack.dpotrf(matrix, lower=1, clean=1)
+    if failed:
+        raise np.linalg.LinAlgError("the covariance of the rows is not positive definite.")
+    return np.asarray(root)
+
+
+def solve_lower(root: Array, columns: Array, transposed: bool = False) -> Array:
+    """Return L⁻¹ or L⁻ᵀ times columns, (N,) or (N, p)."""
+    if not columns.size:
+        return columns
+    return np.asarray(lapack.dtrtrs(root, columns, lower=1, trans=int(transposed))[0]).reshape(columns.shape)
 
 
 @dataclass(frozen=True)
@@ -178,7 +194,7 @@ class Whitener:
         white, p = np.empty_like(matrix), matrix.shape[1]
         for L, runs in self.roots:
             side_by_side = np.hstack([matrix[self.slices[run]] for run in runs])
-            solved = scipy.linalg.solve_triangular(L, side_by_side, lower=True, check_finite=False)
+            solved = solve_lower(L, side_by_side)
             for k, run in enumerate(runs):
                 white[self.slices[run]] = solved[:, k * p : (k + 1) * p]
         return white.reshape(columns.shape)

@@ -185,7 +185,12 @@ def hermite(grid: Grid, time: Array, value: Array, rate: Array) -> tuple[Array, 
     h = (nodes[k + 1] - nodes[k])[behind]
     s = (time - nodes[k])[behind] / h
     y0, y1 = value[half, interval], value[half + 1, interval]
-    d0, d1 = h * rate[half, interval], h * rate[half + 1, interval]
+    return cubic(s, h, y0, y1, rate[half, interval], rate[half + 1, interval])
+
+
+def cubic(s: Array, h: Array, y0: Array, y1: Array, rate0: Array, rate1: Array) -> tuple[Array, Array]:
+    """Value and rate at a part s of an interval of length h, from values and rates at its ends (Hermite)."""
+    d0, d1 = h * rate0, h * rate1
     c2, c3 = 3 * (y1 - y0) - 2 * d0 - d1, 2 * (y0 - y1) + d0 + d1
     return y0 + s * (d0 + s * (c2 + s * c3)), (d0 + s * (2 * c2 + 3 * s * c3)) / h
 

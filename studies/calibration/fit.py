@@ -126,7 +126,7 @@ def objective(problem: CardProblem, state: State, noise: Mapping[str, Noise], ro
 
 def residual_noise(problem: CardProblem, rows: Mapping[str, NoiseRows], state: State) -> dict[str, Noise]:
     """Noise that the residuals would be as they are: far from the values, a straight line promises what no step keeps."""
-    return {n: _levels(problem, rows[n], n, state.residual[n]) for n in problem.responses}
+    return {n: _levels(problem, rows[n].coarse, n, rows[n].means(state.residual[n])) for n in problem.responses}
 
 
 def _estimate(

@@ -21,7 +21,7 @@ from studies.calibration.problem import CardProblem, wide_law
 from studies.diagnosis.constants import CONSTANTS
 from studies.diagnosis.seen import SeenResponse
 from studies.inference.apart import only_apart, with_levels
-from studies.inference.heat_path import HeatPath, evidence_of, find_heat_path, residual_of, slow_share
+from studies.inference.heat_path import FREQUENCY, HeatPath, evidence_of, find_heat_path, residual_of, slow_share
 from studies.inference.held_out import Kept, Model, Rows
 from studies.inference.housing import set_housing_apart
 from studies.inference.inferred import Inferred
@@ -55,7 +55,6 @@ FAR = 2.0
 """The same, beyond which the search begins from the card's own values too."""
 STRAIGHT = 1.0
 """The same, up to which further effects are looked for beside one before the model is linearised anew."""
-FREQUENCY = "frequency_Hz"
 FAINT = 60.0
 """Log evidence up to which a cause whose definite coefficients may all be 0 is not named: of 13 such names on 127 judged campaigns all 7 below were wrong, 4 of 6 above right."""
 FOLLOWS = 0.1

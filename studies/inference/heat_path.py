@@ -9,14 +9,18 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from studies.calibration.fit import CardFit, fit
 from studies.calibration.priors import gather_priors
+from studies.calibration.problem import CardProblem
 from studies.inference.model import PRICE, Background, Linear
 
 if TYPE_CHECKING:
     from studies.instrument.card import Instrument
 
+Array = NDArray[np.float64]
+FREQUENCY = "frequency_Hz"
 LAGS = ("lag_s", "second_lag_s", "third_lag_s")
 SHARE = "law.radiated_share"
 PARTS = ((1.0,), (0.7, 0.3), (0.65, 0.3, 0.05))
@@ -87,21 +91,28 @@ def with_lags(card: "Instrument", lag: float, lags: int) -> "Instrument":
 def find_heat_path(
     baseline: CardFit, lags: int | None = None, progress: Callable[[str], None] = lambda _: None
 ) -> HeatPath:
-    """Return the path of so many lags, else the likeliest one, each further lag paid for, of a gyro calibrated with one."""
-    problem = baseline.problem
-    lag = problem.priors.at(baseline.point[: len(problem.priors.values)])["law.lag_s"]
+    """Return the path of so many lags, else the likeliest one by the frequency, each further lag paid for, of a gyro calibrated with one."""
+    whole = baseline.problem
+    lean = replace(whole, runs=tuple(run.explaining((FREQUENCY,)) for run in whole.runs))
+    lag = whole.priors.at(baseline.point[: len(whole.priors.values)])["law.lag_s"]
     best: HeatPath | None = None
     for number in (lags,) if lags else range(1, len(LAGS) + 1):
         progress(f"a heat path with {number} {'lag' if number == 1 else 'lags in series'} and radiation")
-        card = with_lags(problem.instrument, lag, number)
-        path = HeatPath(card, fit(replace(problem, instrument=card, priors=gather_priors(card))))
-        path = replace(path, evidence=evidence_of(path.fit) + path.price)
+        path = _calibrated(lean, with_lags(whole.instrument, lag, number))
         if best is None or path.evidence > best.evidence + WORTH:
             best = path
         elif number > 2:
             break
     assert best is not None
-    return best
+    if whole.responses == lean.responses or not (best.lags > 1 or best.radiates):
+        return best
+    progress("the other responses beside it")
+    return _calibrated(whole, best.card, best.fit.point if whole.starts == lean.starts else None)
+
+
+def _calibrated(problem: CardProblem, card: "Instrument", start: Array | None = None) -> HeatPath:
+    path = HeatPath(card, fit(replace(problem, instrument=card, priors=gather_priors(card)), start))
+    return replace(path, evidence=evidence_of(path.fit) + path.price)
 
 
 def evidence_of(found: CardFit) -> float:
@@ -109,11 +120,11 @@ def evidence_of(found: CardFit) -> float:
     return Background(Linear.of(found).on_all_rows, (), found.noise).evidence
 
 
-def slow_share(found: CardFit, name: str = "frequency_Hz") -> float:
+def slow_share(found: CardFit, name: str = FREQUENCY) -> float:
     """Rms of the slow noise of a response within a usual run over that of a row; 0 where it is not measured."""
     return found.rows[name].slow_share(found.noise[name]) if name in found.noise else 0.0
 
 
-def residual_of(found: CardFit, name: str = "frequency_Hz") -> float:
+def residual_of(found: CardFit, name: str = FREQUENCY) -> float:
     """Rms of what a calibration leaves of a response that is measured."""
     return float(np.sqrt(np.mean(found.state.residual[name] ** 2)))

@@ -21,6 +21,7 @@ from studies.simulation.drive import Drive
 from studies.simulation.heat_path import SENSOR
 from studies.simulation.loop import DEG_PER_H, settled_columns
 from thermal.meridian import cell_names, energy_weights
+from thermal.sweeping import cubic
 
 if TYPE_CHECKING:
     from shell.law import FrequencyLaw
@@ -141,9 +142,11 @@ def read_out(
 
 def _earlier(time: Array, value: Array, rate: Array, delay: float) -> Array:
     """Values of a curve so much earlier (s), by the cubics through its values and rates."""
-    from scipy.interpolate import CubicHermiteSpline
-
-    return np.asarray(CubicHermiteSpline(time, value, rate)(time - delay)) if delay else value
+    if not delay:
+        return value
+    k = np.clip(np.searchsorted(time, time - delay, side="right") - 1, 0, len(time) - 2)
+    h = time[k + 1] - time[k]
+    return cubic((time - delay - time[k]) / h, h, value[k], value[k + 1], rate[k], rate[k + 1])[0]
 
 
 def check_loss(instrument: "Instrument", inverse_q: Array) -> None:
