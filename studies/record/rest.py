@@ -21,6 +21,11 @@ LEAST_SPIKE = 1e-3  # of a column's span, by which a spike stands out: a smooth 
 DRIVING = (TEMPERATURES[0], TEMPERATURES[2], TEMPERATURES[1])
 BLOCKS, LAG_ROWS = 100, 1000  # by which a rate, and rows by which a lag are told
 FASTEST = 1.0  # K/s over a record, beyond which its time cannot be in seconds
+AT_ONCE, LEAST_CHANGE, FASTER = (
+    4,
+    5.0,
+    2.0,
+)  # rows in one direction, K and K/s, beyond which the same is said of a housing
 DOUBTFUL, FAST, SLOWEST = 0.1, 0.15, 1e-4  # K/s held for a tenth of a record: 6 and 9 K/min, 0.36 K/h
 LEAST_SPREAD, LONG = 10.0, 1e6  # K that a record covers, and s it lasts, before a slow one is doubted
 SHORT_LAG, LONG_LAG = 200.0, 2e5  # s: between them lie resonators behind their housing, in vacuum
@@ -114,6 +119,11 @@ def check_seconds(record: "Record") -> str:
             f"{where}: the temperature changes by {np.ptp(T):.3g} K within {lasts:.3g} s, faster than any chamber."
             " time_s must be in seconds: is it in minutes or hours?"
         )
+    if name != TEMPERATURES[2] and (change := _fastest_change(time, T)):
+        raise InputError(
+            f"{where}: {name} changes by {change[0]:.3g} K within {change[1]:.3g} s, faster than any housing."
+            " time_s must be in seconds: is it in minutes or hours?"
+        )
     if spread < LEAST_SPREAD:
         return ""
     held = _held_rate(time, T, lasts)
@@ -132,6 +142,16 @@ def check_seconds(record: "Record") -> str:
         if unit == "minutes" and lag > SHORT_LAG:
             return ""
     return f"{said}: if time_s is in {unit}, convert it to seconds ('hrg import')."
+
+
+def _fastest_change(time: NDArray[np.float64], T: NDArray[np.float64]) -> tuple[float, float] | None:
+    """Largest change (K) over `AT_ONCE` rows in one direction, and how long it took, if no mass behind a wall can change so fast."""
+    rose, lasts = T[AT_ONCE:] - T[:-AT_ONCE], time[AT_ONCE:] - time[:-AT_ONCE]
+    each = np.lib.stride_tricks.sliding_window_view(np.diff(T), AT_ONCE)[: len(rose)]
+    even = (each * np.sign(rose)[:, None] > 0.1 * np.abs(rose)[:, None]).all(axis=1)  # not one jump among rows
+    fast = np.where(even & (np.abs(rose) > np.maximum(LEAST_CHANGE, FASTER * lasts)), np.abs(rose), 0.0)
+    k = int(np.argmax(fast)) if fast.size else 0
+    return (float(fast[k]), float(lasts[k])) if fast.any() else None
 
 
 def _held_rate(time: NDArray[np.float64], T: NDArray[np.float64], lasts: float) -> float:

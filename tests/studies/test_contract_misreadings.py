@@ -179,6 +179,19 @@ def test_a_time_in_another_unit_is_the_cause_and_not_what_it_leads_to(card, reco
         work(card, spoilt(record, time_s=lambda t: t * factor))
 
 
+def test_a_housing_that_follows_a_jump_of_its_chamber_tells_minutes_by_itself(record):
+    """It falls by 42 K with 600 s: calibrated in minutes, a card was saved without a word; in seconds all is well."""
+    time = np.arange(0.0, 18000.0, 30.0)
+    jumped = {
+        "time_s": time,
+        "housing_temperature_degC": 42.0 * np.exp(-time / 600.0) - 20.0,
+        "inverse_q": 1e-7 + 0 * time,
+    }
+    assert check_seconds(dataclasses.replace(record, columns=jumped)) == ""
+    with pytest.raises(InputError, match="faster than any housing. time_s must be in seconds"):
+        check_seconds(dataclasses.replace(record, columns=jumped | {"time_s": time / 60.0}))
+
+
 @pytest.mark.parametrize(("factor", "unit"), [(1 / 60.0, "minutes"), (1e3, "milliseconds")])
 def test_a_time_that_only_the_thermometer_tells_of_is_a_doubt(record, factor, unit):
     """Without a frequency no lag is seen: such a chamber is unusual and not impossible."""
