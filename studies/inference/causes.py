@@ -16,6 +16,7 @@ from studies.diagnosis.verdict import (
     weigh,
 )
 from studies.effects import library
+from studies.effects.effect import UNITS
 from studies.inference.apart import with_levels
 from studies.inference.clock import settle
 from studies.inference.heat_path import LAGS, SHARE
@@ -116,9 +117,10 @@ def parameters_of(background: Background, signatures: Signatures, k: int) -> dic
         if parameter.moves(value):
             sd, slope = _shape_spread(background, signatures, k, place)
             variance = variance + (slope * sd) ** 2
-        if parameter.logarithmic and sd > 0:
-            half = NINETY * sd
-            out[parameter.name] = Interval(value, value * float(np.exp(-half)), value * float(np.exp(half)))
+        if parameter.logarithmic and sd > 0:  # no end is farther than the shape may go
+            half = min(NINETY * sd, float(np.log(parameter.high / max(parameter.low, 1e-9 * parameter.high))))
+            ends = np.clip(value * np.exp([-half, half]), parameter.low, parameter.high)
+            out[parameter.name] = Interval(value, float(min(ends[0], value)), float(max(ends[1], value)))
         else:
             out[parameter.name] = Interval.about(value, sd)
     begin = 0
@@ -128,6 +130,13 @@ def parameters_of(background: Background, signatures: Signatures, k: int) -> dic
         if at >= 0 and any(own[:, at].any() for own in term.columns.values()):  # what no row shows is left out
             out[name] = Interval.about(float(mean[at]), float(np.sqrt(variance[at])))
         begin += len(coefficient.spread)
+    sizes = [out[name] for name in names if name in out]
+    own = term.columns.get(term.response)
+    if len(term.members) > 1 and own is not None and all(size.low <= 0.0 <= size.high for size in sizes):
+        # members of a family may stand for one another, and what they make together is sure
+        change, out = own @ mean, {name: number for name, number in out.items() if name not in names}
+        way = own[np.argmax(change)] - own[np.argmin(change)]
+        out[f"peak_to_peak_{UNITS[term.response]}"] = Interval.about(float(way @ mean), float(np.sqrt(way @ C @ way)))
     return out
 
 

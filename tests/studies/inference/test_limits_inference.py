@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from compensation.noise import Noise
+from studies.inference.causes import parameters_of
 from studies.inference.diagnosis import build_problem
 from studies.inference.held_out import Kept, Model
 from studies.inference.model import SCALES, Background, Linear
@@ -104,6 +105,20 @@ def test_columns_of_an_effect_are_what_a_card_that_has_it_predicts(search, name,
             changes.append(problem.runs[part.run].responses[found].average(two - one))
         change, column = np.concatenate(changes), own[:, 0] * size
         assert np.abs(change - column).max() <= 0.02 * np.abs(change).max() + 1e-300
+
+
+def test_a_family_whose_first_member_may_be_nothing_says_what_all_make_together(search):
+    """Sizes with 0 in their intervals were printed of a hysteresis that is sure."""
+    effect = next(e for e, r in search.signatures.applicable() if (e.name, r) == ("hysteresis", "frequency_Hz"))
+    shape = tuple(effect.grid(search.signatures.span, "frequency_Hz")[12])
+    term = search.term(effect, "frequency_Hz", shape, members=(0, 3))
+    planted = 2e-2 * term.columns["frequency_Hz"][:, 1]
+    target = {name: np.zeros_like(own) for name, own in search.linear.target.items()} | {"frequency_Hz": planted}
+    background = Background(replace(search.linear, target=target), (term,), search.noise)
+    found = parameters_of(background, search.signatures, 0)
+    assert set(found) == {"half_width_K", "initial_memory", "from_degC", "to_degC", "peak_to_peak_Hz"}
+    size = found["peak_to_peak_Hz"]
+    assert 0.0 < size.low < np.ptp(planted) < size.high
 
 
 def test_rows_held_out_are_those_of_a_refit_to_the_other_records(search):
