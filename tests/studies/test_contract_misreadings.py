@@ -188,7 +188,7 @@ def test_a_housing_that_follows_a_jump_of_its_chamber_tells_minutes_by_itself(re
         "inverse_q": 1e-7 + 0 * time,
     }
     assert check_seconds(dataclasses.replace(record, columns=jumped)) == ""
-    with pytest.raises(InputError, match="faster than any housing. time_s must be in seconds"):
+    with pytest.raises(InputError, match=r"faster than any housing\. time_s must be in seconds"):
         check_seconds(dataclasses.replace(record, columns=jumped | {"time_s": time / 60.0}))
 
 
