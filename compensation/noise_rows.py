@@ -190,7 +190,7 @@ class Whitener:
 
     def __call__(self, columns: Array) -> Array:
         """Return stacked columns, (M,) or (M, p), whitened."""
-        matrix = columns.reshape(len(columns), -1)
+        matrix = columns.reshape(len(columns), -1).astype(float, copy=False)
         white, p = np.empty_like(matrix), matrix.shape[1]
         for L, runs in self.roots:
             side_by_side = np.hstack([matrix[self.slices[run]] for run in runs])

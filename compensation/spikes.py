@@ -84,6 +84,8 @@ def _stand_out(values: Array, least: float) -> NDArray[np.bool_]:
         around = np.pad(distance, REACH)
         peak = distance >= np.fmax.reduce([_shifted(around, k) for k in (-2, -1, 1, 2)])
         candidates = np.flatnonzero(peak & (distance > SPIKE * spread))
+        if not candidates.size:
+            return np.isnan(left)
         without = left.copy()
         without[candidates] = np.nan
         around = np.pad(_distance(without), REACH, mode="reflect")
@@ -121,5 +123,9 @@ def _shifted(padded: Array, k: int) -> Array:
 
 def _median(of: list[Array]) -> Array:
     """Return the median of three arrays, entry by entry, missing ones left out."""
-    low, middle, high = np.sort(of, axis=0)  # NaN last
-    return np.asarray(np.where(np.isnan(high), np.where(np.isnan(middle), low, (low + middle) / 2), middle))
+    a, b, c = of
+    median = np.maximum(np.minimum(a, b), np.minimum(np.maximum(a, b), c))  # NaN where one is missing
+    some = np.isnan(median)
+    low, middle, _ = np.sort([own[some] for own in of], axis=0)  # NaN last
+    median[some] = np.where(np.isnan(middle), low, (low + middle) / 2)
+    return np.asarray(median)

@@ -59,7 +59,7 @@ class Transient:
 def propagate(network: Network, boundaries: Mapping[str, Profile], initial: ArrayLike | None = None) -> Transient:
     """Propagate a linear network exactly through piecewise linear boundaries and powers.
 
-    In modal coordinates x = shapesᵀ C T every mode obeys dx/dt = −λ x + u, u linear between the corners of the
+    In modal coordinates x = shapesᵀ C T every mode obeys dx/dt = −λ x + u₀ + u₁ s, u linear between the corners of the
     profiles, so that x = u₀/λ − u₁/λ² + (u₁/λ) s + c e^(−λ s) at the time s after a corner.
     `initial` temperatures of the nodes: the steady state before the profiles begin unless given.
     """
@@ -71,16 +71,19 @@ def propagate(network: Network, boundaries: Mapping[str, Profile], initial: Arra
     modes = find_relaxation(network, 1.0)  # a linear network has the same modes at every temperature
     rate, shapes = 1 / modes.time_constants, modes.shapes
     value, slope = boundary_forcing(network, boundaries, knots[:-1])
-    u0 = (value @ modes.coupling.T + network.power(knots[:-1])) @ shapes
-    u1 = (slope @ modes.coupling.T + network.power(knots[:-1], 1)) @ shapes
-    trend = u1 / rate
-    level = (u0 - trend) / rate
+    trend = (slope @ modes.coupling.T + network.power(knots[:-1], 1)) @ shapes
+    level = (value @ modes.coupling.T + network.power(knots[:-1])) @ shapes
+    trend /= rate  # in place: a record has many rows and a shell many nodes
+    level -= trend
+    level /= rate
     length = np.diff(knots)[:, None]
     decay = np.exp(-rate * length)
-    particular_end = level + trend * length
+    forced = trend * length
+    forced += level
+    forced -= decay * level
     T0 = initial_state(network, boundaries, initial)
-    state = scan(decay, particular_end - decay * level, (T0 * modes.capacity) @ shapes)
-    departure = state[:-1] - level
+    departure = scan(decay, forced, (T0 * modes.capacity) @ shapes)[:-1]
+    departure -= level
 
     def evaluate(time: Array) -> Array:
         k = np.minimum(np.searchsorted(knots, time, side="right") - 1, len(length) - 1)

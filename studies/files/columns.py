@@ -10,7 +10,7 @@ import hashlib
 import io
 import re
 from collections import Counter
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, TypeAlias
@@ -27,8 +27,6 @@ if TYPE_CHECKING:
 
 LARGEST = 1e20
 """No reading of an instrument, time or count is larger; what is larger would overflow in its powers."""
-# Anything but plain decimal numbers, commas and line ends: 'nan', quotes, comments, blanks.
-_UNUSUAL = re.compile(rb"[^0-9eE+.,\r\n-]")
 _SOMETHING = re.compile(rb"\S")
 IMPORT = " 'hrg import' brings laboratory files with other names, units and notations into this form."
 HEAD = 1 << 20
@@ -96,7 +94,7 @@ def read_columns(
         return columns
     comments, header, header_line, start = _read_head(path)
     names = _check_names(path, header, header_line, known, required, prefixes)
-    values, sha256 = _parse_fast(path, start, names) or _parse_with_care(path, start, names, header_line + 1)
+    values, sha256 = parse_fast(path, start, names) or _parse_with_care(path, start, names, header_line + 1)
     columns = Columns(str(path), values, comments, sha256, header_line + 1)
     _check_size(columns)
     return columns
@@ -195,18 +193,20 @@ def _check_names(
     return names
 
 
-def _parse_fast(path: str | Path, start: int, names: list[str]) -> "tuple[Table, str] | None":
+def parse_fast(
+    path: str | Path, start: int, names: Sequence[str], separator: str = ",", decimal: str = "."
+) -> "tuple[Table, str] | None":
     """Parse a clean table quickly, never all of its text in memory; None when the careful way must decide."""
     import numpy as np
 
     with opened(path) as file:
-        if (found := _scan(file, start, len(names))) is None:
+        if (found := _scan(file, start, len(names), separator, decimal)) is None:
             return None
         rows, body, sha256 = found
         file.seek(body)
         table, done = np.empty((len(names), rows)), 0
         try:
-            if table.size <= FEW:
+            if table.size <= FEW and (separator, decimal) == (",", "."):
                 cells = b",".join(file.read().split()).split(b",")
                 table[:] = np.reshape([float(cell or b"nan") for cell in cells], (rows, -1)).T
                 return dict(zip(names, table, strict=True)), sha256
@@ -214,7 +214,9 @@ def _parse_fast(path: str | Path, start: int, names: list[str]) -> "tuple[Table,
 
             with pd.read_csv(
                 file,
-                names=names,
+                sep=separator,
+                decimal=decimal,
+                names=list(names),
                 header=None,
                 dtype="float64",
                 keep_default_na=False,
@@ -231,27 +233,29 @@ def _parse_fast(path: str | Path, start: int, names: list[str]) -> "tuple[Table,
     return (dict(zip(names, table, strict=True)), sha256) if done == rows else None
 
 
-def _scan(file: IO[bytes], start: int, columns: int) -> tuple[int, int, str] | None:
+def _scan(file: IO[bytes], start: int, columns: int, separator: str, decimal: str) -> tuple[int, int, str] | None:
     """Return the rows of a table whose body starts there, the place of the body in the file, and the hash.
 
-    None where the rows have not all the same columns, or anything stands there but plain numbers.
+    None where the rows have not all the same columns, or anything stands there but plain decimal numbers, separators and
+    line ends: 'nan', quotes, comments, blanks.
     """
+    unusual = re.compile(rf"[^0-9eE+\r\n{separator}{decimal}-]".encode())
     if file.read(len(codecs.BOM_UTF8)) != codecs.BOM_UTF8:
         file.seek(0)
     body = file.tell() + start
     sum_ = hashlib.sha256(file.read(start))
-    rows = commas = 0
+    rows = between = 0
     is_empty, last = True, b""
     while portion := file.read(PORTION):
-        if _UNUSUAL.search(portion):
+        if unusual.search(portion):
             return None
         sum_.update(portion)
         rows += portion.count(b"\n")
-        commas += portion.count(b",")
+        between += portion.count(separator.encode())
         is_empty = is_empty and not _SOMETHING.search(portion)
         last = portion
     rows += not last.endswith(b"\n")
-    return None if is_empty or commas != rows * (columns - 1) else (rows, body, sum_.hexdigest())
+    return None if is_empty or between != rows * (columns - 1) else (rows, body, sum_.hexdigest())
 
 
 def _parse_with_care(path: str | Path, start: int, names: list[str], first_line: int) -> "tuple[Table, str]":

@@ -22,7 +22,7 @@ from studies.files.reading import PORTION, opened
 from studies.importing.formats import KINDS, READERS, Channel, Clock
 from studies.importing.mapping import FileMap
 from studies.importing.raw import name_columns, shorten
-from studies.importing.tables import OVERLOAD, Part, RawTable
+from studies.importing.tables import NumberTable, Part
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -110,12 +110,11 @@ def sort_groups(channels: Sequence[Channel]) -> list[Group]:
 
 
 @dataclass(frozen=True)
-class ChannelTable(RawTable):
+class ChannelTable(NumberTable):
     """The channels that one [[file]] of a map reads, of one file or of several that continue one another."""
 
     channels: tuple[dict[str, Channel], ...]
     files: contextlib.ExitStack = field(repr=False)
-    _last: dict[str, "tuple[Array, int]"] = field(default_factory=dict, repr=False)
 
     def close(self) -> None:
         """Close the files."""
@@ -125,24 +124,6 @@ class ChannelTable(RawTable):
     def row_name(self) -> str:
         """What a row is called in messages."""
         return "row"
-
-    def numbers(self, column: str) -> "Array":
-        """Return a channel as numbers, NaN where a value is missing; of channels only the last one read is kept."""
-        if column not in self._last:
-            self._last.clear()
-            values = self._read(column)
-            for word in self.missing:
-                with contextlib.suppress(ValueError):
-                    values[values == float(word)] = np.nan
-            beyond = (values >= OVERLOAD) | (values <= -OVERLOAD)
-            values[beyond] = np.nan
-            self._last[column] = values, int(np.count_nonzero(beyond))
-        return self._last[column][0]
-
-    def count_overloads(self, column: str) -> int:
-        """Return how many readings of a channel stand for an overload of the instrument."""
-        self.numbers(column)
-        return self._last[column][1]
 
     def own_clock(self) -> "tuple[Array, datetime.datetime | None]":
         """Return the seconds of every row by the file's own clock, and when the first file started."""
@@ -163,7 +144,8 @@ class ChannelTable(RawTable):
             times.append(seconds)
         return np.concatenate(times), start
 
-    def _read(self, column: str) -> "Array":
+    def read(self, column: str) -> "Array":
+        """Return the values of a channel as they stand in the files."""
         values = []
         for part, own in zip(self.parts, self.channels, strict=True):
             with plainly(part.path):

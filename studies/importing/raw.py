@@ -1,9 +1,11 @@
 """Raw tables: text of any separator and encoding, or Excel sheets, as cells of text with the lines that they stand on."""
 
+import codecs
 import csv
 import hashlib
 import importlib
 import io
+import itertools
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,9 +13,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from studies.errors import InputError, MissingEnvironment, nearest
-from studies.files.reading import read_bytes
-from studies.importing.mapping import SEPARATORS, FileMap
-from studies.importing.tables import OVERLOAD, Part, RawTable
+from studies.files.columns import parse_fast
+from studies.files.reading import opened, read_bytes
+from studies.importing.mapping import NUMERIC_TIMES, SEPARATORS, FileMap
+from studies.importing.tables import OVERLOAD, ParsedTable, Part, RawTable
 
 if TYPE_CHECKING:
     import numpy as np
@@ -76,6 +79,28 @@ class TextTable(RawTable):
         import numpy as np
 
         return int(np.count_nonzero(np.isnan(self.numbers(column)) & ~self.is_empty(self.text(column))))
+
+
+def read_plain(path: str | Path, file: "FileMap") -> ParsedTable | None:
+    """Read a text of plain numbers in blocks, so that a long one costs its numbers and little more; None where cells must be looked at as text."""
+    simple = file.encoding == "utf-8" and file.separator != "space" and file.last_line is None
+    if not simple or Path(path).suffix.lower() in EXCEL or (file.time and file.time_format not in NUMERIC_TIMES):
+        return None
+    with opened(path) as raw:
+        head = list(itertools.islice(raw, file.data_line))
+    if b"".join(head).startswith(codecs.BOM_UTF8):
+        return None
+    try:
+        names = _head(path, _split_lines(path, b"".join(head).decode(), file), file)
+        begin = sum(map(len, head[: file.data_line - 1]))
+        found = parse_fast(path, begin, names, SEPARATORS[file.separator], file.decimal)
+    except (UnicodeDecodeError, InputError):
+        return None
+    if found is None:
+        return None
+    columns, sha256 = found
+    part = Part(str(path), sha256, file.data_line, len(columns[names[0]]))
+    return ParsedTable((part,), file.missing, columns)
 
 
 def read_raw(path: str | Path, file: "FileMap") -> TextTable:

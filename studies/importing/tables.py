@@ -1,11 +1,12 @@
 """What every raw table is, of text or of channels: columns by name, and where their rows stand."""
 
+import contextlib
 import itertools
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from studies.errors import InputError
+from studies.errors import InputError, nearest
 
 if TYPE_CHECKING:
     import datetime
@@ -87,3 +88,45 @@ class RawTable:
     def own_clock(self) -> "tuple[NDArray[np.float64], datetime.datetime | None]":
         """Return the seconds of every row by the file's own clock, and when it started."""
         raise InputError(f"{self.path}: a table of text has no clock of its own; name its time column in the map.")
+
+
+@dataclass(frozen=True)
+class NumberTable(RawTable):
+    """A table whose columns are all numbers."""
+
+    _last: "dict[str, tuple[NDArray[np.float64], int]]" = field(default_factory=dict, repr=False, kw_only=True)
+
+    def read(self, column: str) -> "NDArray[np.float64]":
+        """Return the values of a column as they stand in the files, in an array of its own."""
+        raise NotImplementedError
+
+    def numbers(self, column: str) -> "NDArray[np.float64]":
+        """Return a column as numbers, NaN where a value is missing; only the last one read is kept."""
+        if column not in self._last:
+            self._last.clear()
+            values = self.read(column)
+            for word in self.missing:
+                with contextlib.suppress(ValueError):
+                    values[values == float(word)] = float("nan")
+            beyond = (values >= OVERLOAD) | (values <= -OVERLOAD)
+            values[beyond] = float("nan")
+            self._last[column] = values, int(beyond.sum())
+        return self._last[column][0]
+
+    def count_overloads(self, column: str) -> int:
+        """Return how many readings of a column stand for an overload of the instrument."""
+        self.numbers(column)
+        return self._last[column][1]
+
+
+@dataclass(frozen=True)
+class ParsedTable(NumberTable):
+    """A text of plain numbers."""
+
+    columns: "Mapping[str, NDArray[np.float64]]"
+
+    def read(self, column: str) -> "NDArray[np.float64]":
+        """Return the values of a column."""
+        if column not in self.columns:
+            raise InputError(f"{self.path}: there is no column '{column}'{nearest(column, self.columns)}")
+        return self.columns[column].copy()

@@ -189,7 +189,7 @@ def infer(card: "Instrument", campaign: Campaign, progress: Report = lambda _: N
         there = _from(replace(found, state=state, noise=noise, rows=problem.rows), told, progress)
         search, outcome = max((there, (search, outcome)), key=lambda found: _on_all_rows(found[0], found[1].final))
     plain = Model(Linear.of(found, told), Signatures.at(problem, found.point), (), outcome.plain.noise)
-    shipped = plain.residuals(Kept(np.zeros(problem.count), ()))
+    shipped = {name: rows.rms for name, rows in plain.residuals(Kept(np.zeros(problem.count), ())).items()}
     calibrated = plain.residuals(Kept(found.point, ()))
     if path is not None:
         card, found = path.card, path.fit

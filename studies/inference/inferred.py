@@ -25,7 +25,8 @@ class Inferred:
     Attributes
     ----------
     card : as shipped
-    shipped, plain : rows of every response with the card as shipped and calibrated
+    shipped : response -> rms on its rows of what the card as shipped leaves
+    plain, rows : what the calibrated card leaves of every response, and the final model
     search : Search, in the linearisation where it ended
     outcome : Outcome
     left : response -> Leftover
@@ -38,7 +39,7 @@ class Inferred:
     search: Search
     outcome: Outcome
     left: Mapping[str, Leftover]
-    shipped: Mapping[str, Rows]
+    shipped: Mapping[str, float]
     plain: Mapping[str, Rows]
     rows: Mapping[str, Rows]
     held_out: Mapping[str, tuple[float | None, float | None]]

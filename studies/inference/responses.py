@@ -60,7 +60,7 @@ def result_of(found: Inferred, name: str, causes: Sequence[Cause]) -> ResponseRe
         remark,
         white=white,
         wander=float(np.sqrt(max(rows.rms**2 - white**2, 0.0))),
-        shipped=found.shipped[name].rms,
+        shipped=found.shipped[name],
         run_shifts=_run_shifts(found, name),
     )
 

@@ -98,7 +98,7 @@ class Search:
         self.bank = self.shapes_of(signatures.applicable()) if bank is None else bank
 
     def shapes_of(self, effects: Iterable[tuple[Effect, str]]) -> list[Shapes]:
-        """Return the columns of all shapes of some effects."""
+        """Return the columns of all shapes of some effects, in seven digits: whatever leads is computed anew."""
         found = []
         for effect, response in effects:
             grid = [tuple(shape) for shape in effect.grid(self.signatures.span, response)]
@@ -109,7 +109,7 @@ class Search:
                 there = np.any([np.any(own != 0, axis=0) for own in columns.values()], axis=0)
                 members = tuple(k for k in first if there[k])
                 if members:
-                    kept = {name: own[:, members] for name, own in columns.items()}
+                    kept = {name: own[:, members].astype(np.float32) for name, own in columns.items()}
                     groups.setdefault(members, []).append((shape, kept))
             for members, own in groups.items():
                 stacked = {name: np.stack([columns[name] for _, columns in own], axis=1) for name in own[0][1]}

@@ -243,13 +243,8 @@ class Signatures:
             and "bias_deg_per_h" in self.problem.responses
         ):
             kinds["bias_deg_per_h"] = DAMPED
-        found: dict[str, list[Array]] = {name: [] for name in kinds}
-        for k, (part, path) in enumerate(zip(self.problem.parts, self.paths, strict=True)):
-            own = np.asarray(effect.columns(path.states, shape, response), dtype=float)
-            for name in kinds:
-                if name in part.responses:
-                    found[name].append(self._operators[k, name, kinds[name]] @ own)
-        return {name: np.concatenate(parts) for name, parts in found.items() if parts}
+        own = np.concatenate([effect.columns(path.states, shape, response) for path in self.paths])
+        return {name: self._operators[name, kind] @ own for name, kind in kinds.items()}
 
     def of_term(
         self, effect: Effect, shape: tuple[float, ...], response: str, members: Sequence[int], starts: bool
@@ -276,27 +271,31 @@ class Signatures:
         return bool(effect.memory) and memory_of(effect, shape) > self.span.tau
 
     @cached_property
-    def _operators(self) -> "dict[tuple[int, str, str], csr_array]":
-        """By part, response and way: what takes a column on the even grid to the means of the blocks."""
-        from scipy.sparse import csr_array, diags_array
+    def _operators(self) -> "dict[tuple[str, str], csr_array]":
+        """By response and way: what takes a column on the even grids of all parts to the means of the blocks."""
+        from scipy.sparse import block_diag, csr_array, diags_array
 
-        found = {}
-        for k, (part, path) in enumerate(zip(self.problem.parts, self.paths, strict=True)):
+        found: dict[tuple[str, str], list[csr_array]] = {}
+        for part, path in zip(self.problem.parts, self.paths, strict=True):
             onto, slope = path.interpolation, _gradient(len(path.states.time), path.states.step)
-            for name in part.responses:
+            for name in self.problem.responses:
+                own = [found.setdefault((name, way), []) for way in (DIRECT, WARMED, DAMPED)]
+                if name not in part.responses:
+                    for column in own:
+                        column.append(csr_array((0, onto.shape[1])))
+                    continue
                 blocks = self.problem.runs[part.run].responses[name]
                 sizes = np.diff(np.append(blocks.edges, len(blocks.rows)))
                 place = np.repeat(np.arange(len(sizes)), sizes)
                 entries = 1.0 / blocks.counts[place]
                 mean = csr_array((entries, (place, blocks.rows)), (len(sizes), len(path.time)))
-                found[k, name, DIRECT] = csr_array(mean @ onto)
                 warmed = mean @ diags_array(path.by_temperature[name]) @ onto
                 if np.any(path.by_rate[name]):
                     warmed = warmed + mean @ diags_array(path.by_rate[name]) @ onto @ slope
-                found[k, name, WARMED] = csr_array(warmed)
-                if name == "bias_deg_per_h" and np.any(path.by_loss):
-                    found[k, name, DAMPED] = csr_array(mean @ diags_array(path.by_loss) @ onto)
-        return found
+                each = (mean @ onto, warmed, mean @ diags_array(path.by_loss) @ onto)
+                for column, block in zip(own, each, strict=True):
+                    column.append(block)
+        return {key: block_diag(blocks, "csr") for key, blocks in found.items()}
 
     @cached_property
     def _leaks(self) -> bool:

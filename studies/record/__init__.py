@@ -244,8 +244,9 @@ def write_record(record: Record, path: str | Path, progress: Callable[[int], Non
         file.write("".join(f"{note}\n" for note in [*(f"# {n}" for n in notes), ",".join(record.columns)]).encode())
         for begin in range(0, max(map(len, record.columns.values()), default=0), 100_000):
             part = np.column_stack([values[begin : begin + 100_000] for values in record.columns.values()])
-            lines = [",".join([repr(x) if x == x else "" for x in row]) for row in part.tolist()]
-            file.write(("\n".join(lines) + "\n").encode())
+            cells = iter(map(repr, part.ravel().tolist()))
+            lines = "\n".join(map(",".join, zip(*[cells] * part.shape[1], strict=True)))
+            file.write((lines.replace("nan", "") + "\n").encode())
             if progress is not None:
                 progress(begin + len(part))
 

@@ -14,6 +14,7 @@ from studies.errors import InputError, MissingEnvironment
 from studies.importing.draft import draft_map
 from studies.importing.join import import_records, resample
 from studies.importing.mapping import load_map
+from studies.importing.raw import read_plain, read_raw
 from studies.importing.units import TARGETS, units_of
 from studies.record import read_record, write_record
 
@@ -667,3 +668,27 @@ def test_dropouts_are_left_empty_counted_and_marked(tmp_path, capsys):
     raw.write_text("time_s,frequency_Hz\n0,4430\n1,0\n")
     with pytest.raises(InputError, match=r"line 3.*is not a possible reading"):
         read_record(raw)
+
+
+@pytest.mark.parametrize(("separator", "decimal"), [(",", "."), ("tab", "."), (";", ",")])
+def test_plain_numbers_are_read_as_numbers_and_equal_to_the_last_digit_what_is_read_as_text(
+    tmp_path, separator, decimal
+):
+    rng, raw, written = np.random.default_rng(3), tmp_path / "raw.txt", tmp_path / "map.toml"
+    table = np.column_stack([np.arange(500.0), 20 + rng.normal(size=500), 4430 + 1e-9 * rng.normal(size=500)])
+    between = {"tab": "\t"}.get(separator, separator)
+    cells = [[repr(float(value)).replace(".", decimal) for value in row] for row in table]
+    cells[7][1], cells[9][1], cells[11][2] = "", "-999", "9,9E37".replace(",", decimal)
+    raw.write_text("\n".join(between.join(row) for row in [["t", "T", "f"], *cells]) + "\n")
+    written.write_text(
+        f'schema = "hrg.map/1"\n[[file]]\nseparator = "{separator}"\ndecimal = "{decimal}"\nmissing = ["-999"]\n'
+        'time = "t"\ntime_format = "s"\n[[file.column]]\nfrom = "f"\nto = "frequency_Hz"\nunit = "Hz"\n'
+    )
+    (file,) = load_map(written).files
+    plain, text = read_plain(raw, file), read_raw(raw, file)
+    assert plain.parts == text.parts
+    for name in ("t", "T", "f"):
+        np.testing.assert_array_equal(plain.numbers(name), text.numbers(name))
+        assert plain.count_overloads(name) == text.count_overloads(name) == (name == "f")
+    raw.write_text(raw.read_text() + between.join(["500", "see note", "1"]) + "\n")
+    assert read_plain(raw, file) is None
