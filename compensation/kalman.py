@@ -115,7 +115,7 @@ def run_filter(model: LinearModel, measurements: ArrayLike, start: ArrayLike, co
     settled = False
     for i, row in enumerate(z):
         K, S, after = weigh(model, predict(model, x, P)[1])
-        settled, P, before = np.allclose(after, P, rtol=SETTLED, atol=0.0), after, F @ x
+        settled, P, before = bool((np.abs(after - P) <= SETTLED * np.abs(P)).all()), after, F @ x
         x = before + K @ (row - C @ before)
         states[i], covariances[i], innovations[i], spreads[i] = x, P, row - C @ before, S
         if settled:  # the covariance does not depend on the data; once it repeats itself x⁺ = (1 − K C) F x + K z
@@ -132,7 +132,7 @@ def _follow(A: Array, u: Array, start: Array) -> Array:
     from scipy.linalg import schur
     from scipy.signal import lfilter
 
-    T, U = schur(A, output="complex")
+    T, U = schur(A, output="complex" if np.iscomplex(np.linalg.eigvals(A)).any() else "real")
     begun, driven = start @ U.conj(), u @ U.conj()
     y = np.empty_like(driven)
     for k in reversed(range(len(T))):

@@ -188,7 +188,7 @@ class Whitener:
     slices: tuple[slice, ...]
     roots: tuple[tuple[Array, tuple[int, ...]], ...]
 
-    def __call__(self, columns: Array) -> Array:
+    def __call__(self, columns: NDArray[np.floating]) -> Array:
         """Return stacked columns, (M,) or (M, p), whitened."""
         matrix = columns.reshape(len(columns), -1).astype(float, copy=False)
         white, p = np.empty_like(matrix), matrix.shape[1]

@@ -215,7 +215,7 @@ class Background:
             log_prior(self.linear.rows[name], level, self.linear.stated(name)) for name, level in self.noise.items()
         )
 
-    def gains(self, columns: Mapping[str, Array], units: Array, effect: Effect) -> Array:
+    def gains(self, columns: Mapping[str, NDArray[np.floating]], units: Array, effect: Effect) -> Array:
         """Return what effects add to the evidence at each of SCALES, (S, H).
 
         Parameters
@@ -242,7 +242,7 @@ class Background:
         return np.asarray(gain)
 
     def against(
-        self, columns: Mapping[str, Array], units: Array, left: Mapping[str, Array]
+        self, columns: Mapping[str, NDArray[np.floating]], units: Array, left: Mapping[str, Array]
     ) -> tuple[Array, Array, Array]:
         """Return eigenvalues (H, k) and eigenvectors (H, k, k) of the Gram matrices of effects beside this model, and the moments along these of B residuals (H, k, B).
 

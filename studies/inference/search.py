@@ -18,6 +18,7 @@ from studies.inference.shapes import chosen, leading, polish
 from studies.inference.signatures import Signatures
 
 Array = NDArray[np.float64]
+Columns = Mapping[str, NDArray[np.floating]]
 LESS = (0.1, 0.01)
 """Of the slow noise of a response: what an effect has been taken for until it is named."""
 MOST_TERMS, CONTENDERS = 4, 5
@@ -43,7 +44,7 @@ class Shapes:
     response: str
     shapes: tuple[tuple[float, ...], ...]
     members: tuple[int, ...]
-    columns: Mapping[str, Array]
+    columns: Columns
     """response -> (M, H, k)"""
     count: int
     """Shapes of the whole grid."""
@@ -102,7 +103,7 @@ class Search:
         found = []
         for effect, response in effects:
             grid = [tuple(shape) for shape in effect.grid(self.signatures.span, response)]
-            groups: dict[tuple[int, ...], list[tuple[tuple[float, ...], dict[str, Array]]]] = {}
+            groups: dict[tuple[int, ...], list[tuple[tuple[float, ...], Columns]]] = {}
             first = leading(effect, len(grid))
             for shape in chosen(effect, grid):
                 columns = self.signatures.columns(effect, shape, response)
