@@ -196,3 +196,14 @@ def test_a_spectrum_of_a_split_mode_gives_both_lines():
         assert abs(found[name].value - value) < 4 * found[name].sd
     with pytest.raises(CompensationError, match="no resonance"):
         fit_spectrum(f, np.random.default_rng(14).gamma(20, 1 / 20, f.size))
+
+
+def test_absent_rows_are_told_as_lost_like_empty_cells_and_an_uneven_clock_is_not():
+    random = np.random.default_rng(5)
+    z = ring(draw_gyro(random), random)
+    gone = (np.arange(TIME.size) > 400) & (np.arange(TIME.size) < 551)
+    empty = np.where(gone, np.nan, z)
+    for envelope in (from_lock_in(TIME, empty, CARRIER), from_lock_in(TIME[~gone], z[:, ~gone], CARRIER)):
+        assert envelope.lost == pytest.approx(0.1)
+        assert "10 % of the samples are lost." in analyse_decay(envelope).remarks
+    assert from_lock_in(np.geomspace(1.0, 600.0, TIME.size), z, CARRIER).lost == 0
