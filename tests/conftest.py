@@ -6,6 +6,8 @@ import os
 
 import pytest
 
+from tests.sketches import sketch_pages
+
 for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
     os.environ.setdefault(name, "1")  # the solver's matrices are small
 
@@ -17,30 +19,17 @@ def pytest_collection_finish() -> None:
 
 
 @pytest.fixture(scope="session", autouse=True)
-def whole_figures():
-    """Figures of pages are drawn without layout, file and curves, once of each kind: what cannot be drawn fails so too."""
-    from studies.results import page
-
-    known = set()
-
-    def sketch(figure, caption, alt):
-        kind = tuple(caption.split()[:4])
-        if kind not in known:
-            known.add(kind)
-            figure.set_layout_engine("none")
-            figure.draw_without_rendering()
-        return page.Picture("data:image/svg+xml;base64,", caption, alt)
-
-    whole = page.draw
+def whole_pages():
+    """Pages are sketched (`tests/sketches.py`); what draws them whole, for those that look at it."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(page, "draw", sketch)
-        yield whole
+        yield sketch_pages(patch)
 
 
 @pytest.fixture
-def drawn(monkeypatch, whole_figures):
-    """Pages with their figures whole, where these are the subject."""
-    monkeypatch.setattr("studies.results.page.draw", whole_figures)
+def drawn(monkeypatch, whole_pages):
+    """Pages with their figures and pictures whole, where these are the subject."""
+    for name, whole in whole_pages.items():
+        monkeypatch.setattr(name, whole)
 
 
 @pytest.fixture

@@ -188,9 +188,16 @@ def mode_blocks(instrument: "Instrument", harmonics: Sequence[int] = (2, 3)) -> 
     return view_blocks([show_mode(instrument, n) for n in harmonics])
 
 
+def draw_still(shown: ModeScene) -> bytes:
+    """Return the PNG that stands behind an interactive view."""
+    from shell.render import render_png
+
+    return render_png(shown.scene())
+
+
 def view_blocks(shown: "Sequence[ModeScene]", remark: str = "") -> "list[Block]":
     """Return the interactive view of modes of one instrument at one temperature."""
-    from shell.render import NoOpenGL, render_png
+    from shell.render import NoOpenGL
     from studies.reports.webgl import Drawn, view_modes
 
     first = shown[0]
@@ -208,7 +215,7 @@ def view_blocks(shown: "Sequence[ModeScene]", remark: str = "") -> "list[Block]"
             )
     blocks: list[Block] = []
     try:
-        png = render_png(first.scene())
+        png = draw_still(first)
     except NoOpenGL as error:
         png = None
         blocks.append(Sentence(f"The still picture of the mode is missing: {error}", "warning"))

@@ -19,6 +19,10 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import pytest
+
+from tests.sketches import sketch_pages
+
 HERE = Path(__file__).parent
 CASES: dict[str, dict[str, Any]] = tomllib.loads((HERE / "commands.toml").read_text(encoding="utf-8"))
 DIGITS = 6
@@ -130,6 +134,7 @@ class _Text(html.parser.HTMLParser):
 
 def write(names: list[str]) -> None:
     """Write the golden files of the named commands, or of all."""
+    sketch_pages(pytest.MonkeyPatch())
     for name in names or CASES:
         found, page = answer(name)
         text = json.dumps(found, indent=1, ensure_ascii=False) + "\n"

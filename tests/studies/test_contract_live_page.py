@@ -18,6 +18,7 @@ from studies.results import Chapter
 from studies.results.page import render_page
 from tests.studies.test_contract_browser import BROWSER, SOFTWARE_GL, browse
 
+pytestmark = pytest.mark.usefixtures("drawn")
 DESIGNS = [(0.9, 15.0, 20.0), (0.87, 15.6, -30.0), (0.94, 14.4, 75.0), (0.8551, 14.26, 33.3)]
 
 ASK = """

@@ -20,7 +20,7 @@ def hrg_render(*words):
 
 
 @pytest.fixture
-def no_opengl(monkeypatch):
+def no_opengl(monkeypatch, drawn):
     """A machine whose child process cannot draw."""
     monkeypatch.setattr("shell.render._run_child", lambda *_: None)
 

@@ -161,20 +161,16 @@ def test_recovery_dome_at_8_khz(tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["light-cylinder", "robust-dome"])
-def test_recovery_worked_designs(name, tmp_path):
+def test_recovery_robust_dome(tmp_path):
     """Limits are kept with their margins by full solves, something holds the objective back, and no design seen is better."""
-    search = "\n[search]\nstarts = 1\n" if name == "robust-dome" else ""  # steps need more than one start
-    task = write(tmp_path, shipped_tasks()[name].read_text(encoding="utf-8") + search)
+    task = write(tmp_path, shipped_tasks()["robust-dome"].read_text(encoding="utf-8") + "\n[search]\nstarts = 1\n")
     found = optimise(task, workers=1)
     assert found.verified == pytest.approx(found.after, rel=1e-9)
     assert all(limit.room - limit.margin > -2e-6 * abs(limit.limit) for limit in found.limits)
     assert any(limit.price for limit in found.limits)
     column = found.place(found.task.keys.objective[0].column)
     kept = found.history[:, 0] == 0
-    steps = max((one.step or 0.0) for one in found.task.keys.parameter)
-    assert found.after[column] <= found.values[kept, column].min() * (1 + (5e-3 if steps else 1e-4))
-    if found.spreads:
-        (frequency,) = [one for one in found.spreads if one.column == "frequency_n2_Hz"]
-        assert frequency.low >= 4900
-        assert frequency.high <= 5100.05
+    assert found.after[column] <= found.values[kept, column].min() * (1 + 1e-4)
+    (frequency,) = [one for one in found.spreads if one.column == "frequency_n2_Hz"]
+    assert frequency.low >= 4900
+    assert frequency.high <= 5100.05

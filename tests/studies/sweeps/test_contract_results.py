@@ -223,6 +223,17 @@ def test_a_public_scheduler_needs_encryption(address, public):
         check_private(address)
 
 
+def test_a_public_scheduler_is_refused_before_any_work_of_an_interpolated_study_too(tmp_path, refuse):
+    """Whoever imitates the scheduler could send objects that run code; an interpolated study once took the address in silence."""
+    (tmp_path / "spec.toml").write_text(
+        'schema = "hrg.study/1"\nname = "two"\ncard = "free-dome"\nsampling = { solver = "family", method = "grid" }\n'
+        'parameter = [{ name = "resonator.radius_mm", values = [15.0, 15.1] }]\nquantity = [{ name = "frequency", theory = "shell" }]\n'
+    )
+    words = ["study", "run", str(tmp_path / "spec.toml"), "--out", str(tmp_path / "out"), "--scheduler", "tcp://8.8.8.8:8786"]  # fmt: skip
+    assert "a public address without encryption" in refuse(words)
+    assert not (tmp_path / "out").exists()
+
+
 @pytest.mark.parametrize("greeting", [b"", b"SSH-2.0-OpenSSH_9.2p1 Debian-2\r\n"], ids=["silent", "ssh"])
 def test_a_server_that_is_no_scheduler_is_named(greeting, monkeypatch):
     """A silent one kept the study waiting for ever; the greeting of another was taken for a length that no memory holds."""
