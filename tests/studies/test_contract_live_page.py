@@ -1,15 +1,17 @@
 """The page that computes: its numbers in a real browser are those of the family and of the material, and of full solves."""
 
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from shell.family import Axis, build_family
+from shell.family import Axis
 from shell.modes import solve_modes
 from studies.cli import main
 from studies.instrument.card import load_card
 from studies.loss.model import loss_model
+from studies.reports import live
 from studies.reports.live import COLDEST, TOLERANCE, Designs, describe_live
 from studies.reports.live_fields import explore_fields
 from studies.reports.scenes import moving_mode
@@ -18,7 +20,7 @@ from studies.results import Chapter
 from studies.results.page import render_page
 from tests.studies.test_contract_browser import BROWSER, SOFTWARE_GL, browse
 
-pytestmark = pytest.mark.usefixtures("drawn")
+WHOLE = pytest.mark.usefixtures("drawn")  # with the sliders of all dimensions
 DESIGNS = [(0.9, 15.0, 20.0), (0.87, 15.6, -30.0), (0.94, 14.4, 75.0), (0.8551, 14.26, 33.3)]
 
 ASK = """
@@ -44,6 +46,7 @@ addEventListener("load", () => {
 """
 
 
+@WHOLE
 def test_the_data_are_small_and_bounded():
     data, missing = describe_live(load_card("free-dome"), 2, "shell")
     assert len(json.dumps(data)) - len(data["fields"]["outline"]) < 300_000
@@ -55,9 +58,12 @@ def test_the_data_are_small_and_bounded():
     assert data["temperature"]["low"] == pytest.approx(COLDEST + 273.15)
 
 
+@WHOLE
 @pytest.mark.slow
-def test_a_neighbour_whose_solves_jump_between_layouts_has_sliders_too():
+def test_a_neighbour_whose_solves_jump_between_layouts_has_sliders_too(monkeypatch):
     """The harmonics 0, 1 and 3 of this card had none: 3.4e-5 was reached, of which 3e-5 were the solver's own steps."""
+    none = SimpleNamespace(polynomial=SimpleNamespace(indices=()), missing=(), spell=dict)
+    monkeypatch.setattr("studies.reports.live.explore_fields", lambda *_: none)
     data, _ = describe_live(load_card("hrg-30mm"), 0, "solid")
     assert [(mode["harmonic"], mode["index"]) for mode in data["modes"]] == [(0, 0), (1, 0)]
     assert data["modes"][0]["error"] <= TOLERANCE
@@ -73,11 +79,18 @@ def test_a_material_at_one_temperature_gets_no_slider_of_temperature():
     assert not data["slope"]
 
 
+@WHOLE
 @pytest.mark.slow
 @pytest.mark.skipif(BROWSER is None, reason="no Chromium or Chrome on this machine")
-def test_the_browser_computes_what_python_computes(tmp_path):
+def test_the_browser_computes_what_python_computes(tmp_path, monkeypatch):
+    made = {}
+
+    def keep(name, whole):
+        monkeypatch.setattr(live, name, lambda *given: made.setdefault(name, whole(*given)))
+
+    for name in ("describe_live", "explore_fields", "_families"):  # what the page carries
+        keep(name, getattr(live, name))
     card = load_card("free-dome")
-    data, _ = describe_live(card, 2, "solid")
     text = render_page("Live", "lead", [Chapter("Numbers", moving_mode(card))])
     page = tmp_path / "page.html"
     page.write_text(text.replace("</body>", ASK.replace("DESIGNS", json.dumps(DESIGNS)) + "</body>"))
@@ -91,17 +104,9 @@ def test_the_browser_computes_what_python_computes(tmp_path):
 
     from studies.sweeps.parameters import set_parameters
 
-    axes = [Axis(axis["key"], axis["low"], axis["high"]) for axis in data["axes"]]
-    names = [axis.name for axis in axes]
-    designs = Designs(card, tuple(axes), ())
-    T = data["temperature"]["low"], data["temperature"]["high"]
-    fields = explore_fields(designs.at_point, 2, 2, "solid", T, card)
-    family = build_family(
-        lambda v: set_parameters(card, dict(zip(names, v.tolist(), strict=True))).resonator,
-        axes,
-        nu=data["nu"],
-        tolerance=TOLERANCE,
-    )
+    (data, _), fields, ((family, *_), _) = made["describe_live"], made["explore_fields"], made["_families"]
+    names = [axis["key"] for axis in data["axes"]]
+    designs = Designs(card, tuple(Axis(axis["key"], axis["low"], axis["high"]) for axis in data["axes"]), ())
     material = card.material
     for (h, R, T), (own, other), measured, drawn in zip(
         DESIGNS, *(seen[key] for key in ("answers", "measured", "drawn")), strict=True
@@ -148,6 +153,7 @@ def evaluate(fields, data, values, T):
     }
 
 
+@WHOLE
 @pytest.mark.slow
 def test_the_split_of_an_imperfect_shell_moves_as_full_solves_say():
     wave = [
