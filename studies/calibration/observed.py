@@ -41,6 +41,7 @@ LEAST_ROWS = 10
 MOST_KINKS = 24  # of a run
 LEAST_KINK = 1e-3  # K
 THERMOMETER = 0.3  # K, error of a settled temperature that nothing else tells
+LEAST_NOISE = 1e-9  # of a frequency that is not rounded
 LEAST_SCATTER = 1e-5  # of a frequency, where nothing else tells
 
 
@@ -111,9 +112,20 @@ class SettledTable:
         return np.array_equal(self.temperature, other.temperature) and np.array_equal(self.frequency, other.frequency)
 
     @property
+    def middled(self) -> Array:
+        """Temperatures from their middle, K."""
+        return np.asarray(self.temperature - 0.5 * (self.temperature.min() + self.temperature.max()))
+
+    def averaged(self, most: int) -> "SettledTable":
+        """Return it with neighbouring rows averaged where it has more than so many."""
+        group = np.arange(len(self.frequency)) // -(-len(self.frequency) // most)
+        T, f = (average_groups(column, group) for column in (self.temperature, self.frequency))
+        return replace(self, temperature=T, frequency=f)
+
+    @property
     def rounding(self) -> float:
-        """Noise of the last digit, Hz."""
-        return self.resolution / float(np.sqrt(12.0))
+        """Noise of the last digit, Hz; of readings without rounding that of the computer's digits."""
+        return max(self.resolution / float(np.sqrt(12.0)), LEAST_NOISE * float(np.abs(self.frequency).max()))
 
     @property
     def scatter(self) -> float:
@@ -121,14 +133,18 @@ class SettledTable:
 
         Too few of them leave nothing: then what a thermometer good to 0.3 K makes of their slope.
         """
-        T, f = self.temperature - self.temperature.mean(), self.frequency
-        degree = min(2, len(np.unique(T)) - 1)
-        rest = f - np.polyval(np.polyfit(T, f, degree), T)
+        f, degree = self.frequency, min(2, len(np.unique(self.temperature)) - 1)
         free = len(f) - degree - 1
         if degree == 2 and free > 1:
+            rest, _ = self.beside_parabola(f)
             return max(float(np.sqrt(rest @ rest / free)), self.rounding)
-        rise = float(np.ptp(f) / np.ptp(T)) if degree > 0 else 0.0
+        rise = float(np.ptp(f) / np.ptp(self.temperature)) if degree > 0 else 0.0
         return max(THERMOMETER * rise, LEAST_SCATTER * float(np.median(f)), self.rounding)
+
+    def beside_parabola(self, values: Array) -> tuple[Array, Array]:
+        """Return what a parabola leaves of values of the rows, and the leverage h of each."""
+        own = np.linalg.qr(np.vander(self.middled / np.ptp(self.temperature), 3)).Q
+        return values - own @ (own.T @ values), np.sum(own**2, axis=1)
 
 
 def read_settled(path: str) -> SettledTable:

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 MOST_JUMPS = 24  # of a run whose times are free, each for itself
 KNOTS = 5  # in a block
+SOAK = 1e3  # time from one row of a table to the next, in that of a reading
 FARTHEST = 180.0  # s between knots at most: temperatures are exact to microkelvins there
 Progress = Callable[[str], None]
 
@@ -138,7 +139,8 @@ class CardProblem:
             if name != SETTLED
         }
         if self.tables:
-            found[SETTLED] = NoiseRows.of([np.arange(float(len(table.frequency))) for table in self.tables])
+            readings = [np.ones(len(table.frequency)) for table in self.tables]
+            found[SETTLED] = NoiseRows.of([SOAK * np.cumsum(one) for one in readings], readings)
         return found
 
     def instrument_at(self, point: Array) -> "Instrument":

@@ -56,13 +56,11 @@ def find_scatter(table: SettledTable, predicted: Array) -> Scatter | None:
     free = len(T) - 3
     if free < 2 or len(np.unique(T)) < 3:
         return None
-    own = np.linalg.qr(np.vander((T - T.mean()) / np.ptp(T), 3)).Q
-    away = table.frequency - predicted
-    rest = away - own @ (own.T @ away)
+    rest, leverage = table.beside_parabola(table.frequency - predicted)
     rms = float(np.sqrt(rest @ rest / free))
     if rms <= limit:
         return None
-    square = rest @ rest - rest**2 / np.maximum(1.0 - np.sum(own**2, axis=1), 1e-9)
+    square = rest @ rest - rest**2 / np.maximum(1.0 - leverage, 1e-9)
     without = np.sqrt(np.maximum(square, 0.0) / (free - 1))
     k = int(np.argmin(without))
     alone = without[k] < limit and without[k] * CLEARLY < np.delete(without, k).min()

@@ -1,78 +1,137 @@
-"""Steady forms of effects, weighed beside what a table's baseline can do."""
+"""Steady forms of effects, weighed beside what a table's baseline can do, in every noise that its rows may have."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import scipy
 
-from studies.diagnosis.table_noise import Scale, TableBaseline
-from studies.effects import Effect
+from compensation.noise import Noise
+from studies.calibration.observed import SETTLED, SettledTable
+from studies.calibration.problem import SOAK
+from studies.diagnosis.constants import CONSTANTS
+from studies.diagnosis.verdict import NINETY, Cause, Interval, weigh
+from studies.effects import Effect, library
 from studies.effects.states import FloatArray
+from studies.inference.model import SCALES, Background, Linear, Term
 
-NOISE_STEPS = 3
-"""Solutions of a card's values beside a form, each in the noise that the one before has left."""
+WHITES = 8
+"""White noises from rounding to scatter."""
+WANDERS = (0.0, 3.0, 30.0, 300.0, 3e3, 3e4)
+"""Variance of a random walk along the whole table over that of the white noise."""
+FEWEST_WANDERING = 24
+MOST_WALK = 10.0
+"""Largest random walk over the whole table, in what the readings leave of their parabola: a walk leaves about a sixth of itself."""
+STRONG = 0.1
+"""Largest usual size of an effect, in what the readings vary by."""
+FREE = 1e3
+"""Scale of a form whose size nothing holds, as it is shown."""
 
 
 @dataclass(frozen=True)
-class Candidate:
-    """One steady form of an effect: its columns, log evidence, and what it leaves (Hz)."""
+class Form:
+    """One steady form of an effect: twice its log evidence over nothing, and the model with it, of any size, in white noise."""
 
-    effect: Effect
-    shape: tuple[float, ...]
-    columns: FloatArray
-    log_evidence: float
-    ssq: float
-    loo: float
-    residual: FloatArray
+    evidence: float
+    model: Background
+
+    @property
+    def term(self) -> Term:
+        """Effect, shape and columns."""
+        return self.model.terms[0]
 
     @property
     def words(self) -> str:
         """The form in words."""
-        return self.effect.steady_words.format(*self.shape)
+        return self.term.effect.steady_words.format(*self.term.shape)
+
+    @property
+    def residual(self) -> FloatArray:
+        """What it leaves of the rows, Hz."""
+        return self.model.residual(SETTLED)
+
+    @property
+    def left_out(self) -> float:
+        """Rms by which it misses rows that are left out, Hz."""
+        return rms(self.model.left_out(SETTLED))
 
 
-def weigh_forms(
-    effect: Effect, x: FloatArray, base: TableBaseline, scale: Scale, rounding: float, scatter: float
-) -> list[Candidate]:
-    """Weigh every shape of an effect at temperatures x (K from their middle)."""
+def each_once(forms: Sequence[Form], placed: bool = False) -> list[Form]:
+    """Return the likeliest form of every effect, or of all that differ in words, but for where they are placed."""
+    best: dict[str, Form] = {}
+    for one in forms:
+        words = one.term.effect.steady_words
+        best.setdefault(one.term.effect.name if placed else one.words if "{0:.0f}" in words else words, one)
+    return list(best.values())
+
+
+def cause_of(forms: Sequence[Form]) -> Cause:
+    """Return the likeliest form as a cause, with the effects that the table cannot tell from it."""
+    best, each = forms[0], each_once(forms, placed=True)
+    scores = [0.5 * one.evidence + CONSTANTS["log_prior_effect"] for one in each]
+    (name, *others), probability = weigh([one.term.effect.name for one in each], scores, 0.0)
+    (mean, C), columns = best.model.coefficients(0), best.term.columns[SETTLED]
+    change = columns @ mean
+    size, ends = float(np.ptp(change)), columns[np.argmax(change)] - columns[np.argmin(change)]
+    spread = NINETY * float(np.sqrt(ends @ C @ ends))
+    numbers = {"peak_to_peak_Hz": Interval(size, max(size - spread, 0.0), size + spread)}
+    return Cause(name, "frequency_Hz", probability, tuple(sorted(others)), numbers, best.evidence, peak=size)
+
+
+def weigh_forms(linear: Linear, table: SettledTable) -> tuple[list[Form], float]:
+    """Return the steady forms of all effects, the likeliest first, and the white noise of the rows without any, Hz."""
+    levels = _noises(linear, table)
+    nothing, noise = _averaged(levels, np.array([one.evidence for one in levels]))
+    effects = [effect for effect in library().values() if effect.steady]
+    forms = [form for effect in effects for form in _weigh(effect, levels, table, nothing)]
+    return sorted(forms, key=lambda form: -form.evidence), noise.white
+
+
+def _noises(linear: Linear, table: SettledTable) -> list[Background]:
+    """Return the baseline in white noise from the rounding of the readings up to their scatter, with a wander along many rows."""
+    count, most = len(table.frequency), max(table.scatter, 2.0 * table.rounding)
+    return [
+        Background(linear, (), {SETTLED: Noise(white, walk=white * float(np.sqrt(wander / count / SOAK)))})
+        for white in map(float, np.geomspace(table.rounding, most, WHITES))
+        for wander in (WANDERS if count >= FEWEST_WANDERING else WANDERS[:1])
+        if np.sqrt(wander) * white <= MOST_WALK * most
+    ]
+
+
+def _averaged(levels: Sequence[Background], values: FloatArray) -> tuple[float, Noise]:
+    """Return the log of the mean of likelihoods over noises, and the white noise of the rows, weighted by them."""
+    whites = np.log([one.noise[SETTLED].white for one in levels])
+    white = Noise(float(np.exp(scipy.special.softmax(values) @ whites)))
+    return float(scipy.special.logsumexp(values) - np.log(len(values))), white
+
+
+def _weigh(effect: Effect, levels: Sequence[Background], table: SettledTable, nothing: float) -> list[Form]:
+    """Weigh an effect in all its shapes, the sizes averaged; the best one stands for the mean over them."""
     assert effect.steady is not None
     assert effect.steady_grid is not None
-    shapes = list(effect.steady_grid(float(x.min()), float(x.max())))
-    out = []
-    for shape in shapes:
-        columns = effect.steady(x, shape)
-        if columns.shape[1] + 4 > x.size or not np.all(np.linalg.norm(base.beside(columns), axis=0) > 1e-9):
-            continue
-        noise = scatter
-        for _ in range(NOISE_STEPS if base.known.size else 1):
-            residual, lone, _, _ = base.solve(columns, noise)
-            noise = max(rms(residual), rounding)
-        value = scale.log_evidence(columns) - float(np.log(len(shapes)))
-        out.append(Candidate(effect, tuple(shape), columns, value, float(residual @ residual), rms(lone), residual))
-    if len(out) > 1 and effect.shape:  # one form at many places: the mean over them
-        total = float(scipy.special.logsumexp([c.log_evidence for c in out]))
-        best = max(out, key=lambda c: c.log_evidence)
-        out = [c if c is not best else replace(best, log_evidence=total) for c in out]
-    return out
-
-
-def best_by_words(found: Sequence[Candidate]) -> list[Candidate]:
-    """Return the best shape of every form, by its words without the place, the likeliest first."""
-    best: dict[str, Candidate] = {}
-    for c in found:
-        key = c.words if c.effect.name in best or "{0:.0f}" in c.effect.steady_words else c.effect.steady_words
-        if key not in best or c.log_evidence > best[key].log_evidence:
-            best[key] = c
-    return sorted(best.values(), key=lambda c: -c.log_evidence)
-
-
-def span_alike(x: FloatArray, base: TableBaseline, one: FloatArray, two: FloatArray) -> bool:
-    """Return whether two forms are the same data beside the baseline; a card's values do about what a parabola does."""
-    frame = base if base.free.size else replace(base, free=np.vander(x, 3))
-    a, b = frame.beside(one), frame.beside(two)
-    rest = b - a @ np.linalg.lstsq(a, b, rcond=None)[0]
-    return bool(np.linalg.norm(rest) < 0.05 * np.linalg.norm(b)) if a.size else False
+    x, least = table.middled, table.rounding
+    pairs = [(shape, effect.steady(x, shape)) for shape in effect.steady_grid(float(x.min()), float(x.max()))]
+    pairs = [(shape, own) for shape, own in pairs if own.shape[1] + 4 <= x.size and own.any(axis=0).all()]
+    if not pairs:
+        return []
+    columns = np.zeros((x.size, len(pairs), max(own.shape[1] for _, own in pairs)))
+    for h, (_, own) in enumerate(pairs):
+        columns[:, h, : own.shape[1]] = own
+    strong = max(STRONG * float(np.ptp(table.frequency)), 10.0 * least)
+    seen = SCALES >= SCALES[-1] * least / strong  # what is smaller than the last digit is nothing
+    size = np.sqrt(np.mean(columns**2, axis=0))
+    units = strong / SCALES[-1] * np.divide(1.0, size, out=np.zeros_like(size), where=size > 0.0)
+    every = [one.evidence + one.gains({SETTLED: columns}, units, effect.settled)[seen] for one in levels]
+    values = scipy.special.logsumexp(every, axis=1) - np.log(seen.sum())
+    white = [k for k, one in enumerate(levels) if one.noise[SETTLED].walk == 0.0]
+    scores = np.array([_averaged(levels, own)[0] for own in values.T]) - np.log(len(pairs)) - nothing
+    scores[np.argmax(scores)] = scipy.special.logsumexp(scores)
+    found = []
+    for h, (shape, own) in enumerate(pairs):
+        term = Term(effect, SETTLED, shape, {SETTLED: own}, tuple(range(own.shape[1])), units[h, : own.shape[1]], FREE)
+        noise = _averaged([levels[k] for k in white], values[white, h])[1]
+        found.append(Form(2.0 * float(scores[h]), Background(levels[0].linear, (term,), {SETTLED: noise})))
+    return found
 
 
 def rms(values: FloatArray) -> float:

@@ -153,6 +153,11 @@ class Effect:
         return self.acts_on == "temperature"
 
     @property
+    def settled(self) -> "Effect":
+        """It in a steady state: a change of the response in its own unit, of either sign."""
+        return replace(self, coefficients=(Coefficient("settled_{unit}"),), acts_on="response", positive=False)
+
+    @property
     def spread(self) -> FloatArray:
         """Prior standard deviations of all columns over the effect's size."""
         return np.array([value for coefficient in self.coefficients for value in coefficient.spread])

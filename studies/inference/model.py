@@ -309,6 +309,13 @@ class Background:
         c, own_C = mean[own], C[np.ix_(own, own)]
         return not own or bool(c @ np.linalg.pinv(own_C) @ c > scipy.special.chdtri(len(own), 0.1))
 
+    def left_out(self, name: str) -> Array:
+        """Return by how much each row of a response, left out, is missed: (P y)_i/P_ii of P = (Σ + X Xᵀ)⁻¹."""
+        base, left, _, _ = self._solved
+        root = self._whiteners[name](np.eye(len(left[name])))
+        own = np.sum(root**2, axis=0) - np.sum((base[name].T @ root) ** 2, axis=0)
+        return np.asarray(root.T @ left[name] / own)
+
     def residual(self, name: str) -> Array:
         """Return what the most probable model leaves of a response."""
         return np.asarray(self._bent.target[name] - self._bent.columns(self.terms, name) @ self.posterior[0])

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from compensation.noise import white_rms
 from shell.constants import zero_Celsius
 from studies.calibration.fit import LASTING
-from studies.calibration.observed import ObservedRun, observe
+from studies.calibration.observed import ObservedRun, SettledTable, observe
 from studies.record import Record
 from thermal.lag import lag
 
@@ -86,9 +86,7 @@ def polynomial_card(records: Sequence[Record], name: str = "") -> "Instrument":
         level, own, spread = _levels(runs, column, tau, x0)
         if column == "frequency_Hz":
             slope = max(abs(own[0]), 0.1 * spread / reach)
-            law["f0_Hz"] = {"value": level, "sd": WIDE * spread + 1e-4 * level}
-            law["a1_per_K"] = {"value": own[0] / level, "sd": min(WIDE * spread / reach / level, 5e-3)}
-            law["a2_per_K2"] = {"value": own[1] / level, "sd": BENT[column] * spread / reach**2 / level}
+            law |= _parabola(np.array([level, *own]), spread, reach, BENT[column])
             content["noise"]["frequency_white_Hz"] = _white(runs, column)
         elif column == "inverse_q":
             content["loss"] = {
@@ -110,6 +108,28 @@ def polynomial_card(records: Sequence[Record], name: str = "") -> "Instrument":
                 "bias_turn_on_deg_per_h": WIDE * spread if len(runs) > 1 else 0.0,
             }
     return build_instrument(content, "the records")
+
+
+def settled_card(table: SettledTable) -> "Instrument":
+    """Return the card of a gyro with this steady-state table: a parabola of wide level, slope and curvature."""
+    from studies.instrument.card import SCHEMA, build_instrument
+
+    T, x = table.temperature - zero_Celsius, table.middled
+    own = np.asarray(np.polyfit(x, table.frequency, 2)[::-1], dtype=float)
+    law = _parabola(own, max(float(np.std(table.frequency)), table.rounding), float(x.max()), WIDE)
+    law |= {"a3_per_K3": _exact(0.0), "lag_s": _exact(USUAL_LAG), "delay_s": _exact(0.0)}
+    content = {"schema": SCHEMA, "name": "the table", "reference_temperature_degC": float((T - x)[0]), "law": law}
+    return build_instrument(content, table.path)
+
+
+def _parabola(own: Array, spread: float, reach: float, bent: float) -> dict[str, dict[str, float]]:
+    """Return level, slope and curvature of a frequency with their widths, of what it varies by over the covered range."""
+    level, a1, a2 = (float(one) for one in own)
+    return {
+        "f0_Hz": {"value": level, "sd": WIDE * spread + 1e-4 * level},
+        "a1_per_K": {"value": a1 / level, "sd": min(WIDE * spread / reach / level, 5e-3)},
+        "a2_per_K2": {"value": a2 / level, "sd": bent * spread / reach**2 / level},
+    }
 
 
 def _exact(value: float) -> dict[str, float]:

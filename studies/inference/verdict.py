@@ -24,6 +24,7 @@ from studies.diagnosis.verdict import (
 from studies.effects import find_effect
 from studies.inference.causes import candidates_of, causes_of
 from studies.inference.inferred import Inferred
+from studies.inference.model import Background
 from studies.inference.records import Campaign
 from studies.inference.responses import result_of
 from studies.inference.sharp import longest_resolved
@@ -31,7 +32,7 @@ from studies.inference.sharp import longest_resolved
 
 def judge(found: Inferred) -> Verdict:
     """Return the verdict."""
-    shifts = find_shifts(found) if found.card.polynomial is None else []
+    shifts = shifts_of(found.background) if found.card.polynomial is None else []
     causes = tuple(sorted((*wrong_values(shifts), *causes_of(found)), key=lambda cause: -cause.evidence))
     results = {name: result_of(found, name, causes) for name in found.search.linear.responses}
     results |= skipped_results(found.campaign)
@@ -59,9 +60,9 @@ def skipped_results(campaign: Campaign) -> dict[str, ResponseResult]:
     }
 
 
-def find_shifts(found: Inferred) -> list[Shift]:
+def shifts_of(model: Background) -> list[Shift]:
     """Return the values of the card that the data determine or have moved, with 90 % intervals."""
-    priors, (mean, C) = found.search.linear.problem.priors, found.background.posterior
+    priors, (mean, C) = model.linear.problem.priors, model.posterior
     count = len(priors.values)
     z, cov = priors.standard(mean[:count]), priors.covariance(C)
     at, out = priors.at(mean[:count]), []

@@ -14,7 +14,7 @@ from tests.studies.diagnosis import test_recovery_card as card
 def test_an_engine_that_does_not_look_is_caught(name, monkeypatch, tmp_path):
     engine = blind_engine(name)
     monkeypatch.setattr(card, "diagnose_records", engine)
-    for asked in ("study_steady_table", "diagnose_table"):
+    for asked in ("judge_table", "diagnose_table"):
         monkeypatch.setattr(tables, asked, lambda *_: engine([{"frequency_Hz"}]))
     monkeypatch.setattr(card, "simulated", lambda *_: [{"frequency_Hz"}])
     hidden = [
@@ -24,7 +24,7 @@ def test_an_engine_that_does_not_look_is_caught(name, monkeypatch, tmp_path):
         lambda: card.test_a_strong_effect_leaves_the_values_alone(lambda *_: None),
     ]
     nothing = [
-        tables.test_the_same_readings_without_a_loop_are_adequate_and_the_law_is_named,
+        tables.test_the_same_readings_without_a_loop_are_adequate,
         lambda: card.test_a_virtual_record_of_the_card_is_adequate(SimpleNamespace()),
     ]
     for test in [*hidden, *(nothing if name != "adequate" else ())]:

@@ -9,7 +9,7 @@ from shell.constants import zero_Celsius
 from studies.calibration.observed import SettledTable
 from studies.calibration.scatter import find_scatter
 from studies.cli import main
-from studies.diagnosis.table import diagnose_table, study_steady_table
+from studies.diagnosis.table import diagnose_table, judge_table
 from studies.diagnosis.verdict import spell_structure
 from studies.errors import InputError
 from studies.inference.lack_of_fit import doubt_of
@@ -29,7 +29,7 @@ def quartz(T):
 
 def study(T, extra, seed=1, white=2e-3):
     f = quartz(T + 273.15) + extra + np.random.default_rng(seed).normal(0, white, T.size)
-    return study_steady_table(T, np.round(f, 3), 1e-3, quartz, "quartz, law 'at'")
+    return judge_table(SettledTable("table.csv", T + zero_Celsius, np.round(f, 3), 1e-3))
 
 
 def check_first(verdict, hidden):
@@ -64,12 +64,10 @@ def test_one_loop_could_be_a_drift_and_is_not_adequate():
     assert found.verdict.verdict == "unexplained"
 
 
-def test_the_same_readings_without_a_loop_are_adequate_and_the_law_is_named():
+def test_the_same_readings_without_a_loop_are_adequate():
     found = study(CYCLE, 0.0)
     assert (found.verdict.verdict, found.verdict.causes) == ("adequate", ()), found.verdict.causes
     text = " ".join(found.sentences)
-    assert "quartz, law 'at'" in text
-    assert "silica" not in text
     assert "a cubic is sufficient" in text
     assert "not sufficient" not in text
 
@@ -189,7 +187,7 @@ SCRAMBLED = {
     "two gyros": ([f * (1.004 if k % 2 == 0 else 1.0) for k, f in enumerate(PAPER)], "No single row .* of two gyros"),
     "2 Hz of noise": (
         (4417.16, 4423.55, 4423.04, 4430.54, 4431.55, 4435.04, 4443.00),
-        "2.21 Hz .* 9.3 % of the 23.8 Hz",
+        r"2.21 Hz .* 9.(3 % of the 23.8|5 % of the 23.4) Hz",  # of the card's law, of their own parabola
     ),
 }
 

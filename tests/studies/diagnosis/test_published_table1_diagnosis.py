@@ -53,11 +53,11 @@ def test_table1_beside_the_papers_card_says_what_an_engineer_asks_first():
     # one truth: the headline gives the set with its probability, and the text says that none of it is proven
     assert "30 times what rounding leaves, so something is missing" in text
     assert (
-        "nearest, curvature up to order 4 and thermometer error up to order 4, has an evidence of 7.4" in text
+        "nearest, curvature up to order 4 and thermometer error up to order 4, has an evidence of 7.5" in text
     )  # the same data
     assert "less than the 8 that proves a cause" in text
     assert headline(found.verdict).endswith(
-        "One of curvature, activity-dip, mounting-stress, radiation or thermometer-scale in the frequency (probability 0.54)."
+        "One of curvature, activity-dip, mounting-stress, radiation or thermometer-scale in the frequency (probability 0.55)."
     )
     assert "approached from one side" not in text  # the file does not say so
     assert found.verdict.verdict == "not-identifiable"
