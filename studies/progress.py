@@ -39,11 +39,35 @@ class Told:
         print(begin + told, end=end, file=sys.stderr, flush=True)
 
     def __enter__(self) -> Self:
+        TELLING.append(self)
         return self
 
     def __exit__(self, *_: object) -> None:
+        TELLING.remove(self)
         if self.shown and self.terminal:
             print("\r\x1b[2K", end="", file=sys.stderr, flush=True)
+
+
+TELLING: list[Told] = []
+"""Who tells now; the last one does."""
+
+
+class Stages(Told):
+    """The stages of a command, each with a percent and a rest of its own."""
+
+    stage = ""
+
+    def __call__(self, words: str, part: float | None = None) -> None:
+        """Say how far a stage is."""
+        if words != self.stage:
+            self.stage, self.begin, self.part, self.before = words, time.monotonic(), 0.0, part or 0.0
+        super().__call__(words, part)
+
+
+def tell(words: str, part: float) -> None:
+    """Say how far a stage of the command is, where nothing tells of the whole."""
+    if TELLING and isinstance(TELLING[-1], Stages):
+        TELLING[-1](words, part)
 
 
 class Progress(Told):

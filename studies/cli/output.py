@@ -17,6 +17,7 @@ from cyclopts import Parameter
 
 from studies.errors import InputError
 from studies.files.paths import guarded
+from studies.progress import Stages
 from studies.results import Result, Sentence
 from studies.results.terminal import print_result
 
@@ -49,7 +50,8 @@ def answers(
             if report is not None:
                 check_ending("--report", report, "a report is an HTML page", ".html", ".htm")
             with guarded({"report": report, **own.bind(*arguments, **options).arguments}, endings) as read:
-                result = command(*arguments, **options)
+                with Stages(f"hrg {command.__name__.strip('_')}"):
+                    result = command(*arguments, **options)
                 result = replace(result, payload=usual | result.payload)
                 if caveats := _caveats_of(read):
                     parts = [*result.parts, *(Sentence(text, "note") for text in caveats)]
@@ -58,7 +60,8 @@ def answers(
                     from studies.files.writing import write_text
                     from studies.results.page import render_result
 
-                    write_text(report, render_result(result))
+                    with Stages("the page"):
+                        write_text(report, render_result(result))
                     say(f"report: {report}")
                 if json:
                     print_json(result.payload | ({"report": report} if "report" in result.payload and page else {}))
@@ -117,11 +120,10 @@ def keep_model(model: "Model", path: str | None) -> None:
 
 
 def keep_record(record: "Record", path: str) -> None:
-    """Write a record, telling of long ones, and say so."""
+    """Write a record, and say so."""
     from studies.record import write_record
 
-    count = len(record)
-    write_record(record, path, lambda row: say(f"written {row:,} of {count:,} rows") if row % 500_000 == 0 else None)
+    write_record(record, path)
     say(f"record: {path}")
 
 

@@ -18,6 +18,7 @@ from typing import IO, TYPE_CHECKING, TypeAlias
 from studies.errors import InputError, nearest
 from studies.files.parquet import is_parquet, read_comments_and_names, read_table
 from studies.files.reading import PORTION, opened, read_bytes
+from studies.progress import tell
 
 if TYPE_CHECKING:
     import numpy as np
@@ -228,6 +229,7 @@ def parse_fast(
                 for part in parts:
                     table[:, done : done + len(part)] = part.to_numpy().T
                     done += len(part)
+                    tell(f"reading {path}", done / rows)
         except ValueError:
             return None
     return (dict(zip(names, table, strict=True)), sha256) if done == rows else None

@@ -16,6 +16,7 @@ from studies.errors import InputError, nearest
 from studies.files.columns import Columns, read_columns, read_header
 from studies.files.parquet import is_parquet, write_table
 from studies.files.writing import written_whole
+from studies.progress import tell
 from studies.results import Drawing
 
 if TYPE_CHECKING:
@@ -234,8 +235,8 @@ def read_profile(path: str | Path) -> Columns:
     return table
 
 
-def write_record(record: Record, path: str | Path, progress: Callable[[int], None] | None = None) -> None:
-    """Write one run, whole or not at all, as CSV or (by the end of its name) Parquet; `progress` is told the rows written so far."""
+def write_record(record: Record, path: str | Path) -> None:
+    """Write one run, whole or not at all, as CSV or (by the end of its name) Parquet."""
     notes = record.notes
     with written_whole(path) as file:
         if is_parquet(path):
@@ -247,8 +248,7 @@ def write_record(record: Record, path: str | Path, progress: Callable[[int], Non
             cells = iter(map(repr, part.ravel().tolist()))
             lines = "\n".join(map(",".join, zip(*[cells] * part.shape[1], strict=True)))
             file.write((lines.replace("nan", "") + "\n").encode())
-            if progress is not None:
-                progress(begin + len(part))
+            tell(f"writing {path}", (begin + len(part)) / len(record))
 
 
 def check_plausible(columns: Mapping[str, Array], where: Callable[[int], str]) -> None:

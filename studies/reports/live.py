@@ -25,6 +25,7 @@ from shell.layout import Theory
 from shell.modes import Mode, nearest_mode
 from studies.errors import UNUSABLE_INPUT
 from studies.instrument.card import Instrument
+from studies.progress import tell
 from studies.reports.live_fields import explore_fields
 from studies.resonator.law import unknown_slope
 from studies.results import Sentence, row_of
@@ -93,6 +94,7 @@ def describe_live(
         except UNUSABLE_INPUT:
             if part == RANGES[-1]:
                 raise
+    tell("sliders", 1 - 1 / (len(families) + len(lost) + 1))
     fields = explore_fields(designs.at_point, len(axes), harmonic, theory, T, instrument)
     labels = [re.sub("[_.]", " ", key.removeprefix("resonator.").replace("_mm", "")) for key, _ in varied]
     indices = [index for one in (*(one.polynomial for one in families), fields.polynomial) for index in one.indices]
@@ -166,8 +168,10 @@ def _families(
             most=MOST_SOLVES,
         )
 
+    tell("sliders", 0.0)
     families, lost = [build(harmonic, 0, TOLERANCE)], []
-    for n, index in near:
+    for number, (n, index) in enumerate(near, 1):
+        tell("sliders", number / (len(near) + 2))
         try:
             families.append(build(n, index, ROUGH))
         except UNUSABLE_INPUT as error:

@@ -7,7 +7,7 @@ import pytest
 
 from studies import progress
 from studies.cli import calibrate, calibrate_modes, diagnose
-from studies.progress import Progress, Told
+from studies.progress import Progress, Stages, Told, tell
 
 ROOT = Path(progress.__file__).parent
 
@@ -52,6 +52,21 @@ def test_cases_of_a_study_that_goes_on(clock, capsys):
         clock[0] += 10.0
         lines.advance(1000, 3)
     assert capsys.readouterr().err == "done: 1250 of 10000, 3 failed, 12 %, about 88 s left\n"
+
+
+def test_stages_of_a_command(clock, capsys):
+    """Each has its own percent and rest; where a work tells of the whole, and outside a command, they are silent."""
+    tell("reading a", 0.5)
+    with Stages("hrg import"):
+        for words, part in (("reading a", 0.25), ("reading a", 0.5), ("writing b", 0.1), ("writing b", 0.2)):
+            clock[0] += 3.0
+            tell(words, part)
+        with Told("work"):
+            clock[0] += 30.0
+            tell("reading a", 0.5)
+    assert capsys.readouterr().err.splitlines() == [
+        "hrg import: reading a", "hrg import: reading a, 50 %, about 6 s left",
+        "hrg import: writing b", "hrg import: writing b, 20 %, about 24 s left"]  # fmt: skip
 
 
 def test_nothing_of_what_is_quick(clock, capsys):
