@@ -18,7 +18,6 @@ from itertools import pairwise
 import numpy as np
 import scipy
 from numpy.typing import NDArray
-from scipy.linalg import lapack
 
 from compensation.errors import CompensationError
 from compensation.noise import SLOW_TIMES, Noise, flicker, random_walk
@@ -153,7 +152,7 @@ class NoiseRows:
         total += 2 * float(np.log(np.diag(root)).sum())
         both, slopes = np.column_stack([beside, rest]), dict.fromkeys(KINDS, 0.0)
         for (L, runs), (F, W, _) in zip(whitener.roots, self._groups, strict=True):
-            lower = len(runs) * lapack.dpotri(L, lower=1)[0]
+            lower = len(runs) * scipy.linalg.lapack.dpotri(L, lower=1)[0]
             S = lower + lower.T
             np.einsum("ii->i", S)[:] -= lower.diagonal()
             for run in runs:
@@ -168,7 +167,7 @@ class NoiseRows:
 
 def cholesky(matrix: Array) -> Array:
     """Lower root of a symmetric matrix straight from LAPACK: of small ones, checks cost as much as the work."""
-    root, failed = lapack.dpotrf(matrix, lower=1, clean=1)
+    root, failed = scipy.linalg.lapack.dpotrf(matrix, lower=1, clean=1)
     if failed:
         raise np.linalg.LinAlgError("the covariance of the rows is not positive definite.")
     return np.asarray(root)
@@ -178,7 +177,7 @@ def solve_lower(root: Array, columns: Array, transposed: bool = False) -> Array:
     """Return L⁻¹ or L⁻ᵀ times columns, (N,) or (N, p)."""
     if not columns.size:
         return columns
-    return np.asarray(lapack.dtrtrs(root, columns, lower=1, trans=int(transposed))[0]).reshape(columns.shape)
+    return np.asarray(scipy.linalg.lapack.dtrtrs(root, columns, lower=1, trans=int(transposed))[0]).reshape(columns.shape)
 
 
 @dataclass(frozen=True)

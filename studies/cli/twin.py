@@ -38,7 +38,7 @@ def twin(
 
     The heat path, the frequency law, bias, 1/Q, effects, settled loops and noise are those of hrg simulate; without noise the
     numbers are the same to 1e-9. Noise has the levels of [noise]: white, flicker as a sum of first-order processes, random walk.
-    Parameters are named as in the card; shape, material laws and the number of cells are fixed when the twin is written.
+    Parameters are named as in the card; shape, material laws, the number of cells, and [law] with its lags are fixed when the twin is written.
 
     Args:
         fmu: The FMU to write, with its sources; it holds a binary for 64-bit Linux if a C compiler is found (the

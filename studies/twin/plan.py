@@ -32,6 +32,8 @@ FIXED = ("thermal.cells", "thermal.stem_radius_mm", "thermal.stem_length_mm")
 OF_LOOPS = ("gain", "phase_d", "phase_deg", "skew", "misalignment", "split", "axis", "per_Hz", "range", "headroom")
 """Parts of the names of those keys of [loop] that act on settled loops."""
 PRECESSION = "loop.self_precession_deg_per_s"
+ONE = ".one"
+REACH = 150.0  # K on both sides of its reference, within which a polynomial law is carried
 MEMORY = 16  # numbers that one effect may remember
 CAPACITY_STEP = 0.25  # K, of the knots of a heat capacity that varies
 
@@ -78,6 +80,8 @@ class Plan:
     @property
     def key_of(self) -> dict[str, str]:
         """The parameter that scales a capacity, link or radiator, by its name; of shell and stem, by "shell"."""
+        if self.instrument.polynomial is not None:
+            return dict.fromkeys(("radiated", "conducted", "shell"), ONE)
         return {
             "housing": "thermal.housing_heat_capacity_J_per_K",
             SENSOR: "thermal.housing_heat_capacity_J_per_K",
@@ -96,7 +100,40 @@ def plan_twin(instrument: "Instrument", boundary: "Boundary" = "chamber", theory
     from studies.resonator.law import law_of
 
     _refuse(instrument)
-    law = law_of(instrument, theory=theory)
+    reach = (-math.inf, math.inf) if instrument.polynomial is None else (-REACH, REACH)
+    law = law_of(instrument, *(instrument.reference_temperature + own for own in reach), theory)
+    parameters = dict(_card_numbers(instrument))
+    if instrument.polynomial is not None:
+        network, splines = _lumps(instrument, parameters), {"law": _spline(_curve_of(law))}
+    else:
+        network, splines = _shell_and_mount(instrument, parameters), {"law": _spline(law._spline)}
+    splines |= _splines(instrument, law)
+    network = behind_housing(network) if boundary == "housing" else with_sensor(network, 1.0)
+    effects = tuple(_place_effects(instrument, parameters))
+    rows = observed_rows(instrument, law, tuple(node.name for node in network.nodes))[1:6]
+    uneven = law.uneven
+    return Plan(
+        instrument, boundary, parameters, network, rows, uneven, _constants(instrument, law, boundary), splines, effects
+    )
+
+
+def _lumps(instrument: "Instrument", parameters: dict[str, float]) -> "Network":
+    """Return the lags of a polynomial card, fixed; [thermal] does not act on them."""
+    parameters |= {key: math.nan for key in parameters if key.startswith("thermal.")}
+    parameters["thermal.housing_heat_capacity_J_per_K"] = parameters[ONE] = 1.0
+    return build_network(instrument)
+
+
+def _curve_of(law: "FrequencyLaw") -> "CubicSpline":
+    """Return ln f of a polynomial law, with knots every kelvin."""
+    from scipy.interpolate import CubicSpline
+
+    T = np.linspace(law.lowest, law.highest, int(2 * REACH) + 1)
+    return CubicSpline(T, law.logarithm(T))
+
+
+def _shell_and_mount(instrument: "Instrument", parameters: dict[str, float]) -> "Network":
+    """Return the heat path of a geometry with unit constants, which its parameters scale."""
     path = instrument.heat_path
     density = float(instrument.material.value("density", instrument.reference_temperature))
     unit = replace(
@@ -111,23 +148,18 @@ def plan_twin(instrument: "Instrument", boundary: "Boundary" = "chamber", theory
         chamber_conductance=1.0,
         drive_power=1.0,
     )
-    network = assemble(describe_resonator(unit))
-    network = behind_housing(network) if boundary == "housing" else with_sensor(network, 1.0)
-    parameters = dict(_card_numbers(instrument))
     parameters["thermal.conductivity_W_per_m_K"] = path.conductivity
-    splines = {"law": _spline(law._spline), **_splines(instrument, law)}
     capacity = path.volumetric_capacity
     parameters["thermal.heat_capacity_J_per_kg_K"] = math.nan if callable(capacity) else capacity / density
-    effects = tuple(_place_effects(instrument, parameters))
-    rows = observed_rows(instrument, law, tuple(node.name for node in network.nodes))[1:6]
-    uneven = law.uneven
-    return Plan(
-        instrument, boundary, parameters, network, rows, uneven, _constants(instrument, law, boundary), splines, effects
-    )
+    return assemble(describe_resonator(unit))
 
 
 def _refuse(instrument: "Instrument") -> None:
     """Raise for what the C code does not hold."""
+    if instrument.polynomial is not None and instrument.polynomial.delay:
+        raise InputError(
+            f"{instrument.path} [law]: delay_s = {instrument.polynomial.delay:g} is not available in a twin, which knows one moment; add it to lag_s and set it to 0."
+        )
     for effect in instrument.effects:
         if effect.name.replace("-", "_") not in EFFECTS:
             raise InputError(
@@ -164,7 +196,7 @@ def _splines(instrument: "Instrument", law: "FrequencyLaw") -> dict[str, Spline]
     from studies.loss.damping_law import NODE_STEP, damping_law
 
     found: dict[str, Spline] = {}
-    if callable(instrument.heat_path.volumetric_capacity):
+    if instrument.polynomial is None and callable(instrument.heat_path.volumetric_capacity):
         T = np.arange(law.lowest, law.highest + CAPACITY_STEP, CAPACITY_STEP)
         found["heat_capacity"] = _spline(CubicSpline(T, instrument.material.value("heat_capacity", T)))
     damping = damping_law(instrument, law.lowest, law.highest)
@@ -209,7 +241,7 @@ def _constants(instrument: "Instrument", law: "FrequencyLaw", boundary: "Boundar
     """Numbers that are no keys of the card: the solver's, and those of imperfection and electrodes."""
     from studies.resonator.splitting import mean_shift, reference_split
 
-    T0 = instrument.reference_temperature
+    T0, polynomial = instrument.reference_temperature, instrument.polynomial
     keys = instrument.part("electrodes").keys if instrument.part("electrodes").are_charged else None
     split, shift, own, per_volt = 0j, 0.0, 0.0, 0.0
     at = np.array([T0])
@@ -236,6 +268,8 @@ def _constants(instrument: "Instrument", law: "FrequencyLaw", boundary: "Boundar
         "SOFTENING": own,
         "PER_SQUARE_VOLT": per_volt,
         "VOLTAGE_SQUARED": 0.0 if keys is None else keys.voltage_V**2,
+        "BIAS_SLOPE": 0.0 if polynomial is None else polynomial.f0 * polynomial.coefficients[0],
+        "BIAS_BEND": 1.0 if polynomial is None else polynomial.bias_bend,
         "GAP_EXPANSION": 0.0 if keys is None else keys.gap_expansion_per_K,
     }
 

@@ -60,7 +60,7 @@ def card_header(plan: "Plan") -> str:
     switches = {
         "LOOPS": int(card.loop is not None),
         "FREE": int(plan.turns_freely),
-        "LINEAR": int(not card.thermal.radiation),
+        "LINEAR": int(card.polynomial is None and not card.thermal.radiation),
         "STIFF": int(card.loop is not None and card.loop.quadrature_control == "stiffness"),
     }
     numbers = {
@@ -147,7 +147,8 @@ def card_body(plan: "Plan") -> str:
 def exposed(plan: "Plan", key: str) -> str:
     """Return the name of a parameter that may be changed; "" of one that is no key of the card, or does not act."""
     value = plan.parameters[key]
-    idle = ("loss" in plan.splines and key.startswith("loss.")) or key == PRECESSION  # a command
+    fixed = ("loss.",) * ("loss" in plan.splines) + ("thermal.",) * (plan.instrument.polynomial is not None)
+    idle = key.startswith(fixed) or key == PRECESSION  # a command
     return "" if key.startswith(".") or value != value or idle else key
 
 

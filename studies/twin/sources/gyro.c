@@ -111,7 +111,8 @@ const char *twin_row(Twin *w, const TwinInput *in) {
     double wave[2] = {p[P_bias_damping_anisotropy] * loss * cos(axis), p[P_bias_damping_anisotropy] * loss * sin(axis)};
     for (int k = 0; k < 2 && twin_wave[0].count; ++k) wave[k] = twin_spline(&twin_wave[k], T, NULL);
     const double applied = radians(in->given[IN_RATE] ? in->value[IN_RATE] : 0.0);
-    const double felt = polynomial(p, thermal - TWIN_REFERENCE_FREQUENCY, thermal * (slope * rate[0] + uneven)) + change[TARGET_BIAS];
+    const double straight = TWIN_BIAS_SLOPE * excess, bent = thermal - TWIN_REFERENCE_FREQUENCY - straight;
+    const double felt = polynomial(p, straight + TWIN_BIAS_BEND * bent, thermal * (slope * rate[0] + uneven)) + change[TARGET_BIAS];
     double *out = w->out, said[TWIN_SAID] = {frequency, 0.0, loss, 0.0};
 #if TWIN_FREE /* the wave turns with all that feigns a rate */
     const double turned_by = applied + felt / DEG_PER_H, before = w->turning.rate + (w->held ? applied - w->applied : 0.0);

@@ -13,6 +13,7 @@ from studies.effects import library
 from studies.instrument.card import load_card, save_card, shipped_cards
 from studies.record import read_record
 from studies.twin.plan import plan_twin
+from studies.twin.source import exposed
 from tests.studies.twin.building import (
     SANITIZED,
     STRICT,
@@ -192,6 +193,52 @@ def test_limits_imperfect_card(cells, folder):
     found = run_twin(compile_twin(instrument, folder / "busy"), profile, 10.0)
     expected = simulated(instrument, profile, 10.0)
     assert {name: error for name, error in worst(found, expected).items() if error > 1e-9} == {}
+
+
+LAW = """
+schema = "hrg.card/1"
+name = "of records alone"
+reference_temperature_degC = 20.0
+[law]
+f0_Hz = 4432.07
+a1_per_K = 8.1e-5
+a2_per_K2 = 1.3e-7
+a3_per_K3 = -4e-10
+lag_s = 1400.0
+second_lag_s = 220.0
+third_lag_s = 31.0
+radiated_share = {share}
+chamber_lag_s = 500.0
+delay_s = {delay}
+bias_bend = 0.3
+[bias]
+k1_deg_per_h_per_Hz = 0.4
+k2_deg_per_h_per_Hz2 = 0.05
+k4_deg_per_h_s_per_Hz = 30.0
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("share", "most"), [(0.0, 1e-9), (0.4, 1e-8)])
+def test_limits_card_without_a_geometry(share, most, folder, refuse):
+    """A polynomial law behind three lags, bias that follows part of its bend; radiation as far as the simulation follows it, 1e-7 K."""
+    card = folder / "law.toml"
+    card.write_text(LAW.format(share=share, delay=0.0))
+    instrument = load_card(card)
+    profile = write_profile(folder / "ten.csv", TEN_HOURS)
+    found = run_twin(compile_twin(instrument, folder / "law", SANITIZED), profile, 12.0)
+    chamber = Profile(np.array(TEN_HOURS["time_s"]), 273.15 + np.array(TEN_HOURS["chamber_temperature_degC"]))
+    assert {
+        name: error for name, error in worst(found, simulated(instrument, chamber, 12.0)).items() if error > most
+    } == {}
+    assert not [key for key in instrument_keys(instrument) if key.startswith(("thermal.", "law."))]
+    card.write_text(LAW.format(share=share, delay=-0.3))
+    assert "delay_s = -0.3 is not available in a twin" in refuse(["twin", str(card), "--c", str(folder / "none")])
+
+
+def instrument_keys(instrument):
+    plan = plan_twin(instrument)
+    return [exposed(plan, key) for key in plan.parameters]
 
 
 @pytest.mark.slow
