@@ -100,8 +100,8 @@ def plan_twin(instrument: "Instrument", boundary: "Boundary" = "chamber", theory
     from studies.resonator.law import law_of
 
     _refuse(instrument)
-    reach = (-math.inf, math.inf) if instrument.polynomial is None else (-REACH, REACH)
-    law = law_of(instrument, *(instrument.reference_temperature + own for own in reach), theory)
+    T0, reach = instrument.reference_temperature, math.inf if instrument.polynomial is None else REACH
+    law = law_of(instrument, T0 - reach, T0 + reach, theory)
     parameters = dict(_card_numbers(instrument))
     if instrument.polynomial is not None:
         network, splines = _lumps(instrument, parameters), {"law": _spline(_curve_of(law))}
