@@ -177,7 +177,9 @@ def solve_lower(root: Array, columns: Array, transposed: bool = False) -> Array:
     """Return L⁻¹ or L⁻ᵀ times columns, (N,) or (N, p)."""
     if not columns.size:
         return columns
-    return np.asarray(scipy.linalg.lapack.dtrtrs(root, columns, lower=1, trans=int(transposed))[0]).reshape(columns.shape)
+    return np.asarray(scipy.linalg.lapack.dtrtrs(root, columns, lower=1, trans=int(transposed))[0]).reshape(
+        columns.shape
+    )
 
 
 @dataclass(frozen=True)
