@@ -6,12 +6,12 @@ A share is asked of each row; the table fails where as few would come of it in o
 import pytest
 from scipy.stats import binom
 
-from studies.diagnosis.verdict import VERDICTS
 from studies.effects import library
 from tests.benchmarks.diagnosis.marks import mark
 from tests.stranger.batch import CASES, STUBS, answer
 from tests.stranger.effects import EFFECTS
 
+WORST = ("unexplained", "not-identifiable", "explained", "adequate")
 WIDEST = 8
 """Names in one set, a third of the library: naming everything is no answer."""
 
@@ -83,15 +83,20 @@ def test_every_effect_of_the_library_is_hidden_here():
 @pytest.mark.slow
 @pytest.mark.parametrize("place", range(len(CASES)), ids=[f"{kind}:{name}" for kind, name, _ in CASES])
 def test_an_answer_is_whole(place, folder):
-    """A verdict of the contract, causes by falling evidence, values within their intervals."""
+    """The verdict is that of the worst response, causes stand by falling evidence, values within their intervals, gains are those of held-out rows."""
     found = answer(place, folder)
     assert not found["truth"]["faults"]
-    assert found["verdict"] in VERDICTS
+    judged = [one for one in found["responses"].values() if one["verdict"] is not None]
+    assert found["verdict"] == min((one["verdict"] for one in judged), key=WORST.index)
     evidence = [cause["evidence"] for cause in found["causes"]]
     assert evidence == sorted(evidence, reverse=True)
     for cause in found["causes"]:
         assert 0.0 < cause["probability"] < 1.0
         assert all(value["low"] <= value["value"] <= value["high"] for value in cause["parameters"].values())
+    for one in judged:
+        assert (one["extended"] is None) >= (one["verdict"] == "adequate")
+        if one["gain"] is not None:
+            assert one["gain"] == pytest.approx(one["baseline"]["held_out_rms"] / one["extended"]["held_out_rms"])
 
 
 @pytest.mark.slow
