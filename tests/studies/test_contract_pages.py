@@ -87,11 +87,15 @@ def test_wide_tables_are_stacked_on_a_phone_and_long_ones_end_on_paper():
 @pytest.mark.parametrize(
     ("words", "once"),
     [
-        ("tcf hrg-30mm --theory shell", "Measured on the gyro of the HRG paper (Sensors 2012, 12, 6434, Table 1)."),
+        pytest.param(
+            "tcf hrg-30mm --theory shell",
+            "Measured on the gyro of the HRG paper (Sensors 2012, 12, 6434, Table 1).",
+            marks=pytest.mark.slow,
+        ),
         ("trim free-dome --split 0.12 --axis 31", "thermal equilibrium"),
         ("loop hrg-30mm-loops", "phase and rate loops"),
         ("modes free-dome --harmonic 0 2 --theory shell", "bent into 4 lobes"),  # the mode that the sliders move
-        ("loss hrg-30mm", "1.46 times this loss"),
+        pytest.param("loss hrg-30mm", "1.46 times this loss", marks=pytest.mark.slow),
     ],
 )
 def test_a_page_says_of_what_its_numbers_are_and_says_it_once(words, once, tmp_path):

@@ -114,6 +114,7 @@ def test_the_radiated_share_of_lumps_is_found(taus):
     assert found["radiated_share"].value == pytest.approx(0.4, abs=0.008)
 
 
+@pytest.mark.slow
 def test_a_relaxation_tells_the_time_constant_and_not_the_radiated_share():
     found = fit_thermal_constants([one_lag("soak 20 5h", departure=5.0)]).estimates
     assert found["time_constant_1"].low < 1800.0 < found["time_constant_1"].high

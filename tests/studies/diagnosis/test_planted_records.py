@@ -211,6 +211,7 @@ def test_the_heat_path_of_a_real_gyro_is_no_effect_of_its_law():
     assert verdict.responses["frequency_Hz"].extended[0] < 3e-3  # of a swing of 20 Hz
 
 
+@pytest.mark.slow
 def test_a_chamber_logged_by_another_clock_in_one_run_is_found():
     """30 s in one of three runs whose rows are 20 s apart: the chamber moves smoothly, so its clock is known better than its rows."""
     made = []
@@ -227,6 +228,7 @@ def test_a_chamber_logged_by_another_clock_in_one_run_is_found():
     assert cause.parameters["run"].value == 2.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("step", "noise"), [(0.25, 0.005), (0.5, 0.02)])
 def test_what_rounding_leaves_is_no_structure(step, noise):
     """A bias that follows the temperature, read in steps far above its noise: it was unexplained, or had a cross-damping."""
