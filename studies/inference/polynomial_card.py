@@ -86,7 +86,7 @@ def polynomial_card(records: Sequence[Record], name: str = "") -> "Instrument":
         level, own, spread = _levels(runs, column, tau, x0)
         if column == "frequency_Hz":
             slope = max(abs(own[0]), 0.1 * spread / reach)
-            law |= _parabola(np.array([level, *own]), spread, reach, BENT[column])
+            law |= _parabola(np.array([level, *own[:2]]), spread, reach, BENT[column])
             content["noise"]["frequency_white_Hz"] = _white(runs, column)
         elif column == "inverse_q":
             content["loss"] = {

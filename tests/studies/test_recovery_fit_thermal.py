@@ -67,7 +67,8 @@ def test_ninety_percent_intervals_cover_about_nine_in_ten(walk):
 
     Not of the radiated share in a random walk beside the noise of the housing's sensor: 18 of 24 there, by the noise that is estimated.
     """
-    fits = [fit_thermal_constants([one_lag(seed=seed, walk=walk)], lags=1).estimates for seed in range(12)]
+    runs = [one_lag("step 20 -10 2h then step -10 40 2h", seed=seed, walk=walk) for seed in range(12)]
+    fits = [fit_thermal_constants([run], lags=1).estimates for run in runs]
     share = () if walk else (("radiated_share", 0.0),)
     for name, truth in (("time_constant_1", 1800.0), ("curvature", CURVATURE), *share):
         assert sum(one[name].low <= truth <= one[name].high for one in fits) > 7
