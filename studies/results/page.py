@@ -32,6 +32,7 @@ DENSE = 8  # columns; tables of more stand closer
 PAPER_ROWS = 40  # of a table; the others are on the screen only
 CONTENTS_FROM = 4  # chapters
 PHONE = 364.0  # px for a table on a phone
+LONG_CELL = 20  # letters to which sentences in a cell are not narrowed
 
 
 @dataclass(frozen=True)
@@ -180,7 +181,8 @@ def _stacked(table: Cells) -> bool:
 
     def least(text: str) -> int:
         whole = re.match(r"[-+±<> ]*[.\d]", text) or len(text) <= 12
-        return len(text) if whole else max(map(len, re.split(r"[\s._-]+", text)))
+        longest = max(map(len, re.split(r"[\s._-]+", text)))
+        return len(text) if whole else max(longest, LONG_CELL) if len(text) > 40 else longest
 
     columns = [
         max([least(str(row[k])) for row in table.rows] + [max(map(len, str(head).split()), default=0)])
