@@ -2,10 +2,11 @@
 
 import sys
 import time
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from types import MappingProxyType
-from typing import Self
+from typing import Self, TypeVar
 
+Kind = TypeVar("Kind")
 FIRST, EVERY, FRAME = 2.0, 30.0, 0.2  # s until a line, and at most from one to the next in a pipe and on a terminal
 
 
@@ -68,6 +69,13 @@ def tell(words: str, part: float) -> None:
     """Say how far a stage of the command is, where nothing tells of the whole."""
     if TELLING and isinstance(TELLING[-1], Stages):
         TELLING[-1](words, part)
+
+
+def told(items: Sequence[Kind], words: str) -> Iterator[Kind]:
+    """Yield items, telling how many of them are behind."""
+    for k, item in enumerate(items):
+        tell(words, k / len(items))
+        yield item
 
 
 class Progress(Told):

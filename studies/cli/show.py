@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from studies.cli.arguments import Records
-from studies.cli.output import answers, say
+from studies.cli.output import answers
 from studies.errors import InputError
 from studies.instrument.display import display_name
 from studies.reports.digits import plain
@@ -17,8 +17,6 @@ from studies.results import Facts, Result, Sentence, row_of
 
 if TYPE_CHECKING:
     from studies.record.survey import Survey
-
-MANY = 100_000  # rows, of which the reading is told
 
 
 @answers("hrg.show/1")
@@ -36,11 +34,7 @@ def show(*runs: Records) -> Result:
     if not runs:
         raise InputError("no record given: hrg show RUN.csv [RUN.csv ...].")
     records = [read_record(path) for path in runs]
-    surveys = []
-    for record in records:
-        if len(record) > MANY:
-            say(f"looking at {len(record):,} rows of {record.path}")
-        surveys.append(survey_record(record))
+    surveys = [survey_record(record) for record in records]
     told = [parts.tell(survey) for survey in surveys]
     uses, pairs = find_uses(records), list(zip(surveys, told, strict=True))
     payload = {

@@ -18,6 +18,7 @@ from compensation.lines import Line, find_line
 from compensation.noise import white_rms
 from compensation.samples import is_regular
 from compensation.spikes import find_dropouts, find_spikes, find_step, find_stuck
+from studies.progress import told
 from studies.record import COMMANDED, Record
 from studies.record.rest import LEAST_SPIKE
 from studies.record.settled import LEAST, TEMPERATURES, Soak, find_holds, find_soaks
@@ -118,7 +119,8 @@ def survey_record(record: Record) -> Survey:
     time = record["time_s"]
     names = [name for name in record.columns if name != "time_s"]
     step = float(np.median(np.diff(time))) if len(time) > 1 else 0.0
-    columns = tuple(survey_column(name, time, record[name]) for name in names)
+    looked = told(names, f"looking at {record.path}")
+    columns = tuple(survey_column(name, time, record[name]) for name in looked)
     varying = [column.name for column in columns if column.varies]
     return Survey(
         record,
@@ -277,7 +279,8 @@ def find_density(time: Array, values: Array) -> Density | None:
 def _thin_out(frequency: Array, density: Array, even: bool) -> Density:
     """Return means over as many parts of the logarithm of the frequency as can be drawn."""
     part = np.unique(np.round(np.log(frequency / frequency[0]) * 60).astype(np.intp), return_inverse=True)[1]
-    return Density(average_groups(frequency, part), average_groups(density, part), even)
+    # no differences from the first value, as in `average_groups`: it may be 1e20 times the others
+    return Density(average_groups(frequency, part), np.bincount(part, density) / np.bincount(part), even)
 
 
 def _find_settled(record: Record) -> tuple[Soak, ...]:

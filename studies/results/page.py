@@ -17,6 +17,7 @@ from io import BytesIO
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
+from studies.progress import told
 from studies.results import Blocks, Chapter, Drawing, Facts, Figure, Part, Result, Sentence, Table
 from studies.results.curves import read_curves
 
@@ -101,7 +102,7 @@ def _blocks(part: Part | Block) -> Iterator[Block]:
 def render_page(title: str, lead: str, chapters: Sequence[Chapter], sources: Sequence[str] = ()) -> str:
     """Return the page as HTML text; chapters without anything to show are left out."""
     script = (files("studies.reports") / "templates" / "curves.js").read_text(encoding="utf-8")
-    made = [(chapter.title, make_blocks(*chapter.parts)) for chapter in chapters]
+    made = [(chapter.title, make_blocks(*chapter.parts)) for chapter in told(chapters, "chapters")]
     made = [(heading, blocks) for heading, blocks in made if blocks]
     folded = _folded([blocks for _, blocks in made])
     return fill_template(

@@ -189,3 +189,11 @@ def test_limits_what_is_drawn_of_many_rows_has_every_extreme():
     rows = style.outline_rows(y)
     assert {0, 7, 123_456, y.size - 1} <= set(rows)
     assert rows.size <= 2 * style.MOST_POINTS
+
+
+def test_limits_the_density_far_below_its_largest_value(noise):
+    """A housing that follows its chamber smoothly: the readings' own noise, 1e16 times less, is twice variance times step."""
+    found = find_density(T, 2e4 * np.sin(T / 600.0) + 1e-4 * noise)
+    assert (found.density > 0).all()
+    upper = found.density[(found.frequency > 0.42) & (found.frequency < 0.49)]
+    assert upper == pytest.approx(np.full(upper.size, 2e-8), rel=0.6)
