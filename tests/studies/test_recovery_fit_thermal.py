@@ -87,7 +87,7 @@ def test_one_accidental_reading_does_not_move_the_lag(row, column):
 
 @pytest.mark.slow
 def test_two_lags_in_series_are_found_and_a_second_is_not_made_up():
-    t, T_h = housing(STEPS, 30.0)
+    t, T_h = housing(STEPS)
     series = 1.2 * lag(t, T_h, 1800.0) - 0.2 * lag(t, T_h, 300.0) + 1.5 * np.exp(-t / 1800.0)
     found = fit_thermal_constants([record(t, T_h, series)]).estimates
     assert found["time_constant_1"].value == pytest.approx(1800.0, rel=0.01)
@@ -100,7 +100,7 @@ def test_two_lags_in_series_are_found_and_a_second_is_not_made_up():
 @pytest.mark.parametrize("taus", [(1500.0,), (1500.0, 400.0)], ids=["one lump", "two in series"])
 def test_the_radiated_share_of_lumps_is_found(taus):
     """Lumps in a row with 40 % of their conductance by radiation at 20 °C over 100 K, by the implicit integrator."""
-    t, T_h = housing("step 20 -40 4h then step -40 60 4h")
+    t, T_h = housing("step 20 -40 3h then step -40 60 3h")
     parts, before = [Boundary("housing")], "housing"
     for k, tau in enumerate(taus):  # each too small to load the one before
         g, name = 1e-6**k / tau, f"lump {k}"
