@@ -158,7 +158,7 @@ def _refuse(instrument: "Instrument") -> None:
     """Raise for what the C code does not hold."""
     if instrument.polynomial is not None and instrument.polynomial.delay:
         raise InputError(
-            f"{instrument.path} [law]: delay_s = {instrument.polynomial.delay:g} is not available in a twin, which knows one moment; add it to lag_s and set it to 0."
+            f"{instrument.path} [law]: delay_s = {instrument.polynomial.delay:g} is not available in a twin, which knows one moment; set it to 0 and fit the lags again (hrg calibrate)."
         )
     for effect in instrument.effects:
         if effect.name.replace("-", "_") not in EFFECTS:
