@@ -28,6 +28,8 @@ FREQUENCY = "frequency_Hz"
 ROWS = 400
 FOLLOWED, REFUSED = 0.3, 0.4
 """Parts of a frequency's changes: left of them by a reading that agrees, and by one that does not."""
+AGAINST = 0.5
+"""The same of a reading that agrees, where the other one leaves more than there was: a sign is told by less."""
 CLEAR = 20.0
 """Times its own noise by which a frequency must change before it says how a temperature is to be read."""
 SECONDS = 3600.0
@@ -60,7 +62,7 @@ def _check_temperatures(instrument: "Instrument", record: "Record", law: "Freque
     for words, read in READ_AS.items():
         columns = {name: read(record[name] + zero_Celsius) - zero_Celsius for name in names}
         (other,) = _left(instrument, record.with_columns(columns), whole)
-        if other < min(FOLLOWED * changes, left / 3):
+        if other < min((AGAINST if left > changes else FOLLOWED) * changes, left / 3):
             right = columns[COLUMN["housing"] if COLUMN["housing"] in names else names[0]]
             wrong = [one for one in names if _apart(columns[one], right) <= _apart(record[one], right)]
             raise InputError(

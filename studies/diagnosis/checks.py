@@ -8,7 +8,7 @@ from studies.effects.states import FloatArray
 from studies.errors import InputError
 from studies.record import Record
 from studies.record.plausible import check_one_gyro
-from studies.record.rest import check_seconds
+from studies.record.rest import check_temperatures
 
 FEWEST_BINS = 24
 """Values from which on the noise of a response can be told."""
@@ -28,7 +28,7 @@ def check_units(records: Sequence[Record], tables: Sequence[dict[str, FloatArray
             raise InputError(
                 f"{where}: inverse_q is about {value:g}; it must be 1/Q, between 0 and 0.1. Is it Q itself?"
             )
-    return [doubt for doubt in map(check_seconds, records) if doubt]
+    return [doubt for doubt in map(check_temperatures, records) if doubt]
 
 
 def _level(table: dict[str, FloatArray], name: str, none: float) -> float:

@@ -43,6 +43,12 @@ COLUMNS = {
 }
 REPEATED = 0.5  # part of the rows of a record that stand in another of the same run
 PICKED = 500  # rows that are compared
+OUTPUTS = ("frequency_Hz", "bias_deg_per_h", "measured_rate_deg_per_s", "output_counts", "inverse_q")
+ALIKE, AS_LARGE = (
+    0.9,
+    0.02,
+)  # correlation of the noise of two columns, and of ln of its size: of another gyro it is scaled
+FEWEST_ALIKE, MOST_ALIKE = 50, 20_000  # rows that show it
 FAR = 0.7  # of ln f from the median of a table: a factor of two
 COMPENSATED = "compensated_"
 COMMANDED = ("chamber_temperature_degC", "rate_deg_per_s", "drive_amplitude_V", "electrode_bias_V")  # may stand still
@@ -205,8 +211,12 @@ def drop_repeats(records: "Sequence[Record]") -> tuple[list[Record], list[str]]:
 
 
 def repeats(one: Record, two: Record) -> bool:
-    """Whether two records are of one run: of the shorter, most rows stand in the other too, whatever their time, as noise never repeats itself."""
+    """Whether two records are of one run: of the shorter, most rows stand in the other too, whatever their time, or one output scatters as the other does; noise never repeats itself."""
     if one.sha256 and one.sha256 == two.sha256:
+        return True
+    if len(one) == len(two) and any(
+        _same_noise(one[name], two[name]) for name in OUTPUTS if name in one and name in two
+    ):
         return True
     short, long = (dict(own.columns) for own in sorted((one, two), key=len))
     if not set(short) <= set(long):
@@ -220,6 +230,18 @@ def repeats(one: Record, two: Record) -> bool:
     found = np.isin(long[busiest], short[busiest][picked])
     rows, there = (_rows_of(own, names) for own in (wanted, {name: long[name][found] for name in names}))
     return len(rows & there) > REPEATED * len(picked)
+
+
+def _same_noise(one: Array, two: Array) -> bool:
+    """Whether the second differences of two columns are noise, and the same: one was rounded, moved or turned."""
+    both = np.diff([one[:MOST_ALIKE], two[:MOST_ALIKE]], 2)
+    both = both[:, np.isfinite(both).all(axis=0)]
+    spread = 1.4826 * np.median(np.abs(both), axis=1, keepdims=True) if both.size else np.zeros((2, 1))
+    if both.shape[1] < FEWEST_ALIKE or not spread.all() or abs(np.log(spread[0] / spread[1])) > AS_LARGE:
+        return False
+    both = np.clip(both / spread, -5.0, 5.0)
+    rough = [np.corrcoef(own[1:], own[:-1])[0, 1] for own in both]  # of white noise −2/3
+    return max(rough) < -0.5 and min(rough) > -0.8 and bool(abs(np.corrcoef(both)[0, 1]) > ALIKE)
 
 
 def _rows_of(columns: Mapping[str, Array], names: Sequence[str]) -> set[tuple[float, ...]]:

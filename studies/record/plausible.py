@@ -10,7 +10,7 @@ from shell.constants import zero_Celsius
 from studies.errors import InputError
 from studies.instrument.card import Instrument
 from studies.record import Record, drop_repeats
-from studies.record.rest import TEMPERATURES, check_seconds
+from studies.record.rest import TEMPERATURES, check_temperatures
 from studies.resonator.law import check_slope_known, law_of
 
 if TYPE_CHECKING:
@@ -74,7 +74,7 @@ def records_of_one_gyro(records: "Sequence[Record]", say: Callable[[str], None])
         return next((record[name] for name in TEMPERATURES if name in record), None)
 
     kept, repeated = drop_repeats(records)
-    for sentence in (*repeated, *filter(None, map(check_seconds, kept))):
+    for sentence in (*repeated, *filter(None, map(check_temperatures, kept))):
         say(sentence)
     check_one_gyro([(r.path or "a record", thermometer(r), r["frequency_Hz"]) for r in kept if "frequency_Hz" in r])
     return kept

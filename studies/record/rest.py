@@ -21,6 +21,11 @@ LEAST_SPIKE = 1e-3  # of a column's span, by which a spike stands out: a smooth 
 DRIVING = (TEMPERATURES[0], TEMPERATURES[2], TEMPERATURES[1])
 BLOCKS, LAG_ROWS = 100, 1000  # by which a rate, and rows by which a lag are told
 FASTEST = 1.0  # K/s over a record, beyond which its time cannot be in seconds
+OPPOSITE = 15.0  # K between a chamber and the housing in it, from which on one of them may have the opposite sign, and
+FOLLOWS_NOT, STANDS = (
+    3.0,
+    10.0,
+)  # times less with the sign changed, where they move against each other and where one stands
 AT_ONCE, LEAST_CHANGE, FASTER = (
     4,
     5.0,
@@ -102,8 +107,8 @@ def gather_rest(records: "Sequence[Record]", outputs: "dict[str, float]") -> Res
     return RestData(tuple(runs), output, column, left_out, widest)
 
 
-def check_seconds(record: "Record") -> str:
-    """Refuse a record whose temperatures, and the lag of its frequency behind them, no chamber and no resonator has; else return a doubt, if any.
+def check_temperatures(record: "Record") -> str:
+    """Refuse a record whose temperatures contradict each other or, with the lag of its frequency, are those of no chamber and no resonator; else return a doubt, if any.
 
     In minutes a housing changes by tens of kelvin per minute and the resonator follows within seconds; in milliseconds it lags by days.
     """
@@ -111,9 +116,18 @@ def check_seconds(record: "Record") -> str:
     if name is None:
         return ""
     where, known = record.path or "record", np.isfinite(record[name])
+    if DRIVING[0] in record and DRIVING[1] in record:
+        both = np.array([record[DRIVING[0]], record[DRIVING[1]]])
+        apart, turned = (np.nanmedian(np.abs(sign * both[0] - both[1])) for sign in (1.0, -1.0))
+        against = np.nanmean(np.prod(both - np.nanmean(both, axis=1, keepdims=True), axis=0))
+        if apart > max(OPPOSITE, (FOLLOWS_NOT if against < -1.0 else STANDS) * turned):
+            raise InputError(
+                f"{where}: {DRIVING[0]} is {apart:.3g} K away from {DRIVING[1]} (median), and {turned:.3g} K with the sign"
+                " changed. Correct the column that has the opposite sign."
+            )
     time, T = record["time_s"][known], record[name][known]
     time = time - time[0]
-    lasts, spread = max(float(np.ptp(time)), 1e-9), float(np.subtract(*np.percentile(T, [95, 5])))
+    lasts, spread = max(float(np.ptp(time)), 1e-9), float(np.subtract(*np.percentile(T, [99.5, 0.5])))
     if spread > FASTEST * lasts:
         raise InputError(
             f"{where}: the temperature changes by {np.ptp(T):.3g} K within {lasts:.3g} s, faster than any chamber."

@@ -16,7 +16,7 @@ from studies.inference.records import make_ready
 from studies.instrument.card import load_card, save_card
 from studies.record import Record, drop_repeats
 from studies.record.plausible import records_of_one_gyro
-from studies.record.rest import check_seconds
+from studies.record.rest import check_temperatures
 from studies.simulation.chamber import load_profile
 from studies.simulation.drive import drive_by_record
 from studies.simulation.virtual_gyro import simulate_run
@@ -93,7 +93,7 @@ def test_a_bias_of_the_opposite_sign_is_refused_before_the_fit(card, work):
         InputError, match=r"read with the opposite sign.* Correct chamber_temperature_degC and housing_"
     ):
         work(own, dataclasses.replace(cold, path="cold.csv"))  # once laid to the bias, which was right
-    with pytest.raises(InputError, match=r"read with the opposite sign.* Correct housing_temperature_degC"):
+    with pytest.raises(InputError, match=r"away from chamber_temperature_degC .* with the sign changed"):
         work(own, spoilt(made, housing_temperature_degC=lambda T: -T))
     quiet = spoilt(made, bias_deg_per_h=lambda b: np.random.default_rng(1).standard_normal(b.size))
     check_readings(own, [quiet])
@@ -113,7 +113,8 @@ def test_a_record_given_twice_counts_once_and_holds_nothing_out(card, record):
 
 def test_two_gyros_are_not_mixed(card, record):
     """2.8 % apart at one temperature: a diagnosis without a card once added three effects."""
-    other = dataclasses.replace(spoilt(record, frequency_Hz=lambda f: f * 4555.0 / 4432.0), path="other.csv")
+    same = simulate_run(card, load_profile("cycle 20 -15 40 0.5 30min 1"), 1 / 60, 3).record
+    other = dataclasses.replace(spoilt(same, frequency_Hz=lambda f: f * 4555.0 / 4432.0), path="other.csv")
     with pytest.raises(InputError, match="The records are of different gyros"):
         make_ready([record, other])
     with pytest.raises(InputError, match="The records are of different gyros"):
@@ -187,21 +188,41 @@ def test_a_housing_that_follows_a_jump_of_its_chamber_tells_minutes_by_itself(re
         "housing_temperature_degC": 42.0 * np.exp(-time / 600.0) - 20.0,
         "inverse_q": 1e-7 + 0 * time,
     }
-    assert check_seconds(dataclasses.replace(record, columns=jumped)) == ""
+    assert check_temperatures(dataclasses.replace(record, columns=jumped)) == ""
     with pytest.raises(InputError, match=r"faster than any housing\. time_s must be in seconds"):
-        check_seconds(dataclasses.replace(record, columns=jumped | {"time_s": time / 60.0}))
+        check_temperatures(dataclasses.replace(record, columns=jumped | {"time_s": time / 60.0}))
+    slow = jumped | {
+        "frequency_Hz": 4433.0 + follow_lag(time, jumped["housing_temperature_degC"], 1800.0),
+        "time_s": 1e3 * time,
+    }
+    with pytest.raises(InputError, match="is it in milliseconds"):  # most of its rows have settled
+        check_temperatures(dataclasses.replace(record, columns=slow))
+
+
+def test_a_housing_of_the_opposite_sign_is_seen_beside_its_chamber(record):
+    """Without a card nothing else tells: the frequency follows either sign."""
+    chamber = np.where(record["time_s"] < 9000.0, 30.0, -20.0)
+    heated = record.with_columns(
+        {"chamber_temperature_degC": chamber, "housing_temperature_degC": 60.0 + 0.01 * chamber}
+    )
+    assert check_temperatures(heated) == ""
+    turned = record.with_columns({"chamber_temperature_degC": chamber, "housing_temperature_degC": -chamber + 0.3})
+    with pytest.raises(
+        InputError, match=r"away from chamber_temperature_degC .* with the sign changed\. Correct the column"
+    ):
+        check_temperatures(turned)
 
 
 @pytest.mark.parametrize(("factor", "unit"), [(1 / 60.0, "minutes"), (1e3, "milliseconds")])
 def test_a_time_that_only_the_thermometer_tells_of_is_a_doubt(record, factor, unit):
     """Without a frequency no lag is seen: such a chamber is unusual and not impossible."""
     alone = {name: own for name, own in record.columns.items() if name != "frequency_Hz"}
-    assert check_seconds(record) == check_seconds(dataclasses.replace(record, columns=alone)) == ""
+    assert check_temperatures(record) == check_temperatures(dataclasses.replace(record, columns=alone)) == ""
     odd = dataclasses.replace(record, columns=alone | {"time_s": record["time_s"] * factor})
-    assert f"if time_s is in {unit}, convert it" in check_seconds(odd)
+    assert f"if time_s is in {unit}, convert it" in check_temperatures(odd)
     said = []
     assert records_of_one_gyro([odd], said.append) == [odd]
-    assert said == [check_seconds(odd)]
+    assert said == [check_temperatures(odd)]
 
 
 @pytest.mark.parametrize(
@@ -212,7 +233,7 @@ def test_a_resonator_however_quick_or_slow_in_seconds_is_not_refused(rate, lasts
     time = np.linspace(0.0, lasts, 600)
     T = rate * (lasts / 2 - np.abs(time - lasts / 2))
     f = 4432.0 + 0.4 * follow_lag(time, T, lag) + 1e-4 * np.random.default_rng(1).standard_normal(time.size)
-    said = check_seconds(Record({"time_s": time, "housing_temperature_degC": T, "frequency_Hz": f}))
+    said = check_temperatures(Record({"time_s": time, "housing_temperature_degC": T, "frequency_Hz": f}))
     assert ("milliseconds" in said) == (lasts > 1e6)
 
 
@@ -222,8 +243,12 @@ def test_a_resonator_however_quick_or_slow_in_seconds_is_not_refused(rate, lasts
         lambda run: spoilt(run, frequency_Hz=lambda f: f + 1e-4 * (np.arange(f.size) == 7)),
         lambda run: spoilt(run, time_s=lambda t: t + 1000.0),
         lambda run: dataclasses.replace(run, columns={name: own[::2] for name, own in run.columns.items()}),
+        lambda run: spoilt(
+            run, bias_deg_per_h=lambda b: np.round(b + 0.3, 2), frequency_Hz=lambda f: f + 1e-3 * np.sin(f)
+        ),
+        lambda run: spoilt(run, bias_deg_per_h=lambda b: -b, housing_temperature_degC=lambda T: 1.8 * T + 32.0),
     ],
-    ids=["one cell", "later", "every second row"],
+    ids=["one cell", "later", "every second row", "rounded and moved", "of another unit and sign"],
 )
 def test_a_near_copy_is_the_same_run_and_the_longer_one_is_kept(card, record, copied):
     """Each once counted as a held-out run, on which a bias model was 5.28 times better."""
