@@ -20,7 +20,7 @@ from studies.threads import ONE_THREAD
 
 TYPE_CHECKING = False  # `typing` takes as long to load as all the rest here, and until `run` nobody heeds Ctrl-C
 if TYPE_CHECKING:
-    from cyclopts import App, Argument
+    from cyclopts import App, Argument, Token
 
 for _name, _count in ONE_THREAD.items():  # read by the libraries when numpy is first imported
     os.environ.setdefault(_name, _count)
@@ -115,6 +115,17 @@ def spell_default(value: object) -> str | None:
     return re.sub(r"e([-+])0+", r"e\1", f"{value:g}") if isinstance(value, float) else str(value)
 
 
+def convert_exactly(kind: object, tokens: "Sequence[Token]") -> object:
+    """Convert what was typed as cyclopts does, but no 2.5 to a whole number."""
+    from cyclopts import CoercionError, convert
+
+    kinds = (kind, *getattr(kind, "__args__", ()))
+    for token in tokens if int in kinds and float not in kinds else ():
+        if re.fullmatch(r"[-+]?\d*\.\d*[1-9]\d*", token.value):
+            raise CoercionError(token=token, target_type=int)
+    return convert(kind, tokens)
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit status."""
     words = list(sys.argv[1:] if arguments is None else arguments)
@@ -158,7 +169,9 @@ def _command_line(words: Sequence[str]) -> "App":
         exit_on_error=False,
         print_error=False,
         suppress_keyboard_interrupt=False,
-        default_parameter=Parameter(negative="", validator=refuse_unsound, show_default=spell_default),
+        default_parameter=Parameter(
+            negative="", validator=refuse_unsound, show_default=spell_default, converter=convert_exactly
+        ),
     )
     if not words or words[0] in ("--install-completion", "--help", "-h"):  # it takes a tenth of a short command to load
         app.register_install_completion_command(help="Install completion for the shell in use (bash, zsh or fish).")
