@@ -12,6 +12,7 @@ from studies.importing.look import Look, as_number, is_stamp, look_at, look_at_g
 from studies.importing.mapping import NUMERIC_TIMES, SCHEMA, TABLE_TARGETS, FileMap, ImportMap
 from studies.importing.meaning import Meaning, find_meanings, find_unit
 from studies.importing.offset import estimate_offset
+from studies.importing.raw import shorten
 from studies.importing.stated import find_nominal, find_period
 from studies.importing.timing import TIME_WORDS, find_time
 from studies.importing.units import units_of
@@ -21,6 +22,8 @@ from studies.schema.spelling import spell_value
 if TYPE_CHECKING:
     from studies.importing.join import ClockedFile
 
+MOST_DEVICES = 50  # that one file may hold
+DEVICE_WORDS = r"gyro|device|serial|channel|axis|sensor|unit|\bid\b|gerät|kanal"
 MOST_SETTLED = 500  # rows of a table of settled readings
 
 
@@ -230,6 +233,12 @@ def _draft_look(path: str, look: Look, taken: Sequence[str]) -> tuple[list[str],
         lines.append(f"sample_period_s = {period or 0.0!r}    # CHECK: {stated}")
     joined = [" ".join(stamp) for stamp in zip(*(cells[name] for name in time), strict=True)]
     if len(set(joined)) < len(joined):
+        several = next((name for name in names if name not in time and _tells_devices(name, joined, cells[name])), None)
+        if several is not None:
+            raise InputError(
+                f"{path}: each time stands there once for every value of '{shorten(several)}'"
+                f" ({shorten(', '.join(dict.fromkeys(cells[several])))}): these are several gyros or channels. Write a file for each of them."
+            )
         lines.append('repeated_times = "spread"    # CHECK: some times repeat; "first" keeps one row of each')
     lines.append("# clock_offset_s = 0.0    # added to this file's times: positive when its clock is behind")
     usable = {name: hints[name] for name in names if name not in time and numbers[name]}
@@ -246,6 +255,13 @@ def _draft_look(path: str, look: Look, taken: Sequence[str]) -> tuple[list[str],
                 drafted.append('resample = "mean"    # onto the times of the first [[file]]')
             lines += ["", *drafted]
     return lines, [meaning.target for meaning in meanings.values()], others
+
+
+def _tells_devices(name: str, times: Sequence[str], cells: Sequence[str]) -> bool:
+    """Tell whether a column of a few words makes repeated times single: those of one gyro, or channel, each; a counter within a second is none."""
+    few = 1 < len(set(cells)) <= MOST_DEVICES and len(times) > 2 * len(set(cells))
+    named = re.search(DEVICE_WORDS, name.lower()) or not all(as_number(cell, ".") is not None for cell in cells)
+    return bool(few and named) and len(set(zip(times, cells, strict=True))) == len(times)
 
 
 def _guess_meanings(hints: Mapping[str, str], numbers: Mapping[str, Sequence[float]]) -> dict[str, Meaning]:

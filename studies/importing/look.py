@@ -55,7 +55,9 @@ def look_at(path: str) -> Look:
         lines = decode(path, data, encoding).split("\n", SEEN)[:SEEN]
         separator = _find_separator(lines)
         rows = [_split(line, separator) for line in lines]
-    decimal = "," if not excel and separator != "," and _has_decimal_commas(rows) else "."
+    filled = max((k + 1 for row in rows for k, cell in enumerate(row) if cell.strip()), default=0)
+    rows = [row[:filled] for row in rows]  # a spreadsheet writes separators of empty columns behind the last one
+    decimal = "," if not excel and _has_decimal_commas(rows, separator) else "."
     numeric = [sum(as_number(cell, decimal) is not None or is_stamp(cell) for cell in row) for row in rows]
     width = max(
         (len(row) for row, count in zip(rows, numeric, strict=True) if 2 * count >= len(row) and count), default=0
@@ -119,8 +121,13 @@ def _split(line: str, separator: str) -> list[str]:
         return [line]
 
 
-def _has_decimal_commas(rows: Sequence[Sequence[str]]) -> bool:
-    return any(re.fullmatch(r"\s*[+-]?\d+,\d+([eE][+-]?\d+)?\s*", cell) for row in rows for cell in row)
+def _has_decimal_commas(rows: Sequence[Sequence[str]], separator: str) -> bool:
+    """Tell whether commas are decimal ones; between commas (in quotes) only what parts no thousands is."""
+    decimal = r"[+-]?\d+,\d+([eE][+-]?\d+)?"
+    found = [cell.strip() for row in rows for cell in row if re.fullmatch(decimal, cell.strip())]
+    return (
+        any(not re.fullmatch(r"[+-]?[1-9]\d{0,2},\d{3}", cell) for cell in found) if separator == "," else bool(found)
+    )
 
 
 def as_number(cell: str, decimal: str) -> float | None:

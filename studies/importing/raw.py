@@ -6,6 +6,7 @@ import hashlib
 import importlib
 import io
 import itertools
+import re
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -235,6 +236,9 @@ def _read_text(path: str | Path, text: str, file: "FileMap", names: list[str]) -
     body = text.split("\n", file.data_line - 1)[-1] if text.count("\n") >= file.data_line - 1 else ""
     if not body.strip():
         raise InputError(f"{path}: there are no rows from line {file.data_line} on (data_line in the map).")
+    if file.header_line and file.separator != "space" and not _split_lines(path, text, file)[-1][-1].strip():
+        # empty columns of a spreadsheet behind the last one
+        body = re.sub(f"{re.escape(SEPARATORS[file.separator])}+$", "", body, flags=re.MULTILINE)
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error", pd.errors.ParserWarning)

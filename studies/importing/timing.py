@@ -29,6 +29,7 @@ STAMPS = (
 )
 TIME_WORDS = r"time|elapsed|zeit|date|datum|clock|stamp|uhr|^t$|^t\s*[ _/\[(]\s*[mµun]?s\b"
 UNIX_BY_SIZE = ((1e9, "unix-s"), (1e12, "unix-ms"), (1e15, "unix-us"), (1e18, "unix-ns"))
+LONGEST_RUN = 1000.0  # days of a file whose times look like Excel's
 USUAL_STEP = (1e-3, 3600.0)  # s between rows
 
 
@@ -74,7 +75,7 @@ def find_time(
     ):
         if re.search(pattern, hint):
             return [time], form, unsure
-    if 40000 < first < 60000 and first % 1:
+    if 40000 < first < 60000 and any(value % 1 for value in values) and values[-1] - first < LONGEST_RUN:
         return [time], "excel-days", "the values look like Excel's days"
     if re.search(r"_s\b|\bs\b|sec|sek", hint):
         return [time], "s", unsure

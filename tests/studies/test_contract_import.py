@@ -70,6 +70,45 @@ def test_a_drafted_map_reads_a_german_logger(tmp_path, capsys):
     assert record.comments == tuple(told["notes"])
 
 
+@pytest.mark.parametrize(
+    ("head", "row", "tail"),
+    [
+        ("Date,Temp,F", "{d:.8f},{T:.4f},{f:.5f}", ""),
+        ("time_s,housing_temperature_degC,frequency_Hz,,", "{t:g},{T:.4f},{f:.5f},,", ",,,,\n,,,,\n"),
+        ("time_s,housing_temperature_degC,frequency_Hz", '{t:g},"{T:.4f}","{f:.5f}"', ""),
+    ],
+    ids=["serial days of Excel", "empty columns behind the last", "decimal commas in quotes"],
+)
+def test_what_a_spreadsheet_writes_is_drafted_rightly(tmp_path, head, row, tail):
+    """Days were taken for seconds, a header of empty cells for none, quoted numbers for text."""
+    t = np.arange(0.0, 6000.0, 60.0)
+    T, f = signal(t)
+    rows = [row.format(d=45717.0 + a / 86400.0, t=a, T=b, f=c) for a, b, c in zip(t, T, f, strict=True)]
+    if '"' in row:
+        rows = [line.replace(".", ",") for line in rows]
+    raw, map_, out = tmp_path / "raw.csv", tmp_path / "map.toml", tmp_path / "out.csv"
+    raw.write_text("\n".join([head, *rows, tail]))
+    map_.write_text(draft_map([str(raw)]).text)
+    assert main(["import", str(raw), "--map", str(map_), "--out", str(out)]) == 0
+    record = read_record(out)
+    assert record["time_s"] == pytest.approx(t, abs=1e-3)
+    assert record["frequency_Hz"] == pytest.approx(f, abs=1e-5)
+
+
+def test_several_gyros_in_one_file_are_told_apart_from_rows_within_a_second(tmp_path):
+    """Two gyros were joined to a saw-tooth of 120 Hz; a counter of the rows within each second is none of them."""
+    raw = tmp_path / "raw.csv"
+    names = "time_s,housing_temperature_degC,frequency_Hz"
+    both = [f"{gyro},{t},{20 + 0.01 * t},{4430.0 + (gyro == 'B')}" for t in range(50) for gyro in "AB"]
+    raw.write_text("\n".join([f"gyro,{names}", *both, ""]))
+    with pytest.raises(InputError, match=r"once for every value of 'gyro' \(A, B\): these are several gyros"):
+        draft_map([str(raw)])
+    raw.write_text(
+        "\n".join([f"n,{names}", *(f"{n},{t},{20 + 0.01 * t},4430.{n}" for t in range(50) for n in range(5)), ""])
+    )
+    assert 'repeated_times = "spread"' in draft_map([str(raw)]).text
+
+
 def test_a_draft_is_not_overwritten_and_a_file_without_numbers_is_refused(tmp_path, capsys):
     raw, out = tmp_path / "raw.csv", tmp_path / "map.toml"
     raw.write_text("time,f\n0,1\n1,2\n")
