@@ -1,12 +1,14 @@
 """Rows of a steady-state table that follow no law: mixed up, of two gyros, or one of them mistyped.
 
 Readings less the card's law, with level, slope and curvature free: the rms r of what is left is set against what temperature
-changes over the range. Without row k, of leverage h, Σr² falls by r_k² / (1 − h).
+changes over the range, and each row against the others. Without row k, of leverage h, Σr² falls by r_k² / (1 − h), and the row lies
+t_k = r_k / s √(1 − h) from where the others, which then leave s, expect it (Student's t; any of n rows with n times its probability).
 """
 
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 from shell.constants import zero_Celsius
@@ -15,6 +17,7 @@ from studies.calibration.observed import LEAST_SCATTER, THERMOMETER, SettledTabl
 Array = NDArray[np.float64]
 PART = 0.01  # of what temperature changes: measured tables leave a quarter to a half of it
 ROUNDINGS = 10.0
+SURE = 1e-4  # probability below which a row lies as far from the others by chance
 CLEARLY = 2.0  # times less that is left without one row than without any other
 
 
@@ -58,11 +61,15 @@ def find_scatter(table: SettledTable, predicted: Array) -> Scatter | None:
         return None
     rest, leverage = table.beside_parabola(table.frequency - predicted)
     rms = float(np.sqrt(rest @ rest / free))
-    if rms <= limit:
-        return None
-    square = rest @ rest - rest**2 / np.maximum(1.0 - leverage, 1e-9)
-    without = np.sqrt(np.maximum(square, 0.0) / (free - 1))
+    fall = rest**2 / np.maximum(1.0 - leverage, 1e-9)
+    without = np.sqrt(np.maximum(rest @ rest - fall, 0.0) / (free - 1))
     k = int(np.argmin(without))
     alone = without[k] < limit and without[k] * CLEARLY < np.delete(without, k).min()
+    lone = fall[k] ** 0.5 / max(float(without[k]), table.rounding / ROUNDINGS)
+    chance = 2.0 * len(T) * float(scipy.special.stdtr(free - 1, -lone))
+    odd = chance < SURE and abs(rest[k]) > ROUNDINGS * table.rounding
+    if rms <= limit and not odd:
+        return None
     reading = f"{T[k] - zero_Celsius:.4g} °C, {table.frequency[k]:.2f} Hz"
-    return Scatter(table.path, rms, limit, float(np.ptp(predicted)), k if alone else None, reading, float(without[k]))
+    row = k if odd or alone else None
+    return Scatter(table.path, rms, limit, float(np.ptp(predicted)), row, reading, float(without[k]))

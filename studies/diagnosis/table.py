@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from compensation.noise import white_rms
 from shell.constants import zero_Celsius
 from studies.calibration.calibrate import calibrate
 from studies.calibration.observed import SETTLED, SettledTable, read_settled
@@ -34,11 +35,13 @@ if TYPE_CHECKING:
 
     from studies.instrument.card import Instrument
 
-FEWEST_POINTS = 5
+FEWEST_POINTS, FEWEST_BESIDE_CARD = 5, 3
 MOST_ROWS = 120
 """Longer tables are averaged over neighbouring rows."""
 WANDERING = 3.0
 """Residual over white noise from which a table is not called adequate."""
+NEIGHBOURS, FEW = 4.0, 8
+"""The same over what readings at neighbouring temperatures leave, and rows that do not show it: 1 in 1000 of pure noise."""
 UNNAMED = 2.0
 """Evidence from which on it is said how far a form falls short of being named."""
 DEFAULT_LAW = "hrg-30mm"
@@ -94,12 +97,13 @@ def diagnose_table(path: str, card: "Instrument | str | None" = None) -> TableDi
     Raises
     ------
     InputError
-        With a card: a table whose level or slope is further than six standard deviations from it. Without one: fewer than
-        five temperatures.
+        With a card: a table whose level or slope is further than six standard deviations from it. Fewer than five temperatures,
+        or three beside a card.
     """
     table = read_settled(path)
-    if card is None and (distinct := np.unique(table.temperature).size) < FEWEST_POINTS:
-        raise InputError(f"{path}: {distinct} temperatures are too few for a diagnosis; {words.MORE}")
+    if (distinct := np.unique(table.temperature).size) < (FEWEST_POINTS if card is None else FEWEST_BESIDE_CARD):
+        given = "one temperature is" if distinct == 1 else f"{distinct} temperatures are"
+        raise InputError(f"{path}: {given} too few for a diagnosis; {words.MORE}")
     return judge_table(table, load_card(card) if isinstance(card, str) else card)
 
 
@@ -127,6 +131,9 @@ def judge_table(whole: SettledTable, card: "Instrument | None" = None) -> TableD
     # rows that follow no law: averages of neighbours may hide it, and then no effect explains it
     loose = find_scatter(whole, own.frequency(whole.temperature, extrapolate=True))
     said += [] if loose else words.table_sentences(table)
+    near = (
+        max(white_rms(left[np.argsort(table.temperature, kind="stable")]), table.rounding) if f.size > FEW else np.inf
+    )
     # noise that has a shape beyond rounding is not called noise
     shaped = lead > UNNAMED and base[0] > WANDERING * table.rounding and words.bends_beyond_a_cubic(table)
     state, causes, rest, extended = "unexplained", doubted(wrong_values(shifts)), left, None
@@ -138,6 +145,8 @@ def judge_table(whole: SettledTable, card: "Instrument | None" = None) -> TableD
         causes = ()
     elif lead < needed and base[0] > WANDERING * white:
         said.append(words.drift_sentence(base[0], white))
+    elif (best is None or (lead < needed and not shaped)) and base[0] > NEIGHBOURS * near:
+        said.append(words.step_sentence(base[0], near))
     elif best is None or (lead < needed and not shaped):
         state, following = "explained" if causes else "adequate", None
         said += [words.short_sentence(forms, base[0], needed)] if lead > UNNAMED else []

@@ -71,6 +71,14 @@ def drift_sentence(left: float, white: float) -> str:
     )
 
 
+def step_sentence(left: float, near: float) -> str:
+    """Say that what is left (rms, Hz) is far above what readings at neighbouring temperatures leave."""
+    return (
+        f"The residual of {left:.3g} Hz rms is not noise: readings at neighbouring temperatures agree to {near:.2g} Hz. Rows of two"
+        " gyros or of two sessions look like this, and so does a narrow effect of temperature."
+    )
+
+
 def short_sentence(forms: Sequence[Form], left: float, needed: float) -> str:
     """Say how far the nearest form is from being a cause."""
     return (

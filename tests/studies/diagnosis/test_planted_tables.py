@@ -64,6 +64,29 @@ def test_one_loop_could_be_a_drift_and_is_not_adequate():
     assert found.verdict.verdict == "unexplained"
 
 
+@pytest.mark.parametrize(("row", "wrong"), [(0, 1.0), (7, -0.3), (20, 0.3)])
+def test_one_mistyped_digit_far_beyond_the_noise_of_the_others_names_its_row(row, wrong):
+    """A hundred standard deviations in the first row were a hysteresis of probability 0.86, in the middle one nothing."""
+    T = np.linspace(-40.0, 60.0, 21)
+    found = study(T, wrong * (np.arange(21) == row), white=1e-2)
+    assert (found.verdict.verdict, found.verdict.causes) == ("unexplained", ())
+    assert f"Row {row + 1} (" in found.sentences[0]
+    assert "alone makes it" in found.sentences[0]
+
+
+def test_rows_of_two_gyros_one_after_the_other_are_no_noise():
+    """A step of 1.3 Hz among readings of 10 mHz was a noise of 0.33 Hz."""
+    T = np.linspace(-40.0, 60.0, 11)
+    found = study(T, 1.3 * (T >= 20.0), white=1e-2)
+    assert found.verdict.verdict == "unexplained"
+
+
+def test_few_rows_of_pure_noise_name_no_row_and_no_step():
+    tables = [study(np.linspace(-40.0, 60.0, 9 + k % 9), 0.0, seed=k, white=1e-2) for k in range(60)]
+    assert sum(found.verdict.verdict != "adequate" for found in tables) <= 2
+    assert not any("alone makes it" in sentence for found in tables for sentence in found.sentences)
+
+
 def test_the_same_readings_without_a_loop_are_adequate():
     found = study(CYCLE, 0.0)
     assert (found.verdict.verdict, found.verdict.causes) == ("adequate", ()), found.verdict.causes
