@@ -265,12 +265,13 @@ def write_record(record: Record, path: str | Path) -> None:
             write_table(file, record.columns, notes, path)
             return
         file.write("".join(f"{note}\n" for note in [*(f"# {n}" for n in notes), ",".join(record.columns)]).encode())
-        for begin in range(0, max(map(len, record.columns.values()), default=0), 100_000):
+        rows = max(map(len, record.columns.values()), default=0)
+        for begin in range(0, rows, 100_000):
             part = np.column_stack([values[begin : begin + 100_000] for values in record.columns.values()])
             cells = iter(map(repr, part.ravel().tolist()))
             lines = "\n".join(map(",".join, zip(*[cells] * part.shape[1], strict=True)))
             file.write((lines.replace("nan", "") + "\n").encode())
-            tell(f"writing {path}", (begin + len(part)) / len(record))
+            tell(f"writing {path}", (begin + len(part)) / rows)
 
 
 def check_plausible(columns: Mapping[str, Array], where: Callable[[int], str]) -> None:

@@ -160,11 +160,13 @@ def check_temperatures(record: "Record") -> str:
 
 def _fastest_change(time: NDArray[np.float64], T: NDArray[np.float64]) -> tuple[float, float] | None:
     """Largest change (K) over `AT_ONCE` rows in one direction, and how long it took, if no mass behind a wall can change so fast."""
+    if len(T) <= AT_ONCE:
+        return None
     rose, lasts = T[AT_ONCE:] - T[:-AT_ONCE], time[AT_ONCE:] - time[:-AT_ONCE]
     each = np.lib.stride_tricks.sliding_window_view(np.diff(T), AT_ONCE)[: len(rose)]
     even = (each * np.sign(rose)[:, None] > 0.1 * np.abs(rose)[:, None]).all(axis=1)  # not one jump among rows
     fast = np.where(even & (np.abs(rose) > np.maximum(LEAST_CHANGE, FASTER * lasts)), np.abs(rose), 0.0)
-    k = int(np.argmax(fast)) if fast.size else 0
+    k = int(np.argmax(fast))
     return (float(fast[k]), float(lasts[k])) if fast.any() else None
 
 
