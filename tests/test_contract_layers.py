@@ -38,6 +38,7 @@ def parsed(path):
     return ast.parse(path.read_text(encoding="utf-8"))
 
 
+@cache
 def imports(path, *, top_only=False):
     """Return the modules that a file imports, anywhere in it or at its top level, each as deep as it is a file."""
     tree = parsed(path)
