@@ -149,7 +149,8 @@ def read_series(paths: Sequence[str], file: FileMap) -> ClockedFile:
     times, rows = drop_repeated(table, clock, file, repeated)
     for column in file.columns:
         place = column.target, column.axis
-        columns[place], found = drop_doubtful(column, columns[place][rows])
+        kept = columns[place] if len(rows) == table.rows else columns[place][rows]
+        columns[place], found = drop_doubtful(column, kept)
         told += found
     _check_lone_values(table, columns, rows)
     notes = (

@@ -94,7 +94,8 @@ class RawTable:
 class NumberTable(RawTable):
     """A table whose columns are all numbers."""
 
-    _last: "dict[str, tuple[NDArray[np.float64], int]]" = field(default_factory=dict, repr=False, kw_only=True)
+    _last: "dict[str, NDArray[np.float64]]" = field(default_factory=dict, repr=False, kw_only=True)
+    _beyond: dict[str, int] = field(default_factory=dict, repr=False, kw_only=True)
 
     def read(self, column: str) -> "NDArray[np.float64]":
         """Return the values of a column as they stand in the files, in an array of its own."""
@@ -108,15 +109,18 @@ class NumberTable(RawTable):
             for word in self.missing:
                 with contextlib.suppress(ValueError):
                     values[values == float(word)] = float("nan")
+            import numpy as np
+
             beyond = (values >= OVERLOAD) | (values <= -OVERLOAD)
             values[beyond] = float("nan")
-            self._last[column] = values, int(beyond.sum())
-        return self._last[column][0]
+            self._last[column], self._beyond[column] = values, int(np.count_nonzero(beyond))
+        return self._last[column]
 
     def count_overloads(self, column: str) -> int:
         """Return how many readings of a column stand for an overload of the instrument."""
-        self.numbers(column)
-        return self._last[column][1]
+        if column not in self._beyond:
+            self.numbers(column)
+        return self._beyond[column]
 
 
 @dataclass(frozen=True)
