@@ -42,7 +42,7 @@ class Scatter:
             why = "No single row makes it. Are the rows mixed up, or of two gyros? Until then level and slope say little of the gyro."
         return (
             f"The rows of {self.path} scatter by {self.rms:.3g} Hz (rms) about the law with level, slope and curvature free:"
-            f" {100 * self.rms / max(self.swing, 1e-9):.2g} % of the {self.swing:.3g} Hz that temperature changes over their range. {why}"
+            f" {100 * self.rms / max(self.swing, 1e-9):.3g} % of the {self.swing:.3g} Hz that temperature changes over their range. {why}"
         )
 
 

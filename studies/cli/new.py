@@ -5,6 +5,7 @@ import tomllib
 from collections.abc import Collection, Iterator
 from dataclasses import replace
 from pathlib import Path
+from shlex import quote
 from typing import Annotated, Any
 
 import tomli_w
@@ -41,7 +42,7 @@ def card(path: str, *, like: str = "hrg-30mm", name: str | None = None) -> int:
     head = "# Optional entries. Remove the # of a line to set it; entries left out have their documented default."
     lines = [text, head, *(f"# {line}".rstrip() for line in write_form(_other_tables(content)))]
     write_text(path, "\n".join(lines) + "\n")
-    say(f"{path}: written as a copy of {like}. Edit it, then run: hrg modes {path}")
+    say(f"{path}: written as a copy of {like}. Edit it, then run: hrg modes {quote(path)}")
     return 0
 
 
@@ -56,7 +57,7 @@ def study(path: NewFile, *, like: str = "dimension-tolerance", card_: OtherCard 
     Args:
         like: A built-in study: frequency-over-temperature, dimension-tolerance, dimension-influence, split-tolerance.
     """
-    return _copy(path, like, shipped_specs(), card_, StudyKeys, "study", f"hrg study run {path} --dry-run")
+    return _copy(path, like, shipped_specs(), card_, StudyKeys, "study", f"hrg study run {quote(path)} --dry-run")
 
 
 def design(path: NewFile, *, like: str = "dome-8khz", card_: OtherCard = None) -> int:
@@ -65,7 +66,7 @@ def design(path: NewFile, *, like: str = "dome-8khz", card_: OtherCard = None) -
     Args:
         like: A worked design: dome-8khz, light-cylinder, robust-dome.
     """
-    return _copy(path, like, shipped_tasks(), card_, DesignKeys, "design", f"hrg optimise {path} --out FOLDER")
+    return _copy(path, like, shipped_tasks(), card_, DesignKeys, "design", f"hrg optimise {quote(path)} --out FOLDER")
 
 
 def _copy(

@@ -124,7 +124,7 @@ def _check_text(path: str | Path, data: bytes) -> bytes:
     """Make sure that a file is UTF-8 text with something in it, and take its byte-order mark off."""
     data = data.removeprefix(codecs.BOM_UTF8)
     if b"\0" in data:
-        raise InputError(f"{path}: not a text table (it holds zero bytes); export it as CSV in UTF-8.")
+        raise InputError(f"{path}: not a text table (it holds zero bytes); export it as CSV in UTF-8.{IMPORT}")
     if not data.isascii():
         try:
             data.decode()

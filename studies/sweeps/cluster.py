@@ -76,7 +76,7 @@ class Cluster(Workers):
                     f"{address}: this is no Dask scheduler: a server listens there but does not answer as one; correct --scheduler."
                 ) from error
             raise MissingEnvironment(
-                f"{address}: no scheduler with a worker answers ({error}); start both, or correct --scheduler."
+                f"{address}: no scheduler with a worker answers ({str(error) or 'no answer in time'}); start both, or correct --scheduler."
             ) from error
         self._check_versions()
         self.executor = self.client.get_executor(pure=False, retries=0)
