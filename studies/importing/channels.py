@@ -22,7 +22,7 @@ from studies.files.reading import PORTION, opened
 from studies.importing.formats import KINDS, READERS, Channel, Clock
 from studies.importing.mapping import FileMap
 from studies.importing.raw import name_columns, shorten
-from studies.importing.tables import NumberTable, Part
+from studies.importing.tables import Part, RawTable
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -110,7 +110,7 @@ def sort_groups(channels: Sequence[Channel]) -> list[Group]:
 
 
 @dataclass(frozen=True)
-class ChannelTable(NumberTable):
+class ChannelTable(RawTable):
     """The channels that one [[file]] of a map reads, of one file or of several that continue one another."""
 
     channels: tuple[dict[str, Channel], ...]

@@ -17,7 +17,7 @@ from studies.errors import InputError, MissingEnvironment, nearest
 from studies.files.columns import parse_fast
 from studies.files.reading import opened, read_bytes
 from studies.importing.mapping import NUMERIC_TIMES, SEPARATORS, FileMap
-from studies.importing.tables import OVERLOAD, ParsedTable, Part, RawTable
+from studies.importing.tables import ParsedTable, Part, RawTable
 
 if TYPE_CHECKING:
     import numpy as np
@@ -56,8 +56,8 @@ class TextTable(RawTable):
 
         return np.asarray(text.isin(["", *self.missing]))
 
-    def numbers(self, column: str) -> "NDArray[np.float64]":
-        """Return a column as numbers, NaN where a value is missing; anything else is an error that names the line."""
+    def read(self, column: str) -> "NDArray[np.float64]":
+        """Return a column as numbers, NaN where a cell is empty; anything else is an error that names the line."""
         import numpy as np
         import pandas as pd
 
@@ -65,21 +65,13 @@ class TextTable(RawTable):
         empty = self.is_empty(text)
         plain = text.str.replace(self.decimal, ".", regex=False) if self.decimal != "." else text
         values = pd.to_numeric(plain.mask(empty, "nan"), errors="coerce").to_numpy(dtype=float, copy=True)
-        overloaded = np.abs(values) >= OVERLOAD
-        bad = np.flatnonzero(~np.isfinite(values) & ~empty & ~overloaded)
+        bad = np.flatnonzero(np.isnan(values) & ~empty)
         if len(bad):
             raise InputError(
                 f"{self.place(bad[0])}: '{shorten(text.iloc[bad[0]])}' in column '{column}' is not a"
                 f" number (decimal = '{self.decimal}'); where it marks a missing value, add it to 'missing' in the map."
             )
-        values[overloaded] = np.nan
         return values
-
-    def count_overloads(self, column: str) -> int:
-        """Return how many readings of a column stand for an overload of the instrument; `numbers` leaves them empty."""
-        import numpy as np
-
-        return int(np.count_nonzero(np.isnan(self.numbers(column)) & ~self.is_empty(self.text(column))))
 
 
 def read_plain(path: str | Path, file: "FileMap") -> ParsedTable | None:

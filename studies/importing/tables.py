@@ -35,6 +35,8 @@ class RawTable:
 
     parts: tuple[Part, ...]
     missing: tuple[str, ...]
+    _last: "dict[str, NDArray[np.float64]]" = field(default_factory=dict, repr=False, kw_only=True)
+    _beyond: dict[str, int] = field(default_factory=dict, repr=False, kw_only=True)
 
     @property
     def path(self) -> str:
@@ -67,36 +69,6 @@ class RawTable:
         """Rows at which a file continues another."""
         return list(itertools.accumulate(part.rows for part in self.parts))[:-1]
 
-    def numbers(self, column: str) -> "NDArray[np.float64]":
-        """Return a column as numbers, NaN where a value is missing."""
-        raise NotImplementedError
-
-    def count_overloads(self, column: str) -> int:
-        """Return how many readings of a column stand for an overload of the instrument; `numbers` leaves them empty."""
-        raise NotImplementedError
-
-    def joined(self, columns: Sequence[str]) -> "pd.Series[str]":
-        """Return several columns of text joined by a blank, such as a date and a time of day."""
-        raise InputError(
-            f"{self.path}: '{' '.join(columns)}' are numbers; time_format is a unit of time such as 's', or 'own'."
-        )
-
-    def is_empty(self, text: "pd.Series[str]") -> "NDArray[np.bool_]":
-        """Tell which cells of text hold no value."""
-        raise NotImplementedError
-
-    def own_clock(self) -> "tuple[NDArray[np.float64], datetime.datetime | None]":
-        """Return the seconds of every row by the file's own clock, and when it started."""
-        raise InputError(f"{self.path}: a table of text has no clock of its own; name its time column in the map.")
-
-
-@dataclass(frozen=True)
-class NumberTable(RawTable):
-    """A table whose columns are all numbers."""
-
-    _last: "dict[str, NDArray[np.float64]]" = field(default_factory=dict, repr=False, kw_only=True)
-    _beyond: dict[str, int] = field(default_factory=dict, repr=False, kw_only=True)
-
     def read(self, column: str) -> "NDArray[np.float64]":
         """Return the values of a column as they stand in the files, in an array of its own."""
         raise NotImplementedError
@@ -122,9 +94,23 @@ class NumberTable(RawTable):
             self.numbers(column)
         return self._beyond[column]
 
+    def joined(self, columns: Sequence[str]) -> "pd.Series[str]":
+        """Return several columns of text joined by a blank, such as a date and a time of day."""
+        raise InputError(
+            f"{self.path}: '{' '.join(columns)}' are numbers; time_format is a unit of time such as 's', or 'own'."
+        )
+
+    def is_empty(self, text: "pd.Series[str]") -> "NDArray[np.bool_]":
+        """Tell which cells of text hold no value."""
+        raise NotImplementedError
+
+    def own_clock(self) -> "tuple[NDArray[np.float64], datetime.datetime | None]":
+        """Return the seconds of every row by the file's own clock, and when it started."""
+        raise InputError(f"{self.path}: a table of text has no clock of its own; name its time column in the map.")
+
 
 @dataclass(frozen=True)
-class ParsedTable(NumberTable):
+class ParsedTable(RawTable):
     """A text of plain numbers."""
 
     columns: "Mapping[str, NDArray[np.float64]]"
