@@ -129,10 +129,12 @@ def run_filter(model: LinearModel, measurements: ArrayLike, start: ArrayLike, co
 
 def _follow(A: Array, u: Array, start: Array) -> Array:
     """Return x_{k+1} = A x_k + u_k, (N, n): triangular by Schur's form A = U T Uᴴ, so that each row is a filter of first order."""
-    from scipy.linalg import schur
+    from scipy.linalg import rsf2csf, schur
     from scipy.signal import lfilter
 
-    T, U = schur(A, output="complex" if np.iscomplex(np.linalg.eigvals(A)).any() else "real")
+    T, U = schur(A)
+    if np.diag(T, -1).any():  # a pair of complex poles
+        T, U = rsf2csf(T, U)
     begun, driven = start @ U.conj(), u @ U.conj()
     y = np.empty_like(driven)
     for k in reversed(range(len(T))):
