@@ -132,9 +132,8 @@ def _follow(A: Array, u: Array, start: Array) -> Array:
     from scipy.linalg import rsf2csf, schur
     from scipy.signal import lfilter
 
-    T, U = schur(A)
-    if np.diag(T, -1).any():  # a pair of complex poles
-        T, U = rsf2csf(T, U)
+    real = schur(A)
+    T, U = rsf2csf(*real) if np.diag(real[0], -1).any() else real  # a pair of complex poles is a block
     begun, driven = start @ U.conj(), u @ U.conj()
     y = np.empty_like(driven)
     for k in reversed(range(len(T))):
