@@ -131,9 +131,7 @@ def judge_table(whole: SettledTable, card: "Instrument | None" = None) -> TableD
     # rows that follow no law: averages of neighbours may hide it, and then no effect explains it
     loose = find_scatter(whole, own.frequency(whole.temperature, extrapolate=True))
     said += [] if loose else words.table_sentences(table)
-    near = (
-        max(white_rms(left[np.argsort(table.temperature, kind="stable")]), table.rounding) if f.size > FEW else np.inf
-    )
+    near = _between_neighbours(table, left)
     # noise that has a shape beyond rounding is not called noise
     shaped = lead > UNNAMED and base[0] > WANDERING * table.rounding and words.bends_beyond_a_cubic(table)
     state, causes, rest, extended = "unexplained", doubted(wrong_values(shifts)), left, None
@@ -152,10 +150,14 @@ def judge_table(whole: SettledTable, card: "Instrument | None" = None) -> TableD
         said += [words.short_sentence(forms, base[0], needed)] if lead > UNNAMED else []
     else:
         said += [words.unproven_sentence(forms, base[0], table, needed)] if lead < needed else []
-        named, rest, shifts = cause_of(forms), best.residual, _moved(best.model) if card else ()
-        causes = doubted(sorted((named, *wrong_values(shifts)), key=lambda one: -one.evidence))
-        state = "not-identifiable" if named.equivalent else "explained"
-        extended = rms(rest), best.left_out
+        near = min(near, _between_neighbours(table, best.residual))
+        if rms(best.residual) > NEIGHBOURS * near:
+            said.append(words.step_sentence(rms(best.residual), near, best.words))
+        else:
+            named, rest, shifts = cause_of(forms), best.residual, _moved(best.model) if card else ()
+            causes = doubted(sorted((named, *wrong_values(shifts)), key=lambda one: -one.evidence))
+            state = "not-identifiable" if named.equivalent else "explained"
+            extended = rms(rest), best.left_out
     noise = max(rms(rest), table.rounding) if extended else base[0]
     left_over = "structure" if state == "unexplained" else "none"
     result = ResponseResult(state, noise, base, extended, left_over, shipped=law_rms if card else None)
@@ -169,6 +171,12 @@ def judge_table(whole: SettledTable, card: "Instrument | None" = None) -> TableD
 def _moved(model: Background) -> tuple[Shift, ...]:
     """Return the values of the card that a table has moved, the furthest first."""
     return tuple(sorted(shifts_of(model), key=lambda one: -abs(one.shift_sd)))
+
+
+def _between_neighbours(table: SettledTable, left: FloatArray) -> float:
+    """White noise by what readings at neighbouring temperatures leave, Hz; few rows do not show it."""
+    ordered = left[np.argsort(table.temperature, kind="stable")]
+    return max(white_rms(ordered), table.rounding) if left.size > FEW else np.inf
 
 
 def _curvature(table: SettledTable, f: FloatArray) -> float:

@@ -71,10 +71,10 @@ def drift_sentence(left: float, white: float) -> str:
     )
 
 
-def step_sentence(left: float, near: float) -> str:
-    """Say that what is left (rms, Hz) is far above what readings at neighbouring temperatures leave."""
+def step_sentence(left: float, near: float, beside: str = "") -> str:
+    """Say that what is left (rms, Hz), beside a form or none, is far above what readings at neighbouring temperatures leave."""
     return (
-        f"The residual of {left:.3g} Hz rms is not noise: readings at neighbouring temperatures agree to {near:.2g} Hz. Rows of two"
+        f"The residual{f' beside {beside}' if beside else ''} of {left:.3g} Hz rms is not noise: readings at neighbouring temperatures agree to {near:.2g} Hz. Rows of two"
         " gyros or of two sessions look like this, and so does a narrow effect of temperature."
     )
 

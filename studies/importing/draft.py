@@ -1,6 +1,7 @@
 """A first map for raw files: notation, time, columns and units guessed from names and cells, and every guess marked."""
 
 import re
+import statistics
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -22,6 +23,7 @@ from studies.schema.spelling import spell_value
 if TYPE_CHECKING:
     from studies.importing.join import ClockedFile
 
+JUMPS = 20.0  # times that rows of one time lie farther apart than those of neighbouring times
 MOST_DEVICES = 50  # that one file may hold
 DEVICE_WORDS = r"gyro|device|serial|channel|axis|sensor|unit|\bid\b|gerät|kanal"
 MOST_SETTLED = 500  # rows of a table of settled readings
@@ -239,6 +241,11 @@ def _draft_look(path: str, look: Look, taken: Sequence[str]) -> tuple[list[str],
                 f"{path}: each time stands there once for every value of '{shorten(several)}'"
                 f" ({shorten(', '.join(dict.fromkeys(cells[several])))}): these are several gyros or channels. Write a file for each of them."
             )
+        if odd := next((name for name in names if name not in time and _alternates(joined, numbers[name])), None):
+            raise InputError(
+                f"{path}: each time stands there {len(joined) // len(set(joined))} times, and '{shorten(odd)}' jumps from row to row but hardly"
+                " changes from one time to the next: these are several gyros or channels. Write a file for each of them."
+            )
         lines.append('repeated_times = "spread"    # CHECK: some times repeat; "first" keeps one row of each')
     lines.append("# clock_offset_s = 0.0    # added to this file's times: positive when its clock is behind")
     usable = {name: hints[name] for name in names if name not in time and numbers[name]}
@@ -262,6 +269,16 @@ def _tells_devices(name: str, times: Sequence[str], cells: Sequence[str]) -> boo
     few = 1 < len(set(cells)) <= MOST_DEVICES and len(times) > 2 * len(set(cells))
     named = re.search(DEVICE_WORDS, name.lower()) or not all(as_number(cell, ".") is not None for cell in cells)
     return bool(few and named) and len(set(zip(times, cells, strict=True))) == len(times)
+
+
+def _alternates(times: Sequence[str], numbers: Sequence[float]) -> bool:
+    """Tell whether the rows of one time lie far apart in a column in which each place within a time goes on smoothly."""
+    many = len(times) // len(set(times))
+    even = len(times) >= 4 * many and all(times[k] == times[k - k % many] for k in range(len(times)))
+    if not even or len(numbers) != len(times) or len(set(numbers)) <= many:  # a counter within each time
+        return False
+    apart, on = ([abs(b - a) for a, b in zip(numbers, numbers[step:], strict=False)] for step in (1, many))
+    return statistics.median(apart) > JUMPS * statistics.median(on)
 
 
 def _guess_meanings(hints: Mapping[str, str], numbers: Mapping[str, Sequence[float]]) -> dict[str, Meaning]:

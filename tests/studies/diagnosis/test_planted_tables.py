@@ -74,11 +74,13 @@ def test_one_mistyped_digit_far_beyond_the_noise_of_the_others_names_its_row(row
     assert "alone makes it" in found.sentences[0]
 
 
-def test_rows_of_two_gyros_one_after_the_other_are_no_noise():
-    """A step of 1.3 Hz among readings of 10 mHz was a noise of 0.33 Hz."""
-    T = np.linspace(-40.0, 60.0, 11)
-    found = study(T, 1.3 * (T >= 20.0), white=1e-2)
-    assert found.verdict.verdict == "unexplained"
+@pytest.mark.parametrize(("rows", "above"), [(11, 20.0), (40, 11.0)])
+def test_rows_of_two_gyros_one_after_the_other_are_no_noise_and_no_dip(rows, above):
+    """A step of 1.3 Hz among readings of 10 mHz was a noise of 0.33 Hz, or an activity dip that left a good part of it."""
+    T = np.linspace(-40.0, 60.0, rows)
+    found = study(T, 1.3 * (T >= above), white=1e-2)
+    assert (found.verdict.verdict, found.verdict.causes) == ("unexplained", ())
+    assert any("is not noise: readings at neighbouring temperatures agree" in sentence for sentence in found.sentences)
 
 
 def test_few_rows_of_pure_noise_name_no_row_and_no_step():
@@ -210,7 +212,7 @@ SCRAMBLED = {
     "two gyros": ([f * (1.004 if k % 2 == 0 else 1.0) for k, f in enumerate(PAPER)], "No single row .* of two gyros"),
     "2 Hz of noise": (
         (4417.16, 4423.55, 4423.04, 4430.54, 4431.55, 4435.04, 4443.00),
-        r"2.21 Hz .* 9.(3 % of the 23.8|5 % of the 23.4) Hz",  # of the card's law, of their own parabola
+        r"2.21 Hz .* 9.(\d+ % of the 23.8|48 % of the 23.4) Hz",  # of the card's law, of their own parabola
     ),
 }
 
