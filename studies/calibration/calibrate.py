@@ -83,6 +83,8 @@ class Calibration(Shown):
         """Why it makes no card: rows of a table follow no law, it has not converged, has learnt nothing, or needs values that the card all but excludes."""
         for one in self.settled:
             if one.scatter is not None:
+                if one.scatter.row is not None:
+                    return f"row {one.scatter.row + 1} of {one.path} does not follow the others. Correct or remove it"
                 return f"the rows of {one.path} follow no law of temperature"
         if not self.fit.converged:
             return "the fit did not converge. Keep more values fixed (--exact), or leave out the run that differs most"

@@ -5,6 +5,7 @@ unknowns together, and the search begins again there: values that had gone far t
 """
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -188,13 +189,15 @@ def infer(card: "Instrument", campaign: Campaign, progress: Report = lambda _: N
         noise = residual_noise(problem, problem.rows, state)
         there = _from(replace(found, state=state, noise=noise, rows=problem.rows), told, progress)
         search, outcome = max((there, (search, outcome)), key=lambda found: _on_all_rows(found[0], found[1].final))
-    plain = Model(Linear.of(found, told), Signatures.at(problem, found.point), (), outcome.plain.noise)
+    # one lag in its own noise: in that of a longer path its straight lines lead out of the world
+    alone = outcome.plain.noise if path is None else found.noise
+    plain = Model(Linear.of(found, told), Signatures.at(problem, found.point), (), alone)
     shipped = {name: rows.rms for name, rows in plain.residuals(Kept(np.zeros(problem.count), ())).items()}
     calibrated = plain.residuals(Kept(found.point, ()))
     if path is not None:
         card, found = path.card, path.fit
     progress("held-out rows")
-    outcome, held, rows = _confirmed(search, outcome, plain, path is not None)
+    outcome, held, rows = _confirmed(search, outcome, plain, calibrated, path is not None)
     progress("lack of fit")
     without, levelled = outcome.plain, outcome.final
     for name in search.linear.responses:
@@ -321,12 +324,15 @@ def _from(start: CardFit, told: Array | None, progress: Report, least: float | N
 
 
 def _confirmed(
-    search: Search, outcome: Outcome, plain: Model, longer: bool
+    search: Search, outcome: Outcome, plain: Model, calibrated: dict[str, Rows], longer: bool
 ) -> tuple[Outcome, dict[str, tuple[float | None, float | None]], dict[str, Rows]]:
     """Leave out faint causes of no definite size, and those whose model predicts unseen rows no better than the card alone, the weakest first."""
     events = any(term.effect.event for term in outcome.final.terms)
     by_record = len(search.linear.problem.runs) > 1 and not events
-    alone = plain.residuals(plain.kept(plain.mean()))
+    alone = calibrated
+    if not longer:
+        with suppress(*IMPOSSIBLE):  # a straight line may lead where there is no prediction
+            alone = plain.residuals(plain.kept(plain.mean()))
     before = plain.held_out(by_record, alone)
     while True:
         final = outcome.final

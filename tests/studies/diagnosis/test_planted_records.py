@@ -7,7 +7,7 @@ import pytest
 from scipy.constants import Stefan_Boltzmann, zero_Celsius
 
 from studies.inference.model import Background
-from studies.instrument.card import load_card
+from studies.instrument.card import build_instrument, load_card
 from studies.planning.chamber import Chamber
 from studies.record import Record
 from studies.simulation.drive import drive_by_profile, rows_of
@@ -209,6 +209,34 @@ def test_the_heat_path_of_a_real_gyro_is_no_effect_of_its_law():
     verdict = diagnose_records(runs).verdict
     assert {cause.effect for cause in verdict.causes} == {"second-lag", "radiation"}
     assert verdict.responses["frequency_Hz"].extended[0] < 3e-3  # of a swing of 20 Hz
+
+
+LUMPS = {
+    "schema": "hrg.card/1",
+    "name": "two lumps",
+    "law": {"f0_Hz": 4432.0, "a1_per_K": 8.7e-5, "a2_per_K2": -9e-8, "lag_s": 2600.0, "second_lag_s": 1900.0, "chamber_lag_s": 500.0},
+    "bias": {"damping_anisotropy": 0.0, "offset_deg_per_h": 3.0, "k1_deg_per_h_per_Hz": 0.25},
+    "loss": {"inverse_q": 1e-7, "slope_per_K": 0.004},
+    "noise": {"housing_lag_s": 0.0},
+}  # fmt: skip
+
+
+@pytest.mark.slow
+def test_two_lumps_behind_noisy_thermometers_are_diagnosed():
+    """One lag in the small noise of two was led to a housing below 0 K, and the records, which are healthy, were refused."""
+    card, noise, runs = build_instrument(LUMPS), np.random.default_rng(1), []
+    spread = {
+        "chamber_temperature_degC": 0.02,
+        "housing_temperature_degC": 0.02,
+        "frequency_Hz": 2e-3,
+        "bias_deg_per_h": 0.02,
+    }
+    for words in ("soak 25 30min then soak -20 270min", "soak -20 30min then soak 25 270min"):
+        run = simulate_run(card, parse_profile(words), 1 / 60, noise=False).record
+        runs.append(run.with_columns({k: run[k] + noise.normal(0.0, s, len(run)) for k, s in spread.items()}))
+    verdict = diagnose_records(runs).verdict
+    assert verdict.causes[0].effect == "second-lag"
+    assert verdict.responses["frequency_Hz"].extended[0] == pytest.approx(2e-3, rel=0.15)
 
 
 @pytest.mark.slow

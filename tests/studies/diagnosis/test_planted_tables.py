@@ -266,7 +266,7 @@ def test_a_card_of_rows_that_follow_no_law_is_not_saved(tmp_path, capsys):
     assert main(["calibrate", CARD, str(path), "--save", str(card)]) == 2
     said = capsys.readouterr().err
     assert said.startswith(f"warning: The rows of {path} scatter by 22.1 Hz (rms)")
-    assert f"card.toml not saved: the rows of {path} follow no law of temperature" in said
+    assert f"card.toml not saved: row 4 of {path} does not follow the others" in said
     assert not card.exists()
 
 
