@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from compensation.decimation import average_groups
+from compensation.noise import white_rms
 from compensation.spikes import find_spikes
 from shell.constants import zero_Celsius
 from studies.errors import InputError
@@ -42,6 +43,10 @@ MOST_KINKS = 24  # of a run
 LEAST_KINK = 1e-3  # K
 THERMOMETER = 0.3  # K, error of a settled temperature that nothing else tells
 LEAST_NOISE = 1e-9  # of a frequency that is not rounded
+NEIGHBOURS, FEW = (
+    4.0,
+    8,
+)  # residual over what neighbouring temperatures leave that is no noise, 1 in 1000 of pure noise; rows that do not show it
 LEAST_SCATTER = 1e-5  # of a frequency, where nothing else tells
 
 
@@ -140,6 +145,11 @@ class SettledTable:
             return max(float(np.sqrt(rest @ rest / free)), self.rounding)
         rise = float(np.ptp(f) / np.ptp(self.temperature)) if degree > 0 else 0.0
         return max(THERMOMETER * rise, LEAST_SCATTER * float(np.median(f)), self.rounding)
+
+    def between_neighbours(self, left: Array) -> float:
+        """Return the white noise that residuals of neighbouring temperatures show, Hz; few rows do not show it."""
+        ordered = left[np.argsort(self.temperature, kind="stable")]
+        return max(white_rms(ordered), self.rounding) if left.size > FEW else np.inf
 
     def beside_parabola(self, values: Array) -> tuple[Array, Array]:
         """Return what a parabola leaves of values of the rows, and the leverage h of each."""

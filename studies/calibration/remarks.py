@@ -10,7 +10,7 @@ from studies.calibration.ahead import BIAS
 from studies.calibration.estimates import TOLD, Estimate
 from studies.calibration.fit import CardFit, stated_noise
 from studies.calibration.ladder import Rung, noise_rms, usual_mean
-from studies.calibration.observed import UNITS, WORDS
+from studies.calibration.observed import NEIGHBOURS, SETTLED, UNITS, WORDS
 from studies.calibration.problem import CardProblem
 from studies.instrument.display import display_name
 from studies.simulation.virtual_gyro import idle_effects
@@ -69,12 +69,22 @@ def _misfit(found: CardFit, ladder: Mapping[str, Rung]) -> list[str]:
     for name, rung in ladder.items():
         slow = stated_noise(found.problem.instrument.noise, name) or Noise(0.0)
         usual = noise_rms(found, name, replace(slow, white=found.noise[name].white, offset=0.0))
-        if rung.calibrated > MISFIT * usual:
+        most = MISFIT * usual
+        if name == SETTLED and NEIGHBOURS * (near := _near(found)) < most:
+            usual, most = near, NEIGHBOURS * near
+        if rung.calibrated > most:
             said.append(
                 f"poor fit in the {WORDS[name]}: residual {rung.calibrated:.2g} {UNITS[name]} (rms), noise {usual:.2g}. The calibrated values"
                 f" absorb part of this misfit; hrg diagnose --card looks for the missing effect."
             )
     return said
+
+
+def _near(found: CardFit) -> float:
+    """Largest noise that neighbouring readings of the tables show, Hz; their rows are those of the first, then of the next."""
+    ends = np.cumsum([len(table.frequency) for table in found.problem.tables])
+    left = np.split(found.state.residual[SETTLED], ends[:-1])
+    return max(table.between_neighbours(own) for table, own in zip(found.problem.tables, left, strict=True))
 
 
 def _unsettled(found: CardFit) -> list[str]:

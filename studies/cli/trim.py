@@ -9,7 +9,7 @@ one: the next is planned from what is measured after it.
 """
 
 from collections.abc import Sequence
-from math import degrees
+from math import degrees, hypot
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -42,6 +42,7 @@ STATES = (
 )
 
 CELLS = {"azimuth_deg": ".4f", "position": ".6f", "height_mm": ".4f", "mass_ug": ".5f", "depth_um": ".4f"}  # of --out
+UNLIKELY = 5.0  # standard errors of the prediction, by which a measured gain is doubted
 LIMIT = "Upper limit: the split is the length of a vector with this standard error in each component; the limit is exceeded with 5 % probability."
 
 
@@ -125,7 +126,7 @@ def trim(
         "mass_ug": 1e9 * plan.mass,
         "gains": gains(planned),
         "other_cuts": others,
-        "measure": measure_after(planned),
+        "measure": [*doubt_gain(planned, gain, gain_error), *measure_after(planned)],
     }
     if out is not None:
         rows = (
@@ -193,6 +194,17 @@ def _round(planned: CardPlan, resonator: Resonator) -> dict[str, Any]:
         "after": [_state(s) for s in one.after],
         "unbalance": {str(k): [1e9 * abs(u), float(np.rad2deg(np.angle(u)))] for k, u in one.unbalance.items()},
     }
+
+
+def doubt_gain(planned: CardPlan, gain: float, error: float) -> list[str]:
+    """Return the sentence on a measured gain that the prediction of the last round all but excludes."""
+    known = hypot(error, max((cut.error for cut in planned.cuts.values()), default=0.0))
+    if abs(gain - 1.0) <= UNLIKELY * known:
+        return []
+    return [
+        f"--gain {gain:g}: the prediction is known to ± {100 * known:.2g} %, so the last round should have given about 1. Check the masses, the"
+        " readings and the axis before the next cuts: was the mode measured with the same electrodes?"
+    ]
 
 
 def measure_after(planned: CardPlan) -> list[str]:

@@ -12,10 +12,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from compensation.noise import white_rms
 from shell.constants import zero_Celsius
 from studies.calibration.calibrate import calibrate
-from studies.calibration.observed import SETTLED, SettledTable, read_settled
+from studies.calibration.observed import NEIGHBOURS, SETTLED, SettledTable, read_settled
 from studies.calibration.scatter import find_scatter
 from studies.diagnosis import table_words as words
 from studies.diagnosis.constants import CONSTANTS
@@ -40,8 +39,6 @@ MOST_ROWS = 120
 """Longer tables are averaged over neighbouring rows."""
 WANDERING = 3.0
 """Residual over white noise from which a table is not called adequate."""
-NEIGHBOURS, FEW = 4.0, 8
-"""The same over what readings at neighbouring temperatures leave, and rows that do not show it: 1 in 1000 of pure noise."""
 UNNAMED = 2.0
 """Evidence from which on it is said how far a form falls short of being named."""
 DEFAULT_LAW = "hrg-30mm"
@@ -131,7 +128,7 @@ def judge_table(whole: SettledTable, card: "Instrument | None" = None) -> TableD
     # rows that follow no law: averages of neighbours may hide it, and then no effect explains it
     loose = find_scatter(whole, own.frequency(whole.temperature, extrapolate=True))
     said += [] if loose else words.table_sentences(table)
-    near = _between_neighbours(table, left)
+    near = table.between_neighbours(left)
     # noise that has a shape beyond rounding is not called noise
     shaped = lead > UNNAMED and base[0] > WANDERING * table.rounding and words.bends_beyond_a_cubic(table)
     state, causes, rest, extended = "unexplained", doubted(wrong_values(shifts)), left, None
@@ -150,7 +147,7 @@ def judge_table(whole: SettledTable, card: "Instrument | None" = None) -> TableD
         said += [words.short_sentence(forms, base[0], needed)] if lead > UNNAMED else []
     else:
         said += [words.unproven_sentence(forms, base[0], table, needed)] if lead < needed else []
-        near = min(near, _between_neighbours(table, best.residual))
+        near = min(near, table.between_neighbours(best.residual))
         if rms(best.residual) > NEIGHBOURS * near:
             said.append(words.step_sentence(rms(best.residual), near, best.words))
         else:
@@ -171,12 +168,6 @@ def judge_table(whole: SettledTable, card: "Instrument | None" = None) -> TableD
 def _moved(model: Background) -> tuple[Shift, ...]:
     """Return the values of the card that a table has moved, the furthest first."""
     return tuple(sorted(shifts_of(model), key=lambda one: -abs(one.shift_sd)))
-
-
-def _between_neighbours(table: SettledTable, left: FloatArray) -> float:
-    """White noise by what readings at neighbouring temperatures leave, Hz; few rows do not show it."""
-    ordered = left[np.argsort(table.temperature, kind="stable")]
-    return max(white_rms(ordered), table.rounding) if left.size > FEW else np.inf
 
 
 def _curvature(table: SettledTable, f: FloatArray) -> float:

@@ -117,8 +117,12 @@ def test_a_table_of_departures_must_close_the_circle(tmp_path, refuse, ask):
 def test_a_measured_gain_turns_the_cuts_to_the_other_antinodes(capsys):
     words = ["trim", "free-dome", "--split", "0.12", "--axis", "31", "--gain", "-0.5", "--json"]
     assert main(words) == 0
-    (only,) = json.loads(capsys.readouterr().out)["rounds"]
+    found = json.loads(capsys.readouterr().out)
+    (only,) = found["rounds"]
     assert sorted(round(c["azimuth_deg"]) for c in only["cuts"]) == [76, 166, 256, 346]
+    assert found["measure"][0].startswith("--gain -0.5: the prediction is known to ± 3 %")  # doubted, and followed
+    assert main([*words[:-3], "--gain", "0.9", "--json"]) == 0
+    assert not any("--gain 0.9" in sentence for sentence in json.loads(capsys.readouterr().out)["measure"])
 
 
 @pytest.mark.slow

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from shell.constants import zero_Celsius
+from studies.calibration.calibrate import calibrate
 from studies.calibration.observed import SettledTable
 from studies.calibration.scatter import find_scatter
 from studies.cli import main
@@ -81,6 +82,11 @@ def test_rows_of_two_gyros_one_after_the_other_are_no_noise_and_no_dip(rows, abo
     found = study(T, 1.3 * (T >= above), white=1e-2)
     assert (found.verdict.verdict, found.verdict.causes) == ("unexplained", ())
     assert any("is not noise: readings at neighbouring temperatures agree" in sentence for sentence in found.sentences)
+    f = quartz(T + 273.15) + 1.3 * (T >= above) + np.random.default_rng(1).normal(0, 1e-2, rows) + 7.0
+    warned = calibrate(
+        load_card("hrg-30mm"), [], [SettledTable("table.csv", T + zero_Celsius, np.round(f, 3), 1e-3)]
+    ).warnings
+    assert any(warning.startswith("poor fit in the settled frequency") for warning in warned), warned
 
 
 def test_few_rows_of_pure_noise_name_no_row_and_no_step():
