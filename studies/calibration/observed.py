@@ -43,10 +43,8 @@ MOST_KINKS = 24  # of a run
 LEAST_KINK = 1e-3  # K
 THERMOMETER = 0.3  # K, error of a settled temperature that nothing else tells
 LEAST_NOISE = 1e-9  # of a frequency that is not rounded
-NEIGHBOURS, FEW = (
-    4.0,
-    8,
-)  # residual over what neighbouring temperatures leave that is no noise, 1 in 1000 of pure noise; rows that do not show it
+NEIGHBOURS = 4.0  # residual over what neighbouring temperatures leave that is no noise: 1 in 1000 of pure noise
+FEW = 8  # rows that do not show it
 LEAST_SCATTER = 1e-5  # of a frequency, where nothing else tells
 
 

@@ -81,10 +81,9 @@ def _misfit(found: CardFit, ladder: Mapping[str, Rung]) -> list[str]:
 
 
 def _near(found: CardFit) -> float:
-    """Largest noise that neighbouring readings of the tables show, Hz; their rows are those of the first, then of the next."""
-    ends = np.cumsum([len(table.frequency) for table in found.problem.tables])
-    left = np.split(found.state.residual[SETTLED], ends[:-1])
-    return max(table.between_neighbours(own) for table, own in zip(found.problem.tables, left, strict=True))
+    """Largest noise that neighbouring readings of the tables show, Hz."""
+    left, places = found.state.residual[SETTLED], found.problem.rows[SETTLED].slices
+    return max(table.between_neighbours(left[own]) for table, own in zip(found.problem.tables, places, strict=True))
 
 
 def _unsettled(found: CardFit) -> list[str]:

@@ -9,7 +9,7 @@ one: the next is planned from what is measured after it.
 """
 
 from collections.abc import Sequence
-from math import degrees, hypot
+from math import degrees
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -23,7 +23,7 @@ from studies.cli.output import answers, say
 from studies.files.writing import write_csv
 from studies.reports.digits import plain, to_error
 from studies.reports.style import BLUE, GREEN, VERMILION, figure
-from studies.resonator.trim import SURE, CardPlan, Teeth, Tool, other_cuts, plan_for_card
+from studies.resonator.trim import SURE, CardPlan, Teeth, Tool, error_of_gain, other_cuts, plan_for_card
 from studies.results import Chapter, Drawing, Facts, Figure, Result, Sentence, Table, row_of
 
 KINDS = {
@@ -198,7 +198,7 @@ def _round(planned: CardPlan, resonator: Resonator) -> dict[str, Any]:
 
 def doubt_gain(planned: CardPlan, gain: float, error: float) -> list[str]:
     """Return the sentence on a measured gain that the prediction of the last round all but excludes."""
-    known = hypot(error, max((cut.error for cut in planned.cuts.values()), default=0.0))
+    known = error_of_gain(planned.cuts, error)
     if abs(gain - 1.0) <= UNLIKELY * known:
         return []
     return [

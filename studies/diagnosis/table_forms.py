@@ -70,11 +70,8 @@ def cause_of(forms: Sequence[Form]) -> Cause:
     best, each = forms[0], each_once(forms, placed=True)
     scores = [0.5 * one.evidence + CONSTANTS["log_prior_effect"] for one in each]
     (name, *others), probability = weigh([one.term.effect.name for one in each], scores, 0.0)
-    (mean, C), columns = best.model.coefficients(0), best.term.columns[SETTLED]
-    change = columns @ mean
-    size, ends = float(np.ptp(change)), columns[np.argmax(change)] - columns[np.argmin(change)]
-    spread = NINETY * float(np.sqrt(ends @ C @ ends))
-    numbers = {"peak_to_peak_Hz": Interval(size, max(size - spread, 0.0), size + spread)}
+    size, sd = best.model.peak_to_peak(0, SETTLED)
+    numbers = {"peak_to_peak_Hz": Interval(size, max(size - NINETY * sd, 0.0), size + NINETY * sd)}
     return Cause(name, "frequency_Hz", probability, tuple(sorted(others)), numbers, best.evidence, peak=size)
 
 

@@ -112,8 +112,11 @@ def read_raw(path: str | Path, file: "FileMap") -> TextTable:
         cells, decimal = pd.DataFrame(filled, columns=[*names, OVERFLOW], dtype=str), "."
     else:
         text = decode(path, data, file.encoding)
-        names = _head(path, _split_lines(path, text, file), file)
-        cells = _read_text(path, text, file, names)
+        lines = _split_lines(path, text, file)
+        names = _head(path, lines, file)
+        # a spreadsheet writes separators of empty columns behind the last one
+        padded = bool(file.header_line) and file.separator != "space" and not lines[-1][-1].strip()
+        cells = _read_text(path, text, file, names, padded)
     if not len(cells):
         raise InputError(f"{path}: there are no rows from line {file.data_line} on (data_line in the map).")
     part = Part(str(path), hashlib.sha256(data).hexdigest(), file.data_line, len(cells))
@@ -221,15 +224,14 @@ def name_columns(cells: Sequence[str]) -> list[str]:
     return names
 
 
-def _read_text(path: str | Path, text: str, file: "FileMap", names: list[str]) -> "pd.DataFrame":
+def _read_text(path: str | Path, text: str, file: "FileMap", names: list[str], padded: bool) -> "pd.DataFrame":
     import pandas as pd
 
     rows = None if file.last_line is None else file.last_line - file.data_line + 1
     body = text.split("\n", file.data_line - 1)[-1] if text.count("\n") >= file.data_line - 1 else ""
     if not body.strip():
         raise InputError(f"{path}: there are no rows from line {file.data_line} on (data_line in the map).")
-    if file.header_line and file.separator != "space" and not _split_lines(path, text, file)[-1][-1].strip():
-        # empty columns of a spreadsheet behind the last one
+    if padded:
         body = re.sub(f"{re.escape(SEPARATORS[file.separator])}+$", "", body, flags=re.MULTILINE)
     try:
         with warnings.catch_warnings():

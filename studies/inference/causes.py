@@ -131,12 +131,11 @@ def parameters_of(background: Background, signatures: Signatures, k: int) -> dic
             out[name] = Interval.about(float(mean[at]), float(np.sqrt(variance[at])))
         begin += len(coefficient.spread)
     sizes = [out[name] for name in names if name in out]
-    own = term.columns.get(term.response)
-    if len(term.members) > 1 and own is not None and all(size.low <= 0.0 <= size.high for size in sizes):
+    there = term.response in term.columns
+    if len(term.members) > 1 and there and all(size.low <= 0.0 <= size.high for size in sizes):
         # members of a family may stand for one another, and what they make together is sure
-        change, out = own @ mean, {name: number for name, number in out.items() if name not in names}
-        way = own[np.argmax(change)] - own[np.argmin(change)]
-        out[f"peak_to_peak_{UNITS[term.response]}"] = Interval.about(float(way @ mean), float(np.sqrt(way @ C @ way)))
+        out = {name: number for name, number in out.items() if name not in names}
+        out[f"peak_to_peak_{UNITS[term.response]}"] = Interval.about(*background.peak_to_peak(k, term.response))
     return out
 
 

@@ -300,6 +300,13 @@ class Background:
         spread = self.terms[k].spread
         return mean[own] * spread, covariance[own, own] * np.outer(spread, spread)
 
+    def peak_to_peak(self, k: int, response: str) -> tuple[float, float]:
+        """Return how far the change of a response by one term reaches over the rows, and the standard deviation of that."""
+        (mean, C), own = self.coefficients(k), self.terms[k].columns[response]
+        change = own @ mean
+        way = own[np.argmax(change)] - own[np.argmin(change)]
+        return float(way @ mean), float(np.sqrt(way @ C @ way))
+
     def sized(self, k: int) -> bool:
         """Whether the definite coefficients of a term are not all 0, by 90 % of what is known of them together: cᵀC⁻¹c against χ²."""
         term = self.terms[k]

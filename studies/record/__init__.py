@@ -47,7 +47,7 @@ OUTPUTS = ("frequency_Hz", "bias_deg_per_h", "measured_rate_deg_per_s", "output_
 ALIKE, AS_LARGE = (
     0.9,
     0.02,
-)  # correlation of the noise of two columns, and of ln of its size: of another gyro it is scaled
+)  # correlation of the noise of two columns, and ln of its sizes: of another gyro it is scaled
 FEWEST_ALIKE, MOST_ALIKE = 50, 20_000  # rows that show it
 FAR = 0.7  # of ln f from the median of a table: a factor of two
 COMPENSATED = "compensated_"

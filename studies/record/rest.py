@@ -26,11 +26,7 @@ FOLLOWS_NOT, STANDS = (
     3.0,
     10.0,
 )  # times less with the sign changed, where they move against each other and where one stands
-AT_ONCE, LEAST_CHANGE, FASTER = (
-    4,
-    5.0,
-    2.0,
-)  # rows in one direction, K and K/s, beyond which the same is said of a housing
+AT_ONCE, LEAST_CHANGE, FASTER = 4, 5.0, 2.0  # rows in one direction, K and K/s, beyond which it is said of a housing
 DOUBTFUL, FAST, SLOWEST = 0.1, 0.15, 1e-4  # K/s held for a tenth of a record: 6 and 9 K/min, 0.36 K/h
 LEAST_SPREAD, LONG = 10.0, 1e6  # K that a record covers, and s it lasts, before a slow one is doubted
 SHORT_LAG, LONG_LAG = 200.0, 2e5  # s: between them lie resonators behind their housing, in vacuum
@@ -116,15 +112,7 @@ def check_temperatures(record: "Record") -> str:
     if name is None:
         return ""
     where, known = record.path or "record", np.isfinite(record[name])
-    if DRIVING[0] in record and DRIVING[1] in record:
-        both = np.array([record[DRIVING[0]], record[DRIVING[1]]])
-        apart, turned = (np.nanmedian(np.abs(sign * both[0] - both[1])) for sign in (1.0, -1.0))
-        against = np.nanmean(np.prod(both - np.nanmean(both, axis=1, keepdims=True), axis=0))
-        if apart > max(OPPOSITE, (FOLLOWS_NOT if against < -1.0 else STANDS) * turned):
-            raise InputError(
-                f"{where}: {DRIVING[0]} is {apart:.3g} K away from {DRIVING[1]} (median), and {turned:.3g} K with the sign"
-                " changed. Correct the column that has the opposite sign."
-            )
+    _check_signs(record, where)
     time, T = record["time_s"][known], record[name][known]
     time = time - time[0]
     lasts, spread = max(float(np.ptp(time)), 1e-9), float(np.subtract(*np.percentile(T, [99.5, 0.5])))
@@ -156,6 +144,20 @@ def check_temperatures(record: "Record") -> str:
         if unit == "minutes" and lag > SHORT_LAG:
             return ""
     return f"{said}: if time_s is in {unit}, convert it to seconds ('hrg import')."
+
+
+def _check_signs(record: "Record", where: str) -> None:
+    """Refuse a housing that is far from its chamber and near it with the opposite sign."""
+    if DRIVING[0] not in record or DRIVING[1] not in record:
+        return
+    both = np.array([record[DRIVING[0]], record[DRIVING[1]]])
+    apart, turned = (np.nanmedian(np.abs(sign * both[0] - both[1])) for sign in (1.0, -1.0))
+    against = np.nanmean(np.prod(both - np.nanmean(both, axis=1, keepdims=True), axis=0))
+    if apart > max(OPPOSITE, (FOLLOWS_NOT if against < -1.0 else STANDS) * turned):
+        raise InputError(
+            f"{where}: {DRIVING[0]} is {apart:.3g} K away from {DRIVING[1]} (median), and {turned:.3g} K with the sign"
+            " changed. Correct the column that has the opposite sign."
+        )
 
 
 def _fastest_change(time: NDArray[np.float64], T: NDArray[np.float64]) -> tuple[float, float] | None:

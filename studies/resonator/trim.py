@@ -230,7 +230,7 @@ def plan_for_card(
             n: w * np.array([cuts[x].gain(n) if x in cuts else 1.0 for x in sites.position])
             for n, w in sites.gain.items()
         }
-        plan = plan_with(gains, hypot(gain_error, max((cut.error for cut in cuts.values()), default=0.0)))
+        plan = plan_with(gains, error_of_gain(cuts, gain_error))
         planned = {x: _typical(plan, sites, x) for x in sorted({cut.position for cut in plan.cuts})}
         if all(
             x in cuts and max(abs(mass / cuts[x].mass - 1), abs(touching / cuts[x].touching - 1)) < SAME_DEPTH
@@ -252,6 +252,11 @@ def plan_for_card(
     raise ShellError(
         f"no depth of these cuts achieves the plan: the stress that narrow grooves relieve cancels the effect of the mass they remove. {WIDER}"
     )
+
+
+def error_of_gain(cuts: Mapping[float, PlannedCut], common: float) -> float:
+    """Return the relative standard error of what cuts do to the split: what is common to all, and that of the least known groove."""
+    return hypot(common, max((cut.error for cut in cuts.values()), default=0.0))
 
 
 def _typical(plan: TrimPlan, sites: Sites, position: float) -> tuple[float, float, float]:
