@@ -1,7 +1,4 @@
-"""Compensation models of the four papers, as functions of arrays.
-
-The names of `__init__.pyi` can be taken from here; each is imported when it is first used.
-"""
+"""Compensation models of the four papers, as functions of arrays; each name of `__init__.pyi` is imported when first used."""
 
 import lazy_loader
 

@@ -1,9 +1,7 @@
 """Actuators of a gyro: the largest forces and stiffness that its electrodes give, and the part that the loops use.
 
-All limits are over 2ω and the commanded amplitude (1/s), as the loops' commands are. One pair of electrodes pushes across the
-wave for rate and quadrature, a quarter cycle apart, so that √(rate² + quadrature²) counts. Quadrature may instead be nulled by a
-stiffness that couples the two patterns, Ẋ ∋ iκ Y and Ẏ ∋ iκ X (the HRG paper's quadrature loop): it follows the motion itself, so
-that no phase error of the electronics turns it into rate, and it leaves the whole force to the rate.
+Limits are over 2ω and the commanded amplitude (1/s). Rate and quadrature share one pair of electrodes as √(rate² +
+quadrature²), unless a stiffness κ nulls the quadrature, Ẋ ∋ iκ Y and Ẏ ∋ iκ X (HRG paper), which no phase error turns into rate.
 """
 
 from dataclasses import dataclass

@@ -102,10 +102,7 @@ def apply_chain(
 
 
 def invert_chain(chain: BellChain, rate: ArrayLike, temperature: ArrayLike) -> Array:
-    """Return the raw output (counts) that the chain, without its filter, turns into this rate (rad/s).
-
-    The quadratic (35) is inverted on its rising branch; this makes the twin of a gyro that the chain describes.
-    """
+    """Return the raw output (counts) that the chain, without its filter, turns into this rate (rad/s), on (35)'s rising branch."""
     T = np.asarray(temperature, dtype=float)
     target = np.asarray(rate, dtype=float) / chain.scale_over_temperature.value(T)
     c0, c1, c2 = np.pad(chain.scale_over_rate.coefficients, (0, 3))[:3]

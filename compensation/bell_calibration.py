@@ -1,7 +1,4 @@
-"""Calibration of the chain of a bell-shaped gyro, step by step: BVG paper equations (33)–(36).
-
-Every step is fitted to what the steps before it deliver, so its intervals hold *given* those steps.
-"""
+"""Calibration of the chain of a bell-shaped gyro, step by step, each *given* those before it: BVG paper equations (33)–(36)."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -37,10 +34,7 @@ class BellRun:
 
 
 def fit_rough(run: BellRun) -> tuple[float, float, Array]:
-    """Fit null N₁ (counts) and scale S₁ (rad/s per count), with covariance, to a run at rest and then at one rate: eq. (33).
-
-    The output is regressed on the rate, whose values are exact; the paper's two plateaus give the line through both means.
-    """
+    """Fit null N₁ (counts) and scale S₁ (rad/s per count), with covariance, to a run at rest and then at one rate: eq. (33)."""
     line = fit_polynomial(run.rate, run.output, 1, "rate")
     (null, slope), covariance = line.about(0.0, correlated_covariance(line.regression))
     if slope == 0:
@@ -55,11 +49,7 @@ def fit_bias(temperature: ArrayLike, rough: ArrayLike, order: int = 2) -> Polyno
 
 
 def fit_scale_over_rate(bias_compensated: ArrayLike, rate: ArrayLike, order: int = 2) -> PolynomialCurve:
-    """Fit the applied rate over the measured one (both rad/s), at one temperature: eq. (35).
-
-    The measured rate carries the noise here. It flattens the line by noise² over the variance of the rates: 1e-7 for
-    0.06 °/s in ± 360 °/s, which is left alone.
-    """
+    """Fit the applied rate over the measured one (both rad/s), at one temperature: eq. (35); its noise flattens the line by some 1e-7."""
     return _fit_curve(bias_compensated, rate, order, "measured rate", 0.0)
 
 
@@ -85,10 +75,9 @@ def fit_chain(
 ) -> BellChain:
     """Fit all steps in the paper's order.
 
-    `rates` has several at one temperature, eq. (35); `rest` is over temperature (34), `turning` one rate over temperature
-    (36), `rough` a run at rest and turning (33), or `rates`. Without `rest` or `turning` that step changes nothing, and holds
-    at the temperatures of `rates` alone. `cutoff` (Hz), None for no filter, and `order` of the FIR filter
-    are for an output with the step `sampling` (s), that of `rest` or `rates` when left out.
+    `rates` has several at one temperature (35); `rest` is over temperature (34), `turning` one rate over temperature
+    (36), `rough` at rest and turning (33); what is missing changes nothing. The FIR filter has a `cutoff` (Hz; None:
+    none), an `order` and a step (s).
     """
     null, scale, covariance = _step("rough null and scale (33)", fit_rough, rates if rough is None else rough)
     bias = _nothing(rates, 0.0)

@@ -54,10 +54,8 @@ TEMPERATURE = Variable("temperature", "°C", "T", -zero_Celsius)
 
 @dataclass(frozen=True)
 class BiasRun:
-    """One run, decimated: mean `time` (s), `state` (Hz or °C), its `rate` (per s), `play`, and `bias` of each block (b,).
-
-    `state` is the frequency, or the temperature behind the lag of `memory`; `width` of a block (s); `lag` of the rate
-    (s); `window` over which it was taken (s); rows that were left out: `missing` values, `spikes`.
+    """One run, decimated to blocks (b,) of a `width` (s): `state` (Hz or °C, behind `memory`), its `rate` over a
+    `window`, late by `lag` (s).
     """
 
     time: Array
@@ -81,12 +79,10 @@ class BiasRun:
 
 @dataclass(frozen=True)
 class BiasFit:
-    """A bias model fitted to runs.
+    """A bias model fitted to runs: coefficients of ("constant", *terms), their covariance with autocorrelation,
+    `naive_errors` without.
 
-    `coefficients` of ("constant", *terms) and their `covariance`, which respects the autocorrelation;
-    `naive_errors`, the standard errors that take rows for independent; `theta` of the noise (1 white, 0 random walk);
-    `selection` the path; `held_out` the held-out standard deviation of each model on it, constant alone first, where
-    the terms were chosen by it (else empty).
+    `theta` of the noise: 1 white, 0 random walk; `held_out`: sd of each model on the path of the selection, constant alone first.
     """
 
     reference: float
@@ -128,14 +124,9 @@ def prepare_run(
     variable: Variable = FREQUENCY,
     memory: Memory = NO_MEMORY,
 ) -> BiasRun:
-    """Decimate one run and add the rate of its frequency or temperature.
+    """Decimate one run to blocks of a width (s), and add the rate over a window (s) of its frequency or temperature behind `memory`.
 
-    Args:
-        width: length of the blocks that are averaged, s; never less than the sampling interval.
-        window: length of the window over which the rate is taken, s.
-        causal: the rate uses past samples only, as firmware must, and lags by window/2.
-        variable: FREQUENCY or TEMPERATURE.
-        memory: lag and play behind which the temperature acts.
+    A `causal` rate uses past samples only, as firmware must, and lags by window/2.
     """
     blocks = average_run(time, state, bias, width, variable)
     lagged = follow_lag(blocks.time, blocks.columns[variable.name], memory.lag)
@@ -208,10 +199,7 @@ def term_columns(
 
 
 class BiasDesign:
-    """Several runs below each other: `constants` (m, runs), `candidates` (m, names), `bias` (m,), `rows` per run.
-
-    The candidates are the nine terms of eq. (21), and the play where the runs have one.
-    """
+    """Several runs below each other: constants (m, runs), candidates (m, names) of eq. (21) and the play, bias (m,), rows per run."""
 
     def __init__(self, runs: Sequence[BiasRun], reference: float) -> None:
         sizes = [run.time.size for run in runs]
@@ -247,10 +235,7 @@ def fit_terms(
     selection: StepwiseSelection | None = None,
     scores: tuple[float, ...] = (),
 ) -> BiasFit:
-    """Fit the given terms by least squares, with errors for independent and for correlated rows.
-
-    `theta` of the noise is estimated with these terms unless it is given.
-    """
+    """Fit the given terms by least squares, with errors for independent and for correlated rows, of noise `theta` or as estimated."""
     X = np.column_stack([design.constants, design.candidates[:, [design.names.index(name) for name in terms]]])
     count = design.constants.shape[1]
     names = [*(f"constant of run {k + 1}" for k in range(count)), *terms]

@@ -45,12 +45,7 @@ class NoHeldOut(CompensationError):
 
 @dataclass(frozen=True)
 class HeldOutRows:
-    """Errors of models on held-out rows: standard deviations of 100 s averages, pooled.
-
-    `before` without and `after` with compensation, both about the held-out piece's own mean; `coverage` the part of
-    the rows that lies inside the range of the rest; `by_runs` whole runs were held out, else blocks; `terms` those
-    selected each time.
-    """
+    """Standard deviations of 100 s averages of held-out runs (else blocks), pooled, about each one's own mean; `coverage` of the range."""
 
     before: float
     after: float
@@ -71,18 +66,12 @@ class _Fold:
 
 
 def fit_bias(runs: Sequence[BiasRun], method: Method = "guarded", reference: float | None = None) -> BiasFit:
-    """Select and fit the bias model, HRG paper eqs. (21), (22); every run has its own constant, B₀ is their mean.
-
-    `reference`: the frequency or temperature from which changes are counted; the first of the first run unless given.
-    """
+    """Select and fit the bias model, HRG paper eqs. (21), (22), about a reference; every run has its own constant, B₀ is their mean."""
     return _select(runs, method, reference, by_runs=len(runs) > 1)
 
 
 def choose_memory(prepare: Callable[[Memory], Sequence[BiasRun]]) -> Memory:
-    """Return the lag and play of highest likelihood behind which all candidate terms together act.
-
-    Each must gain `WORTH` in deviance, m ln(SSE/m) of the whitened rows, to be taken.
-    """
+    """Return lag and play of highest likelihood behind which all terms act, each worth `WORTH` in deviance, m ln(SSE/m) whitened."""
     plain = prepare(NO_MEMORY)
     span = float(np.ptp(np.concatenate([run.state for run in plain])))
     theta: float | None = None
@@ -103,11 +92,7 @@ def choose_memory(prepare: Callable[[Memory], Sequence[BiasRun]]) -> Memory:
 
 
 def find_opposite(runs: Sequence[BiasRun], reference: float) -> int | None:
-    """Return the run whose bias has the opposite sign to the others', None where all agree.
-
-    All candidate terms with a constant for each run, B = ±(B₀ᵢ + X k), fit to half the residual or less once the signs
-    of one run are changed. Of two runs either may be the one: the last is returned.
-    """
+    """Return the run whose bias has the opposite sign to the others', by B = ±(B₀ᵢ + X k) of half the residual, or None."""
     design = BiasDesign(runs, reference)
     X = np.column_stack([design.constants, design.candidates])
     X /= np.maximum(np.linalg.norm(X, axis=0), 1e-300)
@@ -128,9 +113,7 @@ def find_opposite(runs: Sequence[BiasRun], reference: float) -> int | None:
 def score_held_out(runs: Sequence[BiasRun], method: Method = "guarded") -> HeldOutRows:
     """Predict every run from a model selected and fitted without it; with one run, every fifth of it.
 
-    The blocks of a single run are held out with a gap of one thermal constant, std(f) / rms(ḟ), on either side. The
-    held-out piece's own constant is refitted, nothing else; rows outside the range that the rest has seen are not
-    predicted, as the model refuses to be used there, and `coverage` tells how many were left.
+    Blocks have a gap of one thermal constant, std(f) / rms(ḟ); only the held-out constant is refitted, and rows out of range are left.
     """
     by_runs = len(runs) > 1
     folds, fits = [], []
@@ -195,10 +178,7 @@ def thermal_constant(pieces: Sequence[BiasRun]) -> float:
 
 
 def score_path(runs: Sequence[BiasRun], selection: StepwiseSelection) -> tuple[float, ...]:
-    """Return the held-out standard deviation of each model on a selection's path, over that of the constant alone.
-
-    Whole runs are held out, or blocks of a single one, as in `score_held_out`, but the terms stay those of the path.
-    """
+    """Return the held-out sd of each model on a selection's path, its terms kept, over that of the constant alone."""
     by_runs = len(runs) > 1
     folds = _folds(runs, by_runs)
     designs = [BiasDesign(fold.rest, float(runs[0].state[0])) for fold in folds]
@@ -210,10 +190,7 @@ def score_path(runs: Sequence[BiasRun], selection: StepwiseSelection) -> tuple[f
 
 
 def score_runs(fit: BiasFit, runs: Sequence[BiasRun], *, extrapolate: bool = False) -> HeldOutRows:
-    """Apply a fitted model to held-out runs; each run's own mean is taken out, nothing else.
-
-    Rows outside the range that the fit has seen are left out, unless `extrapolate`.
-    """
+    """Apply a fitted model to held-out runs, less each run's own mean; rows out of range only to `extrapolate`."""
     return _pool([_Fold(run, []) for run in runs], [fit] * len(runs), by_runs=True, everywhere=extrapolate)
 
 

@@ -42,11 +42,7 @@ class ClosedLoop:
 
     @cached_property
     def places(self) -> dict[str, slice]:
-        """Where the parts of the state stand.
-
-        wave (p, S as real parts), filtered, integral, sent (commands under way, newest first), forcing w and measurement
-        offset with their slopes, sums of the commands and of the wave over the row.
-        """
+        """Places of wave (p, S), filtered, integral, sent commands (newest first), forcing w and offset with slopes, and sums over the row."""
         late = self.loops.late[0] + 1
         sizes = {"wave": 4, "filtered": 4, "integral": 4, "sent": 4 * late, "forcing": 4, "forcing_slope": 4}
         sizes |= {"offset": 4, "offset_slope": 4, "sum": 4, "wave_sum": 4}
@@ -154,10 +150,7 @@ class ClosedLoop:
         return np.asarray(_held_maps(real_form(self.A), self.loops.step - rest)[1] @ self.drive_map)
 
     def follow(self, state: Array, samples: int, generator: np.random.Generator | None) -> tuple[Array, bool]:
-        """Return the state after a row, each command limited, and whether any was at its limit.
-
-        A command beyond its limit is what the actuator gives, and the integral of its channel keeps its value (anti-windup).
-        """
+        """Return the state after a row, each command limited and its integral then held (anti-windup), and whether any was."""
         at, F, limits = self.places, self.sample[0], self.electronics.actuators
         newest = slice(at["sent"].start, at["sent"].start + FOUR)
         limited = False

@@ -23,11 +23,7 @@ LEAST_BANDWIDTH = 1e-3
 
 @dataclass(frozen=True)
 class Loops:
-    """Bandwidths (Hz, where the open loop has gain 1) of the four loops, and what they share.
-
-    `sampling` (Hz) of the controllers, `delay` (s) from the end of a sample to its force, `demodulator` (Hz) of the low
-    pass after demodulation.
-    """
+    """Bandwidths (Hz, where the open loop has gain 1) of the four loops; `sampling` and `demodulator` (Hz), `delay` (s) of the force."""
 
     amplitude: float = 1.0
     phase: float = 10.0

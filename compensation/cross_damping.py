@@ -103,11 +103,7 @@ class CrossDampingModel:
         return Omega - self.predict(time, temperature, extrapolate=extrapolate)
 
     def memory(self, time: ArrayLike, temperature: ArrayLike) -> float:
-        """Return the largest part (rad/s) that the dynamics of (9) has in the compensation of this profile.
-
-        It is the difference to the static curve 2k/g₂ ζ₁₂(T); where it lies below the noise, the profile was slow
-        against 1/(kζ) and the record says nothing on the filter.
-        """
+        """Return the largest part (rad/s) that the dynamics of (9) has in this profile beside 2k/g₂ ζ₁₂(T): below the noise it is not seen."""
         static = 2 * self.k / self.g2 * self.cross_damping(temperature)
         return float(np.max(np.abs(self.predict(time, temperature, extrapolate=True) - static)))
 
@@ -140,11 +136,7 @@ def fit_cross_damping(
     calibration_temperature: float = 293.15,
     order: int = 3,
 ) -> CrossDampingModel:
-    """Fit ζ₁₂(T) to the output of a gyro at rest: eq. (10) through eq. (9).
-
-    The model is linear in ζᵢ: each column of the regression is Tⁱ after the filter (9), so the fit is dynamic too.
-    The covariance allows for errors that wander (see `correlated`).
-    """
+    """Fit ζ₁₂(T) to a gyro at rest, eq. (10) through eq. (9): columns Tⁱ after the filter, errors that wander (see `correlated`)."""
     if order < 1:
         raise CompensationError(f"the polynomial of eq. (10) needs an order of 1 or more, not {order}.")
     if not runs:

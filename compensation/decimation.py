@@ -1,8 +1,4 @@
-"""Decimation of a record by block averages, with spikes and missing samples left out and counted.
-
-A block average is the anti-alias filter of stability analysis: its response sin(πfτ)/(πfτ) vanishes at every
-multiple of the output rate, and the averages of white noise stay white. Sampling may be irregular.
-"""
+"""Decimation of a record by block averages, an anti-alias filter sin(πfτ)/(πfτ); spikes and missing samples are counted."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -18,11 +14,7 @@ from compensation.spikes import NEIGHBOURS, find_spikes
 
 @dataclass(frozen=True)
 class Blocks:
-    """Block averages: `time` (b,) mean time of each block, `columns` name → (b,), `counts` samples used (b,).
-
-    `missing` rows with an empty value, `spikes` rows with a value that its neighbours contradict; blocks with
-    fewer than half the usual number of samples are left out.
-    """
+    """Block averages at mean times (b,), of `counts` samples; `missing` and `spikes` are rows left out, half-empty blocks too."""
 
     time: Array
     columns: Mapping[str, Array]
@@ -33,10 +25,7 @@ class Blocks:
 
 
 def average_groups(values: Array, group: NDArray[np.intp], count: int = 0) -> Array:
-    """Return the mean of the values of every group 0, 1, …, at least `count` of them; NaN of a group without values.
-
-    Sums of differences from one value keep the digits that sums of large values lose.
-    """
+    """Return the mean of every group 0, 1, … (NaN of an empty one), summing differences from one value to keep digits."""
     if not values.size:
         return np.full(count, np.nan)
     middle = float(values[0])

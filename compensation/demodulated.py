@@ -22,10 +22,7 @@ from compensation.transfer import TransferFunction
 
 
 def relate_rate_to_secondary(element: SensitiveElement) -> TransferFunction:
-    """W₂(s) = A₁ (s + j g₂ ω) / ((s + jω)² + 2 ζ₂ k₂ (s + jω) + k₂²), in m per rad/s: eq. (12).
-
-    Its frequency response is (13); poles eq. (15).
-    """
+    """W₂(s) = A₁ (s + j g₂ ω) / ((s + jω)² + 2 ζ₂ k₂ (s + jω) + k₂²), m per rad/s: eq. (12); its response is (13), poles (15)."""
     e, A1 = element, element.primary_amplitude
     return TransferFunction((A1, 1j * A1 * e.g2 * e.omega), expand_secondary(e))
 
@@ -74,10 +71,7 @@ def find_slow_pole(element: SensitiveElement) -> complex:
 
 
 def respond_to_oscillating_rate(element: SensitiveElement, frequency: ArrayLike) -> tuple[Array, Array]:
-    """Return amplitude A(λ) (m per rad/s) and phase φ(λ) (rad) of the secondary for the rate e^{jλt}: eq. (14).
-
-    The phase is taken with the sign of numerator and denominator of (14), so it is right in all four quadrants.
-    """
+    """Return amplitude A(λ) (m per rad/s) and phase φ(λ) (rad, all four quadrants) of the secondary for the rate e^{jλt}: eq. (14)."""
     e, frequency = element, np.asarray(frequency, dtype=float)
     shifted = frequency + e.omega
     first, second = e.k1**2 - e.omega**2, e.k2**2 - shifted**2
@@ -91,10 +85,7 @@ def respond_to_oscillating_rate(element: SensitiveElement, frequency: ArrayLike)
 
 
 def split_primary(element: SensitiveElement) -> tuple[float, float]:
-    """Real and imaginary part of A₁ (m): eq. (19).
-
-    The paper prints A₁ᵢ = −2 q₁₀ j ω k₁ ζ₁ / (…); the imaginary *part* is real, so the j there is a slip.
-    """
+    """Real and imaginary part of A₁ (m): eq. (19), without the j that the paper prints in A₁ᵢ, which is a slip."""
     e = element
     detuning, damping = e.k1**2 - e.omega**2, 2 * e.omega * e.k1 * e.zeta1
     size = detuning**2 + damping**2
@@ -121,10 +112,7 @@ def split_secondary(element: SensitiveElement) -> tuple[TransferFunction, Transf
 
 
 def relate_rate_to_tuned_amplitude(element: SensitiveElement) -> TransferFunction:
-    """W₂₀(s) = q₁₀ g₂ √(1 − 2ζ²) / (4 k² ζ (1 − ζ²) (s + kζ)), in m per rad/s: eq. (24).
-
-    It uses k₁ and ζ₁ for both modes, whatever the secondary's are: that is the simplification that (26) judges.
-    """
+    """W₂₀(s) = q₁₀ g₂ √(1 − 2ζ²) / (4 k² ζ (1 − ζ²) (s + kζ)), m per rad/s: eq. (24), with k₁ and ζ₁ for both modes."""
     k, zeta = element.k1, element.zeta1
     gain = element.q10 * element.g2 * np.sqrt(1 - 2 * zeta**2) / (4 * k**2 * zeta * (1 - zeta**2))
     return TransferFunction((gain,), (1.0, k * zeta))
@@ -155,9 +143,8 @@ def map_integral_error(
 ) -> ErrorMap:
     """Judge the simplified transfer function (24) on mistuned gyros by its integral error: eq. (26), figure 3.
 
-    J(δk, δζ) = ∫₀ᵀ [A₂₀ − A₂₀*]² dt after a step of the rate, A₂₀ from (24) and A₂₀* from the full equations (1)
-    for k₂ = δk k, ζ₂ = δζ ζ. The paper gives neither T nor the rate; here T = `settling_times` / (k ζ), and J is
-    divided by ∫ A₂₀*² dt of the tuned gyro, so that 0.01 means a tenth of the amplitude, rms.
+    J(δk, δζ) = ∫₀ᵀ [A₂₀ − A₂₀*]² dt / ∫ A₂₀*² dt after a step of the rate, A₂₀* from (1) for k₂ = δk k, ζ₂ = δζ ζ, the
+    latter of the tuned gyro; here T = `settling_times` / (k ζ).
     """
     ratios, dampings = np.array(frequency_ratio, float, ndmin=1), np.array(damping_ratio, float, ndmin=1)
     if np.any(ratios <= 0) or np.any(dampings <= 0):
@@ -177,11 +164,7 @@ def map_integral_error(
 
 
 def measure_rate(element: SensitiveElement, time: ArrayLike, rate: ArrayLike) -> Array:
-    """Return the rate (rad/s) that the gyro reports: the full dynamics, demodulated and divided by the scale factor.
-
-    The secondary amplitude is detected in the phase that a constant rate gives it, W₂(0), which keeps the sign of the
-    rate; this is the 'realistic' gyro of figures 5–7.
-    """
+    """Return the rate (rad/s) of the 'realistic' gyro of figures 5–7: the full dynamics, demodulated in the phase of W₂(0), scaled."""
     read_columns(time=time, rate=rate)
     secondary = propagate_envelope(element, time, rate).secondary
     measured: Array = (secondary / relate_rate_to_secondary(element).steady_gain).real

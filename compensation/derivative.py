@@ -12,11 +12,7 @@ from compensation.samples import check_time
 
 @dataclass(frozen=True)
 class SmoothDerivative:
-    """dx/dt at the sample times (m,); the slope at time t is the one that x had at t − `lag` (s).
-
-    `complete` (m,) is False near the ends of the record and in gaps, where the window holds fewer than 80 % of its
-    samples and the slope is less certain.
-    """
+    """dx/dt at the sample times (m,), that of t − `lag` (s); `complete` (m,): the window holds 80 % of its samples or more."""
 
     slope: Array
     lag: float
@@ -24,12 +20,9 @@ class SmoothDerivative:
 
 
 def differentiate(time: ArrayLike, values: ArrayLike, window: float, *, causal: bool = False) -> SmoothDerivative:
-    """Return the slope of the least-squares line through the samples within a sliding window.
+    """Return the slope Σ (tᵢ − t̄)(xᵢ − x̄) / Σ (tᵢ − t̄)² within a sliding window (s), centred or `causal` (lag window/2).
 
-    dx/dt ≈ Σ (tᵢ − t̄)(xᵢ − x̄) / Σ (tᵢ − t̄)², the slope of a first-order Savitzky–Golay filter, for any sampling.
     White noise of standard deviation σ on m samples in the window w makes an error of about √12 σ / (w √m).
-
-    `causal`: the window (s) ends at the present sample, as firmware has it, and lags by window/2; else it is centred.
     """
     t, x = np.asarray(time, dtype=np.float64), np.asarray(values, dtype=np.float64)
     check_time(t)

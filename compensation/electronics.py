@@ -19,10 +19,7 @@ BOLTZMANN = 1.380649e-23  # J/K
 
 @dataclass(frozen=True)
 class Channels:
-    """The pair of pick-offs, or of drives.
-
-    `gain_ratio` δ = g_x/g_y − 1, `phase_difference` η (rad), `skew` κ (rad), `rotation` β (rad on the shell), `phase` φ (rad).
-    """
+    """The pair of pick-offs, or of drives: δ = g_x/g_y − 1, phase difference η, skew κ, rotation β on the shell, phase φ (rad)."""
 
     gain_ratio: float = 0.0
     phase_difference: float = 0.0
@@ -46,11 +43,9 @@ class Channels:
 
 @dataclass(frozen=True)
 class LoopNoise:
-    """Noise by source, as it enters the loops; everything over the commanded amplitude.
+    """Noise by source, over the commanded amplitude: `pickoff` (1/√Hz, one-sided, at the carrier), `drive` (1/s/√Hz, over 2ω).
 
-    `pickoff` (1/√Hz, one-sided density at the carrier), `adc_step` and `dac_step` (steps of a demodulated sample, 1, and of
-    a command, 1/s: white noise of step²/12 per sample, true where other noise moves the signal over several steps),
-    `drive` (1/s/√Hz, of the force over 2ω), `thermal` (1/√s, of either quadrature of either pattern).
+    Steps of a demodulated sample (1) and of a command (1/s) are white noise of step²/12; `thermal` (1/√s) is of each quadrature.
     """
 
     pickoff: float = 0.0
@@ -76,8 +71,7 @@ class LoopNoise:
 def thermal_noise(wave: StandingWave, temperature: float, modal_mass: float, amplitude: float) -> float:
     """Return the thermomechanical noise (1/√s) of each quadrature over the amplitude: √(2 k_B T/(m ω² τ))/a.
 
-    A quadrature X obeys dX = −X/τ dt + σ dW; equipartition, ⟨X²⟩ = k_B T/(m ω²) = σ² τ/2, gives σ. As angle random walk
-    of the rate it is σ/(a n k) (rad/√s).
+    dX = −X/τ dt + σ dW with ⟨X²⟩ = k_B T/(m ω²) = σ² τ/2; as angle random walk σ/(a n k) (rad/√s).
     """
     if not (temperature > 0 and modal_mass > 0 and amplitude > 0):
         raise CompensationError("thermal noise needs a positive temperature, modal mass and amplitude.")

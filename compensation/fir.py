@@ -8,11 +8,7 @@ from compensation.errors import CompensationError
 
 
 def design_smoother(sampling: float, cutoff: float, order: int = 50) -> Array:
-    """Return the taps of a low-pass FIR filter (Hamming window) with unit gain at rest.
-
-    Half the amplitude is left at the `cutoff` (Hz), as long as that is above about two over the filter's length; the
-    paper has 50 taps less one and a `sampling` step of 0.1 s.
-    """
+    """Return the taps of a low-pass FIR filter (Hamming window) with unit gain at rest and half of it at the `cutoff` (Hz)."""
     from scipy.signal import firwin
 
     if order < 1 or sampling <= 0:

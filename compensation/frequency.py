@@ -23,12 +23,7 @@ GRID = 2001  # temperatures at which a curve is looked at
 
 @dataclass(frozen=True)
 class FrequencyFit:
-    """The fitted curve f(T), valid between the temperatures that were measured.
-
-    `coefficients` f₀ (Hz), a₁ (Hz/°C), a₂ (Hz/°C²) … about `reference_temperature_degC`, with their
-    `covariance`; `temperature_range_degC` lowest and highest temperature fitted; `resolution` of the
-    readings in Hz, if known.
-    """
+    """The fitted curve f(T) within the measured range: coefficients f₀ (Hz), a₁ (Hz/°C), … about a reference, `resolution` in Hz."""
 
     reference_temperature_degC: float
     temperature_range_degC: tuple[float, float]
@@ -100,10 +95,8 @@ class FrequencyFit:
         )
 
     def temperature(self, frequency: ArrayLike) -> Array:
-        """Return the temperature (°C) whose frequency this is: the inverse of f(T), HRG paper Table 2.
-
-        The root is bracketed, so it cannot leave the measured range by more than the fit's own errors
-        (three residual standard deviations, or the largest residual where that is more).
+        """Return the temperature (°C) whose frequency this is: the inverse of f(T), HRG paper Table 2, at most three
+        residuals out of range.
         """
         frequency = np.asarray(frequency, dtype=np.float64)
         if not np.all(np.isfinite(frequency)):
@@ -132,11 +125,7 @@ class FrequencyFit:
 
 @dataclass(frozen=True)
 class OrderComparison:
-    """Fits of rising order to the same readings, and the F-test of each order against the next.
-
-    `against_next[k]` compares `fits[k]` with `fits[k + 1]`; `recommended` is the lowest order that the next
-    one does not improve on at `level`.
-    """
+    """Fits of rising order, the F-test of `fits[k]` against `fits[k + 1]`, and the lowest order that the next does not improve on."""
 
     fits: tuple[FrequencyFit, ...]
     against_next: tuple[FTest, ...]
@@ -188,10 +177,7 @@ def fit_frequency(
     reference_temperature_degC: float = 0.0,
     resolution: float | None = None,
 ) -> FrequencyFit:
-    """Fit f(T) by least squares, HRG paper eqs. (16)–(18).
-
-    `resolution`: step of the readings (Hz); rounding to it has the variance resolution²/12.
-    """
+    """Fit f(T) by least squares, HRG paper eqs. (16)–(18); rounding to `resolution` (Hz) has the variance resolution²/12."""
     T, f = np.asarray(temperature_degC, dtype=np.float64), np.asarray(frequency, dtype=np.float64)
     if resolution is not None and not (np.isfinite(resolution) and resolution > 0):
         raise CompensationError(f"the resolution of the readings must be positive, not {resolution:g} Hz.")
@@ -228,11 +214,7 @@ def compare_orders(
     resolution: float | None = None,
     level: float = 0.05,
 ) -> OrderComparison:
-    """Fit every order from 1 to `highest` (or as far as the readings allow) and test each against the next.
-
-    F(1, m − p) = (SSE_k − SSE_{k+1}) / (SSE_{k+1} / (m − p)). The search for the recommended order starts at
-    1 and stops where the next order does not help, so a cubic without any quadratic part can be missed.
-    """
+    """Fit every order up to `highest` and test each against the next: F(1, m − p) = (SSE_k − SSE_{k+1}) / (SSE_{k+1} / (m − p))."""
     readings = count_apart(temperature_degC)
     highest = min(highest, readings - 2)
     if highest < 1:
@@ -252,10 +234,7 @@ def compare_orders(
 
 
 def misreading_degC(one: FrequencyFit, other: FrequencyFit, temperature_degC: ArrayLike) -> Array:
-    """Return the error of the temperature that `one` reads from the frequency of `other`: T' - T, one(T') = other(T).
-
-    NaN where `one` does not reach that frequency within the span of its range.
-    """
+    """Return the error T' - T of the temperature that `one` reads from `other`: one(T') = other(T), NaN if not reached within its span."""
     T = np.asarray(temperature_degC, dtype=np.float64)
     reach = np.ptp(one.temperature_range_degC)
 

@@ -1,8 +1,4 @@
-"""How much a compensation improves an output, on the fitted and on held-out data.
-
-Every improvement is told twice: on the rows as they were recorded, where white noise may hide all else, and on averages
-over 100 s, where the slow error shows that a compensation is made for.
-"""
+"""How much a compensation improves an output, fitted and held out: on rows, and on averages over 100 s, which show slow errors."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

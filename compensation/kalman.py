@@ -40,10 +40,7 @@ class LinearModel:
 
 
 def model_gyro(k: float, zeta: float, step: float, process_noise: ArrayLike, measurement_noise: float) -> LinearModel:
-    """Return the model of a tuned gyro with the states (Ω measured, Ω₀ true), Ω₀ a random walk: eqs. (37)–(40).
-
-    A = ((−kζ, kζ), (0, 0)) and C = (1, 0); F = exp(A t), that is e^{−kζt}, 1 − e^{−kζt} in the first row.
-    """
+    """Return the model of a tuned gyro with states (Ω measured, Ω₀ true), Ω₀ a random walk: eqs. (37)–(40), A = ((−kζ, kζ), (0, 0))."""
     if not (k > 0 and zeta > 0 and step > 0):
         raise CompensationError("the gyro model needs a positive natural frequency, damping and sampling step.")
     kept = np.exp(-k * zeta * step)
@@ -62,10 +59,7 @@ def predict(model: LinearModel, x: Array, P: Array) -> tuple[Array, Array]:
 
 
 def weigh(model: LinearModel, P: Array) -> tuple[Array, Array, Array]:
-    """Return the gain K, the covariance of the innovation S = C P Cᵀ + R, and the covariance after a measurement.
-
-    The last is (1 − K C) P (1 − K C)ᵀ + K R Kᵀ, Joseph's form, which stays symmetric and positive.
-    """
+    """Return the gain K, the innovation's S = C P Cᵀ + R, and the covariance after, (1 − K C) P (1 − K C)ᵀ + K R Kᵀ (Joseph)."""
     C, R = model.measurement, model.measurement_noise
     S = C @ P @ C.T + R
     K = np.asarray(np.linalg.solve(S, C @ P).T, dtype=float)
@@ -143,10 +137,7 @@ def _follow(A: Array, u: Array, start: Array) -> Array:
 
 
 def settle(model: LinearModel) -> tuple[Array, Array, Array]:
-    """Return gain K, and covariance before and after a measurement, that the filter tends to.
-
-    The covariance before solves P = F P Fᵀ − F P Cᵀ (C P Cᵀ + R)⁻¹ C P Fᵀ + Q.
-    """
+    """Return gain K and the settled covariances before, P = F P Fᵀ − F P Cᵀ (C P Cᵀ + R)⁻¹ C P Fᵀ + Q, and after a measurement."""
     from scipy.linalg import LinAlgError, solve_discrete_are
 
     C, R = model.measurement, model.measurement_noise
@@ -161,10 +152,7 @@ def settle(model: LinearModel) -> tuple[Array, Array, Array]:
 
 
 def noise_of_estimate(model: LinearModel) -> Array:
-    """Return the covariance of the settled filter's estimate due to measurement noise, for a constant true state.
-
-    With the settled gain K the error of the estimate obeys e⁺ = (1 − K C) F e + K v, so N = A N Aᵀ + K R Kᵀ, A = (1 − K C) F.
-    """
+    """Return the settled estimate's covariance by measurement noise alone: N = A N Aᵀ + K R Kᵀ, A = (1 − K C) F."""
     from scipy.linalg import solve_discrete_lyapunov
 
     K = settle(model)[0]
@@ -173,11 +161,7 @@ def noise_of_estimate(model: LinearModel) -> Array:
 
 
 def expect_mean_nis(rows: int, degrees: int, probability: float = 0.95) -> tuple[float, float]:
-    """Return the band in which the mean of `rows` NIS or NEES values lies with `probability`, from chi-squared.
-
-    Innovations are white, so this holds for NIS over time; NEES values of one run are correlated and must be averaged
-    over independent runs instead.
-    """
+    """Return the band of the mean of `rows` NIS (over time) or NEES (of independent runs) values, from chi-squared."""
     from scipy.special import chdtri
 
     beside = (1 - probability) / 2

@@ -18,10 +18,7 @@ def same_rate(rate: ArrayLike) -> Array:
 
 
 def measure_nonlinearity(applied: ArrayLike, measured: ArrayLike) -> float:
-    """Return the largest departure from the line through measured over applied rate (rad/s), over the largest applied rate.
-
-    By the means of each applied rate, as the BVG paper does.
-    """
+    """Return the largest departure of means from the line over the applied rate (rad/s), over the largest applied rate (BVG paper)."""
     x, y = read_columns(applied=applied, measured=measured)
     _, kind = np.unique(same_rate(x), return_inverse=True)
     rates = np.bincount(kind, x) / np.bincount(kind)

@@ -33,12 +33,10 @@ class Line:
 def find_line(
     series: Sequence[tuple[Array, Array]], sampling: float, slowest: float, least: float = 12.0
 ) -> Line | None:
-    """Return the largest line with a period from `FASTEST` rows to `slowest`, s, of series of times (m,), s, and readings (m,).
+    """Return the largest line with a period from `FASTEST` rows to `slowest`, s, of series (m,), or None below the evidence `least`.
 
-    In noise of any smooth spectrum a periodogram over its level exceeds x with the probability (1 + x/ν)^−ν, the level having ν
-    degrees of freedom; the sum over n series of ν log(1 + x/ν) has a gamma law of order n. A slope that is rounded to steps q makes
-    lines too, of amplitude q/π where the noise does not blur them: none of up to twice that counts. None where no line has the
-    evidence that is the `least`.
+    In noise of any smooth spectrum a periodogram over its level exceeds x with the probability (1 + x/ν)^−ν; the sum
+    over n series of ν log(1 + x/ν) has a gamma law of order n. Rounding to q makes lines of q/π: none of up to twice that counts.
     """
     rows = [(time[known], values[known]) for time, values in series if (known := np.isfinite(values)).sum() > AROUND]
     longest = round(max((time[-1] - time[0] for time, _ in rows), default=0.0) / sampling) + 1

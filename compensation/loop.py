@@ -48,11 +48,9 @@ class BellResonator:
 def read_rate_from_loop(
     resonator: BellResonator, omega: float, time: ArrayLike, p: ArrayLike, q: ArrayLike, force: ArrayLike | None = None
 ) -> Array:
-    """Return the rate (rad/s) from the amplitudes of both axes and of the rebalance force: eqs. (24)–(26).
+    """Return the rate (rad/s) from the amplitudes of both axes and of the rebalance force, (24)–(26); without force open loop, (25).
 
     Ω = Re{ [F/m₀ − (c₁/m₀) P − (ω_n² − ω²) Q − 2jω Q̇] / (4 k jω P) }; Q̈ is neglected against ω Q̇.
-
-    Without `force` (N,), the amplitude F of f_q (N), the loop is open: eq. (25).
     """
     P, Q = np.asarray(p, dtype=complex), np.asarray(q, dtype=complex)
     F = np.zeros_like(P) if force is None else np.asarray(force, dtype=complex)

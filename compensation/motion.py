@@ -28,10 +28,7 @@ class Motion:
 def write_dynamics(
     element: SensitiveElement, rate: ArrayLike, rate_slope: ArrayLike, zeta12: ArrayLike = 0.0, zeta21: ArrayLike = 0.0
 ) -> Array:
-    """Return the matrices M of ẏ = M y + (0, 0, q₁, 0, 0), y = (x₁, x₂, ẋ₁, ẋ₂, 1): CVG cross-damping eq. (2).
-
-    The last state is the constant 1 and carries no force here; the caller adds the excitation in its column.
-    """
+    """Return the matrices M of ẏ = M y + (0, 0, q₁, 0, 0), y = (x₁, x₂, ẋ₁, ẋ₂, 1): CVG cross-damping eq. (2)."""
     e = element
     Omega, slope, cross12, cross21 = np.broadcast_arrays(
         *(np.asarray(values, dtype=float) for values in (rate, rate_slope, zeta12, zeta21))
@@ -58,12 +55,10 @@ def propagate_envelope(
     zeta21: ArrayLike | None = None,
     from_rest: bool = False,
 ) -> Motion:
-    """Propagate the complex amplitudes of equation (2), nothing neglected, from one sample to the next.
+    """Propagate the complex amplitudes of equation (2), x = Im{A e^{jωt}}, from one sample to the next, nothing neglected.
 
-    With x = Im{A e^{jωt}} the state obeys ẏ = (M(t) − jω) y + (0, 0, q₁₀, 0). Each step is one matrix exponential,
-    exact where the rate is constant. Where it changes, a step that resolves the carrier (h ω < 1) uses the
-    fourth-order Magnus expansion h M(mid) + h³/12 [M′, M(mid)], a longer one M(mid) alone: second order in h, and
-    slow amplitudes do not feel the carrier that it steps over.
+    ẏ = (M(t) − jω) y + (0, 0, q₁₀, 0) by matrix exponentials: where the rate changes, by the fourth-order Magnus
+    expansion h M(mid) + h³/12 [M′, M(mid)] while h ω < 1, by M(mid) alone for longer steps.
     """
     from scipy.linalg import expm
 
@@ -99,9 +94,7 @@ def propagate_envelope(
 def demodulate(time: ArrayLike, displacement: ArrayLike, omega: float) -> tuple[Array, Complex]:
     """Return the complex amplitude A of x = Im{A e^{jωt}} by synchronous detection over two carrier periods.
 
-    2 j x e^{−jωt} = A − A* e^{−2jωt}; a moving mean over one period, taken twice, removes the second term as long
-    as A changes linearly over the window, and does not shift A in time.
-    The result lacks one period at either end.
+    A moving mean over one period, twice, takes A* e^{−2jωt} out of 2 j x e^{−jωt}; one period is lost at either end.
     """
     t, x = read_columns(time=time, displacement=displacement)
     step = require_regular(t, "synchronous demodulation")

@@ -43,10 +43,7 @@ class Noise:
     offset: float = 0.0
 
     def allan_variance(self, tau: ArrayLike) -> Array:
-        """Return the Allan variance at averaging times τ (s); of the flicker it is that of its ladder.
-
-        Of a Gauss–Markov process of variance 1, x = τ/T: (2/x) (1 − (3 − 4 e⁻ˣ + e⁻²ˣ)/(2x)), IEEE Std 952 eq. C.17.
-        """
+        """Return the Allan variance at averaging times τ (s); Gauss–Markov: (2/x) (1 − (3 − 4 e⁻ˣ + e⁻²ˣ)/(2x)), IEEE Std 952 eq. C.17."""
         t = np.asarray(tau, dtype=np.float64)
         total = self.white**2 / t + self.walk**2 * t / 3.0
         if self.flicker:
@@ -142,11 +139,7 @@ def _mean_of_decay(x: Array) -> Array:
 
 
 def _draw_flicker(count: int, span: float, generator: np.random.Generator) -> Array:
-    """Draw flicker noise of flat part 1 by circulant embedding (Dietrich & Newsam 1997, SIAM J. Sci. Comput. 18, 1088).
-
-    Rows on a circle of twice the length whose covariance is that of the rows up to half way round: its Fourier transform is the
-    variance of independent amplitudes. It is nowhere below 0.6, for any span and length, so that nothing is cut off.
-    """
+    """Draw flicker noise of flat part 1 by circulant embedding (Dietrich & Newsam 1997, SIAM J. Sci. Comput. 18, 1088)."""
     x = span / FLICKER_TIMES
     lag = np.arange(count + 1.0)
     r = np.zeros(count + 1)

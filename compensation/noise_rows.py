@@ -6,8 +6,7 @@ its prior, 0 for none, are those of the highest marginal likelihood
     −2 ln L = ln|Σ| + ln|Λ + XᵀΣ⁻¹X| + rᵀΣ⁻¹r − bᵀ(Λ + XᵀΣ⁻¹X)⁻¹b,   b = XᵀΣ⁻¹r
 
 (restricted likelihood of Patterson & Thompson 1971, Biometrika 58, 545, where Λ = 0), beside a weak prior of the levels. Rows may be
-uneven and have gaps. A run takes N³/3 operations per evaluation, once for all runs of equal rows: average long records to some
-hundred rows.
+uneven and have gaps. A run takes N³/3 operations per evaluation, once for all runs of equal rows: average long records to some hundred rows.
 """
 
 from collections.abc import Sequence
@@ -134,10 +133,9 @@ class NoiseRows:
     def deviance(
         self, target: Array, columns: Array, precision: Array, noise: Noise, mean: Array | None = None
     ) -> tuple[float, dict[str, float]]:
-        """Return −2 ln L (see the module) of residuals (M,) beside columns (M, p) of prior precision and mean (p,), and its slopes.
+        """Return −2 ln L (see the module) of residuals (M,) beside columns (M, p) of prior precision and mean, and its slopes.
 
-        The slope by the logarithm of a level θ, with C Cᵀ = (Λ + XᵀΣ⁻¹X)⁻¹, what is left e, and U = Σ⁻¹ [X C, e], is
-        Σ_ij (Σ⁻¹ − U Uᵀ)_ij θ ∂Σ_ij/∂θ.
+        By ln θ of a level Σ_ij (Σ⁻¹ − U Uᵀ)_ij θ ∂Σ_ij/∂θ, U = Σ⁻¹ [X C, e], C Cᵀ = (Λ + XᵀΣ⁻¹X)⁻¹, e what is left.
         """
         whitener = self.whitener(noise)
         white, total = whitener(np.column_stack([columns, target])), whitener.log_determinant
@@ -217,14 +215,8 @@ def estimate_noise(
 ) -> Noise:
     """Estimate the levels of the noise by its marginal likelihood.
 
-    Args:
-        target: array (M,), residuals of all runs
-        columns: array (M, p): What else is unknown, with coefficients of prior mean 0.
-        precision: array (p,): Of that prior; 0, no prior, unless given.
-        kinds: of "white" (always), "flicker", "walk", "offset": What the noise may consist of; one run has no offset,
-            since none is known from another.
-        near: Levels from which the search begins: those of residuals that were much the same.
-        stated: What is said of the slow levels beforehand, to a factor of 3; of a level of 0 nothing is.
+    `target` (M,) are residuals of all runs, `columns` (M, p) what else is unknown, of prior `precision`; `kinds`:
+    "white" (always), "flicker", "walk", "offset"; `near`: where to begin; `stated`: slow levels known to a factor of 3.
     """
     X = np.zeros((rows.count, 0)) if columns is None else columns
     size = np.linalg.norm(X, axis=0)

@@ -1,8 +1,4 @@
-"""Polynomials of one variable, fitted in a centred and scaled variable u = (x − centre) / half_span.
-
-Powers of u are nearly independent columns where powers of x are nearly equal ones, so the fit keeps its
-digits; the coefficients about any reference follow by the binomial theorem, and so does their covariance.
-"""
+"""Polynomials of one variable, fitted in u = (x − centre) / half_span, whose powers are nearly independent columns."""
 
 import math
 from dataclasses import dataclass
@@ -65,10 +61,7 @@ class PolynomialFit:
         return np.sort(real[(real >= low) & (real <= high)])
 
     def about(self, reference: float, covariance: Array | None = None) -> tuple[Array, Array]:
-        """Return coefficients b and covariance of the same curve, y = Σ bⱼ (x − reference)ʲ.
-
-        `covariance` of c is that of the regression unless it is given.
-        """
+        """Return coefficients b and covariance (of c: the regression's unless given) of the same curve, y = Σ bⱼ (x − reference)ʲ."""
         own = self.regression.covariance if covariance is None else covariance
         size = self.order + 1
         offset = np.longdouble(reference - self.centre) / np.longdouble(self.half_span)

@@ -51,10 +51,7 @@ class RateLaw:
 def fit_rate_law(
     rate: Array, output: Array, error: Array, temperature: Array | None = None, warming: Array | None = None
 ) -> RateLaw | None:
-    """Choose the form of mean outputs at held rates, with standard errors; None below six rates or of one direction.
-
-    Temperature in K from any origin; warming is 1 while it rises, −1 while it falls, 0 while it rests.
-    """
+    """Choose the form of mean outputs at held rates, with errors, or None; `warming` is 1 while the temperature (K) rises, −1, 0."""
     level = same_rate(rate)
     if len(np.unique(level)) < LEAST or not rate.min() < 0 < rate.max():
         return None

@@ -32,11 +32,9 @@ ALIKE = 0.01
 
 @dataclass(frozen=True)
 class LoopRun:
-    """Output of the loops, one value for each row, the mean over the row.
+    """Output of the loops by rows, means: `rate` (rad/s), `quadrature` (1/s, force over 2ω and amplitude: ½ Δω sin 2n(θ − θ_ω)).
 
-    `time` (s), `rate` (rad/s, indicated), `quadrature` (1/s, the force over 2ω and amplitude that holds the quadrature:
-    ½ Δω sin 2n(θ − θ_ω); a stiffness κ counts alike), `decay` (1/s, the amplitude's drive, so 1/τ), `omega` (rad/s), `angle` (rad,
-    azimuth). `limited` counts the rows in which an actuator was at its limit.
+    `decay` 1/τ (1/s), `omega` (rad/s), `angle` (rad, azimuth); `limited` rows had an actuator at its limit.
     """
 
     time: Array
@@ -58,10 +56,9 @@ def simulate_rebalance(
     angle: ArrayLike = 0.0,
     generator: np.random.Generator | None = None,
 ) -> LoopRun:
-    """Run a gyro in force-to-rebalance mode, settled at the first row.
+    """Run a gyro in force-to-rebalance mode, settled at the first row and where the commanded `angle` (rad) changes.
 
-    `rate` (rad/s) is linear between the rows, which are a whole number of samples apart; where the commanded `angle`
-    (rad) changes, the loops are settled anew. CompensationError where the wave is lost, an actuator being at its limit.
+    `rate` (rad/s) is linear between rows, a whole number of samples apart; CompensationError where the wave is lost.
     """
     t = np.asarray(time, dtype=float)
     samples = samples_in_row(t, loops)

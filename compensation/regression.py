@@ -26,12 +26,7 @@ REFINEMENTS = 3
 
 @dataclass(frozen=True)
 class LinearFit:
-    """Least-squares coefficients with their covariance and the evidence for them.
-
-    `names` (p,), `coefficients` (p,), `fitted`, `residuals` and `leverage` (m,), `design` (m, p),
-    `bread` = (XᵀX)⁻¹ (p, p), `least_variance` a variance that the observations are known to have; the
-    constant, if fitted, comes first.
-    """
+    """Least-squares coefficients (p,) with covariance and evidence; `bread` = (XᵀX)⁻¹, `least_variance` of the observations."""
 
     names: tuple[str, ...]
     coefficients: Array
@@ -163,10 +158,7 @@ def refuse_constant_columns(X: Array, names: Sequence[str]) -> None:
 
 
 def compare_nested(small: LinearFit, large: LinearFit) -> FTest:
-    """Test whether the terms that `large` has beyond `small` are needed: F = (ΔSSE / Δp) / (SSE / (m − p)).
-
-    Both fits must have seen the same observations; independent errors are assumed.
-    """
+    """Test whether the terms that `large` has beyond `small` are needed: F = (ΔSSE / Δp) / (SSE / (m − p)), errors independent."""
     extra = large.coefficients.size - small.coefficients.size
     if extra < 1 or small.rows != large.rows:
         raise CompensationError("the F-test compares a model with a larger one fitted to the same rows.")
@@ -212,11 +204,7 @@ def _factor(Z: Array, names: Sequence[str], tolerance: float) -> tuple[Array, Ar
 
 
 def _solve(Q: Array, R: Array, root: Array, design: Array, y: Array) -> tuple[Array, Array]:
-    """Solve r + X b = y, Xᵀ r = 0 for b and r, and refine both with residuals in extended precision.
-
-    Refining b alone cannot repair the part of its error that grows with the residual and the square of the
-    condition number; refining the augmented system can (Björck 1967).
-    """
+    """Solve r + X b = y, Xᵀ r = 0, refined together with residuals in extended precision (Björck 1967)."""
     X, target = design.astype(np.longdouble), y.astype(np.longdouble)
     b, r = np.zeros(X.shape[1], np.longdouble), np.zeros(X.shape[0], np.longdouble)
     for _ in range(REFINEMENTS + 1):

@@ -45,10 +45,7 @@ class SensitiveElement:
 
 
 def tune(k: float, zeta: float, *, q10: float = 1.0) -> SensitiveElement:
-    """Return the tuned element k₁ = k₂ = k, ζ₁ = ζ₂ = ζ, driven at resonance, ω = k √(1 − 2ζ²).
-
-    This is the case in which CVG cross-damping eq. (9) and demodulated-dynamics eqs. (23)–(25) hold.
-    """
+    """Return the tuned element k₁ = k₂ = k, ζ₁ = ζ₂ = ζ, driven at ω = k √(1 − 2ζ²), for which eqs. (9), (23)–(25) hold."""
     if not 0 < zeta < math.sqrt(0.5):
         raise CompensationError(f"zeta = {zeta:g} must lie between 0 and 0.707.")
     return SensitiveElement(k, k, zeta, zeta, omega=k * math.sqrt(1 - 2 * zeta**2), q10=q10)
@@ -63,11 +60,7 @@ def translate(
     *,
     q10: float = 1.0,
 ) -> SensitiveElement:
-    """Return a translational element: a proof mass in a decoupling frame, eq. (1) of both CVG papers.
-
-    d₁ = d₂ = 1, d₃ = m₂/(m₁ + m₂), g₁ = 2 m₂/(m₁ + m₂), g₂ = 2: along the primary axis frame and proof mass move together,
-    along the secondary axis the proof mass alone.
-    """
+    """Return a proof mass in a decoupling frame, eq. (1): d₁ = d₂ = 1, d₃ = m₂/(m₁ + m₂), g₁ = 2 m₂/(m₁ + m₂), g₂ = 2."""
     if not (frame >= 0 and proof_mass > 0):
         raise CompensationError(
             f"the proof mass must be positive and the frame 0 or more, not {proof_mass:g}, {frame:g} kg."

@@ -37,10 +37,9 @@ def turn_settled(
     precession: ArrayLike = 0.0,
     angle: float = 0.0,
 ) -> LoopRun:
-    """Return the output of settled loops for a precessing wave, without noise.
+    """Return the output of settled loops for a precessing wave, without noise; `angle` is the true one at the start.
 
-    `rate` and `precession`, the commanded turn against the shell (rad/s), are linear between rows; `angle` is the true
-    one at the start. Of the run `angle` is measured, unwrapped, and `rate` what is not commanded of the turn over k.
+    `rate` and `precession` (rad/s, commanded) are linear between rows; the run's `rate` is what of the turn is not commanded, over k.
     """
     t = np.asarray(time, dtype=float)
     if t.ndim != 1 or not (np.diff(t) > 0).all():
@@ -63,10 +62,7 @@ def read_turning(
     precession: ArrayLike | None = None,
     time: Array | None = None,
 ) -> LoopRun:
-    """Return the output of settled loops for a wave at measured azimuths, array (N,), rad.
-
-    Unless `precession` is given, it is what turns the wave through these azimuths over the `time`.
-    """
+    """Return the output of settled loops for a wave at measured azimuths (N,), rad, turned by `precession` or as the time shows."""
     k = wave.bryan_factor
     if precession is None:
         if time is None:

@@ -1,7 +1,4 @@
-"""Rational spectral densities: values, variance, stable factors, and the separation of causal parts.
-
-Spectral densities are rational functions of s, two-sided: variance = ∫ S(jω) dω / 2π. Those of one signal are even in s.
-"""
+"""Rational two-sided spectral densities in s, variance = ∫ S(jω) dω / 2π: stable factors, separation of causal parts."""
 
 from dataclasses import dataclass
 
@@ -43,10 +40,7 @@ class Spectrum:
 
     @property
     def variance(self) -> float:
-        """∫ S(jω) dω / 2π; infinite when S does not fall with frequency.
-
-        S is split into a(s)/d(s) + a(−s)/d(−s), d stable; the variance is then the limit of s a(s)/d(s).
-        """
+        """∫ S(jω) dω / 2π, or infinite: the limit of s a(s)/d(s), S = a(s)/d(s) + a(−s)/d(−s), d stable."""
         if len(self.numerator) >= len(self.denominator):
             return float("inf")
         d = factorise(self.denominator)
@@ -93,10 +87,7 @@ def factorise(even: ArrayLike) -> Array:
 
 
 def separate(numerator: Array, stable: Array, antistable: Array) -> Array:
-    """Return t of numerator / (stable · antistable) = t / stable + (a part with antistable poles only).
-
-    t includes the constant part, so it has as many coefficients as `stable` (Wiener–Hopf separation of eq. (34)).
-    """
+    """Return t (the constant part in it) of numerator / (stable · antistable) = t / stable + antistable rest: Wiener–Hopf, eq. (34)."""
     n, m = len(stable) - 1, len(antistable) - 1
     if len(numerator) > n + m + 1:
         raise CompensationError("the ratio of spectral densities grows with frequency; the optimum does not exist.")
@@ -119,12 +110,7 @@ def separate(numerator: Array, stable: Array, antistable: Array) -> Array:
 
 @dataclass(frozen=True)
 class CrossSpectrum:
-    """A rational cross-spectral density S_φΩ(s) = numerator(s)/denominator(s), of any parity; S_Ωφ(s) = S_φΩ(−s).
-
-    It is E{Ω φ*}, as eq. (31) needs it: noise φ = c(s) Ω that follows the rate has S_φΩ(s) = c(−s) S_Ω(s).
-
-    Poles may lie on both sides of the imaginary axis, none on it.
-    """
+    """A rational cross-spectral density S_φΩ(s) = E{Ω φ*}, of any parity; S_Ωφ(s) = S_φΩ(−s). No pole is on the imaginary axis."""
 
     numerator: tuple[float, ...]
     denominator: tuple[float, ...]
@@ -142,10 +128,7 @@ class CrossSpectrum:
 
 
 def require_possible(one: Spectrum, other: Spectrum, cross: CrossSpectrum | None) -> None:
-    """Raise when two signals cannot have this cross-spectral density: their coherence |S_φΩ|²/(S_φ S_Ω) is above 1.
-
-    The coherence is a rational function of x = ω²; it is largest at 0, at infinity, or where its derivative vanishes.
-    """
+    """Raise when two signals' coherence |S_φΩ|²/(S_φ S_Ω), largest at ω² = 0, ∞ or where its derivative vanishes, is above 1."""
     if cross is None:
         return
     cross.split_poles()

@@ -15,17 +15,10 @@ STUCK = 20  # readings in a row that are alike, where those beside them mostly d
 def find_spikes(values: Array, least: float = 0.0, step: float = 0.0) -> NDArray[np.bool_]:
     """Mark readings (m,) that stand out from their neighbours by more than 6 robust standard deviations.
 
-    What the neighbours say is the median of (y_{i−k} + y_{i+k})/2, k = 1, 2, 3, which follows any straight trend; at the
-    ends of the series that of 2 y_{i+k} − y_{i+2k}, looking inwards, whose distance counts half; there a reading between it
-    and the next one is no spike either, since a run may begin at rest. The distance must exceed 6 times 1.4826 times the
-    median distance of the whole series, be the largest within two rows, and exceed 4 times the distance that is usual next
-    to it without this reading, so that bends, gaps and jumps are no spikes. Spikes that are found are left out, and the rest
-    is searched again: one does not hide another beside it. Missing readings, NaN, are not marked, nor is anything in fewer
-    than seven.
-
-    `least`: part of the series' span, spikes left out of it, by which a spike must stand out too: a smooth column has no
-    noise to measure a spike by. `step`: what the readings were rounded to, where the values do not show it any more: half of
-    it is the least spread.
+    Neighbours say the median of (y_{i−k} + y_{i+k})/2, k = 1, 2, 3; at the ends that of 2 y_{i+k} − y_{i+2k}, whose
+    distance counts half. The distance must exceed 6 · 1.4826 times the series' median, be the largest within two rows,
+    and 4 times what is usual beside it. What is left is searched again. `least` is a part of the span, `step` the
+    rounding, that a spike exceeds too.
     """
     marked, rows = np.zeros(len(values), dtype=bool), np.flatnonzero(np.isfinite(values))
     if len(rows) < NEIGHBOURS:
@@ -45,10 +38,7 @@ def find_step(readings: Array) -> float:
 
 
 def find_stuck(values: Array) -> NDArray[np.bool_]:
-    """Mark readings (m,) of a sensor that is stuck: `STUCK` or more alike, of whose neighbours on either side at least half differ.
-
-    A settled column of coarse readings is no stuck sensor: beside its runs of one value there are others.
-    """
+    """Mark readings (m,) of a stuck sensor: `STUCK` or more alike, of whose neighbours on either side at least half differ."""
     marked, rows = np.zeros(len(values), dtype=bool), np.flatnonzero(np.isfinite(values))
     if len(rows) < 3 * STUCK:
         return marked

@@ -26,10 +26,7 @@ SLOPES: dict[NoiseKind, float] = {"phase": -1.0, "white": -0.5, "flicker": 0.0, 
 
 @dataclass(frozen=True)
 class AllanDeviation:
-    """Overlapping Allan deviation: `tau` (s), `deviation`, equivalent `degrees_of_freedom`, `low` and `high`, all (k,).
-
-    `noise` is the kind of noise that dominates at each τ, from the local slope; `confidence` is that of the band.
-    """
+    """Overlapping Allan deviation at `tau` (s) with its band, degrees of freedom, and the kind of noise that dominates there, (k,)."""
 
     tau: Array
     deviation: Array
@@ -48,11 +45,9 @@ class AllanDeviation:
 
 @dataclass(frozen=True)
 class NoiseCoefficients:
-    """N, B, K of σ²(τ) = N²/τ + 0.664² B² + K² τ/3 and their standard uncertainties.
+    """N, B, K of σ²(τ) = N²/τ + 0.664² B² + K² τ/3 and their standard uncertainties, of a 0 the size that could hide.
 
-    A coefficient that the data do not show is 0, and its uncertainty is then the size that one standard deviation
-    of the fit could hide. `misfit` is the rms of (measured/fitted variance − 1) over its expectation √(2/EDF):
-    about 1 when the three kinds of noise explain the curve.
+    `misfit`: rms of (measured/fitted variance − 1) over √(2/EDF), about 1 when the three kinds explain the curve.
     """
 
     N: float
@@ -80,11 +75,7 @@ def allan_deviation(
     confidence: float = 0.683,
     factors: Sequence[int] | None = None,
 ) -> AllanDeviation:
-    """Compute the overlapping Allan deviation of equally spaced rate samples.
-
-    σ²(m τ₀) = Σ (x_{i+2m} − 2 x_{i+m} + x_i)² / (2 (m τ₀)² (n + 1 − 2m)), x the running integral of the rate.
-    The longest τ is a third of the record unless the `factors` m are given; `confidence` is that of the band.
-    """
+    """σ²(m τ₀) = Σ (x_{i+2m} − 2 x_{i+m} + x_i)² / (2 (m τ₀)² (n + 1 − 2m)), x the integral of even samples; τ to a third of them."""
     y = np.asarray(rate, dtype=np.float64)
     if y.ndim != 1 or y.size < 9:
         raise CompensationError(f"an Allan deviation needs at least 9 samples in a row, not {y.size}; record longer.")
@@ -136,11 +127,7 @@ def equivalent_freedom(noise: NoiseKind, n: int, m: int) -> float:
 
 
 def fit_noise(allan: AllanDeviation) -> NoiseCoefficients:
-    """Fit N, B, K to an Allan deviation.
-
-    Least squares on σ²/σ²_fit with weights EDF/2, non-negative and reweighted until it settles. The uncertainties know
-    that points of the curve share their samples, and grow with the misfit where three kinds of noise do not suffice.
-    """
+    """Fit N, B, K by non-negative least squares on σ²/σ²_fit, weights EDF/2; errors know shared samples and grow with the misfit."""
     if allan.tau.size < 5:
         raise CompensationError(
             f"fitting N, B and K needs at least five values of τ, not {allan.tau.size}; record longer."
@@ -169,10 +156,7 @@ def fit_noise(allan: AllanDeviation) -> NoiseCoefficients:
 
 
 def _correlation(allan: AllanDeviation, c: Array) -> Array:
-    """Correlation between the points of the curve, which share their samples, under the fitted noise.
-
-    cov(σ²_i, σ²_j) ∝ ∫ S² |H_i|² |H_j|² df with |H|² = 2 sin⁴(πfτ)/(πfτ)² and S = 2 N² + B²/(πf) + 2 K²/(2πf)².
-    """
+    """Correlation of points that share samples, cov(σ²_i, σ²_j) ∝ ∫ S² |H_i|² |H_j|² df, |H|² = 2 sin⁴(πfτ)/(πfτ)²."""
     f = np.geomspace(0.02 / allan.tau[-1], 0.5 / allan.tau[0], 8000)
     S = 2 * c[0] + c[1] / (np.pi * f) + 2 * c[2] / (2 * np.pi * f) ** 2
     angle = np.pi * np.outer(allan.tau, f)
@@ -182,11 +166,7 @@ def _correlation(allan: AllanDeviation, c: Array) -> Array:
 
 
 def _identify(tau: Array, deviation: Array) -> tuple[NoiseKind, ...]:
-    """Name the noise whose slope is nearest to the local slope of the curve over about an octave either side.
-
-    Quantisation (phase noise) can only rule from the shortest τ on: later, a slope of −1 is chance, and its many degrees
-    of freedom would give that chance a weight.
-    """
+    """Name the noise of the slope over about an octave either side; quantisation (−1) only from the shortest τ on."""
     u, v = np.log2(tau), np.log2(np.maximum(deviation, 1e-300))
     apart = u - u[:, None]
     near = np.abs(apart) <= 1.0

@@ -16,10 +16,7 @@ SETTLED = 0.01
 
 @dataclass(frozen=True)
 class StartUp:
-    """Course of a start: `time` (s), `amplitude` over the command, `phase_error` (rad), `offset` of the oscillator (rad/s).
-
-    `locked` and `ready` are the times (s) from which the phase stays within 5° and the amplitude within 1 %, else NaN.
-    """
+    """Course of a start: `amplitude` over the command, `phase_error` (rad), `offset` (rad/s); `locked` within 5°, `ready` within 1 % (s)."""
 
     time: Array
     amplitude: Array
@@ -39,11 +36,9 @@ def start_up(
     seconds: float | None = None,
     most_steps: int = 200_000,
 ) -> StartUp:
-    """Start the vibration from almost nothing: nothing is linearised here.
+    """Start the vibration from almost nothing, a quarter cycle off: nothing is linearised here.
 
-    Ż = −Z/τ − i (ν − ω + ω_n) Z + u, Z the amplitude in the phase of the oscillator, u the drive in its phase, at most
-    `headroom` times what holds the amplitude. The phase loop reads arg Z at any amplitude, its integral starts at 0, and what
-    swings at the start is a quarter cycle off.
+    Ż = −Z/τ − i (ν − ω + ω_n) Z + u, the drive u at most `headroom` times what holds the amplitude.
     """
     if not headroom > 1:
         raise CompensationError(f"the drive reaches {headroom:g} of the commanded amplitude; it must exceed 1.")

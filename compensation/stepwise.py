@@ -22,10 +22,7 @@ OWN_PART = 1e-7
 
 @dataclass(frozen=True)
 class SelectionStep:
-    """One step: the `term` that was added (or removed), its F and p, and the model that this leaves.
-
-    `criterion` is BIC = m ln(SSE/m) + p ln m; smaller is better.
-    """
+    """One step: the `term` added (or removed), its F and p, the model it leaves, and BIC = m ln(SSE/m) + p ln m."""
 
     added: bool
     term: str
@@ -57,11 +54,7 @@ def select_stepwise(
     *,
     shared: bool = False,
 ) -> StepwiseSelection:
-    """Select among candidate columns by partial F-tests; `forced` ones are in, a term's `parents` before it.
-
-    `shared`: the entry level is divided by the number of candidates that compete at the step, so that the chance of any
-        term entering where there is nothing is at most `enter`.
-    """
+    """Select candidate columns by partial F-tests after the forced ones and a term's parents; `shared`: candidates share the level."""
     if not 0 < enter <= remove < 1:
         raise CompensationError(f"levels must satisfy 0 < entry ≤ removal < 1, not {enter:g} and {remove:g}.")
     m, q = forced.shape

@@ -1,8 +1,4 @@
-"""Transfer functions with real or complex coefficients, as values: response, poles, time simulation.
-
-Demodulated gyro dynamics have complex coefficients, because the carrier frequency enters as s + jω. The common
-control libraries drop imaginary parts, so the few operations that are needed are written out here.
-"""
+"""Transfer functions with real or complex coefficients (of demodulated dynamics), as values: response, poles, time simulation."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -96,10 +92,7 @@ class TransferFunction:
         return TransferFunction(*pair)
 
     def realise(self) -> tuple[Complex, Complex, Complex, complex]:
-        """Return A, B, C, D of ẋ = A x + B u, y = C x + D u, with W(s) = C (s − A)⁻¹ B + D.
-
-        The companion form is written in time units of the fastest pole, which keeps its entries of order one.
-        """
+        """Return A, B, C, D of ẋ = A x + B u, y = C x + D u: the companion form in time units of the fastest pole."""
         n = len(self.denominator) - 1
         if len(self.numerator) > n + 1:
             raise CompensationError("the numerator has a higher degree than the denominator: not causal.")
@@ -119,10 +112,7 @@ class TransferFunction:
         return np.asarray(scale * A, complex), np.asarray(scale * B, complex), C, D
 
     def simulate(self, time: ArrayLike, values: ArrayLike, *, settled: bool = False) -> NDArray[Any]:
-        """Return the output for an input that is linear between its samples, propagated exactly.
-
-        An even grid is fast, any other is followed step by step; `settled` starts at rest under the first value.
-        """
+        """Return the output for an input linear between samples, exactly; `settled` starts at rest under the first value."""
         t, u = np.asarray(time, dtype=float), np.asarray(values)
         check_time(t)
         if u.shape != t.shape or not np.all(np.isfinite(u)):

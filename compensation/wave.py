@@ -76,10 +76,7 @@ class StandingWave:
         )
 
     def mean_rate(self, rate: float) -> float:
-        """Mean indicated rate (rad/s) of a free wave: sign(Ω) √(Ω² − Ω_d²), and 0 where it locks, |Ω| ≤ Ω_d.
-
-        The angle obeys θ̇ = k [Ω + Ω_d sin 2n(θ − θ_τ)] with Ω_d = Δ(1/τ)/(2 n k).
-        """
+        """Mean rate (rad/s) of a free wave: sign(Ω) √(Ω² − Ω_d²), 0 where it locks, |Ω| ≤ Ω_d = Δ(1/τ)/(2 n k)."""
         most = abs(float(self.damping_split)) / (2 * self.coupling)
         return float(np.sign(rate) * np.sqrt(max(rate**2 - most**2, 0.0)))
 

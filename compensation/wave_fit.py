@@ -71,8 +71,7 @@ def fit_whole_angle(
 ) -> WaveFit:
     """Fit splits, axes, gain ratio, skew and phase error to a whole-angle run.
 
-    `angle` is measured and unwrapped (rad); `rate` indicated (rad/s), each the mean to the next row, without what is
-    commanded of the turn; `coupling` n k; decay (1/s), frequency (rad/s), quadrature (1/s) as in `LoopRun`.
+    `angle` is measured and unwrapped (rad), `rate` the mean to the next row without what is commanded, `coupling` n k.
     """
     t, theta, indicated = read_columns(time=time, angle=angle, rate=rate)
     step = require_regular(t, "the fit of a whole-angle run")
@@ -133,10 +132,7 @@ def fit_whole_angle(
 
 
 def _widen(estimates: dict[str, tuple[float, float]], harmonic: int, coupling: float) -> dict[str, tuple[float, float]]:
-    """Add what formulas of first order leave out: of the size of the squares of the errors found, over 1/τ where damping is.
-
-    So a bias of drive or damping, errors times Δ(1/τ), is left in the rate.
-    """
+    """Add what formulas of first order leave out: of the size of the squares of the errors found, over 1/τ where damping is."""
     squares = sum(estimates[name][0] ** 2 for name in ("gain_ratio", "skew", "phase_error") if name in estimates)
     scale = {name: estimates[name][0] for name in ("decay", "damping_split", "frequency_split") if name in estimates}
     loss = scale.get("decay", scale["damping_split"])
@@ -247,10 +243,7 @@ def _turned(
 def _join(
     S: Array, S_cov: Array, driven: tuple[Array, Array, float, float] | None, W: tuple[Array, Array] | None
 ) -> tuple[Array, Array, tuple[float, float] | None]:
-    """Return C with its covariance and ε: what drive and turn say of damping together, by their precision.
-
-    2 S_sin = C₁ − ε W₁ and −2 S_cos = C₂ − ε W₂; the drive says C₁, C₂ themselves.
-    """
+    """Return C, its covariance and ε by drive and turn together: 2 S_sin = C₁ − ε W₁ and −2 S_cos = C₂ − ε W₂."""
     flip = np.array([2.0, -2.0])
     turned, turned_cov = flip * S, np.outer(flip, flip) * S_cov
     if driven is None or W is None:

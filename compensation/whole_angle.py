@@ -40,11 +40,9 @@ def simulate_whole_angle(
     angle: float = 0.0,
     generator: np.random.Generator | None = None,
 ) -> LoopRun:
-    """Run a gyro in whole-angle mode, its loops settled at the first row.
+    """Run a gyro in whole-angle mode, its loops settled at the first row; `rate` and commanded turn (rad/s) are linear between rows.
 
-    `precession` is the commanded turn against the shell (rad/s), linear between rows as `rate` is. Of the run
-        `angle` is the measured azimuth at the row, unwrapped; `rate` the indicated rate to the next row, what is not
-        commanded of the turn over k; the other values are means from the row to the next.
+    The run's `angle` is measured at the row, unwrapped; all else is the mean to the next, `rate` what is not commanded, over k.
     """
     t = np.asarray(time, dtype=float)
     samples = samples_in_row(t, loops)
@@ -164,10 +162,7 @@ class _Course:
         return psi + (seen - psi + math.pi) % (2 * math.pi) - math.pi
 
     def forces(self, psi: float, command: float, means: Means) -> tuple[complex, complex]:
-        """The forces along and across the wave that commands (along a, across command + i quadrature) become.
-
-        A stiffness that nulls the quadrature is no force, and goes through no channel.
-        """
+        """The forces along and across the wave that commands (along a, across + i quadrature) become; a stiffness is none."""
         along, across = means[0], complex(command, 0.0 if self.stiff else means[1])
         if self.ideal:
             return along, across

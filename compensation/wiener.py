@@ -45,11 +45,9 @@ def design_wiener_filter(
     weight: Spectrum | None = None,
     cross: CrossSpectrum | None = None,
 ) -> WienerFilter:
-    """Return the causal filter of least error variance behind `gyro`: eqs. (31)–(34).
+    """Return the causal filter of least error variance behind `gyro`, eqs. (31)–(34); `wanted` H(s), `weight` R(s), `cross` S_φΩ(s).
 
-    With D D* = W S_Ω W* + W S_φΩ + S_Ωφ W* + S_φ, Γ Γ* = R and T = Γ H (S_Ω W* + S_φΩ)/D*, the optimum of
-    E R|ε|², ε = (G W − H) Ω + G φ, is G = Γ⁻¹ (T₀ + T₊) D⁻¹.
-    `wanted` is H(s): 1, a stable filter, or s for the angular acceleration; `weight` R(s), `cross` S_φΩ(s).
+    ε = (G W − H) Ω + G φ: G = Γ⁻¹ (T₀ + T₊) D⁻¹, D D* = W S_Ω W* + W S_φΩ + S_Ωφ W* + S_φ, Γ Γ* = R, T = Γ H (S_Ω W* + S_φΩ)/D*.
     """
     require_possible(rate, noise, cross)
     if not gyro.is_real or not gyro.is_stable:

@@ -1,7 +1,4 @@
-"""Resonator mechanics: materials, meridians, derivation, shell modes.
-
-The names of `__init__.pyi` can be taken from here; each is imported when it is first used.
-"""
+"""Resonator mechanics: materials, meridians, derivation, shell modes; each name of `__init__.pyi` is imported when first used."""
 
 import lazy_loader
 

@@ -29,10 +29,7 @@ class Layout:
 
 
 def lay_system(resonator: Resonator, n: int, level: Level, alongside: tuple[int, ...] = ()) -> System:
-    """Lay out, number and tabulate a resonator.
-
-    The elements suit the harmonics `alongside` too, and are the same for all of them.
-    """
+    """Lay out, number and tabulate a resonator, in elements that suit the harmonics `alongside` too and are the same for all of them."""
     rigid = 0 if resonator.support != "free" or n > 1 else 2
     return assemble(resonator, lay_resonator(resonator, n, level, alongside), n, level, rigid)
 

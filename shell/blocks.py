@@ -106,9 +106,8 @@ def find_boundary(mesh: Mesh, solid: Solid, ties: tuple[Tie, ...]) -> Support:
 
 
 def number_functions(mesh: Mesh, degree: int) -> tuple[Index, Array, int]:
-    """Numbers and signs (cells, functions) of the hierarchic functions: of vertices, edges, then insides; and their count.
-
-    An edge taken backwards changes the sign of its odd functions.
+    """Numbers and signs (cells, functions) of the hierarchic functions: of vertices, edges (odd ones backwards: −),
+    insides; and their count.
     """
     inside = degree - 1
     cells, vertices = len(mesh.vertices), mesh.points.shape[1]
@@ -177,10 +176,7 @@ def _regular_on_axis(rows: Rows, own: Index, n: int) -> None:
 
 
 def _follow(rows: Rows, own: Index, tie: Tie, modes: Array) -> None:
-    """Unknowns (places, component, function) that follow the cross-section's modes (places, function, order + 1).
-
-    The cross-section moves along (t, θ, n), the solid along (r, θ, z).
-    """
+    """Unknowns (places, component, function) that follow the cross-section's modes: along (t, θ, n) there, (r, θ, z) in the solid."""
     place = tie.place
     t_r, t_z, n_r, n_z = (float(x[0]) for x in (place.tangent_r, place.tangent_z, place.normal_r, place.normal_z))
     turn = np.array([[t_r, 0.0, n_r], [0.0, 1.0, 0.0], [t_z, 0.0, n_z]])

@@ -1,8 +1,6 @@
 """Lowest eigenpairs of K x = λ M x by Cholesky, element by element, and a Krylov subspace of K⁻¹ M.
 
-λ_min/λ_max of a thin shell is about (h/R)², so dense eigensolvers lose the digits that matter. Here K is only ever
-inverted: unknowns that live in one element are eliminated there, the rest by one band Cholesky factor, and the
-subspace sees K⁻¹ alone, free of cancellation. The frequency itself is taken elsewhere, from strains.
+λ_min/λ_max of a thin shell is about (h/R)², so dense eigensolvers lose the digits that matter; here K is only inverted.
 """
 
 from dataclasses import dataclass
@@ -161,11 +159,8 @@ class ElementMass:
 def lowest_pairs(factor: Factor, mass: Mass, count: int, accuracy: float) -> tuple[Array, Array]:
     """The `count` lowest eigenvectors as columns, M-orthonormal, lowest first, and what is left undone of each eigenvalue, relative.
 
-    Krylov subspaces of K⁻¹ M: block Lanczos with full orthogonalisation. Inverse iteration gains the ratio of two eigenvalues at a
-    step; the best combination of its steps gains about exp(4 √(gap)) for the same work, which is what neighbouring modes of a thin
-    shell ask for. It stops where the relative error of the eigenvalues is `accuracy`: a Ritz vector x of K⁻¹ M with value θ leaves
-    r = K⁻¹ M x - θ x. Its angle to the eigenvector is at most |r| over the distance to the other values, and the error of the
-    eigenvalue the square of that; or simply at most |r|/θ.
+    Block Lanczos of K⁻¹ M with full orthogonalisation gains about exp(4 √(gap)) at a step. A Ritz vector x of value θ
+    leaves r = K⁻¹ M x - θ x; the eigenvalue is off by the square of |r| over the distance to the others, or by |r|/θ at most.
     """
     size = factor.pattern.size
     wide = min(BLOCK + count // 4, size)

@@ -42,10 +42,7 @@ class Elastic:
 
 @dataclass(frozen=True)
 class VaryingElastic:
-    """E (Pa), ν and ρ (kg/m³) along the meridian: numbers or functions of the position 0 ... 1 of the arc length.
-
-    A solid root takes the values of the place where it joins the shell.
-    """
+    """E (Pa), ν and ρ (kg/m³) along the meridian, numbers or functions of the position 0 ... 1; a root takes those where it joins."""
 
     E: float | Callable[[Array], ArrayLike]
     nu: float | Callable[[Array], ArrayLike]

@@ -126,9 +126,7 @@ class Electrodes:
     def pull_in(self) -> float:
         """Factor by which all voltages can grow before the shell, bending in this mode, is pulled onto an electrode.
 
-        On the way q of the mode towards an electrode K q = s² F(q), F = ½ ∫ ε₀ V² w/(g - q w)² dA; s is the largest for which
-        there is a solution. A small electrode alone gives √(8/27) of what the stiffness would balance; a balanced ring the
-        voltage that makes the frequency vanish.
+        The largest s with a solution of K q = s² F(q), F = ½ ∫ ε₀ V² w/(g - q w)² dA; √(8/27) of the balance for a small one.
         """
         return float(np.sqrt(self._bearing(200)))
 
@@ -255,10 +253,7 @@ def trim_voltages(electrodes: Electrodes, wave: complex, limit: float) -> Trim:
 
 
 def reach(electrodes: Electrodes, limit: float) -> float:
-    """The largest relative split that voltages up to a limit (V) can null at any axis.
-
-    Splits that can be made are the sums of x_j z_j, 0 <= x_j <= V², a polygon around 0; this is its inscribed circle.
-    """
+    """The largest relative split that voltages up to a limit (V) can null at any axis: the inscribed circle of Σ x_j z_j, x_j <= V²."""
     _, waves = electrodes.per_square_volt
     normals = np.exp(1j * (np.angle(waves)[:, None] + np.array([-pi / 2, pi / 2]))).ravel()
     support: Array = np.maximum((waves[:, None] * np.conj(normals)).real, 0.0).sum(axis=0)

@@ -150,9 +150,8 @@ def build_family(
 ) -> Family:
     """Interpolate one mode over ranges of dimensions and of Poisson's ratio.
 
-    `build`: values of the axes (axes,) -> Resonator; `slopes`: whether ∂ ln f/∂ν and ∂ ln f/∂ ln h are wanted; `tolerance` of
-    the interpolated frequency, relative, against the full solve; `most`: full solves that may be spent, about; a finer one
-    counts by the square of its unknowns.
+    `build`: (axes,) -> Resonator; `slopes`: ∂ ln f/∂ν and ∂ ln f/∂ ln h too; `tolerance` relative to the full solve;
+    `most` full solves, finer ones counting by the square of their unknowns.
     """
     _check(axes, nu, tolerance, most)
     if theory == "rayleigh":

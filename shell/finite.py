@@ -73,10 +73,7 @@ def squared(H: Array, doubled: bool) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class QuadraticForce:
-    """The force g of u ~ cos nθ on the wave 0 or 2n with the same elements, on its free unknowns.
-
-    Integrals are over the π of cos² 2nθ for the wave 2n and over 2π for the wave 0, as those of the matrices of each.
-    """
+    """The force g of u ~ cos nθ on the wave 0 or 2n with the same elements: integrals over the π of cos² 2nθ, or over 2π."""
 
     stretch: Array  # stretch, turn: its two terms, ½ q : C : e(ψ) and σ_ij u_k,i ψ_k,j
     turn: Array

@@ -51,11 +51,7 @@ def likeness(one: Mode, other: Mode) -> float:
 
 
 def follow(solve: Callable[[float, int], Sequence[Mode]], known: Mode) -> Mode:
-    """Follow the mode `known` from one design to another by its shape.
-
-    Where no mode at the end is like it, the way is halved, so that a shape that changes slowly is followed step by step.
-    solve(place on the way 0 ... 1, count) gives the lowest modes there.
-    """
+    """Follow the mode `known` to another design by its shape, by solve(place 0 ... 1, count); the way is halved where none is like it."""
     return _step(solve, known, 0.0, 1.0, DEEPEST)
 
 

@@ -39,11 +39,9 @@ RELIEF_ERROR = (
 
 @dataclass(frozen=True)
 class Groove:
-    """A cut with sharp corners.
+    """A cut with sharp corners: `face` off the rim's edge, through the wall, or off a face, `position` 0 ... 1 of its middle.
 
-    face : off the edge of the rim, through the wall, or off a face. position : of its middle on the meridian, 0 ... 1 (rim).
-    width : along the circle. length : along the meridian (of a face). depth : along the meridian off the edge, else along the
-    normal. All in m, width and length at the middle surface. A cut that would pass the rim ends there.
+    `width` along the circle, `length` along the meridian, `depth` along it off the edge, else along the normal; m, at the middle surface.
     """
 
     face: Face
@@ -55,11 +53,7 @@ class Groove:
 
 @dataclass(frozen=True)
 class GrooveSplit:
-    """Effect of one cut at the azimuth 0 on a pair, relative to its frequency.
-
-    mass : removed, kg. layer : (f_cos - f_sin)/f by the material that is gone. relief : by the stress relieved beside it.
-    error : standard error of their sum.
-    """
+    """Effect of one cut at the azimuth 0 on a pair, (f_cos - f_sin)/f by `layer` and stress `relief`; `mass` in kg, standard `error`."""
 
     mass: float
     layer: float

@@ -54,10 +54,7 @@ class SparsePolynomial:
     surpluses: Array  # (terms, outputs)
 
     def __call__(self, x: Array, along: int | None = None) -> Array:
-        """Values (m, outputs) at points (m, dimensions), or their derivatives by the coordinate `along`.
-
-        What a point gives does not depend on the other points.
-        """
+        """Values (m, outputs) at points (m, dimensions), or derivatives by the coordinate `along`; no point depends on the others."""
         tables = []
         for axis, column in enumerate(x.T):
             values, slopes = tabulate(column, 1 + max(index[axis] for index in self.indices))
@@ -95,10 +92,7 @@ class Exploration:
         return max((abs(float(self.surpluses[index][0])) for index in self.frontier), default=0.0)
 
     def refine(self, threshold: float, most: int) -> bool:
-        """Grow until no surplus on the frontier exceeds the threshold; False where that is not reached.
-
-        At most about `most` evaluations are spent, and MOST_POINTS along an axis.
-        """
+        """Grow by at most about `most` evaluations until no surplus on the frontier exceeds the threshold; False where it still does."""
         self.polynomial()
         for index in self._quadratic():
             self._settle(index)

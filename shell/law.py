@@ -93,10 +93,7 @@ class FrequencyLaw:
     mount: Mount | None = None  # a base with another expansion than the resonator
 
     def frequency(self, temperature: ArrayLike, *, extrapolate: bool = False) -> Array:
-        """Frequency (Hz) at even temperatures of the resonator (K).
-
-        `extrapolate` continues a little beyond the range, as the trial states of a fit do, instead of raising.
-        """
+        """Frequency (Hz) at even temperatures of the resonator (K), or to `extrapolate` a little beyond the range, as fits try."""
         return np.asarray(np.exp(self.logarithm(temperature, extrapolate=extrapolate)))
 
     def inside(self, temperature: ArrayLike) -> Array:
@@ -166,10 +163,9 @@ class FrequencyLaw:
         return self.mode.along
 
     def sensitivity(self, temperature: float | None = None) -> Array:
-        """What each station of the meridian contributes to d ln f/dT (1/K); they add up to the slope.
+        """What each station of the meridian contributes to d ln f/dT (1/K), stress of uneven expansion and base included.
 
-        The stress that uneven expansion makes is in it; the base is as warm as the station next to it. `temperature` (K) is that of the material's slopes, the
-        reference temperature when absent.
+        They add up to the slope, taken at the reference temperature unless another (K) is given.
         """
         T = self.reference_temperature if temperature is None else temperature
         kinetic, nu, growth, base = self.uneven_slopes(T)
@@ -182,10 +178,7 @@ class FrequencyLaw:
         )
 
     def uneven_slopes(self, temperature: float) -> Array:
-        """What multiplies temperatures weighed with the shares of kinetic energy, ν, expansion and base, 1/K.
-
-        −½ (ρ'/ρ + 3 α), since the mass stays where it is, ν', α, and s α_base.
-        """
+        """What multiplies temperatures weighed with the shares of kinetic energy, −½ (ρ'/ρ + 3 α), ν, ν', expansion, α, and base, 1/K."""
         alpha = float(self.material.value("expansion", temperature))
         density = float(self.material.log_slope("density", temperature))
         base = self.prestress.by_base * (self.mount.expansion if self.mount else alpha)
@@ -287,15 +280,9 @@ def build_law(
     harmonic: int = 2,
     mount: Mount | None = None,
 ) -> FrequencyLaw:
-    """Solve the mode at a few Poisson's ratios and build its frequency law.
+    """Solve the mode at a few Poisson's ratios and build its frequency law over the wanted range (K), within the material's.
 
-    Args:
-        resonator: with its dimensions at the reference temperature (K).
-        lowest, highest: K, wanted range; it ends where the material's does. Where both are one temperature, there is a
-            single solve, and the law does not follow changes of Poisson's ratio.
-        theory: "solid", "shell" or "rayleigh".
-        harmonic: n.
-        mount: the base, if its expansion differs; for the solid theory and n >= 1.
+    A range of one temperature takes a single solve. The mount's expansion is for the solid theory and n >= 1.
     """
     if mount is not None:
         check_mount(resonator, theory, harmonic)

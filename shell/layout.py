@@ -1,8 +1,4 @@
-"""Elements of a meridian: their levels of refinement, and where they break.
-
-Orders and lengths of elements rise together or one by one. Elements break at joints, at knots of the thickness, and beside the layers
-that edges and joints cause.
-"""
+"""Elements of a meridian: their levels of refinement, and their breaks at joints, knots of thickness and layers of edges and joints."""
 
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -22,10 +18,7 @@ LONGEST = 1.6  # element length over the radius
 
 @dataclass(frozen=True)
 class Level:
-    """Polynomial orders: (u, v, w) through the thickness, along the meridian, in blocks; rings around sharp corners.
-
-    No element is longer than `longest` times the radius (and less for n > 4); each is cut into `split`.
-    """
+    """Orders (u, v, w) through the thickness, along the meridian, in blocks; rings at corners; `longest` times the radius, each `split`."""
 
     through: Orders
     along: int
@@ -86,11 +79,9 @@ class Chain:
 
 
 def lay_chain(resonator: Resonator, start: float, stop: float, ends: tuple[End, End], n: int, level: Level) -> Chain:
-    """Break the meridian between two arc lengths into elements.
+    """Break the meridian between two arc lengths into elements as long as the level says, each cut into as many.
 
-    The edge of a shell carries two layers: the three-dimensional one, about 2 h wide, and the bending layer, about
-    5 √(h R). A jump of curvature carries the bending layer on both sides. Each gets its own element where it fits.
-    The level says how long one may be, and into how many each is cut.
+    Edges get elements for the layers of about 2 h and 5 √(h R), jumps of curvature for the latter on both sides.
     """
     length = stop - start
     joints = [s for s in resonator.joints if start + 1e-9 * length < s < stop - 1e-9 * length]

@@ -1,7 +1,4 @@
-"""One law of one material over temperature: its properties, their uncertainty, and what no source states.
-
-Temperatures are in kelvin. Outside a law's range there is an error, never an extrapolation.
-"""
+"""One law of one material over temperature (K): properties, uncertainty, and what no source states; nothing is extrapolated."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -178,11 +175,8 @@ class Material:
         return self.properties[name].deviation[coefficient_names(name).index(coefficient)]
 
     def rescaled(self, reference: float, **given: float) -> "Material":
-        """Return the material with given values at the reference temperature, its laws' shapes kept.
-
-        Deviations and their prior count from that temperature.
-
-        `given`: any of `youngs_modulus`, `poisson_ratio`, `density`; what the law does not state becomes a constant.
+        """Return the material with `given` values (`youngs_modulus`, `poisson_ratio`, `density`) at the reference, from
+        which deviations count.
         """
         target = dict(given)
         properties = dict(self.properties)

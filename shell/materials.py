@@ -1,7 +1,4 @@
-"""Materials by name: published laws with source, range and uncertainty (`materials.toml`), and files of one's own.
-
-The files state degrees Celsius. A property that no source states is refused by name.
-"""
+"""Materials by name: published laws with source, range (°C) and uncertainty (`materials.toml`), and files of one's own."""
 
 import tomllib
 from collections import UserDict

@@ -27,10 +27,8 @@ def hemisphere(
     Args:
         radius: of the middle surface, m.
         thickness: h in m, or [(position, h), ...] along the arc.
-        rim_angle: polar angle where the meridian ends, rad; π closes the sphere.
-        pole_angle: polar angle where it starts, rad; above 0 the pole is open.
+        rim_angle, pole_angle: where the meridian ends and starts, rad; π closes the sphere, above 0 the pole is open.
         support: "free", "clamped-pole", "clamped-rim" or "stem".
-        stem: the solid stem of support "stem".
     """
     _require_positive(radius=radius)
     if not 0 <= pole_angle < rim_angle <= pi + 1e-12:
@@ -48,11 +46,9 @@ def cylinder(
     """A tube, open or with a flat bottom that meets the wall in a square corner.
 
     Args:
-        radius: of the wall's middle surface, m.
-        thickness: of the wall, m, or [(position, h), ...] with position 0 at the foot of the wall and 1 at the rim.
+        radius, thickness: of the wall's middle, m; h or [(position, h), ...] from the foot, 0, to the rim, 1.
         height: from the lower face of the bottom (z = 0) to the rim, m.
-        bottom_thickness: of the bottom plate, m; None for an open tube.
-        clamp_radius: the lower face is held within this radius, m; 0: free.
+        bottom_thickness, clamp_radius: m; None for an open tube; the lower face is held within, 0: free.
     """
     _require_positive(radius=radius, height=height)
     wall = _profile(thickness)
@@ -88,16 +84,10 @@ def bell(
     support: Support = "free",
     stem: Stem | None = None,
 ) -> Resonator:
-    """The bell: hemisphere, cylinder and hyperbola joined smoothly, BVG paper eq. (1).
+    """The bell: hemisphere, cylinder and hyperbola joined smoothly, BVG paper eq. (1), lengths in m.
 
-    x² + z² = R²;  x = R for -L <= z < 0;  x²/R² - (R_b² - R²)(z + L)²/(R² S²) = 1 below, to the mouth x = R_b.
-
-    Args:
-        radius: R, m.
-        thickness: h in m, or [(position, h), ...].
-        cylinder_height, hyperbola_height: L and S, m.
-        mouth_radius: R_b >= R, m.
-        support, stem: as for `hemisphere`.
+    x² + z² = R²;  x = R for -L <= z < 0;  x²/R² - (R_b² - R²)(z + L)²/(R² S²) = 1 below, to the mouth x = R_b >= R. L
+    and S are the heights of cylinder and hyperbola; thickness, support and stem as for `hemisphere`.
     """
     _require_positive(radius=radius, cylinder_height=cylinder_height, hyperbola_height=hyperbola_height)
     if not mouth_radius >= radius:

@@ -54,10 +54,7 @@ def encode_mesh(
 def encode_animation(
     surface: Surface, swing: float, colours: "NDArray[np.uint8] | None" = None, animated: bool = True
 ) -> bytes:
-    """Return a GLB in which the mode swings: one morph target whose weight goes as cos ωt (glTF 2.0).
-
-    With `animated` false it is the still solid at its largest swing. Viewers compute the normals.
-    """
+    """Return a GLB in which the mode swings, one morph target of weight cos ωt (glTF 2.0), or the still solid at its largest swing."""
     if animated and swing == 0:
         raise ShellError("an animation needs a swing other than 0.")
     buffers = _Buffers()

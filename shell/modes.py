@@ -107,10 +107,7 @@ class Mode:
 
 @dataclass(frozen=True)
 class Sensitivities:
-    """Derivatives of ln f: by ln E, by ν (at constant E), by ln ρ, by ln h, and by the logarithm of all other lengths.
-
-    E + rho = 0 and thickness + radius = -1 hold exactly, by dimensions.
-    """
+    """Derivatives of ln f by ln E, ν (at constant E), ln ρ, ln h, and all other lengths; E + rho = 0, thickness + radius = -1."""
 
     E: float
     nu: float
@@ -129,16 +126,8 @@ def solve_modes(
 ) -> tuple[Mode, ...]:
     """The lowest modes of one circumferential harmonic, without rigid motions.
 
-    The polynomial orders rise until what the next functions of every element would still change lies within `tolerance`;
-    that is the error estimate (see shell.surplus), to which thin shells add what double precision loses (shell.refinement).
-
-    Args:
-        resonator: meridian, thickness, support.
-        elastic: E, ν, ρ, constant or varying along the meridian.
-        harmonic: n >= 0.
-        count: number of modes.
-        theory: "solid" (three-dimensional), "shell" (Naghdi) or "rayleigh" (inextensional hemisphere, closed form).
-        tolerance: wanted relative error of the frequency.
+    Orders rise until what the next functions would still change lies within the relative `tolerance`: the error
+    estimate (shell.surplus), to which thin shells add what double precision loses (shell.refinement).
 
     Warns:
         TheoryRangeWarning: Where the theory is outside its range, or the tolerance is out of reach.
@@ -183,9 +172,8 @@ def solve_modes(
 def nearest_mode(
     solve: Callable[[int, int], Sequence[Mode]], own: Mode, harmonics: Iterable[int] = range(5), least: int = 2
 ) -> Mode:
-    """Return the mode nearest in frequency to `own` among some harmonics.
+    """Return the mode nearest in frequency to `own` among some harmonics, each solved until a mode lies above `own`.
 
-    Every harmonic is solved until a mode lies above `own`: the nearest below and above are then both known.
     solve(harmonic, count) gives at least the `count` lowest modes of a harmonic, in order of frequency.
     """
     others: list[Mode] = []

@@ -1,8 +1,6 @@
 """The outline of a resonator's cross-section, with the displacement of a mode: the basis of pictures and meshes.
 
-The outline is made of the free sides of the solver's own elements: the two faces of the shell, its ends, and the sides
-of the solid cells of roots and corners that no other element shares. So it is the real solid: shell with its thickness,
-rim, corners, fillets and stem.
+It is made of the free sides of the solver's own elements: the real solid with rim, corners, fillets and stem.
 """
 
 from collections.abc import Iterator
@@ -62,10 +60,7 @@ class Outline:
 
 
 def trace_outlines(resonator: Resonator, spacing: float, mode: "Mode | None" = None) -> tuple[Outline, ...]:
-    """The outlines of a resonator's section, the outer one first; a closed shell has a second one around its cavity.
-
-    `spacing` (m) is the wanted distance of points; the amplitudes are scaled so that the largest displacement is 1.
-    """
+    """The outlines of a section, the outer one first, points `spacing` (m) apart; amplitudes have a largest displacement of 1."""
     if mode is not None and mode.solution is None:
         raise ShellError(f"theory '{mode.theory}' gives no shape through the thickness: use theory solid or shell.")
     if mode is not None and mode.resonator != resonator:

@@ -19,11 +19,7 @@ SHRINK = 0.18  # size of one ring of cells around a sharp corner over the ring o
 
 @dataclass(frozen=True)
 class Patch:
-    """A curved quadrilateral and its cells.
-
-    The four sides map [0, 1] to (r, z): `bottom` and `top` run along x, `left` and `right` along y. A cell is four
-    points of the unit square, in the order (ξ, η) = (-1, -1), (1, -1), (-1, 1), (1, 1).
-    """
+    """A curved quadrilateral, its sides [0, 1] -> (r, z), and its cells: four points of the unit square, (-1, -1), (1, -1), (-1, 1), (1, 1)."""
 
     bottom: Path
     top: Path
@@ -71,10 +67,7 @@ def layers(steps: tuple[float, ...], cuts: tuple[float, ...] = (1.0,)) -> tuple[
 
 
 def rings(steps: tuple[float, ...]) -> tuple[Cell, ...]:
-    """Rings of two cells around the corner (0, 0) between the falling steps, and one square at the corner.
-
-    The sides x = 1 and y = 1 stay whole; the sides through the corner are cut as `layers` cuts them.
-    """
+    """Rings of two cells around the corner (0, 0) between the falling steps, and one square at the corner; far sides stay whole."""
     last = steps[-1]
     cells: list[Cell] = [((0.0, 0.0), (last, 0.0), (0.0, last), (last, last))]
     for outer, inner in pairwise(steps):

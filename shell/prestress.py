@@ -34,10 +34,7 @@ DONE = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Prestress:
-    """Effect of thermal expansion on one mode through stress and shape; computed once, on demand.
-
-    In shell theory, and for the harmonic 0, shares are those of the energies alone, and no base is known.
-    """
+    """Effect of thermal expansion on one mode through stress and shape, once, on demand; a shell and n = 0 have energies alone."""
 
     mode: Mode
 
@@ -73,10 +70,7 @@ class Prestress:
 
 
 def expansion_shares(mode: Mode) -> Array:
-    """Contributions of a thermal strain β(s) to δ ln f = Σ share β, the base unchanged.
-
-    E, ν and ρ of the warm material come besides. Free resonators: the shares add up to ½.
-    """
+    """Contributions of a thermal strain β(s) to δ ln f = Σ share β, the base unchanged, beside E, ν and ρ; ½ of a free resonator."""
     solution = solved_as_solid(mode)
     if mode.harmonic < 1:
         raise ShellError("the effect of stress is computed for pairs, harmonics from 1 up.")
@@ -101,7 +95,7 @@ def expansion_shares(mode: Mode) -> Array:
 def mean_answer(mode: Mode) -> tuple[Solution, list[Array]]:
     """The static answer y = K_0⁻¹ g of the harmonic 0 to the quadratic force of a mode, and the wave 0 of q(u, u).
 
-    A static field u_0 that the forces f hold changes ω² ∫ ρ u² dV by 4 y · f (integrals of n over π, of 0 over 2π).
+    Forces f that hold a static field change ω² ∫ ρ u² dV by 4 y · f (integrals of n over π, of 0 over 2π).
     """
     solution = solved_as_solid(mode)
     system = neighbour(mode, 0)

@@ -48,10 +48,7 @@ def nodal(degree: int, points: Array) -> Basis:
 
 
 def hierarchic(degree: int, points: Array) -> Basis:
-    """Two linear end functions, then the integrated Legendre polynomials, which vanish at both ends.
-
-    φ_k = (P_k - P_(k-2)) / √(2 (2k - 1)), k = 2 ... degree. An edge of lower degree is had by dropping functions.
-    """
+    """Two linear end functions, then the integrated Legendre polynomials, φ_k = (P_k - P_(k-2)) / √(2 (2k - 1)), k = 2 ... degree."""
     p = series.legvander(points, degree)
     k = np.arange(2, degree + 1)
     bubbles = (p[:, 2:] - p[:, :-2]) / np.sqrt(2 * (2 * k - 1))

@@ -47,17 +47,10 @@ def rayleigh_frequency(
     phi_1: float = 0.0,
     phi_2: float = pi / 2,
 ) -> NDArray[np.float64]:
-    """Return the natural frequency of the inextensional mode of a spherical shell.
+    """Return the natural frequency of the inextensional mode of a spherical shell, lengths in m, angles in rad; all but n broadcast.
 
-    HRG paper eq. (13): ω² = n²(n²−1)² E h² I / (3 (1+ν) ρ R⁴ J), I and J from `rayleigh_integrals`.
-    It measures the shear modulus, E/(1+ν) = 2G. With an open pole (phi_1 > 0) a second inextensional mode
-    tan⁻ⁿ(φ/2) exists that this formula leaves out.
-
-    Args:
-        n: circumferential harmonic, at least 2.
-        E, nu, rho: array_like, Young's modulus (Pa), Poisson ratio (1), density (kg/m³).
-        h, R: array_like, thickness and radius of the middle surface (m). All five broadcast together.
-        phi_1, phi_2: polar angles (rad) where the shell starts and ends, 0 ≤ phi_1 < phi_2 < π.
+    HRG paper eq. (13): ω² = n²(n²−1)² E h² I / (3 (1+ν) ρ R⁴ J): it measures the shear modulus, E/(1+ν) = 2G. With an
+    open pole (phi_1 > 0) a second mode, tan⁻ⁿ(φ/2), exists that this formula leaves out.
     """
     E, nu, rho, h, R = (np.asarray(value, dtype=float) for value in (E, nu, rho, h, R))
     for name, value in {"Young's modulus": E, "density": rho, "thickness": h, "radius": R}.items():
@@ -71,21 +64,16 @@ def rayleigh_frequency(
 
 
 def rayleigh_bryan_factor(n: int, phi_1: float = 0.0, phi_2: float = pi / 2) -> float:
-    """Return the Bryan factor: the angle by which the standing wave lags behind the rotating shell, per angle of rotation.
+    """Return the Bryan factor: the angle by which the wave lags behind the rotating shell, per angle of rotation.
 
-    The Coriolis energy of the mode over its kinetic energy: K = N / J = 2 ∫ sin³φ tan²ⁿ(φ/2) dφ / J
-    (`shell.derivation.coriolis`); 0.27699 for n = 2 on the hemisphere.
+    K = N / J = 2 ∫ sin³φ tan²ⁿ(φ/2) dφ / J (`shell.derivation.coriolis`); 0.27699 for n = 2 on the hemisphere.
     """
     shape = rayleigh_integrals(n, phi_1, phi_2)
     return shape.N / shape.J
 
 
 def rayleigh_log_derivatives(n: int, nu: float, phi_1: float = 0.0, phi_2: float = pi / 2) -> RayleighLogDerivatives:
-    """Return the derivatives of the logarithm of the frequency (13).
-
-    d ln f = ½ d ln E − ½ d ln ρ − dν/(2(1+ν)) + d ln h − 2 d ln R + ½ [i(φ₂)/I − j(φ₂)/J] dφ₂, where i and j
-    are the integrands of I and J.
-    """
+    """Return d ln f = ½ d ln E − ½ d ln ρ − dν/(2(1+ν)) + d ln h − 2 d ln R + ½ [i(φ₂)/I − j(φ₂)/J] dφ₂, i and j the integrands."""
     if not -1 < nu < 0.5:
         raise ShellError(f"Poisson's ratio must lie between -1 and 0.5 (exclusive), not {nu:g}.")
     shape = rayleigh_integrals(n, phi_1, phi_2)

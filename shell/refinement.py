@@ -124,10 +124,7 @@ def _in_parts(longest: float) -> float:
 
 
 def _wavenumbers(solution: Solution) -> list[Array]:
-    """Wavenumbers along the meridian, 1/m, of bending waves of the mode's frequency at the stations of every chain:
-
-    k⁴ = 12 ρ (1 - ν²) ω²/(E h²), of which n/r runs around.
-    """
+    """Wavenumbers, 1/m, of bending waves at the stations of every chain: k⁴ = 12 ρ (1 - ν²) ω²/(E h²), of which n/r runs around."""
     found = []
     for group, c in zip(solution.system.groups, solution.constants, strict=True):
         if isinstance(group, ShellGroup):
@@ -140,10 +137,7 @@ def _wavenumbers(solution: Solution) -> list[Array]:
 
 
 def _is_resolved(solution: Solution) -> bool:
-    """Whether the degree follows bending waves over its elements.
-
-    Polynomials of degree p begin to converge on a wave over a length L at p = k L/2; before, no surplus tells their error.
-    """
+    """Whether the degree p follows bending waves over its elements, p > k L/2; before, no surplus tells their error."""
     along = solution.system.level.along
     return all(
         np.max(k * group.section.ds) <= along

@@ -1,7 +1,6 @@
 """Mode shapes as pictures, drawn off-screen by pyvista.
 
-VTK ends the whole process with a segmentation fault where the system has no OpenGL, so everything is drawn in a child
-process, and a machine that cannot draw gives a `NoOpenGL` with the remedy.
+VTK ends the process where the system has no OpenGL: a child process draws, and `NoOpenGL` has the remedy.
 """
 
 import io
@@ -37,10 +36,7 @@ class NoOpenGL(RuntimeError):
 
 
 def render_png(scenes: Scene | Sequence[Scene], view: View = "oblique", width: int = 900, height: int = 700) -> bytes:
-    """Return a PNG: the mode at maximum displacement, with the undeformed shape in grey; several scenes stand side by side.
-
-    All share one colour and one length scale; views: "oblique" into the open end, "axis" straight into it, or "side".
-    """
+    """Return a PNG of scenes side by side on one scale, views "oblique", "axis" (into the open end) or "side"."""
     return _draw(scenes, view, (width, height), [1.0])[0]
 
 

@@ -22,13 +22,9 @@ LONGEST_STEM = 100.0  # stem lengths over its radius that are meshed as a solid
 
 @dataclass(frozen=True)
 class Stem:
-    """A solid cylinder on the axis, joined to the dome at the pole.
+    """A solid cylinder on the axis, joined to the dome at the pole, on one side ("inner", "outer") or "both".
 
-    Args:
-        radius: stem radius, m.
-        ends: height z of the clamped end, m; for side "both" the pair (inner, outer).
-        fillet: radius of the root fillet, m; 0 for a sharp corner.
-        side: "inner", "outer" or "both".
+    `ends`: height z of the clamped end, of "both" (inner, outer); `fillet`: radius at the root, 0 if sharp; m.
     """
 
     radius: float
@@ -56,11 +52,7 @@ class Stem:
 
 @dataclass(frozen=True)
 class MeridianPoints:
-    """Samples of the middle surface: arrays of equal shape, lengths in m, curvatures in 1/m.
-
-    `position` is the arc length divided by the whole length (0 at the start, 1 at the rim); `normal_r / r` is the second
-    principal curvature; `thickness_slope` is dh/ds.
-    """
+    """Samples of the middle surface, m and 1/m: `position` 0 ... 1 (rim), `normal_r / r` the second curvature, slope dh/ds."""
 
     position: Array
     arc_length: Array
@@ -95,14 +87,9 @@ class MeridianPoints:
 
 @dataclass(frozen=True)
 class Resonator:
-    """A shell of revolution: middle-surface meridian, thickness along it, support.
+    """A shell of revolution: segments of its meridian, thickness [(position, h in m)] along it, linear between, and support.
 
-    Args:
-        segments: smooth curves, each starting where the one before ends.
-        thickness: (position, h) pairs, position in 0 ... 1 of the arc length, h in m, linear between them.
-        support: what is held; a clamp holds the edge through its thickness.
-        stem: only with support "stem".
-        clamp_radius: with support "clamped-face", the lower face is held within this radius, m.
+    A clamp holds the edge through its thickness, "clamped-face" the lower face within the clamp radius, m.
     """
 
     segments: tuple[Curve, ...]

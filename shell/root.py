@@ -230,8 +230,7 @@ def _fillet(
 def _stem(radii: list[float], base: Base, end: float, steps: tuple[float, ...], ring_count: int, n: int) -> list[Patch]:
     """The stem itself, from its root to the clamped end, in columns between the radii.
 
-    A motion with n > 1 dies out as exp(-1.8 z/a) or faster (measured: by e over less than a/2): beyond a length of
-    `QUIET` radii the clamp is not felt, and its edge needs no small cells.
+    A motion with n > 1 dies out as exp(-1.8 z/a) or faster: beyond `QUIET` radii the clamp is not felt.
     """
     length = min(abs(end - _point(base.path, arc)[1]) for arc in (base.arcs[0], base.arcs[-1]))
     quiet = n > 1 and length > QUIET * radii[0]
@@ -294,10 +293,7 @@ def _at_radius(surface: Callable[[Array], Planar], r: float, s_most: float) -> f
 
 
 def _crossing(value: Callable[[Array], Array], low: float, high: float) -> float:
-    """Where a rising function vanishes: the interval of 256 on which it does, again and again.
-
-    scipy.optimize.brentq does the same, but its package takes half of what it takes to start and solve.
-    """
+    """Where a rising function vanishes, by intervals of 256 (importing scipy.optimize takes half of what a start and solve take)."""
     for _ in range(7):  # 256^7 = 2^56
         places = np.linspace(low, high, 257)
         k = max(int(np.searchsorted(value(places[1:-1]), 0.0)), 0)

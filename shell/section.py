@@ -62,10 +62,7 @@ def _shell_patches(
 
 
 def draw_section(patches: Sequence[ShapePatch], harmonic: int, title: str) -> "Figure":
-    """Return the meridian section at rest and at full swing, (r, z) in mm; `patches` as `Mode.shape` gives them.
-
-    Right of the axis the azimuth θ = 0, where u_r and u_z are largest; left of it θ = 180°, where cos nθ is (−1)ⁿ.
-    """
+    """Return the meridian section at rest and at full swing, (r, z) in mm, with θ = 0 on the right and 180° on the left."""
     from matplotlib.figure import Figure
 
     extent = max(float(max(np.max(p.r), np.ptp(p.z))) for p in patches)

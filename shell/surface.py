@@ -60,10 +60,7 @@ class Surface:
 def build_surface(
     resonator: Resonator, mode: "Mode | None" = None, spacing: float | None = None, count: int | None = None
 ) -> Surface:
-    """Turn the section of a resonator into its surface.
-
-    Points lie `spacing` (m) apart along the outline, R/50 unless given; `count` (160) around, up to a multiple of 4n.
-    """
+    """Turn the section of a resonator into its surface: points R/50 or `spacing` (m) apart, and `count` around, up to a multiple of 4n."""
     n = mode.harmonic if mode else 0
     around = 4 * max(n, 1) * int(np.ceil((count or 160) / (4 * max(n, 1))))
     return revolve(trace_outlines(resonator, spacing or resonator.size / 50, mode), around, n)

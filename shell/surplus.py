@@ -61,11 +61,7 @@ def estimate_errors(resonator: Resonator, elastic: Elastic | VaryingElastic, sol
 
 
 def _correction(k: int, values: Array, mass: Array, S: Array, C: Array, T: Array) -> float:
-    """What the answers x of all modes and the other modes u take off the energy of mode k, λ_k ∫ ρ u² dV.
-
-    One step of Newton's method in the space of the u_j, j ≠ k, and the x_j: bᵀ A⁻¹ b with A of K - λ_k M there and b of
-    (K - λ_k M) u_k, which is nothing on the u_j and S_jk on the x_j.
-    """
+    """What the answers x and the other modes u take off λ_k ∫ ρ u² dV: bᵀ A⁻¹ b, A of K - λ_k M, b of (K - λ_k M) u_k."""
     if len(values) == 1:
         return max(abs(float(S[0, 0] ** 2 / (S[0, 0] - values[0] * T[0, 0]))), float(S[0, 0]))
     others = np.delete(np.arange(len(values)), k)
@@ -124,11 +120,7 @@ class ShellExtension:
         return _inner(x.T @ loads, shares, moved, answers, constants.rho[..., None] * self.table.volume, self.factor)
 
     def _yield_to(self, loads: Array, constants: Constants) -> Array:
-        """K⁻¹ loads.
-
-        One material differs from `REFERENCE` in λ/G alone, in all strain energies by a factor between 1 and
-        (3 λ + 2 G)/(3 λ_0 + 2 G): a few conjugate gradients from the reference's factor, which only geometry changes.
-        """
+        """K⁻¹ loads, by conjugate gradients from the factor of `REFERENCE`: another material differs by λ/G alone."""
         lam, G = (field.mean(axis=1) for field in constants.lame)
         ratio = float(lam[0] / G[0])
         spread = max((3 * ratio + 2) / (3 * REFERENCE + 2), (3 * REFERENCE + 2) / (3 * ratio + 2))

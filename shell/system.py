@@ -37,8 +37,7 @@ class ShellGroup:
     def matrices(self, integrate: Callable[[Array, Array], Array], stations: Array, first: int) -> Array:
         """Integrals over the elements from `first` on of their station matrices, in the unknowns that are solved for.
 
-        In the small elements at a free edge these are the values at the inner node and differences from them: `anchors`
-        are such (element, node). Else the layers' stiff shear would drown the bending as (R/h)³ instead of (R/h)².
+        At a free edge (`anchors`) these are differences: else stiff shear would drown the bending as (R/h)³, not (R/h)².
         """
         found = integrate(stations, self.table.along)
         for element, node in self.anchors:
@@ -124,10 +123,7 @@ Group: TypeAlias = ShellGroup | SolidGroup
 
 @dataclass(frozen=True, eq=False)
 class System:
-    """Every element of a resonator at one harmonic and level, with the constraints between raw and free unknowns.
-
-    raw = constraint @ free. What costs geometry is kept for the next material or temperature where it is not too large.
-    """
+    """Every element of a resonator at one harmonic and level; raw = constraint @ free. Geometry is kept for the next material."""
 
     groups: tuple[Group, ...]
     constraint: "scipy.sparse.csr_matrix"
@@ -185,10 +181,7 @@ class System:
     def operators(
         self, constants: Sequence[Constants], shift: float = 0.0, once: bool = False, over: float = 1.0
     ) -> tuple[list[Array], "Inertia"]:
-        """Stiffness, plus `shift` (1/s²) times mass, of every element in the order of `pattern`, and the mass, both divided by `over`.
-
-        What costs geometry is kept for the next material unless they are wanted but `once`.
-        """
+        """Stiffness, plus `shift` (1/s²) times mass, of every element, and the mass, `over` a divisor; geometry is kept unless wanted `once`."""
         uniform = not once and self.is_small and are_uniform(constants)
         K: list[Array] = []
         M: list[Array] = []

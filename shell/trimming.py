@@ -28,10 +28,7 @@ DIRECTIONS = 24  # sides of the polygon that stands for a circle
 
 @dataclass(frozen=True)
 class SplitWave:
-    """A split of one harmonic as a vector, measured or expected: its most probable wave, and its error.
-
-    harmonic : n. frequency : f, Hz. wave : (f_fast - f_slow)/f exp(2 i n α_fast). error : standard error of either part of it.
-    """
+    """A split as a vector (f_fast - f_slow)/f exp(2 i n α_fast), most probable, with the standard error of either part."""
 
     harmonic: int
     frequency: float
@@ -125,11 +122,9 @@ def plan_trim(
     gain_error: float = 0.03,
     unbalance: Mapping[int, complex] | None = None,
 ) -> TrimPlan:
-    """The next round of cuts, which brings the splits towards the goal and not beyond.
+    """The next round of cuts, which brings the splits towards the goal (Hz each) and not beyond.
 
-    `readings` are measured splits, one per harmonic, `goal` (Hz) is that of each. Relative standard errors: `removal_error` of
-    the mass of each cut, `gain_error` that all cuts share, of what a mass does and of the removal rate. `unbalance`:
-    k -> u_k = Σ m exp(i k θ) of the resonator, kg, for k of 1 ... 3 as far as known.
+    Relative standard errors: `removal_error` of each cut's mass, `gain_error` common to all; `unbalance`: k -> Σ m exp(i k θ), kg.
     """
     if not goal > 0:
         raise ShellError("the goal is a positive split in Hz.")

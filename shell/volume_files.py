@@ -1,7 +1,4 @@
-"""Mesh files for finite-element programs: VTK (.vtu), Gmsh (.msh) and the input of Abaqus and CalculiX (.inp), all in metres.
-
-What the support holds is the physical group or set "held"; the body is "resonator".
-"""
+"""Mesh files, VTK (.vtu), Gmsh (.msh), Abaqus and CalculiX (.inp), in metres, with "held" and "resonator" as sets."""
 
 import io
 from typing import Literal

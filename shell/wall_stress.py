@@ -23,10 +23,7 @@ class WallStress:
 
 
 def find_wall_stress(mode: Mode, first: float, last: float, face: Literal["inner", "outer"] = "outer") -> WallStress:
-    """Return σ_φφ and σ_θθ of a free face between two positions of the meridian, E/(1 − ν²) (ε_φ + ν ε_θ) and its like.
-
-    Positions are 0 … 1 of the arc length of the shell; means are by area.
-    """
+    """Return σ_φφ and σ_θθ of a free face, means by area between two positions: E/(1 − ν²) (ε_φ + ν ε_θ) and its like."""
     from shell.damping.faces import shell_faces
 
     if mode.solution is None:

@@ -1,7 +1,4 @@
-"""The place where mechanics, heat and compensation meet: instruments, records, reports, commands.
-
-The names of `__init__.pyi` can be taken from here; each is imported when it is first used.
-"""
+"""Where mechanics, heat and compensation meet; each name of `__init__.pyi` is imported when it is first used."""
 
 __version__ = "0.1.0"
 

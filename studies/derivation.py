@@ -1,7 +1,4 @@
-"""Chain of equations of a derivation as text for a terminal, as LaTeX and on one line each.
-
-The chains are rows (number, title, left sides, right sides) of `shell.derivation` and `compensation.derivation`.
-"""
+"""Chain of equations, rows (number, title, left sides, right sides), as text for a terminal, as LaTeX and on one line each."""
 
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence

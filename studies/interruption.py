@@ -1,9 +1,4 @@
-"""Ctrl-C and a request to end (SIGTERM): heard at once, and again until they are.
-
-Python raises KeyboardInterrupt wherever it happens to be. Callbacks of compiled modules, finalisers and modules that are
-being loaded drop it or make another error of it; the work would go on as if nobody had asked. So it is raised again every
-second, except while the first one is on its way: what cleans up is let finish.
-"""
+"""Ctrl-C and a request to end (SIGTERM): raised every second until heard, for compiled modules and finalisers may drop them."""
 
 import signal
 import sys

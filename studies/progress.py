@@ -14,11 +14,7 @@ class Told:
     """What comes next of a work whose length is not known; a context manager that clears its line."""
 
     def __init__(self, what: str, stages: Mapping[str, float] = MappingProxyType({}), shown: bool = True) -> None:
-        """Begin to count the time of `what`.
-
-        Args:
-            stages: The words with which a stage begins, and the part of the time that is usually behind then.
-        """
+        """Begin to count the time of `what`, by the words with which its stages begin and the part of the time usually behind then."""
         self.what, self.stages, self.shown, self.terminal = what, stages, shown, sys.stderr.isatty()
         self.begin, self.next = time.monotonic(), time.monotonic() + FIRST
         self.part = self.before = 0.0  # of the work, now and when this began

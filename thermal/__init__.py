@@ -1,7 +1,4 @@
-"""Lumped thermal networks: chamber profile to temperatures.
-
-The names of `__init__.pyi` can be taken from here; each is imported when it is first used.
-"""
+"""Lumped thermal networks: chamber profile to temperatures; each name of `__init__.pyi` is imported when first used."""
 
 import lazy_loader
 

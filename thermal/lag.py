@@ -24,10 +24,7 @@ def lag(time: ArrayLike, temperature: ArrayLike, time_constant: float, initial: 
 
 
 def scan(decay: Array, forced: Array, start: Array) -> Array:
-    """Run x_{k+1} = decay_k x_k + forced_k from `start`; shapes (N, m), (N, m), (m,) give (N + 1, m).
-
-    The rows x_{k+1} − decay_k x_k = forced_k are a triangular system with one band below its diagonal of ones.
-    """
+    """Run x_{k+1} = decay_k x_k + forced_k from `start`, a banded triangular system; (N, m), (N, m), (m,) give (N + 1, m)."""
     states = np.vstack([start, forced])
     band = np.ones((2, len(states)), order="F")
     for m in range(len(start)):

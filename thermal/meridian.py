@@ -71,11 +71,7 @@ def cut_meridian_table(s: ArrayLike, radius: ArrayLike, thickness: ArrayLike, co
 
 
 def lump(cells: MeridianCells) -> MeridianCells:
-    """Make one cell of many, joined by the resistance to the mean temperature of an evenly heated shell.
-
-    Even heating sends the share m(s) of the heat, that of the volume beyond s, through every section, so the mean
-    temperature rises by ∫ m² ds / (2π r h) per unit of heat and of conductivity.
-    """
+    """Make one cell of many, joined by ∫ m² ds / (2π r h), m(s) the share of the volume beyond s: the mean of even heating."""
     beyond = np.cumsum(cells.volume[::-1])[::-1] / cells.volume.sum()
     return MeridianCells(
         edge=cells.edge[[0, -1]],
@@ -95,11 +91,9 @@ def describe_meridian(
     exchange: float = 0.0,
     surroundings: str = "",
 ) -> list[Part]:
-    """Return the parts "shell-1" (at the root) … "shell-N" (at the rim) of a network.
+    """Return the parts "shell-1" (at the root) … "shell-N" (at the rim) of a network, the first joined to `root` by K/W.
 
-    `root` is joined to the inner end of the meridian, through `root_resistance` (K/W); `volumetric_capacity` ρ c in J/(m³ K),
-    `conductivity` in W/(m K). The faces exchange radiation with the `surroundings`: `exchange` is the area of that per area of
-    the middle surface, the effective emissivities of both faces added.
+    ρ c in J/(m³ K), conductivity in W/(m K); `exchange` is the radiating area per area of the middle surface, of both faces.
     """
     names = cell_names(cells.count)
     parts: list[Part] = [
@@ -122,11 +116,7 @@ def cell_names(count: int) -> list[str]:
 
 
 def energy_weights(cells: MeridianCells, place: ArrayLike, share: ArrayLike) -> Array:
-    """Give the contributions of places of the meridian to d ln f/dT to the cells, the field linear between middles.
-
-    The change of frequency of a temperature field is then Σ weights (T − T_ref) = δ ln f. Before the first middle and
-    beyond the last the field is even.
-    """
+    """Give the places' contributions to d ln f/dT to the cells, Σ weights (T − T_ref) = δ ln f, linear between middles, even beyond."""
     place = np.asarray(place, dtype=float)
     hats = np.array([np.interp(place, cells.middle, unit) for unit in np.eye(cells.count)])
     weights: Array = hats @ np.asarray(share, dtype=float)

@@ -190,10 +190,7 @@ def assemble(parts: Iterable[Part]) -> Network:
 
 
 def linearise(network: Network, temperature: float) -> Network:
-    """Replace radiation by conduction 4 σ a T³ and capacities by their values at one temperature (K).
-
-    The result describes small departures from a network that is everywhere at `temperature`.
-    """
+    """Replace radiation by conduction 4 σ a T³ and capacities by their values at one temperature (K), for small departures."""
     if not (math.isfinite(temperature) and temperature > 0):
         raise ThermalError(f"a network is linearised at a temperature above 0 K, not at {temperature:g} K.")
     per_area = 4 * Stefan_Boltzmann * temperature**3

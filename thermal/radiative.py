@@ -43,10 +43,7 @@ def integrate(
     initial: ArrayLike | None = None,
     relative_tolerance: float = 1e-8,
 ) -> Transient:
-    """Integrate a network with radiation and capacities that depend on temperature.
-
-    Implicit Runge-Kutta of order 5 (Radau IIA) with the exact Jacobian, restarted at the corners of the profiles.
-    """
+    """Integrate a network with radiation and C(T): Radau IIA of order 5, exact Jacobian, restarted at corners of the profiles."""
     knots = find_corners(network, boundaries)
     jumps = np.concatenate([boundaries[b.name].jumps for b in network.boundaries])
     restarts = knots

@@ -42,11 +42,8 @@ def find_relaxation(network: Network, temperature: float) -> Relaxation:
 def time_constant_sensitivities(network: Network, temperature: float) -> dict[str, Array]:
     """Relative change of every time constant per relative change of each constant of the network.
 
-    d ln τ_k / d ln p = −(1/λ_k) v_kᵀ (∂G/∂ln p − λ_k ∂C/∂ln p) v_k, from the derivative of a simple eigenvalue.
-
-        "capacity NODE", "conductance ONE-OTHER", "exchange ONE-OTHER" to an array (n,) in the order of
-        `find_relaxation`. Capacities sum to 1 in every mode, conductances and exchange areas together to −1.
-        Links that share both ends are counted together.
+    d ln τ_k / d ln p = −(1/λ_k) v_kᵀ (∂G/∂ln p − λ_k ∂C/∂ln p) v_k, by "capacity NODE", "conductance ONE-OTHER",
+    "exchange ONE-OTHER". Capacities sum to 1 in every mode, links (of equal ends together) to −1.
     """
     modes = find_relaxation(network, temperature)
     n = network.count

@@ -84,10 +84,7 @@ def respond(
     departure: Array | None = None,
     longest: float | None = None,
 ) -> ObservedSums:
-    """Temperatures of a network at the rows, with derivatives by every change.
-
-    `weights` (sums, n) of the nodes; `departure` (n,) of the initial state from the steady one at the first values (K).
-    """
+    """Temperatures at the rows, weighed (sums, n), with derivatives by every change; departures (n,) are from the first steady state."""
     rows = np.asarray(time, dtype=float)
     first = {name: float(profile.value[0]) for name, profile in boundaries.items()}
     begin = min(profile.start for profile in boundaries.values())

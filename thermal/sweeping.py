@@ -35,11 +35,7 @@ class SweepError(ThermalError):
 
 @dataclass(frozen=True)
 class Grid:
-    """Knots of a run with their midpoints, and the linear network's modes between them.
-
-    Arrays over "moments" have the shape (3, K, …): start, middle and end of each of the K intervals; what jumps at a
-    knot has its value before the jump at the end and the value after it at the start.
-    """
+    """Knots of a run with their midpoints, and the modes between; (3, K, …) are start, middle and end (before a jump) of intervals."""
 
     knots: Array
     modes: Relaxation

@@ -57,11 +57,9 @@ class Transient:
 
 
 def propagate(network: Network, boundaries: Mapping[str, Profile], initial: ArrayLike | None = None) -> Transient:
-    """Propagate a linear network exactly through piecewise linear boundaries and powers.
+    """Propagate a linear network exactly through piecewise linear boundaries and powers, from `initial` or the first steady state.
 
-    In modal coordinates x = shapesᵀ C T every mode obeys dx/dt = −λ x + u₀ + u₁ s, u linear between the corners of the
-    profiles, so that x = u₀/λ − u₁/λ² + (u₁/λ) s + c e^(−λ s) at the time s after a corner.
-    `initial` temperatures of the nodes: the steady state before the profiles begin unless given.
+    Modes x = shapesᵀ C T obey dx/dt = −λ x + u₀ + u₁ s: x = u₀/λ − u₁/λ² + (u₁/λ) s + c e^(−λ s) after a corner.
     """
     if not network.is_linear:
         raise ThermalError(

@@ -32,10 +32,7 @@ class Rates(NamedTuple):
 
 @cache
 def amplitude_rates() -> sp.Matrix:
-    """Return dX/dt, dY/dt by averaging over one cycle, forces F = Re{F e^{iωt}} among them.
-
-    With X = X_c + i X_s, variation of parameters gives Ẋ_c = −g sin ωt/ω, Ẋ_s = −g cos ωt/ω.
-    """
+    """Return dX/dt, dY/dt by averaging over one cycle: Ẋ_c = −g sin ωt/ω, Ẋ_s = −g cos ωt/ω, with forces F = Re{F e^{iωt}}."""
     parts = {name: sp.symbols(f"{name}_c {name}_s", real=True) for name in "XYFG"}
     cosine, sine = sp.symbols("cosine sine", real=True)  # of ωt
 

@@ -1,7 +1,6 @@
 """The averaged dynamics as one chain of equations, from the oscillator of two patterns to the measured rate.
 
-A row is a step: its number in the paper on demodulated dynamics (empty where it has none), its title, the left sides (names
-parted by spaces, or expressions) and the right sides; 0 says that the left sides vanish.
+A row: its number in the paper (or empty), its title, the left sides (names or expressions) and right sides; 0 vanishes.
 """
 
 from typing import Any, TypeAlias

@@ -35,10 +35,7 @@ def amplitude_equations() -> tuple[sp.Expr, sp.Expr]:
 
 @cache
 def slow_rates() -> sp.Matrix:
-    """Return dA₁/dt, dA₂/dt to leading order where all changes are slow against the carrier.
-
-    Damping 1/τ ± ½ Δ(1/τ), detuning ± ½ Δω, rate, drive and d/dt are of order ε; the order ε of (7) is kept.
-    """
+    """Return dA₁/dt, dA₂/dt to leading order in slow changes: damping 1/τ ± ½ Δ(1/τ), detuning ± ½ Δω, rate, drive."""
     order = sp.Symbol("epsilon", positive=True)
     slow = [sp.Symbol(f"{name}{dots}") for name in "XY" for dots in ("", "'", "''")]
     scaled = {
@@ -79,10 +76,7 @@ def neglected() -> sp.Matrix:
 
 @cache
 def measured_rate() -> sp.Expr:
-    """Return W(s) of eq. (25) from the averaged equations: tuned, settled primary, (s + 1/τ) Y = n k Ω X.
-
-    W(s) = kζ/(s + kζ) with kζ = 1/τ.
-    """
+    """Return W(s) = kζ/(s + kζ) of eq. (25), kζ = 1/τ, from the averaged equations: (s + 1/τ) Y = n k Ω X."""
     _, Y, _, G = amplitudes()
     tuned = {delta_tau: 0, delta_omega: 0, G: 0}
     secondary = sp.solve(s * Y - amplitude_rates()[1].subs(tuned), Y)[0]

@@ -24,10 +24,7 @@ class WienerDerivation:
 
 @cache
 def derive_wiener_filter(noise: Literal["white", "high-pass"]) -> WienerDerivation:
-    """Derive eq. (35) or (36) for W of eq. (25) and the rate (27).
-
-    Δ Δ* = p s⁴ − q s² + r gives Δ = √p s² + √(q + 2√(p r)) s + √r; the causal part is one residue at s = −B.
-    """
+    """Derive eq. (35) or (36): Δ Δ* = p s⁴ − q s² + r has Δ = √p s² + √(q + 2√(p r)) s + √r, the causal part is a residue at −B."""
     a = k * zeta
     square = (B * a) ** 2 + gamma**2 * (a**2 - s**2) * (B**2 - s**2 if noise == "white" else -(s**2))
     p, _, q, _, r = sp.Poly(sp.expand(square), s).all_coeffs()

@@ -1,8 +1,4 @@
-"""Transfer functions of the CVG paper on demodulated dynamics, eqs. (8)–(24), derived from its amplitude equations (7).
-
-The settled primary makes the rate the input of the second of (7), linear with constant, complex coefficients. Where the copy
-prints otherwise: the imaginary part in (19) carries a j, which is a slip.
-"""
+"""Transfer functions of the CVG paper on demodulated dynamics, eqs. (8)–(24), derived from its amplitude equations (7)."""
 
 from functools import cache
 from typing import NamedTuple
@@ -79,10 +75,7 @@ def slow_pole() -> sp.Expr:
 
 @cache
 def responses() -> tuple[sp.Expr, sp.Expr, sp.Expr]:
-    """Return W₂(jλ), eq. (13), and the amplitude and phase of it, eq. (14), for λ + g₂ω > 0.
-
-    (13) is jq₁₀(λ + g₂ω)/(d₁d₂), so that A = q₁₀(λ + g₂ω)/√(|d₁|²|d₂|²) and φ = atan2(Re d₁d₂, Im d₁d₂).
-    """
+    """Return W₂(jλ) = jq₁₀(λ + g₂ω)/(d₁d₂), eq. (13), and (14), A = q₁₀(λ + g₂ω)/√(|d₁|²|d₂|²), φ = atan2(Re d₁d₂, Im d₁d₂)."""
     shifted = lam + omega
     first = k_1**2 - omega**2 + 2 * sp.I * omega * zeta_1 * k_1
     second = k_2**2 - shifted**2 + 2 * sp.I * zeta_2 * k_2 * shifted
@@ -103,10 +96,7 @@ def primary_parts() -> tuple[sp.Expr, sp.Expr]:
 
 @cache
 def real_parts() -> RealParts:
-    """Return the polynomials of eqs. (21), (22), from the two real equations (20).
-
-    With D = a + jb, a = k₂² − ω² + 2k₂ζ₂s + s², b = 2ω(k₂ζ₂ + s), and N = A₁(s + jg₂ω), A₂ = N D*/(a² + b²).
-    """
+    """Return the polynomials of (21), (22) from (20): A₂ = N D*/(a² + b²), D = a + jb, a = k₂² − ω² + 2k₂ζ₂s + s², b = 2ω(k₂ζ₂ + s)."""
     a = k_2**2 - omega**2 + 2 * k_2 * zeta_2 * s + s**2
     b = 2 * omega * (k_2 * zeta_2 + s)
     along, across = s * a + g_2 * omega * b, s * b - g_2 * omega * a

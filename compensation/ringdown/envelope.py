@@ -40,10 +40,7 @@ class Envelope:
 
 
 def find_carrier(samples: ArrayLike, rate: float) -> float:
-    """Return the frequency (Hz) of the largest line of evenly sampled raw data, within 1/1000 of its resolution.
-
-    The spectrum of the strongest stretch of at most 2¹⁸ rows under a Hann window, its peak by the parabola of the logarithm.
-    """
+    """Return the frequency (Hz) of the largest line of evenly sampled raw data: strongest 2¹⁸ rows, Hann window, parabola of the log."""
     x = np.asarray(samples, dtype=np.float64)
     length = min(x.size, CHUNK)
     starts = range(0, x.size - length + 1, max(length, 1))
@@ -147,10 +144,7 @@ def from_lock_in(time: ArrayLike, amplitudes: ArrayLike, carrier: float = 0.0) -
 
 
 def estimate_noise(values: Complex) -> float:
-    """Return the variance of white noise, summed over the channels, from second differences: six times it, no slow signal.
-
-    The median of |n|² of complex noise is ln 2 times its mean.
-    """
+    """Return the variance of white noise, summed over channels, from second differences; the median of |n|² is ln 2 times its mean."""
     return float(np.sum(np.median(np.abs(np.diff(values, 2, axis=1)) ** 2, axis=1)) / (6 * np.log(2)))
 
 

@@ -107,10 +107,7 @@ def fit_decay(envelope: Envelope, terms: Terms = Terms(), starts: Sequence[Guess
 
 
 def drift_shapes(envelope: Envelope, count: int) -> Array:
-    """Legendre polynomials of degree 2, 3, … over the window, less the straight line that fits them best where the decay is strong.
-
-    The weights are the power Σ|z|², so a drift moves neither δ nor its error: δ stays the frequency that a fit without drift gives.
-    """
+    """Legendre polynomials of degree 2, 3, … less the straight line that fits best with weights Σ|z|²: δ and its error stay."""
     y = 2 * (envelope.time - envelope.time[0]) / (envelope.time[-1] - envelope.time[0]) - 1
     size = np.linalg.norm(envelope.values, axis=0)
     line = np.vander(y, 2)

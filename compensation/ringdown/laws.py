@@ -38,10 +38,7 @@ BEND = 20.0  # span of temperature (K) from which a bend of 1/Q is tried
 
 @dataclass(frozen=True)
 class Rows:
-    """Readings: `value` with its own `sd`, the decay each belongs to, its time (s), and the conditions that are known.
-
-    `conditions` may have `temperature` (K, from any origin), `pressure` (Pa), `energy` (amplitude squared).
-    """
+    """Readings with their own `sd`, decay, time (s), and conditions: `temperature` (K), `pressure` (Pa), `energy` (amplitude squared)."""
 
     value: Array
     sd: Array
@@ -52,10 +49,9 @@ class Rows:
 
 @dataclass(frozen=True)
 class Law:
-    """Terms of a law by name; steps are named `step 1`, … and stand for the beginning of the sessions at `sessions` (s).
+    """Terms of a law by name, `step k` for the sessions from that time (s) on; `level` at the means of the conditions.
 
-    `level` is the value at the means of the conditions (no pressure, no amplitude, before the first step); `scatter` the rms that is left, relative;
-    `fitted` of every row; `left_out` rows at the beginning of every decay follow another law (a launch) and are not used.
+    `scatter` is the relative rms left; `left_out` rows at the beginning of every decay (a launch) follow another law.
     """
 
     level: Estimate
@@ -67,10 +63,9 @@ class Law:
 
 
 def fit_law(rows: Rows, *, loss: bool) -> Law:
-    """Fit a law to readings of ln f (`loss` false) or of 1/Q, whose scatter goes with their size.
+    """Fit a law to ln f, or to 1/Q (`loss`), whose scatter goes with their size.
 
-    The first twentieth of the rows of every decay is left out where it stands out of the later rows, or where without it the
-    effect of the amplitude is another one: the variance of the difference is that of the variances (Hausman 1978).
+    The first twentieth of every decay is left out where it stands out, or changes the effect of the amplitude (Hausman 1978).
     """
     law = _fit(rows, loss)
     place = _places(rows)

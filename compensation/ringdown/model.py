@@ -71,8 +71,8 @@ def propagate(decay: Decay, time: Array, start: Complex) -> Complex:
 def differentiate(decay: Decay, time: Array, start: Complex) -> tuple[Complex, dict[str, Complex], list[Complex]]:
     """Return z of the linear decay, its derivatives by the rates, and by each start amplitude.
 
-    exp(M t) = e^{mt} (c + A r) with A = M − m = [[a, b], [b, −a]], s² = a² + b², c = cosh st, r = sinh(st)/s; of q = s²
-    dc/dq = t r/2 and dr/dq = (t c − r)/2q.
+    exp(M t) = e^{mt} (c + A r), A = [[a, b], [b, −a]], s² = a² + b², c = cosh st, r = sinh(st)/s; dc/ds² = t r/2,
+    dr/ds² = (t c − r)/2s².
     """
     common = np.exp(decay.mean * time)
     if start.size == 1:
@@ -101,10 +101,9 @@ def differentiate(decay: Decay, time: Array, start: Complex) -> tuple[Complex, d
 
 
 def swing(decays: "list[Decay]", time: Array, starts: Complex) -> Complex:
-    """Return z (decays, channels, rows) of decays with κ and γ from their start amplitudes (decays, channels).
+    """Return z (decays, channels, rows) of decays with κ and γ from their start amplitudes, integrated in the same steps.
 
-    Without the phase δt + κ∫|z|² dt that all patterns share, κ turns a pattern (x, y) by ⅔κ S, S = Im(x* y) the area of its ellipse.
-    All decays are integrated in the same steps.
+    Without the common phase δt + κ∫|z|² dt, κ turns a pattern (x, y) by ⅔κ S, S = Im(x* y) the area of its ellipse.
     """
     channels = starts.shape[1]
     turn, loss, decay = (np.array([getattr(one, k) for one in decays]) for k in ("hardening", "thickening", "decay"))

@@ -29,10 +29,7 @@ def find_end(envelope: Envelope) -> float:
 
 
 def find_jump(envelope: Envelope) -> float | None:
-    """Return the time after the last jump of the phase, common to the channels, that leaves the amplitude as it was; None without one.
-
-    The turn over two rows is compared with that of the rows around: a jump turns two such pairs alike, a single bad row none.
-    """
+    """Return the time after the last jump of the channels' common phase at constant amplitude, seen in two turns alike, or None."""
     t, z = envelope.time, envelope.values
     size = np.sqrt(np.sum(np.abs(z) ** 2, axis=0))
     usual = max(float(np.sqrt(estimate_noise(z))), 1e-12 * float(size.max()))
@@ -54,10 +51,9 @@ def find_jump(envelope: Envelope) -> float | None:
 
 
 def find_free(whole: Envelope) -> Found:
-    """Return the fit from the first time from which one decay describes all that follows, its first rows as well as the rest.
+    """Return the fit from the first time from which one decay describes all that follows.
 
-    Where that is not the whole record, the window grows backwards from its end, each fit from what the one before foretells, and the
-    last start that fails and the first that does not are brought together by halving; where all fail, what leaves the least is taken.
+    The window grows backwards from the end; between the last start that fails and the first that does not, by halving.
     """
     first, last = float(whole.time[0]), float(whole.time[-1])
     judged: list[tuple[float, float, Found]] = []

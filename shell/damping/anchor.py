@@ -23,11 +23,10 @@ LAYER = 3  # cells across the absorbing layer
 
 
 def anchor_loss(mode: Mode, elastic: Elastic | VaryingElastic, base: Elastic | None = None) -> Radiating:
-    """Solve the mode with its stem on an elastic half-space, which absorbs the waves, instead of a clamp.
+    """Solve the mode with its stem on an elastic half-space (`base`, else the resonator's material), which absorbs
+    waves, instead of a clamp.
 
-    A mode with n >= 2 has neither force nor moment on the stem, and its motion dies out along it as exp(-1.8 z/a) or faster:
-    what arrives is tiny. The harmonics 0 and 1 arrive as a force; an imperfect resonator has them too (`unbalance_loss`).
-    The half-space is of the resonator's material unless a `base` is given.
+    With n >= 2 the motion dies out along the stem as exp(-1.8 z/a) or faster; n = 0 and 1 arrive as a force (`unbalance_loss`).
     """
     _, waves = _stand(mode, elastic, base, _solved(mode).system.n)
     return radiating_mode(waves, mode.frequency)

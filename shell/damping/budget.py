@@ -25,10 +25,7 @@ HeatLaw = Callable[[float], Heat]
 
 @dataclass(frozen=True)
 class LossCause:
-    """One cause of loss: its name, 1/Q at temperatures (K), relative standard uncertainty, source.
-
-    `advice` says what lowers it.
-    """
+    """One cause of loss: its name, 1/Q at temperatures (K), relative standard uncertainty, source, and `advice` how to lower it."""
 
     name: str
     inverse_q: Callable[[Vibration, Array], Array]
@@ -154,10 +151,7 @@ def bulk_cause(coefficient: float, exponent: float, relative_sd: float, source: 
 
 
 def surface_cause(depth: float, relative_sd: float, source: str) -> LossCause:
-    """Loss of the damaged surface, of depth times loss (m): 1/Q = (d φ_s) ∫ σ : ε dA / ∫ σ : ε dV.
-
-    The energy is that of the mode at its surfaces, which a ratio S/V misses threefold in bending.
-    """
+    """Loss of the damaged surface, of depth times loss (m): 1/Q = (d φ_s) ∫ σ : ε dA / ∫ σ : ε dV (S/V misses threefold in bending)."""
 
     def inverse_q(v: Vibration, T: Array) -> Array:
         return np.full(len(T), depth * sum(face.integrate(face.energy) for face in v.surfaces) / v.strain_energy)
@@ -174,10 +168,7 @@ def surface_cause(depth: float, relative_sd: float, source: str) -> LossCause:
 def film_causes(
     name: str, film: Film, heat: HeatLaw | None, relative: tuple[float, float], source: str
 ) -> list[LossCause]:
-    """A film's own loss, and the heat between it and the wall where both materials' heat is known.
-
-    `relative` are the relative uncertainties of thickness and of the film's loss.
-    """
+    """A film's own loss, and the heat between it and the wall; `relative` uncertainties are of thickness and of the film's loss."""
 
     def internal(v: Vibration, T: Array) -> Array:
         check_film(film, v.thinnest)
@@ -208,10 +199,7 @@ def film_causes(
 def gas_cause(
     vibration: Vibration, gas: Gas, pressure: float, relative_sd: float, accommodation: float = 1.0
 ) -> LossCause:
-    """Gas at a pressure (Pa, with its relative uncertainty) at the reference temperature, sealed in: p ∝ T.
-
-    The formula itself is uncertain by a tenth where molecules fly far against the radius, else by a half.
-    """
+    """Gas at a pressure (Pa) at the reference temperature, sealed in: p ∝ T; uncertain by a tenth where molecules fly far, else a half."""
     if not pressure >= 0:
         raise ShellError(f"the gas pressure must be 0 or positive, not {pressure:g} Pa.")
     flight = mean_free_path(gas, pressure, vibration.reference) if pressure > 0 else np.inf

@@ -1,7 +1,4 @@
-"""A mode at the free surfaces of its body: strains, stresses and motion of the faces, the edges and the root.
-
-Areas are per π around the axis, as the solver's volumes are (`table.volume`), so that ratios to its energies need no factor.
-"""
+"""A mode at the free surfaces of its body: strains, stresses and motion of faces, edges and root; areas, as volumes, are per π."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -53,10 +50,7 @@ class FreeFaces:
 
 @dataclass(frozen=True, eq=False)
 class Vibration:
-    """A solved mode with its material, from which losses are computed.
-
-    reference : temperature (K) at which it was solved. Over temperature its shape stays and ω follows √(E/ρ).
-    """
+    """A solved mode with its material at `reference` (K): over temperature its shape stays and ω follows √(E/ρ)."""
 
     solution: Solution
     resonator: Resonator

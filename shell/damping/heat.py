@@ -42,10 +42,7 @@ def mean_stress(c: Constants, strain: Array) -> Array:
 
 
 def conduct_in_cells(solution: Solution, index: int, x: float) -> float:
-    """S(x) of one solid part, heat flowing in all directions within it; the functions are those of its displacements.
-
-    A boundary layer thinner than the cells is left out: its share is of the order of its width over theirs.
-    """
+    """S(x) of one solid part, heat flowing in all directions within it; a boundary layer thinner than the cells is left out."""
     group, c = solution.system.groups[index], solution.constants[index]
     if not isinstance(group, SolidGroup):
         raise ShellError("only a solid part has cells.")

@@ -196,9 +196,6 @@ def equations_of_motion() -> tuple[sp.Expr, sp.Expr]:
 
 @cache
 def printed_precession_factor() -> sp.Expr:
-    """Return k = b/(2 m₀) of m₀ = πρh W and b = πρh V (cos φ + sin φ) as printed, letter by letter of (19).
-
-    It depends on φ, from 0 at the pole to −1/6 at the waist: the integrals are lost, and the Galerkin weights with them.
-    """
+    """Return k = b/(2 m₀) of m₀ = πρh W and b = πρh V (cos φ + sin φ) as printed: from 0 at the pole to −1/6 at the waist."""
     shape = rayleigh_functions()
     return sp.simplify(shape.v * (sp.cos(phi) + sp.sin(phi)) / (2 * shape.w))

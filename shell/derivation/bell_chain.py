@@ -1,7 +1,4 @@
-"""The bell's theory as one numbered chain of equations: BVG paper eqs. (1)–(22), beside what its copy prints.
-
-Rows as in `shell.derivation.chain`; a left side of None says that the right sides are equations.
-"""
+"""The bell's theory as one numbered chain of equations: BVG paper eqs. (1)–(22), beside what its copy prints."""
 
 import sympy as sp
 from sympy.core.function import AppliedUndef

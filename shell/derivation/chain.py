@@ -1,7 +1,6 @@
 """The derivation as one numbered chain of equations.
 
-A row is a step: its number in the HRG paper (empty where the paper has none), its title, the left sides (names parted by spaces,
-or expressions) and the right sides; 0 says that the left sides vanish.
+A row: its number in the HRG paper (or empty), its title, the left sides (names or expressions) and right sides; 0 vanishes.
 """
 
 from dataclasses import dataclass
@@ -26,10 +25,7 @@ class DerivedCase:
 
     @classmethod
     def from_degrees(cls, harmonic: int, start: float, end: float) -> "DerivedCase":
-        """Return the case of a range in degrees: multiples of 30° exactly, others with enough digits to subtract.
-
-        The closed forms of a small cap are small differences, and nested radicals of 7.5° help nobody.
-        """
+        """Return the case of a range in degrees: multiples of 30° exactly, others with enough digits to subtract small differences."""
 
         def angle(degrees: float) -> sp.Expr:
             exact = sp.Rational(repr(degrees)) * sp.pi / 180

@@ -35,10 +35,7 @@ def two_patterns() -> Displacement:
 
 @cache
 def turning_kinetic_energy() -> sp.Expr:
-    """Return the kinetic energy per unit of φ over ρ h, to first order in Ω: ½ ∫ |ḋ + Ω e_z × (x + d)|² dA.
-
-    Only the quadratic terms are kept: ½ |ḋ|² and the Coriolis term Ω e_z · (d × ḋ).
-    """
+    """Return the kinetic energy per unit of φ over ρ h, to first order in Ω: quadratic terms of ½ ∫ |ḋ + Ω e_z × (x + d)|² dA."""
     displacement = sp.Matrix([list(two_patterns())])
     velocity = displacement.diff(t)
     axis = (frame() * sp.Matrix([0, 0, 1])).T

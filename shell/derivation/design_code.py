@@ -1,8 +1,4 @@
-"""The frequency formula (13), (14) as self-contained Python or C code for design work.
-
-The integrals of the chosen harmonic and polar range are worked out in closed form and written with 17
-digits, which a double holds exactly; the formula and its derivatives are printed from the symbolic ones.
-"""
+"""The frequency formula (13), (14) as self-contained Python or C code for design work, its integrals written with 17 digits."""
 
 from string import Template
 from typing import Literal

@@ -35,19 +35,13 @@ def full_energy_density() -> sp.Expr:
 
 @cache
 def thin_energy_density() -> sp.Expr:
-    """Return HRG paper eq. (4) per volume: ½ (σ_φ e_φ + σ_θ e_θ + σ_φθ γ_φθ).
-
-    In a thin shell no pressure acts across, σ_z = 0, and Kirchhoff's normals stay normal, γ_φz = γ_θz = 0.
-    """
+    """Return HRG paper eq. (4) per volume: ½ (σ_φ e_φ + σ_θ e_θ + σ_φθ γ_φθ), with σ_z = 0 and γ_φz = γ_θz = 0 (Kirchhoff)."""
     return full_energy_density().subs({STRESS.sigma_z: 0, STRAIN.gamma_phiz: 0, STRAIN.gamma_thetaz: 0})
 
 
 @cache
 def hooke() -> dict[sp.Symbol, sp.Expr]:
-    """Return HRG paper eq. (5): the three stresses left in (4), as functions of the strains.
-
-    Solved from e_φ = (σ_φ − νσ_θ)/E, e_θ = (σ_θ − νσ_φ)/E and γ_φθ = 2(1+ν) σ_φθ/E.
-    """
+    """Return HRG paper eq. (5), from e_φ = (σ_φ − νσ_θ)/E, e_θ = (σ_θ − νσ_φ)/E and γ_φθ = 2(1+ν) σ_φθ/E."""
     compliance = [
         (STRESS.sigma_phi - nu * STRESS.sigma_theta) / E - STRAIN.e_phi,
         (STRESS.sigma_theta - nu * STRESS.sigma_phi) / E - STRAIN.e_theta,

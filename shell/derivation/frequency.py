@@ -91,10 +91,7 @@ def integrate_in_half_angle(integrand: sp.Expr, start: sp.Expr, end: sp.Expr) ->
 
 @cache
 def log_derivatives() -> LogDerivatives:
-    """Return d ln f by d ln E, dν, d ln ρ, d ln h, d ln r and dφ₂, with I and J standing for their integrals.
-
-    Only the rim needs the integrals themselves: ∂I/∂φ₂ is the integrand of I at φ₂ (Leibniz), the same for J.
-    """
+    """Return d ln f by d ln E, dν, d ln ρ, d ln h, d ln r and dφ₂; ∂I/∂φ₂ is the integrand of I at φ₂ (Leibniz), the same for J."""
     logarithm = sp.log(frequency())
     by_logarithm = {symbol: sp.simplify(symbol * logarithm.diff(symbol)) for symbol in (E, rho, h, r)}
     at_rim = {

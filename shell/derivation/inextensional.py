@@ -55,10 +55,7 @@ def separated_rates() -> tuple[sp.Expr, sp.Expr]:
 
 @cache
 def integrate_separated() -> tuple[sp.Expr, sp.Expr]:
-    """Return ln P and ln M as functions of T = tan(φ/2), up to a constant: (1 ± n) ln T − ln(1 + T²).
-
-    With dφ = 2 dT/(1+T²) the rate becomes (1 ± n)/T − 2T/(1+T²) in partial fractions, integrated term by term.
-    """
+    """Return ln P and ln M as functions of T = tan(φ/2), up to a constant, by dφ = 2 dT/(1+T²): (1 ± n) ln T − ln(1 + T²)."""
     logarithms = []
     for rate in separated_rates():
         by_half_angle = in_half_angle(rate) * 2 / (1 + tan_half**2)
@@ -69,10 +66,7 @@ def integrate_separated() -> tuple[sp.Expr, sp.Expr]:
 
 @cache
 def general_solution() -> tuple[sp.Expr, sp.Expr]:
-    """Return P ∝ sin φ tanⁿ(φ/2) and M ∝ sin φ tan⁻ⁿ(φ/2), the exponentials of the two logarithms.
-
-    T/(1+T²) = ½ sin φ; the constant is taken so that the factor in front is one.
-    """
+    """Return P ∝ sin φ tanⁿ(φ/2) and M ∝ sin φ tan⁻ⁿ(φ/2), the exponentials of the two logarithms, by T/(1+T²) = ½ sin φ."""
     solutions = []
     for logarithm in integrate_separated():
         power = sp.expand(sp.powsimp(sp.exp(sp.expand(logarithm)))) * 2
@@ -83,20 +77,14 @@ def general_solution() -> tuple[sp.Expr, sp.Expr]:
 
 @cache
 def pole_exponents() -> tuple[sp.Expr, sp.Expr]:
-    """Return the powers of φ with which P and M start at the pole: 1 + n and 1 − n, the limits of φ d ln/dφ.
-
-    For n ≥ 2 the second is negative: M is infinite at the pole, so a closed pole asks for M = 0, U = V.
-    """
+    """Return the powers of φ with which P and M start at the pole, 1 + n and 1 − n: for n ≥ 2 a closed pole asks for M = 0, U = V."""
     rates = separated_rates()
     return sp.limit(phi * rates[0], phi, 0), sp.limit(phi * rates[1], phi, 0)
 
 
 @cache
 def inextensional_mode() -> Displacement:
-    """Return HRG paper eq. (10): U = V = C sin φ tanⁿ(φ/2), W = −U′ = −C (n + cos φ) tanⁿ(φ/2).
-
-    U′ is taken from the separated equation, U′ = U (cos φ + n)/sin φ.
-    """
+    """Return HRG paper eq. (10): U = V = C sin φ tanⁿ(φ/2), W = −U′ = −C (n + cos φ) tanⁿ(φ/2), by U′ = U (cos φ + n)/sin φ."""
     tangential = C * general_solution()[0]
     return Displacement(tangential, tangential, -tangential * separated_rates()[0])
 

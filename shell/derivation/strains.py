@@ -1,8 +1,6 @@
 """Strains of a thin shell of revolution from the Kirchhoff hypothesis: HRG paper eqs. (6), (8).
 
-Nothing is typed in but the frame (along the meridian, around, outward normal) and the hypothesis that normals
-stay straight, unstretched and normal. The HRG paper's printed eq. (8) stands beside the result, with its
-twist as printed and as corrected, and the proofs that the printed one is wrong.
+The printed eq. (8) stands beside the result, its twist as printed and as corrected, with proofs that the printed one is wrong.
 """
 
 from functools import cache
@@ -61,10 +59,7 @@ def frame_rotation(coordinate: sp.Symbol) -> sp.Matrix:
 
 
 def layer_strains(displacement: Displacement, radii: Radii = SPHERE) -> LayerStrains:
-    """Return the exact linear strains of a body in the coordinates (φ, θ, z): BVG paper eq. (6), HRG eq. (3).
-
-    The symmetric part of the displacement gradient with the lengths (ρ₁+z) dφ, (ρ₂+z) sin φ dθ and dz.
-    """
+    """Return the exact linear strains of a body in (φ, θ, z), lengths (ρ₁+z) dφ, (ρ₂+z) sin φ dθ, dz: BVG eq. (6), HRG eq. (3)."""
     components = sp.Matrix([list(displacement)])
     along = (components.diff(phi) + components * frame_rotation(phi)) / (radii.rho_1 + z)
     around = (components.diff(theta) + components * frame_rotation(theta)) / ((radii.rho_2 + z) * sp.sin(phi))
@@ -75,10 +70,7 @@ def layer_strains(displacement: Displacement, radii: Radii = SPHERE) -> LayerStr
 
 
 def kirchhoff_displacement(displacement: Displacement, radii: Radii = SPHERE) -> Displacement:
-    """Return the displacement at height z when normals stay normal: u + z β_φ, v + z β_θ, w.
-
-    The rotations β are solved from γ_φz = γ_θz = 0 on the middle surface; they then vanish at every z.
-    """
+    """Return the displacement when normals stay normal, u + z β_φ, v + z β_θ, w; β from γ_φz = γ_θz = 0 on the middle surface."""
     beta_phi, beta_theta = sp.symbols("beta_phi beta_theta")
     tilted = Displacement(displacement.u + z * beta_phi, displacement.v + z * beta_theta, displacement.w)
     shears = layer_strains(tilted, radii)

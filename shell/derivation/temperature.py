@@ -1,7 +1,6 @@
 """The frequency over temperature and its slope by parts: HRG paper eq. (15), which prints no derivative.
 
-Every one of E, ν, ρ, h and r is a function of T in (13); the shape integrals I and J hold their values, since a shell that grows
-evenly keeps its angles. Then d ln f/dT is a sum of five parts, and with free isotropic expansion of one of two.
+E, ν, ρ, h and r in (13) follow T; I and J stay. Of five parts free isotropic expansion makes two of h, r one.
 """
 
 from functools import cache

@@ -19,11 +19,7 @@ RUN = 4  # elements that are treated at once: fields that stay in the fast memor
 
 
 class Body:
-    """Layers on faces, changes of the material, the edge of the rim, masses.
-
-    together : the harmonics. cores : the solid parts. flaw : what is there more, its fields cut down to `waves`.
-    theta : azimuths of the quadrature, rad.
-    """
+    """Layers on faces, changes of the material, the rim's edge, masses; `flaw` is cut down to `waves`, `theta` are azimuths (rad)."""
 
     def __init__(
         self, together: Together, cores: Sequence[Core], flaw: Imperfection, waves: tuple[int, ...], theta: Array

@@ -106,12 +106,7 @@ class CoupledHarmonics:
         return self._together[harmonics]
 
     def solve(self, imperfection: Imperfection, tolerance: float = 1e-6, rounds: int = MOST) -> Split:
-        """The split with every order of the imperfection.
-
-        imperfection : fields and masses. The edge of the rim counts to first order in its height.
-        tolerance : of the split, relative to it: where a further round of answers is foretold to change less, there is none.
-        rounds : most rounds of answers.
-        """
+        """The split with every order of the imperfection, but the first in the height of the rim's edge, to a relative tolerance."""
         waves = _waves_that_count(imperfection)
         reach = waves | (set(range(self.highest + self.n + 1)) if imperfection.masses else set())
         answering = self._answering(reach)

@@ -1,8 +1,4 @@
-"""Quantities over the shell as waves around the axis, p(x, θ) = Re Σ_m c_m(x) exp(-i m θ), x the position 0 ... 1.
-
-A wave a cos m(θ - θ_m) has c_m = a exp(i m θ_m); c_0 is the mean around. Positions are shares of the arc length, 0 where
-the meridian starts and 1 at the rim.
-"""
+"""Quantities over the shell as waves, p(x, θ) = Re Σ_m c_m(x) exp(-i m θ): a cos m(θ - θ_m) has c_m = a exp(i m θ_m); x = 0 ... 1."""
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass

@@ -14,10 +14,7 @@ from shell.system import ShellGroup, System
 
 @dataclass(frozen=True)
 class PointMass:
-    """A small mass (kg; negative: taken away) at an azimuth (rad) and a position (0 ... 1, 1 the rim).
-
-    height : through the wall, -1 the inner face, 0 the middle surface, 1 the outer face.
-    """
+    """A small mass (kg, negative: removed) at azimuth (rad), position 0 ... 1 (rim) and height -1 (inner) ... 1 (outer face)."""
 
     mass: float
     azimuth: float
@@ -46,10 +43,7 @@ class Imperfection:
         return Imperfection(**joined, masses=self.masses + other.masses)
 
     def faces(self, fade: Callable[[Array], Array] | None = None) -> tuple[Field | None, Field | None]:
-        """How far the inner and the outer face stand out of the material: thickness, faces and offset together.
-
-        fade : factor along the meridian.
-        """
+        """How far the inner and the outer face stand out of the material: thickness, faces and offset, times `fade` along the meridian."""
         half = scaled(self.thickness, 0.5)
         inner, outer = add(half, self.inner, scaled(self.offset, -1.0)), add(half, self.outer, self.offset)
         if fade is None:
@@ -63,10 +57,7 @@ class Imperfection:
 
 
 def fade(resonator: Resonator, system: System) -> Callable[[Array], Array] | None:
-    """Factor of the departures of the faces along the meridian: 1, falling to 0 at a solid part or clamp.
-
-    Solid roots, corners and clamps keep their shape; the faces of the shell join them smoothly over √(h R). None: nothing held.
-    """
+    """Factor of the departures of the faces: 1, falling to 0 over √(h R) at a solid part or clamp, which keeps its shape; or None."""
     edges: list[tuple[float, int, float]] = []
     spans: list[tuple[float, float]] = []
     for group in system.groups:

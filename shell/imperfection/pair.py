@@ -30,10 +30,7 @@ from shell.system import ShellGroup
 
 @dataclass(frozen=True, eq=False)
 class Density:
-    """Change of ln ω² per unit of a field at stations: of the mean, and of z with the wave 2n.
-
-    position : 0 ... 1, (stations,). mean, wave : (stations,).
-    """
+    """Change of ln ω² per unit of a field at stations (position 0 ... 1): of the `mean`, and of z with the `wave` 2n."""
 
     position: Array
     mean: Array
@@ -122,20 +119,14 @@ class Pair:
         return Density(np.ones(1), np.array([mean]), np.array([wave]) / 2)
 
     def mass(self, position: float = 1.0, height: float = 0.0) -> tuple[float, float]:
-        """Per kilogram of a point mass there: the mean shift, and z for the azimuth 0; at θ it is z exp(2 i n θ).
-
-        δK - ω² δM = -ω² m (u_c² cos² + u_s² sin²); here T includes the factor π of the integral around.
-        """
+        """Per kilogram of a point mass: the mean shift, and z for the azimuth 0, exp(2 i n θ) at θ: -ω² m (u_c² cos² + u_s² sin²)."""
         here = cut(self.resonator, self.solution.system, position, np.array([height]))
         u, v, w = here.displacements(self.solution.unknowns)[:, 0]
         norm = -self.solution.eigenvalue / (np.pi * self.scale)
         return float(norm * (u**2 + w**2 + v**2) / 2), float(norm * (u**2 + w**2 - v**2) / 2)
 
     def shaving(self, position: float, face: int) -> tuple[float, float]:
-        """Like `mass` for a kilogram of material on a face (-1 inner, 1 outer): its strain energy comes with it.
-
-        Of a shallow cut; the concentration of stress around a deep groove is left out.
-        """
+        """Like `mass` for a kilogram of material on a face (-1 inner, 1 outer) with its strain energy: a shallow cut."""
         here = cut(self.resonator, self.solution.system, position, np.array([float(face)]))
         return self._of_material(here, np.ones(1))
 

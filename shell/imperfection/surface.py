@@ -27,10 +27,7 @@ def turn_surface(surface: Surface, angle: float) -> Surface:
 def find_departures(
     resonator: Resonator, imperfection: Imperfection, x: Array, r: Array, z: Array
 ) -> dict[int, Complex]:
-    """How far points of the section (position x, r, z) depart outwards and upwards: waves m to (2, points), m.
-
-    What is not a shape (density, modulus, masses) is not seen.
-    """
+    """How far points of the section (position x, r, z) depart outwards and upwards by shapes: waves m to (2, points), m."""
     inner, outer = imperfection.faces()
     place = resonator.at(np.clip(x, 0.0, 1.0) * resonator.length)
     height = (r - place.r) * place.normal_r + (z - place.z) * place.normal_z

@@ -1,7 +1,4 @@
-"""Harmonics of the perfect resonator side by side: all of their unknowns in one row.
-
-A vector is of two kinds at once, cos kθ and sin kθ of every harmonic k: columns come in such twos, (unknowns, vectors, 2).
-"""
+"""Harmonics of the perfect resonator side by side; a vector is of cos kθ and sin kθ at once: (unknowns, vectors, 2)."""
 
 from collections.abc import Sequence
 from functools import cached_property

@@ -29,10 +29,7 @@ GIVEN = np.deg2rad(0.1)  # error of an axis that is taken as it is given
 
 @dataclass(frozen=True, eq=False)
 class RigidMotion:
-    """p -> rotation p + offset. `told` : which of the shifts x, y, z (m) and the turns about x, y the points tell.
-
-    tilt_error : standard error of the turns where the shape does not tell them, rad.
-    """
+    """p -> rotation p + offset; `told` which of the shifts x, y, z (m) and turns about x, y are known, `tilt_error` (rad) else."""
 
     rotation: Array
     offset: Array

@@ -108,10 +108,7 @@ class Face:
         return found, covariance + self.motion.tilt_error**2 * parts.T @ parts
 
     def centred(self, rigid: Array) -> "Face":
-        """Return the face without what a rigid motion makes of its first wave: only the frame holds that.
-
-        The motion was found from points that also show form, which pushes it aside where they are uneven or have gaps.
-        """
+        """Return the face without what a rigid motion makes of its first wave, which only the frame holds."""
         count = len(rigid)
         u, size, _ = np.linalg.svd(rigid, full_matrices=False)
         u = u[:, size > RIGID * size.max(initial=0.0)]

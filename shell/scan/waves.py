@@ -12,10 +12,7 @@ OUTLIER = 5.0  # standard deviations
 
 @dataclass(frozen=True)
 class WaveBasis:
-    """1, cos mθ, sin mθ for m = 1 ... highest, each times P_0 ... P_degree over the positions low ... high.
-
-    Coefficients come flat: those of the mean, then of the cosine and of the sine of every wave.
-    """
+    """1, cos mθ, sin mθ for m = 1 ... highest, each times P_0 ... P_degree over low ... high; coefficients flat in this order."""
 
     low: float
     high: float

@@ -194,8 +194,7 @@ def measure_scale(record: "Record") -> Found:
 def measure_warm_up(record: "Record", output: str, band: float | None) -> tuple[Found, float]:
     """Time from power-on until the means over 50 s stay within the band of the final output (12.5, 12.6).
 
-    The final output is the mean of the last quarter, whose scatter is that of the means: the interval is from where they last
-    were outside by two standard deviations more to where they last were outside by two less.
+    The final output is the mean of the last quarter; the interval shifts the band by two standard deviations of its scatter.
     """
     step = float(np.median(np.diff(record["time_s"])))
     width = max(WARM_BLOCK, 7 * step)

@@ -1,8 +1,7 @@
 """Values with which the data agree: they stay as the card has them.
 
-A fit follows the noise of its own runs. The values z of one table of the card (posterior covariance C, the prior included) that together lie
-within what that noise moves, zᵀ C⁻¹ z below the 90 % quantile of χ² of as many degrees of freedom, are held at the card's, z = 0, and
-the others are solved for anew, if that costs the fit no more than the same quantile.
+Values z of one table of the card (posterior covariance C) with zᵀ C⁻¹ z below the 90 % quantile of χ² are held at the
+card's, z = 0, and the others solved for anew, if that costs the fit no more than the same quantile.
 """
 
 from collections.abc import Sequence

@@ -20,14 +20,9 @@ BIAS = "bias_deg_per_h"
 def spread_of_prediction(
     instrument: "Instrument", drive: "Drive", law: "FrequencyLaw | None" = None
 ) -> dict[str, Array]:
-    """Return the standard deviation of every column of a predicted run at its rows: √diag(J C Jᵀ), without noise within it.
+    """Return the standard deviation of every column of a predicted run: √diag(J C Jᵀ), without noise within it.
 
-    C is the covariance of the card's uncertain values, correlations included: the prior of a card as shipped, the posterior
-    of a calibrated one. What the card says of the bias from turn-on to turn-on is part of it. No calibration predicts a run
-    more closely than this, beside the noise of that run.
-
-    Args:
-        law: One that was built before for this instrument.
+    C is the covariance of the card's uncertain values, prior or posterior, the bias from turn-on to turn-on included.
     """
     priors = gather_priors(instrument)
     found = predict(instrument, drive, priors.names, law)

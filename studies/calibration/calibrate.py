@@ -122,12 +122,9 @@ def calibrate(
     """Find the most probable values of a card, given its uncertainties and records of the device.
 
     Args:
-        records: Runs of one device.
-        tables: Steady-state tables of the same device.
         hold_out: Place of a record that a second calibration, without it, predicts.
         exact: Values of the card that are not to move.
-        keep: Whether values with which the data agree stay as the card has them (`keep_agreeing`); not beside an effect
-            that a diagnosis has found, where the device is not the card's.
+        keep: Whether values with which the data agree stay as the card has them (`keep_agreeing`).
         profile: Whether intervals follow the likelihood where it is bent.
     """
     if not records and not tables:
@@ -258,11 +255,7 @@ def predict_held_out(
 
 
 def _usual_starts(whole: CardFit, problem: CardProblem) -> Array:
-    """Covariance of the free starts of a run of which only the chamber is known: mean squares over the campaign's runs.
-
-    Where the campaign has none of a kind, such as a jump of the chamber, the prior's. What departs behind the housing is
-    taken from where the measured housing drives, for frequency sees it there.
-    """
+    """Covariance of the free starts of a run of which only the chamber is known: mean squares over the campaign's runs, else the prior's."""
     count, seen = len(whole.problem.priors.values), whole.problem
     units = np.array([sd for _, _, sd in seen.starts])
     point, C = units * whole.point[count:], np.outer(units, units) * whole.covariance[count:, count:]

@@ -93,11 +93,7 @@ def estimate(fit: CardFit, profile: bool = True) -> tuple[Estimate, ...]:
 
 
 def _over_the_wave(fit: CardFit) -> tuple[dict[int, Polar], Array, Array, Array]:
-    """Most probable coordinates, their mean and covariance, with length and axis of the damping's anisotropy by their places.
-
-    The components have the posterior that length and axis give them; the other values follow: they depend on the components
-    as in the normal distribution of the fit.
-    """
+    """Most probable coordinates, their mean and covariance, with length and axis of the damping's anisotropy by their places."""
     priors = fit.problem.priors
     count = len(priors.values)
     point, C, pair = fit.point[:count], fit.covariance[:count, :count], priors.pair

@@ -153,14 +153,8 @@ def estimate_levels(
 ) -> dict[str, Noise]:
     """Return the noise of highest marginal likelihood of some responses, each given the others'.
 
-    What the others say of the unknowns, of unit prior, is then their prior for this one: it may not bend for itself what they
-    hold. What the model cannot follow is left to the slow noise (the discrepancy of Kennedy & O'Hagan 2001, J. R. Stat. Soc. B
-    63, 425).
-
-    Args:
-        target, slopes: response -> (M,) and (M, p), about the prior mean of the unknowns
-        names: responses whose noise is estimated
-        known: (q, p + 1), what else says something of the unknowns: rows of white noise of variance 1 and their target
+    `target`, `slopes` (response -> (M,), (M, p)) are about the prior mean; `known`, (q, p + 1), is what else says
+    something of the unknowns. What the model cannot follow is left to the slow noise (Kennedy & O'Hagan 2001, J. R. Stat. Soc. B 63, 425).
     """
     found = dict(noise)
     for name in names:
@@ -235,10 +229,7 @@ def whitened(
 
 @dataclass(frozen=True)
 class _Linear:
-    """Whitened slopes J and residuals r at a point u; (JᵀJ + 1) Δ = Jᵀ r − u within ends, by the triangle of [J; 1].
-
-    Not by JᵀJ: of sharp data against a wide prior that has no digits left.
-    """
+    """Whitened slopes J and residuals r at a point u; (JᵀJ + 1) Δ = Jᵀ r − u within ends, by the triangle of [J; 1]."""
 
     slopes: Array
     residual: Array
@@ -273,9 +264,8 @@ class _Linear:
         return self._damped(np.exp(high)), float(np.exp(high))
 
     def bend(self, move: Array, damping: float, bent: Array, reached: Array) -> Array:
-        """What a move is short of a valley that bends, from the whitened residuals that it reached when it was `bent` already.
-
-        Damped as the move was: along the valley, where nothing holds it, what is missed would say anything.
+        """What a move is short of a valley that bends, from the whitened residuals reached when it was `bent` already,
+        damped as the move was.
         """
         missed = reached - (self.residual - self.slopes @ (move + bent))
         count = len(move)
@@ -297,10 +287,7 @@ def _advance(
     noise: Mapping[str, Noise],
     rows: Mapping[str, NoiseRows],
 ) -> tuple[State | None, float, bool]:
-    """Go the longest step that keeps what it promises; None where nothing falls.
-
-    With it the radius that the next one should keep, and whether it was a whole step that kept half of its promise.
-    """
+    """Go the longest step that keeps what it promises, or None; with the next radius, and whether a whole step kept half its promise."""
     before = objective(problem, state, noise, rows)
     for _ in range(TRIALS):
         move, damping = linear.step(radius)

@@ -12,11 +12,7 @@ from studies.calibration.problem import CardProblem, State
 
 @dataclass(frozen=True)
 class Rung:
-    """Residuals of one response (its unit, rms of block averages): with the card as shipped, calibrated, and the noise.
-
-    The mean of a run's residual is left out of all three, that of a table is not: its level is a value of the card. `offset` is the
-    rms of the means after the calibration.
-    """
+    """Residuals of one response, rms of block averages: as shipped, calibrated, noise; `offset` is the rms of the means of runs."""
 
     as_shipped: float
     calibrated: float

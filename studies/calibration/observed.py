@@ -132,10 +132,7 @@ class SettledTable:
 
     @property
     def scatter(self) -> float:
-        """Largest noise that its readings can have, Hz: what they leave of their own parabola.
-
-        Too few of them leave nothing: then what a thermometer good to 0.3 K makes of their slope.
-        """
+        """Largest noise that its readings can have, Hz: what they leave of their own parabola, or 0.3 K of the thermometer."""
         f, degree = self.frequency, min(2, len(np.unique(self.temperature)) - 1)
         free = len(f) - degree - 1
         if degree == 2 and free > 1:
@@ -171,13 +168,7 @@ def observe(
     turning: bool = False,
     blocks: int = MOST_BLOCKS,
 ) -> tuple[ObservedRun, ...]:
-    """Make runs ready.
-
-    Args:
-        responses: names of the columns that are predicted
-        turning: whether they are of a whole-angle wave, each row's the mean to the next
-        blocks: of a run that are compared, at most
-    """
+    """Make runs ready; `turning` are those of a whole-angle wave, each row's the mean to the next; `blocks` of a run are compared at most."""
     starts, _ = place_in_time(records)
     return tuple(
         _observe(record, start, responses, turning, blocks) for record, start in zip(records, starts, strict=True)

@@ -1,9 +1,7 @@
 """What is known of a card's values before any record: independent standard normal coordinates.
 
-A value v of mean v₀ and standard deviation s is v₀ + s z, or v₀ exp(s z/v₀) where its logarithm is normal; z of values
-that go together, such as slope and curvature of a material's law, have a correlation R = L Lᵀ, and z = L u with u of
-independent unit normals. A value that is even between its bounds is taken as normal within them. Length and axis of the
-damping's anisotropy are moved by their components (`studies.calibration.wave`).
+v = v₀ + s z, or v₀ exp(s z/v₀) where the logarithm is normal; z of values that go together have the correlation R = L
+Lᵀ, z = L u. The damping's anisotropy is moved by its components (`studies.calibration.wave`).
 """
 
 from collections.abc import Sequence

@@ -1,8 +1,7 @@
 """The least-squares problem of a calibration: predictions of all runs, their derivatives, and what else is free.
 
-Coordinates: the card's uncertain values (`studies.calibration.priors`), then for each run how far its housing, base, stem and
-resonator departed from being settled at the start, all of unit prior variance. Frequency, bias and 1/Q are driven by the
-measured housing where there is one; the chamber then explains the housing.
+Coordinates, all of unit prior variance: the card's uncertain values, then each run's departures from settled at its
+start. Frequency, bias and 1/Q are driven by the measured housing where there is one; the chamber then explains the housing.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -81,10 +80,7 @@ class CardProblem:
     def starts(self) -> tuple[tuple[int, str, float], ...]:
         """What is free of each run, with its prior standard deviation: departures (K), and the chamber's clock (s).
 
-        Of a set point that jumped between two rows, the time of each jump is free: it was up to a row earlier. A jump at
-        the first row is not: what it did before the record began is in the departures. A chamber that never jumps is known between
-        its rows; another clock is an effect. What the measured housing did
-        between these two rows is free too: it has a kink there, and a straight line between its rows is not it.
+        Free are also the time of each jump of a set point between two rows, and the kink of the measured housing there.
         """
         away = [start_spread(run, self.instrument, self.law) for run in self.runs]
         absent = () if self.instrument.polynomial is None else self.instrument.polynomial.absent

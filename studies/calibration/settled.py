@@ -1,7 +1,6 @@
 """Level and slope of a steady-state table beside the card's, at one temperature.
 
-Readings and predictions go through the same polynomial (a cubic where there are enough temperatures): f and f'/f at the
-reference temperature are weighted sums of the rows, and so are their derivatives by the card's uncertain values.
+Readings, predictions and derivatives go through one polynomial: f and f'/f at the reference are weighted sums of rows.
 """
 
 from collections.abc import Callable

@@ -1,8 +1,4 @@
-"""How far a gyro may have been from rest when its record begins, from what then moved.
-
-A part that departs by d from where it settles moves at about d/τ, τ the slowest time constant behind the housing. Where neither the
-frequency nor the housing moves in the first rows, no part was far from rest.
-"""
+"""How far a gyro may have been from rest when its record begins: a departure d moves at about d/τ, τ the slowest time constant."""
 
 from typing import TYPE_CHECKING
 

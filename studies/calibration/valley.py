@@ -43,11 +43,7 @@ class Bend:
 
 
 def find_bend(fit: CardFit, J: Array) -> Bend:
-    """Follow what is left unknown to both sides.
-
-    Args:
-        J: array (M, p): Slopes in rows whose noise is white.
-    """
+    """Follow what is left unknown to both sides; `J`, (M, p), are slopes in rows whose noise is white."""
     ways, curves, rest = _follow(fit, J)
     generator = np.random.default_rng(0)
     count = len(fit.problem.priors.values)
@@ -98,17 +94,10 @@ def _curve(fit: CardFit, J: Array, row: Array, way: Array) -> Array:
 
 
 def follow(fit: CardFit, J: Array, row: Array, point: Array, enough: float) -> tuple[Array, float]:
-    """Go down to the bottom of a valley beside a point, one value held.
+    """Go down to the bottom of a valley beside a point, `row` · point held: Gauss–Newton with the slopes `J` of the
+    fit, else with each point's.
 
-    Gauss–Newton steps with the slopes of the fit, where they do not suffice with those of each point.
-
-    Args:
-        J: array (M, p): Slopes at the fit in rows whose noise is white.
-        row: array (p,): What is held: row · point.
-        enough: Rise of the objective above the fit's at which the bottom is near.
-
-    Returns:
-        point, rise: The lowest point; the rise is infinite where the bottom is not found.
+    Returns the lowest point and its rise, infinite where the bottom is not within `enough` of the fit's objective.
     """
     problem = fit.problem
     least = objective(problem, fit.state, fit.noise, fit.rows)

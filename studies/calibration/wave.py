@@ -82,13 +82,7 @@ class WavePrior:
         return np.asarray(turn * [spread_a, spread_b])
 
     def posterior(self, information: Array, mean: Array) -> WavePosterior:
-        """Length and axis, from the data's information on (x, y) and the mean that it has beside the unit prior.
-
-        Args:
-            information: array (2, 2)
-            mean: array (2,): Solves (information + 1) mean = pull, so that ln of the data's likelihood is pull·u − ½ uᵀ
-                information u.
-        """
+        """Length and axis, from the data's information (2, 2) on (x, y) and the mean that it has beside the unit prior."""
         pull = (information + np.eye(2)) @ mean
         strength, ways = np.linalg.eigh(information)
         told = strength > 1.0

@@ -22,11 +22,7 @@ ALIKE = 5e-3  # of the objectives' ranges: designs of the front nearer than this
 
 @dataclass(frozen=True, eq=False)
 class Limit:
-    """One limit at the best design.
-
-    `price`: what the objective gains (in its unit) for one unit of the column more room; None where the limit holds nothing back.
-    `margin`: what is kept in hand for the tolerances.
-    """
+    """One limit at the best design: `price` of one unit (None: it holds nothing back), `margin` in hand for the tolerances."""
 
     column: str
     sign: float

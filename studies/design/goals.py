@@ -106,10 +106,7 @@ class Goals:
         return found
 
     def margins(self, values: Array, slopes: Array) -> Array:
-        """Return what the limits of each column keep in hand for the tolerances, in its unit; (columns,).
-
-        `slopes`: of the columns as they count, (columns, parameters).
-        """
+        """Return what the limits of each column keep in hand for the tolerances, in its unit, by the slopes (columns, parameters)."""
         found = np.zeros(len(self.task.columns))
         if self.task.keys.margin is not None:
             for c in {c for column, *_ in self.limits for c in self.smooth(column)}:
@@ -185,11 +182,7 @@ def lay_goals(task: Task, values: Array, nominal: Array) -> Goals:
 def step(
     surface: Interpolant, pieces: Sequence[Piece], start: Array, low: Array, high: Array
 ) -> tuple[Array, float, float]:
-    """Minimise t on the interpolant from a start within a box, by SLSQP; where no design keeps the limits, the largest excess.
-
-    Returns:
-        x, the largest excess (in spreads), and t there.
-    """
+    """Minimise t on the interpolant within a box, by SLSQP; return x, the largest excess over limits (in spreads), and t there."""
     columns = np.array([one.column for one in pieces])
     slope, offset = (np.array([getattr(one, name) for one in pieces]) for name in ("slope", "offset"))
     aims = np.array([one.of >= 0 for one in pieces])

@@ -1,8 +1,7 @@
 """Keys of a design task, `schema = "hrg.design/1"`: what is free, what is wanted, what must hold.
 
-A column is named as in the results of a study (`frequency_n2_Hz`, `tcf_n2_ppm_per_degC`, `inverse_q_n2_mount`, `separation_n2_Hz`);
-its quantity is found by that name, and needs a [[quantity]] table only for other than default keys. The separation counts here
-by its magnitude. `hrg keys design` lists the keys; `hrg design new` writes a task to start from.
+A column is named as in the results of a study (`tcf_n2_ppm_per_degC`); its quantity is found by that name, and needs a
+[[quantity]] table only for other than default keys. The separation counts here by its magnitude.
 """
 
 from typing import Annotated, Literal

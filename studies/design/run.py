@@ -26,12 +26,9 @@ CARD, TABLE = "best.toml", "evaluations.csv"
 def optimise(
     source: str | Path, out: str | Path | None = None, *, workers: int | None = None, show_progress: bool = False
 ) -> Answer:
-    """Find the best design of a task, or resume where an earlier run stopped.
+    """Find the best design of a task, a path or the name of one that ships, or resume where an earlier run stopped.
 
-    Args:
-        source: path of a task, or the name of one that ships.
-        out: folder for the store, the best design as a card and the table of all designs; without it nothing is kept.
-        workers: processes; one for every core unless given. More than one need the guard `if __name__ == "__main__":`.
+    More than one of the workers, one a core unless given, need the guard `if __name__ == "__main__":`. Without `out` nothing is kept.
     """
     task = read_task(source)
     study = task.study

@@ -1,9 +1,7 @@
 """The search for the best design: full solves, an interpolant through them, steps on it, and full solves again.
 
-First designs are drawn over the whole box. Steps on the interpolant through all of them, from several starts, look for the best
-region; then a star of designs about the best one renews the interpolant within a box that shrinks (a trust region), so that its
-slopes become those of full solves. Every design is kept in the store, and the path is the same every time: run again, it walks
-over what is there.
+First designs cover the whole box; steps from several starts look for the best region; a star of designs about the best
+one then renews the interpolant within a shrinking box (a trust region). All are kept: a search that is resumed takes the same path.
 """
 
 from collections.abc import Sequence
@@ -121,10 +119,7 @@ class Search:
         return max(hopeful, key=lambda x: float(np.linalg.norm(self.x - x, axis=1).min()))
 
     def descend(self, scalar: Scalar, best: int, boxes: Sequence[float] = BOXES, known: Sequence[int] = ()) -> int:
-        """Improve a design within boxes that move with it and shrink, and return the place of the best one found.
-
-        It ends where it comes to one of the designs `known` before.
-        """
+        """Improve a design within boxes that move with it and shrink, until it meets one `known` before; return the place of the best one."""
         first = best
         for half in boxes:
             strict = half == BOXES[-1]
@@ -148,10 +143,7 @@ class Search:
         return best if self._merit(best, scalar) <= self._merit(first, scalar) or not strict else first
 
     def best(self, scalar: Scalar) -> int:
-        """Return the best design that is found from several regions, each descended into at first, the best to the end.
-
-        Three regions that lead to one place are enough.
-        """
+        """Return the best design of several regions, each descended into at first, the best to the end; three that meet are enough."""
         found: list[int] = []
         for k in self.explore(scalar):
             found.append(self.descend(scalar, k, BOXES[:1], found))
@@ -202,10 +194,9 @@ class Search:
         return self._surface(plain[np.argsort(apart, kind="stable")[:count]])
 
     def slopes(self, best: int, half: float) -> Array:
-        """Return the slopes of all columns as they count by every parameter, (columns, parameters), from a star of full solves.
+        """Return the slopes of all columns as they count, (columns, parameters), from a star of full solves.
 
-        Free parameters are moved by `half`, the others by a part of their tolerance: towards the middle of the box, in the last
-        and smallest star to both sides; the other way where a design cannot be computed.
+        Free parameters are moved by `half`, others by a part of their tolerance, to one side; the smallest star to both sides.
         """
         x, count, last = self.x[best], len(self.low), half <= BOXES[-1]
         by = np.where(np.arange(count) < self.task.free, half, ASIDE) * np.where(x <= 0.5, 1.0, -1.0)

@@ -15,11 +15,7 @@ DRAWN = 16  # designs drawn from the tolerances, besides the worst corners
 
 @dataclass(frozen=True, eq=False)
 class Spread:
-    """What tolerances do to one wanted column about the best design.
-
-    `first_order`: one side of the worst case. `sd`: standard deviation. `low`, `high`: of the full solves that check it.
-    `passed`: the probability, to first order, that its limits hold; None without limits.
-    """
+    """What tolerances do to one wanted column; `first_order` worst case to one side, `passed` the probability that its limits hold, or None."""
 
     column: str
     value: float

@@ -1,9 +1,7 @@
 """Diagnosis of a steady-state table: soaked points (T, f), like the HRG paper's Table 1.
 
-A table is a record of settled states: its baseline is the calibrated card, or, without one, a card with a parabola of wide level,
-slope and curvature. Beside it the steady form of every effect that has one is weighed by its marginal likelihood, in white noise (at
-least what rounding leaves, at most what the readings leave of their own parabola) with a wander along the rows: a table is measured
-in some order, and its rows know of each other.
+The baseline is the calibrated card, else a wide parabola. Beside it the steady form of every effect that has one is
+weighed by its marginal likelihood, in white noise with a wander along the rows, which are measured in some order.
 """
 
 from collections.abc import Sequence
@@ -89,14 +87,7 @@ class TableDiagnosis(Shown):
 
 
 def diagnose_table(path: str, card: "Instrument | str | None" = None) -> TableDiagnosis:
-    """Diagnose a steady-state table, against a card's own simulation or a parabola.
-
-    Raises
-    ------
-    InputError
-        With a card: a table whose level or slope is further than six standard deviations from it. Fewer than five temperatures,
-        or three beside a card.
-    """
+    """Diagnose a steady-state table, of five temperatures or three beside a card, against a card's own simulation or a parabola."""
     table = read_settled(path)
     if (distinct := np.unique(table.temperature).size) < (FEWEST_POINTS if card is None else FEWEST_BESIDE_CARD):
         given = "one temperature is" if distinct == 1 else f"{distinct} temperatures are"

@@ -103,10 +103,7 @@ class Shift:
 
 @dataclass(frozen=True)
 class ResponseResult:
-    """What was found about one response.
-
-    `noise` is the rms per row of what no model could remove, `white` and `wander` its two parts.
-    """
+    """What was found about one response; `noise`, rms per row of what no model could remove, has the parts `white` and `wander`."""
 
     verdict: str
     noise: float | None
@@ -214,9 +211,8 @@ def overall(verdicts: Sequence[str]) -> str:
 
 
 def doubted(causes: Sequence[Cause]) -> tuple[Cause, ...]:
-    """Return the causes, the strongest first, with probabilities lowered by how often such names were wrong all the same.
-
-    A further name may only patch what the form of the first leaves; what was found in one with it shares its evidence.
+    """Return the causes, strongest first, with probabilities lowered by how often such names were wrong; further names
+    may only patch the first.
     """
     first = next((cause for cause in causes if cause.kind == "physics"), None)
     share = {True: CONSTANTS["doubt"], False: CONSTANTS["doubt_further"]}
@@ -238,17 +234,8 @@ def weigh(
 ) -> tuple[tuple[str, ...], float]:
     """Return the set of effects that stands for one cause, the likeliest first, and the probability that it holds the truth.
 
-    Weights exp(score / temper) of everything that could stand there. No form is exact: a difference counts less the more
-    evidence there is, by a part of the best one's lead over nothing.
-
-    Parameters
-    ----------
-    names, scores : sequences
-        Effects that contend for the place and their log posteriors, votes of other responses included.
-    nothing : float
-        Log posterior of the model without any of them.
-    unknown : float
-        Log posterior of structure that nobody can name, over that of the whole named model.
+    Weights exp(score / temper) of log posteriors: of `names`, of `nothing`, and of structure that nobody can name
+    (`unknown`). No form is exact: a difference counts less by a part of the best one's lead over nothing.
     """
     values = np.array(scores, dtype=float)
     order = np.argsort(-values)
@@ -285,10 +272,7 @@ def wrong_values(shifts: Sequence[Shift]) -> list[Cause]:
 
 
 def same_cause(one: Cause, two: Cause) -> bool:
-    """Return whether two entries are one cause: the same effect in two responses is one when its place agrees; two members of one set are one answer.
-
-    An equal that does not act on both tells of a choice that the other response does not have: then each is named.
-    """
+    """Return whether two entries are one cause: one effect in two responses whose places agree, or two members of one set."""
     if one.response == two.response:
         return one.effect == two.effect or (one.effect in two.equivalent and two.effect in one.equivalent)
     if not all(_acts(name, own.response) for name in (*one.names, *two.names) for own in (one, two)):

@@ -1,8 +1,4 @@
-"""The library of physical effects, below simulation and diagnosis: one file an effect in `entries`, found by discovery.
-
-The same effect fits a record (a family: its first column of each coefficient is the definite curve, the others are what
-nature may add to it) and runs forward in a simulation from the numbers of an `[[effect]]` table.
-"""
+"""The library of physical effects: one file an effect in `entries`, found by discovery; the same fits a record and runs in a simulation."""
 
 from studies.effects.effect import (
     Coefficient,

@@ -22,9 +22,8 @@ Numbers = float | Sequence[float]
 class Parameter:
     """A shape parameter: it enters the signature nonlinearly, between `low` and `high`.
 
-    `steady` ones are chosen from the grid only and are `low` where a card leaves them out; of these, `refined` ones are moved
-    afterwards unless they are `low`, which stands for none. `of_run` bounds it from above by that part of the longest run,
-    `of_range` by that part of the covered temperatures, besides `high`.
+    `steady` ones come from the grid only; of these, `refined` ones are moved afterwards. `of_run` bounds it from above
+    by that part of the longest run, `of_range` of the covered temperatures.
     """
 
     name: str
@@ -54,11 +53,7 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Coefficient:
-    """A linear coefficient: a number, or a list where the effect is a family.
-
-    `name` ends with its unit, `{unit}` standing for that of the response. `spread` are the prior standard deviations of
-    the members of the list, in parts of the effect's size; the first is the definite curve. None is above `most`.
-    """
+    """A linear coefficient, a number, or a list where the effect is a family, whose `spread` are the prior sd in parts of the effect's size."""
 
     name: str
     spread: tuple[float, ...] = (1.0,)
@@ -231,18 +226,9 @@ def check_effect(name: str, parameters: Mapping[str, Numbers], response: str) ->
 def apply_effect(
     name: str, parameters: Mapping[str, Numbers], states: States, response: str | None = None
 ) -> tuple[str, FloatArray]:
-    """Run one effect forward.
+    """Run one effect forward, on an even grid: return its target, "resonator_temperature" or the response, and the change of it.
 
-    Args:
-        name: Contract name of the effect.
-        parameters: Shape parameters and coefficients by name, as a diagnosis saves them; absent coefficients are zero.
-        states: The run, on an even time grid.
-        response: The response to change; the effect's first one unless given.
-
-    Returns:
-        target: "resonator_temperature" or the response.
-        change: (N,) array: What must be added to the target, K or the response's unit. Zero where the effect's drive
-            (amplitude, voltage, quadrature, azimuth) is not part of the run: it then stays where it was calibrated.
+    The change is zero where the effect's drive is no part of the run. Absent coefficients are zero.
     """
     effect = find_effect(name)
     response = effect.responses[0] if response is None else response
@@ -254,15 +240,7 @@ def apply_effect(
 
 
 def apply_effects(entries: Sequence[tuple[str, str, Mapping[str, Numbers]]], states: States) -> dict[str, FloatArray]:
-    """Run several effects forward, those on the temperature first: the others see the temperature that they leave.
-
-    Args:
-        entries: sequence of (name, response, parameters): As `[[effect]]` tables give them.
-        states: The run, on an even time grid.
-
-    Returns:
-        changes: What must be added to "resonator_temperature" (K) and to each response.
-    """
+    """Run effects (name, response, parameters) forward, those on the temperature first; return the change of each target."""
     changes: dict[str, FloatArray] = {}
     warmed = states
     for stage in range(3):  # on the temperature; on the temperature that these leave; on the responses

@@ -68,13 +68,8 @@ def remembered(runs: Sequence[States]) -> list[FloatArray]:
 
 
 def lag(drive: FloatArray, step: float, tau: float, start: float | None = None) -> FloatArray:
-    """Return the response of a first-order lag, τ y′ = u − y, started in equilibrium or from a value.
-
-    Exact for a drive that is linear between its samples (first-order hold).
-
-    Args:
-        drive: (N,) or (N, m) array: Input on an even grid, or several side by side.
-        step, tau: Time step and time constant, s.
+    """Return the response of a first-order lag, τ y′ = u − y, to drives (N,) or (N, m) linear between samples; settled
+    at first, or from a value.
     """
     ratio = step / tau
     decay = np.exp(-ratio)
@@ -85,18 +80,9 @@ def lag(drive: FloatArray, step: float, tau: float, start: float | None = None) 
 
 
 def play(drive: FloatArray, radius: float | Sequence[float], start: float = 0.0) -> FloatArray:
-    """Return the play (backlash) operator, the elementary rate-independent hysteresis.
+    """Return the play (backlash) operator, the elementary rate-independent hysteresis, of one half width or of several, (N, R).
 
-    p_k = min(u_k + r, max(u_k − r, p_{k−1})), with p_0 = u_0 + start · r. While u rises that is max(u_k − r, p before),
-    while it falls min(u_k + r, p before), so that each branch is done at once.
-
-    Args:
-        drive: (N,) array: Input.
-        radius: float or (R,) sequence: Half width of the loop, in the unit of the drive.
-        start: Where in its band the operator starts, −1 … 1.
-
-    Returns:
-        output: (N,) or (N, R) array
+    p_k = min(u_k + r, max(u_k − r, p_{k−1})), with p_0 = u_0 + start · r: each rising or falling branch is done at once.
     """
     radii = np.atleast_1d(np.asarray(radius, dtype=float))
     out = np.empty((drive.size, radii.size))

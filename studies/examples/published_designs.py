@@ -1,7 +1,4 @@
-"""Published resonators beside the same ones computed: frequency, Q with its 90 % interval, and temperature slope.
-
-Frequencies agree by choice: of each design one dimension is not printed, and its card says how it was chosen. Q and slope are predictions.
-"""
+"""Published resonators beside the same ones computed: frequency (one dimension each is fitted to it), Q with interval, slope."""
 
 from dataclasses import dataclass
 

@@ -30,11 +30,10 @@ class FaceGrid:
 
 
 def read_cloud(path: str | Path, unit: Unit = "mm") -> "Array | FaceGrid":
-    """Points (count, 3) in m, or a table.
+    """Points (count, 3) in m from text with x, y, z in the first columns, or a table of departures.
 
-    Text files have x, y, z in the first three columns, apart by blanks, commas, semicolons or tabs; lines that start with #
-    are comments. A table begins with the line `position,0,5,10,…` (azimuths in degrees) and has one line per position (0 ... 1 of the
-    meridian) with the departures of the face in µm, positive out of the material, empty where there is none.
+    A table begins with `position,0,5,10,…` (azimuths in degrees); its lines give a position 0 … 1 and departures in µm,
+    positive out of the material.
     """
     file = check_file(path)
     if file.suffix.lower() in MESHES:

@@ -1,8 +1,4 @@
-"""Comma-separated tables of numbers, read fast and refused with the line that is wrong.
-
-A table is UTF-8 text: optional comment lines that start with `#`, one header line, then numbers; an empty cell
-is a missing value.
-"""
+"""Comma-separated tables of numbers, read fast and refused with the line that is wrong; `#` begins a comment, empty cells are missing."""
 
 import codecs
 import csv
@@ -78,14 +74,7 @@ class Columns:
 def read_columns(
     path: str | Path, known: Collection[str], required: Collection[str] = (), prefixes: Collection[str] = ()
 ) -> Columns:
-    """Read a table of numbers.
-
-    Args:
-        path: The file.
-        known: collection of str: Column names that may appear.
-        required: collection of str: Column names that must appear.
-        prefixes: collection of str: Beginnings of further names that may appear.
-    """
+    """Read a table of numbers whose columns are `known` or begin with one of the prefixes, and have the required ones."""
     if is_parquet(path):
         comments, header = read_comments_and_names(path)
         _check_names(path, header, 0, known, required, prefixes)
@@ -236,11 +225,7 @@ def parse_fast(
 
 
 def _scan(file: IO[bytes], start: int, columns: int, separator: str, decimal: str) -> tuple[int, int, str] | None:
-    """Return the rows of a table whose body starts there, the place of the body in the file, and the hash.
-
-    None where the rows have not all the same columns, or anything stands there but plain decimal numbers, separators and
-    line ends: 'nan', quotes, comments, blanks.
-    """
+    """Return rows, place of the body and hash; None unless all rows have all columns and nothing but plain decimal numbers."""
     usual = f"0123456789eE+-\r\n{separator}{decimal}".encode()
     if file.read(len(codecs.BOM_UTF8)) != codecs.BOM_UTF8:
         file.seek(0)

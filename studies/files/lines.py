@@ -18,10 +18,7 @@ KEY = re.compile(r"\s*\"?([\w.-]+)\"?\s*=")
 
 
 def point_out(message: str) -> str:
-    """Return a message with "(file:line)" of the key that it names, or of the table where the key is missing; else as it is.
-
-    A built-in card is named, with what makes a copy of it that can be changed; its file is inside the installation.
-    """
+    """Return a message with "(file:line)" of the key or table that it names; a built-in card is named, with how to copy it."""
     named = NAMED.match(message)
     if named is not None and (file := Path(named["file"])).parent == Path(str(files("studies"))) / "cards":
         copied = f"To change it, copy it: hrg card new MY.toml --like {file.stem}."

@@ -1,8 +1,6 @@
 """Paths that a command reads and writes: those that it is given, and those that its files lead to.
 
-A card names tables of departures, a spec names a card, a fleet its records, the folder of a study its spec. A name that stands
-anywhere in a TOML file, or in the spec of a study's store, and is a file beside it, counts as read. So no key of any format has to
-be known here.
+A name anywhere in a TOML file, or in the spec of a study's store, that is a file beside it counts as read.
 """
 
 import json
@@ -45,12 +43,7 @@ def beside(path: str | Path, ending: str) -> Path:
 def guarded(
     arguments: Mapping[str, Any], endings: Mapping[str, Iterable[str]] = MappingProxyType({})
 ) -> Iterator[list[Path]]:
-    """Keep what a command reads from being overwritten by what it writes, while it runs; gives what it reads.
-
-    Args:
-        arguments: Of the command, by name.
-        endings: By name of an output, those of the files that are written `beside` it.
-    """
+    """Keep what a command reads from being overwritten by what it writes, while it runs; `endings`: of files written `beside` an output."""
     outputs = {name: value for name, value in arguments.items() if name in OUTPUTS and isinstance(value, str)}
     words = [word for name, value in arguments.items() if name not in OUTPUTS for word in _words(value)]
     global _written

@@ -15,13 +15,7 @@ from studies.files.paths import claim
 
 @contextmanager
 def written_whole(path: str | Path) -> Iterator[IO[bytes]]:
-    """Open a binary file that takes its name only when everything has been written.
-
-    A link is followed; what is no regular file, such as /dev/null or a pipe, is written into and stays what it is.
-
-    Args:
-        path: Where the file shall appear, in a folder that exists: a mistyped one is not made.
-    """
+    """Open a binary file that takes its name only when everything has been written; a link is followed, a pipe stays what it is."""
     temporary: Path | None = None
     try:
         target = _follow(Path(path))

@@ -1,7 +1,4 @@
-"""A bias calibration from record files: both ways of selecting terms, held-out scores, Allan deviations.
-
-This is what `hrg fit bias` computes and its page shows.
-"""
+"""A bias calibration from record files: both ways of selecting terms, held-out scores, Allan deviations."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -90,12 +87,8 @@ def study_bias(
 ) -> BiasStudy:
     """Fit the bias model to records of a gyro at rest while its temperature changes.
 
-    Args:
-        method: whose terms `model` takes; both are computed.
-        width, window: averaging before the fit and window of the rate, s; 100 s, less for runs of less than 200 such
-            rows, and three times that.
-        causal: the rate uses past samples only.
-        over: what the bias is a function of; "auto" takes the frequency where every record has it.
+    `width` and `window`, s, of averaging and of the rate: 100 s, less for short runs, and three times that. A `causal`
+    rate uses past samples only.
     """
     records = records_of_one_gyro(records, progress)
     check_lengths(records)

@@ -74,12 +74,7 @@ class Decay(RingDown):
 def read_decay(
     path: str | Path, *, frequency: float | None = None, harmonic: int = 2, expected: float | None = None
 ) -> Decay:
-    """Read one decay and analyse it.
-
-    Args:
-        frequency: Hz, carrier of raw samples, reference of a lock-in, frequency of a trace; in place of the file's.
-        expected: Hz, what a card predicts; raw samples whose frequency is an alias of it are refused.
-    """
+    """Read one decay and analyse it; `frequency` (Hz) replaces the file's carrier or reference, an alias of `expected` (Hz) is refused."""
     table, notes = _read(path)
     if frequency is not None:
         notes = {**notes, "reference_frequency_Hz": frequency}

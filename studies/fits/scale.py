@@ -178,10 +178,7 @@ def _parts_of(table: BellRun) -> dict[str, BellRun]:
 
 
 def read_law(runs: Sequence[BellRun]) -> RateLaw | None:
-    """Return the law of the raw output over rate (°/s) and temperature, from the mean of every hold within a kelvin.
-
-    A hold's error is what its fifths show about the line through them. It warms or cools where its run sweeps the temperature.
-    """
+    """Return the law of the raw output over rate (°/s) and temperature, from the mean of every hold within a kelvin."""
     means: list[tuple[float, ...]] = []
     scatter: list[float] = []
     for run in runs:

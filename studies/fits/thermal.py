@@ -44,15 +44,7 @@ class ThermalEstimate:
 
 @dataclass(frozen=True)
 class ThermalFit:
-    """What records say of the heat path.
-
-    Attributes
-    ----------
-    estimates : by name: time_constant_1 … (s), radiated_share, offset, slope, curvature (Hz, per K and K²)
-    undetermined : names of constants that the records cannot separate
-    departures : K, of the lumps from their settled state at the start of each run, the resonator last
-    notes : what was done to the records
-    """
+    """What records say of the heat path: `estimates` by name (s; Hz, per K and K²), the initial `departures` (K) of the lumps of each run."""
 
     path: HeatPath
     confidence: float
@@ -88,12 +80,7 @@ def fit_thermal_constants(
 ) -> ThermalFit:
     """Find the lags of the resonator behind its housing, each run with an initial state of its own.
 
-    Args:
-        records: Runs with `frequency_Hz` and the temperature of the housing, else of the chamber.
-        instrument: Gives the curvature of the frequency over temperature; without it the curvature is fitted.
-        lags: Number of lags; as many as the records support, up to three, when absent.
-        confidence: Of the intervals.
-        progress: Told in words what comes next.
+    The instrument gives the curvature of the frequency over temperature; `lags` are as many as the records support, up to three.
     """
     if lags is not None and not 1 <= lags <= len(LAGS):
         raise InputError(f"--lags {lags}: the number of lags lies between 1 and {len(LAGS)}.")

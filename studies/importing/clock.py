@@ -33,10 +33,7 @@ class Times:
 
 
 def read_times(table: RawTable, file: "FileMap") -> Times:
-    """Return the times of a raw file by its own clock, corrected as its map says.
-
-    A clock that runs fast by ε and is behind by d at its zero gives t = t' / (1 + ε) + d.
-    """
+    """Return times by the raw file's own clock, corrected by the map: t = t' / (1 + ε) + d for a clock that is fast by ε and behind by d."""
     form = file.time_format
     origin, notes = file.start, []
     if file.sample_period is not None:

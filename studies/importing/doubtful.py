@@ -1,7 +1,4 @@
-"""Readings that a raw file should not have: rows that a second file repeats, spikes, a sensor that is stuck, dropouts to 0.
-
-Rows that repeat are left out. Other readings are counted, and become missing values only where the map says so (`drop`).
-"""
+"""Readings that a raw file should not have: rows that repeat (left out), spikes, stuck sensors, dropouts (counted; `drop` clears them)."""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING

@@ -112,10 +112,7 @@ def _load_text(lines: Sequence[str]) -> FileMap:
 
 
 def _find_offsets(paths: Sequence[str], files: list[list[str]]) -> list[str]:
-    """Offer the offset between the first file's clock and each other's, where their columns share enough.
-
-    Each file is read by a draft of its own, so that two sensors of one kind, of which a record takes one, are compared too.
-    """
+    """Offer the offset between the first file's clock and each other's, where their columns share enough."""
     from studies.importing.join import read_series, shift_between
 
     try:

@@ -48,10 +48,7 @@ class ClockedFile:
 
 
 def import_records(paths: Sequence[str], import_map: LoadedMap) -> dict[str, Record]:
-    """Read raw files, convert and join them into one record, or one for each axis ("" where there is only one).
-
-    The comments of the record's header list every change; nothing is extrapolated, and nothing interpolated across gaps.
-    """
+    """Read raw files, convert and join them into one record, or one for each axis; the comments of the header list every change."""
     series = [read_series(own, file) for own, file in zip(share_out(paths, import_map), import_map.files, strict=True)]
     base = series[0]
     shifts = [shift_between(base, other) for other in series]
@@ -87,10 +84,7 @@ def import_records(paths: Sequence[str], import_map: LoadedMap) -> dict[str, Rec
 
 
 def import_table(path: str, import_map: LoadedMap) -> "tuple[dict[str, Array], tuple[str, ...]]":
-    """Read settled readings: temperature (°C) and frequency (Hz) in the order of the file, and what was changed.
-
-    Rows that lack one of the two are left out.
-    """
+    """Read settled readings, temperature (°C) and frequency (Hz), in the order of the file, and what was changed; incomplete rows go."""
     (file,) = import_map.files
     with closing(read_parts([path], file)) as table:
         columns = {column.target: convert(table, column) for column in file.columns}
@@ -207,11 +201,7 @@ def convert(table: RawTable, column: ColumnMap) -> "Array":
 
 
 def resample(time: "Array", values: "Array", grid: "Array", how: str, longest_gap: float) -> "Array":
-    """Return the values at the times of the grid, NaN outside their range and within gaps.
-
-    linear: between the neighbours. mean: of the samples that lie nearer to this grid time than to any other.
-    nearest: the nearest sample. previous: the last sample, held (for set points).
-    """
+    """Return values at the times of the grid, NaN outside and within gaps: linear, the mean of nearer samples, the nearest, the previous."""
     known = np.isfinite(values)
     t, v = time[known], values[known]
     if not len(t):

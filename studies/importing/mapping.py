@@ -1,7 +1,4 @@
-"""The map of an import, `schema = "hrg.map/1"`: what each raw file's columns are and how they become a record.
-
-`hrg keys map` lists the keys; `hrg import RAW --draft MAP.toml` drafts a map.
-"""
+"""The map of an import, `schema = "hrg.map/1"`: what each raw file's columns are and how they become a record."""
 
 import datetime
 from collections.abc import Mapping

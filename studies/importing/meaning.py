@@ -1,8 +1,4 @@
-"""What a laboratory's column means: every column of the record bids for it, and the best bid wins.
-
-A bid is the weight of the words in the column's name, raised by a unit that fits. A unit that cannot belong to a column
-of the record, such as [T] or m/s² beside "temp", forbids it.
-"""
+"""What a laboratory's column means: columns of the record bid for it, by the words of its name and a unit that fits or forbids."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -77,12 +73,7 @@ class Meaning:
 
 
 def find_meanings(hints: Mapping[str, str], taken: Sequence[str] = ()) -> dict[str, Meaning]:
-    """Return the meaning of every column for which one is found.
-
-    Args:
-        hints: Name of a column to what is known of it: its name and its unit.
-        taken: Columns of the record that other files fill.
-    """
+    """Return the meaning of every column for which one is found, from `hints` of name and unit; `taken` are filled by other files."""
     axes = _find_axes(hints)
     bids = [
         (-weight, place, name, target)

@@ -36,12 +36,7 @@ class Offset:
 
 
 def estimate_offset(t1: Array, y1: Array, t2: Array, y2: Array, same_unit: bool = False) -> Offset | None:
-    """Return what must be added to the times t2 so that y2 follows y1; None where the two share too little.
-
-    Args:
-        t1, y1, t2, y2: Two series with times (s) by their own clocks; NaN marks missing values.
-        same_unit: Whether both show one quantity in one unit.
-    """
+    """Return what must be added to the times t2 so that y2 follows y1 (`same_unit`: of one quantity); None where the two share too little."""
     t1, y1, t2, y2 = *_known(t1, y1), *_known(t2, y2)
     if min(t1.size, t2.size) < 20 or np.ptp(y1) == 0 or np.ptp(y2) == 0:
         return None

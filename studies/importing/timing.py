@@ -41,10 +41,7 @@ def find_time(
     decimal: str,
     evenly: bool = False,
 ) -> tuple[list[str], str, str]:
-    """Return the time columns, their format, and what is doubtful about it; no columns where the rows have no time.
-
-    `evenly` says that the file states the time between its rows: then a column that merely rises is no time.
-    """
+    """Return the time columns, their format and doubts; `evenly`: the file states its step, and a column that merely rises is no time."""
     named = [name for name in names if re.search(TIME_WORDS, name.lower())]
     stamps = [name for name in names if cells[name] and all(is_stamp(cell) for cell in cells[name] if cell)]
     stamped = [name for name in (named or stamps) if name in stamps][:2]

@@ -18,11 +18,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Unit:
-    """How a reading x in this unit becomes a value of the record.
-
-    `settings` are the keys of the map that the conversion needs besides x, in the order of its arguments; `never_zero`
-    tells that a reading of 0 is no value: nothing was counted.
-    """
+    """How a reading x becomes a value of the record: `settings` are further keys of the map, `never_zero` says that 0 is no value."""
 
     convert: "Callable[..., Array]"
     words: str
@@ -120,10 +116,7 @@ _NOMINAL = re.compile(r"(pp[mb])\s+of\s+(.*?)\s*(?:hz)?", re.IGNORECASE)
 
 
 def find_spelling(column: str, text: str) -> str | None:
-    """Return the unit of a column that a text such as "°/s", "mdps" or "deg_per_h" spells; None where it spells none.
-
-    Small and capital letters are the same, except an m: mHz is not MHz.
-    """
+    """Return the unit that a text such as "°/s", "mdps" or "deg_per_h" spells, in any case but for m and M, or None."""
     units = units_of(column)
     if text in units:
         return text

@@ -16,14 +16,7 @@ if TYPE_CHECKING:
 def place_in_zone(
     origin: datetime.datetime, seconds: "Array", zone: str, place: Callable[[int], str]
 ) -> "tuple[datetime.datetime, Array, int]":
-    """Return the origin with its offset from UTC, true seconds after it, and how many rows lie in an hour that comes twice.
-
-    Args:
-        origin: local time without a zone.
-        seconds: (N,) local time after the origin, s; NaN where a row has none.
-        zone: name such as "Europe/Berlin".
-        place: tells the file and line of a row.
-    """
+    """Return the origin with its offset from UTC, true seconds (N,) after it, and how many rows lie in an hour that comes twice."""
     import numpy as np
 
     rows = np.flatnonzero(np.isfinite(seconds))
@@ -59,9 +52,8 @@ def _utc_offsets(origin: datetime.datetime, seconds: "Array", zone: str) -> "tup
 
 
 def _second_pass(seconds: "Array", begin: int, end: int) -> int:
-    """Return the row of a block in the repeated hour from which on it is the second pass: where the stamps step back.
-
-    Where none does, the log has seen the hour once: the pass that leaves the smaller step to the rows beside the block.
+    """Return the row of a block in the repeated hour that begins the second pass: where stamps step back, else by the
+    smaller step beside it.
     """
     import numpy as np
 

@@ -1,7 +1,4 @@
-"""Runs that lie apart, where no card states a turn-on: a level of every run stands beside the effects as one more hypothesis.
-
-What a level of each run explains better is no reason to name a cause, and no structure within the runs.
-"""
+"""Runs that lie apart, where no card states a turn-on: a level of every run is one more hypothesis beside the effects."""
 
 from studies.calibration.fit import LASTING
 from studies.inference.generic_forms import offsets

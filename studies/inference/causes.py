@@ -105,10 +105,7 @@ def _shape_of(term: Term) -> dict[str, Interval]:
 
 
 def parameters_of(background: Background, signatures: Signatures, k: int) -> dict[str, Interval]:
-    """Return shape and definite coefficients of a term with 90 % intervals.
-
-    What is not known of the shape is part of what is not known of the coefficients: Σ = Σ_c + Σ_s (∂c/∂s)² σ_s².
-    """
+    """Return shape and coefficients of a term with 90 % intervals; Σ = Σ_c + Σ_s (∂c/∂s)² σ_s² includes what is not known of the shape."""
     term, out = background.terms[k], {}
     mean, C = background.coefficients(k)
     variance = np.diag(C).copy()

@@ -33,10 +33,7 @@ def drift_of(records: Sequence[Record]) -> tuple[float, float] | None:
 
 
 def settle(names: Sequence[str], judge: str, equals: Sequence[str], drifts: bool | None) -> list[str]:
-    """Return the names that could stand for one cause without those that the reference clock excludes, the first of the others first.
-
-    `judge` is the effect of the clock, `equals` what looks the same without a reference.
-    """
+    """Return the names that could stand for one cause without those that the reference clock (`judge`, its `equals`) excludes."""
     pair = {judge, *equals}
     if drifts is None or not pair & set(names):
         return list(names)

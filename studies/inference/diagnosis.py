@@ -1,7 +1,7 @@
 """Diagnosis of a campaign against a card: calibrate, search for effects beside all values and responses at once, judge.
 
-The card is calibrated without effects first. Where effects are found its values are linearised anew at the most probable point of all
-unknowns together, and the search begins again there: values that had gone far to do what an effect does come back.
+Where effects are found, the card's values are linearised anew at the most probable point of all unknowns together, and
+the search begins again there: values that had gone far to do what an effect does come back.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -215,10 +215,7 @@ def infer(card: "Instrument", campaign: Campaign, progress: Report = lambda _: N
 
 
 def _with_heat_path(found: CardFit, told: Array | None, progress: Report) -> tuple[HeatPath | None, Search, Outcome]:
-    """Search beside one lag, and beside several in series where one leaves slow noise: those stand for the strongest cause in the frequency.
-
-    Where these follow nearly all that one lag does not, they are searched first, and one lag only as long as it may be the likelier one.
-    """
+    """Search beside one lag, and beside several where one leaves slow noise; the likelier heat path stays."""
     path = find_heat_path(found, progress=progress) if slow_share(found) > SUSPICIOUS else None
     if path is None or not (path.lags > 1 or path.radiates):
         return (None, *_from(found, told, progress))

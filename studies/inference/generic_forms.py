@@ -1,8 +1,4 @@
-"""Generic forms: families like any effect, with many columns and no physics, by which structure that nobody explains is seen.
-
-Smooth in temperature, in temperature and rate, in history, in a drive, in time; a narrow feature at one temperature, a step at one moment. They are
-weighed by the same marginal likelihood; the name of one is where structure is left.
-"""
+"""Generic forms: families of many columns and no physics (in temperature, rate, history, drive, time) that show unexplained structure."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace

@@ -38,14 +38,7 @@ SURE_SHARE = 3.0
 
 @dataclass(frozen=True)
 class HeatPath:
-    """A card with lags in series, its most probable values, and their log evidence, choices paid for.
-
-    Attributes
-    ----------
-    card, fit
-    evidence : of the calibrated card; once effects are beside it, what both bring to one lag without effects
-    lead : log evidence ahead of one lag with other effects
-    """
+    """A card with lags in series, its fit and log `evidence`, choices paid for; `lead` is that ahead of one lag with other effects."""
 
     card: "Instrument"
     fit: CardFit

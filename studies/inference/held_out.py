@@ -1,7 +1,7 @@
 """Predictions of rows that a model has not seen, on the records' own rows.
 
-One record is left out at a time, and its own start and offset are refitted; of a single record, or beside effects that other runs know
-nothing of, a fifth of each run with a gap of one thermal constant on both sides.
+One record is left out at a time, its start and offset refitted; of a single one, a fifth with a gap of one thermal
+constant on both sides.
 """
 
 from collections.abc import Mapping, Sequence

@@ -1,7 +1,6 @@
 """What the chamber says of a card: the housing that it drives, as rows that know the card's values beside all other responses.
 
-A housing that was measured drives frequency, bias and 1/Q; how it follows the chamber holds conductances, capacities and the lag of its
-sensor. The starts of that path concern nobody else: with the triangle of [J_start J_values r; 1 0 0] they are integrated out.
+The starts of that path are integrated out with the triangle of [J_start J_values r; 1 0 0].
 """
 
 from dataclasses import replace

@@ -22,16 +22,8 @@ if TYPE_CHECKING:
 class Inferred:
     """What a card and records say together.
 
-    Attributes
-    ----------
-    card : as shipped
-    shipped : response -> rms on its rows of what the card as shipped leaves
-    plain, rows : what the calibrated card leaves of every response, and the final model
-    search : Search, in the linearisation where it ended
-    outcome : Outcome
-    left : response -> Leftover
-    held_out : response -> (without effects, with them)
-    path : the heat path of several lags that stands in place of one, with the log evidence that it brought
+    By response: rms of the card as `shipped`, rows that the calibrated card (`plain`) and the final model (`rows`)
+    leave, `left` the lack of fit, `held_out` without effects and with them; `path` is a heat path of several lags in place of one.
     """
 
     card: "Instrument"

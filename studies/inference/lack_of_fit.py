@@ -64,13 +64,7 @@ def generic_bank(search: Search) -> list[Shapes]:
 def look(
     search: Search, bank: Sequence[Shapes], plain: "Hypothesis | Model", final: Hypothesis, rows: Mapping[str, Rows]
 ) -> dict[str, Leftover]:
-    """Return what a model leaves of every response.
-
-    Parameters
-    ----------
-    plain, final : the models without effects, or of another heat path, and with the named ones
-    rows : response -> what the final model leaves on the rows of the records
-    """
+    """Return what a model leaves of every response, on `rows` of the records; `plain` has no effects, or another heat path."""
     seen = search.scan(final, bank, less=())
     own = Background(search.linear, final.terms, final.noise)
     longer = isinstance(plain, Model)

@@ -34,18 +34,10 @@ PRICE = -4.0
 
 @dataclass(frozen=True)
 class Term:
-    """An effect of one shape with its columns.
+    """An effect of one shape with its columns, by response (M, k).
 
-    Attributes
-    ----------
-    effect, response, shape
-    columns : response -> (M, k), of the members that are fitted
-    members : which columns of the effect these are
-    unit : array (k,), prior standard deviations in a strong case; behind those of the members what each run began with
-    scale : of SCALES
-    price : log prior of the effect and of the choice of shape and scale
-    brought : log posterior that it brought when it was found
-    bend : response -> (M, p + 1), how its columns at its size go with the card's coordinates, and these where they were taken
+    `members` are places of its columns, `unit` their prior sd in a strong case, `scale` one of SCALES, `price` the log
+    prior of the choice, `brought` its log posterior when found, `bend` (M, p + 1) how its columns go with the card's coordinates.
     """
 
     effect: Effect
@@ -77,15 +69,9 @@ class Term:
 
 @dataclass(frozen=True)
 class Linear:
-    """The rows of a calibration linearised at a point.
+    """The rows of a calibration linearised at a point: by response `target` (M,) about u = 0 and `slope` (M, p).
 
-    Attributes
-    ----------
-    problem : CardProblem
-    rows : response -> NoiseRows
-    target : response -> (M,), what the card leaves, about u = 0
-    slope : response -> (M, p)
-    told : (q, p + 1) or None, what else says something of the coordinates: rows of white noise of variance 1 and their target
+    `told`, (q, p + 1), is what else says something of the coordinates: rows of white noise of variance 1 and their target.
     """
 
     problem: CardProblem
@@ -216,13 +202,9 @@ class Background:
         )
 
     def gains(self, columns: Mapping[str, NDArray[np.floating]], units: Array, effect: Effect) -> Array:
-        """Return what effects add to the evidence at each of SCALES, (S, H).
+        """Return what effects of columns (M, H, k) and units (H, k) add to the evidence at each of SCALES, (S, H).
 
-        Parameters
-        ----------
-        columns : response -> (M, H, k)
-        units : array (H, k)
-        effect : one that cannot go against its first column, or beyond the most of it, adds nothing there: −∞
+        An effect that cannot go against its first column, or beyond the most of it, adds nothing there: −∞.
         """
         some = max(1, AT_ONCE // (units.shape[1] * max(len(own) for own in columns.values())))
         if len(units) > some:
@@ -244,12 +226,8 @@ class Background:
     def against(
         self, columns: Mapping[str, NDArray[np.floating]], units: Array, left: Mapping[str, Array]
     ) -> tuple[Array, Array, Array]:
-        """Return eigenvalues (H, k) and eigenvectors (H, k, k) of the Gram matrices of effects beside this model, and the moments along these of B residuals (H, k, B).
-
-        Parameters
-        ----------
-        columns, units : as in `gains`
-        left : response -> (M, B), whitened rows that this model leaves
+        """Return eigenvalues (H, k) and eigenvectors (H, k, k) of the Gram matrices of effects, and the moments of B
+        residuals `left` along these.
         """
         base, (H, k) = self._solved[0], units.shape
         gram, moment = np.zeros((H, k, k)), np.zeros((H, k, next(iter(left.values())).shape[1]))

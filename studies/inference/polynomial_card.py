@@ -43,13 +43,7 @@ POWERS = {"frequency_Hz": 2, "inverse_q": 2, "bias_deg_per_h": 3}
 
 
 def polynomial_card(records: Sequence[Record], name: str = "") -> "Instrument":
-    """Return the card of a gyro with these records.
-
-    Raises
-    ------
-    InputError
-        Records without a drive or a response, or too short.
-    """
+    """Return the card of a gyro with these records; InputError where they have no drive or response, or are too short."""
     from studies.instrument.card import SCHEMA, build_instrument
 
     runs = observe(records, blocks=ROWS)

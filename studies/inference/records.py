@@ -21,16 +21,9 @@ REFERENCE = "reference_frequency_Hz"
 
 @dataclass(frozen=True)
 class Campaign:
-    """Records that a diagnosis can use.
+    """Records that a diagnosis can use, each once, with their `numbers` among those given (from 1), `skipped` responses and notes.
 
-    Attributes
-    ----------
-    paths : of the records that were given, each once
-    records : those with enough rows, bias and driving temperature under their usual names
-    numbers : their places among those that were given, from 1
-    skipped : response -> why it is not judged
-    notes : sentences
-    timed : whether every record states its start
+    They have enough rows, and bias and driving temperature under their usual names; `timed` says whether all state their start.
     """
 
     paths: tuple[str, ...]
@@ -48,13 +41,7 @@ def driving(record: Record) -> Array:
 
 
 def make_ready(given: Sequence[Record]) -> Campaign:
-    """Check several records of one gyro and keep what can be used.
-
-    Raises
-    ------
-    InputError
-        If the records disagree about the gyro, lack a temperature or a response, or use another unit.
-    """
+    """Check several records of one gyro and keep what can be used; InputError where they disagree or lack a column or unit."""
     if not given:
         raise InputError("no records given; a diagnosis needs at least one.")
     kept, repeated = drop_repeats(given)

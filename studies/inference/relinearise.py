@@ -73,10 +73,7 @@ def relinearise(
 
 
 def _bent(start: CardFit, point: Array, terms: Sequence[Term], sizes: Sequence[Array]) -> tuple[Term, ...]:
-    """Return terms that know how what they do goes with the path of the temperature: with the starts of runs, and with the lag of a polynomial card.
-
-    Of an effect on the temperature itself also with the slope of such a card, which no record may know.
-    """
+    """Return terms that know how what they do goes with the starts of runs and with the lag, and slope, of a polynomial card."""
     problem, names = start.problem, start.problem.priors.names
     thermal = any(term.effect.thermal for term in terms)
     law = [k for k, name in enumerate(names) if name == "law.lag_s" or (thermal and name.startswith("law.a"))]

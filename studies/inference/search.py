@@ -1,7 +1,6 @@
 """Search over effects: the model of all responses grows by the effect that adds most evidence, as long as that pays its price.
 
-Every effect is looked at in all shapes of its grid at once; the nearest contenders are refitted, each with shape, size and noise of its
-own. Log posteriors are those of `model`, with the prior of an effect, the mean over its shapes and the mean over its sizes.
+Shapes of a grid are looked at together; near contenders are refitted with shape, size and noise of their own.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence

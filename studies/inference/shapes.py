@@ -1,7 +1,4 @@
-"""Shapes of an effect: which of a grid are scanned, and where between them one is likeliest.
-
-Grids come in series of equal steady parameters; of a large one every second, third, … shape stands for its neighbours.
-"""
+"""Shapes of an effect: which of a grid are scanned (every second, third, … of a large one), and where between them one is likeliest."""
 
 from collections.abc import Callable, Sequence
 
@@ -26,10 +23,7 @@ MOVES, EDGE = 3, 0.05
 
 
 def polish(moved: Moved, span: Span, beside: Background, term: Term, anew: bool = True) -> Term:
-    """Move a shape to where the evidence is largest: among those that it stands for, then between the next ones.
-
-    Not `anew`, only the latter: after values of the card have moved.
-    """
+    """Move a shape to where the evidence is largest, among those that it stands for (if `anew`), then between the next ones."""
     effect = term.effect
     grid = [tuple(shape) for shape in effect.grid(span, term.response)]
     around = _passed(effect, grid, term.shape) if len(grid) > MOST_SHAPES else []

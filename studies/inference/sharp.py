@@ -30,10 +30,9 @@ def fast_line(
 
 
 def intermittent(runs: Sequence[FloatArray]) -> float:
-    """Return the log evidence of oscillations that come, go or wander: noise has the same spectrum all the time.
+    """Return the log evidence of oscillations that come, go or wander, by short periodograms of the innovations.
 
-    Short periodograms of the innovations over their mean in each run are of one exponential law in noise, with about one
-    mean at all frequencies; against it a mixture of two, a small part of the cells with more power.
+    Noise has one exponential law about one mean at all frequencies; against it stands a mixture with some cells of more power.
     """
     best = 0.0
     for length in CELLS:
@@ -63,11 +62,7 @@ UNEVEN = 2.5
 
 
 def brief_events(rows: FloatArray, heaviest: float) -> float:
-    """Return the log evidence of brief events: a few innovations that are too large for noise of tails no heavier than Student's t.
-
-    A mixture of two normal laws about 0, by expectation and maximisation, against the likeliest of Student's laws, for the
-    tails of noise may be heavy; as many numbers more as the BIC counts.
-    """
+    """Return the log evidence of brief events: two normal laws about 0 against Student's t of tails no heavier than given, by the BIC."""
     square = rows**2 / max(float(np.mean(rows**2)), 1e-300)
     best = -np.inf
     for part in (0.02, 0.1, 0.3):

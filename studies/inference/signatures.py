@@ -53,11 +53,7 @@ def _gradient(count: int, step: float) -> "csr_array":
 
 @dataclass(frozen=True)
 class Path:
-    """One run as the card predicts it: its states on an even grid, and how responses follow the resonator's temperature.
-
-    `by_temperature` and `by_rate`: response -> slope at the predicted rows, per K and per K/s; `by_loss`: of the bias by 1/Q, through the
-    anisotropy of damping.
-    """
+    """One run as the card predicts it: its states on an even grid, and by response the slopes per K, per K/s and by 1/Q."""
 
     time: Array
     states: States

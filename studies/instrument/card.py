@@ -1,8 +1,4 @@
-"""Cards: the description of one instrument, `schema = "hrg.card/1"`, parsed whole when it is loaded.
-
-A card names the resonator's geometry at the reference temperature and its material, or a polynomial law; the optional tables `[thermal]`,
-`[bias]`, `[loss]`, `[noise]` and `[[effect]]` say more, and every file of `studies.instrument.tables` adds one.
-"""
+"""Cards: the description of one instrument, `schema = "hrg.card/1"`, parsed whole when loaded; `studies.instrument.tables` has the tables."""
 
 import os
 from collections.abc import Mapping
@@ -182,12 +178,10 @@ class Instrument:
         return _reread(self, {**self.content, name: raw}, {name})
 
     def with_values(self, values: Mapping[str, Any]) -> "Instrument":
-        """Return a new instrument with other values at dotted keys of the card.
+        """Return a new instrument with other values at dotted keys of the card, in its units:
+        {"thermal.mount_conductance_W_per_K": 0.012}.
 
-        Args:
-            values: mapping from dotted key to value: In the card's units: {"thermal.mount_conductance_W_per_K": 0.012}.
-                A plain number leaves the uncertainty beside it as it is; a mapping such as {"value": 0.012, "sd":
-                0.001} replaces both. Text and lists replace text and lists.
+        A plain number keeps the uncertainty beside it; a mapping such as {"value": 0.012, "sd": 0.001} replaces both.
         """
         content: Mapping[str, Any] = self.content
         for name, value in values.items():

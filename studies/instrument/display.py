@@ -1,7 +1,4 @@
-"""Names that people read for a card's keys: "temperature slope of the shear modulus".
-
-The key itself stays in JSON, in cards, and beside the name where the reader edits a card.
-"""
+"""Names that people read for a card's keys, beside them or in their place: "temperature slope of the shear modulus"."""
 
 from studies.instrument.units import split_unit
 

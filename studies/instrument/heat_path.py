@@ -27,12 +27,7 @@ FROM_MATERIAL = {
 def build_heat_path(
     thermal: "Thermal", resonator: "Resonator", material: "Material", reference: float, where: str
 ) -> "HeatPath":
-    """Build the heat path.
-
-    Args:
-        reference: reference temperature, K.
-        where: "file [thermal]", for messages.
-    """
+    """Build the heat path at a reference temperature (K); `where` is "file [thermal]", for messages."""
     from thermal.resonator import HeatPath
 
     radius, length = _stem_size(thermal, resonator)

@@ -18,9 +18,7 @@ LAW = "material.deviation."
 def uncertain_of_law(material: "Material", stated: Collection[str]) -> Iterator[UncertainValue]:
     """Yield the coefficients of the law's deviation that act on the frequency, as uncertain as the material's prior.
 
-    Args:
-        stated: dotted names whose uncertainty the card states; they are not repeated here, and where it states that of
-            a given value (`material.youngs_modulus_GPa`), the law's own value is exact.
+    Not those of which the card states the uncertainty, by key or by a given value of which it states one.
     """
     from shell.law import ACTING
 

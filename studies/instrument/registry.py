@@ -52,10 +52,8 @@ class CardTable:
 
 @dataclass(frozen=True)
 class ReadTable:
-    """What one table of a card says.
-
-    `keys` as they stand in the card and `parts` as built from them, by name of the part; the uncertain numbers; the dotted
-    names of those whose uncertainty the card states, exact ones among them.
+    """What one table of a card says: `keys` as they stand, `parts` built from them, uncertain numbers, and those
+    `stated` so, exact ones too.
     """
 
     keys: Mapping[str, Any]

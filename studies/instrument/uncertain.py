@@ -96,15 +96,9 @@ def is_spread(raw: Any) -> bool:
 
 
 def read_uncertain(raw: Any, keys: Any, where: str, name: str) -> "tuple[Any, list[UncertainValue], set[str]]":
-    """Read a table of a card into its class.
+    """Read a table of a card (`name`: "thermal", "effect.0") into its class.
 
-    Returns:
-        table
-        uncertain: those of its numbers that are not exact, as the card states or as their keys document.
-        stated: names of the numbers whose uncertainty the card states.
-
-    Args:
-        name: of the table, with the place in an array of tables: "thermal", "effect.0".
+    Returns it, those of its numbers that are not exact, and the names of those whose uncertainty the card states.
     """
     stated: dict[Path, UncertainValue] = {}
 

@@ -26,12 +26,9 @@ class Assignment:
 
 
 def assign(y: Array, sd: Array, allowed: Sequence[Sequence[int]], g: Array, J: Array) -> list[Assignment]:
-    """Return the likeliest assignments, best first; empty where no assignment explains all readings.
+    """Return the likeliest assignments, best first; empty where none explains all readings.
 
-    Args:
-        y, sd: ln f of the readings, and the standard deviation of each, the model's error at this distance included.
-        allowed: places of the candidates of every reading.
-        g, J: ln f of the candidates at u = 0, and ∂ln f/∂u.
+    `y`, `sd`: ln f of the readings, `allowed` the places of each one's candidates; `g`, `J`: ln f of these at u = 0, and ∂ln f/∂u.
     """
     count = J.shape[1]
     order = sorted(range(len(y)), key=lambda i: len(allowed[i]))  # what is known first

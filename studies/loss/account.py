@@ -19,10 +19,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class DampingAround:
-    """Damping that differs around the axis, over the temperatures of a budget.
-
-    `split` Δ(1/Q), `axis` (rad) of the pattern that is damped most, `drift` (deg/h) of the wave at most.
-    """
+    """Damping that differs around the axis: `split` Δ(1/Q), `axis` (rad) of the most damped pattern, `drift` (deg/h) at most."""
 
     split: Array
     axis: Array

@@ -19,10 +19,7 @@ NODE_STEP = 4.0  # K, for the narrowest activated peaks
 
 @dataclass(frozen=True)
 class DampingLaw:
-    """1/Q and its anisotropy over temperature, for a simulation: between nodes as cubic splines.
-
-    wave : Δ(1/Q) exp(2 i n θ_τ); None where the card states no anisotropy of its parts.
-    """
+    """1/Q and, where the card states it, `wave` Δ(1/Q) exp(2 i n θ_τ) over temperature: between nodes as cubic splines."""
 
     inverse_q: "Callable[[NDArray[np.float64]], NDArray[np.float64]]"
     wave: "Callable[[NDArray[np.float64]], Complex] | None"

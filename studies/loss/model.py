@@ -59,10 +59,8 @@ class LossModel:
 def loss_model(
     instrument: "Instrument", harmonic: int = 2, theory: "Theory" = "solid", anchor: bool = False
 ) -> LossModel:
-    """Solve the lowest mode of a harmonic and gather its causes of loss.
-
-    Args:
-        anchor: compute what a stem sends into its base (a second or two); else it is left out and said so.
+    """Solve the lowest mode of a harmonic and gather its causes of loss; the `anchor`, what a stem sends into its base,
+    takes a second or two.
     """
     from shell.damping.faces import Vibration
 

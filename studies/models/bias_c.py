@@ -12,12 +12,7 @@ from studies.models.file import Model
 
 @dataclass(frozen=True)
 class CausalBias:
-    """What the code computes: see `kinds.bias`.
-
-    `column` of the input, its `reference` and the `unit` of the bias; `terms` and their `coefficients`, the constant
-    first; `memory` before them; `window`, `lag` of the rate and `block` (s); the fewest `blocks` of a rate; the calibrated
-    `values` and `rates`.
-    """
+    """What the code of `kinds.bias` computes: terms over a column about its `reference`, behind `memory`, with the rate's window and lag."""
 
     column: str
     unit: str

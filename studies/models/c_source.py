@@ -28,12 +28,7 @@ def _one_comment(text: str) -> str:
 
 
 def self_test(rows: Sequence[Sequence[float]], meaning: str, step: str) -> str:
-    """Return a `main` under HRG_SELF_TEST that compares the code with a table of what Python computes.
-
-    Args:
-        meaning: Of the columns.
-        step: C statements that set `found` and `expected` from `row`, a pointer to one row.
-    """
+    """Return a `main` under HRG_SELF_TEST that compares the code with rows of what Python computes, by C statements on `row`."""
     width = len(rows[0])
     table = ",\n".join("    {" + ", ".join("NAN" if x != x else repr(float(x)) for x in row) + "}" for row in rows)
     return f"""/* Test: cc -std=c99 -DHRG_SELF_TEST this_file.c -lm && ./a.out; columns: {meaning}. */

@@ -1,7 +1,6 @@
 """The model file `hrg.model/1`: a fitted compensation as a small TOML that people and firmware engineers read.
 
-`hrg keys model` lists its keys. Numbers keep all their digits, so a model that was saved and read computes the same to the last
-bit. The text is laid out here, not by tomli-w, for the comments: how well each coefficient is known.
+Numbers keep all digits. The text is laid out here, not by tomli-w, for its comments: how well each coefficient is known.
 """
 
 import math
@@ -175,10 +174,7 @@ class Model(ModelKeys, frozen=True, kw_only=True):
         return self.validity[variable]
 
     def check_range(self, variable: str, values: "NDArray[np.float64]", extrapolate: bool) -> None:
-        """Refuse values of a variable outside the fitted range, unless told to extrapolate.
-
-        Missing values (NaN) pass; they stay missing in the result.
-        """
+        """Refuse values of a variable outside the fitted range, unless told to extrapolate; NaN pass and stay missing."""
         import numpy as np
 
         low, high = self.range_of(variable)

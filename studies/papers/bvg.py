@@ -1,7 +1,6 @@
 """The BVG paper's compensation chain on a virtual gyro, beside its printed claims and what can explain them.
 
-The paper prints coefficients and results but no data. The twin is a gyro whose output the printed coefficients bring
-to the applied rate exactly, with white noise and a wandering bias added; nothing was tuned to the printed results.
+The paper prints no data: the printed coefficients bring the twin's output to the rate exactly, with noise and wander added.
 """
 
 from collections.abc import Sequence
@@ -137,11 +136,7 @@ def examine_claims() -> Claims:
 
 
 def reduce_white(taps: Array, rows: int) -> float:
-    """Return the factor by which a FIR filter lowers the Allan deviation of white noise over `rows` samples.
-
-    The Allan variance is half the mean square of the difference of neighbouring means, a window (−1…−1, 1…1) on the
-    samples; behind the filter the window is convolved with the taps, so the ratio of their lengths is exact.
-    """
+    """Return the factor by which a FIR filter lowers the Allan deviation of white noise over `rows` samples: exact, by the window convolved."""
     window = np.r_[-np.ones(rows), np.ones(rows)]
     return float(np.linalg.norm(window) / np.linalg.norm(np.convolve(window, taps)))
 

@@ -48,10 +48,7 @@ def read_shape() -> Array:
 
 
 def make_profile(soak_h: float = 1.0, slope_K_per_min: float = 1.0) -> tuple[Array, Array]:
-    """Return times (s) and chamber temperatures (K) of a cycle 20 → 60 → −40 → 20 °C with soaks.
-
-    The paper's figure 1 is a picture only; this is a usual chamber cycle and not its copy.
-    """
+    """Return times (s) and chamber temperatures (K) of a usual cycle 20 → 60 → −40 → 20 °C with soaks; figure 1 is a picture only."""
     corners_degC = [20.0, 60.0, -40.0, 20.0]
     time, temperature = [0.0], [corners_degC[0]]
     for corner in corners_degC:

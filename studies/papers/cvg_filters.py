@@ -1,9 +1,7 @@
-"""The filtering paper's figures 3 and 5–7 for k = 500 Hz, ζ = 0.025, γ = 0.1, B = 3 Hz, with noise reduction as numbers.
+"""The filtering paper's figures 3 and 5–7 for k = 2π·500 rad/s, ζ = 0.025, γ = 0.1, B = 2π·3 rad/s, with noise reduction as numbers.
 
-"k = 500 Hz" is taken as 2π·500 rad/s and "B = 3 Hz" as 2π·3 rad/s. The paper gives neither its sampling step nor σ:
-σ² = 2/B is taken, which gives the rate the variance 1 rad²/s². The Wiener case is sampled every 1 ms. For the Kalman
-filter the step matters, because Q is per step: its rate estimate is "closer to the actual square pulse shape than the
-measured output", as the paper says, only for steps below about 0.04 ms, so 0.02 ms is taken.
+The paper gives neither step nor σ: σ² = 2/B gives the rate the variance 1 rad²/s²; the Wiener case is sampled every 1
+ms, the Kalman filter, whose Q is per step, every 0.02 ms: it follows the pulse as printed only below 0.04 ms.
 """
 
 from dataclasses import dataclass

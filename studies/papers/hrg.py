@@ -1,7 +1,4 @@
-"""The HRG paper's Table 1, Table 2 and figures 4 and 5, recomputed from its data and set beside first principles.
-
-Sensors 2012, 12, 6434. The resonator's geometry is not printed there: the shipped card `hrg-30mm` stands for it.
-"""
+"""Table 1, Table 2 and figures 4 and 5 of the HRG paper (Sensors 2012, 12, 6434) beside first principles by the card `hrg-30mm`."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,8 +1,4 @@
-"""What published gyros and papers claim of their loops, put to the loop twin: met, met conditionally, or not met.
-
-Drift and mean rate of a free wave are closed forms. The published figures are of gyros whose electronics are not published, so
-the twin says what they ask of the electronics.
-"""
+"""What published gyros and papers claim of their loops, put to the loop twin: met, met conditionally (on electronics), or not met."""
 
 from dataclasses import dataclass
 from typing import Literal

@@ -1,10 +1,8 @@
 """Figure 3 of the HRG paper and the soak error of its Table 1, by the heat path of a card.
 
-The paper gives no heat path. Its text around Figure 3 is read as: 95 % of a chamber step made after 9 000 s, less than
-1 % left after 15 000 s. The first statement identifies one constant, the conductance of the mount; the second is then a
-prediction. A campaign of points that all start at room temperature leaves, at each, the same share of its step if the
-network is linear, which hides in the slope; radiation leaves more on the cold side than on the hot one. Points that
-follow each other upwards leave the same share of 10 °C each, which hides in the offset.
+The text is read as: 95 % of a step made after 9 000 s, which identifies the mount's conductance, and under 1 % left
+after 15 000 s, a prediction. Points that all start at room temperature leave the same share of each step, which hides
+in the slope (radiation leaves more when cold); points that follow each other upwards leave an offset.
 """
 
 from dataclasses import dataclass

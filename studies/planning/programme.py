@@ -110,10 +110,7 @@ class NextRun:
 
 
 def words_of(low: float, high: float, duration: float) -> dict[str, str]:
-    """Return the family of chamber profiles between two temperatures, °C, each lasting about `duration`, s.
-
-    Staircases up, down and both ways, ramps at two rates, cycles at two periods, step and soak, random steps, quiet.
-    """
+    """Return a family of chamber profiles (stairs, ramps, cycles, steps, quiet) between two temperatures, °C, of about one duration, s."""
     middle, wide = _short(0.5 * (low + high)), high - low
     fifth, third = _short(np.floor(2.0 * wide) / 10.0), _short(np.floor(10.0 * wide / 3.0) / 10.0)
     top, upper = _short(low + 5.0 * fifth), _short(low + 3.0 * third)

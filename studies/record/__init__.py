@@ -1,7 +1,4 @@
-"""Records: one run of a gyro, measured or simulated; steady-state tables; chamber profiles (CSV files).
-
-Columns keep the names of the file, which carry their units; missing values are NaN.
-"""
+"""Records of a gyro, steady-state tables and chamber profiles: columns named as in the file, with their units; NaN is missing."""
 
 import datetime
 from collections.abc import Callable, Mapping, Sequence
@@ -192,10 +189,7 @@ def reading_resolution(values: Array) -> float:
 
 
 def drop_repeats(records: "Sequence[Record]") -> tuple[list[Record], list[str]]:
-    """Return the records without those that repeat another, whatever the file's name, and a sentence for each that was left out.
-
-    Of two that share most of their rows the longer is kept.
-    """
+    """Return the records without those that repeat most of a longer one, and a sentence for each that was left out."""
     kept: list[Record] = []
     said = []
     for record in records:

@@ -104,10 +104,7 @@ def gather_rest(records: "Sequence[Record]", outputs: "dict[str, float]") -> Res
 
 
 def check_temperatures(record: "Record") -> str:
-    """Refuse a record whose temperatures contradict each other or, with the lag of its frequency, are those of no chamber and no resonator; else return a doubt, if any.
-
-    In minutes a housing changes by tens of kelvin per minute and the resonator follows within seconds; in milliseconds it lags by days.
-    """
+    """Refuse temperatures that contradict each other or lag as in no chamber and no resonator; else return a doubt, if any."""
     name = next((one for one in DRIVING if one in record and np.isfinite(record[one]).sum() > 1), None)
     if name is None:
         return ""

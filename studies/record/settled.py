@@ -55,12 +55,7 @@ class Soak:
 
 
 def find_soaks(records: Sequence[Record], time_constant: float = 3000.0, tolerance: float = 0.05) -> tuple[Soak, ...]:
-    """Find the settled parts of records.
-
-    Args:
-        time_constant: Slowest of the gyro; what the records show takes its place where that is longer.
-        tolerance: What may be left of a change.
-    """
+    """Find the settled parts of records, by the slowest time constant, given or shown, and what may be left of a change."""
     if not (time_constant > 0 and tolerance > 0):
         raise InputError("a time constant and a tolerance must be positive.")
     found = []
@@ -82,10 +77,7 @@ def settled_table(soaks: Sequence[Soak], where: str, advice: str = "") -> tuple[
 
 
 def advise_hold(records: Sequence[Record], time_constant: float, tolerance: float) -> str:
-    """Say how long to hold a temperature, from the longest hold that had not settled and how its frequency moves.
-
-    What is left to settle decays with the record's own time constant τ, so that it takes τ ln(left/tolerance) more.
-    """
+    """Say how long to hold a temperature: the longest hold that had not settled needs τ ln(left/tolerance) more."""
     holds = [(one, rows) for one in _judge(records, time_constant, tolerance) for rows in find_holds(one.seen.drive)]
     # Slopes near the end of a hold know of what comes after it.
     whole = [(one, rows[: -one.reach]) for one, rows in holds if _is_whole(one.time, rows, one.reach)]
@@ -175,11 +167,7 @@ def _see(record: Record) -> _Seen | None:
 
 
 def _shown(seen: Sequence[_Seen], tolerance: float) -> float:
-    """Return the longest time constant (s) of those that the longest holds show, 0 where none does.
-
-    It counts where what settles in the second half of a hold is more than the tolerance and the half is longer than it:
-    what is seen of a shorter part may be a bend of another kind.
-    """
+    """Return the longest time constant (s) that the longest holds show clearly, 0 where none does."""
     found = []
     for one in seen:
         for rows in (rows[:-REACH] for rows in find_holds(one.drive) if _is_whole(one.time, rows, REACH)):
@@ -282,10 +270,7 @@ def find_holds(drive: Array) -> list[NDArray[np.intp]]:
 
 
 def _time_constant(t: Array, f: Array, least: float = 0.0) -> float:
-    """Time constant (s) of f = a + b exp(−t/τ); infinite where the fit shows none: b does not stand out, or τ is beyond the rows.
-
-    To stand out, b must be larger than `least` (Hz) too.
-    """
+    """Time constant (s) of f = a + b exp(−t/τ); infinite where b stands out neither from noise nor `least` (Hz), or τ is too long."""
 
     def miss(log_tau: float) -> tuple[float, float]:
         X = np.column_stack([np.ones(len(t)), np.exp(-(t - t[0]) / np.exp(log_tau))])

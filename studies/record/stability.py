@@ -31,11 +31,7 @@ def read_stability(series: Array, step: float, confidence: float) -> Stability:
 
 
 def unbroken(time: Array, columns: dict[str, Array], spikes_left_out: bool = False) -> tuple[float, dict[str, Array]]:
-    """Return an equally spaced series for Allan deviations and its step (s).
-
-    The samples themselves where they are regular, complete and free of spikes; else averages of ten samples, over the
-    longest stretch without a gap. Where `spikes_left_out`, none are looked for.
-    """
+    """Return an equally spaced series for Allan deviations and its step (s): the samples, or means of ten over the longest stretch."""
     steps = np.diff(time)
     step = float(np.median(steps))
     regular = bool(np.all(np.abs(steps - step) < 0.01 * step))

@@ -1,7 +1,4 @@
-"""A record looked at without a card and without a fit: every column's range, faults, steps, spectrum and noise.
-
-Nothing is changed and nothing is left out of the record: spikes and missing values are left out of spectra and Allan deviations only.
-"""
+"""A record looked at without a card and without a fit: every column's range, faults, steps, spectrum and noise; nothing is changed."""
 
 from dataclasses import dataclass, replace
 from itertools import combinations
@@ -188,10 +185,9 @@ def average_evenly(time: Array, values: Array, most: int = MOST) -> tuple[Array,
 
 
 def find_steps(time: Array, values: Array) -> tuple[Step, ...]:
-    """Return where a series moves at once, seen in its rows and, for what noise hides there, in means of 8 and of 64 rows.
+    """Return where a series moves at once, in its rows and in means of 8 and of 64 rows.
 
-    Straight lines through the 25 means before and after differ by D, which stands out by 8 robust standard deviations over the series;
-    the change is there within two means; and about it a parabola with a step follows the rows better than one with a bend.
+    Lines through the 25 means on either side differ by 8 robust sd, within two means, and a parabola with a step fits better than a bend.
     """
     spacing = float(np.median(np.diff(time)))
     count = round(float(time[-1] - time[0]) / spacing) + 1

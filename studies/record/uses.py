@@ -1,7 +1,4 @@
-"""What records can be used for: for each command, what it asks of records and these lack, and the line to type.
-
-Each command's own readers are asked, so that what is said here is what the command would say.
-"""
+"""What records can be used for: by command the line to type, or what its own readers say is missing."""
 
 import shlex
 from collections.abc import Callable, Sequence

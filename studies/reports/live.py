@@ -52,10 +52,7 @@ def live_blocks(
     instrument: Instrument, harmonic: int = 2, theory: Theory = "solid", names: Sequence[str] = (),
     derived: Sequence[Derived] = (),
 ) -> list[Block]:  # fmt: skip
-    """Return sliders for keys of the card (main dimensions unless given) and temperature; one sentence where they cannot be had.
-
-    They move the view of the mode that stands above them in the page.
-    """
+    """Return sliders for keys of the card (main dimensions unless given) and temperature, or a sentence why not; they move the view above."""
     try:
         data, missing = describe_live(instrument, harmonic, theory, names, derived)
     except UNUSABLE_INPUT as error:

@@ -113,10 +113,7 @@ def show_mode(
     theory: Literal["solid", "shell"] = "solid",
     exaggerated: bool = True,
 ) -> ModeScene:
-    """Solve one mode of an instrument (temperature in K, its reference unless given) and build its surface.
-
-    Of a card with an imperfection it is the slower mode on its axis, the shell's departures `exaggerated` or as they are.
-    """
+    """Solve one mode (at K, or the reference) and build its surface; of an imperfect card the slower mode, departures `exaggerated` or not."""
     from shell.modes import solve_modes
     from shell.surface import build_surface
 

@@ -79,10 +79,7 @@ def panels(
 def figure(
     rows: int = 1, columns: int = 1, height: float = 3.4, x: str = "", y: str | Sequence[str] = "", **options: Any
 ) -> Iterator[tuple[Drawing, Any]]:
-    """Give a figure and its axes in the house style; it belongs to no window and is forgotten afterwards.
-
-    `x` stands below the last row, `y` beside every row or one for each; what has named lines gets a legend.
-    """
+    """Give a figure and its axes in the house style, with `x` below the last row, `y` beside every row, and legends of named lines."""
     import matplotlib as mpl
     from matplotlib.figure import Figure
 

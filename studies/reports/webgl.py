@@ -1,7 +1,6 @@
-"""An interactive view of modes for a page: it swings, turns and pauses from one file without a network.
+"""An interactive view of modes for a page, from one file without a network.
 
-The page carries only the outline of the section with the amplitudes of each mode; the browser turns it around the axis,
-so the normals of the swinging surface are exact and a mode takes about 20 kB. Where WebGL2 is missing the picture stays.
+The page carries the outline with each mode's amplitudes, some 20 kB; without WebGL2 the picture stays.
 """
 
 import base64

@@ -39,11 +39,7 @@ def shift_per_kelvin(instrument: Instrument, loads: Loads, temperature: float) -
 
 
 def bias_by_tilt(instrument: Instrument, loads: Loads, temperature: float) -> BiasSensitivity | None:
-    """Return what a shift of the wall within its charged electrodes does to the bias of the loops; None without either.
-
-    The gap gets a wave of order 1; with the other waves of the gap or unequal voltages that makes a wave 2n of the springs, which
-    splits the pair, and the phase errors of the loops turn the quadrature into bias.
-    """
+    """Return the bias by a shift of the wall within its charged electrodes: a gap of order 1 splits the pair; None without loop or charge."""
     card = instrument.part("electrodes")
     if instrument.loop is None or "electrodes" not in instrument.content or not card.are_charged:
         return None

@@ -105,12 +105,10 @@ def scan_faces(
     theory: Literal["solid", "shell"] = "solid",
     say: Callable[[str], None] = lambda _: None,
 ) -> Scan:
-    """Read, align and fit the faces, and find the splits of harmonics n.
+    """Read, align and fit the faces, and find the splits of harmonics n; the fit goes up to the `highest` wave, at
+    least twice the highest n.
 
-    Args:
-        frames: "own" aligns each face by itself, so that its first wave holds no rigid motion; "common" keeps them as
-            they lie to each other.
-        highest: wave around up to which the faces are fitted, at least twice the highest harmonic.
+    With frames "own" each face is aligned by itself, its first wave without rigid motion; "common" keeps them as they lie.
     """
     if 2 * max(harmonics) > highest:
         needed = f"the split of n = {max(harmonics)} needs harmonic {2 * max(harmonics)} of the faces"

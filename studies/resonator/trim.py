@@ -1,7 +1,6 @@
 """Trimming of a card's resonator: the sites that its rim or teeth offer, and a plan for measured splits.
 
-What a groove does depends on its depth: the shape derivative holds for shallow, wide ones alone. So a plan is made, its cuts are
-solved (shell.groove), and made again with what they do, until the depth stays. Cuts that touch are one wide groove.
+A groove's effect depends on its depth: plan and solve (shell.groove) alternate until the depth stays. Cuts that touch are one.
 """
 
 from collections.abc import Mapping, Sequence
@@ -110,10 +109,7 @@ def rim_sites(
     tool: Tool = TOOL,
     kind: CutKind = "mass",
 ) -> Sites:
-    """Grooves side by side around the shell, one of them on the antinode at `axis` (rad), at positions of the meridian.
-
-    Their number is a multiple of 4n for every harmonic, so that the antinodes of each are among them and balance each other.
-    """
+    """Grooves around the shell, a multiple of 4n for every n, one on the antinode at `axis` (rad), at positions of the meridian."""
     if not (tool.width >= NARROWEST and NARROWEST <= tool.length < np.inf and 0 < tool.depth_limit < 1):
         raise InputError(
             f"a cut is at least {1e6 * NARROWEST:g} µm wide and long, and takes a share of the wall between 0 and 1."
@@ -185,14 +181,9 @@ def plan_for_card(
     gain: float = 1.0,
     unbalance: Mapping[int, complex] | None = None,
 ) -> CardPlan:
-    """A plan for splits measured on a card's resonator.
+    """A plan for splits measured on a card's resonator: (harmonic, split in Hz, azimuth of the slow axis in rad, reading error in Hz).
 
-    Args:
-        resonator, elastic: of the card at the temperature.
-        measured: (harmonic, split in Hz, azimuth of the slow axis in rad, reading error in Hz), one for each harmonic.
-        goal: Hz. heights : positions of the cuts. tool, teeth : what is cut. removal_error, gain_error, unbalance : see
-            `plan_trim`.
-        gain: effect of the last round over its prediction, of either sign, which scales what a cut is taken to do.
+    `heights` are positions of the cuts, `gain` the last round's effect over its prediction, of either sign; see `plan_trim`.
     """
     if not 0 < goal < np.inf:
         raise InputError(f"--goal {goal:g}: must be a positive split in Hz.")

@@ -1,8 +1,6 @@
-"""Results as a page: text, tables and figures in one self-contained HTML file.
+"""Results as a page: text (escaped), tables and figures in one HTML file that works without a network.
 
-All text is escaped; figures are embedded, so the page works without a network; a short script shows their values and enlarges them. What would make a page long is folded:
-tables of many rows, and the chapters that begin below `OPEN_HEIGHT`. On paper everything is unfolded, but no table has more
-than `PAPER_ROWS` rows. On a phone a table that is too wide is stacked, every row a few lines of heading and value.
+Long tables and chapters below `OPEN_HEIGHT` are folded, on a phone wide tables stacked; paper has `PAPER_ROWS` rows of a table at most.
 """
 
 import base64

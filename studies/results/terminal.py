@@ -44,10 +44,7 @@ def _print(part: Part) -> None:
 
 
 def print_table(title: str, columns: Sequence[str], rows: Sequence[Sequence[object]], note: str = "") -> None:
-    """Print a table with numbers aligned to the right; floats must already be formatted text.
-
-    On a narrow terminal columns of text and headings fold, numbers never: where they alone are too wide, lines run over.
-    """
+    """Print a table, numbers (as text) aligned to the right; a narrow terminal folds headings and columns of text, never numbers."""
     room = shutil.get_terminal_size().columns if sys.stdout.isatty() else PAPER
     cells = [["" if cell is None else printable(str(cell)) for cell in row] for row in rows]
     headings = [printable(column) for column in columns]

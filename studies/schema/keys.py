@@ -25,13 +25,9 @@ def number(
     relative_sd: float | None = None,
     example: Any = None,
 ) -> msgspec.Meta:
-    """Annotate a number with its meaning, its bounds, and the uncertainty that it has where a card states none.
+    """Annotate a number with its meaning, its bounds in the unit of the key, and its uncertainty where a card states none.
 
-    Args:
-        above, least, below, most: bounds, in the unit of the key.
-        sd, relative_sd: standard deviation of the default and of any plain number in the card, in the unit of the key
-            or as a part of the value; without either a plain number is taken as exact.
-        example: what stands in the forms for a key without a default.
+    With neither `sd` nor `relative_sd` a plain number is exact; `example` is shown in forms for a key without a default.
     """
     prior = {key: value for key, value in (("sd", sd), ("relative_sd", relative_sd)) if value is not None}
     ends: Any = {"gt": above, "ge": least, "lt": below, "le": most}

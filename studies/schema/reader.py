@@ -72,13 +72,7 @@ def _spell_syntax(text: str, error: str) -> str:
 
 
 def read_keys(raw: Any, keys: type[T], where: str, numbers: Numbers | None = None) -> T:
-    """Read a table into its class.
-
-    Args:
-        where: "file [table]", for messages.
-        numbers: callable (raw, path, type, place) -> raw: Sees what stands for a number before it is checked, such as a
-            number with its uncertainty.
-    """
+    """Read a table (`where`: "file [table]") into its class; `numbers` sees what stands for a number before it is checked."""
     declared: Any = keys
     found: T = _Reader(where, numbers).read(describe(declared), raw, ())
     return found

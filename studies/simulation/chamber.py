@@ -33,11 +33,7 @@ def load_profile(text: str) -> "Profile":
 
 
 def load_schedule(text: str) -> "tuple[Profile, Mapping[str, NDArray[np.float64]]]":
-    """Read a profile and the commands beside it: drive_amplitude_V, electrode_bias_V, quadrature_V, pattern_angle_deg, rate_deg_per_s.
-
-    Returns:
-        Profile, mapping: The chamber (K), and each command at the times of the profile, linear between; none for words.
-    """
+    """Read a chamber profile (K) and the commands beside it, by the names of a record's columns; words have none."""
     import numpy as np
 
     from studies.files.columns import read_header
@@ -60,11 +56,8 @@ def load_schedule(text: str) -> "tuple[Profile, Mapping[str, NDArray[np.float64]
 
 
 def load_drive(text: str, boundary: "Boundary | None" = None, rate: float = 1.0) -> "Profile | Drive":
-    """Read what drives a run: a profile, with commands or without, or a record, of which a measured column is imposed.
-
-    Args:
-        boundary: "chamber" or "housing", optional: Column of a record; the housing's where there is one.
-        rate: Rows per second of a profile with commands.
+    """Read what drives a run: a profile, its commands at `rate` rows per second, or a record's measured column, the
+    housing's if it has one.
     """
     from studies.files.columns import read_header
     from studies.record import PROFILE_COLUMNS, read_record

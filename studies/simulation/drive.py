@@ -130,12 +130,7 @@ def drive_by_profile(profile: Profile, time: Array) -> Drive:
 
 
 def drive_by_schedule(profile: Profile, columns: Mapping[str, Array], rate: float) -> Drive:
-    """Impose a chamber profile, and commands beside it, linear between its times.
-
-    Args:
-        columns: Any of the commands' columns of a record and the applied rate, at the times of the profile.
-        rate: Rows per second.
-    """
+    """Impose a chamber profile, with commands and applied rate, linear between its times, at `rate` rows per second."""
     time = rows_of(profile, rate)
     commands = {
         name: (np.interp(time, profile.time, columns[column]) * factor) ** power
@@ -161,10 +156,7 @@ def rows_of(profile: Profile, rate: float) -> Array:
 
 
 def drive_by_record(record: Record, boundary: Boundary | None = None, time: Array | None = None) -> Drive:
-    """Impose a measured column: the housing's unless it is absent or the chamber's is asked for.
-
-    Gaps of the column are bridged by straight lines; of very many rows, means are taken.
-    """
+    """Impose a measured column of a record, the housing's or the chamber's, gaps bridged by lines; of very many rows, means."""
     if boundary is None:
         boundary = "chamber" if COLUMN["housing"] not in record and COLUMN["chamber"] in record else "housing"
     if COLUMN[boundary] not in record:

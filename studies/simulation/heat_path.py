@@ -26,12 +26,7 @@ LEAST_LAG = 1e-3  # s
 
 
 def build_network(instrument: "Instrument", radiation: bool | None = None, boundary: str = "chamber") -> Network:
-    """Build the whole heat path, from the boundary "chamber" to the cells of the shell, or what is behind the "housing".
-
-    Args:
-        radiation: False linearises at the reference temperature; what the card says when absent.
-        boundary: "chamber" or "housing"
-    """
+    """Build the heat path from the "chamber", or "housing", to the cells of the shell; without radiation it is linear about the reference."""
     if instrument.polynomial is not None:
         law = instrument.polynomial
         network = lags_in_series(law.lags, law.chamber_lag, law.radiated_share if radiation is not False else 0.0)
@@ -53,10 +48,7 @@ def behind_housing(network: Network) -> Network:
 
 
 def lags_in_series(lags: Sequence[float], chamber_lag: float, radiated_share: float = 0.0) -> Network:
-    """Return lumps behind a housing behind a chamber that take no heat from what they follow, by their time constants (s).
-
-    Of the heat exchange at 20 °C the share is radiated; a negative one is no radiator, but as good a number.
-    """
+    """Return lumps behind a housing behind a chamber, by their time constants (s); a share of the heat exchange at 20 °C is radiated."""
     (cell,) = cell_names(1)
     parts: list[Part] = [Boundary("chamber"), Node("housing", 1.0), Conductor("chamber", "housing", 1.0 / chamber_lag)]
     radiators: list[Radiator] = []
@@ -94,8 +86,7 @@ def slowest_lag(network: Network, temperature: float) -> float:
 def departures(network: Network, lumps: Sequence[str], temperature: float) -> dict[str, NDArray[np.float64]]:
     """Temperatures of the nodes (K) for 1 K of each lump: "housing", "base", "stem", or "resonator" (stem and shell).
 
-    Only what persists of it, Σ v vᵀC e over as many of the slowest modes v as there are lumps: what happened before a run
-    is left in its slow modes, and a lump that departed evenly would begin with fast ones.
+    Only what persists: Σ v vᵀC e over as many of the slowest modes v as there are lumps.
     """
     names = [node.name for node in network.nodes]
     relaxation = find_relaxation(network, temperature)

@@ -1,8 +1,4 @@
-"""Holes in a record: what a driving temperature may have done between two distant rows.
-
-Over a hole the temperature is drawn as a straight line in a few parts; a departure (K) in the middle of each part is free. As
-many as the heat path has slow parts leave nothing of its state known after the hole but what its rows show.
-"""
+"""Holes in a record: what a driving temperature may have done between two distant rows: departures (K) from a line, in a few parts."""
 
 import numpy as np
 
@@ -15,13 +11,7 @@ LEAST = 0.02  # K, departure of a temperature that was steady on both sides
 
 
 def bridge_holes(profile: Profile) -> tuple[Profile, dict[int, float]]:
-    """Put rows into the holes of a measured profile.
-
-    Returns:
-        profile: With `PARTS − 1` rows more in each hole, on the straight line across it.
-        departures: How far (K, standard deviation) it may have been from that line midway before row k, by k: half of
-            the change across the hole, and half of what changed over as long before and after it.
-    """
+    """Put `PARTS − 1` rows into each hole of a measured profile; return it, and by row k how far (K, sd) it may be off midway before."""
     t, T = profile.time, profile.value
     h = np.diff(t)
     usual = float(np.median(h))

@@ -33,10 +33,7 @@ def wave_of(
     harmonic: int = 2,
     damping: NDArray[np.complex128] | None = None,
 ) -> StandingWave:
-    """Return the standing wave at frequencies (Hz) and losses, numbers or rows.
-
-    `damping` is Δ(1/Q) exp(2inθ_τ) of the parts of a loss budget, in place of the anisotropy and axis of `[bias]`.
-    """
+    """Return the standing wave at frequencies (Hz) and losses, numbers or rows; `damping`: Δ(1/Q) exp(2inθ_τ) in place of `[bias]`'s."""
     loop, bias = require_loop(instrument), instrument.bias
     omega = 2 * np.pi * np.asarray(frequency, dtype=float)
     decay = omega * np.asarray(inverse_q, dtype=float) / 2
@@ -198,16 +195,7 @@ def settled_columns(
 ) -> dict[str, Array]:
     """Return what the settled loops of a card record, without the offset and polynomial of `[bias]`.
 
-    Args:
-        frequency, inverse_q: arrays (N,), Hz and 1: Of the resonator.
-        pattern_angle: array (N,): Azimuth (rad), through which a whole-angle wave has turned. Unless given, that of
-            `[bias]`, from which it turns over the time.
-        damping: array (N,): Of the parts of a loss budget; see `wave_of`.
-        time: array (N,), optional, s: Of the rows; a whole-angle wave turns only with it.
-        rate: float or array (N,): Rate (rad/s); `bias_deg_per_h` is what is indicated, with it.
-
-    Returns:
-        dict: `frequency_Hz`, `bias_deg_per_h`, `inverse_q`, `quadrature_V`, `pattern_angle_deg`.
+    `rate` in rad/s; a whole-angle wave turns over the time (s) from the azimuth of `[bias]`, unless its pattern angle (N,) is given.
     """
     loop, start = require_loop(instrument), float(np.radians(instrument.bias.pattern_angle_deg))
     angle = np.broadcast_to(np.asarray(start if pattern_angle is None else pattern_angle), np.shape(frequency))
@@ -251,12 +239,7 @@ def run_loops(
 ) -> LoopRun:
     """Run the card's loops over even rows (s), its resonator's frequency (Hz) and loss numbers or rows.
 
-    Args:
-        rate: float or array (N,): Rate (rad/s).
-        pattern_angle: float or array (N,): Azimuth (rad), at the start in whole-angle mode; that of `[bias]` unless
-            given.
-        both_ways: Whether the self-precession turns back after half of the rows.
-        damping: array (N,): Of the parts of a loss budget; see `wave_of`.
+    `rate` (rad/s) and azimuth (rad) are numbers or rows; `both_ways`: the self-precession turns back after half of them.
     """
     loop = require_loop(instrument)
     angle = np.radians(instrument.bias.pattern_angle_deg) if pattern_angle is None else np.asarray(pattern_angle)

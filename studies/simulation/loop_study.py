@@ -76,9 +76,7 @@ class BiasSlope:
 class LoopStudy:
     """What the loops of a card are like at one temperature.
 
-    `frequency` (Hz), `inverse_q` and `bryan_factor` are of the resonator; `settled` the columns at rest; `sources` of bias;
-    `noise` by source: deg/h of a mean over 1 s, and angle random walk (deg/√h) from a mean over 100 s; `margins`; `start`
-    from rest; `use` the parts of the actuators' ranges that the settled loops use.
+    `noise` by source: deg/h of a mean over 1 s, and deg/√h from one over 100 s; `use`: parts of the actuators' ranges.
     """
 
     instrument: "Instrument"

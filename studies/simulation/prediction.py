@@ -1,7 +1,6 @@
 """The one forward model: what an instrument's record is, without noise, and how it changes with every value of its card.
 
-Temperatures and their derivatives come from the network (`thermal.sensitivity`); what the gyro reads at them is algebra
-(`studies.simulation.response`), whose derivatives are differences along the change of values and temperatures together.
+Temperatures come from the network (`thermal.sensitivity`), what is read at them from `studies.simulation.response`.
 """
 
 from collections.abc import Mapping, Sequence
@@ -57,14 +56,10 @@ def predict(
     law: "FrequencyLaw | None" = None,
     longest: float | None = None,
 ) -> Prediction:
-    """Predict the record of a run.
+    """Predict the record of a run, and its derivatives by names or by `Variations` that runs share.
 
-    Args:
-        derivatives: names, or `Variations` of this instrument that several runs share Keys of the card
-            ("thermal.mount_conductance_W_per_K"), "initial.base" (K) and whatever else of the drive may depart, "shift"
-            (s), "jump.0" (s) and the other jumps of its profile, "kink.7" (K) before its row 7.
-        law: One that was built before for this instrument and a range that is wide enough.
-        longest: Between the knots of what radiation adds; the error goes with its fourth power.
+    Names are keys of the card, departures "initial.base" (K), "shift" (s), "jump.0" (s), "kink.7" (K, before row 7);
+    `longest` is between the knots of what radiation adds.
     """
     if law is None:
         law = law_for(instrument, drive)
@@ -110,10 +105,7 @@ def predict(
 def law_for(
     instrument: "Instrument", drive: Drive, margin: float = MARGIN, theory: "Theory" = "solid"
 ) -> "FrequencyLaw":
-    """Build the frequency law over the temperatures of a drive and of the reference, and some kelvin more.
-
-    Over all that the material allows where the card has effects on the temperature: how far they go is not known before.
-    """
+    """Build the frequency law over the temperatures of a drive and the reference; over all that the material allows for effects on it."""
     from studies.effects import find_effect
 
     if any(find_effect(one.name).thermal for one in instrument.effects):
@@ -123,10 +115,7 @@ def law_for(
 
 
 def _impose(instrument: "Instrument", drive: Drive) -> tuple[Profile, Profile]:
-    """Temperature that is imposed, of the housing what its sensor will have read, y + τ dy/dt: at its rows, and as lines between them.
-
-    The area of τ dy/dt, the sum of central differences, is right as it is. What jumps is behind no sensor.
-    """
+    """Temperature that is imposed, of the housing y + τ dy/dt of its sensor (not of jumps): at its rows, and as lines between them."""
     read = drive.imposed
     if drive.boundary == "chamber" or read.jumps.size:
         return read, read
@@ -137,11 +126,7 @@ def _impose(instrument: "Instrument", drive: Drive) -> tuple[Profile, Profile]:
 
 
 def of_equal_area(curve: Profile) -> Profile:
-    """Straight lines between the rows of a smooth curve T(t), with the area under it.
-
-    Straight lines through its rows leave out h³ T''/12 between two of them; rows moved by h² T''/12 do not. What follows
-    with a time constant of many rows takes in the area. Beside a gap the rows stay.
-    """
+    """Straight lines between the rows of a smooth curve T(t), with the area under it: rows moved by h² T''/12, not beside a gap."""
     h = np.diff(curve.time)
     before, after = h[:-1], h[1:]
     bend = np.diff(np.diff(curve.value) / h) * (before**3 + after**3) / (6 * (before + after) ** 2)
@@ -150,10 +135,7 @@ def of_equal_area(curve: Profile) -> Profile:
 
 
 def _slope_of_timing(network: Network, drive: Drive, name: str, rows: Array, departure: Array) -> tuple[Array, Array]:
-    """Derivatives of `Temperatures` by the time of the boundary or of one of its jumps (K/s, K/s²): differences.
-
-    A jump is moved to earlier times only: at a row there is a kink.
-    """
+    """Derivatives of `Temperatures` by the time of the boundary or of a jump (K/s, K/s²): differences, of a jump to earlier times only."""
 
     def moved(step: float) -> Drive:
         if name == SHIFT:

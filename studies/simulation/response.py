@@ -33,10 +33,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Temperatures:
-    """Temperatures at the rows and their rates, arrays (N, 6), K and K/s.
-
-    Columns: the housing (its rate is not used), the resonator's mean T_r, T_k − T_r, Σ n (T − T_r), Σ g (T − T_r), T_b − T_r.
-    """
+    """Temperatures at the rows and their rates, (N, 6), K and K/s: housing, mean T_r, T_k − T_r, Σ n (T − T_r), Σ g (T − T_r), T_b − T_r."""
 
     value: Array
     rate: Array
@@ -90,11 +87,8 @@ def read_out(
 ) -> dict[str, Array]:
     """Columns of the record, without noise: °C, Hz, deg/h, 1; of a card with loops also what their quadrature control says.
 
-    Args:
-        tau: Slowest time constant (s) of the resonator behind its housing, for the effects.
-        damping: 1/Q and its anisotropy from the parts in the card; else `[loss]`'s polynomial and `[bias]`'s
-            anisotropy.
-        more_loss: Added to 1/Q, as an effect on it would be.
+    `tau` (s) is the resonator's behind its housing, `damping` from the card's parts in place of `[loss]` and `[bias]`;
+    `more_loss` is added to 1/Q.
     """
     reference = instrument.reference_temperature
     housing, resonator, *uneven = found.value.T

@@ -84,10 +84,7 @@ def loops_system(loop: ClosedLoop, coupling: float) -> dict[str, Any]:
 
 
 def transfer(loops: Loops, name: str, decay: float) -> dict[str, dict[str, Array | float]]:
-    """Return L(z) of one loop alone, and L/(1 + L), as polynomials; see `Loops.open_loop`.
-
-    L = (g z + l) a (K (z − 1) + K_i T) / [z^m (z − e^{−dT}) (z − 1 + a) (z − 1)].
-    """
+    """Return L(z) of one loop alone, and L/(1 + L); L = (g z + l) a (K (z − 1) + K_i T) / [z^m (z − e^{−dT}) (z − 1 + a) (z − 1)]."""
     d, T, (whole, rest) = 0.0 if name == "phase" else decay, loops.step, loops.late
     K, K_i = loops.gains(name)
     a = loops.smoothing

@@ -64,16 +64,9 @@ def simulate_run(
     theory: "Theory" = "solid",
     law: "FrequencyLaw | None" = None,
 ) -> VirtualRun:
-    """Run a virtual gyro.
+    """Run a virtual gyro through chamber temperatures (K), settled at the first, or a drive, which brings its own rows.
 
-    Args:
-        instrument: With optional tables `[thermal]`, `[loss]`, `[bias]`, `[noise]` and `[[effect]]`.
-        driven: Chamber temperature (K), the gyro has settled at its first value; or a drive, which brings its own rows.
-        rate: Rows per second of a profile; of a drive, for its noise.
-        seed: Of the noise.
-        noise: False records what is true, without noise, sensor lag or rounding.
-        theory: Of the shell: "solid" or "shell".
-        law: One that was built before for the same instrument.
+    `rate`: rows per second. Without noise neither sensor lag nor rounding is added. A law built before serves the same instrument.
     """
     drive = driven if isinstance(driven, Drive) else drive_by_profile(driven, rows_of(driven, rate))
     if isinstance(driven, Drive):
@@ -148,10 +141,7 @@ def _observe(
     sensed: bool,
     turns_by: float | None,
 ) -> dict[str, Array]:
-    """Return the columns as they are read: noise and rounding. A housing that was imposed has been read already.
-
-    `turns_by` is the Bryan factor of a wave that turns freely: its azimuth is measured; else it is commanded.
-    """
+    """Return the columns as they are read: noise and rounding, but of an imposed housing; `turns_by`: Bryan factor of a free wave."""
     count = len(true["frequency_Hz"])
     housing = true["housing_temperature_degC"]
     scatter = Noise(levels.housing_white_K).draw(count, rate, generator)

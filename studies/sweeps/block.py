@@ -1,8 +1,6 @@
 """Designs of a study and what became of them, as columns: how they travel to a worker and back, and how they are kept.
 
-Kept, a block is a line of JSON and its columns: eight bytes a number, the bytes of equal weight beside each other, so that
-signs, exponents and what is constant take next to nothing; zlib's run lengths and Huffman codes are as small as its search
-for repetitions within a hundredth, and three times as fast.
+Kept: a line of JSON, then columns, bytes of equal weight beside each other, by zlib's run lengths and Huffman codes.
 """
 
 import json

@@ -1,7 +1,6 @@
-"""A user's Python function in a process of its own, so that what it does there harms only its own case.
+"""A user's Python function in a process of its own, kept from case to case, so that what it does there harms only its own case.
 
-The process is started at the first case and kept for the next ones. Requests and answers are lines of JSON over its
-pipes; what the function prints goes to standard error. It is killed, with a reason, when one case takes too long.
+Requests and answers are lines of JSON over its pipes; it is killed, with a reason, when one case takes too long.
 """
 
 import atexit

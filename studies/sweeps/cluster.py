@@ -1,9 +1,8 @@
 """Workers on a Dask cluster: the same interface as the pool of processes, for when one machine is not enough.
 
-Start `dask scheduler` on one machine and `dask worker tcp://HOST:8786 --nworkers N --nthreads 1` on each, in the same
-environment with the same version of the workbench. Dask sends Python objects: the scheduler, its workers and whoever can
-reach or imitate them can run code on this machine and on each other. So an address without encryption must be private;
-elsewhere `tls://` is needed, with the certificates that Dask's configuration names (`distributed.comm.tls`).
+Start `dask scheduler`, and `dask worker tcp://HOST:8786 --nworkers N --nthreads 1` on each machine, in one environment.
+Whoever can reach or imitate them can run code here: an address without encryption must be private, others need `tls://`
+with the certificates that Dask's configuration names (`distributed.comm.tls`).
 """
 
 import asyncio

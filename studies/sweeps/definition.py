@@ -16,10 +16,7 @@ FREE = ("name", "note", "requirement", "search")
 
 @dataclass(frozen=True)
 class StudyParameter:
-    """What is varied, in the unit of its name; `nominal` is text where `values` are.
-
-    A normal parameter that is not `bounded` has no ends: `low` and `high` are then three standard deviations away.
-    """
+    """What is varied, in the unit of its name; `low` and `high` of a normal one without bounds are three standard deviations away."""
 
     name: str
     nominal: float | str

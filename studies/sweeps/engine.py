@@ -1,9 +1,7 @@
 """The engine: evaluate the designs that a store lacks, batch by batch, on any workers, in any order.
 
-The spec fixes the batches. How many of them travel as one task is decided by how long they take, and changes no result.
-A task that comes back is committed in blocks of whole batches. When a worker is lost, what it had is tried again, alone and in pieces, so
-that a design that kills its worker is found and does not stop the rest. The loss of a worker is no result: such a case
-is noted as lost and tried again by the next run. Workers that end before any of them has computed anything stop the run.
+How many of the spec's batches travel as one task changes no result. What a lost worker had is tried again, alone and in
+pieces, to find a design that kills it; such a case is noted as lost and tried by the next run.
 """
 
 from collections import deque

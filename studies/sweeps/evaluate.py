@@ -37,10 +37,7 @@ class Row(NamedTuple):
 
 @dataclass(frozen=True)
 class WorkPlan:
-    """What a worker must know of a study; without families small, so that it travels with every task.
-
-    start : the design of a search from which modes are followed by their shapes; None where they go by their order.
-    """
+    """What travels to a worker with every task; `start` is the design from which a search follows modes by their shapes, not order."""
 
     instrument: Instrument
     coding: tuple[tuple[str, tuple[str, ...]], ...]

@@ -20,10 +20,7 @@ GROUP = 32_768  # cases in a row group of a Parquet file
 
 
 def export_results(results: Results, path: str | Path, part_rows: int = 1_000_000) -> Path:
-    """Write the table and, beside it, `NAME.units.json`, whose path is returned; floats keep every digit.
-
-    A name without an ending is a folder for a data set: Parquet files of about `part_rows` cases each, in order.
-    """
+    """Write the table (a folder of Parquet files without an ending) with every digit, and `NAME.units.json`, whose path is returned."""
     if is_parquet(path):
         _write_parquet(_tables(results, path, GROUP), path)
     elif Path(path).suffix:

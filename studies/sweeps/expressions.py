@@ -1,7 +1,6 @@
 """Parameters that follow from others: `end_mm = "radius_mm + 4"`, arithmetic that is parsed and never run as code.
 
-A name is a parameter of the study or a key of the card by its dotted path; the last part of the path does where only one
-parameter of the study, or one key beside the derived one, ends so.
+A name is a parameter of the study or a dotted key of the card, of which the last part does where only one ends so.
 """
 
 import ast

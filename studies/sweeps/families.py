@@ -1,8 +1,6 @@
 """Many designs at once through families (`shell.family`): frequency, TCF and Bryan factor.
 
-A family interpolates full solves over the ranges of the dimensions and of ν that a study needs; E, ρ and growth with
-temperature follow exactly. Its error is judged by full solves that it has not seen; where it is too large, or would take
-more solves than half the designs, every design is solved in full. No result depends on the other designs of its batch.
+Its error is judged by full solves that it has not seen; too large, or for half the designs, every design is solved in full.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence

@@ -1,8 +1,6 @@
 """Keys of a study's spec, `schema = "hrg.study/1"`: what is varied, how it is sampled, what is computed.
 
-`grid` takes every combination, `list` the rows of equally long `values`, `sensitivity` the design of Saltelli for Sobol
-indices (cases × (parameters + 2) designs), `one-at-a-time` five levels of each parameter about the nominal design.
-`hrg keys study` lists the keys; `hrg study new` writes a spec to start from.
+`sensitivity` is the design of Saltelli for Sobol indices: cases × (parameters + 2) designs; `one-at-a-time` takes five levels.
 """
 
 from math import inf

@@ -1,8 +1,4 @@
-"""Stores in folders: opened to read at any time, claimed by one run at a time, and mended when they are.
-
-A run leaves damaged blocks out and computes what they held anew. A second runner on the same folder is refused by a lock
-that ends with its process.
-"""
+"""Stores in folders: opened to read at any time, claimed by one run at a time (a lock), and mended then: damaged blocks are left out."""
 
 import fcntl  # POSIX only, as pyproject.toml declares
 import os

@@ -96,10 +96,7 @@ def run_study(
 
 @dataclass(frozen=True)
 class Effort:
-    """What a study would take: designs, batches, seconds of one design, of all, memory in MB; how designs are solved.
-
-    `why_full`: what in the spec keeps the designs from being interpolated, where that makes the study slow.
-    """
+    """What a study would take: seconds of one design and of all, memory in MB, how they are solved, `why_full` without interpolation."""
 
     cases: int
     batches: int

@@ -1,8 +1,6 @@
 """A file of sealed blocks: appended to and never changed, so that kill -9 loses nothing kept and damage stays where it is.
 
-A block is a head (mark, kind, length and checksum of its content, checksum of the head itself) and the content. Every
-checksum is verified when the file is read; beyond damage the next head that holds is looked for. An end that lacks a part
-is what a killed writer left: it is cut off.
+A block is a head (mark, kind, length, checksums) and content. Beyond damage the next head that holds is looked for.
 """
 
 import os

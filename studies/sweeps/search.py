@@ -1,8 +1,4 @@
-"""Searches beyond the sampled designs: the worst case over a box, and the tolerances to ask for; `studies.design` looks for designs.
-
-Every design that a search looks at is kept in the store, and the search takes the same path every time:
-resumed, it walks over what is already there.
-"""
+"""Searches beyond the sampled designs, the worst case over a box and the tolerances to ask for; each design looked at is kept."""
 
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
@@ -93,11 +89,7 @@ def name_search(search: Search) -> str:
 
 
 def find_worst_case(explorer: Explorer, search: WorstCase) -> dict[str, Any]:
-    """Find the extremes of a column over the box of all numeric parameters.
-
-    From the best corner (or, with many parameters, the best of single excursions) a bounded quasi-Newton search goes on,
-    so that an extreme inside the box or on an edge is found as well.
-    """
+    """Find the extremes of a column over the box of all numeric parameters, by a bounded quasi-Newton search from the best corner."""
     from scipy.optimize import minimize
 
     study = explorer.study
@@ -130,8 +122,7 @@ def find_worst_case(explorer: Explorer, search: WorstCase) -> dict[str, Any]:
 def find_tolerance(explorer: Explorer, search: ToleranceSearch) -> dict[str, Any]:
     """Find by which factor the tolerances may be wider (or must be narrower) for a share of designs to meet the requirements.
 
-    Every sampled design moves along its line through the nominal one. How far it then is on its way to its limit is taken to go
-    as the factor, which gives the next one; a split goes so to first order. The interval is that of a quantile of so many draws.
+    Every design moves along its line through the nominal one; the interval is that of a quantile of so many draws.
     """
     from scipy.stats import binom
 

@@ -1,8 +1,4 @@
-"""Which parameter matters: Sobol indices, local slopes, linear shares; each with an interval, none with invented values.
-
-A case that failed has no value, and nothing is put in its place: where a design needs every case, the analysis refuses
-and lists those that lack.
-"""
+"""Which parameter matters: Sobol indices, local slopes, linear shares; each with an interval, none where cases lack."""
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -21,10 +17,7 @@ SHOWN = 10
 
 @dataclass(frozen=True)
 class SobolIndices:
-    """First-order and total indices of every parameter with 90 % bootstrap intervals, arrays (parameters,).
-
-    `variance` is that of the column; where it is zero, so are all indices.
-    """
+    """First-order and total indices of every parameter with 90 % bootstrap intervals, (parameters,); all 0 where the variance is."""
 
     parameters: tuple[str, ...]
     first: Array
@@ -97,10 +90,9 @@ def _indices(A: Array, B: Array, AB: Array) -> tuple[Array, Array]:
 
 
 def local_slopes(results: "Results", column: str) -> list[LocalSlope]:
-    """Return the slopes of a column at the nominal design from a study with method = "one-at-a-time".
+    """Return slopes at the nominal design from method = "one-at-a-time", each of the polynomial through a parameter's levels.
 
-    The slope is that of the polynomial through a parameter's levels; its uncertainty is the distance to the
-    polynomial through the inner levels, plus the numerical error of the values over the distance of the inner levels.
+    The uncertainty is the distance to the polynomial through the inner levels, plus the values' numerical error.
     """
     study = results.study
     if study.sampling.method != "one-at-a-time":
@@ -127,10 +119,7 @@ def _derivative(x: Array, y: Array) -> float:
 
 
 def linear_shares(results: "Results", column: str) -> LinearShares | None:
-    """Return the linear influence of every numeric parameter over a sample, from the cases that have a value.
-
-    None where there are too few cases, or where the column does not vary.
-    """
+    """Return the linear influence of every numeric parameter over a sample; None of too few cases or a constant column."""
     from scipy.stats import t
 
     study = results.study

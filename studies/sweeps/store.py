@@ -1,9 +1,4 @@
-"""The store of a study: one file of sealed blocks in its folder, one writer, whole batches or nothing.
-
-What is in the file is what was done, in order: what the study is, when a run began and ended, the cases that were
-computed, what searches found. Of a case that was computed twice the later one counts. Every block is verified when the
-file is opened (`studies.sweeps.opening`).
-"""
+"""The store of a study: one file of sealed blocks, one writer, whole batches or nothing; of a case computed twice the later counts."""
 
 import io
 import json

@@ -44,10 +44,7 @@ class Yield:
 
 @dataclass(frozen=True)
 class Reach:
-    """How far tolerances may reach: the largest part of the box about the nominal design without a design that fails.
-
-    `part` is relative to the asked ranges; None where no sampled design fails.
-    """
+    """How far tolerances may reach: the largest part of the box about the nominal design without a failing one; None: none fails."""
 
     part: float | None
     inside: int
@@ -80,10 +77,7 @@ def find_yield(results: "Results", requirements: "tuple[Requirement, ...]") -> Y
 
 
 def find_reach(results: "Results", requirements: "tuple[Requirement, ...]") -> Reach:
-    """Return the largest box about the nominal design, in parts of the asked ranges, inside which no sampled design fails.
-
-    A design that has no value counts as failing.
-    """
+    """Return the largest box about the nominal design, in parts of the asked ranges, without a failing design; no value is a failure."""
     limits = tuple(resolve_limits(results, requirement) for requirement in requirements)
     good, _ = _judge(results, limits)
     distance = np.zeros(len(good))

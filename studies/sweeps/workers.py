@@ -19,10 +19,7 @@ PR_SET_PDEATHSIG = 1
 
 
 class Workers:
-    """What the engine needs: how many there are, a way to submit, restart and close.
-
-    `lost`: errors which mean that the worker of that task was lost; `gone`: that all are gone for good.
-    """
+    """What the engine needs of workers; `lost`: errors of a task whose worker was lost; `gone`: that all are gone for good."""
 
     count = 1
     lost: tuple[type[BaseException], ...] = ()

@@ -10,8 +10,7 @@ from studies.effects.states import FloatArray, States
 def columns(states: States, shape: Shape, response: str) -> FloatArray:
     """With z = (T − T_d)/w, f shifts by z/(1 + z²), 1/Q by 1/(1 + z²); a stronger coupling mixes and widens the two.
 
-    A loop that follows the branch which is more the working mode, δ ± √(δ² + κ²), hops where they cross: f then shifts by
-    sgn(z) (√(z² + 1) − |z|), 1/Q by 1 − |z|/√(z² + 1), the other mode's share; a hop is sharp however wide the crossing.
+    A loop that follows the branch δ ± √(δ² + κ²) hops where they cross: sgn(z) (√(z² + 1) − |z|), and 1 − |z|/√(z² + 1) in 1/Q.
     """
     centre, width = shape
     out = []

@@ -61,16 +61,10 @@ class Bias(Keys, frozen=True, kw_only=True):
         pattern_angle: Array | None = None,
         wave: NDArray[np.complex128] | None = None,
     ) -> Array:
-        """Zero-rate output (deg/h).
+        """Zero-rate output (deg/h) at changes and rates (N,) of frequency, Hz and Hz/s, and losses.
 
-        B = Δ(1/τ) sin 2n(θ − θ_τ) / (2 n k) (averaged equations of Lynch 1995), 1/τ = π f/Q, plus Σ k fⁱ ḟʲ.
-
-        Args:
-            change, rate: arrays (N,), Hz and Hz/s
-            frequency, inverse_q: arrays (N,), Hz and 1
-            pattern_angle: array (N,), rad: Where the azimuth is commanded; that of the card unless given.
-            wave: array (N,): Δ(1/Q) exp(2inθ_τ) of the parts of a loss budget, in place of the anisotropy and axis of
-                this table.
+        B = Δ(1/τ) sin 2n(θ − θ_τ) / (2 n k) (averaged equations of Lynch 1995), 1/τ = π f/Q, plus Σ k fⁱ ḟʲ. `wave`,
+        (N,), is Δ(1/Q) exp(2inθ_τ) of the parts of a loss budget, in place of this table's anisotropy.
         """
         theta = np.radians(self.pattern_angle_deg) if pattern_angle is None else pattern_angle
         if wave is None:

@@ -1,7 +1,6 @@
 """`[[effect]]`: what extends the model of a card beyond its other tables, by the names of the library of effects.
 
-An entry has every parameter of the effect's shape, within its bounds, and at least one of its coefficients, a list where the effect is
-a family. Parameters are exact unless the card states their uncertainty.
+An entry has the effect's whole shape and at least one coefficient; all are exact unless the card states otherwise.
 """
 
 from collections.abc import Mapping

@@ -1,8 +1,4 @@
-"""`[loss]`, beside its polynomial: what a loss budget is made of. `hrg loss` shows the budget.
-
-With any of these keys a simulation takes 1/Q from the budget and not from the polynomial, and with an anisotropy it takes Δ(1/τ)
-and its axis from the parts and not from `[bias]`.
-"""
+"""`[loss]`, beside its polynomial: what a loss budget is made of, from which a simulation then takes 1/Q, Δ(1/τ) and its axis."""
 
 from typing import Annotated, Literal
 

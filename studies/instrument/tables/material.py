@@ -1,8 +1,4 @@
-"""`[material]`: an entry of the material table, or given values.
-
-Given values rescale the law of a table's name; with any other name they are constant. A deviation is 0 unless given, and as
-uncertain as the material table says ("hrg materials NAME").
-"""
+"""`[material]`: an entry of the material table, or given values, which rescale the law of that name or are constant."""
 
 from typing import TYPE_CHECKING, Annotated
 

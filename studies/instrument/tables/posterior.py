@@ -1,7 +1,6 @@
 """`[posterior]`: how the uncertainties of a calibrated card go together; written by `hrg calibrate --save`.
 
-A value's own sd and the correlations hold together near the most probable card: they are what a prediction's spread follows from.
-Where the likelihood is bent the interval is not symmetric about the value, and may be many times as wide as that sd.
+Sds and correlations hold near the most probable card; where the likelihood is bent, the interval is not symmetric.
 """
 
 from typing import Annotated

@@ -1,8 +1,6 @@
 """`[thermal]`: constants of the heat path from the chamber to the shell.
 
-Shell and stem follow from geometry and material. The mount's conductance is identified from the settling in the HRG
-paper's Figure 3 (`studies.papers.settling`); capacities and the chamber's air are assumptions, and so are all the
-uncertainties: what is known before a thermal record has been seen.
+The mount's conductance is identified from Figure 3 of the HRG paper (`studies.papers.settling`); the rest are assumptions.
 """
 
 from typing import Annotated

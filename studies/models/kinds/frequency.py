@@ -40,12 +40,10 @@ def save_frequency(fit: "FrequencyFit", sources: tuple[ModelSource, ...], made_b
 
 
 def compensate(model: Model, record: Record, *, extrapolate: bool) -> dict[str, Array]:
-    """Take the fitted temperature dependence out of the frequency: f − (f(T) − f₀), T the housing's.
+    """Take the fitted temperature dependence out of the frequency: f − (f(T) − f₀), T the housing's, the resonator's or the chamber's.
 
-    Without a housing sensor T is the resonator's, where it is known, or the chamber's. Without any thermometer the frequency
-    is its own: nothing of it would be left but f₀, so that what is returned is the resonator's temperature, over which
-    the other outputs can be compensated, and to extrapolate is to leave the rows empty that lie outside. The curve is a settled one: while a housing's or chamber's temperature moves, the
-    resonator lags behind it and the difference stays in the result.
+    Without any thermometer the resonator's temperature is returned. The curve is a settled one: behind a housing that
+    moves the resonator lags, and the difference stays in the result.
     """
     model.check_output(("frequency_Hz",))
     column = next((name for name in TEMPERATURES if name in record and np.isfinite(record[name]).any()), None)
@@ -69,11 +67,7 @@ def evaluate(model: Model, temperature_degC: Array) -> Array:
 
 
 def find_temperature(model: Model, frequency: Array, path: str = "record", *, spare: bool = False) -> Array:
-    """Return the temperature (°C) whose frequency this is, HRG paper Table 2; NaN where no frequency is given.
-
-    Args:
-        spare: Leave frequencies outside the model's range without a temperature.
-    """
+    """Return the temperature (°C) of a frequency, HRG paper Table 2; NaN without one or, to `spare` it, outside the model's range."""
     from compensation.frequency import invert
 
     if not np.isfinite(frequency).any():

@@ -1,7 +1,6 @@
-"""A user's own Python function of a design, run in a process of its own that may raise, hang or crash.
+"""A user's own Python function of a design, (instrument, parameters) -> number, in a process of its own; only with --allow-python.
 
-It is named by module path, `function = "package.module:name"` or `"file.py:name"` (beside the spec), takes
-(instrument, parameters) and returns one finite number. It runs only where the study was started with --allow-python.
+It is named by module path, `function = "package.module:name"` or `"file.py:name"` (beside the spec).
 """
 
 from typing import Annotated
