@@ -95,9 +95,7 @@ def apply_chain(
     if len(chain.taps):
         step = require_regular(t, "the FIR filter")
         if abs(step - chain.sampling) > 1e-3 * chain.sampling:
-            raise CompensationError(
-                f"the FIR filter was designed for an output every {chain.sampling:g} s, not every {step:g} s."
-            )
+            raise CompensationError(f"the filter is designed for an output every {chain.sampling:g} s, not {step:g} s.")
     return ChainOutput(rough, straight, linear, steady, smooth(steady, chain.taps))
 
 

@@ -137,9 +137,7 @@ def average_run(time: ArrayLike, state: ArrayLike, bias: ArrayLike, width: float
     """Return one run averaged over blocks of `width` (s), the part of `prepare_run` that no memory changes."""
     t = np.asarray(time, dtype=np.float64)
     if np.any(np.asarray(state, dtype=np.float64) <= variable.above):
-        raise CompensationError(
-            f"a {variable.name} must be above {variable.above:g} {variable.unit}; check the unit of the column."
-        )
+        raise CompensationError(f"a {variable.name} must be above {variable.above:g} {variable.unit}; check its unit.")
     _check_seconds("averaging", width)
     width = max(width, float(np.median(np.diff(t)))) if t.size > 1 else width
     blocks = average_blocks(t, {variable.name: state, "bias": bias}, width)
@@ -149,9 +147,7 @@ def average_run(time: ArrayLike, state: ArrayLike, bias: ArrayLike, width: float
             f"averaging over {width:g} s leaves {rows} rows, but at least three are needed; record longer or average less."
         )
     if np.ptp(blocks.columns["bias"]) <= 1e-13 * np.max(np.abs(blocks.columns["bias"])):
-        raise CompensationError(
-            f"the bias is constant ({blocks.columns['bias'][0]:g}): there is nothing to fit; check the column."
-        )
+        raise CompensationError(f"the bias is constant ({blocks.columns['bias'][0]:g}): there is nothing to fit.")
     return blocks
 
 

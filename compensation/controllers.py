@@ -45,7 +45,7 @@ class Loops:
         for name in self.NAMES:
             if not getattr(self, name) < self.sampling / 2:
                 raise CompensationError(
-                    f"the {name} loop's bandwidth {getattr(self, name):g} Hz is not below half the sampling rate."
+                    f"the {name} loop's {getattr(self, name):g} Hz is not below half the sampling rate."
                 )
 
     @property

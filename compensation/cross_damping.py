@@ -146,9 +146,7 @@ def fit_cross_damping(
     )
     refuse_constant_columns(temperature[:, None], ["temperature"])
     if len(rate) < order + 2:
-        raise CompensationError(
-            f"order {order} needs at least {order + 2} rows, not {len(rate)}; lower it or record more."
-        )
+        raise CompensationError(f"order {order} needs at least {order + 2} rows, not {len(rate)}; lower it.")
     size = float(np.max(np.abs(temperature - calibration_temperature)))
     powers = [
         np.concatenate(

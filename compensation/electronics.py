@@ -30,9 +30,7 @@ class Channels:
     def __post_init__(self) -> None:
         for name in ("gain_ratio", "phase_difference", "skew", "phase"):
             if not abs(getattr(self, name)) < 0.5:
-                raise CompensationError(
-                    f"{name} = {getattr(self, name):g} of the electronics must lie between -0.5 and 0.5."
-                )
+                raise CompensationError(f"{name} = {getattr(self, name):g} of the electronics is not within ±0.5.")
 
     def matrix(self, harmonic: int) -> Complex:
         """Return G (2, 2)."""

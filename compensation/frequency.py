@@ -192,9 +192,7 @@ def fit_frequency(
     if np.any(f <= 0):
         raise CompensationError(f"a frequency must be positive, not {f[f <= 0][0]:g} Hz.")
     if np.ptp(f) == 0:
-        raise CompensationError(
-            f"'frequency' is constant ({f[0]:g} Hz): it does not depend on temperature; check the column."
-        )
+        raise CompensationError(f"'frequency' is constant ({f[0]:g} Hz) over temperature; check the column.")
     coefficients, covariance = polynomial.about(reference_temperature_degC)
     return FrequencyFit(
         reference_temperature_degC=float(reference_temperature_degC),
@@ -218,9 +216,7 @@ def compare_orders(
     readings = count_apart(temperature_degC)
     highest = min(highest, readings - 2)
     if highest < 1:
-        raise CompensationError(
-            f"comparing orders needs at least 3 different temperatures, not {readings}; measure more."
-        )
+        raise CompensationError(f"comparing orders needs 3 different temperatures or more, not {readings}.")
     fits = tuple(
         fit_frequency(temperature_degC, frequency, order, reference_temperature_degC, resolution)
         for order in range(1, highest + 1)

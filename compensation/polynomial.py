@@ -94,9 +94,7 @@ def fit_polynomial(
         raise CompensationError(f"'{name}' has missing or infinite values; remove those rows.")
     distinct = count_apart(x)
     if np.ptp(x) == 0:
-        raise CompensationError(
-            f"'{name}' is constant ({x[0]:g}): there is nothing to fit; record data in which it varies."
-        )
+        raise CompensationError(f"'{name}' is constant ({x[0]:g}); record data in which it varies.")
     if distinct <= order or x.size <= order + 1:
         raise CompensationError(
             f"order {order} needs at least {order + 1} different values of '{name}' and {order + 2} rows, "

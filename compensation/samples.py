@@ -15,9 +15,7 @@ def read_columns(**columns: ArrayLike) -> list[NDArray[np.float64]]:
     arrays = [np.asarray(values, dtype=float) for values in columns.values()]
     for name, values in zip(columns, arrays, strict=True):
         if values.ndim != 1 or len(values) != len(arrays[0]):
-            raise CompensationError(
-                f"'{name}' has shape {values.shape} where one value per row, {len(arrays[0])} in all, is needed."
-            )
+            raise CompensationError(f"'{name}' has shape {values.shape}, but there are {len(arrays[0])} rows.")
         holes = np.flatnonzero(~np.isfinite(values))
         if len(holes):
             raise CompensationError(
@@ -43,16 +41,14 @@ def check_time(time: NDArray[np.float64]) -> None:
     """Raise unless `time` (s) has two rows or more, all finite, and increases strictly."""
     if len(time) < 2:
         raise CompensationError(
-            f"'time' has {len(time)} {'row' if len(time) == 1 else 'rows'}; a time series needs two or more."
+            f"'time' has {len(time)} {'row' if len(time) == 1 else 'rows'}; two or more are needed."
         )
     if not np.all(np.isfinite(time)):
         row = int(np.flatnonzero(~np.isfinite(time))[0])
         raise CompensationError(f"'time' is missing or infinite in row {row + 1}; every row needs its time.")
     back = np.flatnonzero(np.diff(time) <= 0)
     if len(back):
-        raise CompensationError(
-            f"'time' does not increase from row {back[0] + 1} to row {back[0] + 2}; sort the rows by time."
-        )
+        raise CompensationError(f"'time' does not increase from row {back[0] + 1} to row {back[0] + 2}; sort it.")
 
 
 def is_regular(time: NDArray[np.float64]) -> bool:

@@ -62,8 +62,6 @@ def translate(
 ) -> SensitiveElement:
     """Return a proof mass in a decoupling frame, eq. (1): d₁ = d₂ = 1, d₃ = m₂/(m₁ + m₂), g₁ = 2 m₂/(m₁ + m₂), g₂ = 2."""
     if not (frame >= 0 and proof_mass > 0):
-        raise CompensationError(
-            f"the proof mass must be positive and the frame 0 or more, not {proof_mass:g}, {frame:g} kg."
-        )
+        raise CompensationError(f"the proof mass must be positive, the frame 0 or more: {proof_mass:g}, {frame:g} kg.")
     share = proof_mass / (frame + proof_mass)
     return SensitiveElement(k[0], k[1], zeta[0], zeta[1], omega, q10, d1=1.0, d2=1.0, d3=share, g1=2 * share, g2=2.0)

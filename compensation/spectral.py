@@ -20,9 +20,7 @@ class Spectrum:
         for name in ("numerator", "denominator"):
             coefficients = np.trim_zeros(np.asarray(getattr(self, name), dtype=float), "f")
             if not len(coefficients) or not np.all(np.isfinite(coefficients)):
-                raise CompensationError(
-                    f"the {name} of a spectral density must have finite coefficients, not all zero."
-                )
+                raise CompensationError(f"the {name} of a spectral density needs finite coefficients, not all zero.")
             if np.any(coefficients[-2::-2]):
                 raise CompensationError(f"the {name} of a spectral density must be even in s.")
             object.__setattr__(self, name, tuple(coefficients.tolist()))
@@ -120,9 +118,7 @@ class CrossSpectrum:
         p = np.trim_zeros(np.asarray(self.denominator, dtype=float), "f")
         roots = np.roots(p)
         if np.any(np.abs(roots.real) <= 1e-9 * np.abs(roots)):
-            raise CompensationError(
-                "a cross-spectral density has a pole on the imaginary axis; give it a corner frequency."
-            )
+            raise CompensationError("a cross-spectral density has a pole on the imaginary axis.")
         left, right = (np.atleast_1d(np.poly(roots[side]).real) for side in (roots.real < 0, roots.real > 0))
         return np.asarray(p[0] * left, dtype=float), np.asarray(right, dtype=float)
 

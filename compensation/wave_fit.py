@@ -109,9 +109,7 @@ def fit_whole_angle(
         estimates["decay"] = driven[2], driven[3]
     C, C_cov, epsilon = _join(S, S_cov, driven, W)
     if not both_ways:
-        undetermined.append(
-            "gain ratio and skew, because the wave precesses at one rate only; precess it in both directions"
-        )
+        undetermined.append("gain ratio and skew: the wave precesses at one rate only; precess it in both directions")
     if epsilon is None:
         undetermined.append("phase error, which needs the drive effort (inverse_q) and the frequency or quadrature")
     else:

@@ -71,9 +71,7 @@ def mesh_solid(solid: Solid, degree: int) -> Mesh:
     codes, edges = np.unique(low * len(kept) + high, return_inverse=True)
     pairs = np.stack(np.divmod(codes, len(kept)), axis=1)
     if np.bincount(edges.ravel()).max() > 2 or len(kept) - len(pairs) + len(vertices) != 1:  # Euler's count of a disc
-        raise ShellError(
-            f"the cells of the solid part at {100 * solid.position:.3g} % of the meridian do not join edge to edge."
-        )
+        raise ShellError(f"the cells of the solid part at {100 * solid.position:.3g} % do not join edge to edge.")
     parts = tuple(patch.part for patch in solid.patches for _ in patch.cells)
     return Mesh(grid, vertices, edges.reshape(-1, 4), first > last, np.array([r, z])[:, kept], pairs, parts)
 

@@ -82,9 +82,7 @@ class CubicPair:
 def solve_cubic(resonator: Resonator, crystal: Cubic, harmonic: int = 2, tolerance: float = 1e-5) -> CubicPair:
     """The lowest pair of a harmonic n >= 2, not a multiple of 4, of a shell without stem, clamp or kink."""
     if harmonic < 2 or harmonic % 4 == 0:
-        raise ShellError(
-            f"a cubic crystal is solved for pairs n >= 2 that do not couple with n = 0, not n = {harmonic}."
-        )
+        raise ShellError(f"a cubic crystal is solved for n >= 2 that do not couple with n = 0, not {harmonic}.")
     mean = crystal.isotropic
     (mode,) = solve_modes(resonator, mean, harmonic, tolerance=tolerance)
     assert mode.solution is not None
@@ -96,9 +94,7 @@ def solve_cubic(resonator: Resonator, crystal: Cubic, harmonic: int = 2, toleran
     if len(systems[0].groups) > 1:
         raise ShellError("a cubic crystal is computed only for plain shells, without stem, clamp or kink.")
     if sum(system.constraint.shape[1] for system in systems) > LARGEST:
-        raise ShellError(
-            f"harmonic {harmonic} of this shell and those that the crystal couples to it have too many unknowns."
-        )
+        raise ShellError(f"harmonic {harmonic} and those that the crystal couples to it have too many unknowns.")
     shift = 1e-2 * mean.G / mean.rho / resonator.size**2 if systems[0].rigid_motions else 0.0
     found, errors = [], []
     for sign in (1, -1):
@@ -140,9 +136,7 @@ def _lowest(systems: list[System], harmonics: list[int], crystal: Cubic, n: int,
     share = np.einsum("ik,ik->k", own, M[ends[at] : ends[at + 1], ends[at] : ends[at + 1]] @ own)
     share /= np.einsum("ik,ik->k", vectors, M @ vectors)
     if not np.any(share > 0.5):
-        raise ShellError(
-            f"harmonic {n} is not among the lowest {LOWEST} modes of the crystal, or is mixed with other harmonics."
-        )
+        raise ShellError(f"harmonic {n} is not among the lowest {LOWEST} modes of the crystal, or is mixed.")
     x = vectors[:, int(np.argmax(share > 0.5))]
     return sqrt(float(x @ K @ x) / float(x @ M @ x)) / (2 * pi)
 

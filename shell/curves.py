@@ -114,9 +114,7 @@ class Arc(Curve):
         offsets = [(point[0] - center[0], point[1] - center[1]) for point in (start, end)]
         radii = [hypot(*offset) for offset in offsets]
         if abs(radii[0] - radii[1]) > 1e-6 * max(radii):
-            raise ShellError(
-                f"the arc's ends are {mm(radii[0])} and {mm(radii[1])} from its centre: they must be equal."
-            )
+            raise ShellError(f"the arc's ends are {mm(radii[0])} and {mm(radii[1])} from its centre, not equally far.")
         first, last = (atan2(*offset) for offset in offsets)
         turn = (last - first + pi) % (2 * pi) - pi
         if abs(turn) < 1e-9 or abs(abs(turn) - pi) < 1e-9:

@@ -76,13 +76,11 @@ class Electrodes:
         size = self.pair.resonator.size
         if self.gap > 0.2 * size:
             raise ShellError(
-                f"a gap of {1e3 * self.gap:g} mm is too wide for a radius of {1e3 * size:g} mm: is it in µm?"
+                f"a gap of {1e3 * self.gap:g} mm is too wide for {1e3 * size:g} mm of radius: is it in µm?"
             )
         for one in self.electrodes:
             if not (one.width > 0 and 0 <= one.first < one.last <= 1):
-                raise ShellError(
-                    "an electrode has a positive width and lies between two positions 0 <= first < last <= 1."
-                )
+                raise ShellError("an electrode has a positive width and lies between 0 <= first < last <= 1.")
 
     def charged(self, voltage: float | Sequence[float]) -> "Electrodes":
         """The same electrodes at other voltages, one for all or one for each."""

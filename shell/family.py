@@ -113,9 +113,7 @@ class Family:
         """Return the points of the cube (m, coordinates) and ν (m,)."""
         given = np.atleast_2d(np.asarray(values, dtype=float))
         if given.ndim != 2 or given.shape[1] != len(self.axes):
-            raise ShellError(
-                f"a family of {len(self.axes)} axes takes an array (designs, {len(self.axes)}), not {given.shape}."
-            )
+            raise ShellError(f"a family of {len(self.axes)} axes takes (designs, {len(self.axes)}), not {given.shape}.")
         poisson = np.asarray(nu, dtype=float)
         count = max(len(given), poisson.size)
         poisson = np.broadcast_to(poisson, (count,))

@@ -259,9 +259,7 @@ def check_sign(where: str, name: str, found: Property, span: list[float]) -> Non
     if name == "expansion" and not (np.abs(values) < 0.01).all():
         raise ShellError(f"{where}: no solid expands by 1 % per kelvin; give it in 1/K.")
     if name not in ("poisson_ratio", "expansion") and not ((values > 1e-30) & (values < 1e30)).all():
-        raise ShellError(
-            f"{where}: must be positive, and no larger than SI units make it, everywhere within range_degC."
-        )
+        raise ShellError(f"{where}: must be positive, and of a size in SI units, everywhere within range_degC.")
 
 
 def spell(names: Sequence[str]) -> str:

@@ -124,9 +124,7 @@ def _read_crystal(where: str, entry: Any) -> Crystal:
         raise ShellError(f"{where}: slope_uncertainty names a constant without a slope; add the slope.")
     found = Crystal(system, entry["axis"], float(entry["at_degC"]), constants, *tables)
     if not (np.linalg.eigvalsh(found.stiffness()) > 0).all():
-        raise ShellError(
-            f"{where}: these constants are not those of a stable crystal; check their signs and units (Pa)."
-        )
+        raise ShellError(f"{where}: these constants are of no stable crystal; check signs and units (Pa).")
     return found
 
 
@@ -147,9 +145,7 @@ def _read_property(where: str, name: str, entry: Any, span: list[float]) -> Prop
     if entry["form"] == "table":
         at, values = np.array(numbers["temperature_degC"]), numbers["values"]
         if len(at) != len(values) or len(at) < 2 or (np.diff(at) <= 0).any():
-            raise ShellError(
-                f"{where}: temperature_degC must increase and have as many entries as values (two or more)."
-            )
+            raise ShellError(f"{where}: temperature_degC must increase, with as many entries as values.")
         if at[0] > span[0] or at[-1] < span[1]:
             raise ShellError(f"{where}: the table covers {at[0]:g} to {at[-1]:g} °C, less than the law's range_degC.")
     if entry["form"] == "parabola" and numbers["maximum_degC"] == numbers["at_degC"]:

@@ -54,9 +54,7 @@ def cylinder(
     wall = _profile(thickness)
     if bottom_thickness is None:
         if clamp_radius:
-            raise ShellError(
-                "an open tube has no bottom to clamp: leave out the clamp radius or give a bottom thickness."
-            )
+            raise ShellError("an open tube has no bottom to clamp: give a bottom thickness.")
         return Resonator((Line((radius, 0.0), (radius, height)),), wall)
     _require_positive(bottom_thickness=bottom_thickness)
     if not height > bottom_thickness:
@@ -115,9 +113,7 @@ def _profile(thickness: Profile) -> tuple[tuple[float, float], ...]:
         return (0.0, float(thickness)), (1.0, float(thickness))
     profile = tuple((float(position), float(value)) for position, value in thickness)
     if any(second[0] <= first[0] for first, second in pairwise(profile)):
-        raise ShellError(
-            "the positions of a thickness profile must rise from 0 (start) to 1 (rim), none of them twice."
-        )
+        raise ShellError("the positions of a thickness profile must rise from 0 to 1 (rim), none of them twice.")
     return profile
 
 

@@ -184,9 +184,7 @@ def _join(sides: list[Outline], margin: float) -> list[Outline]:
             line = Outline(*(np.concatenate([one, two[..., 1:]], axis=-1) for one, two in pairs))
         closed = np.hypot(line.r[0] - line.r[-1], line.z[0] - line.z[-1]) < margin
         if not closed and max(line.r[0], line.r[-1]) >= margin:
-            raise ShellError(
-                "the outline of the section has a gap; the elements of its solid parts do not meet the shell."
-            )
+            raise ShellError("the outline of the section has a gap: solid parts do not meet the shell.")
         lines.append(line)
     return lines
 

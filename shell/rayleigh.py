@@ -104,9 +104,7 @@ def rayleigh_integrals(n: int, phi_1: float = 0.0, phi_2: float = pi / 2) -> Ray
         if not value > 0:
             raise ShellError(f"The cap up to phi_2 = {phi_2:g} rad is too small for harmonic {n}: its mode vanishes.")
         if not error < 1e-9 * value:
-            raise ShellError(
-                f"A rim at phi_2 = {phi_2:.9g} rad nearly closes the sphere: the mode's integrals diverge."
-            )
+            raise ShellError(f"A rim at phi_2 = {phi_2:.9g} rad closes the sphere: the mode's integrals diverge.")
         values.append(value)
     return RayleighIntegrals(*values)
 

@@ -107,9 +107,7 @@ def _run_child(folder: str, seconds: float) -> None:
     try:
         done = subprocess.run(job, stdin=listened, capture_output=True, timeout=seconds, cwd=Path(__file__).parents[1])
     except subprocess.TimeoutExpired:
-        raise NoOpenGL(
-            f"drawing took more than {seconds:.0f} s and was stopped; check the OpenGL of this machine."
-        ) from None
+        raise NoOpenGL(f"drawing took more than {seconds:.0f} s and was stopped; check OpenGL.") from None
     finally:
         os.close(listened)
         os.close(held)

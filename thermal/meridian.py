@@ -47,7 +47,7 @@ def cut_meridian(length: float, radius: Along, thickness: Along, count: int) -> 
         area: Array = 2 * np.pi * radius(s) * thickness(s)
         if not (np.isfinite(area).all() and (area > 0).all()):
             raise ThermalError(
-                "radius and thickness must be positive all along the meridian; start it at the stem, not at the pole."
+                "radius and thickness must be positive all along; start it at the stem, not at the pole."
             )
         return area
 

@@ -216,9 +216,7 @@ def _check_names(network: Network) -> None:
         for end in (part.one, part.other):
             if end not in names:
                 kind = type(part).__name__.lower()
-                raise ThermalError(
-                    f"the {kind} '{part.name}' ends at '{end}', which is not a node{_nearest(end, names)}"
-                )
+                raise ThermalError(f"{kind} '{part.name}' ends at '{end}', which is not a node{_nearest(end, names)}")
         if part.one == part.other:
             raise ThermalError(f"the link '{part.name}' joins a node to itself.")
     inner = [node.name for node in network.nodes]

@@ -46,9 +46,7 @@ class Profile:
         back = np.flatnonzero(np.diff(time) < 0)
         if back.size:
             k = int(back[0])
-            raise ThermalError(
-                f"the profile's time runs backwards at row {k + 2} ({time[k]:g} s, then {time[k + 1]:g} s)."
-            )
+            raise ThermalError(f"the time runs backwards at row {k + 2} ({time[k]:g} s, then {time[k + 1]:g} s).")
         if np.any(time[2:] == time[:-2]):
             k = int(np.flatnonzero(time[2:] == time[:-2])[0])
             raise ThermalError(f"the profile gives the time {time[k]:g} s three times; a jump needs it twice.")

@@ -63,7 +63,7 @@ def propagate(network: Network, boundaries: Mapping[str, Profile], initial: Arra
     """
     if not network.is_linear:
         raise ThermalError(
-            "exact propagation needs constant capacities and no radiation; linearise the network or integrate it."
+            "exact only without radiation and with constant capacities; linearise the network or integrate it."
         )
     knots = find_corners(network, boundaries)
     modes = find_relaxation(network, 1.0)  # a linear network has the same modes at every temperature

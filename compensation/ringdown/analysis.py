@@ -130,9 +130,7 @@ def _remark(envelope: Envelope, fit: DecayFit, left: Leftover, jump: float | Non
             f"The phase jumps at {jump:.4g} s (reference or samples lost, or a drive switched): only the part after it is used."
         )
     if start - (first if jump is None else jump) > 2 * fit.envelope.width:
-        said.append(
-            f"The first {start - first:.4g} s are not a free decay (drive, transient or release) and are left out."
-        )
+        said.append(f"The first {start - first:.4g} s are no free decay (drive or transient) and are left out.")
     said += [f"{SAID_OF[name]}." for name in fit.terms.curved]
     if fit.terms.drift:
         phase = np.array(fit.found.drift) @ drift_shapes(fit.envelope, fit.terms.drift)
@@ -163,18 +161,14 @@ def _remark(envelope: Envelope, fit: DecayFit, left: Leftover, jump: float | Non
 def _undetermined(fit: DecayFit, estimates: Mapping[str, Estimate]) -> list[str]:
     said = []
     if fit.one_mode:
-        said.append(
-            "Only one mode is seen: the other is not excited, or the split is not resolved. The axes are not known."
-        )
+        said.append("Only one mode is seen: the other is not excited, or not resolved. The axes are not known.")
     if "split_Hz" in estimates:
         split = estimates["split_Hz"]
         width = 1 / (np.pi * estimates["decay_time_s"].value)
         if not split.value > RESOLVED * split.sd:
             said.append(f"The split is not resolved: below {split.high:.3g} Hz; its axis is not determined.")
         elif split.value < width:
-            said.append(
-                f"The split of {split.value:.3g} Hz is less than the line width of {width:.3g} Hz: the modes overlap."
-            )
+            said.append(f"The split of {split.value:.3g} Hz is below the line width {width:.3g} Hz: the modes overlap.")
     if "damping_split_per_s" in estimates:
         split = estimates["damping_split_per_s"]
         if not split.value > RESOLVED * split.sd:

@@ -99,9 +99,7 @@ def fit_decay(envelope: Envelope, terms: Terms = Terms(), starts: Sequence[Guess
     """Fit the decay of one or two modes to one or two channels, from the best of the starting points."""
     rows = envelope.time.size
     if rows < 2 * (2 * terms.modes + len(terms.curved) + 4):
-        raise CompensationError(
-            f"{rows} rows are too few for a decay of {terms.modes} mode(s); record longer or faster."
-        )
+        raise CompensationError(f"{rows} rows are too few for a decay of {terms.modes} mode(s); record more.")
     tried = starts or [Guess(one) for one in find_starts(envelope, terms.modes)]
     return min((_fit_from(envelope, terms, one) for one in tried), key=lambda one: one.cost)
 

@@ -36,7 +36,7 @@ def fit_spectrum(frequency: ArrayLike, power: ArrayLike) -> RingDown:
     scatter = _scatter(one, f, y)
     if not smooth.max() / exp(one[0]) > 1 + 4 * scatter:
         raise CompensationError(
-            "no resonance stands above the background of this spectrum; average more, or take a span about the line."
+            "no resonance stands above the background; average more, or take a span about the line."
         )
     rest = smooth / _model(one, f)
     two = _fit(f, y, [tuple(one[2:5]), _line_at(f, rest * np.median(smooth))])

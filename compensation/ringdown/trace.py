@@ -63,9 +63,7 @@ def analyse_trace(time: ArrayLike, amplitude: ArrayLike, frequency: float | None
         size *= 2
     sd = bound * float(np.sqrt(widest))
     if not -slope > 2 * sd:
-        raise CompensationError(
-            f"nothing decays in this trace (1/τ = {-slope:.3g} ± {sd:.2g} 1/s); record a free ring-down, longer."
-        )
+        raise CompensationError(f"nothing decays in this trace (1/τ = {-slope:.3g} ± {sd:.2g} 1/s); record longer.")
     rate = Estimate.normal(-slope, sd)
     most = 1 / rate.low if rate.low > 0 else np.inf
     estimates = {"decay_per_s": rate, "decay_time_s": Estimate(1 / rate.value, sd / rate.value**2, 1 / rate.high, most)}
@@ -80,9 +78,7 @@ def analyse_trace(time: ArrayLike, amplitude: ArrayLike, frequency: float | None
     elif last < t.size:
         said.append(f"The last {t[-1] - t[last - 1]:.4g} s are below {FLOOR:g} times the noise and are left out.")
     if x[-1] * -slope < 0.5:
-        said.append(
-            "The amplitude falls by less than 40 %: a decay that is not exponential is not seen; record longer."
-        )
+        said.append("The amplitude falls by less than 40 %: a decay that is not exponential is not seen.")
     window = (float(t[first]), float(t[last - 1]))
     fitted = 20 / np.log(10) * (level + slope * (whole - t[first]))
     fitted[(whole < window[0]) | (whole > window[1])] = np.nan

@@ -53,9 +53,7 @@ class Film:
             raise ShellError("a film covers a share 0 ... 1 of a part of the meridian [from, to] within 0 ... 1.")
         unknown = set(self.faces) - {"inner", "outer"}
         if unknown or not self.faces:
-            raise ShellError(
-                f"a film lies on inner, outer or both faces, not on {', '.join(sorted(unknown)) or 'none'}."
-            )
+            raise ShellError(f"a film lies on inner, outer or both faces, not {', '.join(sorted(unknown)) or 'none'}.")
 
     def carries(self, face: FreeFaces) -> Array:
         """Covered share at the points of a face."""
@@ -66,9 +64,7 @@ class Film:
 def check_film(film: Film, wall: float) -> None:
     """Refuse a film that is not thin compared with the thinnest wall (m)."""
     if film.thickness >= wall:
-        raise ShellError(
-            f"the film ({mm(film.thickness)}) is thicker than the wall ({mm(wall)}): film thickness is in nm."
-        )
+        raise ShellError(f"the film ({mm(film.thickness)}) is thicker than the wall ({mm(wall)}): is it in nm?")
     if film.thickness > THICKEST * wall:
         raise ShellError(
             f"the film ({mm(film.thickness)}) is more than {100 * THICKEST:.0f} % of the wall ({mm(wall)}): the mode would change;"

@@ -146,9 +146,7 @@ def _check(samples: list[tuple[Array, int]], projector: Projector, motion: Rigid
         spread = float(scipy.stats.median_abs_deviation(off, scale="normal"))
         if abs(middle + side * h) < 0.3 * h and spread < LOOSE * h:
             here, there = ("outer", "inner") if side > 0 else ("inner", "outer")
-            raise ShellError(
-                f"{name}: the points given for the {here} face lie on the {there} face; exchange the files."
-            )
+            raise ShellError(f"{name}: the points of the {here} face lie on the {there} face; exchange the files.")
         if abs(middle) > 0.5 * h or spread > LOOSE * h:
             frames = "; perhaps the faces do not share one frame (hrg scan --frames own)" if len(names) > 1 else ""
             raise ShellError(

@@ -26,18 +26,14 @@ def measure_transfer(record: "Record") -> Found:
     time, x, y = (record[name] for name in ("time_s", "rate_deg_per_s", "measured_rate_deg_per_s"))
     step = np.diff(time)
     if len(time) < LEAST or np.ptp(step) > 1e-3 * float(np.median(step)) or not np.isfinite(x + y).all():
-        raise InputError(
-            f"{record.path}: a transfer function needs both rates in {LEAST} or more evenly spaced rows without gaps."
-        )
+        raise InputError(f"{record.path}: a transfer function needs both rates in {LEAST} evenly spaced rows or more.")
     rate, size = 1 / float(np.median(step)), max(2 * len(x) // (SEGMENTS + 1), 16)
     f, across = scipy.signal.csd(x, y, rate, nperseg=size)
     _, applied = scipy.signal.welch(x, rate, nperseg=size)
     _, coherence = scipy.signal.coherence(x, y, rate, nperseg=size)
     kept = (f > 0) & (applied > HEARD * applied[1:].max()) & (coherence > COHERENT)
     if kept.sum() < 4:
-        raise InputError(
-            f"{record.path}: the applied rate covers only {int(kept.sum())} frequencies; sweep it over the bandwidth."
-        )
+        raise InputError(f"{record.path}: the applied rate covers {int(kept.sum())} frequencies only; sweep it.")
     f, H, squared = f[kept], across[kept] / applied[kept], coherence[kept]
     gain, phase = np.abs(H), np.unwrap(np.angle(H))
     error = np.sqrt((1 - squared) / (2 * squared * SEGMENTS))

@@ -162,11 +162,7 @@ def read_settled(path: str) -> SettledTable:
 
 
 def observe(
-    records: Sequence[Record],
-    responses: Sequence[str] = RESPONSES,
-    *,
-    turning: bool = False,
-    blocks: int = MOST_BLOCKS,
+    records: Sequence[Record], responses: Sequence[str] = RESPONSES, *, turning: bool = False, blocks: int = MOST_BLOCKS
 ) -> tuple[ObservedRun, ...]:
     """Make runs ready; `turning` are those of a whole-angle wave, each row's the mean to the next; `blocks` of a run are compared at most."""
     starts, _ = place_in_time(records)

@@ -216,10 +216,7 @@ class CardProblem:
 
 
 def wide_law(
-    instrument: "Instrument",
-    runs: Sequence[ObservedRun],
-    tables: Sequence[SettledTable] = (),
-    margin: float = 30.0,
+    instrument: "Instrument", runs: Sequence[ObservedRun], tables: Sequence[SettledTable] = (), margin: float = 30.0
 ) -> "FrequencyLaw":
     """Build the law over all that the runs reach, and so much more that trial states stay within it."""
     ends = [instrument.reference_temperature, *(float(T) for table in tables for T in table.temperature)]

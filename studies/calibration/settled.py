@@ -180,9 +180,7 @@ def _bridges(problem: "CardProblem", level: Compared, row: Array) -> tuple[str, 
             f" {abs(away / per_sd[best]):.1f} standard deviations."
         )
     if not any(name.startswith("resonator.") for name in names):
-        text.append(
-            "The card states no tolerance for any dimension, such as thickness_mm = { value = …, relative_sd = 0.02 }."
-        )
+        text.append("The card states no tolerance of a dimension, as thickness_mm = { value = …, relative_sd = 0.02 }.")
     return tuple(text)
 
 

@@ -79,12 +79,7 @@ def compensate(
                 stay = "row stays" if empty == 1 else "rows stay"
                 parts.append(f"{empty} {stay} empty: the frequency is missing, or outside the fitted range.")
             parts.append(Figure(lambda: _draw(record, result, RESONATOR), "Temperature of the resonator."))
-    payload: dict[str, Any] = {
-        "model": model,
-        "kind": loaded.kind,
-        "run": run,
-        "out": out,
-    }
+    payload: dict[str, Any] = {"model": model, "kind": loaded.kind, "run": run, "out": out}
     payload |= {"added": added, "columns": columns}
     return Result(payload, "Compensation of a record", f"{run or 'No record'}, compensated with {model}.", parts)
 

@@ -44,9 +44,7 @@ def electrodes(
         raise InputError("a split that is to be nulled needs both --split (Hz) and --axis (degrees).")
     instrument, T = open_card(card, temperature)
     if "electrodes" not in instrument.content:
-        raise InputError(
-            f"{instrument.path}: the card has no table [electrodes]; add it (gap_um, count, coverage, voltage_V)."
-        )
+        raise InputError(f"{instrument.path}: no table [electrodes]; add it (gap_um, count, coverage, voltage_V).")
     keys = instrument.part("electrodes").keys
     with naming(f"{instrument.path} [electrodes]"):
         resonator, elastic = instrument.at(T)

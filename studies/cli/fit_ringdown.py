@@ -226,15 +226,11 @@ def _shown(name: str, term: str, law: "Law") -> dict[str, Any]:
 def _remarks(law: "Law") -> list[str]:
     said = []
     if law.left_out:
-        said.append(
-            f"the first {law.left_out} readings of every decay follow another law (launch or release) and are left out."
-        )
+        said.append(f"the first {law.left_out} readings of every decay follow another law (release) and are left out.")
     if "step 1" in law.terms:
         said.append("sessions differ by steps that no common ageing explains: mounting, or what was done between them.")
     elif "time" in law.terms:
-        said.append(
-            "it changes with time beyond what the conditions explain: ageing, or a condition that was not recorded."
-        )
+        said.append("it changes with time beyond the conditions: ageing, or a condition that was not recorded.")
     return said
 
 

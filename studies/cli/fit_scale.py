@@ -57,9 +57,7 @@ def fit_scale(
         no_filter: Omit the FIR filter; the record may then have gaps.
     """
     if not data:
-        raise InputError(
-            "name a record (CSV) with several rates, best also one at rest and one at one rate, over temperature."
-        )
+        raise InputError("name a record (CSV) with several rates, best also at rest and at one rate over temperature.")
     records = [read_record(path) for path in data]
     study = study_scale(records, None if no_filter else cutoff, order)
     sources = tuple(source_of(record) for record in records)
@@ -165,10 +163,7 @@ def _remarks(study: ScaleStudy) -> list[str | Sentence]:
     ends = (f"{T - zero_Celsius:.1f}" for T in (study.runs[0].temperature.min(), study.runs[0].temperature.max()))
     where = " … ".join(dict.fromkeys(ends))
     lacks: list[str | Sentence] = [
-        Sentence(
-            f"The {what} is not determined: the model holds near {where} °C. Add a record {record}.",
-            "warning",
-        )
+        Sentence(f"The {what} is not determined: the model holds near {where} °C. Add a record {record}.", "warning")
         for what, record in _undetermined(study)
     ]
     said = {

@@ -109,11 +109,7 @@ def _import_table(raw: tuple[str, ...], import_map: LoadedMap, out: str) -> Resu
 def _show(records: Mapping[str, Columns], notes: Sequence[str], start: str | None, more: dict[str, Any]) -> Result:
     out, columns = next(iter(records.items()))
     missing = {name: {"missing": int(np.isnan(v).sum())} for name, v in columns.items()}
-    payload: dict[str, Any] = {
-        "start": start,
-        "record": out,
-        "rows": len(next(iter(columns.values()))),
-    }
+    payload: dict[str, Any] = {"start": start, "record": out, "rows": len(next(iter(columns.values())))}
     payload |= {"columns": missing, "notes": notes, **more}
     chapters = []
     for name, found in records.items():

@@ -71,9 +71,7 @@ def read_scan(path: str, harmonic: tuple[int, ...]) -> list[tuple[int, float, fl
             raise InputError(f"{path}: no split of n = {n}; it contains n = {', '.join(map(str, entries))}.")
         size, axis = entries[n].split_Hz, entries[n].slow_axis_deg
         if axis is None:
-            raise InputError(
-                f"{path}: the split of n = {n} cannot be distinguished from 0; measure more accurately before cutting."
-            )
+            raise InputError(f"{path}: the split of n = {n} may be 0; measure more accurately before cutting.")
         found.append((n, size.value, radians(axis.value), (size.high - size.low) / 3.29))
     return found
 

@@ -43,7 +43,7 @@ def optimise(design: str, *, out: str, workers: Workers = None, quiet: Quiet = F
         found = find_best(design, out, workers=workers, show_progress=not quiet)
     except KeyboardInterrupt:
         raise KeyboardInterrupt(
-            f"interrupted; finished designs are kept in {out}. Run the same command again to resume."
+            f"interrupted; {out} keeps the designs; run the same command again to resume."
         ) from None
     payload: dict[str, Any] = {
         **row_of(found, "evaluations", design="task.name", card="task.study.instrument.name"),

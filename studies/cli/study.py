@@ -82,7 +82,7 @@ def run(
         )  # fmt: skip
     except KeyboardInterrupt:
         raise KeyboardInterrupt(
-            f"interrupted; finished cases are kept in {out}. Run the same command again to resume."
+            f"interrupted; {out} keeps the finished cases; run the same command again to resume."
         ) from None
     found = _status(results, out, running=False)
     failed = found["failed"]

@@ -43,9 +43,7 @@ def tcf(
             hrg-30mm, Table 1 of the HRG paper unless another is given.
     """
     if harmonic > MOST_HARMONIC and theory != "rayleigh":
-        raise InputError(
-            f"--harmonic {harmonic}: the law over temperature is solved up to n = {MOST_HARMONIC}; hrg modes goes higher."
-        )
+        raise InputError(f"--harmonic {harmonic}: the law is solved up to n = {MOST_HARMONIC}; hrg modes goes higher.")
     temperatures = lay_temperatures(from_degC, to_degC, step)
     instrument = load_card(card)
     check_slope_known(instrument)

@@ -33,9 +33,7 @@ def temperature(model: str, run: str, /, *, out: str | None = None) -> Result:
     """
     loaded = read_model(model)
     if loaded.kind != "frequency":
-        raise InputError(
-            f"{model}: a model of kind '{loaded.kind}'; one of kind 'frequency' is needed (hrg fit frequency)."
-        )
+        raise InputError(f"{model}: of kind '{loaded.kind}'; one of kind 'frequency' is needed (hrg fit frequency).")
     record = read_record(run)
     with naming(run):
         found = find_temperature(loaded, record["frequency_Hz"], run)

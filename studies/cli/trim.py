@@ -220,7 +220,7 @@ def measure_after(planned: CardPlan) -> list[str]:
         )
         if abs(value - 1) > 0.15 or error > 0.15:
             found.append(
-                "Stress relief beside the groove is large; wider, shallower cuts (--width-mm) or teeth are more predictable."
+                "Stress relief beside the groove is large; wider, shallower cuts (--width-mm) or teeth are surer."
             )
     for state in plan.after:
         spread_Hz = state.error * state.frequency

@@ -21,13 +21,9 @@ def check_units(records: Sequence[Record], tables: Sequence[dict[str, FloatArray
     for record, table in zip(records, tables, strict=True):
         where = record.path or "record"
         if not 100.0 < (value := _level(table, "frequency_Hz", 1e3)) < 1e9:
-            raise InputError(
-                f"{where}: frequency_Hz is about {value:g}; a resonator vibrates at 100 Hz to 1 GHz. Is it in another unit?"
-            )
+            raise InputError(f"{where}: frequency_Hz is about {value:g}, not 100 Hz to 1 GHz. Is it in another unit?")
         if not 0.0 < (value := _level(table, "inverse_q", 1e-3)) < 0.1:
-            raise InputError(
-                f"{where}: inverse_q is about {value:g}; it must be 1/Q, between 0 and 0.1. Is it Q itself?"
-            )
+            raise InputError(f"{where}: inverse_q is about {value:g}, not between 0 and 0.1. Is it Q itself?")
     return [doubt for doubt in map(check_temperatures, records) if doubt]
 
 

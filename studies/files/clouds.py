@@ -116,9 +116,7 @@ def _read_grid(path: Path, skipped: int) -> FaceGrid:
     position = table.index.to_numpy(dtype=float)
     order = np.argsort(position)
     if len(position) < 1 or np.any(np.diff(position[order]) <= 0) or position.min() < 0 or position.max() > 1:
-        raise InputError(
-            f"{path}: the positions must lie between 0 (start of the meridian) and 1 (rim), each only once."
-        )
+        raise InputError(f"{path}: the positions must lie between 0 (start) and 1 (rim), each only once.")
     step = 2 * np.pi / max(len(azimuth), 1)
     if len(azimuth) < FEWEST:
         raise InputError(f"{path}: {len(azimuth)} azimuths are too few for harmonics; a table needs {FEWEST} or more.")
@@ -131,7 +129,5 @@ def _read_grid(path: Path, skipped: int) -> FaceGrid:
     if not np.isfinite(values).any():
         raise InputError(f"{path}: every cell of the table is empty; there is nothing to fit.")
     if np.nanmax(abs(values)) > 2e-3:
-        raise InputError(
-            f"{path}: deviations up to {1e3 * np.nanmax(abs(values)):.3g} mm; the cells of the table must be in µm."
-        )
+        raise InputError(f"{path}: up to {1e3 * np.nanmax(abs(values)):.3g} mm; the cells of the table must be in µm.")
     return FaceGrid(position[order], azimuth, values)

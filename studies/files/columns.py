@@ -141,9 +141,7 @@ def _split_head(path: str | Path, data: bytes) -> tuple[tuple[str, ...], list[st
 
 def _split_header(path: str | Path, line: str, number: int) -> list[str]:
     if "\r" in line:
-        raise InputError(
-            f"{path}, line {number}: lines end with a bare carriage return; save the file with line feeds."
-        )
+        raise InputError(f"{path}, line {number}: a bare carriage return; save the file with line feeds.")
     try:
         return next(csv.reader([line]))
     except csv.Error as error:

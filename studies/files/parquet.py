@@ -45,9 +45,7 @@ def read_table(path: str | Path) -> "tuple[dict[str, NDArray[np.float64]], str]"
     parquet, values = _open(path), {}
     for field in parquet.schema_arrow:
         if not str(field.type).startswith(("double", "float", "halffloat", "int", "uint")):
-            raise InputError(
-                f"{path}: the column '{field.name}' holds {field.type}, not numbers; 'hrg import' reads such files."
-            )
+            raise InputError(f"{path}: '{field.name}' holds {field.type}, not numbers; 'hrg import' reads such files.")
         try:
             values[field.name] = np.array(parquet.read(columns=[field.name]).column(0).to_numpy(), dtype=float)
         except Exception as error:

@@ -67,9 +67,7 @@ def guarded(
             for path, said in () if _is_special(Path(value)) else chain([(Path(value), given)], more):
                 _spare_read(path, said)
                 if seen.setdefault(_identity(path), said) != said:
-                    raise InputError(
-                        f"{seen[_identity(path)]} and {said}: two outputs would be one file; name two files."
-                    )
+                    raise InputError(f"{seen[_identity(path)]} and {said}: two outputs in one file; name two files.")
         yield read
     finally:
         _read.clear()

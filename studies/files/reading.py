@@ -81,6 +81,6 @@ def find_shipped(name: str | Path, shipped: dict[str, Path], kind: str) -> Path:
         return path
     if str(name) not in shipped:
         raise InputError(
-            f"there is no built-in {kind} '{name}' (for a {kind} of your own, give its path){nearest(str(name), shipped)}"
+            f"there is no built-in {kind} '{name}' (give the path of your own){nearest(str(name), shipped)}"
         )
     return shipped[str(name)]

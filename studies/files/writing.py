@@ -24,9 +24,7 @@ def written_whole(path: str | Path) -> Iterator[IO[bytes]]:
         claim(target)
         special = target.exists() and not target.is_file()
         if not target.parent.is_dir():
-            raise InputError(
-                f"{path}: cannot be written: there is no folder '{target.parent}'; create it, or correct the path."
-            )
+            raise InputError(f"{path}: cannot be written: there is no folder '{target.parent}'; create it.")
         handle, name = tempfile.mkstemp(prefix=".hrg-", dir=None if special else target.parent)
         temporary = Path(name)
         with os.fdopen(handle, "wb") as file:
@@ -67,9 +65,7 @@ def check_folder(path: str | Path) -> Path:
     """Make a folder for output files, in one that exists, and make sure that it can be written."""
     folder = Path(path)
     if not folder.parent.is_dir():
-        raise InputError(
-            f"{path}: cannot be written: there is no folder '{folder.parent}'; create it, or correct the path."
-        )
+        raise InputError(f"{path}: cannot be written: there is no folder '{folder.parent}'; create it.")
     try:
         folder.mkdir(exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):

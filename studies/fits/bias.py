@@ -193,9 +193,7 @@ def find_state(records: Sequence[Record], over: Over = "auto") -> str:
         frequency = record["frequency_Hz"]
         typical = float(np.nanmedian(frequency)) if np.isfinite(frequency).any() else LOWEST_FREQUENCY
         if 0 < typical < LOWEST_FREQUENCY:
-            raise InputError(
-                f"{where}: frequency_Hz around {typical:g} cannot be a resonator's; is it in kHz? Multiply it by 1000."
-            )
+            raise InputError(f"{where}: frequency_Hz around {typical:g} is no resonator's; is it in kHz?")
     return "frequency_Hz"
 
 

@@ -47,9 +47,7 @@ def study_cross_damping(
 
     model = fit(runs)
     if len(runs) == 1 and len(runs[0].time) < LEAST_ROWS:
-        raise CompensationError(
-            f"{len(runs[0].time)} rows are too few to judge the fit on data left out; record {LEAST_ROWS} or more."
-        )
+        raise CompensationError(f"{len(runs[0].time)} rows are too few to hold some out; record {LEAST_ROWS} or more.")
     after = [model.compensate(run.time, run.rate, run.temperature) for run in runs]
     training = compare_outputs([run.time for run in runs], [run.rate for run in runs], after)
     if training.rows.before == 0 or training.rows.after == 0:

@@ -121,9 +121,7 @@ def study_scale(records: "Sequence[Record]", cutoff: float | None, order: int) -
                 from_table.append(kind)
     several = next(iter(KINDS))
     if several not in sorted_runs:
-        raise InputError(
-            f"no record is a run {several}, which {KINDS[several]} needs, nor a rate table over temperature; add one."
-        )
+        raise InputError(f"no record is a run {several}, which {KINDS[several]} needs, nor a rate table; add one.")
     rates, rest, turning = (sorted_runs[kind][0] if kind in sorted_runs else None for kind in KINDS)
     assert rates is not None
     rough = _thin(sorted_runs[ROUGH][0]) if ROUGH in sorted_runs else None

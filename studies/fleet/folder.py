@@ -43,9 +43,7 @@ def read_lot(folder: str, card: str | None = None) -> list[Device]:
         else []
     )
     if not inside:
-        raise InputError(
-            f"{folder}: no folders of devices; put the records of each device in a folder named by its serial number."
-        )
+        raise InputError(f"{folder}: no folders of devices, each named by its serial number, with its records.")
     said = _read_table(root / LOT, {path.name for path in inside}) if (root / LOT).is_file() else {}
     out = []
     for path in inside:
@@ -70,9 +68,7 @@ def _read_table(path: Path, serials: Collection[str]) -> dict[str, tuple[date | 
         for line, row in enumerate(csv.DictReader(file), 2):
             serial = (row["serial"] or "").strip()
             if serial not in serials:
-                raise InputError(
-                    f"{path}, line {line}: there is no folder of device '{serial}'{nearest(serial, serials)}"
-                )
+                raise InputError(f"{path}, line {line}: no folder of device '{serial}'{nearest(serial, serials)}")
             try:
                 made = date.fromisoformat(row["date"].strip()) if (row.get("date") or "").strip() else None
             except ValueError:

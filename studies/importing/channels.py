@@ -152,7 +152,7 @@ class ChannelTable(RawTable):
                 values.append(np.array(own[column].read(-1), dtype=float))
             if len(values[-1]) != part.rows:
                 raise InputError(
-                    f"{part.path}: '{column}' has {len(values[-1])} values, but {part.rows} are declared; export it again."
+                    f"{part.path}: '{column}' has {len(values[-1])} values, not the {part.rows} declared; export it again."
                 )
         return np.concatenate(values)
 

@@ -42,9 +42,7 @@ def read_times(table: RawTable, file: "FileMap") -> Times:
         rows = np.arange(table.rows, dtype=np.float64)
         return Times(np.asarray(file.sample_period * rows + file.clock_offset), origin)
     if form in NUMERIC_TIMES and len(file.time) > 1:
-        raise InputError(
-            f"{table.path}: time_format = '{form}' is a number in one column, but 'time' names {len(file.time)}."
-        )
+        raise InputError(f"{table.path}: time_format = '{form}' is one column, but 'time' names {len(file.time)}.")
     if form == OWN:
         seconds, origin = table.own_clock()
         origin = file.start or origin
@@ -161,9 +159,7 @@ def _mend(table: RawTable, file: "FileMap", row: int) -> str:
 def seconds_between(one: datetime.datetime, two: datetime.datetime, path: str) -> float:
     """Return two - one in seconds; stamps with and without a time zone cannot be compared."""
     if (one.tzinfo is None) != (two.tzinfo is None):
-        raise InputError(
-            f"{path}: one clock states its time zone and the other does not; give 'start' or a pattern with %z."
-        )
+        raise InputError(f"{path}: one clock states its time zone, the other does not; give 'start' or %z.")
     return (two - one).total_seconds()
 
 

@@ -62,8 +62,7 @@ def draft_map(paths: Sequence[str]) -> Draft:
                 written.insert(2, "same_file = true")
             elif len(group) > 1:
                 written.insert(
-                    2,
-                    f"parts = {len(group)}    # CHECK: consecutive files: {', '.join(map(_comment, group))}",
+                    2, f"parts = {len(group)}    # CHECK: consecutive files: {', '.join(map(_comment, group))}"
                 )
             begun = begun or bool(found)
             files.append(written if found or look.group is None else [f"# {line}".rstrip() for line in written])

@@ -75,9 +75,7 @@ def read_tdms(path: str, files: ExitStack) -> Iterator[Channel]:
     nptdms = load_library("nptdms", path, "TDMS")
     file = nptdms.TdmsFile.open(files.enter_context(opened(path)))
     if file.file_status.incomplete_final_segment:
-        raise InputError(
-            f"{path}: is cut off within its last block; copy it again, or stop the recording before copying."
-        )
+        raise InputError(f"{path}: is cut off within its last block; copy it again after the recording.")
     for group in file.groups():
         numbers = [c for c in group.channels() if c.dtype is not None and c.dtype.kind in NUMBERS and len(c)]
         stamps = next((c for c in group.channels() if c.dtype is not None and c.dtype.kind == "M" and len(c)), None)

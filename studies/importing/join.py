@@ -147,12 +147,7 @@ def read_series(paths: Sequence[str], file: FileMap) -> ClockedFile:
         columns[place], found = drop_doubtful(column, kept)
         told += found
     _check_lone_values(table, columns, rows)
-    notes = (
-        f"{_name_files(table)}, {len(rows)} rows {_name_clock(file)}",
-        *times.notes,
-        *empty,
-        *told,
-    )
+    notes = (f"{_name_files(table)}, {len(rows)} rows {_name_clock(file)}", *times.notes, *empty, *told)
     return ClockedFile(file, table.path, times.seconds, times.origin, columns, notes)
 
 
@@ -295,5 +290,5 @@ def _later(origin: "datetime.datetime", seconds: float) -> "datetime.datetime":
         return origin + datetime.timedelta(seconds=seconds)
     except OverflowError:
         raise InputError(
-            f"the first time of the record, {seconds:g} s after {origin}, is not a date; check time_format."
+            f"the record's first time, {seconds:g} s after {origin}, is no date; check time_format."
         ) from None

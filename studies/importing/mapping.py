@@ -139,8 +139,7 @@ class FileMap(Keys, frozen=True, kw_only=True):
     ] = msgspec.field(name="clock_offset_s", default=0.0)
     clock_rate_ppm: Annotated[float, number("by how much its clock runs fast", least=-1e5, most=1e5)] = 0.0
     repeated_times: Annotated[
-        Literal["error", "first", "spread"],
-        says("first keeps one row, spread spaces them evenly up to the next time"),
+        Literal["error", "first", "spread"], says("first keeps one row, spread spaces them evenly up to the next time")
     ] = "error"
     longest_gap: (
         Annotated[float, number("longer gaps are not interpolated; 10 steps unless given", above=0.0)] | None
@@ -206,9 +205,7 @@ class ImportMap(Keys, frozen=True, kw_only=True):
                 known = nearest(wrong[0], TABLE_TARGETS if self.is_table else TARGETS)
                 raise ValueError(f"{where}: to = '{wrong[0]}' is not a column of a {self.target}{known}")
             if self.is_table and lacking:
-                raise ValueError(
-                    f"{where}: a table needs a column that becomes {' and one that becomes '.join(lacking)}."
-                )
+                raise ValueError(f"{where}: a table needs a column that becomes {' and one for '.join(lacking)}.")
             if self.is_table and (file.time or file.time_format or file.sample_period):
                 raise ValueError(f"{where}: a table has no time; remove time, time_format and sample_period_s.")
             if not self.is_table and file.sample_period is None:
@@ -225,7 +222,7 @@ class ImportMap(Keys, frozen=True, kw_only=True):
                 for axis in {"", column.axis}:
                     if (column.target, axis) in seen and (axis or not column.axis):
                         raise ValueError(
-                            f"'{column.target}' is assigned twice, by [[file]] {seen[column.target, axis]} and {place}."
+                            f"'{column.target}' is assigned twice, by {seen[column.target, axis]} and {place}."
                         )
                 seen[column.target, column.axis] = place
 

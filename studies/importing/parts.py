@@ -27,8 +27,6 @@ def read_parts(paths: Sequence[str | Path], file: FileMap) -> RawTable:
     first = tables[0]
     for other in tables[1:]:
         if list(other.cells) != list(first.cells):
-            raise InputError(
-                f"{other.path}: its columns differ from those of {first.path}; give it its own [[file]] table."
-            )
+            raise InputError(f"{other.path}: has other columns than {first.path}; give it its own [[file]] table.")
     cells = pd.concat([table.cells for table in tables], ignore_index=True)
     return TextTable(tuple(part for table in tables for part in table.parts), first.missing, cells, first.decimal)

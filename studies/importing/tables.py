@@ -97,7 +97,7 @@ class RawTable:
     def joined(self, columns: Sequence[str]) -> "pd.Series[str]":
         """Return several columns of text joined by a blank, such as a date and a time of day."""
         raise InputError(
-            f"{self.path}: '{' '.join(columns)}' are numbers; time_format is a unit of time such as 's', or 'own'."
+            f"{self.path}: '{' '.join(columns)}' are numbers; time_format is a unit such as 's', or 'own'."
         )
 
     def is_empty(self, text: "pd.Series[str]") -> "NDArray[np.bool_]":

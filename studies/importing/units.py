@@ -70,12 +70,7 @@ _RATE_PER_S = {
     "rad/s": _times(180 / pi, "(180 / pi) x"),
     "rpm": _times(6.0, "6 x"),
 }
-_VOLTAGE = {
-    "V": _SAME,
-    "mV": _times(1e-3, "x / 1000"),
-    "uV": _times(1e-6, "x / 1e6"),
-    "kV": _times(1e3, "1000 x"),
-}
+_VOLTAGE = {"V": _SAME, "mV": _times(1e-3, "x / 1000"), "uV": _times(1e-6, "x / 1e6"), "kV": _times(1e3, "1000 x")}
 _ANGLE = {"deg": _SAME, "rad": _times(180 / pi, "(180 / pi) x"), "turns": _times(360.0, "360 x")}
 
 _BY_ENDING: Mapping[str, Mapping[str, Unit]] = {

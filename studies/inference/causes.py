@@ -8,13 +8,7 @@ import scipy
 from numpy.typing import NDArray
 
 from studies.diagnosis.constants import CONSTANTS
-from studies.diagnosis.verdict import (
-    NINETY,
-    Cause,
-    Interval,
-    same_cause,
-    weigh,
-)
+from studies.diagnosis.verdict import NINETY, Cause, Interval, same_cause, weigh
 from studies.effects import library
 from studies.effects.effect import UNITS
 from studies.inference.apart import with_levels

@@ -56,9 +56,7 @@ def make_ready(given: Sequence[Record]) -> Campaign:
         raise InputError(f"{kept[0].path or 'record'}: a diagnosis needs frequency_Hz, bias_deg_per_h or inverse_q.")
     _, timed = place_in_time(kept)
     if not timed and len(kept) > 1:
-        notes.append(
-            "The records have no distinct start times (# start: …); they are treated as consecutive, with unknown gaps."
-        )
+        notes.append("The records have no distinct start times (# start: …); they are treated as consecutive.")
     for name in COMMAND_COLUMNS:
         there = [name in record and np.isfinite(record[name]).all() for record in kept]
         if any(there) and not all(there) and name != RATE:
@@ -91,9 +89,7 @@ def _temperature_source(records: Sequence[Record]) -> str:
         if all(name in record and np.isfinite(record[name]).sum() > 1 for record in records):
             return name
     lacking = next((r for r in records if not any(n in r for n in (HOUSING, CHAMBER, RESONATOR))), records[0])
-    raise InputError(
-        f"{lacking.path or 'record'}: a diagnosis needs {HOUSING} or {CHAMBER}, the same one in every record."
-    )
+    raise InputError(f"{lacking.path or 'record'}: {HOUSING} or {CHAMBER} is needed, the same in every record.")
 
 
 def _columns(record: Record, source: str) -> dict[str, Array]:

@@ -11,10 +11,7 @@ from studies.calibration.fit import LASTING, stated_noise
 from studies.calibration.ladder import noise_rms
 from studies.diagnosis.constants import CONSTANTS
 from studies.diagnosis.response import RESPONSES
-from studies.diagnosis.verdict import (
-    Cause,
-    ResponseResult,
-)
+from studies.diagnosis.verdict import Cause, ResponseResult
 from studies.inference.causes import SURE_DELAY, delay_of
 from studies.inference.inferred import Inferred
 from studies.inference.lack_of_fit import doubt_of
@@ -96,9 +93,7 @@ def _judge(
             )
     resonator = np.concatenate([path.states.resonator for path in found.search.signatures.paths])
     if np.ptp(resonator) < NARROW_RANGE:
-        remark = (
-            f"the resonator's temperature changes by {np.ptp(resonator):.2g} K only: what depends on it cannot show"
-        )
+        remark = f"the resonator's temperature changes by only {np.ptp(resonator):.2g} K: what follows it cannot show"
     else:
         remark = ""
     return ("not-identifiable", doubt_of(left.input, left.evidence)) if left.doubtful else ("adequate", remark)

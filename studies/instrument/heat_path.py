@@ -87,9 +87,7 @@ def _material_value(thermal: "Thermal", material: "Material", key: str, referenc
         return float(given)
     name = FROM_MATERIAL[key]
     if name not in material.properties:
-        raise InputError(
-            f"{where}: no source states the {name.replace('_', ' ')} of {material.name}; add the key '{key}'."
-        )
+        raise InputError(f"{where}: no source states {name.replace('_', ' ')} of {material.name}; add '{key}'.")
     return float(material.value(name, reference))
 
 

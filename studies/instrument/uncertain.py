@@ -111,9 +111,7 @@ def read_uncertain(raw: Any, keys: Any, where: str, name: str) -> "tuple[Any, li
         low, high = bounds(node)
         for word, end in (("low", spread.low), ("high", spread.high)):
             if end is not None and not low <= end <= high:
-                raise InputError(
-                    f"{place}: {word} = {end:g} lies beyond {low if end < low else high:g}, which the key allows."
-                )
+                raise InputError(f"{place}: {word} = {end:g} lies beyond {low if end < low else high:g} of the key.")
         stated[path] = _make(name, path, spread, low, high)
         return spread.value
 

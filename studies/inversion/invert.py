@@ -119,9 +119,7 @@ def invert(
 def _priors(instrument: "Instrument", exact: Sequence[str]) -> Priors:
     check_exact(instrument, exact)
     if instrument.polynomial is not None:
-        raise InputError(
-            f"{instrument.path}: a card with a polynomial [law] has no modes; give it [resonator] and [material]."
-        )
+        raise InputError(f"{instrument.path}: a polynomial [law] has no modes; give [resonator] and [material].")
     idle = [
         one.name
         for one in instrument.uncertain

@@ -160,9 +160,7 @@ def _of_material(
     elif bulk:
         causes.append(bulk_cause(bulk["coefficient"], bulk["exponent"], bulk["relative_sd"], bulk["source"]))
     else:
-        left_out.append(
-            f"bulk: no source states that of {instrument.material.name}; give bulk_coefficient and bulk_exponent."
-        )
+        left_out.append(f"bulk: no source states that of {instrument.material.name}; give bulk_coefficient.")
     surface: Mapping[str, Any] = known.get("surface", {})
     if parts.surface_layer_pm is not None:
         depth = 1e-12 * parts.surface_layer_pm

@@ -139,11 +139,7 @@ def _law(instrument: "Instrument") -> FrequencyLaw:
     return law_of(instrument, low - 5, high + 5)
 
 
-COLOURS = {
-    "radiative": (style.BLUE, "-"),
-    "linear": (style.ORANGE, "--"),
-    "shell and stem alone": (style.GREEN, ":"),
-}
+COLOURS = {"radiative": (style.BLUE, "-"), "linear": (style.ORANGE, "--"), "shell and stem alone": (style.GREEN, ":")}
 NO_HEAT_PATH = (
     "The paper gives no heat path. Shell and stem follow from geometry and material. One constant, the conductance between base and"
     " housing, is identified from the statement that a step is 95 % complete after 9 000 s. The model then predicts that less than"

@@ -226,9 +226,7 @@ def stated_noises(card: "Instrument", records: Sequence[Record]) -> dict[str, No
     """Return the noise of every response as the card states it."""
     for response, key in WHITE.items():
         if getattr(card.noise, key) <= 0:
-            raise InputError(
-                f"{card.path or card.name} [noise]: {key} is 0, but a plan depends on the noise of {response}; state it."
-            )
+            raise InputError(f"{card.path or card.name} [noise]: {key} is 0, but a plan needs the noise of {response}.")
     loss = float(np.median(np.concatenate([record["inverse_q"] for record in records])))
     return {
         "frequency_Hz": frequency_noise(card.noise),

@@ -24,12 +24,7 @@ LEVELS = (0.5, 1.0, 0.0, 0.75, 0.25, 0.9)
 HOLDS = {"voltage_squared": 5, "amplitude_squared": 7, "quadrature": 6, "pattern_angle": 4}
 """Steps of each drive in a run: different numbers, so that no two drives step together."""
 RANDOM_HOLDS = (0.1, 0.18, 0.08, 0.2, 0.12, 0.17, 0.15)
-BY_INPUT = {
-    "temperature": "staircase both ways",
-    "rate": "two rates",
-    "history": "steps and soaks",
-    "voltage": "quiet",
-}
+BY_INPUT = {"temperature": "staircase both ways", "rate": "two rates", "history": "steps and soaks", "voltage": "quiet"}
 """Kind of run that varies one input alone."""
 
 

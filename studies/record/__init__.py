@@ -79,9 +79,7 @@ class Record:
 
     def __getitem__(self, name: str) -> Array:
         if name not in self.columns:
-            raise InputError(
-                f"{self.path or 'record'}: the column '{name}' is missing; it has {', '.join(self.columns)}."
-            )
+            raise InputError(f"{self.path or 'record'}: column '{name}' is missing; it has {', '.join(self.columns)}.")
         return self.columns[name]
 
     def __contains__(self, name: str) -> bool:

@@ -159,9 +159,7 @@ class _Measures:
         """Return the outline at the same parts of its runs as in the nominal design, and in its sense."""
         runs = outline_rows(instrument.resonator, self._mode(instrument), self.size)
         if len(runs) != len(self.places):
-            raise OutlineDiffers(
-                "The picture does not follow the sliders: the section's corners differ within their ranges."
-            )
+            raise OutlineDiffers("The picture stays: the section's corners differ within the sliders' ranges.")
         sampled = [
             np.column_stack([np.interp(at, _arc(run), column) for column in run.T])
             for run, at in zip(runs, self.places, strict=True)

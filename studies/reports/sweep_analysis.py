@@ -72,9 +72,7 @@ def _slopes(results: Results, column: Output) -> list[Part]:
         Column(lambda slope: units[slope.parameter], "Unit"),
         Column("swing", "Change over the range", column.unit, ".6g"),
     )
-    note = (
-        "± includes curvature beyond the outer levels and the solver error; slopes smaller than ± are not significant."
-    )
+    note = "± includes curvature beyond the outer levels and the solver error; smaller slopes are not significant."
     table = Table(f"Slopes of {column.label} at the nominal design", found, columns, note, sortable=True)
     return [table, figures.tornado_figure(found, column)]
 
@@ -112,9 +110,7 @@ def tolerance_parts(results: Results) -> list[Part]:
         reach = find_reach(results, study.requirements)
     except InputError as error:
         return [Sentence(str(error), "warning")]
-    note = (
-        "In the interval, a design without a result counts as failed at the lower end and as passed at the upper end."
-    )
+    note = "In the interval, a design without a result counts as failed at the lower end, passed at the upper."
     if reach.part is None:
         words = "No sampled design fails: the tolerances can be wider than the ranges of the study."
     else:

@@ -15,11 +15,7 @@ SLOPE_KEYS = {"youngs_modulus": "log_slope_per_K", "shear_modulus": "log_slope_p
 
 
 def law_of(
-    instrument: "Instrument",
-    lowest: float = -inf,
-    highest: float = inf,
-    theory: "Theory" = "solid",
-    harmonic: int = 2,
+    instrument: "Instrument", lowest: float = -inf, highest: float = inf, theory: "Theory" = "solid", harmonic: int = 2
 ) -> "FrequencyLaw":
     """Build the frequency law of an instrument between two temperatures (K), within its material's range: over all of it unless given."""
     if instrument.polynomial is not None:

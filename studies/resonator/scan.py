@@ -121,7 +121,7 @@ def scan_faces(
         check_unit(points, resonator, files[name])
         if highest > (most := most_waves(len(points))):
             raise InputError(
-                f"--highest {highest}: {len(points)} points of {files[name]} allow harmonics up to {most}; lower it."
+                f"--highest {highest}: {len(points)} points of {files[name]} allow up to {most}; lower it."
             )
     if clouds and projector is not None:
         say("aligning the faces")

@@ -120,9 +120,7 @@ def rim_sites(
         place = resonator.at([x * resonator.length])
         circle = 2 * pi * float(place.r[0])
         if not tool.width <= circle:
-            raise InputError(
-                f"a cut of {1e3 * tool.width:g} mm is wider than the circle it lies on ({1e3 * circle:.3g} mm)."
-            )
+            raise InputError(f"a cut of {1e3 * tool.width:g} mm is wider than its circle ({1e3 * circle:.3g} mm).")
         room = int(circle / tool.width)
         count = max(step, room // step * step)
         azimuth.append(axis + 2 * pi * np.arange(count) / count)

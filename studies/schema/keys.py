@@ -32,10 +32,7 @@ def number(
     prior = {key: value for key, value in (("sd", sd), ("relative_sd", relative_sd)) if value is not None}
     ends: Any = {"gt": above, "ge": least, "lt": below, "le": most}
     return msgspec.Meta(
-        **ends,
-        description=meaning or None,
-        examples=None if example is None else [example],
-        extra=prior or None,
+        **ends, description=meaning or None, examples=None if example is None else [example], extra=prior or None
     )
 
 

@@ -16,10 +16,7 @@ from thermal.profile import Profile
 
 Array = NDArray[np.float64]
 Boundary = Literal["chamber", "housing"]
-COLUMN: dict[Boundary, str] = {
-    "chamber": "chamber_temperature_degC",
-    "housing": "housing_temperature_degC",
-}
+COLUMN: dict[Boundary, str] = {"chamber": "chamber_temperature_degC", "housing": "housing_temperature_degC"}
 COMMANDS = {
     # field of the effects' states: (column, factor, power)
     "amplitude_squared": ("drive_amplitude_V", 1.0, 2),
@@ -65,9 +62,7 @@ class Drive:
     def __post_init__(self) -> None:
         for name in self.initial:
             if name not in self.departing:
-                raise InputError(
-                    f"a drive by the {self.boundary} has no initial '{name}'; it has {', '.join(self.departing)}."
-                )
+                raise InputError(f"a drive by the {self.boundary} has no '{name}'; it has {', '.join(self.departing)}.")
 
     @property
     def lumps(self) -> tuple[str, ...]:

@@ -41,13 +41,7 @@ def wave_of(
     if damping is not None:
         split, axis = omega * np.abs(damping) / 2, np.angle(damping) / (2 * harmonic)
     return StandingWave(
-        omega,
-        1 / decay,
-        split,
-        axis,
-        *_frequency_split(instrument, loop, harmonic),
-        harmonic,
-        bryan_factor,
+        omega, 1 / decay, split, axis, *_frequency_split(instrument, loop, harmonic), harmonic, bryan_factor
     )
 
 

@@ -241,11 +241,7 @@ def _close(instrument: "Instrument", wave: StandingWave, electronics: Electronic
 
 
 def _noise(
-    instrument: "Instrument",
-    wave: StandingWave,
-    electronics: Electronics,
-    loops: Loops,
-    seconds: tuple[float, ...],
+    instrument: "Instrument", wave: StandingWave, electronics: Electronics, loops: Loops, seconds: tuple[float, ...]
 ) -> dict[str, Array]:
     """Standard deviation (deg/h) of means of the rate over these times, of each source that there is and of all."""
     there = [name for name in NOISES if getattr(electronics.noise, name) > 0]

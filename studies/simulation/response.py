@@ -128,10 +128,7 @@ def read_out(
             instrument, frequency, inverse_q, law.bryan_factor, angle, wave, time=drive.time, rate=rate_felt
         )
         read["bias_deg_per_h"] = read["bias_deg_per_h"] - applied * DEG_PER_H + (0.0 if free else felt)
-    return {
-        "resonator_temperature_degC": warmed - zero_Celsius,
-        **read,
-    }
+    return {"resonator_temperature_degC": warmed - zero_Celsius, **read}
 
 
 def _earlier(time: Array, value: Array, rate: Array, delay: float) -> Array:
@@ -146,9 +143,7 @@ def _earlier(time: Array, value: Array, rate: Array, delay: float) -> Array:
 def check_loss(instrument: "Instrument", inverse_q: Array) -> None:
     """Raise when 1/Q has become negative."""
     if not (inverse_q > 0).all():
-        raise InputError(
-            f"{instrument.path} [loss]: 1/Q becomes negative in this profile; correct its slope or curvature."
-        )
+        raise InputError(f"{instrument.path} [loss]: 1/Q becomes negative here; correct its slope or curvature.")
 
 
 def _apply_effects(

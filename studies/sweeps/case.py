@@ -72,9 +72,7 @@ class Case:
     def require_lowest(self, harmonic: int, theory: "Theory", temperature: float) -> None:
         """Refuse a design in which another mode has come below the followed one: what is asked is of the lowest."""
         if self.on_the_way is not None and (k := self.mode(harmonic, 0, theory, temperature).index):
-            raise InputError(
-                f"the mode n = {harmonic} of the start is no longer the lowest of its harmonic but number {k + 1}."
-            )
+            raise InputError(f"the mode n = {harmonic} of the start is no longer the lowest but number {k + 1}.")
 
 
 @lru_cache(maxsize=32)

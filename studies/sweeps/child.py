@@ -105,9 +105,7 @@ class Child:
         stopped = -(self.process.returncode or 0)
         if stopped in STOPPED:
             self.kill()
-            raise FunctionLost(
-                f"the process of {self.function} was killed from outside ({signal.Signals(stopped).name})"
-            )
+            raise FunctionLost(f"the process of {self.function} was killed ({signal.Signals(stopped).name})")
         self.fail("ended its process")
 
     def fail(self, how: str) -> NoReturn:

@@ -121,9 +121,7 @@ class Cluster(Workers):
         if others:
             address, text = next(iter(others.items()))
             leave(self.client)
-            raise MissingEnvironment(
-                f"worker {address} has {text}, here is {ours}; install the same versions on every machine."
-            )
+            raise MissingEnvironment(f"worker {address} has {text}, here is {ours}; install the same versions.")
 
 
 async def greet(distributed: Any, address: str, security: Any) -> None:
@@ -185,9 +183,7 @@ def call_if_same(code: str, function: Callable[..., Any], *arguments: Any) -> An
     """Call a function on a worker; one that joined later with another version refuses."""
     here = describe_code()
     if here != code:
-        raise MissingEnvironment(
-            f"a worker that joined later has {here}, the study has {code}; install the same versions."
-        )
+        raise MissingEnvironment(f"a later worker has {here}, the study has {code}; install the same versions.")
     return function(*arguments)
 
 

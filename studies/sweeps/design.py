@@ -72,9 +72,7 @@ def nominal_design(study: "Study") -> dict[str, Any]:
 
 def _grid(study: "Study") -> Array:
     if count_cases(study) > MOST_CASES:
-        raise InputError(
-            f"the grid has {count_cases(study)} cases, more than {MOST_CASES}; take fewer values or a sample."
-        )
+        raise InputError(f"the grid has {count_cases(study)} cases, above {MOST_CASES}; take fewer or a sample.")
     axes = [_axis(p) if p.values else _spread(p) for p in study.parameters]
     return np.stack([x.ravel() for x in np.meshgrid(*axes, indexing="ij")], axis=1)
 

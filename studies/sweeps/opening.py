@@ -88,9 +88,7 @@ def _lock(lock: IO[str], folder: str | Path) -> None:
     except BlockingIOError:
         lock.seek(0)
         owner = lock.read().strip() or "another process"
-        raise InputError(
-            f"{folder}: {owner} is running this study; wait for it, or use another folder with --out."
-        ) from None
+        raise InputError(f"{folder}: {owner} is running this study; wait, or use another folder with --out.") from None
     lock.truncate(0)
     lock.write(f"process {os.getpid()}, since {now_utc()},")
     lock.flush()

@@ -36,7 +36,7 @@ def find_nominal(instrument: Instrument, name: str, where: str) -> float | str |
         if name not in set(possible_keys(instrument.content)):
             known = [*_named(instrument), *possible_keys(instrument.content), TEMPERATURE]
             raise InputError(
-                f"{where}: the card '{instrument.name}' has no parameter '{name}'{nearest(name, known)}"
+                f"{where}: card '{instrument.name}' has no parameter '{name}'{nearest(name, known)}"
             ) from None
         table, key = name.split(".", 1)
         if table == "material" and key in GIVEN:

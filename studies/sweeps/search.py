@@ -176,10 +176,7 @@ def _tolerance(parameter: "StudyParameter", factor: float) -> dict[str, Any]:
     return {"name": parameter.name, "low": ends[0], "high": ends[1]}
 
 
-SEARCHES: Mapping[str, Callable[..., dict[str, Any]]] = {
-    "worst-case": find_worst_case,
-    "tolerance": find_tolerance,
-}
+SEARCHES: Mapping[str, Callable[..., dict[str, Any]]] = {"worst-case": find_worst_case, "tolerance": find_tolerance}
 
 
 def _starts(free: "Sequence[StudyParameter]") -> Array:

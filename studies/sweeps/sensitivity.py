@@ -61,9 +61,7 @@ def sobol_indices(results: "Results", column: str) -> SobolIndices:
     """Return the Sobol indices of a column from a study with method = "sensitivity" (Saltelli 2010, table 2 b and f)."""
     study = results.study
     if study.sampling.method != "sensitivity":
-        raise InputError(
-            f"Sobol indices need a study with method = 'sensitivity', not '{study.sampling.method}'; change [sampling]."
-        )
+        raise InputError(f"Sobol indices need [sampling] method = 'sensitivity', not '{study.sampling.method}'.")
     y = _complete(results, column)
     n, d = study.sampling.cases, len(study.parameters)
     A, B, AB = y[:n], y[n : 2 * n], y[2 * n :].reshape(d, n)
@@ -96,9 +94,7 @@ def local_slopes(results: "Results", column: str) -> list[LocalSlope]:
     """
     study = results.study
     if study.sampling.method != "one-at-a-time":
-        raise InputError(
-            f"local slopes need a study with method = 'one-at-a-time', not '{study.sampling.method}'; change [sampling]."
-        )
+        raise InputError(f"local slopes need [sampling] method = 'one-at-a-time', not '{study.sampling.method}'.")
     y = _complete(results, column)
     error = float(np.nan_to_num(results.error(column)).max(initial=0.0))
     slopes = []
@@ -152,9 +148,7 @@ def linear_shares(results: "Results", column: str) -> LinearShares | None:
 def _complete(results: "Results", column: str) -> Array:
     """Return a column of which every case is there, or refuse with the list."""
     if results.done < results.total:
-        raise InputError(
-            f"{results.total - results.done} cases are not computed yet; run the study again to resume it."
-        )
+        raise InputError(f"{results.total - results.done} cases are not computed yet; resume the study.")
     y = results.column(column)
     lacking = np.flatnonzero(~np.isfinite(y))
     if lacking.size:

@@ -147,7 +147,7 @@ def test_lengths_a_thousand_times_too_large_are_named(tmp_path, stem):
         f"{stem}"
         '[material]\nname = "fused-silica"\n'
     )
-    with pytest.raises(InputError, match="radius_mm = 15000 looks 1000 × too large: lengths are in mm, not in µm"):
+    with pytest.raises(InputError, match="radius_mm = 15000 looks 1000 × too large: is it in µm"):
         load_card(card)
 
 

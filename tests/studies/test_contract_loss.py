@@ -96,14 +96,14 @@ def test_what_no_source_states_is_left_out_and_said():
     ("loss", "words"),
     [
         ({"gas": "xenon"}, "gas = 'xenon' is unknown"),
-        ({"film": [GOLD | {"thickness_nm": 2e6}]}, "thicker than the wall (0.9 mm): film thickness is in nm."),
+        ({"film": [GOLD | {"thickness_nm": 2e6}]}, "thicker than the wall (0.9 mm): is it in nm?"),
         ({"film": [GOLD | {"thickness_nm": 1e5}]}, "more than 5 % of the wall"),
         ({"film": [{"material": "gold", "thickness_nm": 100.0}]}, "no source states loss of the film 'gold'; add it."),
         (
             {"film": [{"material": "ti", "thickness_nm": 9.0}]},
             "(films of the table: gold, chromium, tantala, silica); add it.",
         ),
-        ({"film": [GOLD | {"from_position": 1.0}]}, "from_position (1) must lie before to_position (1)."),
+        ({"film": [GOLD | {"from_position": 1.0}]}, "from_position (1) is not before to_position (1)."),
         ({"activated": [PEAK | {"energy_eV": 0.0}]}, "energy_eV must be"),
         ({"unbalance_mg": 1.0}, "on a stem"),
         ({"inverse_q": 1e7}, "inverse_q = 1e+07 must lie between 0 and 0.1: it is 1/Q, not Q."),

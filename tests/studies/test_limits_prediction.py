@@ -154,7 +154,7 @@ def test_a_run_without_a_drive_and_an_unknown_start_are_refused(card, drive):
         drive_by_record(Record({"time_s": TIME, "frequency_Hz": TIME}))
     with pytest.raises(InputError, match="chamber_temperature_degC is missing; choose the other boundary"):
         drive_by_record(Record({"time_s": TIME, "housing_temperature_degC": TIME * 0.0}), "chamber")
-    with pytest.raises(InputError, match="no initial 'shell'"):
+    with pytest.raises(InputError, match="no 'shell'"):
         replace(drive, initial={"shell": 1.0})
     with pytest.raises(InputError, match="the card has no number"):
         predict(card, drive, ["thermal.mass"])

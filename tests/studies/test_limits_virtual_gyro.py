@@ -238,7 +238,7 @@ def test_every_shipped_shape_has_a_heat_path(card):
 
 
 def test_a_material_without_heat_capacity_is_asked_for_by_its_key():
-    with pytest.raises(InputError, match="of 3j53; add the key 'heat_capacity_J_per_kg_K'"):
+    with pytest.raises(InputError, match="of 3j53; add 'heat_capacity_J_per_kg_K'"):
         build_network(load_card("bvg-bell").with_table("thermal", {}))
 
 

@@ -64,7 +64,7 @@ def test_films_of_a_card_shift_its_frequency(modes):
     ("old", "new", "said"),
     [
         ("density_kg_m3 = 2329.0\n", "", "density_kg_m3 of the crystal is missing"),
-        ("2329.0\n", "2329.0\nyoungs_modulus_GPa = 130.0\n", "instead of youngs_modulus_GPa"),
+        ("2329.0\n", "2329.0\nyoungs_modulus_GPa = 130.0\n", "no youngs_modulus_GPa"),
         ("C44_GPa = 79.6", "C44_GPa = 79.6, C55_GPa = 1.0", "C55_GPa"),
         ("63.9", "263.9", "stable only with"),
     ],

@@ -24,10 +24,7 @@ EFFECT = Effect(
     source="B = S_q sin φ, phase error φ linear in temperature",
     isolate="step the quadrature control at constant temperature",
     sensor="the quadrature control's voltage (quadrature_V)",
-    coefficients=(
-        Coefficient("leakage_{unit}_per_V"),
-        Coefficient("leakage_slope_{unit}_per_V_per_10K", (0.2,)),
-    ),
+    coefficients=(Coefficient("leakage_{unit}_per_V"), Coefficient("leakage_slope_{unit}_per_V_per_10K", (0.2,))),
     columns=columns,
     grid=grid,
     sizes={"bias_deg_per_h": 20.0},

@@ -175,9 +175,7 @@ def _map(keys: MapKeys, place: CardPlace) -> "Field":
     path = place.folder / keys.file
     grid = read_cloud(path)
     if not isinstance(grid, FaceGrid):
-        raise InputError(
-            f"{path}: {place.where} asks for a table over position and azimuth; hrg scan makes one of points."
-        )
+        raise InputError(f"{path}: {place.where} asks for a table over position and azimuth (hrg scan).")
     return survey_map(grid.position, grid.azimuth, grid.values, 1, str(path)).field
 
 

@@ -22,11 +22,7 @@ class Loop(Keys, frozen=True, kw_only=True):
     self_precession_deg_per_s: Annotated[float, number("commanded precession of a whole-angle wave")] = 0.0
     frequency_split_mHz: Annotated[
         float,
-        number(
-            "Δω/2π held by the quadrature loop, besides [imperfection], [electrodes]",
-            least=0.0,
-            relative_sd=1.0,
-        ),
+        number("Δω/2π held by the quadrature loop, besides [imperfection], [electrodes]", least=0.0, relative_sd=1.0),
     ] = 5.0
     frequency_axis_deg: Annotated[float, number("θ_ω, of the higher frequency", sd=13.0)] = 0.0
     pickoff_gain_ratio: Annotated[float, number("g_x/g_y − 1", above=-0.5, below=0.5, sd=0.005)] = 0.0
@@ -43,8 +39,7 @@ class Loop(Keys, frozen=True, kw_only=True):
         float, number("misalignment of the drives to the pick-offs, on the shell", above=-200.0, below=200.0, sd=0.5)
     ] = 0.0
     amplitude_V: Annotated[
-        float,
-        number("of the pick-offs at the commanded vibration; it scales the column drive_amplitude_V", above=0.0),
+        float, number("of the pick-offs at the commanded vibration; it scales the column drive_amplitude_V", above=0.0)
     ] = 1.0
     quadrature_V_per_Hz: Annotated[float, number("quadrature_V per compensated split", above=0.0)] = 10.0
     pickoff_noise_uV_per_rt_Hz: Annotated[float, number("at the carrier, one-sided", least=0.0)] = 1.0
@@ -69,9 +64,7 @@ class Loop(Keys, frozen=True, kw_only=True):
 
     def __post_init__(self) -> None:
         if (self.vibration_um is None) != (self.modal_mass_mg is None):
-            raise ValueError(
-                "thermal noise needs both vibration_um and modal_mass_mg; add the other, or leave out both."
-            )
+            raise ValueError("thermal noise needs both vibration_um and modal_mass_mg, or neither.")
 
 
 TABLE = CardTable("loop", Loop, optional=True)

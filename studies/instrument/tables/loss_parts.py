@@ -58,7 +58,7 @@ class FilmKeys(Keys, frozen=True, kw_only=True):
     def __post_init__(self) -> None:
         if not self.from_position < self.to_position:
             raise ValueError(
-                f"from_position ({self.from_position:g}) must lie before to_position ({self.to_position:g})."
+                f"from_position ({self.from_position:g}) is not before to_position ({self.to_position:g})."
             )
 
 
@@ -107,10 +107,7 @@ class LossParts(Keys, frozen=True, kw_only=True):
         | None
     ) = None
     surface_anisotropy: (
-        Annotated[
-            float,
-            number("wave 2n of the surface loss", least=0.0, most=1.0, relative_sd=1.0, example=0.01),
-        ]
+        Annotated[float, number("wave 2n of the surface loss", least=0.0, most=1.0, relative_sd=1.0, example=0.01)]
         | None
     ) = None
     surface_anisotropy_angle_deg: Annotated[float, number("azimuth of its crest", sd=13.0)] = 0.0

@@ -117,9 +117,7 @@ class MaterialKeys(Keys, frozen=True, kw_only=True):
     def __post_init__(self) -> None:
         if self.crystal is not None:
             if self.youngs_modulus_GPa is not None or self.poisson_ratio is not None:
-                raise ValueError(
-                    "a crystal has C11_GPa, C12_GPa and C44_GPa instead of youngs_modulus_GPa and poisson_ratio."
-                )
+                raise ValueError("a crystal has C11_GPa, C12_GPa and C44_GPa, no youngs_modulus_GPa or poisson_ratio.")
             if self.density_kg_m3 is None:
                 raise ValueError("density_kg_m3 of the crystal is missing; add it.")
         E, rho = self.youngs_modulus_GPa, self.density_kg_m3

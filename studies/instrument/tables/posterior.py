@@ -27,9 +27,7 @@ class Correlations(Keys, frozen=True, kw_only=True):
             raise ValueError(f"interval must be {count} pairs of numbers [low, high], one for each name.")
         for name, (low, high) in self.intervals.items():
             if not low <= high:
-                raise ValueError(
-                    f"interval of {name} must go from a lower to a higher number, not from {low:g} to {high:g}."
-                )
+                raise ValueError(f"interval of {name} must go from low to high, not from {low:g} to {high:g}.")
 
     @property
     def intervals(self) -> dict[str, tuple[float, float]]:

@@ -208,9 +208,7 @@ class Meridian(Shape, frozen=True, kw_only=True, tag="meridian"):
 def build_resonator(keys: Shape, place: CardPlace) -> "Resonator":
     """Build the resonator; what the geometry does not allow is named with the card."""
     if (radius := getattr(keys, "radius_mm", 0.0) * MM) > LARGEST:
-        raise InputError(
-            f"{place.where}: radius_mm = {radius / MM:g} looks 1000 × too large: lengths are in mm, not in µm."
-        )
+        raise InputError(f"{place.where}: radius_mm = {radius / MM:g} looks 1000 × too large: is it in µm?")
     with naming(place.where):
         resonator = keys.build()
     if not SMALLEST <= resonator.size <= LARGEST:

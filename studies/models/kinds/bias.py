@@ -111,9 +111,7 @@ def _predict_causally(model: Model, time: Array, values: Array, extrapolate: boo
     check_time(time)
     known = np.isfinite(values)
     if np.count_nonzero(known) < 2:
-        raise InputError(
-            f"the column '{variable_column(model)}' has fewer than two values; nothing can be compensated."
-        )
+        raise InputError(f"the column '{variable_column(model)}' has fewer than two values to compensate.")
     length = block_length(model)
     numbers = np.floor((time - time[known][0]) / length).astype(int)
     used, starts = np.unique(numbers[known], return_index=True)
