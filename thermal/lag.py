@@ -24,10 +24,11 @@ def lag(time: ArrayLike, temperature: ArrayLike, time_constant: float, initial: 
 
 
 def scan(decay: Array, forced: Array, start: Array) -> Array:
-    """Run x_{k+1} = decay_k x_k + forced_k from `start`, a banded triangular system; (N, m), (N, m), (m,) give (N + 1, m)."""
-    states = np.vstack([start, forced])
+    """Run x_{k+1} = decay_k x_k + forced_k from `start`, banded triangular systems; (N, m), (N, …, m), (…, m) give (N + 1, …, m)."""
+    states = np.concatenate([start[None], forced])
     band = np.ones((2, len(states)), order="F")
-    for m in range(len(start)):
+    for m in range(states.shape[-1]):
         band[1, :-1] = -decay[:, m]
-        states[:, m] = scipy.linalg.lapack.dtbtrs(band, states[:, m : m + 1], uplo="L", diag="U")[0][:, 0]
+        columns = states[..., m].reshape(len(states), -1)
+        states[..., m] = scipy.linalg.lapack.dtbtrs(band, columns, uplo="L", diag="U")[0].reshape(states.shape[:-1])
     return states

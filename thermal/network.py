@@ -143,7 +143,7 @@ class Network:
         """Heat leaving each node and boundary, L T + σ R T⁴ (W); `temperature` has shape (..., nodes and boundaries)."""
         flow: Array = temperature @ self.conduction
         if self.radiators:
-            flow += Stefan_Boltzmann * (temperature**4 @ self.radiation)
+            flow += (temperature**2) ** 2 @ (Stefan_Boltzmann * self.radiation)
         return flow
 
     def outflow_slope(self, temperature: Array) -> Array:

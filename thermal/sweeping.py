@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike
 
 from thermal.errors import ThermalError
 from thermal.forcing import MOST_ROWS, find_corners, initial_state
+from thermal.lag import scan
 from thermal.network import Array, Network, linearise
 from thermal.profile import Profile
 from thermal.relaxation import Relaxation, find_relaxation
@@ -78,11 +79,7 @@ class Grid:
         shift = (2 * u[1] - u[0] - u[2]) / 3  # straight lines of the parabola's mean
         u0, u1 = u[0] + shift, u[2] + shift
         decay2, near2, far2, decay, near, far = (w[:, None, :] for w in self._weights)
-        forced = near * u0 + far * u1
-        x = np.empty((len(forced) + 1, *forced.shape[1:]))
-        x[0] = (start * self.modes.capacity) @ self.modes.shapes
-        for k in range(len(forced)):
-            x[k + 1] = decay[k] * x[k] + forced[k]
+        x = scan(decay[:, 0], near * u0 + far * u1, (start * self.modes.capacity) @ self.modes.shapes)
         half = decay2 * x[:-1] + near2 * u0 + far2 * (u0 + u1) / 2
         return np.array([x[:-1], half, x[1:]])
 

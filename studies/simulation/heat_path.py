@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 SENSOR = "sensor"
 """Node of the sensor on a housing that is predicted; its reading at the start may depart from the housing."""
 SENSOR_SHARE = 1e-8  # of the housing's heat capacity: hardly any heat
-LEAST_LAG = 1e-3  # s
+LEAST_LAG, UNREAD = 1e-3, 1.0  # s; of a sensor without a lag, whose reading is the housing's
 
 
 def build_network(instrument: "Instrument", radiation: bool | None = None, boundary: str = "chamber") -> Network:
@@ -67,7 +67,7 @@ def with_sensor(network: Network, time_constant: float) -> Network:
     """Return a whole heat path with the sensor on its housing, a node that takes no heat: τ dT_s/dt = T_housing − T_s."""
     housing = next(node for node in network.nodes if node.name == "housing")
     capacity = SENSOR_SHARE * housing.capacity_at(0.0)
-    joint = Conductor("housing", SENSOR, capacity / max(time_constant, LEAST_LAG))
+    joint = Conductor("housing", SENSOR, capacity / max(time_constant or UNREAD, LEAST_LAG))
     parts: list[Part] = [*network.nodes, Node(SENSOR, capacity), *network.boundaries, *network.sources]
     return replace(assemble([*parts, *network.conductors, joint]), radiators=network.radiators)
 

@@ -132,12 +132,14 @@ def read_out(
 
 
 def _earlier(time: Array, value: Array, rate: Array, delay: float) -> Array:
-    """Values of a curve so much earlier (s), by the cubics through its values and rates."""
+    """Values of a curve so much earlier (s), by the cubics through its values and rates; before its first row a straight line."""
     if not delay:
         return value
-    k = np.clip(np.searchsorted(time, time - delay, side="right") - 1, 0, len(time) - 2)
+    at = np.maximum(time - delay, time[0])
+    k = np.clip(np.searchsorted(time, at, side="right") - 1, 0, len(time) - 2)
     h = time[k + 1] - time[k]
-    return cubic((time - delay - time[k]) / h, h, value[k], value[k + 1], rate[k], rate[k + 1])[0]
+    within = cubic((at - time[k]) / h, h, value[k], value[k + 1], rate[k], rate[k + 1])[0]
+    return np.asarray(within + rate[0] * (time - delay - at))
 
 
 def check_loss(instrument: "Instrument", inverse_q: Array) -> None:

@@ -37,8 +37,8 @@ DIGITS = {
     "inverse_q": 16,
 }
 COMMAND_DIGITS = 9
-FINEST, MOST_STEPS = 15.0, 20_000
-"""Steps of the heat path (s) with which temperatures are exact to a tenth of the digits that are recorded, and how many of them."""
+FINEST, MOST_STEPS = 5.0, 20_000
+"""Steps of the heat path (s) with which every column of ten hours is exact to 1e-9, and how many of them."""
 
 
 @dataclass(frozen=True)

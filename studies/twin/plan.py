@@ -35,6 +35,7 @@ PRECESSION = "loop.self_precession_deg_per_s"
 ONE = ".one"
 REACH = 150.0  # K on both sides of its reference, within which a polynomial law is carried
 MEMORY = 16  # numbers that one effect may remember
+PAST = 256  # moments at which the temperature of a resonator that is late is kept, over twice its delay
 CAPACITY_STEP = 0.25  # K, of the knots of a heat capacity that varies
 
 
@@ -156,10 +157,6 @@ def _shell_and_mount(instrument: "Instrument", parameters: dict[str, float]) -> 
 
 def _refuse(instrument: "Instrument") -> None:
     """Raise for what the C code does not hold."""
-    if instrument.polynomial is not None and instrument.polynomial.delay:
-        raise InputError(
-            f"{instrument.path} [law]: delay_s = {instrument.polynomial.delay:g} is not available in a twin, which knows one moment; set it to 0 and fit the lags again (hrg calibrate)."
-        )
     for effect in instrument.effects:
         if effect.name.replace("-", "_") not in EFFECTS:
             raise InputError(
@@ -262,6 +259,7 @@ def _constants(instrument: "Instrument", law: "FrequencyLaw", boundary: "Boundar
         "HIGHEST": law.highest,
         "BRYAN": law.bryan_factor,
         "LAG": lag,
+        "DELAY": 0.0 if polynomial is None else polynomial.delay,
         "SPLIT_RE": split.real,
         "SPLIT_IM": split.imag,
         "SHIFT": shift,

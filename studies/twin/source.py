@@ -10,7 +10,7 @@ import numpy as np
 
 from studies.simulation.heat_path import LEAST_LAG, SENSOR, SENSOR_SHARE
 from studies.simulation.virtual_gyro import COMMAND_DIGITS, DIGITS
-from studies.twin.plan import EFFECTS, MEMORY, PRECESSION, Spline, input_starts
+from studies.twin.plan import EFFECTS, MEMORY, PAST, PRECESSION, Spline, input_starts
 from thermal.constants import Stefan_Boltzmann
 
 if TYPE_CHECKING:
@@ -53,6 +53,7 @@ def card_header(plan: "Plan") -> str:
         "RADIATORS": max(len(network.radiators), 1),
         "EFFECTS": max(len(plan.effects), 1),
         "MEMORY": MEMORY * max(len(plan.effects), 1),
+        "PAST": PAST if plan.constants["DELAY"] > 0.0 else 1,
         "SENSOR": nodes.index(SENSOR) if SENSOR in nodes else -1,
         "HOUSING": nodes.index("housing") if "housing" in nodes else 0,
         "QUADRATURE": outputs.index("quadrature_V") if card.loop is not None else 0,
@@ -60,6 +61,7 @@ def card_header(plan: "Plan") -> str:
     switches = {
         "LOOPS": int(card.loop is not None),
         "FREE": int(plan.turns_freely),
+        "AHEAD": int(plan.constants["DELAY"] < 0.0),
         "LINEAR": int(card.polynomial is None and not card.thermal.radiation),
         "STIFF": int(card.loop is not None and card.loop.quadrature_control == "stiffness"),
     }

@@ -71,6 +71,26 @@ static double azimuth_of(const Twin *w, const TwinInput *in) {
 }
 #endif
 
+/* The resonator's temperature as much earlier as [law] says, by cubics through what has been; where it is ahead of its lags, as much later, the boundary going straight on. */
+static const char *displace(Twin *w, double *T, double rate) {
+#if TWIN_AHEAD
+    Twin later = *w;
+    const char *fault = twin_heat(&later, -TWIN_DELAY, w->boundary, w->boundary - w->trend * TWIN_DELAY);
+    for (int i = 0; i < TWIN_NODES; ++i) *T += twin_rows[0][i] * (later.T[i] - w->T[i]);
+    return (void)rate, fault;
+#else
+    const double now[3] = {w->time, *T, rate}, at = w->time - TWIN_DELAY, *later = now;
+    if (!w->pasts || w->time - w->past[(w->pasts - 1) % TWIN_PAST][0] >= 2 * TWIN_DELAY / TWIN_PAST)
+        memcpy(w->past[w->pasts++ % TWIN_PAST], now, sizeof now);
+    const double *sooner = w->past[(w->pasts - 1) % TWIN_PAST];
+    for (long k = w->pasts - 1; k > 0 && sooner[0] > at; sooner = w->past[--k % TWIN_PAST]) later = sooner;
+    const double h = later[0] - sooner[0], s = (at - sooner[0]) / h, rise = later[1] - sooner[1], one = h * sooner[2], other = h * later[2];
+    *T = at <= sooner[0] ? sooner[1] + sooner[2] * (at - sooner[0])
+                         : sooner[1] + s * (one + s * (3 * rise - 2 * one - other + s * (one + other - 2 * rise)));
+    return NULL;
+#endif
+}
+
 const char *twin_row(Twin *w, const TwinInput *in) {
     const double *p = w->p, span = w->row_time < 0 ? w->step : w->time - w->row_time;
     const double housing = TWIN_SENSOR >= 0 ? w->T[TWIN_HOUSING] : w->boundary;
@@ -82,6 +102,8 @@ const char *twin_row(Twin *w, const TwinInput *in) {
             warm[k] += twin_rows[k][i] * w->T[i];
             rate[k] += twin_rows[k][i] * warming[i];
         }
+    const char *fault = TWIN_DELAY != 0 ? displace(w, &warm[0], rate[0]) : NULL;
+    if (fault) return fault;
     for (int stage = 0; stage < 3; ++stage) { /* on the temperature; on what these leave of it; on the responses */
         const double warmed = change[TARGET_TEMPERATURE], moved = (warmed - w->last_change) / span;
         const double turning = rate[0] + (stage && w->row_time >= 0 ? moved : 0.0);

@@ -86,7 +86,8 @@ const char *twin_settle(Twin *w, double boundary) {
     w->boundary = boundary;
     w->time = 0.0;
     w->row_time = -1.0;
-    w->length = w->last_change = 0.0;
+    w->length = w->last_change = w->trend = 0.0;
+    w->pasts = 0;
     w->of_frequency.begun = w->of_bias.begun = 0;
     for (int i = 0; i < N; ++i) w->T[i] = boundary;
     for (int k = 0;; ++k) {
@@ -157,7 +158,7 @@ static const char *advance(Twin *w, double h, double from, double to) {
         for (int moment = k ? 1 : 0; moment < 3; ++moment) drive(w, T[moment], from + (to - from) * moment / 2, u[moment]);
         for (int part = 0; part < 2; ++part) {
             double *found = T[part + 1], y[N];
-            const double(*weight)[N] = w->weight[part];
+            double(*weight)[N] = w->weight[part];
             for (int m = 0; m < N; ++m) {
                 const double slope = (4 * u[1][m] - 3 * u[0][m] - u[2][m]) / h;
                 const double bend = 2 * (u[0][m] - 2 * u[1][m] + u[2][m]) / (h * h);
@@ -187,6 +188,7 @@ const char *twin_heat(Twin *w, double h, double from, double to) {
     }
     w->time += h;
     w->boundary = to;
+    w->trend = (to - from) / h;
     return NULL;
 }
 

@@ -35,7 +35,7 @@ typedef struct { double rate; TwinComplex drift[TWIN_TERMS]; } TwinTurning; /* a
 typedef struct {
     double p[TWIN_PARAMETERS];
     double time, step, row_time; /* since the start; between rows; of the last row, below 0 before the first */
-    double boundary, T[TWIN_NODES];
+    double boundary, trend, T[TWIN_NODES]; /* of the boundary, K/s */
     double out[TWIN_OUTPUTS];
     double actuator_use; /* largest part of an actuator's range that the settled loops need; above 1 they cannot hold the wave */
     int noise;
@@ -44,6 +44,8 @@ typedef struct {
     double scratch[TWIN_NODES * TWIN_NODES];
     double length, weight[2][3][TWIN_NODES];                /* of the last step: t^k phi_k, half and whole */
     double memory[TWIN_MEMORY], last_change;
+    double past[TWIN_PAST][3]; /* of a resonator that is late: times, temperatures and their rates, in turns */
+    long pasts;
     uint64_t random[4];
     double spare;
     int has_spare;
