@@ -160,8 +160,7 @@ def rate_run(blocks: Blocks, f: Array, window: float, *, causal: bool, variable:
     ok = derivative.complete
     if np.count_nonzero(ok) < 3:
         raise CompensationError(
-            f"no stretch of the run fills the window of {window:g} s over which the rate is taken; "
-            "shorten the window or record longer."
+            f"no stretch of the run fills the window of {window:g} s over which the rate is taken; shorten the window or record longer."
         )
     return BiasRun(
         time=blocks.time[ok],

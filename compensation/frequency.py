@@ -109,8 +109,7 @@ class FrequencyFit:
         outside = np.isnan(T) | np.less(T, low) | np.greater(T, high)
         if not extrapolate and np.any(outside):
             raise CompensationError(
-                f"{T[outside][0]:g} °C lies outside the fitted range {low:g} to {high:g} °C; "
-                "measure there, or ask for extrapolation."
+                f"{T[outside][0]:g} °C lies outside the fitted range {low:g} to {high:g} °C; measure there, or ask for extrapolation."
             )
         return T
 

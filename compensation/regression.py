@@ -85,8 +85,7 @@ class LinearFit:
         alone = np.flatnonzero(self.leverage > 1 - 1e-10)
         if alone.size:
             raise CompensationError(
-                f"row {alone[0] + 1} alone fixes one of the coefficients, so it cannot be predicted from the "
-                "others; lower the order or measure more."
+                f"row {alone[0] + 1} alone fixes one of the coefficients, so it cannot be predicted from the others; lower the order or measure more."
             )
         return self.residuals / (1.0 - self.leverage)
 
@@ -114,8 +113,7 @@ def fit_linear(
     m, k = X.shape
     if m < k + constant + 1:
         raise CompensationError(
-            f"{k + constant} coefficients need at least {k + constant + 1} rows, not {m}; "
-            "record more or ask for fewer terms."
+            f"{k + constant} coefficients need at least {k + constant + 1} rows, not {m}; record more or ask for fewer terms."
         )
     shift = X.mean(axis=0) if constant else np.zeros(k)
     Z = X - shift
@@ -152,8 +150,7 @@ def refuse_constant_columns(X: Array, names: Sequence[str]) -> None:
     for name, column in zip(names, X.T, strict=True):
         if np.ptp(column) <= 1e-13 * np.max(np.abs(column)):
             raise CompensationError(
-                f"column '{name}' is constant ({column[0]:g}): it determines nothing; leave it out or "
-                "record data in which it varies."
+                f"column '{name}' is constant ({column[0]:g}): it determines nothing; leave it out or record data in which it varies."
             )
 
 
@@ -175,15 +172,13 @@ def _check(X: ArrayLike, y: ArrayLike, names: Sequence[str]) -> tuple[Array, Arr
     y = np.asarray(y, dtype=np.float64)
     if X.ndim != 2 or y.shape != (X.shape[0],) or len(names) != X.shape[1]:
         raise CompensationError(
-            f"a fit needs one row per observation and one name per column: "
-            f"X is {X.shape}, y is {y.shape}, {len(names)} names."
+            f"a fit needs one row per observation and one name per column: X is {X.shape}, y is {y.shape}, {len(names)} names."
         )
     for name, column in zip([*names, "y"], [*X.T, y], strict=True):
         bad = np.flatnonzero(~np.isfinite(column))
         if bad.size:
             raise CompensationError(
-                f"column '{name}' has {bad.size} missing or infinite values (first in row {bad[0] + 1}); "
-                "remove those rows."
+                f"column '{name}' has {bad.size} missing or infinite values (first in row {bad[0] + 1}); remove those rows."
             )
     return X, y
 

@@ -19,8 +19,7 @@ def read_columns(**columns: ArrayLike) -> list[NDArray[np.float64]]:
         holes = np.flatnonzero(~np.isfinite(values))
         if len(holes):
             raise CompensationError(
-                f"'{name}' has {len(holes)} missing or infinite values, the first in row {holes[0] + 1}; "
-                "fill them or leave these rows out."
+                f"'{name}' has {len(holes)} missing or infinite values, the first in row {holes[0] + 1}; fill them or leave these rows out."
             )
     return arrays
 

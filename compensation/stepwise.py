@@ -60,8 +60,7 @@ def select_stepwise(
     m, q = forced.shape
     if m < q + len(names) + 1:
         raise CompensationError(
-            f"{len(names)} candidate terms and {q} constants need at least {q + len(names) + 1} rows, not {m}; "
-            "record longer or average less."
+            f"{len(names)} candidate terms and {q} constants need at least {q + len(names) + 1} rows, not {m}; record longer or average less."
         )
     search = _Search(forced, candidates, y, tuple(names), parents or {})
     refused = {name: why for name in names if (why := search.refusal(name))}

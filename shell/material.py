@@ -205,10 +205,7 @@ class Material:
         return self.growth(T, self.properties["density"].numbers["at_degC"] + zero_Celsius)
 
     def _lack(self, name: str) -> str:
-        return (
-            f"material '{self.name}', law '{self.law}': no source states its {spell([name])};"
-            " give it in the card or in a material file of your own."
-        )
+        return f"material '{self.name}', law '{self.law}': no source states its {spell([name])}; give it in the card or in a material file of your own."
 
 
 @dataclass(frozen=True)

@@ -136,8 +136,7 @@ def solve_modes(
     ratio = max(value for _, value in resonator.thickness) / resonator.size
     if theory != "solid" and ratio > THICKEST_SHELL:
         warnings.warn(
-            f"h/R = {ratio:.3g} is {ratio / THICKEST_SHELL:.2g} times the limit ({THICKEST_SHELL:g}) of the "
-            f"{theory} theory: use the solid theory.",
+            f"h/R = {ratio:.3g} is {ratio / THICKEST_SHELL:.2g} times the limit ({THICKEST_SHELL:g}) of the {theory} theory: use the solid theory.",
             TheoryRangeWarning,
             stacklevel=2,
         )

@@ -21,10 +21,7 @@ import numpy as np
 from shell.errors import ShellError
 from shell.scene import Scene
 
-REMEDY = (
-    "no OpenGL on this machine, so no picture could be drawn. On Debian or Ubuntu"
-    " 'apt install libegl1 libgl1-mesa-dri' installs a software renderer."
-)
+REMEDY = "no OpenGL on this machine, so no picture could be drawn. On Debian or Ubuntu 'apt install libegl1 libgl1-mesa-dri' installs a software renderer."
 PER_FRAME = 15.0  # seconds that one frame may take before the drawing is given up
 
 View = Literal["oblique", "axis", "side"]

@@ -94,8 +94,7 @@ def _find_frame(resonator: Resonator) -> Frame:
     if collar > widest + 0.5 * (resonator.length - widest):
         raise ShellError(
             f"the stem (radius {mm(stem.radius)}, fillet {mm(stem.fillet)}) with {mm(collar - widest)} of solid around its root "
-            f"leaves no room for the shell, whose meridian is {mm(resonator.length)} long: make the stem or its fillet "
-            "smaller, or the shell thinner."
+            f"leaves no room for the shell, whose meridian is {mm(resonator.length)} long: make the stem or its fillet smaller, or the shell thinner."
         )
     # columns of the stem, from its side to the axis, wider the further in
     inset = min(0.5 * stem.radius, 2 * h + stem.fillet)

@@ -118,8 +118,7 @@ def parse_profile(words: str) -> Profile:
         if len(arguments) != len(names):
             durations = " (durations without a space: 5h, 30min, 90s)" if {"DURATION", "HOLD"} & set(names) else ""
             raise ThermalError(
-                f"'{' '.join(sentence)}' has {len(arguments)} values after '{kind}', not {len(names)}; write"
-                f" '{kind} {' '.join(names)}'{durations}."
+                f"'{' '.join(sentence)}' has {len(arguments)} values after '{kind}', not {len(names)}; write '{kind} {' '.join(names)}'{durations}."
             )
         given = " ".join(sentence)
         piece = build(*[_read(name, text, given) for name, text in zip(names, arguments, strict=True)])

@@ -24,8 +24,7 @@ def find_steady_state(network: Network, boundaries: Mapping[str, float], time: f
         if np.abs(step).max() < TOLERANCE * T.max():
             return T
     raise ThermalError(
-        f"no steady state was found after {NEWTON_STEPS} Newton steps; "
-        "look for a source whose heat the network cannot carry away."
+        f"no steady state was found after {NEWTON_STEPS} Newton steps; look for a source whose heat the network cannot carry away."
     )
 
 

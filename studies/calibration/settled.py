@@ -176,8 +176,7 @@ def _bridges(problem: "CardProblem", level: Compared, row: Array) -> tuple[str, 
     best = max(acting, key=lambda k: abs(per_sd[k]), default=None)
     if best is not None and per_sd[best] != 0.0:
         text.append(
-            f"Among the card's uncertain values, {names[best]} would remove it with a change of"
-            f" {abs(away / per_sd[best]):.1f} standard deviations."
+            f"Among the card's uncertain values, {names[best]} would remove it with a change of {abs(away / per_sd[best]):.1f} standard deviations."
         )
     if not any(name.startswith("resonator.") for name in names):
         text.append("The card states no tolerance of a dimension, as thickness_mm = { value = …, relative_sd = 0.02 }.")

@@ -25,10 +25,7 @@ from studies.results import Chapter, Column, Drawing, Facts, Figure, Part, Resul
 from studies.schema.reader import read_file
 
 VERDICTS = {"pass": "all limits met", "fail": "a limit is not met", "incomplete": "not all limits could be judged"}
-MEASURED = (
-    "words: quantity | section | value in low … high: value | low … high: 90 % interval .0 | shown_unit: unit"
-    " | shown_limit: limit | verdict"
-)
+MEASURED = "words: quantity | section | value in low … high: value | low … high: 90 % interval .0 | shown_unit: unit | shown_limit: limit | verdict"
 RECORDS = (
     Column(lambda record: np.ptp(record["time_s"]) / 3600, "duration", "h", digits=3),
     Column(len, "rows"),

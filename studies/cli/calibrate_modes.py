@@ -25,8 +25,7 @@ from studies.results import Column, Result, Sentence, Table, row_of
 STAGES = {"assignment 1": 0.2, "the mode to measure next": 0.9}
 MODES = (
     "line | harmonic: n | index | frequency_Hz: measured (Hz) .9 | predicted_Hz: calibrated (Hz) .9"
-    " | residual_ppm: residual (ppm) +.2g | sd_ppm: noise (ppm) .2g | chance: probability (%) ×100 .3g"
-    " | others: or n, index (%)"
+    " | residual_ppm: residual (ppm) +.2g | sd_ppm: noise (ppm) .2g | chance: probability (%) ×100 .3g | others: or n, index (%)"
 )
 NEXT = (
     Column("parameter", "quantity", spell=display_name),

@@ -91,8 +91,7 @@ def derive(
     for closed, integral in ((case.bending, shape.I), (case.mass, shape.J)):
         if abs(complex(closed.evalf(20)) / integral - 1) > 1e-9:
             raise InputError(
-                f"from {pole_angle_deg:g} to {rim_angle_deg:g} degrees the closed forms of harmonic {harmonic} cancel"
-                " to nothing; take a wider cap."
+                f"from {pole_angle_deg:g} to {rim_angle_deg:g} degrees the closed forms of harmonic {harmonic} cancel to nothing; take a wider cap."
             )
     payload: dict[str, Any] = {
         "harmonic": case.harmonic,
@@ -144,10 +143,7 @@ def _derive_bell(latex: bool) -> Result:
         return found
     theory = compare_bell_theory()
     title = f"Equations (21), (22) with these patterns, and the solver: card {theory.card}"
-    head = (
-        "name: pattern | frequency: f (Hz) .6g | precession_factor: precession factor .5f"
-        " | membrane_share: membrane share of the energy .3g"
-    )
+    head = "name: pattern | frequency: f (Hz) .6g | precession_factor: precession factor .5f | membrane_share: membrane share of the energy .3g"
     table = Table(title, [*theory.rows, theory.free, theory.solid], head)
     printed = Sentence(found.printed or "", "source", "terminal")
     return replace(

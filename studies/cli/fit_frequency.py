@@ -24,8 +24,7 @@ from studies.results import Chapter, Result, Table, row_of
 SHOWN = ("temperature_degC", "frequency_Hz", "error_Hz", "left_K", "extrapolated_K")
 SOAKS = (
     "Record | start_s: From (s) .0f | end_s: To (s) .0f | temperature_degC: Temperature (°C) .3f"
-    " | frequency_Hz ± error_Hz: Frequency (Hz) | left_K: Settling error (K) .2"
-    " | extrapolated_K: Extrapolated by (K) .2"
+    " | frequency_Hz ± error_Hz: Frequency (Hz) | left_K: Settling error (K) .2 | extrapolated_K: Extrapolated by (K) .2"
 )
 
 

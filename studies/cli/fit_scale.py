@@ -22,10 +22,7 @@ STEPS = {
     "scale_over_rate": "scale over rate (35)",
     "scale_over_temperature": "scale over temperature (36)",
 }
-FORMS = (
-    "Form | gain: Evidence over the line .3 | over: Null and scale over"
-    " | held_out_deg_per_s: Error on rates left out (°/s) .2 | chosen: "
-)
+FORMS = "Form | gain: Evidence over the line .3 | over: Null and scale over | held_out_deg_per_s: Error on rates left out (°/s) .2 | chosen: "
 FORM_NOTE = (
     "Evidence: fall of N ln(mean square) + p ln N; above 6 is 20:1. Directions: different scales for positive and negative rates. The"
     " coefficients below follow the paper's quadratic form."

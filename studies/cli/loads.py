@@ -139,10 +139,7 @@ def loads(
         "bias": bias,
         "amplitude": nonlinear,
     }
-    beam = (
-        f"The stem as a beam has {1e-6 * stem:.3g} MPa at its clamped end, by its axial force and its bending moment under these"
-        " accelerations."
-    )
+    beam = f"The stem as a beam has {1e-6 * stem:.3g} MPa at its clamped end, by its axial force and its bending moment under these accelerations."
     return Result(
         payload,
         f"Loads on {instrument.name}",

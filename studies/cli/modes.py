@@ -46,13 +46,9 @@ COLUMNS = (
 )
 SPLIT = (
     f"{MODE} | split.slow_Hz: slow (Hz) .5f | split.fast_Hz: fast (Hz) .5f | split.split_Hz: split (Hz) .5f"
-    " | split.every_order_split_Hz: split, all orders (Hz) .5f | split.slow_axis_deg: slow axis (°) .2f"
-    " | split.shift_ppm: shift (ppm) +.3f"
+    " | split.every_order_split_Hz: split, all orders (Hz) .5f | split.slow_axis_deg: slow axis (°) .2f | split.shift_ppm: shift (ppm) +.3f"
 )
-MOUNT = (
-    f"{MODE} | mount.per_strain: per strain +.4g | mount.shift_ppm: shift (ppm) +.4g"
-    " | mount.slope_ppm_per_degC: slope (ppm/°C) +.3g"
-)
+MOUNT = f"{MODE} | mount.per_strain: per strain +.4g | mount.shift_ppm: shift (ppm) +.4g | mount.slope_ppm_per_degC: slope (ppm/°C) +.3g"
 FILMS = (
     f"{MODE} | film | shift_ppm: shift (ppm) +.4g",
     Column(lambda film: " and ".join(film["missing"]), "unknown without"),
@@ -73,8 +69,7 @@ SLOPES = (
 )
 ENERGY = (
     f"{MODE} | energy_fractions.bending: bending ×100 .3f | energy_fractions.membrane: membrane ×100 .3f"
-    " | energy_fractions.shear: transverse shear ×100 .3f | energy_fractions.root: root ×100 .3f"
-    " | energy_fractions.stem: stem ×100 .3f"
+    " | energy_fractions.shear: transverse shear ×100 .3f | energy_fractions.root: root ×100 .3f | energy_fractions.stem: stem ×100 .3f"
 )
 DERIVED = "ν at constant E; ln r: all lengths except the wall thickness. Modal mass: for a maximum displacement of 1."
 

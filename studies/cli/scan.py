@@ -30,8 +30,7 @@ TABLE = "-{}.csv"  # of a face, beside the saved card
 
 
 SPLITS = (
-    "harmonic: n | frequency_Hz: frequency (Hz) .3f"
-    " | split_Hz.value: split (mHz) ×1e3 | split_Hz.low … split_Hz.high: 90 % interval (mHz) ×1e3"
+    "harmonic: n | frequency_Hz: frequency (Hz) .3f | split_Hz.value: split (mHz) ×1e3 | split_Hz.low … split_Hz.high: 90 % interval (mHz) ×1e3"
     " | slow_axis_deg.value: slow axis (°) .2f | slow_axis_deg.low … slow_axis_deg.high: 90 % interval (°) .2f"
     " | every_order.split_Hz: split, all orders (mHz) ×1e3 | every_order.slow_axis_deg: slow axis, all orders (°) .2f"
 )

@@ -32,10 +32,7 @@ KINDS = {
     "inner": "from the inner face",
     "outer": "from the outer face",
 }
-CUTS = (
-    "number: cut | azimuth_deg: azimuth (°) .2f | height_mm: height z (mm) .3f | mass_ug: mass (µg) .3f"
-    " | depth_um: depth (µm) .3f | done"
-)
+CUTS = "number: cut | azimuth_deg: azimuth (°) .2f | height_mm: height z (mm) .3f | mass_ug: mass (µg) .3f | depth_um: depth (µm) .3f | done"
 STATES = (
     "state | harmonic: n | split_Hz: split (mHz) ×1e3 .3f | error_Hz: standard error (mHz) ×1e3 .3f"
     " | most_Hz: 95 % upper limit (mHz) ×1e3 .3f | slow_axis_deg: slow axis (°) .2f"

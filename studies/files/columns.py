@@ -290,8 +290,7 @@ def _number(path: str | Path, line: int, name: str, cell: str) -> float:
         return float("nan")
     if not _is_number(text):
         raise InputError(
-            f"{path}, line {line}: '{text}' in column '{name}' is not a number; correct it, or leave the cell"
-            " empty where the value is missing."
+            f"{path}, line {line}: '{text}' in column '{name}' is not a number; correct it, or leave the cell empty where the value is missing."
         )
     return float(text)
 

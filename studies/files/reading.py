@@ -43,8 +43,7 @@ def check_file(path: str | Path, most: int = MOST_BYTES) -> Path:
             raise InputError(f"{path}: is a device or a pipe, not a file; save what it gives and name that file.")
         if about.st_size > most:
             raise InputError(
-                f"{path}: has {about.st_size / 1e6:,.0f} MB, above the limit of {most / 1e6:,.0f} MB; split it or"
-                " record at a lower rate."
+                f"{path}: has {about.st_size / 1e6:,.0f} MB, above the limit of {most / 1e6:,.0f} MB; split it or record at a lower rate."
             )
         return Path(path)
     except InputError:

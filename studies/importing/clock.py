@@ -103,8 +103,7 @@ def _check_span(seconds: "Array", table: RawTable, file: "FileMap") -> None:
     ]
     hint = f" time_format = {' or '.join(better)} would be possible." if better else " Check the dates."
     raise InputError(
-        f"{table.path}: with time_format = '{file.time_format}' its times span {span / 31557600:.3g} years, too long for"
-        f" one run.{hint}"
+        f"{table.path}: with time_format = '{file.time_format}' its times span {span / 31557600:.3g} years, too long for one run.{hint}"
     )
 
 

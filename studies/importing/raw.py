@@ -257,7 +257,6 @@ def _read_text(path: str | Path, text: str, file: "FileMap", names: list[str], p
     if len(longer):
         line = file.data_line + int(longer[0])
         raise InputError(
-            f"{path}, line {line}: more values than the {len(names)} columns of the header; check separator and decimal"
-            " in the map."
+            f"{path}, line {line}: more values than the {len(names)} columns of the header; check separator and decimal in the map."
         )
     return cells

@@ -184,8 +184,7 @@ class Model(ModelKeys, frozen=True, kw_only=True):
             unit = f" {unit_of(variable)}".removesuffix(" 1")
             raise InputError(
                 f"{variable} runs from {lowest:.8g} to {highest:.8g}, outside {low:.8g} to {high:.8g}{unit} that the "
-                f"model was fitted to ({100 * np.mean(outside):.1f} % of the rows); calibrate over that range, or add "
-                "--extrapolate."
+                f"model was fitted to ({100 * np.mean(outside):.1f} % of the rows); calibrate over that range, or add --extrapolate."
             )
 
 

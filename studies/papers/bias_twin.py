@@ -172,10 +172,7 @@ def _draw_trace(fit: TwinFit) -> Drawing:
         return made
 
 
-IMPROVEMENT = (
-    "Selection | fitted: Fitted to | training: On the training run | cooling: Held out: new cooling run"
-    " | warming: Held out: warming run"
-)
+IMPROVEMENT = "Selection | fitted: Fitted to | training: On the training run | cooling: Held out: new cooling run | warming: Held out: warming run"
 
 
 def twin_table(twins: Twins) -> Table:

@@ -210,10 +210,7 @@ PATTERNS = (
     "precession_factor: Precession factor .4f",
     Column(lambda row: 0 if row.membrane_share < 1e-9 else row.membrane_share, "Membrane energy", "%", ".3g", scale=100.0),
 )  # fmt: skip
-PATTERNS_NOTE = (
-    "First three rows: (21), (22) with m₀, b and c₀ computed for the assumed pattern. Stretching the wall is of order (R/h)² stiffer"
-    " than bending it."
-)
+PATTERNS_NOTE = "First three rows: (21), (22) with m₀, b and c₀ computed for the assumed pattern. Stretching the wall is of order (R/h)² stiffer than bending it."
 SYMBOLS_NOTE = (
     "U: along the meridian, V: circumferential, W: normal, with the parity of (16) corrected; ε, κ, γ: the strains (5), (6) of the"
     " pattern. Our copy of the paper lacks fraction bars, most minus signs and derivative marks: a blank between two terms"

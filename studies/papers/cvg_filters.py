@@ -165,8 +165,7 @@ RESPONSES = (
 APART, LIGHT = 1.02, 0.2
 WIENER = (
     "name: Noise | optimum.error: Error, optimum .4f | renormalised.error: Error, as printed .4f"
-    " | renormalised.distortion: Distortion part .4f | renormalised.noise: Noise part .4f"
-    " | optimum.filter.steady_gain.real: G(0) of the optimum .4f"
+    " | renormalised.distortion: Distortion part .4f | renormalised.noise: Noise part .4f | optimum.filter.steady_gain.real: G(0) of the optimum .4f"
 )
 WIENER_NOTE = (
     "Error variance divided by the variance of the rate. The printed filters are the optimum scaled to G(0) W(0) = 1, which removes"

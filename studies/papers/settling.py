@@ -235,6 +235,5 @@ def soak_sentence(study: SettlingStudy) -> str:
         f" {max(abs(soak.curvature) for soak in linear):.4f} ppm/°C², from the curvature of the law itself). Radiation adds"
         f" {largest.curvature:+.4f} ppm/°C², {against} the difference of {missing:+.3f} ppm/°C² to be explained. With points taken"
         f" in ascending order the slope changes by at most {max((s.slope for s in upwards), key=abs):+.3f} ppm/°C and the curvature by"
-        f" at most {max((s.curvature for s in upwards), key=abs):+.4f} ppm/°C². An incomplete soak cannot explain the measured"
-        " curvature."
+        f" at most {max((s.curvature for s in upwards), key=abs):+.4f} ppm/°C². An incomplete soak cannot explain the measured curvature."
     )

@@ -90,16 +90,10 @@ def advise_hold(records: Sequence[Record], time_constant: float, tolerance: floa
     longest = max(float(np.ptp(one.time[rows])) for one, rows in moving)
     found = [_settling(one, rows, tolerance) for one, rows in moving if np.ptp(one.time[rows]) > 0.9 * longest]
     speed, own, needed = max(found, key=lambda one: one[2])  # the temperature that settles most slowly
-    moves = (
-        f"The frequency still drifts by {speed * HOUR:.2g} Hz/h at the end of the longest hold that has not settled,"
-        f" {longest / HOUR:.1f} h"
-    )
+    moves = f"The frequency still drifts by {speed * HOUR:.2g} Hz/h at the end of the longest hold that has not settled, {longest / HOUR:.1f} h"
     if not np.isfinite(own):
         return f"{moves}: hold each temperature longer."
-    return (
-        f"{moves}; with the time constant of {own / 60:.0f} min that it shows, hold each temperature"
-        f" {np.ceil(10 * needed / HOUR) / 10:.1f} h."
-    )
+    return f"{moves}; with the time constant of {own / 60:.0f} min that it shows, hold each temperature {np.ceil(10 * needed / HOUR) / 10:.1f} h."
 
 
 def _settling(one: "_Judged", rows: NDArray[np.intp], tolerance: float) -> tuple[float, float, float]:

@@ -185,10 +185,7 @@ def gain_table(study: BiasStudy) -> Table:
             data = f"held-out {'runs' if held.by_runs else 'blocks'}"
             reselected = (METHOD[judged.method], "reselected without the held-out data", data)
             rows.append((*reselected, held.before, held.after, held.gain, held.coverage))
-    columns = (
-        f"0: Selection | 1: Terms | 2: Data | 3: Before ({unit}) | 4: After ({unit}) | 5: Improvement .2f"
-        " | 6: Rows in range (%) ×100 .0f"
-    )
+    columns = f"0: Selection | 1: Terms | 2: Data | 3: Before ({unit}) | 4: After ({unit}) | 5: Improvement .2f | 6: Rows in range (%) ×100 .0f"
     note = "Standard deviation of 100 s averages about the mean of each run or block."
     if study.no_held_out:
         note += f" No held-out data: {study.no_held_out}"

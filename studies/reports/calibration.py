@@ -30,15 +30,11 @@ TOLD = {"data": "data", "prior": "prior", "both": "data and prior"}
 VALUES = (
     Column("parameter", "quantity", spell=display_name),
     "unit | card: card .5",
-    "value in low … high: calibrated | low … high: 90 % interval .0 | shift_sd: shift (sd) +.2f | width: width .3f"
-    " | told: determined by",
+    "value in low … high: calibrated | low … high: 90 % interval .0 | shift_sd: shift (sd) +.2f | width: width .3f | told: determined by",
 )
 KEY = "parameter: key of the card"
 RESIDUALS = "response | unit | as_shipped: as given .3 | calibrated: calibrated .3 | noise: noise .3 | run_offset: run offset .2 | outliers"
-PREDICTED = (
-    "response | unit | source: predicted from | as_shipped: as given .3 | calibrated: calibrated .3"
-    " | stated: expected error .3 | noise: noise .3"
-)
+PREDICTED = "response | unit | source: predicted from | as_shipped: as given .3 | calibrated: calibrated .3 | stated: expected error .3 | noise: noise .3"
 LEVELS = "response | unit | white: white .3 | flicker: flicker .3 | walk: walk .3 | offset: offset .3"
 OFFSETS = "Rms of block averages about the mean of each run; run offset: rms of these means after the calibration."
 DRIVEN = "The measured housing drives the other responses where there is one."
@@ -55,8 +51,7 @@ def lead(found: Calibration, data: Sequence[str]) -> str:
     moved = sum(abs(one.shift_sd) > 2 for one in found.estimates)
     return (
         f"Most probable values of the card {found.card.name}, from {', '.join(data)}. Of {len(told)} uncertain values the data determine"
-        f" {told.count('data')}; {told.count('prior')} stay at their prior; {moved or 'none'} moved by more than two prior standard"
-        " deviations."
+        f" {told.count('data')}; {told.count('prior')} stay at their prior; {moved or 'none'} moved by more than two prior standard deviations."
     )
 
 

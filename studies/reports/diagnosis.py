@@ -41,8 +41,7 @@ WITHOUT_CARD = (
     " the bias as a cubic in the frequency change with an offset for each run, and 1/Q as a quadratic in temperature. "
 )
 METHOD = (
-    "Each effect in"
-    " the library is a family of curves with a prior on its size. Models with no, one or several effects are compared by their"
+    "Each effect in the library is a family of curves with a prior on its size. Models with no, one or several effects are compared by their"
     " marginal likelihood in white and coloured noise. Effects that fit equally well are named as a set; the other responses help"
     " to decide between them. Smooth generic functions of time, temperature, rate, history and drives detect structure that no"
     " effect explains. A cause is rejected if it makes the prediction of held-out rows worse."

@@ -16,10 +16,7 @@ from studies.sweeps.search import name_search
 from studies.sweeps.sensitivity import linear_shares, local_slopes, sobol_indices
 from studies.sweeps.tolerance import Yield, find_reach, find_yield, resolve_limits
 
-SOBOL = (
-    "Parameter | first: First order .4f | first_low … first_high: 90 % interval .4f | total: Total .4f"
-    " | total_low … total_high: 90 % interval .4f"
-)
+SOBOL = "Parameter | first: First order .4f | first_low … first_high: 90 % interval .4f | total: Total .4f | total_low … total_high: 90 % interval .4f"
 SHARES = "Parameter | slope: Slope .6g | half_width: ± .2g | Unit | share: Share of variance (%) ×100 .2f"
 YIELD = (
     "Requirement | from: From .8g | to: To .8g | share: Designs that meet it (%) ×100 .2f"
@@ -194,10 +191,7 @@ SEARCHES: dict[str, Callable[[Results, Mapping[str, Any]], list[Part]]] = {
 }
 
 
-STATISTICS = (
-    "label: Quantity | Unit | Nominal | Mean | deviation: Standard deviation | least: Minimum | greatest: Maximum"
-    " | error: Numerical error"
-)
+STATISTICS = "label: Quantity | Unit | Nominal | Mean | deviation: Standard deviation | least: Minimum | greatest: Maximum | error: Numerical error"
 NUMERICAL = "The numerical error is the largest error estimate of the solver over all designs, relative to the exact solution of its theory."
 
 

@@ -173,8 +173,7 @@ def idle_effects(instrument: "Instrument", drive: Drive) -> tuple[str, ...]:
     from studies.effects import find_effect
 
     return tuple(
-        f"the effect '{effect.name}' does not act in this run, which lacks its drive"
-        f" ({', '.join(find_effect(effect.name).needs)})."
+        f"the effect '{effect.name}' does not act in this run, which lacks its drive ({', '.join(find_effect(effect.name).needs)})."
         for effect in instrument.effects
         if any(need not in (*drive.commands, "pattern_angle") for need in find_effect(effect.name).needs)
     )

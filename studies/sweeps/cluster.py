@@ -67,8 +67,7 @@ class Cluster(Workers):
         except (OSError, TimeoutError, ValueError, TypeError, RuntimeError, MemoryError) as error:
             if isinstance(error, TypeError):  # no context of TLS
                 raise MissingEnvironment(
-                    f"{address}: encryption needs certificates: distributed.comm.tls.ca-file, .client.cert and .client.key in"
-                    " Dask's configuration."
+                    f"{address}: encryption needs certificates: distributed.comm.tls.ca-file, .client.cert and .client.key in Dask's configuration."
                 ) from error
             if not greeted and is_open(address):
                 raise MissingEnvironment(
@@ -104,8 +103,7 @@ class Cluster(Workers):
             )
         elif now - self.lonely > PATIENCE:
             raise MissingEnvironment(
-                f"{self.address}: no worker is left; everything computed before is kept. Start workers, then run the same"
-                " command again to resume."
+                f"{self.address}: no worker is left; everything computed before is kept. Start workers, then run the same command again to resume."
             )
 
     def close(self) -> None:

@@ -149,8 +149,7 @@ def check_functions(study: Study, allowed: bool) -> dict[str, str]:
         return {}
     if not allowed:
         raise InputError(
-            f"the study runs Python code of its own ({', '.join(Path(f).name for f in study.functions)}); read it, and allow it"
-            " with --allow-python."
+            f"the study runs Python code of its own ({', '.join(Path(f).name for f in study.functions)}); read it, and allow it with --allow-python."
         )
     from studies.sweeps.child import check_function
 

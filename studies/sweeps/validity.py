@@ -76,8 +76,7 @@ def check_sample(study: "Study", where: str) -> None:
     """Raise when a study gives a search for tolerances no sample or nothing to keep."""
     if study.sampling.method not in SAMPLES:
         raise InputError(
-            f"{where}: a search for tolerances needs designs that are drawn: method = 'latin-hypercube' or 'sobol', not"
-            f" '{study.sampling.method}'."
+            f"{where}: a search for tolerances needs designs that are drawn: method = 'latin-hypercube' or 'sobol', not '{study.sampling.method}'."
         )
     if not study.requirements:
         raise InputError(f"{where}: a search for tolerances needs a [[requirement]] that the designs must meet.")
