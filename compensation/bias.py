@@ -124,10 +124,7 @@ def prepare_run(
     variable: Variable = FREQUENCY,
     memory: Memory = NO_MEMORY,
 ) -> BiasRun:
-    """Decimate one run to blocks of a width (s), and add the rate over a window (s) of its frequency or temperature behind `memory`.
-
-    A `causal` rate uses past samples only, as firmware must, and lags by window/2.
-    """
+    """Decimate one run to blocks of a width (s), and add the rate over a window (s), `causal` (lag window/2) or not, behind `memory`."""
     blocks = average_run(time, state, bias, width, variable)
     lagged = follow_lag(blocks.time, blocks.columns[variable.name], memory.lag)
     return rate_run(blocks, lagged, window, causal=causal, variable=variable, memory=memory)

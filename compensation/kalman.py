@@ -1,8 +1,4 @@
-"""Kalman filter of a sampled linear system, and the model of a gyro for it.
-
-Equation numbers are those of the paper on demodulated dynamics and optimal noise filtering for CVGs. Symbols: x state,
-P its covariance, F transition, C measurement matrix, Q and R variances of process and measurement noise per step.
-"""
+"""Kalman filter of a sampled linear system (x, P, F, C, Q, R as usual), and the model of a gyro by the CVG paper on optimal filtering."""
 
 from dataclasses import dataclass
 

@@ -92,10 +92,7 @@ def propagate_envelope(
 
 
 def demodulate(time: ArrayLike, displacement: ArrayLike, omega: float) -> tuple[Array, Complex]:
-    """Return the complex amplitude A of x = Im{A e^{jωt}} by synchronous detection over two carrier periods.
-
-    A moving mean over one period, twice, takes A* e^{−2jωt} out of 2 j x e^{−jωt}; one period is lost at either end.
-    """
+    """Return the complex amplitude A of x = Im{A e^{jωt}} by synchronous detection over two carrier periods, one lost at either end."""
     t, x = read_columns(time=time, displacement=displacement)
     step = require_regular(t, "synchronous demodulation")
     period = 2 * np.pi / omega / step

@@ -56,10 +56,7 @@ def simulate_rebalance(
     angle: ArrayLike = 0.0,
     generator: np.random.Generator | None = None,
 ) -> LoopRun:
-    """Run a gyro in force-to-rebalance mode, settled at the first row and where the commanded `angle` (rad) changes.
-
-    `rate` (rad/s) is linear between rows, a whole number of samples apart; CompensationError where the wave is lost.
-    """
+    """Run a gyro in force-to-rebalance mode, settled where the commanded `angle` (rad) changes; `rate` (rad/s) is linear between rows."""
     t = np.asarray(time, dtype=float)
     samples = samples_in_row(t, loops)
     require_stable(loops, float(np.max(1 / np.asarray(wave.tau))))

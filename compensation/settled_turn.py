@@ -37,10 +37,7 @@ def turn_settled(
     precession: ArrayLike = 0.0,
     angle: float = 0.0,
 ) -> LoopRun:
-    """Return the output of settled loops for a precessing wave, without noise; `angle` is the true one at the start.
-
-    `rate` and `precession` (rad/s, commanded) are linear between rows; the run's `rate` is what of the turn is not commanded, over k.
-    """
+    """Return the output of settled loops, without noise, for a wave that `rate` and `precession` (rad/s, linear) turn from `angle`."""
     t = np.asarray(time, dtype=float)
     if t.ndim != 1 or not (np.diff(t) > 0).all():
         raise CompensationError("the times of a run must increase.")

@@ -69,10 +69,7 @@ def fit_whole_angle(
     drive_skew: float = 0.0,
     confidence: float = 0.95,
 ) -> WaveFit:
-    """Fit splits, axes, gain ratio, skew and phase error to a whole-angle run.
-
-    `angle` is measured and unwrapped (rad), `rate` the mean to the next row without what is commanded, `coupling` n k.
-    """
+    """Fit splits, axes, gain ratio, skew and phase error to a whole-angle run: measured `angle` (rad), `rate` less the command, n k."""
     t, theta, indicated = read_columns(time=time, angle=angle, rate=rate)
     step = require_regular(t, "the fit of a whole-angle run")
     x = 2 * harmonic * theta

@@ -40,9 +40,8 @@ def simulate_whole_angle(
     angle: float = 0.0,
     generator: np.random.Generator | None = None,
 ) -> LoopRun:
-    """Run a gyro in whole-angle mode, its loops settled at the first row; `rate` and commanded turn (rad/s) are linear between rows.
-
-    The run's `angle` is measured at the row, unwrapped; all else is the mean to the next, `rate` what is not commanded, over k.
+    """Run a gyro in whole-angle mode, its loops settled at the first row; the run's `angle` is measured at rows, all
+    else means to the next.
     """
     t = np.asarray(time, dtype=float)
     samples = samples_in_row(t, loops)

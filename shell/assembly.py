@@ -139,11 +139,7 @@ def _shell_group(resonator: Resonator, chain: Chain, n: int, level: Level, start
 def _anchor(
     resonator: Resonator, chain: Chain, unknowns: Index, m: int, fresh: int
 ) -> tuple[tuple[tuple[int, int], ...], Rows, int]:
-    """Choose the small elements at free edges that are solved in differences from their inner node.
-
-    From the inside out, the inner node of the next one is the sum of the differences so far: it gets numbers of its own
-    (from `fresh` on, changed in `unknowns`) and rows that say so. Returns the elements, the rows, and the next number.
-    """
+    """Choose the small elements at free edges solved in differences from their inner node; return them, their rows and the next number."""
     elements = len(chain.segments)
     small = np.diff(chain.breaks) < SMALL * resonator.size
     anchors: list[tuple[int, int]] = []

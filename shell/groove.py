@@ -39,9 +39,8 @@ RELIEF_ERROR = (
 
 @dataclass(frozen=True)
 class Groove:
-    """A cut with sharp corners: `face` off the rim's edge, through the wall, or off a face, `position` 0 ... 1 of its middle.
-
-    `width` along the circle, `length` along the meridian, `depth` along it off the edge, else along the normal; m, at the middle surface.
+    """A cut with sharp corners off the rim's edge, through the wall, or off a face, at a position 0 ... 1; lengths in m
+    at the middle surface.
     """
 
     face: Face

@@ -163,10 +163,7 @@ class FrequencyLaw:
         return self.mode.along
 
     def sensitivity(self, temperature: float | None = None) -> Array:
-        """What each station of the meridian contributes to d ln f/dT (1/K), stress of uneven expansion and base included.
-
-        They add up to the slope, taken at the reference temperature unless another (K) is given.
-        """
+        """What each station of the meridian contributes to d ln f/dT (1/K), stress and base included; they add up to the slope."""
         T = self.reference_temperature if temperature is None else temperature
         kinetic, nu, growth, base = self.uneven_slopes(T)
         return np.asarray(

@@ -79,10 +79,7 @@ class Chain:
 
 
 def lay_chain(resonator: Resonator, start: float, stop: float, ends: tuple[End, End], n: int, level: Level) -> Chain:
-    """Break the meridian between two arc lengths into elements as long as the level says, each cut into as many.
-
-    Edges get elements for the layers of about 2 h and 5 √(h R), jumps of curvature for the latter on both sides.
-    """
+    """Break the meridian between two arc lengths into elements, also for the layers of edges (2 h, 5 √(h R)) and of jumps of curvature."""
     length = stop - start
     joints = [s for s in resonator.joints if start + 1e-9 * length < s < stop - 1e-9 * length]
     knots = [position * resonator.length for position, _ in resonator.thickness[1:-1]]

@@ -171,10 +171,7 @@ def solve_modes(
 def nearest_mode(
     solve: Callable[[int, int], Sequence[Mode]], own: Mode, harmonics: Iterable[int] = range(5), least: int = 2
 ) -> Mode:
-    """Return the mode nearest in frequency to `own` among some harmonics, each solved until a mode lies above `own`.
-
-    solve(harmonic, count) gives at least the `count` lowest modes of a harmonic, in order of frequency.
-    """
+    """Return the mode nearest in frequency to `own` among harmonics; solve(harmonic, count) gives at least the lowest `count`, in order."""
     others: list[Mode] = []
     for n in harmonics:
         count, found = least, solve(n, least)

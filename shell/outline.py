@@ -1,7 +1,4 @@
-"""The outline of a resonator's cross-section, with the displacement of a mode: the basis of pictures and meshes.
-
-It is made of the free sides of the solver's own elements: the real solid with rim, corners, fillets and stem.
-"""
+"""The outline of a resonator's cross-section, free sides of the solver's own elements, with the displacement of a mode."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, fields, replace

@@ -34,10 +34,10 @@ DEEP = 0.7  # wavenumber times thickness beyond which the first order through th
 def refine(
     resonator: Resonator, elastic: Elastic | VaryingElastic, n: int, count: int, theory: Theory, tolerance: float
 ) -> tuple[list[Solution], list[float]]:
-    """The `count` lowest elastic modes of the first level whose estimated errors lie within `tolerance`, and these errors.
+    """The `count` lowest elastic modes of the first level whose estimated errors lie within `tolerance`, and these
+    errors.
 
-    An error has two parts: what the level lacks, and what the arithmetic loses in a thin shell; where the second is the
-    larger, a finer level would only lose more. The next level is finer in what most of the error comes from.
+    The next level is finer in what most of the error comes from, until what arithmetic loses in a thin shell is larger.
     """
     thinnest = min(value for _, value in resonator.thickness) / resonator.size
     density = _density(elastic)

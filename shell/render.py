@@ -1,7 +1,4 @@
-"""Mode shapes as pictures, drawn off-screen by pyvista.
-
-VTK ends the process where the system has no OpenGL: a child process draws, and `NoOpenGL` has the remedy.
-"""
+"""Mode shapes as pictures, drawn off-screen by pyvista in a child process: VTK ends one without OpenGL (`NoOpenGL` has the remedy)."""
 
 import io
 import os

@@ -22,10 +22,7 @@ LONGEST_STEM = 100.0  # stem lengths over its radius that are meshed as a solid
 
 @dataclass(frozen=True)
 class Stem:
-    """A solid cylinder on the axis, joined to the dome at the pole, on one side ("inner", "outer") or "both".
-
-    `ends`: height z of the clamped end, of "both" (inner, outer); `fillet`: radius at the root, 0 if sharp; m.
-    """
+    """A solid cylinder on the axis at the pole: clamped `ends` at heights z (of "both": inner, outer), root `fillet` (0: sharp), m."""
 
     radius: float
     ends: float | tuple[float, float]

@@ -227,10 +227,7 @@ def _fillet(
 
 
 def _stem(radii: list[float], base: Base, end: float, steps: tuple[float, ...], ring_count: int, n: int) -> list[Patch]:
-    """The stem itself, from its root to the clamped end, in columns between the radii.
-
-    A motion with n > 1 dies out as exp(-1.8 z/a) or faster: beyond `QUIET` radii the clamp is not felt.
-    """
+    """The stem from its root to the clamped end, in columns between the radii; n > 1 dies out as exp(-1.8 z/a) within `QUIET` radii."""
     length = min(abs(end - _point(base.path, arc)[1]) for arc in (base.arcs[0], base.arcs[-1]))
     quiet = n > 1 and length > QUIET * radii[0]
     # cells grow from both ends; the first is as tall as the outer column is wide

@@ -91,9 +91,8 @@ def describe_meridian(
     exchange: float = 0.0,
     surroundings: str = "",
 ) -> list[Part]:
-    """Return the parts "shell-1" (at the root) … "shell-N" (at the rim) of a network, the first joined to `root` by K/W.
-
-    ρ c in J/(m³ K), conductivity in W/(m K); `exchange` is the radiating area per area of the middle surface, of both faces.
+    """Return the parts "shell-1" (joined to `root`) … "shell-N" (at the rim); `exchange` is the radiating area per
+    middle surface, both faces.
     """
     names = cell_names(cells.count)
     parts: list[Part] = [

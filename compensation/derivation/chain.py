@@ -1,7 +1,4 @@
-"""The averaged dynamics as one chain of equations, from the oscillator of two patterns to the measured rate.
-
-A row: its number in the paper (or empty), its title, the left sides (names or expressions) and right sides; 0 vanishes.
-"""
+"""The averaged dynamics as one chain of equations, from the oscillator of two patterns to the measured rate."""
 
 from typing import Any, TypeAlias
 

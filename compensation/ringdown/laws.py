@@ -49,10 +49,7 @@ class Rows:
 
 @dataclass(frozen=True)
 class Law:
-    """Terms of a law by name, `step k` for the sessions from that time (s) on; `level` at the means of the conditions.
-
-    `scatter` is the relative rms left; `left_out` rows at the beginning of every decay (a launch) follow another law.
-    """
+    """Terms of a law by name, `step k` for sessions; `level` at the means of the conditions, `scatter` relative, `left_out` rows a launch."""
 
     level: Estimate
     terms: Mapping[str, Estimate]

@@ -51,10 +51,7 @@ def find_jump(envelope: Envelope) -> float | None:
 
 
 def find_free(whole: Envelope) -> Found:
-    """Return the fit from the first time from which one decay describes all that follows.
-
-    The window grows backwards from the end; between the last start that fails and the first that does not, by halving.
-    """
+    """Return the fit from the first time from which one decay describes all that follows, found by halving."""
     first, last = float(whole.time[0]), float(whole.time[-1])
     judged: list[tuple[float, float, Found]] = []
 

@@ -104,10 +104,7 @@ def hooke_in_three_dimensions() -> dict[str, sp.Expr]:
 
 @cache
 def strains_of_the_body() -> LayerStrains:
-    """Return BVG paper eq. (6), for u_φ, u_θ, u_υ functions of φ, θ and the height z (the paper's υ).
-
-    The paper's ε_φθ, ε_υφ, ε_υθ are halves of the three shears here.
-    """
+    """Return BVG paper eq. (6), for u_φ, u_θ, u_υ functions of φ, θ and z (the paper's υ); its ε_φθ, ε_υφ, ε_υθ are halves of the shears."""
     displacement = Displacement(*(sp.Function(name)(phi, theta, z) for name in ("u_phi", "u_theta", "u_upsilon")))
     return layer_strains(displacement, Radii(rho_1(phi), rho_2(phi)))
 
@@ -135,10 +132,7 @@ def strain_amplitudes(shape: Displacement, radii: Radii) -> Deformation:
 
 @cache
 def membrane_strains(with_factor: bool = True) -> tuple[sp.Expr, sp.Expr, sp.Expr]:
-    """Return ε_φφ, ε_θθ and the shear 2ε_φθ of (19) on the hemisphere, over their cos 2θ, cos 2θ, sin 2θ.
-
-    BVG paper eq. (17) says that they are zero. Without the factor they are 0, 0 and −3 sin⁴φ/r.
-    """
+    """Return ε_φφ, ε_θθ, 2ε_φθ of (19) on the hemisphere over cos 2θ, sin 2θ: (17) says zero; 0, 0, −3 sin⁴φ/r without the factor."""
     amplitudes = strain_amplitudes(rayleigh_functions(with_factor), SPHERE)[:3]
     return tuple(sp.factor(sp.trigsimp(strain.subs(n, 2))) for strain in amplitudes)
 
@@ -184,10 +178,7 @@ def galerkin_model() -> GalerkinModel:
 
 @cache
 def equations_of_motion() -> tuple[sp.Expr, sp.Expr]:
-    """Return the left-hand sides of BVG paper eq. (20), Lagrange's equations of p and q per unit of φ and over ρh.
-
-    M p̈ − 2ΩB q̇ + c₀ p and M q̈ + 2ΩB ṗ + c₀ q, with M and B of `pattern_coefficients`; c₁ = 0.
-    """
+    """Return M p̈ − 2ΩB q̇ + c₀ p and M q̈ + 2ΩB ṗ + c₀ q of BVG paper eq. (20), per unit of φ and over ρh (`pattern_coefficients`)."""
     c_0 = sp.Symbol("c_0")
     lagrangian = turning_kinetic_energy() - c_0 * (p(t) ** 2 + q(t) ** 2) / 2
     equations = (sp.diff(lagrangian, y.diff(t)).diff(t) - sp.diff(lagrangian, y) for y in (p(t), q(t)))

@@ -1,7 +1,4 @@
-"""The derivation as one numbered chain of equations.
-
-A row: its number in the HRG paper (or empty), its title, the left sides (names or expressions) and right sides; 0 vanishes.
-"""
+"""The derivation as one numbered chain of equations: rows of number, title, left sides and right sides; 0 says that these vanish."""
 
 from dataclasses import dataclass
 from typing import Any, TypeAlias

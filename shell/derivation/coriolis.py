@@ -1,8 +1,4 @@
-"""The Bryan factor of the mode, from Lagrange's equations of the rotating shell.
-
-A shell that turns with rate Ω about its axis vibrates in two patterns p(t), q(t), a quarter wave apart. The
-Coriolis term of its kinetic energy couples them, and the pattern turns against the shell by K Ω.
-"""
+"""The Bryan factor of the mode, from Lagrange's equations of the rotating shell's two patterns p(t), q(t), a quarter wave apart."""
 
 from functools import cache
 from typing import NamedTuple

@@ -1,8 +1,4 @@
-"""The inextensional mode: HRG paper eqs. (9)–(11), solved by separation, and its curvatures.
-
-With u, w ∝ cos nθ and v ∝ sin nθ the three conditions (9) are ordinary differential equations in φ. W drops
-out, sum and difference of U and V decouple, each separates and is integrated in T = tan(φ/2).
-"""
+"""The inextensional mode: HRG paper eqs. (9)–(11), separated in P = U + V, M = U − V and integrated in T = tan(φ/2)."""
 
 from functools import cache
 

@@ -1,7 +1,4 @@
-"""The frequency over temperature and its slope by parts: HRG paper eq. (15), which prints no derivative.
-
-E, ν, ρ, h and r in (13) follow T; I and J stay. Of five parts free isotropic expansion makes two of h, r one.
-"""
+"""The frequency over temperature and its slope by parts, HRG paper eq. (15), which prints no derivative; I and J stay."""
 
 from functools import cache
 from typing import NamedTuple

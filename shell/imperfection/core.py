@@ -1,7 +1,7 @@
-"""A solid part (root, corner, clamp) of an imperfect resonator: its shape is kept, its density and modulus may vary around.
+"""A solid part (root, corner, clamp) of an imperfect resonator: its shape is kept, density and modulus may vary around.
 
-It moves as the shell's edge drives it (shell.imperfection.block). Its strains go as cos kθ or sin kθ times a section, so that
-energies of two harmonics are those of their sections times ∫ (1 + p) cos kθ cos lθ dθ and the like.
+It moves as the shell's edge drives it; energies of two harmonics are those of their sections times ∫ (1 + p) cos kθ cos
+lθ dθ.
 """
 
 from collections.abc import Callable

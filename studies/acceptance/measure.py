@@ -190,10 +190,7 @@ def measure_scale(record: "Record") -> Found:
 
 
 def measure_warm_up(record: "Record", output: str, band: float | None) -> tuple[Found, float]:
-    """Time from power-on until the means over 50 s stay within the band of the final output (12.5, 12.6).
-
-    The final output is the mean of the last quarter; the interval shifts the band by two standard deviations of its scatter.
-    """
+    """Time from power-on until the means over 50 s stay within the band of the final output, the last quarter's mean (12.5, 12.6)."""
     step = float(np.median(np.diff(record["time_s"])))
     width = max(WARM_BLOCK, 7 * step)
     blocks = average_blocks(record["time_s"], {"output": record[output]}, width)

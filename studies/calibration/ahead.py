@@ -20,10 +20,7 @@ BIAS = "bias_deg_per_h"
 def spread_of_prediction(
     instrument: "Instrument", drive: "Drive", law: "FrequencyLaw | None" = None
 ) -> dict[str, Array]:
-    """Return the standard deviation of every column of a predicted run: √diag(J C Jᵀ), without noise within it.
-
-    C is the covariance of the card's uncertain values, prior or posterior, the bias from turn-on to turn-on included.
-    """
+    """Return √diag(J C Jᵀ) of every column of a predicted run, C of the card's uncertain values, turn-on included, without noise."""
     priors = gather_priors(instrument)
     found = predict(instrument, drive, priors.names, law)
     scale = priors.slopes(np.zeros(len(priors.values)))

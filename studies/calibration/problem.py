@@ -78,10 +78,7 @@ class CardProblem:
 
     @cached_property
     def starts(self) -> tuple[tuple[int, str, float], ...]:
-        """What is free of each run, with its prior standard deviation: departures (K), and the chamber's clock (s).
-
-        Free are also the time of each jump of a set point between two rows, and the kink of the measured housing there.
-        """
+        """What is free of each run, with its prior sd: departures (K), the chamber's clock and its jumps (s), kinks of the housing there."""
         away = [start_spread(run, self.instrument, self.law) for run in self.runs]
         absent = () if self.instrument.polynomial is None else self.instrument.polynomial.absent
         found = [

@@ -1,7 +1,4 @@
-"""Level and slope of a steady-state table beside the card's, at one temperature.
-
-Readings, predictions and derivatives go through one polynomial: f and f'/f at the reference are weighted sums of rows.
-"""
+"""Level f and slope f'/f of a steady-state table beside the card's at the reference temperature, by one polynomial of the rows."""
 
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace

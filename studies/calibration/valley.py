@@ -94,11 +94,7 @@ def _curve(fit: CardFit, J: Array, row: Array, way: Array) -> Array:
 
 
 def follow(fit: CardFit, J: Array, row: Array, point: Array, enough: float) -> tuple[Array, float]:
-    """Go down to the bottom of a valley beside a point, `row` · point held: Gauss–Newton with the slopes `J` of the
-    fit, else with each point's.
-
-    Returns the lowest point and its rise, infinite where the bottom is not within `enough` of the fit's objective.
-    """
+    """Go down to the bottom of a valley beside a point, `row` · point held; return it and its rise, infinite where it is not `enough`."""
     problem = fit.problem
     least = objective(problem, fit.state, fit.noise, fit.rows)
     point = np.clip(point, *problem.ends)

@@ -1,8 +1,4 @@
-"""Keys of a design task, `schema = "hrg.design/1"`: what is free, what is wanted, what must hold.
-
-A column is named as in the results of a study (`tcf_n2_ppm_per_degC`); its quantity is found by that name, and needs a
-[[quantity]] table only for other than default keys. The separation counts here by its magnitude.
-"""
+"""Keys of a design task, `schema = "hrg.design/1"`: what is free, what is wanted, what must hold; columns as in a study's results."""
 
 from typing import Annotated, Literal
 

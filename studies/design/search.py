@@ -194,10 +194,7 @@ class Search:
         return self._surface(plain[np.argsort(apart, kind="stable")[:count]])
 
     def slopes(self, best: int, half: float) -> Array:
-        """Return the slopes of all columns as they count, (columns, parameters), from a star of full solves.
-
-        Free parameters are moved by `half`, others by a part of their tolerance, to one side; the smallest star to both sides.
-        """
+        """Return slopes of all columns as they count, (columns, parameters), from a star of solves, in the last stage to both sides."""
         x, count, last = self.x[best], len(self.low), half <= BOXES[-1]
         by = np.where(np.arange(count) < self.task.free, half, ASIDE) * np.where(x <= 0.5, 1.0, -1.0)
         sides = [x + side * move for move in np.diag(by) for side in ((1.0, -1.0) if last else (1.0,))]

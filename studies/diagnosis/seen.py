@@ -11,11 +11,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class SeenResponse:
-    """Residuals of one response over time and inputs (the resonator's temperature and its rate first), and what stood for its causes.
-
-    `plain` and `final` are of the baseline and of the model with causes, `rest` of the baseline on averages of `step`
-    s, `slope` df/dT, Hz/K; `left` is an input and twice the log evidence of a significant lack of fit.
-    """
+    """Residuals of one response over time and inputs, `plain` and `final`; `left` an input and twice the log evidence of a lack of fit."""
 
     time: tuple[Array, ...]
     plain: tuple[Array, ...]

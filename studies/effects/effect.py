@@ -226,10 +226,7 @@ def check_effect(name: str, parameters: Mapping[str, Numbers], response: str) ->
 def apply_effect(
     name: str, parameters: Mapping[str, Numbers], states: States, response: str | None = None
 ) -> tuple[str, FloatArray]:
-    """Run one effect forward, on an even grid: return its target, "resonator_temperature" or the response, and the change of it.
-
-    The change is zero where the effect's drive is no part of the run. Absent coefficients are zero.
-    """
+    """Run one effect forward, on an even grid: return its target and the change of it, zero where its drive is no part of the run."""
     effect = find_effect(name)
     response = effect.responses[0] if response is None else response
     shape, weights = check_effect(name, parameters, response)

@@ -1,8 +1,4 @@
-"""The symbolic derivation inside design code: which wall gives a wanted frequency, and how sharply it must be held.
-
-HRG paper, eq. (13), is taken from the derivation, turned into a fast function and solved for the thickness; the solver
-then says how far Rayleigh's mode, which ignores the free edge, was off.
-"""
+"""The symbolic derivation inside design code: which wall gives a wanted frequency (HRG paper, eq. 13), and how sharply it must be held."""
 
 from typing import NamedTuple
 

@@ -30,11 +30,7 @@ class FaceGrid:
 
 
 def read_cloud(path: str | Path, unit: Unit = "mm") -> "Array | FaceGrid":
-    """Points (count, 3) in m from text with x, y, z in the first columns, or a table of departures.
-
-    A table begins with `position,0,5,10,…` (azimuths in degrees); its lines give a position 0 … 1 and departures in µm,
-    positive out of the material.
-    """
+    """Points (count, 3) in m from text with x, y, z, or a table: `position,0,5,10,…` (°), then a position 0 … 1 and departures in µm."""
     file = check_file(path)
     if file.suffix.lower() in MESHES:
         return _read_mesh(file) * UNITS[unit]

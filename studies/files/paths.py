@@ -1,7 +1,4 @@
-"""Paths that a command reads and writes: those that it is given, and those that its files lead to.
-
-A name anywhere in a TOML file, or in the spec of a study's store, that is a file beside it counts as read.
-"""
+"""Paths that a command reads and writes, also those in its TOML files and a study's spec that are files beside them."""
 
 import json
 import os

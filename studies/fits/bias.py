@@ -85,11 +85,7 @@ def study_bias(
     over: Over = "auto",
     progress: Callable[[str], None] = lambda _: None,
 ) -> BiasStudy:
-    """Fit the bias model to records of a gyro at rest while its temperature changes.
-
-    `width` and `window`, s, of averaging and of the rate: 100 s, less for short runs, and three times that. A `causal`
-    rate uses past samples only.
-    """
+    """Fit the bias model to records of a gyro at rest while its temperature changes; `width` and `window` of averages and rate in s."""
     records = records_of_one_gyro(records, progress)
     check_lengths(records)
     output, column = find_output(records), find_state(records, over)

@@ -78,10 +78,7 @@ def fit_thermal_constants(
     confidence: float = 0.9,
     progress: Callable[[str], None] = lambda _: None,
 ) -> ThermalFit:
-    """Find the lags of the resonator behind its housing, each run with an initial state of its own.
-
-    The instrument gives the curvature of the frequency over temperature; `lags` are as many as the records support, up to three.
-    """
+    """Find the lags of the resonator behind its housing, as many as the records support, each run with an initial state of its own."""
     if lags is not None and not 1 <= lags <= len(LAGS):
         raise InputError(f"--lags {lags}: the number of lags lies between 1 and {len(LAGS)}.")
     for record in records:

@@ -1,7 +1,7 @@
-"""Files of channels (TDMS, MDF, HDF5, MATLAB, Parquet): groups of numbers with units and clocks, read channel by channel.
+"""Files of channels (TDMS, MDF, HDF5, MATLAB, Parquet): groups of numbers with units and clocks, read channel by
+channel.
 
-The libraries that read them are the extra `formats`. Nothing in a file is executed: pickled objects and MATLAB's own classes are
-refused. The channels of one `[[file]]` of a map become a table.
+The extra `formats` reads them. Nothing in a file is executed: pickled objects and MATLAB's own classes are refused.
 """
 
 import contextlib

@@ -1,7 +1,7 @@
 """Diagnosis of a campaign against a card: calibrate, search for effects beside all values and responses at once, judge.
 
-Where effects are found, the card's values are linearised anew at the most probable point of all unknowns together, and
-the search begins again there: values that had gone far to do what an effect does come back.
+Where effects are found, the card's values are linearised anew at the most probable point of all, and the search begins
+again.
 """
 
 from collections.abc import Callable, Mapping, Sequence

@@ -1,8 +1,4 @@
-"""A heat path longer than one lag, for a gyro of which only records are known: lags in series, part of whose heat is radiated.
-
-One lag is the baseline; effects on it that are small corrections are columns (`second-lag`, `radiation`). Where lumps follow one another
-they are not small, and the longer path is a card of its own, whose lags and radiated share are values like all others.
-"""
+"""A heat path longer than one lag, of a gyro without a card: lags in series, part of whose heat is radiated, as a card of its own."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace

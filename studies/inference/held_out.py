@@ -1,8 +1,4 @@
-"""Predictions of rows that a model has not seen, on the records' own rows.
-
-One record is left out at a time, its start and offset refitted; of a single one, a fifth with a gap of one thermal
-constant on both sides.
-"""
+"""Predictions of rows that a model has not seen: one record at a time, or of a single one a fifth, a thermal constant apart."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace

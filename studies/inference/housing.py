@@ -1,7 +1,4 @@
-"""What the chamber says of a card: the housing that it drives, as rows that know the card's values beside all other responses.
-
-The starts of that path are integrated out with the triangle of [J_start J_values r; 1 0 0].
-"""
+"""What the chamber says of a card: the housing it drives, its starts integrated out by the triangle of [J_start J_values r; 1 0 0]."""
 
 from dataclasses import replace
 

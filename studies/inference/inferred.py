@@ -20,10 +20,8 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, repr=False)
 class Inferred:
-    """What a card and records say together.
-
-    By response: rms of the card as `shipped`, rows that the calibrated card (`plain`) and the final model (`rows`)
-    leave, `left` the lack of fit, `held_out` without effects and with them; `path` is a heat path of several lags in place of one.
+    """What a card and records say together: by response `shipped` rms, `plain` and final `rows`, `left` lack of fit,
+    `held_out`, heat `path`.
     """
 
     card: "Instrument"

@@ -69,10 +69,7 @@ class Term:
 
 @dataclass(frozen=True)
 class Linear:
-    """The rows of a calibration linearised at a point: by response `target` (M,) about u = 0 and `slope` (M, p).
-
-    `told`, (q, p + 1), is what else says something of the coordinates: rows of white noise of variance 1 and their target.
-    """
+    """The rows of a calibration linearised at u = 0: `target` (M,), `slope` (M, p); `told`, (q, p + 1), further white rows on u."""
 
     problem: CardProblem
     rows: Mapping[str, NoiseRows]
@@ -202,10 +199,7 @@ class Background:
         )
 
     def gains(self, columns: Mapping[str, NDArray[np.floating]], units: Array, effect: Effect) -> Array:
-        """Return what effects of columns (M, H, k) and units (H, k) add to the evidence at each of SCALES, (S, H).
-
-        An effect that cannot go against its first column, or beyond the most of it, adds nothing there: −∞.
-        """
+        """Return what effects of columns (M, H, k) and units (H, k) add to the evidence at SCALES, (S, H); −∞ against the first column."""
         some = max(1, AT_ONCE // (units.shape[1] * max(len(own) for own in columns.values())))
         if len(units) > some:
             parts = (slice(k, k + some) for k in range(0, len(units), some))

@@ -146,11 +146,7 @@ def _followed(runs: Sequence[ObservedRun], column: str, tau: float, x0: float) -
 
 
 def _fit(runs: Sequence[ObservedRun], column: str, tau: float, x0: float, apart: bool) -> tuple[Array, float]:
-    """Return the coefficients of a polynomial with starts (and levels, where they lie `apart`) of each run, and what is left over its noise.
-
-    Starts and bends have the priors of a card: else a single slow run is followed by any lag. What a first fit leaves is no less than
-    `MISFIT` of what the response varies by.
-    """
+    """Return the coefficients of a polynomial with starts (and levels, where they lie `apart`) of each run, and what is left over noise."""
     y, x, starts = _followed(runs, column, tau, x0)
     spread = max(float(np.std(y)), 1e-300)
     reach = max(*(0.5 * float(np.ptp(run.inner.profile.value)) for run in runs), 1e-2)

@@ -21,10 +21,7 @@ REFERENCE = "reference_frequency_Hz"
 
 @dataclass(frozen=True)
 class Campaign:
-    """Records that a diagnosis can use, each once, with their `numbers` among those given (from 1), `skipped` responses and notes.
-
-    They have enough rows, and bias and driving temperature under their usual names; `timed` says whether all state their start.
-    """
+    """Records that a diagnosis can use, each once, with their `numbers` (from 1), `skipped` responses, notes, and whether all are `timed`."""
 
     paths: tuple[str, ...]
     records: tuple[Record, ...]

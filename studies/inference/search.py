@@ -1,7 +1,4 @@
-"""Search over effects: the model of all responses grows by the effect that adds most evidence, as long as that pays its price.
-
-Shapes of a grid are looked at together; near contenders are refitted with shape, size and noise of their own.
-"""
+"""Search over effects: the model of all responses grows by the effect that adds most evidence, as long as that pays its price."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace

@@ -30,10 +30,7 @@ def fast_line(
 
 
 def intermittent(runs: Sequence[FloatArray]) -> float:
-    """Return the log evidence of oscillations that come, go or wander, by short periodograms of the innovations.
-
-    Noise has one exponential law about one mean at all frequencies; against it stands a mixture with some cells of more power.
-    """
+    """Return the log evidence of oscillations that come, go or wander: a mixture of powers against one exponential law of noise."""
     best = 0.0
     for length in CELLS:
         cells = []

@@ -178,10 +178,8 @@ class Instrument:
         return _reread(self, {**self.content, name: raw}, {name})
 
     def with_values(self, values: Mapping[str, Any]) -> "Instrument":
-        """Return a new instrument with other values at dotted keys of the card, in its units:
-        {"thermal.mount_conductance_W_per_K": 0.012}.
-
-        A plain number keeps the uncertainty beside it; a mapping such as {"value": 0.012, "sd": 0.001} replaces both.
+        """Return a new instrument with other values at dotted keys of the card; a number keeps the uncertainty,
+        {"value", "sd"} replaces it.
         """
         content: Mapping[str, Any] = self.content
         for name, value in values.items():

@@ -16,10 +16,7 @@ LAW = "material.deviation."
 
 
 def uncertain_of_law(material: "Material", stated: Collection[str]) -> Iterator[UncertainValue]:
-    """Yield the coefficients of the law's deviation that act on the frequency, as uncertain as the material's prior.
-
-    Not those of which the card states the uncertainty, by key or by a given value of which it states one.
-    """
+    """Yield the coefficients of the law's deviation that act on the frequency, by the material's prior unless the card states it."""
     from shell.law import ACTING
 
     given = {f"{_scaled_by(material, name)}." for key, (name, _) in GIVEN.items() if f"material.{key}" in stated}

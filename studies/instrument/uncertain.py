@@ -96,10 +96,7 @@ def is_spread(raw: Any) -> bool:
 
 
 def read_uncertain(raw: Any, keys: Any, where: str, name: str) -> "tuple[Any, list[UncertainValue], set[str]]":
-    """Read a table of a card (`name`: "thermal", "effect.0") into its class.
-
-    Returns it, those of its numbers that are not exact, and the names of those whose uncertainty the card states.
-    """
+    """Read a table of a card into its class; return it, its numbers that are not exact, and the names whose uncertainty it states."""
     stated: dict[Path, UncertainValue] = {}
 
     def take(raw: Mapping[str, Any], path: Path, node: inspect.Type, place: str) -> Any:

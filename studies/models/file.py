@@ -1,7 +1,4 @@
-"""The model file `hrg.model/1`: a fitted compensation as a small TOML that people and firmware engineers read.
-
-Numbers keep all digits. The text is laid out here, not by tomli-w, for its comments: how well each coefficient is known.
-"""
+"""The model file `hrg.model/1`: a fitted compensation as a small TOML with all digits, and comments how well each number is known."""
 
 import math
 from collections.abc import Collection, Sequence

@@ -1,7 +1,4 @@
-"""The BVG paper's compensation chain on a virtual gyro, beside its printed claims and what can explain them.
-
-The paper prints no data: the printed coefficients bring the twin's output to the rate exactly, with noise and wander added.
-"""
+"""The BVG paper's compensation chain on a virtual gyro by its printed coefficients, beside its claims and what can explain them."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

@@ -1,8 +1,4 @@
-"""The CVG cross-damping paper's compensation on a virtual gyro: figures 1 and 2, and what sets the improvement.
-
-The paper prints the shape of ζ₁₂(T), two figures without their data and "approximately 8 times". The twin takes the
-printed shape and typical values for all else; none of them was chosen to arrive at 8.
-"""
+"""The CVG cross-damping paper's compensation on a virtual gyro: figures 1 and 2, and what sets the improvement of some 8 times."""
 
 from dataclasses import dataclass
 from importlib.resources import files

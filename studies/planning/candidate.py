@@ -1,8 +1,4 @@
-"""Candidates for the next run in the linear model of the records: what is known of their rows beforehand.
-
-A candidate goes through the simulation of the card at the values that were found. Its rows are linear in what is unknown: the card's
-values and the coefficients of effects, with the mean and covariance Σ that the records leave, and the start of the run itself.
-"""
+"""Candidates for the next run in the linear model of the records: the mean and covariance of their rows beforehand."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

@@ -1,8 +1,4 @@
-"""Before any data: which effects a planned campaign could tell apart, and how small they may be.
-
-The card's own simulation goes through the planned chamber profiles. Every effect is hidden in the runs in several shapes, beside all
-that is uncertain of the card, its starts and its noise, and `studies.planning.expectation` says what a diagnosis would answer.
-"""
+"""Before any data: which effects a planned campaign could tell apart, and how small they may be (`studies.planning.expectation`)."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace

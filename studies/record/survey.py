@@ -185,10 +185,7 @@ def average_evenly(time: Array, values: Array, most: int = MOST) -> tuple[Array,
 
 
 def find_steps(time: Array, values: Array) -> tuple[Step, ...]:
-    """Return where a series moves at once, in its rows and in means of 8 and of 64 rows.
-
-    Lines through the 25 means on either side differ by 8 robust sd, within two means, and a parabola with a step fits better than a bend.
-    """
+    """Return where a series moves at once, in rows and means of 8 and 64: lines of 25 means on either side, by 8 robust sd."""
     spacing = float(np.median(np.diff(time)))
     count = round(float(time[-1] - time[0]) / spacing) + 1
     if len(time) < count <= 2 * len(time):  # a line across rows that are missing, where a slope is no step

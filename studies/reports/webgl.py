@@ -1,7 +1,4 @@
-"""An interactive view of modes for a page, from one file without a network.
-
-The page carries the outline with each mode's amplitudes, some 20 kB; without WebGL2 the picture stays.
-"""
+"""An interactive view of modes for a page, from one file of some 20 kB a mode; without WebGL2 the picture stays."""
 
 import base64
 import hashlib

@@ -105,11 +105,7 @@ def scan_faces(
     theory: Literal["solid", "shell"] = "solid",
     say: Callable[[str], None] = lambda _: None,
 ) -> Scan:
-    """Read, align and fit the faces, and find the splits of harmonics n; the fit goes up to the `highest` wave, at
-    least twice the highest n.
-
-    With frames "own" each face is aligned by itself, its first wave without rigid motion; "common" keeps them as they lie.
-    """
+    """Read, align ("own" frames or one "common") and fit the faces up to the `highest` wave, and find the splits of harmonics n."""
     if 2 * max(harmonics) > highest:
         needed = f"the split of n = {max(harmonics)} needs harmonic {2 * max(harmonics)} of the faces"
         raise InputError(f"{needed}; set --highest to at least that.")

@@ -1,7 +1,4 @@
-"""Trimming of a card's resonator: the sites that its rim or teeth offer, and a plan for measured splits.
-
-A groove's effect depends on its depth: plan and solve (shell.groove) alternate until the depth stays. Cuts that touch are one.
-"""
+"""Trimming of a card's resonator: sites of rim or teeth, and a plan that is solved (shell.groove) and made again until depths stay."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -179,10 +176,7 @@ def plan_for_card(
     gain: float = 1.0,
     unbalance: Mapping[int, complex] | None = None,
 ) -> CardPlan:
-    """A plan for splits measured on a card's resonator: (harmonic, split in Hz, azimuth of the slow axis in rad, reading error in Hz).
-
-    `heights` are positions of the cuts, `gain` the last round's effect over its prediction, of either sign; see `plan_trim`.
-    """
+    """A plan for splits (harmonic, Hz, slow axis in rad, reading error in Hz) by cuts at `heights`; `gain` of the last round; `plan_trim`."""
     if not 0 < goal < np.inf:
         raise InputError(f"--goal {goal:g}: must be a positive split in Hz.")
     if gain == 0 or not np.isfinite(gain):

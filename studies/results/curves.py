@@ -1,8 +1,4 @@
-"""What a figure shows, as numbers: so that a page can show values under the pointer and draw a part of it larger.
-
-Every matplotlib figure of a page goes through here. Lines, points, bands and bars of plain axes are read from the finished drawing, in
-parts of the picture; axes with images, contours or other projections stay pictures.
-"""
+"""What a matplotlib figure of a page shows, as numbers to point at and enlarge; axes with images or contours stay pictures."""
 
 import json
 from collections.abc import Iterator

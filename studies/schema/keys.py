@@ -25,10 +25,7 @@ def number(
     relative_sd: float | None = None,
     example: Any = None,
 ) -> msgspec.Meta:
-    """Annotate a number with its meaning, its bounds in the unit of the key, and its uncertainty where a card states none.
-
-    With neither `sd` nor `relative_sd` a plain number is exact; `example` is shown in forms for a key without a default.
-    """
+    """Annotate a number with its meaning, its bounds in the unit of the key, and its uncertainty where a card states none (else exact)."""
     prior = {key: value for key, value in (("sd", sd), ("relative_sd", relative_sd)) if value is not None}
     ends: Any = {"gt": above, "ge": least, "lt": below, "le": most}
     return msgspec.Meta(

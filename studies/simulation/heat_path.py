@@ -84,10 +84,7 @@ def slowest_lag(network: Network, temperature: float) -> float:
 
 
 def departures(network: Network, lumps: Sequence[str], temperature: float) -> dict[str, NDArray[np.float64]]:
-    """Temperatures of the nodes (K) for 1 K of each lump: "housing", "base", "stem", or "resonator" (stem and shell).
-
-    Only what persists: Σ v vᵀC e over as many of the slowest modes v as there are lumps.
-    """
+    """Temperatures of the nodes (K) for 1 K of each lump, as far as it persists: Σ v vᵀC e over as many of the slowest modes v."""
     names = [node.name for node in network.nodes]
     relaxation = find_relaxation(network, temperature)
     slow = relaxation.shapes[:, : len(lumps)]

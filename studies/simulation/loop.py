@@ -187,10 +187,7 @@ def settled_columns(
     time: Array | None = None,
     rate: ArrayLike = 0.0,
 ) -> dict[str, Array]:
-    """Return what the settled loops of a card record, without the offset and polynomial of `[bias]`.
-
-    `rate` in rad/s; a whole-angle wave turns over the time (s) from the azimuth of `[bias]`, unless its pattern angle (N,) is given.
-    """
+    """Return what the settled loops of a card record, `rate` in rad/s, without the offset and polynomial of `[bias]`."""
     loop, start = require_loop(instrument), float(np.radians(instrument.bias.pattern_angle_deg))
     angle = np.broadcast_to(np.asarray(start if pattern_angle is None else pattern_angle), np.shape(frequency))
     wave = wave_of(instrument, frequency, inverse_q, bryan_factor, damping=damping)
@@ -231,10 +228,7 @@ def run_loops(
     damping: NDArray[np.complex128] | None = None,
     generator: np.random.Generator | None = None,
 ) -> LoopRun:
-    """Run the card's loops over even rows (s), its resonator's frequency (Hz) and loss numbers or rows.
-
-    `rate` (rad/s) and azimuth (rad) are numbers or rows; `both_ways`: the self-precession turns back after half of them.
-    """
+    """Run the card's loops over even rows (s); frequency (Hz), loss, `rate` (rad/s) and azimuth (rad) are numbers or rows."""
     loop = require_loop(instrument)
     angle = np.radians(instrument.bias.pattern_angle_deg) if pattern_angle is None else np.asarray(pattern_angle)
     wave = wave_of(instrument, frequency, inverse_q, bryan_factor, damping=damping)

@@ -74,10 +74,7 @@ class BiasSlope:
 
 @dataclass(frozen=True)
 class LoopStudy:
-    """What the loops of a card are like at one temperature.
-
-    `noise` by source: deg/h of a mean over 1 s, and deg/√h from one over 100 s; `use`: parts of the actuators' ranges.
-    """
+    """What the loops of a card are like at one temperature; `noise` by source: deg/h over 1 s, deg/√h over 100 s."""
 
     instrument: "Instrument"
     frequency: float

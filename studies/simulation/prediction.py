@@ -1,7 +1,4 @@
-"""The one forward model: what an instrument's record is, without noise, and how it changes with every value of its card.
-
-Temperatures come from the network (`thermal.sensitivity`), what is read at them from `studies.simulation.response`.
-"""
+"""The one forward model: what an instrument's record is, without noise, and how it changes with every value of its card."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace

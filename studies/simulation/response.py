@@ -85,11 +85,7 @@ def read_out(
     damping: "DampingLaw | None" = None,
     more_loss: float = 0.0,
 ) -> dict[str, Array]:
-    """Columns of the record, without noise: °C, Hz, deg/h, 1; of a card with loops also what their quadrature control says.
-
-    `tau` (s) is the resonator's behind its housing, `damping` from the card's parts in place of `[loss]` and `[bias]`;
-    `more_loss` is added to 1/Q.
-    """
+    """Columns of the record, without noise: °C, Hz, deg/h, 1, and quadrature; `tau` (s) behind the housing, `more_loss` added to 1/Q."""
     reference = instrument.reference_temperature
     housing, resonator, *uneven = found.value.T
     if instrument.polynomial is not None:

@@ -64,10 +64,7 @@ def simulate_run(
     theory: "Theory" = "solid",
     law: "FrequencyLaw | None" = None,
 ) -> VirtualRun:
-    """Run a virtual gyro through chamber temperatures (K), settled at the first, or a drive, which brings its own rows.
-
-    `rate`: rows per second. Without noise neither sensor lag nor rounding is added. A law built before serves the same instrument.
-    """
+    """Run a virtual gyro through chamber temperatures (K), settled at the first, or a drive with its own rows; `rate`: rows per second."""
     drive = driven if isinstance(driven, Drive) else drive_by_profile(driven, rows_of(driven, rate))
     if isinstance(driven, Drive):
         rate = 1 / float(np.median(np.diff(drive.time)))

@@ -1,7 +1,4 @@
-"""Designs of a study and what became of them, as columns: how they travel to a worker and back, and how they are kept.
-
-Kept: a line of JSON, then columns, bytes of equal weight beside each other, by zlib's run lengths and Huffman codes.
-"""
+"""Designs of a study and what became of them, as columns, for travel to workers and (zlib over bytes of equal weight) for the store."""
 
 import json
 import zlib

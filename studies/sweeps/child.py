@@ -1,7 +1,4 @@
-"""A user's Python function in a process of its own, kept from case to case, so that what it does there harms only its own case.
-
-Requests and answers are lines of JSON over its pipes; it is killed, with a reason, when one case takes too long.
-"""
+"""A user's Python function in a process of its own (lines of JSON over its pipes), killed with a reason when a case takes too long."""
 
 import atexit
 import contextlib

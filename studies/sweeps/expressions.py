@@ -1,7 +1,4 @@
-"""Parameters that follow from others: `end_mm = "radius_mm + 4"`, arithmetic that is parsed and never run as code.
-
-A name is a parameter of the study or a dotted key of the card, of which the last part does where only one ends so.
-"""
+"""Parameters that follow from others: `end_mm = "radius_mm + 4"`, arithmetic of parameters and dotted keys, never run as code."""
 
 import ast
 import math

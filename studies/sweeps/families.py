@@ -1,7 +1,4 @@
-"""Many designs at once through families (`shell.family`): frequency, TCF and Bryan factor.
-
-Its error is judged by full solves that it has not seen; too large, or for half the designs, every design is solved in full.
-"""
+"""Many designs at once through families (`shell.family`), their error judged by full solves not seen, else every design solved."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,4 @@
-"""Keys of a study's spec, `schema = "hrg.study/1"`: what is varied, how it is sampled, what is computed.
-
-`sensitivity` is the design of Saltelli for Sobol indices: cases × (parameters + 2) designs; `one-at-a-time` takes five levels.
-"""
+"""Keys of a study's spec, `schema = "hrg.study/1"`: what is varied, how it is sampled, what is computed."""
 
 from math import inf
 from typing import TYPE_CHECKING, Annotated, Literal, Union

@@ -1,7 +1,4 @@
-"""A file of sealed blocks: appended to and never changed, so that kill -9 loses nothing kept and damage stays where it is.
-
-A block is a head (mark, kind, length, checksums) and content. Beyond damage the next head that holds is looked for.
-"""
+"""A file of sealed blocks (head with checksums, content), only appended to: kill -9 loses nothing kept, damage stays where it is."""
 
 import os
 import struct

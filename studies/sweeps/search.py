@@ -120,9 +120,8 @@ def find_worst_case(explorer: Explorer, search: WorstCase) -> dict[str, Any]:
 
 
 def find_tolerance(explorer: Explorer, search: ToleranceSearch) -> dict[str, Any]:
-    """Find by which factor the tolerances may be wider (or must be narrower) for a share of designs to meet the requirements.
-
-    Every design moves along its line through the nominal one; the interval is that of a quantile of so many draws.
+    """Find by which factor tolerances may be wider, or must be narrower, for a share of designs to meet the
+    requirements, with an interval.
     """
     from scipy.stats import binom
 

@@ -88,10 +88,7 @@ def _indices(A: Array, B: Array, AB: Array) -> tuple[Array, Array]:
 
 
 def local_slopes(results: "Results", column: str) -> list[LocalSlope]:
-    """Return slopes at the nominal design from method = "one-at-a-time", each of the polynomial through a parameter's levels.
-
-    The uncertainty is the distance to the polynomial through the inner levels, plus the values' numerical error.
-    """
+    """Return the slopes at the nominal design of polynomials through each parameter's levels; ±: to that of inner levels, and error."""
     study = results.study
     if study.sampling.method != "one-at-a-time":
         raise InputError(f"local slopes need [sampling] method = 'one-at-a-time', not '{study.sampling.method}'.")

@@ -1,7 +1,4 @@
-"""`[posterior]`: how the uncertainties of a calibrated card go together; written by `hrg calibrate --save`.
-
-Sds and correlations hold near the most probable card; where the likelihood is bent, the interval is not symmetric.
-"""
+"""`[posterior]`: how the uncertainties of a calibrated card go together, near its values; written by `hrg calibrate --save`."""
 
 from typing import Annotated
 

@@ -1,7 +1,4 @@
-"""`[thermal]`: constants of the heat path from the chamber to the shell.
-
-The mount's conductance is identified from Figure 3 of the HRG paper (`studies.papers.settling`); the rest are assumptions.
-"""
+"""`[thermal]`: constants of the heat path; the mount's from HRG paper Figure 3 (`studies.papers.settling`), the rest assumed."""
 
 from typing import Annotated
 

@@ -1,7 +1,7 @@
 """Models of kind `frequency`: f(T) as a polynomial, HRG paper eqs. (16)–(18), its inverse, and their C code.
 
-The file has one part "frequency" (f0, a1, a2 …) and the setting `reference_temperature_degC`. The range is that of the
-fit, widened by 5 % of its length on either side because readings scatter, as far as the curve does not turn round there.
+One part "frequency" (f0, a1, a2 …) and `reference_temperature_degC`; the range is the fit's and 5 % more, to a turning
+point.
 """
 
 from functools import partial

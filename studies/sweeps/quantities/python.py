@@ -1,7 +1,4 @@
-"""A user's own Python function of a design, (instrument, parameters) -> number, in a process of its own; only with --allow-python.
-
-It is named by module path, `function = "package.module:name"` or `"file.py:name"` (beside the spec).
-"""
+"""A user's function "package.module:name" or "file.py:name", (instrument, parameters) -> number, only with --allow-python."""
 
 from typing import Annotated
 
