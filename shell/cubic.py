@@ -82,7 +82,7 @@ class CubicPair:
 def solve_cubic(resonator: Resonator, crystal: Cubic, harmonic: int = 2, tolerance: float = 1e-5) -> CubicPair:
     """The lowest pair of a harmonic n >= 2, not a multiple of 4, of a shell without stem, clamp or kink."""
     if harmonic < 2 or harmonic % 4 == 0:
-        raise ShellError(f"a cubic crystal is solved for n >= 2 that do not couple with n = 0, not {harmonic}.")
+        raise ShellError(f"a cubic crystal is solved for n >= 2 that do not couple with n = 0, not n = {harmonic}.")
     mean = crystal.isotropic
     (mode,) = solve_modes(resonator, mean, harmonic, tolerance=tolerance)
     assert mode.solution is not None

@@ -129,7 +129,6 @@ def diagnose_records(
 
 
 def _flat(given: Iterable[Any]) -> Iterator[Any]:
-    """Yield what was given one by one, or as lists."""
     for one in given:
         if isinstance(one, list | tuple):
             yield from one

@@ -66,7 +66,7 @@ def mix_down(time: ArrayLike, channels: ArrayLike, carrier: float | None = None)
     if carrier is None:
         carrier = find_carrier(x[int(np.argmax(np.nanvar(x, axis=1)))], rate)
     if not 0 < carrier < rate / 2:
-        raise CompensationError(f"the frequency {carrier:.6g} Hz is not below half the rate of {rate:.6g} Hz.")
+        raise CompensationError(f"the frequency {carrier:.6g} Hz is not below half the sampling rate {rate:.6g} Hz.")
     if not np.nanvar(x, axis=1).any():
         raise CompensationError("the samples are all 0 or alike: nothing was recorded; check the pick-off.")
     period = rate / carrier  # in samples

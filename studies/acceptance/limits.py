@@ -77,8 +77,6 @@ class WarmUp(Keys, frozen=True, kw_only=True):
 
 
 def _declare_quantities() -> Any:
-    """Declare a key for every quantity of the test."""
-
     def check(limits: Any) -> None:
         if not any(getattr(limits, key) is not None for key in limits.__struct_fields__):
             raise ValueError("no limit is given; add one, such as bias_deg_per_h = 5.0.")

@@ -1,7 +1,6 @@
 """What a fit says of each value: how far it moved, how well it is known, and what it cannot be told apart from."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,9 +9,7 @@ from studies.calibration.fit import CardFit, whitened
 from studies.calibration.priors import Priors, from_standard, to_standard
 from studies.calibration.valley import find_bend, follow
 from studies.calibration.wave import Polar
-
-if TYPE_CHECKING:
-    from studies.instrument.uncertain import UncertainValue
+from studies.instrument.uncertain import UncertainValue
 
 Array = NDArray[np.float64]
 NINETY = 1.6448536269514722
@@ -107,7 +104,7 @@ def _over_the_wave(fit: CardFit) -> tuple[dict[int, Polar], Array, Array, Array]
     return polar, best, mean, C + gain @ (found.covariance - C[np.ix_(pair, pair)]) @ gain.T
 
 
-def _told_polar(value: "UncertainValue", one: Polar, seen: bool) -> Estimate:
+def _told_polar(value: UncertainValue, one: Polar, seen: bool) -> Estimate:
     if not seen:
         low, high = (float(np.clip(from_standard(value, z), value.low, value.high)) for z in (-NINETY, NINETY))
         return Estimate(value.name, value.unit, value.value, value.value, low, high, value.sd, 0.0, 1.0, None, "normal")

@@ -12,7 +12,7 @@ from compensation.noise import white_rms
 from compensation.spikes import find_spikes
 from shell.constants import zero_Celsius
 from studies.errors import InputError
-from studies.record import Record, place_in_time
+from studies.record import Record, place_in_time, read_frequency_table, reading_resolution
 from studies.simulation.drive import COLUMN, Drive, drive_by_record
 from studies.simulation.holes import bridge_holes
 
@@ -154,8 +154,6 @@ class SettledTable:
 
 def read_settled(path: str) -> SettledTable:
     """Read a steady-state table (HRG paper, Table 1)."""
-    from studies.record import read_frequency_table, reading_resolution
-
     values = read_frequency_table(path).values
     f = values["frequency_Hz"]
     return SettledTable(path, values["temperature_degC"] + zero_Celsius, f, reading_resolution(f))

@@ -7,6 +7,7 @@ from typing import Any
 from studies.cli.output import answers
 from studies.instrument.card import SCHEMA, load_card, shipped_cards
 from studies.instrument.display import display_name
+from studies.reports.digits import plain
 from studies.results import Column, Facts, Result, Table
 from studies.schema.reader import read_toml
 
@@ -39,8 +40,6 @@ def cards(card: str = "") -> Result:
 
 def _spread(row: dict[str, Any]) -> str:
     """One standard deviation; a factor where the logarithm is normal and wide."""
-    from studies.reports.digits import plain
-
     share = row["sd"] / row["value"] if row["logarithmic"] else 0.0
     return f"×/÷ {exp(share):.2g}" if share >= WIDE else plain(row["sd"], 2)
 

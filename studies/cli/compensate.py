@@ -85,7 +85,6 @@ def compensate(
 
 
 def _judge(record: Record, result: Record, name: str) -> dict[str, Any]:
-    """Return the stability of a column before and after, and how many of its rows stay empty."""
     # A rate made from raw counts has no uncompensated column of its own in the record.
     after, before = result[name], record.columns.get(name.removeprefix(COMPENSATED))
     missing = np.isnan(after) if before is None else np.isnan(after) & ~np.isnan(before)
@@ -129,7 +128,6 @@ def _show(record: Record, result: Record, columns: dict[str, dict[str, Any]], wo
 
 
 def _draw(record: Record, result: Record, name: str) -> Drawing:
-    """Draw a column that was added, with what it compensates where the record has that."""
     rows = style.few_rows(len(record))
     hours = record["time_s"][rows] / 3600
     with style.figure(height=3.4, x="time (h)", y=unit_of(name)) as (made, axes):
@@ -140,7 +138,6 @@ def _draw(record: Record, result: Record, name: str) -> Drawing:
 
 
 def _stability(time: Array, values: Array) -> float | None:
-    """Return the standard deviation of block averages, missing values left out; None of too few rows."""
     try:
         return float(average_blocks(time, {"output": values}, AVERAGE).columns["output"].std())
     except CompensationError:

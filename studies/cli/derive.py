@@ -108,7 +108,6 @@ def derive(
 
 
 def _keep(found: Result, out: str | None) -> Result:
-    """Write what would be printed to a file, where one is named."""
     if out is None:
         return found
     (shown,) = (

@@ -11,7 +11,7 @@ from studies.errors import InputError
 from studies.instrument.card import load_card, save_card
 from studies.planning.chamber import Chamber, parse_chamber
 from studies.progress import Told
-from studies.reports.diagnosis import headline
+from studies.reports.diagnosis import diagnosis_parts, headline
 from studies.results import Result
 
 PLANNED = "hrg-30mm"
@@ -89,7 +89,6 @@ def _table(path: str, card: str | None) -> Result:
 def _campaign(runs: tuple[str, ...], card: str | None, limits: Chamber | None, save: str | None) -> Result:
     from studies.inference.diagnosis import Inference
     from studies.inference.extension import extend
-    from studies.reports.diagnosis import diagnosis_parts
 
     instrument, records = None if card is None else load_card(card), workbench.open_records(runs)
     with Told("diagnosis", STAGES) as told:

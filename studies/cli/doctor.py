@@ -1,5 +1,8 @@
 """`hrg doctor`: what this environment has and what it lacks."""
 
+import platform
+import shutil
+
 from studies.cli.output import answers
 from studies.results import Result, Table
 
@@ -23,8 +26,6 @@ def doctor() -> Result:
     Exit status 3 when pictures cannot be drawn.
 
     """
-    import platform
-    import shutil
     from importlib.metadata import PackageNotFoundError, version
 
     from shell.render import can_draw

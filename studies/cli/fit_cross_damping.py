@@ -129,7 +129,6 @@ def _coefficients(summary: dict[str, Any]) -> list[dict[str, Any]]:
 
 
 def _draw_curve(study: CrossDampingStudy) -> Drawing:
-    """Draw ζ₁₂(T) over its value at calibration, with its 90 % band."""
     model = study.model
     T = np.linspace(model.lowest, model.highest, 200)
     powers = (T - model.calibration_temperature)[:, None] ** np.arange(len(model.coefficients))
@@ -167,7 +166,6 @@ def _change(change: Change, unit: float) -> dict[str, float]:
 
 
 def _median(records: list[Record], column: str, option: str) -> float:
-    """Median of a column over all records that have it."""
     values = np.concatenate([record[column] for record in records if column in record] or [np.empty(0)])
     if not np.any(np.isfinite(values)):
         raise InputError(f"the records have no {column}; give {option}.")

@@ -9,10 +9,11 @@ With --json one object, schema `hrg.fit-ringdown/3`: `decays` (a list: `data`, `
 
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from compensation.ringdown.laws import Law
 from studies.cli.arguments import Harmonic
 from studies.cli.output import answers, keep_card, say
 from studies.errors import InputError
@@ -23,9 +24,6 @@ from studies.record.decays import Decays, fit_laws, is_table, read_table, table_
 from studies.reports import style
 from studies.resonator.law import law_of
 from studies.results import Chapter, Drawing, Figure, Part, Result, Sentence, Table, row_of
-
-if TYPE_CHECKING:
-    from compensation.ringdown.laws import Law
 
 QUANTITIES = {
     "frequency_1_Hz": "frequency of the upper mode (Hz)",
@@ -183,7 +181,7 @@ TERM = (
 )
 
 
-def _law_row(name: str, law: "Law") -> dict[str, Any]:
+def _law_row(name: str, law: Law) -> dict[str, Any]:
     """Return a law for --json: relative values of a frequency (1 = the frequency itself), plain ones of 1/Q."""
     level = float(np.exp(law.level.value)) if name == "frequency_Hz" else law.level.value
     return {
@@ -194,8 +192,7 @@ def _law_row(name: str, law: "Law") -> dict[str, Any]:
     }
 
 
-def _law_chapter(laws: "dict[str, Law]", decays: "Decays") -> Chapter:
-    """Return tables, what the laws say in words, and pictures of them."""
+def _law_chapter(laws: dict[str, Law], decays: "Decays") -> Chapter:
     parts: list[Part] = []
     for name, law in laws.items():
         if name == "frequency_Hz":
@@ -211,7 +208,7 @@ def _law_chapter(laws: "dict[str, Law]", decays: "Decays") -> Chapter:
     return Chapter("Over many decays", parts)
 
 
-def _shown(name: str, term: str, law: "Law") -> dict[str, Any]:
+def _shown(name: str, term: str, law: Law) -> dict[str, Any]:
     scale, unit = (1e6, "ppm") if name == "frequency_Hz" else (1.0, "1")
     if term.startswith("step"):
         day = law.sessions[int(term.split()[1]) - 1] / 86400
@@ -223,7 +220,7 @@ def _shown(name: str, term: str, law: "Law") -> dict[str, Any]:
     return {"words": words, "shown_unit": shown_unit} | {key: scale * x for key, x in values.items()}
 
 
-def _remarks(law: "Law") -> list[str]:
+def _remarks(law: Law) -> list[str]:
     said = []
     if law.left_out:
         said.append(f"the first {law.left_out} readings of every decay follow another law (release) and are left out.")
@@ -234,8 +231,7 @@ def _remarks(law: "Law") -> list[str]:
     return said
 
 
-def _draw_law(name: str, law: "Law", decays: "Decays") -> Drawing:
-    """Draw readings and law over each condition."""
+def _draw_law(name: str, law: Law, decays: "Decays") -> Drawing:
     over = list(dict.fromkeys(WORDS[t][2] for t in law.terms if t in WORDS and WORDS[t][2]))
     over = over or ["time_s"]
     labels = {"housing_temperature_degC": "temperature (°C)", "pressure_Pa": "pressure (Pa)", "vibration_amplitude_V": "amplitude", "time_s": "time (d)"}  # fmt: skip

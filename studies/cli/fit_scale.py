@@ -156,7 +156,6 @@ def _undetermined(study: ScaleStudy) -> list[tuple[str, str]]:
 
 
 def _remarks(study: ScaleStudy) -> list[str | Sentence]:
-    """Say how the records were used, and what they do not tell."""
     ends = (f"{T - zero_Celsius:.1f}" for T in (study.runs[0].temperature.min(), study.runs[0].temperature.max()))
     where = " … ".join(dict.fromkeys(ends))
     lacks: list[str | Sentence] = [
@@ -174,6 +173,5 @@ def _remarks(study: ScaleStudy) -> list[str | Sentence]:
 
 
 def _spell_unit(unit: str) -> str:
-    """Return a unit of a model file as people write it: °/s/K² for deg/s/degC^2."""
     spelled = unit.replace("deg/s per counts", "°/s per count").replace("/degC", "/K").replace("deg", "°")
     return re.sub(r"\^(\d+)", lambda power: raised(int(power[1])), re.sub("^/", "per ", spelled.removeprefix("1")))

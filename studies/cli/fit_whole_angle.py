@@ -95,7 +95,6 @@ def fit_whole_angle(
 def _fit_record(
     path: str, bryan_factor: float, volts_per_hertz: float | None, loop: Loop | None, confidence: float
 ) -> tuple[WaveFit, float | None]:
-    """Fit what is in a record; also its mean frequency in Hz, where it has one."""
     record = read_record(path)
     rate = record["measured_rate_deg_per_s"] if "measured_rate_deg_per_s" in record else record["bias_deg_per_h"] / 3600
     frequency = record.columns.get("frequency_Hz")

@@ -199,7 +199,6 @@ def _under(found: Loads, amounts: dict[Kind, float], shift: float) -> dict[str, 
 
 
 def _amplitudes(instrument: Instrument, harmonic: int, temperatures: "np.ndarray[Any, Any]") -> list[dict[str, float]]:
-    """Duffing's coefficient over temperature."""
     rows: list[dict[str, float]] = []
     for T in instrument.material.check(temperatures):
         (mode,) = solve_modes(*instrument.at(float(T)), harmonic)

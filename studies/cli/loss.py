@@ -110,7 +110,6 @@ def _describe(model: LossModel, budget: Budget, theory: str) -> dict[str, Any]:
 def _parts(
     payload: dict[str, Any], model: LossModel, budget: Budget, stated: StatedLoss | None, at: int
 ) -> list[Chapter]:
-    """What people read: the answer, the parts, their course, where on the wall, around the axis, what is left out."""
     degrees, around = payload["temperature_degC"], payload["anisotropy"]
     low, high = budget.interval
     over = rows_of(
@@ -189,7 +188,6 @@ SMALLEST = 1e-6  # of the sum: smaller parts are in the tables, not in the pictu
 
 
 def _draw_bars(budget: Budget, at: int) -> Drawing:
-    """The parts at one temperature with their intervals, largest on top."""
     parts = _shown(budget, at)
     with style.figure(height=0.34 * len(parts) + 1.0, x="1/Q (1e−9)") as (made, axis):
         place = np.arange(len(parts))[::-1]
@@ -221,7 +219,6 @@ def _draw_course(budget: Budget, stated: StatedLoss | None, reference: float) ->
 
 
 def _draw_along(model: LossModel) -> Drawing:
-    """What the faces of the wall take part in, both together, over the meridian."""
     faces = model.vibration.faces
     area, order = faces[0].area + faces[1].area, np.argsort(faces[0].position)
     shares = {

@@ -153,7 +153,6 @@ def _effects(m: Mode, instrument: Instrument, T: float, tolerance: float) -> Ent
 
 
 def _split(m: Mode, instrument: Instrument, T: float) -> Entry | None:
-    """What the card's imperfection and electrodes make of a pair."""
     if m.theory == "rayleigh" or m.harmonic < 1 or not instrument.is_imperfect:
         return None
     from studies.resonator.splitting import SplitPair
@@ -170,7 +169,6 @@ def _split(m: Mode, instrument: Instrument, T: float) -> Entry | None:
 
 
 def _mount(m: Mode, instrument: Instrument, T: float) -> Entry | None:
-    """Shift and slope of a pair by the stress of [mount]."""
     mount = instrument.part("mount")
     if mount is None or m.theory != "solid" or not m.harmonic:
         return None
@@ -215,7 +213,6 @@ def _crystal(m: Mode, instrument: Instrument, T: float, tolerance: float) -> Ent
 
 
 def _effect_tables(modes: list[Entry]) -> list[Table]:
-    """Return the tables of what applies to the modes."""
     of = {key: [row for row in modes if key in row] for key in ("split", "mount", "films", "crystal")}
     strain = next((row["mount"]["strain_ppm"] for row in of["mount"]), 0.0)
     films = [row | film for row in of["films"] for film in row["films"]]
@@ -229,7 +226,6 @@ def _effect_tables(modes: list[Entry]) -> list[Table]:
 
 
 def _view(instrument: Instrument, harmonics: list[int], T: float, theory: str) -> "list[Block]":
-    """The lowest modes, to be turned."""
     drawn: Literal["solid", "shell"] = "solid" if theory == "solid" else "shell"
     words = " Rayleigh's closed form gives the frequencies of the table, not these shapes."
     remark = words if theory == "rayleigh" else ""
@@ -245,7 +241,6 @@ def _note(theory: str, share: float) -> str:
 
 
 def _all_orders(modes: list[Entry]) -> list[Sentence]:
-    """Warn where imperfections are too large for the first order."""
     found = []
     for row in modes:
         one, every = (row.get("split", {}).get(key, 0.0) for key in ("split_Hz", "every_order_split_Hz"))

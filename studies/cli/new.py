@@ -92,7 +92,6 @@ def _refuse_existing(path: str) -> None:
 
 
 def _other_tables(present: Collection[str]) -> Iterator[tuple[Any, str]]:
-    """Yield the keys and the heading of each table that a card may have and this one has not."""
     for name, entries in card_tables().items():
         for entry in entries if name not in (*present, "posterior") else ():
             keys = entry.keys if entry.keys_of is None else entry.keys_of({"name": "second-lag"}, "")

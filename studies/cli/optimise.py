@@ -165,7 +165,6 @@ def _parts(found: Answer, payload: dict[str, Any]) -> list[Any]:
 
 
 def _live(found: Answer) -> list[Block]:
-    """The best design's mode, with sliders of the free dimensions."""
     study = found.task.study
     names = [name for name in study.names[: found.task.free] if name.startswith("resonator.")]
     return moving_mode(best_instrument(found), names=names, derived=study.derived)
@@ -176,7 +175,6 @@ def _number(count: int, what: str) -> str:
 
 
 def _draw_history(found: "Answer") -> Drawing:
-    """The best so far, and the excess of every design over its limits."""
     over, t = found.history.T
     count = np.arange(1, len(over) + 1)
     held = over == 0
@@ -193,7 +191,6 @@ def _draw_history(found: "Answer") -> Drawing:
 
 
 def _draw_front(found: "Answer") -> Drawing:
-    """The first two objectives: every design that keeps the limits, the front, the design that is handed out."""
     columns = {column.name: column for column in found.task.study.columns}
     names = [one.column for one in found.task.keys.objective[:2]]
     titles = [f"{columns[n].label}{f' ({columns[n].unit})' if columns[n].unit != '1' else ''}" for n in names]

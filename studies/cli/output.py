@@ -15,7 +15,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
+from shell.errors import ShellError
 from studies.errors import InputError
+from studies.files.given import printable
 from studies.files.paths import guarded
 from studies.progress import Stages
 from studies.results import Result, Sentence
@@ -86,7 +88,6 @@ def check_ending(option: str, path: str, what: str, *endings: str) -> None:
 
 def _caveats_of(paths: Iterable[Path]) -> list[str]:
     """Return the caveats of the materials of all cards among some files, each once."""
-    from shell.errors import ShellError
     from studies.instrument.card import SCHEMA, load_card
 
     found: dict[str, None] = {}
@@ -139,8 +140,6 @@ def dump_json(payload: Mapping[str, Any]) -> str:
 
 def say(message: str) -> None:
     """Tell people something beside the result (standard error)."""
-    from studies.files.given import printable
-
     print(printable(message), file=sys.stderr)
 
 

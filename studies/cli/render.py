@@ -89,7 +89,6 @@ def _solve(
     cards: Sequence[str], harmonics: Sequence[int], index: int, temperatures: Sequence[float],
     theory: Literal["solid", "shell"], kind: str,
 ) -> list[ModeScene]:  # fmt: skip
-    """Solve every mode that is to be shown: cards × temperatures × harmonics."""
     if not cards:
         raise InputError("a card is missing: give its path or the name of a built-in one ('hrg cards').")
     count = len(cards) * max(len(temperatures), 1)

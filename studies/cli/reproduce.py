@@ -48,7 +48,6 @@ def reproduce(*, out: str = "report") -> Result:
 
 
 def _reproduce() -> "Reproduction":
-    """Compute every part of the page, telling which one is under way."""
     from studies.diagnosis.table import diagnose_table
     from studies.instrument.card import load_card
     from studies.papers import bias_twin, hrg

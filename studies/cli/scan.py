@@ -101,7 +101,6 @@ def scan(
 
 
 def _parts(found: Scan, payload: dict[str, Any]) -> list[Chapter]:
-    """What people read: splits, maps, harmonics, roundness, faces."""
     faces, splits = payload["faces"], payload["splits"]
     shown = ("wall", "offset") if len(faces) == 2 else tuple(faces)
     rim = max(w.position for w in found.waves)
@@ -128,7 +127,6 @@ def _parts(found: Scan, payload: dict[str, Any]) -> list[Chapter]:
 
 
 def _significant(split: dict[str, Any]) -> dict[str, Any]:
-    """A split that is not significant as its limit, without an axis."""
     if split["slow_axis_deg"] is not None:
         return split
     limit = f"< {plain(1e3 * split['split_Hz']['high'])}"
@@ -173,7 +171,6 @@ def _payload(found: Scan, name: str, temperature: float, files: dict[str, str]) 
 
 
 def _save(path: str, instrument: Instrument, found: Scan) -> None:
-    """Write the card with the faces as maps, and their tables first."""
     target, maps = Path(path).resolve(), []
     for name in found.faces:
         x, theta, values = found.map_of(name, columns=72)
@@ -198,7 +195,6 @@ def _write_maps(path: str, found: Scan) -> None:
 
 
 def _draw_maps(scan: Scan) -> Drawing:
-    """Return maps of wall and middle surface, or of the one face."""
     names = ["wall", "offset"] if len(scan.faces) == 2 else list(scan.faces)
     with figure(len(names), 1, 2.5 * len(names), squeeze=False) as (made, axes):
         for ax, name in zip(axes[:, 0], names, strict=True):
@@ -215,7 +211,6 @@ def _draw_maps(scan: Scan) -> Drawing:
 
 
 def _draw_harmonics(scan: Scan) -> Drawing:
-    """Return the amplitudes of the harmonics at the rim."""
     quantity = "wall" if len(scan.faces) == 2 else next(iter(scan.faces))
     rim = max(w.position for w in scan.waves)
     with figure(1, 1, 3.2) as (made, ax):

@@ -12,6 +12,7 @@ from studies.cli.arguments import Records
 from studies.cli.output import answers
 from studies.errors import InputError
 from studies.instrument.display import display_name
+from studies.reports import survey as parts
 from studies.reports.digits import plain
 from studies.results import Facts, Result, Sentence, row_of
 
@@ -29,7 +30,6 @@ def show(*runs: Records) -> Result:
     from studies.record import read_record
     from studies.record.survey import survey_record
     from studies.record.uses import find_uses
-    from studies.reports import survey as parts
 
     if not runs:
         raise InputError("no record given: hrg show RUN.csv [RUN.csv ...].")
@@ -72,7 +72,6 @@ def _facts(survey: "Survey") -> list[tuple[str, str, str]]:
 
 
 def _warnings(surveys: "list[Survey]") -> list[Sentence]:
-    """Say which readings look wrong, and how to leave them out."""
     found = [
         f"{survey.record.path}, {display_name(column.name)}: {words}: {count}"
         for survey in surveys

@@ -141,7 +141,6 @@ def trim(
 
 
 def _parts(planned: CardPlan, payload: dict[str, Any]) -> list[Chapter]:
-    """What people read: the cuts and what to measure, where they are, the splits expected."""
     first, plan = payload["rounds"][0], planned.plan
     in_order = sorted(first["cuts"], key=lambda one: (one["azimuth_deg"], one["position"]))
     cuts = [{"number": k, "done": "☐"} | one for k, one in enumerate(in_order, 1)]
@@ -237,7 +236,6 @@ def _state(state: SplitWave) -> dict[str, Any]:
 
 
 def _draw_polar(plan: TrimPlan, cuts: Sequence[dict[str, Any]]) -> Drawing:
-    """Return the cuts as bars on the rim, and the splits as curves around it, before and as expected after the cuts."""
     theta = np.linspace(0, 2 * np.pi, 721)
     with figure(1, 2, 4.2, subplot_kw={"projection": "polar"}) as (made, axes):
         titles = ("measured, with the cuts", "expected after the cuts")

@@ -158,7 +158,6 @@ def _lattice(objectives: int, count: int) -> list[Array]:
 
 
 def _refuse_infeasible(search: Search, best: int) -> None:
-    """Refuse limits that no design keeps."""
     goals, values = search.goals, search.values[best]
     if goals.violation(values, search.margins) == 0:
         return

@@ -99,7 +99,6 @@ def read_header(path: str | Path) -> list[str]:
 
 
 def _read_head(path: str | Path) -> tuple[tuple[str, ...], list[str], int, int]:
-    """See `_split_head`."""
     head = read_bytes(path, first=HEAD)
     if len(head) == HEAD:  # whole lines only
         try:

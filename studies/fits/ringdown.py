@@ -203,7 +203,6 @@ def _refuse_alias(path: str | Path, found: float, rate: float, expected: float) 
 
 
 def _refuse_other(path: str | Path, found: float, expected: float) -> None:
-    """Refuse a decay that is far from what the card predicts."""
     if not 0.8 < found / expected < 1.25:
         raise InputError(
             f"{path}: the decay is at {found:.6g} Hz, the card predicts {expected:.6g} Hz, {expected / found:.4g} times as much. Correct the sampling rate"

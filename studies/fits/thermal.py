@@ -6,7 +6,6 @@ that share a radiated part (`studies.inference.heat_path`), each run with a star
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy
@@ -20,10 +19,9 @@ from studies.inference.diagnosis import build_problem
 from studies.inference.heat_path import LAGS, SHARE, HeatPath, find_heat_path, slow_share
 from studies.inference.polynomial_card import polynomial_card
 from studies.inference.records import driving, make_ready
+from studies.instrument.card import Instrument
 from studies.record import Record
-
-if TYPE_CHECKING:
-    from studies.instrument.card import Instrument
+from studies.resonator.law import law_of
 
 NAMES = {f"law.{key}": f"time_constant_{k}" for k, key in enumerate(LAGS, 1)} | {
     SHARE: "radiated_share", "law.f0_Hz": "offset", "law.a1_per_K": "slope", "law.a2_per_K2": "curvature"
@@ -73,7 +71,7 @@ class ThermalFit:
 
 def fit_thermal_constants(
     records: Sequence[Record],
-    instrument: "Instrument | None" = None,
+    instrument: Instrument | None = None,
     lags: int | None = None,
     confidence: float = 0.9,
     progress: Callable[[str], None] = lambda _: None,
@@ -117,10 +115,8 @@ def fit_thermal_constants(
     )
 
 
-def curvature_of(instrument: "Instrument", reference: float) -> dict[str, dict[str, float]]:
+def curvature_of(instrument: Instrument, reference: float) -> dict[str, dict[str, float]]:
     """Return the bends a₂ and a₃ of a card's own law about a temperature (K), exact."""
-    from studies.resonator.law import law_of
-
     law = law_of(instrument, reference - 60.0, reference + 60.0)
     T = np.linspace(max(law.lowest, reference - 60.0), min(law.highest, reference + 60.0), 61)
     f = np.polynomial.Polynomial.fit(T - reference, law.frequency(T), 3).convert().coef

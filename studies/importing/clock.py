@@ -4,6 +4,8 @@ import datetime
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from studies.errors import InputError
 from studies.importing.mapping import NUMERIC_TIMES, OWN, SECONDS, UNIX, FileMap
 from studies.importing.raw import shorten
@@ -11,7 +13,6 @@ from studies.importing.tables import RawTable
 from studies.importing.zone import place_in_zone
 
 if TYPE_CHECKING:
-    import numpy as np
     import pandas as pd
     from numpy.typing import NDArray
 
@@ -89,8 +90,6 @@ def _place(
 
 def _check_span(seconds: "Array", table: RawTable, file: "FileMap") -> None:
     """Refuse times that span longer than any run, and name the units that would make a run of them."""
-    import numpy as np
-
     known = seconds[np.isfinite(seconds)]
     span = float(np.ptp(known)) if known.size else 0.0
     if span <= LONGEST_RUN:
@@ -111,8 +110,6 @@ def drop_repeated(
     table: RawTable, times: Times, file: "FileMap", repeated: "NDArray[np.bool_]"
 ) -> "tuple[Times, NDArray[np.intp]]":
     """Return strictly increasing times and the rows that they belong to; rows without a time, and those `repeated`, are left out."""
-    import numpy as np
-
     rule = file.repeated_times
 
     rows = np.flatnonzero(np.isfinite(times.seconds) & ~repeated)
@@ -164,8 +161,6 @@ def seconds_between(one: datetime.datetime, two: datetime.datetime, path: str) -
 
 def _from_first(seconds: "Array", epoch: datetime.datetime) -> "tuple[Array, datetime.datetime]":
     """Move the origin to the first whole second, so that small steps keep their digits."""
-    import numpy as np
-
     known = seconds[np.isfinite(seconds)]
     if not len(known) or not abs(known[0]) < 1e11:
         return seconds, epoch
@@ -175,7 +170,6 @@ def _from_first(seconds: "Array", epoch: datetime.datetime) -> "tuple[Array, dat
 
 def _read_stamps(table: RawTable, file: "FileMap") -> "tuple[Array, datetime.datetime]":
     """Parse stamps written as text; several time zones in one file are brought to UTC."""
-    import numpy as np
     import pandas as pd
 
     name = " ".join(file.time)
@@ -212,8 +206,6 @@ def _parse(text: "pd.Series[str]", form: str, table: RawTable, file: "FileMap") 
 
 def _unroll_midnights(seconds: "Array") -> "tuple[Array, int]":
     """Add a day whenever a clock without a date jumps back by more than half a day."""
-    import numpy as np
-
     known = np.flatnonzero(np.isfinite(seconds))
     jumps = np.diff(seconds[known]) < -_HALF_DAY
     unrolled = seconds.copy()
@@ -230,8 +222,6 @@ def _combine(start: datetime.datetime | None, clock: datetime.datetime) -> datet
 
 def _spread(t: "Array") -> "Array":
     """Spread rows with the same stamp evenly up to the next stamp; the last group takes the usual step."""
-    import numpy as np
-
     stamps, first, count = np.unique(t, return_index=True, return_counts=True)
     usual = float(np.median(np.diff(stamps))) if len(stamps) > 1 else 1.0
     width = np.append(np.diff(stamps), usual)

@@ -105,7 +105,6 @@ def _continues(paths: Sequence[str]) -> bool:
 
 
 def _load_text(lines: Sequence[str]) -> FileMap:
-    """Return the one file that a draft describes."""
     text = "\n".join([f'schema = "{SCHEMA}"', *lines])
     return read_keys(tomllib.loads(text), ImportMap, "draft").files[0]
 
@@ -156,7 +155,6 @@ def _one_unit(one: str, two: str) -> bool:
 
 
 def _draft_table(path: str) -> list[str] | None:
-    """Draft a table of settled readings: a file without a time, with one temperature and one frequency."""
     look = look_at(path)
     if look.header is None or any(re.search(TIME_WORDS, name.lower()) for name in look.names):
         return None

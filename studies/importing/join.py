@@ -1,5 +1,6 @@
 """Columns of several loggers, each with its own clock and rate, brought onto the times of one record."""
 
+import datetime
 import itertools
 from collections.abc import Sequence
 from contextlib import closing
@@ -164,7 +165,6 @@ def _name_clock(file: FileMap) -> str:
 
 
 def _report_empty(table: RawTable, file: FileMap) -> list[str]:
-    """Say which readings of the instruments are no values: overloads, and zeros of what cannot be zero."""
     kinds = "an instrument's overload", "0, a dropout"
     counts = {
         column.source: (
@@ -284,8 +284,6 @@ def _describe(column: ColumnMap, values: "Array", moved: bool) -> str:
 
 
 def _later(origin: "datetime.datetime", seconds: float) -> "datetime.datetime":
-    import datetime
-
     try:
         return origin + datetime.timedelta(seconds=seconds)
     except OverflowError:

@@ -3,6 +3,8 @@
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
+
 from studies.errors import InputError
 from studies.importing.channels import is_container, read_channel_table
 from studies.importing.mapping import FileMap
@@ -14,7 +16,6 @@ def read_parts(paths: Sequence[str | Path], file: FileMap) -> RawTable:
     """Read raw files that continue one another as one table."""
     if is_container(paths[0]):
         return read_channel_table(paths, file)
-    import numpy as np
     import pandas as pd
 
     plain = [table for table in (read_plain(path, file) for path in paths) if table is not None]

@@ -13,6 +13,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from studies.errors import InputError, MissingEnvironment, nearest
 from studies.files.columns import parse_fast
 from studies.files.reading import opened, read_bytes
@@ -20,7 +22,6 @@ from studies.importing.mapping import NUMERIC_TIMES, SEPARATORS, FileMap
 from studies.importing.tables import ParsedTable, Part, RawTable
 
 if TYPE_CHECKING:
-    import numpy as np
     import pandas as pd
     from numpy.typing import NDArray
 
@@ -52,13 +53,10 @@ class TextTable(RawTable):
 
     def is_empty(self, text: "pd.Series[str]") -> "NDArray[np.bool_]":
         """Tell which cells hold no value."""
-        import numpy as np
-
         return np.asarray(text.isin(["", *self.missing]))
 
     def read(self, column: str) -> "NDArray[np.float64]":
         """Return a column as numbers, NaN where a cell is empty; anything else is an error that names the line."""
-        import numpy as np
         import pandas as pd
 
         text = self.text(column)
@@ -199,7 +197,6 @@ def _split_lines(path: str | Path, text: str, file: "FileMap") -> list[list[str]
 
 
 def _head(path: str | Path, lines: Sequence[Sequence[str]], file: "FileMap") -> list[str]:
-    """Return the column names of the header line."""
     if len(lines) < file.header_line:
         raise InputError(f"{path}: has {len(lines)} lines, but header_line is {file.header_line} in the map.")
     if file.header_line == 0:

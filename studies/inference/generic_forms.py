@@ -114,7 +114,6 @@ def offsets(count: int) -> Effect:
 
 
 def _step(states: States, shape: Sequence[float], response: str) -> FloatArray:
-    """One step at one moment of one run."""
     run, moment = shape
     return np.asarray(np.clip((states.time - moment) / states.step + 0.5, 0.0, 1.0)[:, None] * (states.run == int(run)))
 

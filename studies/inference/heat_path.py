@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,9 +10,7 @@ from studies.calibration.fit import CardFit, fit
 from studies.calibration.priors import gather_priors
 from studies.calibration.problem import CardProblem
 from studies.inference.model import PRICE, Background, Linear
-
-if TYPE_CHECKING:
-    from studies.instrument.card import Instrument
+from studies.instrument.card import Instrument
 
 Array = NDArray[np.float64]
 FREQUENCY = "frequency_Hz"
@@ -36,7 +33,7 @@ SURE_SHARE = 3.0
 class HeatPath:
     """A card with lags in series, its fit and log `evidence`, choices paid for; `lead` is that ahead of one lag with other effects."""
 
-    card: "Instrument"
+    card: Instrument
     fit: CardFit
     evidence: float = 0.0
     lead: float = 0.0
@@ -68,7 +65,7 @@ class HeatPath:
         return priors.at(self.fit.point[:count])[name], sd
 
 
-def with_lags(card: "Instrument", lag: float, lags: int) -> "Instrument":
+def with_lags(card: Instrument, lag: float, lags: int) -> Instrument:
     """Return a polynomial card with so many lags in series where one of `lag` s stood, and a radiated share."""
     given = {
         key: {"value": part * lag, "sd": LAG_WIDTH * part * lag}
@@ -99,7 +96,7 @@ def find_heat_path(
     return _calibrated(whole, best.card, best.fit.point if whole.starts == lean.starts else None)
 
 
-def _calibrated(problem: CardProblem, card: "Instrument", start: Array | None = None) -> HeatPath:
+def _calibrated(problem: CardProblem, card: Instrument, start: Array | None = None) -> HeatPath:
     path = HeatPath(card, fit(replace(problem, instrument=card, priors=gather_priors(card)), start))
     return replace(path, evidence=evidence_of(path.fit) + path.price)
 

@@ -3,7 +3,6 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 from studies.calibration.fit import CardFit
 from studies.inference.clock import CLEAR, drift_of
@@ -13,9 +12,7 @@ from studies.inference.lack_of_fit import Leftover
 from studies.inference.model import Background
 from studies.inference.records import Campaign
 from studies.inference.search import Hypothesis, Outcome, Search
-
-if TYPE_CHECKING:
-    from studies.instrument.card import Instrument
+from studies.instrument.card import Instrument
 
 
 @dataclass(frozen=True, repr=False)
@@ -24,7 +21,7 @@ class Inferred:
     `held_out`, heat `path`.
     """
 
-    card: "Instrument"
+    card: Instrument
     fit: CardFit
     search: Search
     outcome: Outcome

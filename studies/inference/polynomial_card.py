@@ -6,7 +6,7 @@ Most probable values are those of a fit by least squares at the lag that leaves 
 """
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import scipy
@@ -16,11 +16,9 @@ from compensation.noise import white_rms
 from shell.constants import zero_Celsius
 from studies.calibration.fit import LASTING
 from studies.calibration.observed import ObservedRun, SettledTable, observe
+from studies.instrument.card import SCHEMA, Instrument, build_instrument
 from studies.record import Record
 from thermal.lag import lag
-
-if TYPE_CHECKING:
-    from studies.instrument.card import Instrument
 
 Array = NDArray[np.float64]
 LAGS = np.geomspace(30.0, 3e4, 40)
@@ -42,10 +40,8 @@ PER_KELVIN = 1e-4
 POWERS = {"frequency_Hz": 2, "inverse_q": 2, "bias_deg_per_h": 3}
 
 
-def polynomial_card(records: Sequence[Record], name: str = "") -> "Instrument":
+def polynomial_card(records: Sequence[Record], name: str = "") -> Instrument:
     """Return the card of a gyro with these records; InputError where they have no drive or response, or are too short."""
-    from studies.instrument.card import SCHEMA, build_instrument
-
     runs = observe(records, blocks=ROWS)
     housing = np.concatenate([run.inner.profile.value for run in runs])
     reference = float(np.round(0.5 * (housing.min() + housing.max()) - zero_Celsius, 1))
@@ -104,10 +100,8 @@ def polynomial_card(records: Sequence[Record], name: str = "") -> "Instrument":
     return build_instrument(content, "the records")
 
 
-def settled_card(table: SettledTable) -> "Instrument":
+def settled_card(table: SettledTable) -> Instrument:
     """Return the card of a gyro with this steady-state table: a parabola of wide level, slope and curvature."""
-    from studies.instrument.card import SCHEMA, build_instrument
-
     T, x = table.temperature - zero_Celsius, table.middled
     own = np.asarray(np.polyfit(x, table.frequency, 2)[::-1], dtype=float)
     law = _parabola(own, max(float(np.std(table.frequency)), table.rounding), float(x.max()), WIDE)

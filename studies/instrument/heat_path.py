@@ -49,7 +49,6 @@ def build_heat_path(
 
 
 def _cut_shell(resonator: "Resonator", stem_radius: float, count: int) -> "MeridianCells":
-    """Cut the shell's meridian, from its root to its free end, into the cells of the network."""
     from thermal.meridian import cut_meridian_table, lump
 
     s, r, h = _root_to_end(resonator, stem_radius)

@@ -9,7 +9,6 @@ weighs the assignments (Laplace). A further mode with derivative j would lower t
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy
@@ -19,13 +18,11 @@ from studies.calibration.estimates import NINETY, Estimate, find_groups
 from studies.calibration.posterior import posterior_card
 from studies.calibration.priors import Priors, check_exact, from_standard, gather_priors
 from studies.errors import InputError
+from studies.instrument.card import Instrument
 from studies.inversion.assignment import assign
 from studies.inversion.model import ModeFit, ModeModel, Which
 from studies.inversion.readings import ModeReadings
 from studies.inversion.remarks import unexplained, warn
-
-if TYPE_CHECKING:
-    from studies.instrument.card import Instrument
 
 Array = NDArray[np.float64]
 Progress = Callable[[str], None]
@@ -57,8 +54,8 @@ class ModeCalibration:
     """A card and what its modes say of it."""
 
     # card, instrument: as given; with the values found.
-    card: "Instrument"
-    instrument: "Instrument"
+    card: Instrument
+    instrument: Instrument
     readings: ModeReadings
     fit: ModeFit  # of the likeliest assignment
     estimates: tuple[Estimate, ...]
@@ -73,7 +70,7 @@ class ModeCalibration:
 
 
 def invert(
-    instrument: "Instrument", readings: ModeReadings, exact: Sequence[str] = (), progress: Progress = lambda _: None
+    instrument: Instrument, readings: ModeReadings, exact: Sequence[str] = (), progress: Progress = lambda _: None
 ) -> ModeCalibration:
     """Find the card's uncertain dimensions and elastic values from the frequencies of its modes."""
     priors = _priors(instrument, exact)
@@ -116,7 +113,7 @@ def invert(
     )
 
 
-def _priors(instrument: "Instrument", exact: Sequence[str]) -> Priors:
+def _priors(instrument: Instrument, exact: Sequence[str]) -> Priors:
     check_exact(instrument, exact)
     if instrument.polynomial is not None:
         raise InputError(f"{instrument.path}: a polynomial [law] has no modes; give [resonator] and [material].")
@@ -137,7 +134,6 @@ def _priors(instrument: "Instrument", exact: Sequence[str]) -> Priors:
 def _fit_likely(
     model: ModeModel, readings: ModeReadings, T: Array, relative: Array, progress: Progress
 ) -> list[ModeFit]:
-    """Fits of the likeliest assignments, best first."""
     y, start = np.log(readings.frequency), np.zeros(len(model.priors.values))
     n, k = readings.harmonic, readings.index
     if not (np.isnan(n) | np.isnan(k)).any():

@@ -72,7 +72,6 @@ class ModeModel:
         return found
 
     def _by_material(self, modes: Sequence[Which], u: Array, below: dict[str, float], above: dict[str, float]) -> Array:
-        """Change of ln f between two values of the material, by the energies of the modes."""
         one, other = self.instrument.with_values(below), self.instrument.with_values(above)
         change = []
         for mode in modes:

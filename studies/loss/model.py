@@ -122,7 +122,6 @@ def _thermoelastic(instrument: "Instrument", vibration: "Vibration", heat: "Call
 
 
 def _heat_law(instrument: "Instrument") -> "tuple[Callable[[float], Heat] | None, str]":
-    """Return expansion, capacity and conductivity over temperature, or what is lacking."""
     from shell.damping.heat import Heat
 
     material, thermal = instrument.material, instrument.thermal
@@ -146,7 +145,6 @@ def _heat_law(instrument: "Instrument") -> "tuple[Callable[[float], Heat] | None
 def _of_material(
     instrument: "Instrument", parts: "LossParts", spread: Mapping[str, float], left_out: list[str]
 ) -> "list[LossCause]":
-    """Loss of the bulk and of the surface, from the card or the table."""
     from shell.damping.budget import bulk_cause, surface_cause
     from shell.damping.sources import known_losses
 

@@ -3,22 +3,19 @@
 import math
 from collections.abc import Collection, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import msgspec
+import numpy as np
+from numpy.typing import NDArray
 
 from studies.errors import InputError
 from studies.files.writing import write_text
 from studies.instrument.units import unit_of
+from studies.record import Record
 from studies.schema.keys import Keys, number, says
 from studies.schema.reader import read_file, read_keys
 from studies.schema.spelling import spell_value
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
-    from studies.record import Record
 
 SCHEMA = "hrg.model/1"
 WIDENED = 0.05  # of a fitted range, on each side
@@ -145,7 +142,7 @@ class Model(ModelKeys, frozen=True, kw_only=True):
         kind: Any = Annotated[float, number(above=above, least=least)]
         return float(read_keys(self.settings[key], kind, f"{where}: {key}"))
 
-    def check_inputs(self, record: "Record", *columns: str, outputs: Collection[str]) -> None:
+    def check_inputs(self, record: Record, *columns: str, outputs: Collection[str]) -> None:
         """Refuse a column that this kind cannot compensate, and a record that lacks a column that it needs."""
         self.check_output(outputs)
         for name in (self.compensates, *columns):
@@ -170,10 +167,8 @@ class Model(ModelKeys, frozen=True, kw_only=True):
             raise InputError(f"{self.where} [validity]: the range of '{variable}' is missing; add it.")
         return self.validity[variable]
 
-    def check_range(self, variable: str, values: "NDArray[np.float64]", extrapolate: bool) -> None:
+    def check_range(self, variable: str, values: NDArray[np.float64], extrapolate: bool) -> None:
         """Refuse values of a variable outside the fitted range, unless told to extrapolate; NaN pass and stay missing."""
-        import numpy as np
-
         low, high = self.range_of(variable)
         outside = (values < low) | (values > high)
         if not extrapolate and np.any(outside):
@@ -193,13 +188,11 @@ def widen(low: float, high: float) -> tuple[float, float]:
 def make_part(
     name: str,
     names: Sequence[str],
-    values: "Sequence[float] | NDArray[np.float64]",
+    values: Sequence[float] | NDArray[np.float64],
     units: Sequence[str],
-    covariance: "NDArray[np.float64] | None" = None,
+    covariance: NDArray[np.float64] | None = None,
 ) -> ModelPart:
     """Build a part from arrays."""
-    import numpy as np
-
     columns = zip(names, map(float, values), units, strict=True)
     return ModelPart(
         name=name,

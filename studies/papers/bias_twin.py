@@ -204,7 +204,6 @@ def terms_table(twins: Twins) -> Table:
 
 
 def _draw_gains(twins: Twins) -> Drawing:
-    """Draw every gyro's improvement, held out against training."""
     paper = _fits(twins, "paper", 1)
     training = [fit.training_gain for fit in paper]
     x, y = (f"improvement factor, {run} run" for run in ("training", "held-out"))

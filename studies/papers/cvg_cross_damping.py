@@ -142,7 +142,6 @@ def twin_chapters(twin: CrossDampingTwin) -> list[Chapter]:
 
 
 def _determinants_table(twin: CrossDampingTwin) -> Table:
-    """Return what the improvement depends on: lag of the resonator and white noise."""
     rows = [(lag, *ratios) for lag, ratios in zip(twin.lags, twin.table, strict=True)]
     noises = [f"{k}: {noise:g} °/√h .1f" for k, noise in enumerate(twin.noises, 1)]
     note = (

@@ -105,7 +105,6 @@ def _curve(name: str, network: Network, weights: Array, law: FrequencyLaw, targe
 
 
 def _soak(protocol: str, name: str, network: Network, weights: Array, law: FrequencyLaw, hours: float) -> SoakResult:
-    """Read every point after `hours`."""
     row = shell_weights(tuple(node.name for node in network.nodes), weights)
     reach = _reach_from_room if protocol == PROTOCOLS[0] else _reach_upwards
     settled, read = law.frequency(POINTS_degC + zero_Celsius), law.frequency(reach(network, row, 3600 * hours))

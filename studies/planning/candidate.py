@@ -119,7 +119,6 @@ def simulate_candidates(found: Inferred, programmes: Sequence[Programme]) -> lis
 
 
 def _simulated(programme: Programme, card: "Instrument", law: "FrequencyLaw") -> ObservedRun:
-    """Return a candidate as a record of the card's own simulation would be observed."""
     chamber = programme.chamber
     steady = {column: np.full(len(chamber.time), value) for column, value in programme.steady.items()}
     drive = drive_by_schedule(chamber, steady, COARSE / (chamber.end - chamber.start))

@@ -10,14 +10,13 @@ energy of every effect of the library beyond what the card absorbs.
 """
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from shell.material import spell
 from studies.diagnosis.constants import CONSTANTS
-from studies.diagnosis.verdict import spell_structure
+from studies.diagnosis.verdict import Verdict, spell_structure
 from studies.effects import find_effect, library
 from studies.inference.inferred import Inferred
 from studies.inference.model import Background, Term
@@ -25,9 +24,6 @@ from studies.inference.search import Hypothesis
 from studies.planning.candidate import Candidate, Known, simulate_candidates, unabsorbed
 from studies.planning.chamber import Chamber
 from studies.planning.programme import BY_INPUT, NextRun, Programme, candidates
-
-if TYPE_CHECKING:
-    from studies.diagnosis.verdict import Verdict
 
 Array = NDArray[np.float64]
 MOST_RIVALS, CLOSE = 3, 10.0
@@ -47,7 +43,7 @@ Scored = tuple[float, tuple[str, str], Programme]
 
 
 def suggest(
-    found: Inferred, verdict: "Verdict", chamber: Chamber, progress: Callable[[str], None] = lambda words: None
+    found: Inferred, verdict: Verdict, chamber: Chamber, progress: Callable[[str], None] = lambda words: None
 ) -> Advice:
     """Return one or two sentences about the run that would tell most, and the run; None where nothing can be gained."""
     progress("the next run")
@@ -176,7 +172,7 @@ def _by_programme(term: Term) -> bool:
     return not (effect.event or effect.by_clock or effect.needs == ("quadrature",))
 
 
-def _look_again(found: Inferred, verdict: "Verdict", chamber: Chamber) -> Advice:
+def _look_again(found: Inferred, verdict: Verdict, chamber: Chamber) -> Advice:
     """Repeat a run to see whether what nobody explains recurs, then vary its input alone."""
     results = verdict.responses
     name = max(

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,13 +15,14 @@ from studies.inference.diagnosis import build_problem
 from studies.inference.model import SCALES, Background, Linear
 from studies.inference.search import Search, Shapes
 from studies.inference.signatures import Signatures
+from studies.instrument.card import Instrument
 from studies.planning.chamber import Chamber, limited
 from studies.planning.expectation import Chances, Expectation, Hidden, Key, hide
 from studies.record import Record
+from studies.resonator.law import law_of
+from studies.simulation.drive import drive_by_schedule
 from studies.simulation.noise import bias_noise, frequency_noise
-
-if TYPE_CHECKING:
-    from studies.instrument.card import Instrument
+from studies.simulation.prediction import MARGIN
 
 Array = NDArray[np.float64]
 SNRS, SURE, OFTEN, SMALLER = (1.0, 0.3, 0.1), 0.9, 0.05, 0.5
@@ -136,7 +137,7 @@ class Plan:
 
 
 def plan_campaign(
-    card: "Instrument",
+    card: Instrument,
     profiles: Sequence[str],
     chamber: Chamber | None = None,
     progress: Callable[[str], None] = lambda words: None,
@@ -195,12 +196,9 @@ def _least_snr(one: Prospect) -> float:
     return np.inf if least is None else least["snr"]
 
 
-def simulate_plan(card: "Instrument", profiles: Sequence[str]) -> list[Record]:
+def simulate_plan(card: Instrument, profiles: Sequence[str]) -> list[Record]:
     """Return the records of planned runs: the card's own simulation, with its noise."""
-    from studies.resonator.law import law_of
     from studies.simulation.chamber import load_schedule
-    from studies.simulation.drive import drive_by_schedule
-    from studies.simulation.prediction import MARGIN
     from studies.simulation.virtual_gyro import simulate_run
 
     schedules = [load_schedule(words) for words in profiles]
@@ -218,7 +216,7 @@ def simulate_plan(card: "Instrument", profiles: Sequence[str]) -> list[Record]:
     return [replace(run.record, path=f"planned run {k}") for k, run in enumerate(runs, 1)]
 
 
-def stated_noises(card: "Instrument", records: Sequence[Record]) -> dict[str, Noise]:
+def stated_noises(card: Instrument, records: Sequence[Record]) -> dict[str, Noise]:
     """Return the noise of every response as the card states it."""
     for response, key in WHITE.items():
         if getattr(card.noise, key) <= 0:

@@ -9,20 +9,17 @@ import datetime
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from compensation.arrays import Array
+from compensation.ringdown.laws import Law, Rows, fit_law
 from studies.errors import InputError, naming
 from studies.files.columns import read_columns, read_header
 from studies.files.reading import read_bytes
 from studies.fits.ringdown import POWERS, Decay
 from studies.record import Record, check_plausible, write_record
-
-if TYPE_CHECKING:
-    from compensation.ringdown.laws import Law
 
 TEMPERATURE, AMPLITUDE = "housing_temperature_degC", "vibration_amplitude_V"
 RESPONSES = ("frequency_Hz", "inverse_q")
@@ -86,10 +83,8 @@ def _sd(decay: Decay, name: str) -> float:
     return 0.0 if found is None else found.sd
 
 
-def fit_laws(decays: Decays) -> "dict[str, Law]":
+def fit_laws(decays: Decays) -> dict[str, Law]:
     """Fit the laws of ln f and of 1/Q, `fitted` in their own units; none where there are fewer than four readings or nothing varies."""
-    from compensation.ringdown.laws import Rows, fit_law
-
     found = {}
     for name in RESPONSES:
         value = decays.columns.get(name)

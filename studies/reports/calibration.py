@@ -106,7 +106,6 @@ def calibration_parts(found: Calibration, payload: Mapping[str, Any]) -> list[Ch
 
 
 def _scaled(name: str, row: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a row of numbers of a response in the unit that they are shown in."""
     unit, scale = SHOWN[name]
     numbers = {key: scale * value if isinstance(value, float) else value for key, value in row.items()}
     if name == SETTLED:

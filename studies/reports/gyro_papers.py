@@ -68,7 +68,6 @@ def _summarise_filters(study: cvg_filters.FilterStudy) -> dict[str, Any]:
 
 
 def _claims_chapter(found: LoopClaims) -> Chapter:
-    """Return the chapter on what is claimed of loops, and what the simulation says."""
     (drift, drift_closed), (mean, mean_closed) = found.drift, found.mean_rate
     text = (
         f"A damping anisotropy of 1 % at Q = 1e7 causes a drift of {drift:.3f} °/h in the simulation ({drift_closed:.3f} in closed form)."

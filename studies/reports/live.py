@@ -12,7 +12,7 @@ import hashlib
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.polynomial import Chebyshev
@@ -23,6 +23,7 @@ from shell.family import Axis, Family, build_family
 from shell.interpolation import leja_points
 from shell.layout import Theory
 from shell.modes import Mode, nearest_mode
+from shell.resonator import Resonator
 from studies.errors import UNUSABLE_INPUT
 from studies.instrument.card import Instrument
 from studies.progress import tell
@@ -33,9 +34,6 @@ from studies.results.page import Block, Embedded, fill_template
 from studies.sweeps.case import Case
 from studies.sweeps.expressions import Derived
 from studies.sweeps.parameters import find_nominal, set_parameters
-
-if TYPE_CHECKING:
-    from shell.resonator import Resonator
 
 DIMENSIONS = ("thickness_mm", "radius_mm", "height_mm", "stem.radius_mm", "bottom_thickness_mm", "cylinder_height_mm")
 MOST_AXES = 3
@@ -151,7 +149,7 @@ def _families(
     span = float(nu.min()) - MARGIN, float(nu.max()) + MARGIN
 
     def build(n: int, index: int, tolerance: float) -> Family:
-        def resonator(values: Array) -> "Resonator":
+        def resonator(values: Array) -> Resonator:
             return designs.make(values).resonator
 
         return build_family(

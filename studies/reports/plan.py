@@ -103,7 +103,6 @@ def plan_parts(plan: Plan, profiles: Sequence[str]) -> list[Chapter]:
 
 
 def _draw(plan: Plan) -> Drawing:
-    """Chance that each effect is identified at a range of SNR."""
     snrs = 10.0 ** np.arange(-2.0, 1.51, 0.5)
     table = [[one.at(one.chances.named, float(snr)) for snr in snrs] for one in plan.prospects]
     shares = np.array([[np.nan if share is None else share for share in row] for row in table])

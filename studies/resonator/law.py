@@ -4,6 +4,7 @@ from dataclasses import replace
 from math import inf
 from typing import TYPE_CHECKING, cast
 
+from shell.errors import ShellError
 from studies.errors import InputError, naming
 
 if TYPE_CHECKING:
@@ -65,8 +66,6 @@ def moved_law(law: "FrequencyLaw", instrument: "Instrument") -> "FrequencyLaw":
     """Return the law of an instrument whose material or mount has moved; solved anew where Poisson's ratio has left the law's."""
     if instrument.polynomial is not None:
         return law_of(instrument, law.lowest, law.highest)
-    from shell.errors import ShellError
-
     try:
         return replace(law.with_material(instrument.material), mount=instrument.part("mount"))
     except ShellError:

@@ -79,7 +79,6 @@ def _rule(corners: str, widths: Sequence[int]) -> str:
 def _row(
     cells: Sequence[Sequence[str]], widths: Sequence[int], numeric: Sequence[bool], bar: str, style: str = "{}"
 ) -> Iterator[str]:
-    """Yield the lines of one row of folded cells."""
     for parts in zip_longest(*cells, fillvalue=""):
         padded = []
         for part, width, number in zip(parts, widths, numeric, strict=True):

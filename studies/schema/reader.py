@@ -57,7 +57,6 @@ def read_toml(path: str | FilePath, schema: str | None = None) -> dict[str, Any]
 
 
 def _spell_syntax(text: str, error: str) -> str:
-    """Return the line of a syntax error, and what is wrong there."""
     found = re.search(r"\(at line (\d+), column \d+\)$", error)
     lines = text.splitlines()
     number = int(found.group(1)) if found else 0

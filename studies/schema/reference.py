@@ -84,7 +84,6 @@ def spell_uncertainty(row: Mapping[str, Any]) -> str:
 
 
 def _describe(field: inspect.Field) -> dict[str, Any]:
-    """Return what a field says of its key."""
     parts = field.type.types if isinstance(field.type, inspect.UnionType) else (field.type,)
     noted = [one for one in parts if isinstance(one, inspect.Metadata)]
     said = {key: value for one in noted for key, value in (one.extra_json_schema or {}).items()}

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +15,7 @@ from compensation.start_up import StartUp, start_up
 from compensation.wave import StandingWave
 from compensation.whole_angle import close_without_rate
 from studies.errors import naming
+from studies.instrument.card import Instrument
 from studies.simulation.loop import (
     DEG_PER_H,
     electronics_of,
@@ -27,9 +27,6 @@ from studies.simulation.loop import (
     settled_columns,
     wave_of,
 )
-
-if TYPE_CHECKING:
-    from studies.instrument.card import Instrument
 
 Array = NDArray[np.float64]
 ERRORS = {
@@ -76,7 +73,7 @@ class BiasSlope:
 class LoopStudy:
     """What the loops of a card are like at one temperature; `noise` by source: deg/h over 1 s, deg/√h over 100 s."""
 
-    instrument: "Instrument"
+    instrument: Instrument
     frequency: float
     inverse_q: float
     bryan_factor: float
@@ -106,7 +103,7 @@ class LoopStudy:
 
 
 def study_loops(
-    instrument: "Instrument", frequency: float, inverse_q: float, bryan_factor: float, rate: float = 0.0
+    instrument: Instrument, frequency: float, inverse_q: float, bryan_factor: float, rate: float = 0.0
 ) -> LoopStudy:
     """Return margins, bias by source, noise by source, start and range of a card's loops, the range under a rate (rad/s)."""
     loop = require_loop(instrument)
@@ -191,7 +188,7 @@ def bias_slopes(study: LoopStudy) -> tuple[BiasSlope, ...]:
 
 
 def _bias_of(
-    instrument: "Instrument", frequency: float, inverse_q: float, bryan_factor: float
+    instrument: Instrument, frequency: float, inverse_q: float, bryan_factor: float
 ) -> Callable[[dict[str, float]], float]:
     """Bias (deg/h) of the settled loops as a function of values of the card."""
 
@@ -203,9 +200,7 @@ def _bias_of(
     return bias
 
 
-def _sources(
-    instrument: "Instrument", frequency: float, inverse_q: float, bryan_factor: float
-) -> tuple[BiasSource, ...]:
+def _sources(instrument: Instrument, frequency: float, inverse_q: float, bryan_factor: float) -> tuple[BiasSource, ...]:
     """Bias of each source: what goes when its keys are 0; its spread: the card's uncertain values, moved by their sd."""
     bias = _bias_of(instrument, frequency, inverse_q, bryan_factor)
     total = bias({})
@@ -231,14 +226,14 @@ def _ends(value: float, sd: float, key: str) -> tuple[float, float]:
     return max(value - sd, least), value + sd
 
 
-def _close(instrument: "Instrument", wave: StandingWave, electronics: Electronics, loops: Loops) -> ClosedLoop:
+def _close(instrument: Instrument, wave: StandingWave, electronics: Electronics, loops: Loops) -> ClosedLoop:
     if require_loop(instrument).mode == "whole-angle":
         return close_without_rate(wave, electronics, loops)
     return close_loops(wave, electronics, loops, 0.0, float(np.radians(instrument.bias.pattern_angle_deg)))[0]
 
 
 def _noise(
-    instrument: "Instrument", wave: StandingWave, electronics: Electronics, loops: Loops, seconds: tuple[float, ...]
+    instrument: Instrument, wave: StandingWave, electronics: Electronics, loops: Loops, seconds: tuple[float, ...]
 ) -> dict[str, Array]:
     """Standard deviation (deg/h) of means of the rate over these times, of each source that there is and of all."""
     there = [name for name in NOISES if getattr(electronics.noise, name) > 0]

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shell.constants import zero_Celsius
+from studies.effects import find_effect
 from studies.loss.damping_law import DampingLaw
 from studies.resonator.law import law_of
 from studies.simulation.drive import COLUMN, Drive
@@ -103,8 +104,6 @@ def law_for(
     instrument: "Instrument", drive: Drive, margin: float = MARGIN, theory: "Theory" = "solid"
 ) -> "FrequencyLaw":
     """Build the frequency law over the temperatures of a drive and the reference; over all that the material allows for effects on it."""
-    from studies.effects import find_effect
-
     if any(find_effect(one.name).thermal for one in instrument.effects):
         return law_of(instrument, theory=theory)
     reached = np.append(drive.profile.value, instrument.reference_temperature)

@@ -15,6 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shell.constants import zero_Celsius
+from studies.effects import apply_effects
+from studies.effects.states import States
 from studies.errors import InputError, naming
 from studies.resonator.splitting import mean_shift
 from studies.simulation.drive import Drive
@@ -150,9 +152,6 @@ def _apply_effects(
     """Sum what the card's effects add to the resonator's temperature (K) and to the responses; they need even rows."""
     if not instrument.effects:
         return {}
-    from studies.effects import apply_effects
-    from studies.effects.states import States
-
     time = drive.time - drive.time[0]
     step = np.diff(time)
     even = time

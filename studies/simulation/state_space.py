@@ -117,7 +117,6 @@ def write_state_space(study: "LoopStudy", path: str) -> None:
 
 
 def _cells(value: Any) -> Any:
-    """Turn tuples of names into arrays of objects, which become cell arrays."""
     if isinstance(value, dict):
         return {key: _cells(item) for key, item in value.items()}
     return np.array(value, dtype=object) if isinstance(value, tuple) else value

@@ -153,7 +153,6 @@ class Variations:
 
 
 def _number(instrument: "Instrument", name: str) -> float:
-    """Return an exact number of the card."""
     try:
         return float(look_up(instrument.content, name))
     except (LookupError, TypeError, ValueError):

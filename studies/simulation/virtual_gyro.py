@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from compensation.noise import Noise
 from shell.constants import zero_Celsius
+from studies.effects import find_effect
 from studies.instrument.tables.noise import SILENT
 from studies.record import Record
 from studies.resonator.law import unknown_slope
@@ -167,8 +168,6 @@ def idle_effects(instrument: "Instrument", drive: Drive) -> tuple[str, ...]:
     """Name the effects whose drive (amplitude, voltage, quadrature) the run does not have; an azimuth it always has."""
     if not instrument.effects:
         return ()
-    from studies.effects import find_effect
-
     return tuple(
         f"the effect '{effect.name}' does not act in this run, which lacks its drive ({', '.join(find_effect(effect.name).needs)})."
         for effect in instrument.effects

@@ -71,7 +71,6 @@ def fill_in(derived: Sequence[Derived], values: Mapping[str, Any], in_card: Look
 
 
 def _look_up(one: Derived, name: str, values: Mapping[str, Any], in_card: LookUp) -> float:
-    """Return the value of a name: of a parameter, else of the card."""
     beside = f"{one.name.rpartition('.')[0]}.{name}"
     table = f"{one.name.split('.')[0]}.{name}"
     ending = [known for known in values if known.endswith(f".{name}")]

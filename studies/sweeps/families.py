@@ -265,7 +265,6 @@ def _describe(
 
 
 def _range(study: "Study", design: "Design", k: int) -> tuple[float, float]:
-    """Return the ends of a numeric parameter over the designs, its range and its nominal value."""
     p, values = study.parameters[k], design.values[:, k]
     return min(float(values.min()), p.low, float(p.nominal)), max(float(values.max()), p.high, float(p.nominal))
 

@@ -14,6 +14,7 @@ from studies.errors import InputError
 from studies.progress import Progress
 from studies.sweeps.block import Batch
 from studies.sweeps.canonical import PHYSICS_VERSION, digest, spell, spell_material
+from studies.sweeps.child import check_function
 from studies.sweeps.cluster import check_private
 from studies.sweeps.definition import FREE, Study
 from studies.sweeps.design import Design, draw, nominal_row
@@ -151,8 +152,6 @@ def check_functions(study: Study, allowed: bool) -> dict[str, str]:
         raise InputError(
             f"the study runs Python code of its own ({', '.join(Path(f).name for f in study.functions)}); read it, and allow it with --allow-python."
         )
-    from studies.sweeps.child import check_function
-
     return {Path(function).name: check_function(function) for function in study.functions}
 
 

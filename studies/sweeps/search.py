@@ -167,7 +167,6 @@ def find_tolerance(explorer: Explorer, search: ToleranceSearch) -> dict[str, Any
 
 
 def _tolerance(parameter: "StudyParameter", factor: float) -> dict[str, Any]:
-    """What a parameter's tolerance becomes."""
     middle = float(parameter.nominal)
     if parameter.standard_deviation is not None:
         return {"name": parameter.name, "standard_deviation": factor * parameter.standard_deviation}

@@ -137,7 +137,7 @@ class Store:
     def about(self) -> dict[str, Any]:
         """Return what the study is: identity, spec, instrument, number of cases, when it was made."""
         if self.study is None:
-            raise InputError(f"{self.path}: holds no study yet, or was truncated. Run the study again.")
+            raise InputError(f"{self.path}: holds no study yet, or the file was truncated. Run it again.")
         return self.study
 
     def check_same(self, identity: Mapping[str, Any]) -> None:

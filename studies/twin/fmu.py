@@ -9,15 +9,12 @@ import tempfile
 import zipfile
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 from xml.sax.saxutils import quoteattr
 
 from studies.files.writing import written_whole
-from studies.twin.plan import idle_input, input_starts, symbol
+from studies.twin.plan import Plan, idle_input, input_starts, symbol
 from studies.twin.source import CORE, FMI, exposed, one_line, outputs_of, sources
-
-if TYPE_CHECKING:
-    from studies.twin.plan import Plan
 
 Version = Literal["2.0", "3.0"]
 OUT, USE, IN, PARAMETER = 100, 199, 200, 1000  # value references, as fmi.c has them
@@ -47,7 +44,7 @@ def compiler() -> str | None:
     return next((found for name in (os.environ.get("CC"), "cc", "gcc") if name and (found := shutil.which(name))), None)
 
 
-def write_fmu(plan: "Plan", path: str | Path, version: Version) -> bool:
+def write_fmu(plan: Plan, path: str | Path, version: Version) -> bool:
     """Write an FMU, whole or not at all, and return whether it holds a binary beside its sources."""
     texts = sources(plan, FMI)
     name = "hrg_" + re.sub(r"\W", "_", plan.instrument.name, flags=re.ASCII)
@@ -80,7 +77,7 @@ def _compile(texts: Mapping[str, str]) -> bytes | None:
         return Path(folder, "twin.so").read_bytes() if done.returncode == 0 else None
 
 
-def describe(plan: "Plan", version: Version, name: str, token: str) -> str:
+def describe(plan: Plan, version: Version, name: str, token: str) -> str:
     """Return modelDescription.xml."""
     rows = list(_variables(plan))
     units = dict.fromkeys(unit for *_, unit, _ in rows)
@@ -128,7 +125,7 @@ def describe(plan: "Plan", version: Version, name: str, token: str) -> str:
 Row = tuple[int, str, str, str, float | None]
 
 
-def _variables(plan: "Plan") -> Iterator[Row]:
+def _variables(plan: Plan) -> Iterator[Row]:
     """Yield the real variables: reference, name, causality, unit, value at the start."""
     for k, name in enumerate(outputs_of(plan)):
         yield OUT + k, name, "output", symbol(name), None

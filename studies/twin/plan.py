@@ -9,8 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shell.constants import zero_Celsius
+from studies.effects import find_effect
+from studies.effects.effect import check_effect
 from studies.errors import InputError
 from studies.instrument.units import unit_of
+from studies.resonator.splitting import mean_shift, reference_split
 from studies.simulation.heat_path import SENSOR, behind_housing, build_network, slowest_lag, with_sensor
 from studies.simulation.response import observed_rows
 from thermal.network import assemble
@@ -173,7 +176,6 @@ EFFECTS = (
 
 
 def _card_numbers(instrument: "Instrument") -> Iterator[tuple[str, float]]:
-    """Yield the numbers of the tables that act, by their dotted keys."""
     for table in TABLES:
         keys = getattr(instrument, table)
         if keys is None:
@@ -212,10 +214,6 @@ def _spline(curve: "CubicSpline") -> Spline:
 
 
 def _place_effects(instrument: "Instrument", parameters: dict[str, float]) -> Iterator[EffectRow]:
-    """Add the shapes and weights of the card's effects to the parameters, and yield their rows."""
-    from studies.effects import find_effect
-    from studies.effects.effect import check_effect
-
     for number, one in enumerate(instrument.effects, 1):
         effect = find_effect(one.name)
         shape, weights = check_effect(one.name, one.parameters, one.response)
@@ -236,8 +234,6 @@ def _place_effects(instrument: "Instrument", parameters: dict[str, float]) -> It
 
 def _constants(instrument: "Instrument", law: "FrequencyLaw", boundary: "Boundary") -> dict[str, float]:
     """Numbers that are no keys of the card: the solver's, and those of imperfection and electrodes."""
-    from studies.resonator.splitting import mean_shift, reference_split
-
     T0, polynomial = instrument.reference_temperature, instrument.polynomial
     keys = instrument.part("electrodes").keys if instrument.part("electrodes").are_charged else None
     split, shift, own, per_volt = 0j, 0.0, 0.0, 0.0

@@ -4,18 +4,14 @@ import hashlib
 import math
 from collections.abc import Iterable, Sequence
 from importlib.resources import files
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from studies.simulation.heat_path import LEAST_LAG, SENSOR, SENSOR_SHARE
 from studies.simulation.virtual_gyro import COMMAND_DIGITS, DIGITS
-from studies.twin.plan import EFFECTS, MEMORY, PAST, PRECESSION, Spline, input_starts
+from studies.twin.plan import EFFECTS, MEMORY, PAST, PRECESSION, Plan, Spline, input_starts
 from thermal.constants import Stefan_Boltzmann
-
-if TYPE_CHECKING:
-    from studies.twin.plan import Plan
-    from thermal.network import Conductor, Radiator
+from thermal.network import Conductor, Radiator
 
 CORE = ("heat.c", "effects.c", "loops.c", "gyro.c")
 SHARED = ("twin.h", *CORE)
@@ -27,13 +23,13 @@ LOOP_OUTPUTS = ("quadrature_V", "pattern_angle_deg")
 RATE_OUTPUT = "measured_rate_deg_per_s"
 
 
-def outputs_of(plan: "Plan") -> tuple[str, ...]:
+def outputs_of(plan: Plan) -> tuple[str, ...]:
     """Return the columns that the twin gives, in the order of a record."""
     loops = LOOP_OUTPUTS if plan.instrument.loop is not None else ()
     return (*OUTPUTS, *loops, RATE_OUTPUT)
 
 
-def sources(plan: "Plan", names: Iterable[str]) -> dict[str, str]:
+def sources(plan: Plan, names: Iterable[str]) -> dict[str, str]:
     """Return the text of the files by name: shared ones, and those of the card."""
     folder = files("studies.twin") / "sources"
     found = {name: (folder / name).read_text(encoding="utf-8") for name in (*SHARED, *names)}
@@ -42,7 +38,7 @@ def sources(plan: "Plan", names: Iterable[str]) -> dict[str, str]:
     return {**found, "card.h": head.replace("@TOKEN@", token), "card.c": body}
 
 
-def card_header(plan: "Plan") -> str:
+def card_header(plan: Plan) -> str:
     """Return card.h: sizes, names of parameters and outputs, and single numbers."""
     card, network = plan.instrument, plan.network
     nodes = [node.name for node in network.nodes]
@@ -85,14 +81,14 @@ def card_header(plan: "Plan") -> str:
     return "\n".join(lines)
 
 
-def card_body(plan: "Plan") -> str:
+def card_body(plan: Plan) -> str:
     """Return card.c: the tables."""
     network, outputs = plan.network, outputs_of(plan)
     place = {name: k for k, name in enumerate(network.names)}
     order = list(plan.parameters)
     keys = plan.key_of
 
-    def link(part: "Conductor | Radiator", kind: str) -> str:
+    def link(part: Conductor | Radiator, kind: str) -> str:
         own = f"radiated {part.name}" if kind == "radiated" else part.name
         if SENSOR in (part.one, part.other):
             return f"{{{place[part.one]}, {place[part.other]}, -1, 0}}"
@@ -146,7 +142,7 @@ def card_body(plan: "Plan") -> str:
     return "\n".join(parts)
 
 
-def exposed(plan: "Plan", key: str) -> str:
+def exposed(plan: Plan, key: str) -> str:
     """Return the name of a parameter that may be changed; "" of one that is no key of the card, or does not act."""
     value = plan.parameters[key]
     fixed = ("loss.",) * ("loss" in plan.splines) + ("thermal.",) * (plan.instrument.polynomial is not None)

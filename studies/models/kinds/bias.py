@@ -11,13 +11,11 @@ ten seconds; when a block is complete its mean and the slope of the line through
 which holds until the next block is complete.
 """
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from msgspec.structs import replace
 from numpy.typing import NDArray
 
-from compensation.bias import FREQUENCY, PLAY, TEMPERATURE, TERMS, Variable, term_columns
+from compensation.bias import FREQUENCY, PLAY, TEMPERATURE, TERMS, BiasFit, BiasRun, Variable, term_columns
 from compensation.decimation import average_blocks
 from compensation.derivative import differentiate
 from compensation.memory import NO_MEMORY, Memory, follow_lag, follow_play
@@ -27,9 +25,6 @@ from studies.models.bias_c import CausalBias, write_c
 from studies.models.file import Model, ModelSource, Setting, make_part, widen
 from studies.record import COMPENSATED, Record
 
-if TYPE_CHECKING:
-    from compensation.bias import BiasFit, BiasRun
-
 Array = NDArray[np.float64]
 OUTPUTS = {"bias_deg_per_h": "deg/h", "measured_rate_deg_per_s": "deg/s"}
 BLOCK = 10.0  # s over which the frequency is averaged before it is used
@@ -38,7 +33,7 @@ LEAST_BLOCKS = 3  # and half a window, before a causal rate is known
 
 
 def save_bias(
-    fit: "BiasFit", run: "BiasRun", output: str, column: str, sources: tuple[ModelSource, ...], made_by: str
+    fit: BiasFit, run: BiasRun, output: str, column: str, sources: tuple[ModelSource, ...], made_by: str
 ) -> Model:
     """Return a fitted bias model; `run` tells how the rate was taken, `output` the column fitted, `column` over which."""
     units = [OUTPUTS[output], *(unit_of_term(OUTPUTS[output], name, fit.variable) for name in fit.terms)]

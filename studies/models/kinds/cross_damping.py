@@ -5,11 +5,11 @@ The file has one part "cross-damping" (zeta_0, zeta_1 …, per power of °C of s
 """
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from compensation.cross_damping import CrossDampingModel
 from shell.constants import zero_Celsius
 from studies.errors import InputError
 from studies.models.c_source import head, polynomial, self_test
@@ -17,15 +17,12 @@ from studies.models.file import Model, ModelPart, ModelSource, make_part, widen
 from studies.record import COMPENSATED, Record
 from studies.record.rest import celsius_range
 
-if TYPE_CHECKING:
-    from compensation.cross_damping import CrossDampingModel
-
 OUTPUTS = {"bias_deg_per_h": math.radians(1 / 3600), "measured_rate_deg_per_s": math.radians(1.0)}
 """Columns that a cross-damping model can compensate, with the size of their unit in rad/s."""
 
 
 def save_cross_damping(
-    fit: "CrossDampingModel", output: str, temperature_column: str, sources: tuple[ModelSource, ...], made_by: str
+    fit: CrossDampingModel, output: str, temperature_column: str, sources: tuple[ModelSource, ...], made_by: str
 ) -> Model:
     """Return a fitted ζ₁₂(T) as a model that compensates the column `output`."""
     order = len(fit.coefficients) - 1
@@ -48,10 +45,8 @@ def save_cross_damping(
     )
 
 
-def load_cross_damping(model: Model) -> "CrossDampingModel":
+def load_cross_damping(model: Model) -> CrossDampingModel:
     """Return the fit that a model file holds."""
-    from compensation.cross_damping import CrossDampingModel
-
     part = _part(model)
     low, high = model.range_of(model.temperature_column)
     return CrossDampingModel(

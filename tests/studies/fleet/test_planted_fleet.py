@@ -191,7 +191,7 @@ def test_a_device_that_ends_its_worker_costs_no_other():
         ("serial,bach\nA,1\n", "unknown column 'bach'; did you mean 'batch'"),
         ("date\n2024-01-01\n", "the column serial is missing"),
         ("serial,date\nA,yesterday\n", "line 2: date 'yesterday' is not of the form 2024-05-31"),
-        ("serial,date\nZ,2024-01-01\n", "line 2: there is no folder of device 'Z'"),
+        ("serial,date\nZ,2024-01-01\n", "line 2: no folder of device 'Z'"),
         ("serial\nA\nA\n", "line 3: device 'A' is listed twice"),
     ],
 )
