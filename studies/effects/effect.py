@@ -99,15 +99,15 @@ class Effect:
     # temperature in K when the effect `acts_on` the temperature (frequency, bias and 1/Q then follow by themselves),
     # else a change of the response in its own unit.
     columns: Callable[[States, Shape, str], FloatArray]
-    # callable (span, response) -> list of shapes: Shapes to look at, fine enough for a scan; all equally likely
-    # beforehand.
-    grid: Callable[[Span, str], Sequence[tuple[float, ...]]]
     # mapping from response to number: How large the first coefficient is in strong cases that sources show; smaller
     # sizes are likely as well, down to a ten thousandth, every decade as much. Frequency and 1/Q count in parts of
     # their level. Its keys are the responses on which the effect acts directly.
     sizes: Mapping[str, float]
     sensor: str = ""
     shape: tuple[Parameter, ...] = ()  # parameters that enter nonlinearly
+    # callable (span, response) -> list of shapes: Shapes to look at, fine enough for a scan; all equally likely
+    # beforehand. One, without parameters, unless given.
+    grid: Callable[[Span, str], Sequence[tuple[float, ...]]] = lambda span, response: [()]
     acts_on: str = "response"  # "temperature" or "response"
     law_key: str = ""  # key of [law] that takes its place in a heat path of several lags
     needs: tuple[str, ...] = ()  # drives (fields of `States`) that must be measured and must vary

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from studies.effects.effect import Coefficient, Effect, Shape, Span
+from studies.effects.effect import Coefficient, Effect, Shape
 from studies.effects.states import FloatArray, States
 
 
@@ -13,11 +13,6 @@ def columns(states: States, shape: Shape, response: str) -> FloatArray:
     return np.stack([power, power**2], axis=1)
 
 
-def grid(span: Span, response: str) -> list[tuple[float, ...]]:
-    """No shape parameter."""
-    return [()]
-
-
 EFFECT = Effect(
     name="amplitude-frequency",
     summary="the frequency depends on the vibration amplitude: a nonlinear spring",
@@ -25,7 +20,6 @@ EFFECT = Effect(
     isolate="step the drive amplitude at constant temperature: an instant change, which the bias does not follow",
     coefficients=(Coefficient("slope_{unit}_per_V2"), Coefficient("quartic_{unit}_per_V4", (0.1,))),
     columns=columns,
-    grid=grid,
     sizes={"frequency_Hz": 1e-4},
     needs=("amplitude_squared",),
 )

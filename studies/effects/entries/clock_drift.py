@@ -1,17 +1,12 @@
 """Clock drift: the gyro's own clock runs ever faster or slower."""
 
-from studies.effects.effect import Coefficient, Effect, Shape, Span
+from studies.effects.effect import Coefficient, Effect, Shape
 from studies.effects.states import FloatArray, States
 
 
 def columns(states: States, shape: Shape, response: str) -> FloatArray:
     """Measured frequency f (1 + c t): a straight line in time, per day."""
     return (states.campaign_time / 86400.0)[:, None]
-
-
-def grid(span: Span, response: str) -> list[tuple[float, ...]]:
-    """No shape parameter."""
-    return [()]
 
 
 EFFECT = Effect(
@@ -22,7 +17,6 @@ EFFECT = Effect(
     sensor="a reference clock (reference_frequency_Hz)",
     coefficients=(Coefficient("drift_{unit}_per_day"),),
     columns=columns,
-    grid=grid,
     sizes={"frequency_Hz": 2e-5},
     equivalents={"frequency_Hz": ("ageing",)},
     judge="reference_frequency_Hz",

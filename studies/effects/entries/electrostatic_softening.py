@@ -3,7 +3,7 @@
 import numpy as np
 
 from shell.electrodes import soften_at_gap
-from studies.effects.effect import Coefficient, Effect, Shape, Span
+from studies.effects.effect import Coefficient, Effect, Shape
 from studies.effects.states import FloatArray, States
 
 
@@ -14,11 +14,6 @@ def columns(states: States, shape: Shape, response: str) -> FloatArray:
     return np.stack([soften_at_gap(-1.0, power), soften_at_gap(-1.0, power) * power], axis=1)
 
 
-def grid(span: Span, response: str) -> list[tuple[float, ...]]:
-    """No shape parameter."""
-    return [()]
-
-
 EFFECT = Effect(
     name="electrostatic-softening",
     summary="the electrode voltage softens the resonator: the frequency falls with its square",
@@ -26,7 +21,6 @@ EFFECT = Effect(
     isolate="step the electrode voltage at constant temperature: an instant change, proportional to its square",
     coefficients=(Coefficient("softening_{unit}_per_V2"), Coefficient("narrowing_{unit}_per_V4", (1e-5,))),
     columns=columns,
-    grid=grid,
     sizes={"frequency_Hz": 2e-8},
     needs=("voltage_squared",),
     positive=True,

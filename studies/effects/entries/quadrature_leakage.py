@@ -3,7 +3,7 @@
 import numpy as np
 
 from compensation.rebalance import leak_quadrature
-from studies.effects.effect import Coefficient, Effect, Shape, Span
+from studies.effects.effect import Coefficient, Effect, Shape
 from studies.effects.states import FloatArray, States
 
 
@@ -11,11 +11,6 @@ def columns(states: States, shape: Shape, response: str) -> FloatArray:
     """B = V_q (φ₀ + φ₁ x), x = T_r − T₀ in units of 10 K."""
     assert states.quadrature is not None
     return np.stack([leak_quadrature(states.quadrature, phase) for phase in (1.0, states.excess / 10.0)], axis=1)
-
-
-def grid(span: Span, response: str) -> list[tuple[float, ...]]:
-    """No shape parameter."""
-    return [()]
 
 
 EFFECT = Effect(
@@ -26,7 +21,6 @@ EFFECT = Effect(
     sensor="the quadrature control's voltage (quadrature_V)",
     coefficients=(Coefficient("leakage_{unit}_per_V"), Coefficient("leakage_slope_{unit}_per_V_per_10K", (0.2,))),
     columns=columns,
-    grid=grid,
     sizes={"bias_deg_per_h": 20.0},
     needs=("quadrature",),
 )

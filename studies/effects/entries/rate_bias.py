@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from studies.effects.effect import Coefficient, Effect, Shape, Span
+from studies.effects.effect import Coefficient, Effect, Shape
 from studies.effects.states import FloatArray, States, lag
 
 
@@ -10,11 +10,6 @@ def columns(states: States, shape: Shape, response: str) -> FloatArray:
     """B ∝ dT_r/dt, and its product with the temperature as in HRG paper eqs. (21), (22); the same behind 5 min."""
     late = lag(states.rate, states.step, LATE)
     return np.stack([states.rate, states.rate * states.excess, late - states.rate], axis=1)
-
-
-def grid(span: Span, response: str) -> list[tuple[float, ...]]:
-    """No shape parameter."""
-    return [()]
 
 
 LATE = 300.0
@@ -33,6 +28,5 @@ EFFECT = Effect(
         Coefficient("late_{unit}_per_K_per_s", (0.2,)),
     ),
     columns=columns,
-    grid=grid,
     sizes={"bias_deg_per_h": 1000.0},
 )

@@ -1,17 +1,12 @@
 """Rate frequency: a gradient across the resonator shifts its frequency."""
 
-from studies.effects.effect import Coefficient, Effect, Shape, Span
+from studies.effects.effect import Coefficient, Effect, Shape
 from studies.effects.states import FloatArray, States
 
 
 def columns(states: States, shape: Shape, response: str) -> FloatArray:
     """δf ∝ dT_r/dt: the frequency responds to the gradient that a changing temperature brings."""
     return states.rate[:, None]
-
-
-def grid(span: Span, response: str) -> list[tuple[float, ...]]:
-    """No shape parameter."""
-    return [()]
 
 
 EFFECT = Effect(
@@ -22,7 +17,6 @@ EFFECT = Effect(
     sensor="two thermometers across the resonator's mount",
     coefficients=(Coefficient("coefficient_{unit}_per_K_per_s"),),
     columns=columns,
-    grid=grid,
     delay=1,
     sizes={"frequency_Hz": 0.02},
     equivalents={"frequency_Hz": ("thermometer-lag",)},

@@ -1,6 +1,6 @@
 """Self-heating: the power of the vibration warms the resonator above its housing."""
 
-from studies.effects.effect import Coefficient, Effect, Shape, Span
+from studies.effects.effect import Coefficient, Effect, Shape
 from studies.effects.states import FloatArray, States, lag
 
 
@@ -10,11 +10,6 @@ def columns(states: States, shape: Shape, response: str) -> FloatArray:
     return lag(states.amplitude_squared, states.step, states.tau)[:, None]
 
 
-def grid(span: Span, response: str) -> list[tuple[float, ...]]:
-    """No shape parameter."""
-    return [()]
-
-
 EFFECT = Effect(
     name="self-heating",
     summary="the power of the vibration warms the resonator, delayed by the thermal time constant",
@@ -22,7 +17,6 @@ EFFECT = Effect(
     isolate="step the drive amplitude at constant temperature: heating follows with the thermal lag, and the bias with it",
     coefficients=(Coefficient("heating_K_per_V2"),),
     columns=columns,
-    grid=grid,
     sizes={"frequency_Hz": 10.0},
     acts_on="temperature",
     needs=("amplitude_squared",),

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from studies.effects.effect import Coefficient, Effect, Shape, Span
+from studies.effects.effect import Coefficient, Effect, Shape
 from studies.effects.states import FloatArray, States, lag
 
 
@@ -10,11 +10,6 @@ def columns(states: States, shape: Shape, response: str) -> FloatArray:
     """The true housing temperature is T_s + τ_s dT_s/dt; behind the resonator's lag τ that adds τ_s d lag(T_s; τ)/dt."""
     late = lag(states.housing, states.step, states.tau)
     return np.gradient(late, states.step)[:, None] if late.size > 1 else np.zeros((late.size, 1))
-
-
-def grid(span: Span, response: str) -> list[tuple[float, ...]]:
-    """No shape parameter."""
-    return [()]
 
 
 EFFECT = Effect(
@@ -25,7 +20,6 @@ EFFECT = Effect(
     sensor="a fast thermometer on the housing",
     coefficients=(Coefficient("sensor_time_constant_s"),),
     columns=columns,
-    grid=grid,
     delay=-1,
     sizes={"frequency_Hz": 300.0},
     acts_on="temperature",

@@ -12,6 +12,8 @@ def library() -> dict[str, type[Quantity]]:
     """Return every quantity of this folder by name."""
     found: dict[str, type[Quantity]] = {}
     for module in pkgutil.iter_modules(__path__):
-        quantity: type[Quantity] = importlib.import_module(f"{__name__}.{module.name}").QUANTITY
-        found[str(quantity.__struct_config__.tag)] = quantity
+        path = f"{__name__}.{module.name}"
+        for one in vars(importlib.import_module(path)).values():
+            if isinstance(one, type) and issubclass(one, Quantity) and one.__module__ == path:
+                found[str(one.__struct_config__.tag)] = one
     return found

@@ -14,6 +14,3 @@ class BryanFactor(OvertoneQuantity, frozen=True, kw_only=True, tag="bryan-factor
     def evaluate(self, case: Case) -> tuple[Number, ...]:
         """Return the factor."""
         return (Number(self.mode(case).bryan_factor),)
-
-
-QUANTITY = BryanFactor

@@ -41,6 +41,3 @@ class CompensationResidual(HarmonicQuantity, frozen=True, kw_only=True, tag="com
         f = np.array([case.modes(self.harmonic, 1, self.theory, x + zero_Celsius)[0].frequency for x in T])
         fit = fit_frequency(T, f, self.order, float(np.mean(T)))
         return (Number(float(np.sqrt(np.mean(fit.residuals**2)))), Number(float(np.abs(fit.temperature(f) - T).max())))
-
-
-QUANTITY = CompensationResidual

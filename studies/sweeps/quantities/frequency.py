@@ -15,6 +15,3 @@ class Frequency(OvertoneQuantity, frozen=True, kw_only=True, tag="frequency"):
         """Return the frequency."""
         mode = self.mode(case)
         return (Number(mode.frequency, mode.frequency * mode.relative_error_estimate),)
-
-
-QUANTITY = Frequency

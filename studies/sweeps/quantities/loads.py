@@ -38,6 +38,3 @@ class LoadsOfDesign(Quantity, frozen=True, kw_only=True, tag="loads"):
             Number(1e6 * STANDARD_GRAVITY * abs(loads.sag({"lateral": 1.0}).tilt)),
             Number(1e-6 * max(stresses)),
         )
-
-
-QUANTITY = LoadsOfDesign

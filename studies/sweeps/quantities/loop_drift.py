@@ -31,6 +31,3 @@ class LoopDrift(Quantity, frozen=True, kw_only=True, tag="loop-drift"):
         found = study_loops(instrument, mode.frequency, inverse_q, mode.bryan_factor)
         total = found.sources[-1]
         return Number(total.bias), Number(total.sd), Number(found.noise["all"][1])
-
-
-QUANTITY = LoopDrift

@@ -56,6 +56,3 @@ def _kind(name: str) -> str:
     if name in PARTS:
         return name
     return "mount" if name in MOUNT else "activated" if name.startswith("activated") else "films"
-
-
-QUANTITY = Loss

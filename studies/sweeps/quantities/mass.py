@@ -18,6 +18,3 @@ class Mass(Quantity, frozen=True, kw_only=True, tag="mass"):
         resonator, elastic = case.instrument.at(case.instrument.reference_temperature)
         found = weigh(resonator, elastic.rho)
         return Number(1e3 * found.mass), Number(1e3 * found.center)
-
-
-QUANTITY = Mass

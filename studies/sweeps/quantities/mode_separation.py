@@ -66,6 +66,3 @@ class ModeSeparation(ModeQuantity, frozen=True, kw_only=True, tag="mode-separati
         if not self.distances:
             return []
         return [(n, k) for n in range(self.highest + 1) for k in range(self.each - (n == self.harmonic))]
-
-
-QUANTITY = ModeSeparation

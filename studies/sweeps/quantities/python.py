@@ -29,6 +29,3 @@ class Python(Quantity, frozen=True, kw_only=True, tag="python"):
         from studies.sweeps.child import ask
 
         return (Number(ask(self.function, self.time_limit_s, case)),)
-
-
-QUANTITY = Python

@@ -27,6 +27,3 @@ class QualityFactor(ModeQuantity, frozen=True, kw_only=True, tag="q"):
         total = float(budget.inverse_q[0])
         warm = sum(float(part.inverse_q[0]) for part in budget.parts if part.name == "thermoelastic")
         return Number(1 / total), Number(warm / total)
-
-
-QUANTITY = QualityFactor

@@ -31,6 +31,3 @@ class Split(ModeQuantity, frozen=True, kw_only=True, tag="split"):
         whole = SplitPair(case.instrument, case.mode(self.harmonic, 0, self.theory, T), T)
         split = whole.of_every_order() if self.order == "every" else whole.split
         return Number(split.hertz), Number(math.degrees(split.slow_axis))
-
-
-QUANTITY = Split

@@ -33,6 +33,3 @@ class SplitPerWave(ModeQuantity, frozen=True, kw_only=True, tag="split-per-wave"
         whole = SplitPair(alone, case.mode(self.harmonic, 0, self.theory, T), T)
         split = whole.imperfection if self.order == 2 * self.harmonic else whole.of_every_order()
         return (Number(split.hertz / AMPLITUDE),)
-
-
-QUANTITY = SplitPerWave

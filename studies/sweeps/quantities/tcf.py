@@ -30,6 +30,3 @@ class TemperatureCoefficient(ModeQuantity, frozen=True, kw_only=True, tag="tcf")
         values = (found.total, *(getattr(found, part) for part in PARTS))
         errors = (of_nu, 0.0, of_nu, 0.0, of_h, of_h)
         return tuple(Number(1e6 * float(value), 1e6 * error) for value, error in zip(values, errors, strict=True))
-
-
-QUANTITY = TemperatureCoefficient

@@ -29,6 +29,3 @@ class ThermalTimeConstants(Quantity, frozen=True, kw_only=True, tag="thermal-tim
         path = find_relaxation(build_network(case.instrument), T).time_constants[: self.count]
         alone = find_relaxation(build_shell_and_stem(case.instrument), T).time_constants[0]
         return tuple(Number(float(tau)) for tau in (*path, alone))
-
-
-QUANTITY = ThermalTimeConstants
