@@ -24,21 +24,12 @@ from numpy.typing import ArrayLike
 from compensation.arrays import Array
 from compensation.errors import CompensationError
 from compensation.noise_regression import fit_coloured
+from compensation.ringdown.answer import Estimate
 from compensation.samples import read_columns, require_regular
 
 LEAST_TURN = 2 * np.pi  # least span of x (rad): one period of what is looked for
 LEAKS = ("leak", "leak cos", "leak sin")
 LEAST_CONTRAST = 0.05  # least spread of the turn rate over its largest: below it, turning both ways is missing
-
-
-@dataclass(frozen=True)
-class WaveEstimate:
-    """A value with its standard deviation and the ends of its interval."""
-
-    value: float
-    sd: float
-    low: float
-    high: float
 
 
 @dataclass(frozen=True)
@@ -49,7 +40,7 @@ class WaveFit:
     `frequency_axis` (rad), `gain_ratio` δ, `skew` κ (rad), `phase_error` ε (rad), `rate` (rad/s, what is left of the rate).
     """
 
-    estimates: dict[str, WaveEstimate]
+    estimates: dict[str, Estimate]
     undetermined: tuple[str, ...]
     confidence: float
 
@@ -122,7 +113,7 @@ def fit_whole_angle(
     if W is not None:
         estimates |= _polar("frequency", *W, harmonic)
     estimates = _widen(estimates, harmonic, coupling)
-    found = {name: WaveEstimate(value, sd, value - z * sd, value + z * sd) for name, (value, sd) in estimates.items()}
+    found = {name: Estimate.normal(value, sd, z) for name, (value, sd) in estimates.items()}
     return WaveFit(found, tuple(undetermined), confidence)
 
 

@@ -70,14 +70,10 @@ def calibrate(
         found = workbench.calibrate(instrument, *data, hold_out=hold_out or None, exact=exact, progress=told)
     for warning in found.warnings:
         say(f"warning: {warning}")
-    refused = save is not None and found.unsaved is not None
-    if refused:
-        say(f"{save} not saved: {found.unsaved}.")
-        save = None
-    keep_card(found.instrument, save)
-    payload = _payload(found, list(data), save)
+    saved = keep_card(found.instrument, save, found.unsaved)
+    payload = _payload(found, list(data), saved)
     title, lead = f"Calibration of {found.card.name}", parts.lead(found, data)
-    return Result(payload, title, lead, parts.calibration_parts(found, payload), 2 if refused else 0)
+    return Result(payload, title, lead, parts.calibration_parts(found, payload), 2 * (saved != save))
 
 
 def _payload(found: Calibration, data: list[str], save: str | None) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from studies.cli.output import keep_card, say
+from studies.cli.output import keep_card
 from studies.instrument.card import Instrument
 from studies.instrument.display import display_name
 from studies.inversion.invert import EXCLUDED, ModeCalibration, decided, invert
@@ -45,12 +45,8 @@ def calibrate_modes(instrument: Instrument, path: str, save: str | None, exact: 
     """Calibrate a card by a table of modes, and save it."""
     with Told("calibration", STAGES) as told:
         found = invert(instrument, read_modes(path), exact, told)
-    refused = save is not None and unsaved(found)
-    if refused:
-        say(f"{save} not saved: {refused}.")
-        save = None
-    keep_card(found.instrument, save)
-    payload = _payload(found, save)
+    saved = keep_card(found.instrument, save, unsaved(found))
+    payload = _payload(found, saved)
     values = [
         {**one, "unit": one["unit"] if one["unit"] != "1" else "", "told": TOLD[one["told_by"]]}
         for one in sorted(payload["values"], key=lambda one: float(one["width"]))
@@ -72,7 +68,7 @@ def calibrate_modes(instrument: Instrument, path: str, save: str | None, exact: 
             Table("Modes", modes, MODES, READ),
             Table("Measure next", payload["next_modes"], NEXT, MEASURE),
         ],
-        2 if refused else 0,
+        2 * (saved != save),
     )
 
 

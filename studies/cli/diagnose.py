@@ -6,9 +6,9 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from studies import workbench
-from studies.cli.output import answers, say
+from studies.cli.output import answers, keep_card, say
 from studies.errors import InputError
-from studies.instrument.card import load_card, save_card
+from studies.instrument.card import load_card
 from studies.planning.chamber import Chamber, parse_chamber
 from studies.progress import Told
 from studies.reports.diagnosis import diagnosis_parts, headline
@@ -95,13 +95,10 @@ def _campaign(runs: tuple[str, ...], card: str | None, limits: Chamber | None, s
         ask = workbench.diagnose_records
         found = ask(records, instrument, limits, told)
         extended = extend(found, told) if save is not None and isinstance(found, Inference) else None
-    refused = extended is not None and not extended.fit.converged
-    if refused:
-        say(f"{save} not saved: the calibration of the extended card did not converge.")
-        save = None
-    if save is not None and extended is not None:
-        save_card(extended.instrument, save)
-        say(f"extended model: {save}")
-    payload = {**found.verdict.as_dict(), "extended_model": save}
+    saved = save
+    if extended is not None:
+        against = "" if extended.fit.converged else "the calibration of the extended card did not converge"
+        saved = keep_card(extended.instrument, save, against, "extended model")
+    payload = {**found.verdict.as_dict(), "extended_model": saved}
     parts = diagnosis_parts(found)
-    return Result(payload, "Diagnosis of a campaign", headline(found.verdict), parts, 2 if refused else 0)
+    return Result(payload, "Diagnosis of a campaign", headline(found.verdict), parts, 2 * (saved != save))

@@ -51,10 +51,8 @@ def fit_bias(
         say(f"reading {path}")
         records.append(read_record(path))
     study = study_bias(records, method, average, window, causal=causal, over=over, progress=say)
-    refused = save is not None and study.opposite is not None
-    if refused:
-        say(f"{save} not saved: the runs have biases of opposite sign.")
-    keep_model(study.model, None if refused else save)
+    against = "the runs have biases of opposite sign" if study.opposite is not None else ""
+    saved = keep_model(study.model, save, against)
     judged, other = study.by(method), study.by("paper" if method == "guarded" else "guarded")
     variable = judged.fit.variable.name
     return Result(
@@ -73,7 +71,7 @@ def fit_bias(
             Chapter("Stability", parts.stability_parts(study)),
         ],
         sources=parts.SOURCES,
-        status=2 if refused else 0,
+        status=2 * (saved != save),
     )  # fmt: skip
 
 

@@ -102,22 +102,27 @@ def _caveats_of(paths: Iterable[Path]) -> list[str]:
     return list(found)
 
 
-def keep_card(instrument: "Instrument", path: str | None) -> None:
-    """Save a card where a path was given, and say so."""
+def keep_card(instrument: "Instrument", path: str | None, against: str | None = "", kind: str = "card") -> str | None:
+    """Save a card where a path was given and nothing speaks against it, say so, and return where it is."""
     from studies.instrument.card import save_card
 
-    if path is not None:
-        save_card(instrument, path)
-        say(f"card: {path}")
+    return _keep(lambda: save_card(instrument, str(path)), kind, path, against)
 
 
-def keep_model(model: "Model", path: str | None) -> None:
-    """Save a model where a path was given, and say so."""
+def keep_model(model: "Model", path: str | None, against: str = "") -> str | None:
+    """Save a model likewise."""
     from studies.models import write_model
 
-    if path is not None:
-        write_model(model, path)
-        say(f"model: {path}")
+    return _keep(lambda: write_model(model, str(path)), "model", path, against)
+
+
+def _keep(write: Callable[[], object], kind: str, path: str | None, against: str | None) -> str | None:
+    if path is None or against:
+        say(f"{path} not saved: {against}.") if path is not None else None
+        return None
+    write()
+    say(f"{kind}: {path}")
+    return path
 
 
 def keep_record(record: "Record", path: str) -> None:

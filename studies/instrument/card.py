@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from importlib.resources import files
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Generic, TypeVar
 
 from shell.constants import zero_Celsius
 from studies.errors import InputError, nearest
@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from studies.instrument.tables.thermal import Thermal
     from thermal.resonator import HeatPath
 
+T = TypeVar("T")
 SCHEMA = "hrg.card/1"
 OF_GEOMETRY = ("resonator", "material", "thermal", "mount", "imperfection", "electrodes", "loop")
 """Tables that a card without geometry cannot have."""
@@ -47,6 +48,17 @@ class Head(Keys, frozen=True, kw_only=True):
     ] = 20.0
 
 
+class Said(Generic[T]):
+    """What a table of a card has become (`Instrument.part`), with its type."""
+
+    def __init__(self, *names: str) -> None:
+        self.names = names
+
+    def __get__(self, card: "Instrument", _: object) -> T:
+        found: T = card.part(*self.names)
+        return found
+
+
 @dataclass(frozen=True)
 class Instrument:
     """One instrument: the typed parts of its card."""
@@ -59,6 +71,13 @@ class Instrument:
     # The card as written, in the units of its keys: for saving, hashing, and names of parameters only.
     content: Mapping[str, Any] = field(default_factory=dict, repr=False, compare=False)
     path: str = field(default="", compare=False)  # the file it came from
+
+    polynomial: ClassVar["Said[PolynomialLaw | None]"] = Said("law")  # None where the card has a geometry
+    thermal: ClassVar["Said[Thermal]"] = Said("thermal")
+    bias: ClassVar["Said[Bias]"] = Said("bias")
+    loss: ClassVar["Said[Loss]"] = Said("loss")
+    noise: ClassVar["Said[NoiseKeys]"] = Said("noise")
+    effects: ClassVar["Said[tuple[EffectEntry, ...]]"] = Said("effect", "effects")
 
     def part(self, table: str, name: str = "") -> Any:
         """Return what a table of the card has become; `name` tells the parts of one table apart."""
@@ -81,51 +100,15 @@ class Instrument:
         return found
 
     @property
-    def polynomial(self) -> "PolynomialLaw | None":
-        """The law of a gyro without geometry; None where the card has one."""
-        found: PolynomialLaw | None = self.part("law")
-        return found
-
-    @property
     def is_imperfect(self) -> bool:
         """Whether the card says anything that could split a pair; else the resonator is a body of revolution."""
         own, electrodes = self.part("imperfection"), self.part("electrodes")
         return bool(own.fields is not None or own.split is not None or electrodes.are_charged)
 
     @property
-    def thermal(self) -> "Thermal":
-        """The table `[thermal]` with its defaults."""
-        found: Thermal = self.part("thermal")
-        return found
-
-    @property
-    def bias(self) -> "Bias":
-        """Zero-rate output."""
-        found: Bias = self.part("bias")
-        return found
-
-    @property
-    def loss(self) -> "Loss":
-        """1/Q over temperature."""
-        found: Loss = self.part("loss")
-        return found
-
-    @property
     def loop(self) -> "Loop | None":
         """The loops that read the gyro; None where the card has no such table."""
         return self.part("loop") if "loop" in self.content else None
-
-    @property
-    def noise(self) -> "NoiseKeys":
-        """What a record is read with."""
-        found: NoiseKeys = self.part("noise")
-        return found
-
-    @property
-    def effects(self) -> "tuple[EffectEntry, ...]":
-        """The effects that extend the model."""
-        found: tuple[EffectEntry, ...] = self.part("effect", "effects")
-        return found
 
     @cached_property
     def heat_path(self) -> "HeatPath":
