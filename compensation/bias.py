@@ -1,12 +1,8 @@
 """Bias of the gyro as a function of its own frequency and of its rate of change, HRG paper eqs. (19)–(22).
 
 B = B₀ + k₁ f + k₂ f² + k₃ f³ + k₄ ḟ + k₅ ḟ² + k₆ ḟ³ + k₇ f ḟ + k₈ f² ḟ + k₉ f ḟ², f the *change* of frequency (Hz),
-ḟ its rate (Hz/s), B in the unit of the bias column. Which terms are taken is decided in `compensation.bias_selection`.
-
-A gyro whose frequency is not measured has a thermometer instead: then f stands for the change of its temperature (°C).
-A thermometer is not the sensing element, so the temperature may first pass a lag, and a tenth candidate is the `play`
-p − T of a backlash p that follows T at a distance of no more than w: the loop between cooling and warming
-(`compensation.memory`).
+ḟ its rate (Hz/s), B in the unit of the bias column. Without a frequency f is the change of a temperature (°C) behind a
+lag, and a tenth candidate the `play` p − T of a backlash p (`compensation.memory`).
 """
 
 from collections.abc import Sequence

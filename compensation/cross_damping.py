@@ -1,14 +1,9 @@
 """Bias of a Coriolis vibratory gyro from cross-damping that varies with temperature, and its compensation.
 
-Equation numbers are those of the CVG cross-damping paper (Apostolyuk, Chikovani). Equations (1), (2) are in
-`compensation.motion`; (3) is printed with k₁ in its cross-damping term where (2), (4) and (8) have k₂, and k₂ is right.
-
-Against the full equations (2), integrated with the carrier and demodulated, the slow model (8), (9) errs by 0.23 ζ in
-the complex amplitude and by 2.6 ζ² in its part in phase with a rate, for a ζ₁₂ that changes within 1/(kζ): 1e-3 of the
-bias at ζ = 0.02, 1e-8 at Q = 10 000.
-
-Only the product ζ₁₂ · 2k/g₂ is seen in the output, so the *scale* of ζ₁₂ is as good as k; and the printed
-coefficients of (10) would mean tens of rad/s, so they serve as the shape ζ₁₂(T)/ζ₁₂(0) only.
+Equation numbers are those of the CVG cross-damping paper (Apostolyuk, Chikovani), whose (3) prints k₁ for k₂. The slow
+model (8), (9) errs by 0.23 ζ in the complex amplitude and by 2.6 ζ² in its part in phase with a rate: 1e-3 of the bias
+at ζ = 0.02. Only the product ζ₁₂ · 2k/g₂ is seen, so the *scale* of ζ₁₂ is as good as k; the printed (10) serves as the
+shape ζ₁₂(T)/ζ₁₂(0) only.
 """
 
 from collections.abc import Sequence

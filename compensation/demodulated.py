@@ -1,11 +1,8 @@
 """Demodulated dynamics of a Coriolis vibratory gyro: the angular rate is the input, the secondary amplitude the output.
 
-Equation numbers are those of the paper on demodulated dynamics and optimal noise filtering for CVGs. Its equation (7)
-for the complex amplitudes follows from the motion equations (4) without approximation; `motion.propagate_envelope`
-solves it together with everything that (4) leaves out. `compensation.derivation.transfer_functions` derives (8)–(24).
-
-How far to trust which: (12) neglects the reaction of the secondary on the primary, an error of order (Ω/kζ)²; (24) also
-the second derivative, of order ζ + λ/ω, and the mismatch of the two modes.
+Equation numbers are those of the CVG paper on demodulated dynamics and optimal noise filtering; (7) is exact
+(`motion.propagate_envelope` solves it). (12) neglects the reaction of the secondary, of order (Ω/kζ)²; (24) also the
+second derivative, of order ζ + λ/ω, and the mismatch of the two modes.
 """
 
 from dataclasses import dataclass

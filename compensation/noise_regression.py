@@ -1,16 +1,9 @@
 """Least squares with correlated errors: white noise and a random walk, estimated from the same rows.
 
-Rows that are means over equal steps have differences of white noise and a walk that remember one step: 1 + θ² on the diagonal of their
-covariance and −θ beside it, in units of the innovations, with θ = 1 for white noise and √3 − 2 for a walk alone. In levels of
-`noise.Noise` that is N²/Δ = θ + (1 − θ)²/6 and K² Δ = (1 − θ)². The factor of this tridiagonal matrix whitens y and every column, exactly
-and in O(rows), which makes ordinary least squares and its F-tests valid again; θ comes from restricted likelihood (Patterson & Thompson
-1971, Biometrika 58, 545), which does not take the freedom of the fit for quietness.
-
-Newey–West covariances, even prewhitened, do not do here: on records of noise alone, regressed on a smooth
-temperature, they call a term significant at 5 % in 60 to 85 % of the cases once a random walk or flicker noise
-is present; with this factor the rate stays near 5 %.
-
-Rows that are not even, flicker noise and offsets of runs are in `noise_rows`.
+Differences of means over equal steps remember one step: 1 + θ² on the diagonal of their covariance and −θ beside it, θ
+= 1 for white noise, √3 − 2 for a walk; N²/Δ = θ + (1 − θ)²/6, K² Δ = (1 − θ)². Its factor whitens y and every column in
+O(rows), so that ordinary F-tests hold (5 % of noise alone is called significant; Newey–West: 60 to 85 %); θ by
+restricted likelihood (Patterson & Thompson 1971, Biometrika 58, 545). Uneven rows, flicker, offsets: `noise_rows`.
 """
 
 import itertools

@@ -1,10 +1,9 @@
 """Most probable values: Gauss–Newton steps in coloured noise that is estimated beside them.
 
-At first the noise of each response is all of its residual; once a whole step has kept what it promised, its levels are those of
-highest marginal likelihood, the free coordinates integrated out (`compensation.noise_rows`); where steps then leave no less, the
-model cannot follow all responses at once, and the noise of each is judged given the others. With rows whitened by it,
-(JᵀJ + 1) Δ = Jᵀ r − u, damped until the step keeps its promise, then bent as the valley bends. Blocks whose innovation stands
-out by more than 5 standard deviations are given the variance that they show: one outlier moves nothing.
+Noise levels are at first those of the whole residual, then those of highest marginal likelihood
+(`compensation.noise_rows`), at last of each response given the others. With rows whitened by it, (JᵀJ + 1) Δ = Jᵀ r −
+u, damped until the step keeps its promise, then bent as the valley bends. Blocks beyond 5 standard deviations get the
+variance that they show.
 """
 
 from collections.abc import Mapping, Sequence

@@ -14,7 +14,7 @@ from studies.errors import InputError
 from studies.instrument.display import display_name
 from studies.reports import survey as parts
 from studies.reports.digits import plain
-from studies.results import Facts, Result, Sentence, row_of
+from studies.results import Facts, Result, Sentence, Table, row_of
 
 if TYPE_CHECKING:
     from studies.record.survey import Survey
@@ -47,7 +47,8 @@ def show(*runs: Records) -> Result:
         _title([Path(run).name for run in runs]),
         lead,
         [
-            *(part for survey, one in pairs for part in (Facts(_facts(survey)), parts.columns_table(survey, one))),
+            *(part for survey, one in pairs for part in (Facts(_facts(survey)),
+                Table(f"Columns of {one['path']}", one["columns"], parts.COLUMNS, parts.COLUMNS_NOTE))),
             *_warnings(surveys),
             *parts.use_parts(uses),
             *(chapter for survey, one in pairs for chapter in parts.run_chapters(survey, one, several=len(runs) > 1)),

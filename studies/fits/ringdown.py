@@ -1,17 +1,10 @@
 """Ring-down files: decays as a laboratory records them, what one says of a gyro, and what many say together.
 
-A file is a table with the column `time_s` and one of these groups, for one pick-off (cos) or two (cos along 0°, sin along
-90°/n of the shell):
-
-- raw samples: `pickoff_cos_V`, `pickoff_sin_V`;
-- a lock-in's pairs: `amplitude_cos_V`, `phase_cos_deg` and the same with sin, or `in_phase_cos_V`, `out_of_phase_cos_V`; a
-  comment `# reference_frequency_Hz: 7000.0` gives its reference;
-- a power without phase: `power_dBm`, `power_dB` or `power_W` (linear, any unit).
-
-A spectrum analyser's trace has `frequency_Hz` in place of `time_s`, and a power.
-
-Comments `# pressure_Pa: …`, `# temperature_degC: …` and `# start: …` say where and when; a trace of a membrane or
-quartz laboratory with `%` comments and a last comment `time [s], power [dBm]` is read as it is.
+A file has `time_s` and, for one pick-off (cos) or two (cos along 0°, sin along 90°/n): raw samples `pickoff_cos_V`; a
+lock-in's `amplitude_cos_V` and `phase_cos_deg`, or `in_phase_cos_V` and `out_of_phase_cos_V` (`#
+reference_frequency_Hz: …`); or `power_dBm`, `power_dB`, `power_W`. A spectrum has `frequency_Hz` and a power. `#
+pressure_Pa: …`, `# temperature_degC: …`, `# start: …` say where and when; a trace with `%` comments and a last one
+`time [s], power [dBm]` is read as it is.
 """
 
 import datetime

@@ -1,12 +1,8 @@
 """The offset between two loggers' clocks, from what their columns share.
 
-For every offset d the first column is compared with a straight line in the second, read d later: y₁(t) = a + b y₂(t − d), b = 1
-for two columns of one unit: an exponential settling that is later looks like one that is larger. The best d leaves the least
-sum of squares S; its 90 % interval ends where n′ ln(S/S_min) = 2.71, n′ the number of rows that the memory of the residual
-leaves independent, n (1 − ρ)/(1 + ρ).
-
-Both columns are first smoothed by the same kernel: between two rows interpolation would average noise, and every half step
-would look better than a whole one.
+The first column is a straight line in the second, read d later: y₁(t) = a + b y₂(t − d), b = 1 for two columns of one
+unit, both smoothed by one kernel. The best d leaves the least sum of squares S; its 90 % interval ends where n′
+ln(S/S_min) = 2.71, n′ = n (1 − ρ)/(1 + ρ) independent rows.
 """
 
 import math

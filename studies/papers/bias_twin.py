@@ -50,13 +50,10 @@ class TwinFit:
 
 
 def draw_tables(generator: np.random.Generator) -> dict[str, Any]:
-    """Draw what makes one gyro's bias: tables of a card.
+    """Draw what makes one gyro's bias: tables of a card, each size within a factor of two, signs at random.
 
-    Damping: Q from 10⁶ to 10⁷ with 1 % of anisotropy at a random azimuth, 1/Q rising by 0.4 % per kelvin with a curvature
-    of about 4·10⁻⁵ 1/K². Gradient: 0.2 °/h per kelvin between housing and resonator, some 1000 s apart, through ḟ.
-    Hysteresis: a loop about 1 K wide in which the bias moves by 0.1 °/h per kelvin, which no term of eq. (21) describes.
-    Noise: 0.01…0.1 °/√h and a flat Allan deviation of 0.03…0.3 °/h, as data sheets of this class. Each size is
-    drawn within a factor of two, signs at random.
+    Q of 10⁶ … 10⁷, 1 % anisotropy, 1/Q +0.4 % per K; 0.2 °/h per K of gradient some 1000 s apart; a loop 1 K wide with
+    0.1 °/h per K, which no term of eq. (21) describes; 0.01…0.1 °/√h and 0.03…0.3 °/h flat noise, as data sheets.
     """
 
     def about(value: float) -> float:

@@ -1,11 +1,7 @@
 """Settled parts of a record: soaks, each of which becomes one row of a steady-state table, as the HRG paper makes its Table 1.
 
-A moment is settled when what is left of the change, |dT/dt| τ of the sensor and |df/dt| τ over the slope of the frequency,
-is small: τ the slowest time constant, about 3 000 s for the gyro of the paper's Figure 3, or what the records show where that
-is longer. Slopes are taken over as many blocks as the noise asks for.
-
-A hold that ends before it has settled is extrapolated along the exponential of its last third, f = a + b exp(−t/τ), where the error
-of that is small enough: the error of a by the noise, a share of what is left, and what the second half of the hold would say.
+Settled: |dT/dt| τ of the sensor and |df/dt| τ over the slope of the frequency are small, τ the slowest time constant (3
+000 s, Figure 3) or the record's. An unsettled hold is extrapolated along its last third, f = a + b exp(−t/τ), where that is sure enough.
 """
 
 from collections.abc import Sequence

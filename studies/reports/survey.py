@@ -65,11 +65,6 @@ def use_parts(uses: Sequence[Use]) -> list[Part]:
     return [Table("Use of these records", uses, USES), told]
 
 
-def columns_table(survey: Survey, told: dict[str, Any]) -> Table:
-    """Return the table of one record's columns."""
-    return Table(f"Columns of {survey.record.path}", told["columns"], COLUMNS, COLUMNS_NOTE)
-
-
 def run_chapters(survey: Survey, told: dict[str, Any], several: bool) -> list[Chapter]:
     """Return the chapters of one record; `told` is what the payload says of it."""
     name = Path(survey.record.path).name

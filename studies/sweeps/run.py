@@ -43,25 +43,16 @@ def run_study(
     retry_failed: bool = False,
     show_progress: bool = False,
 ) -> Results:
-    """Run a study, or resume it where an earlier run stopped, and return its results.
+    """Run a study (path, name or mapping), or resume it where an earlier run stopped, and return its results.
 
-    >>> results = run_study("tolerance.toml", "tolerance")          # doctest: +SKIP
-    >>> table = results.table()                                     # doctest: +SKIP
-    >>> table.attrs["units"]["frequency_n2_Hz"]                     # doctest: +SKIP
-    'Hz'
+        >>> results = run_study("tolerance.toml", "tolerance")          # doctest: +SKIP
+        >>> table = results.table()                                     # doctest: +SKIP
 
     Args:
-        source: path, name or mapping, the spec (`studies.sweeps.spec`).
         out: folder of the store; without it the results live in memory only.
-        card: another card than the spec's.
-        workers: processes on this machine; one for every core unless given. With 1 everything is computed in this
-            process. In a script, more than one need the guard `if __name__ == "__main__":`.
-        scheduler: Address of a Dask scheduler, instead of processes here; it and its workers can run code here
-            (`studies.sweeps.cluster`).
-        allow_python: run the user functions that the spec names.
-        retry_failed: Compute the cases again that failed in an earlier run. Those whose worker was lost are always
-            tried again.
-        show_progress: show progress on standard error.
+        workers: processes here, one a core unless given; more than one need the guard `if __name__ == "__main__":`.
+        scheduler: address of a Dask scheduler instead, whose workers can run code here (`studies.sweeps.cluster`).
+        retry_failed: compute failed cases again; those whose worker was lost are always tried again.
 
     Raises:
         InputError: An unusable spec, another study's store, a damaged store, a second runner.

@@ -1,14 +1,9 @@
 """Models of kind `bias`: B(f, ḟ) of HRG paper eq. (21), applied to a record or emitted as C.
 
-The file has one part "bias" (constant and terms) and the settings `variable`, the column that the bias is a function of
-(`frequency_Hz` or a temperature), `reference_frequency_Hz` or `reference_temperature_degC`, `rate_window_s` and
-`rate_lag_s`: the rate is the slope of the line through the values of the last `rate_window_s` seconds when the lag is half
-of that, and of a window centred on the sample when it is 0. A temperature may act behind `memory_lag_s` and a loop of
-half-width `play_degC`. Ranges are those of the fit, widened by 5 % of their length, because readings scatter.
-
-A causal model is applied as firmware applies it, and its C source computes the same: samples are averaged over blocks of
-ten seconds; when a block is complete its mean and the slope of the line through the blocks of the window give the bias,
-which holds until the next block is complete.
+One part "bias" (constant and terms) and the settings `variable` (`frequency_Hz` or a temperature), its reference,
+`rate_window_s` and `rate_lag_s`: the rate is the slope over the last window when the lag is half of it, over a centred
+one when it is 0. A temperature may act behind `memory_lag_s` and `play_degC`. Ranges are the fit's and 5 % more. A
+causal model holds what ten-second blocks gave until the next is complete, in Python as in C.
 """
 
 import numpy as np
