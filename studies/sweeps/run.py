@@ -45,8 +45,8 @@ def run_study(
 ) -> Results:
     """Run a study (path, name or mapping), or resume it where an earlier run stopped, and return its results.
 
-        >>> results = run_study("tolerance.toml", "tolerance")          # doctest: +SKIP
-        >>> table = results.table()                                     # doctest: +SKIP
+    >>> results = run_study("tolerance.toml", "tolerance")          # doctest: +SKIP
+    >>> table = results.table()                                     # doctest: +SKIP
 
     Args:
         out: folder of the store; without it the results live in memory only.
