@@ -5,11 +5,11 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
 
 from compensation.arrays import Complex
 from compensation.errors import CompensationError
-from compensation.recursion import recur
 from compensation.samples import check_time, is_regular
 
 SAME_STEP = 1e-9  # part of the usual step by which two steps may differ and still share one matrix exponential
@@ -177,3 +177,14 @@ def _march(A: Complex, B: Complex, t: NDArray[np.float64], u: NDArray[Any], x0: 
     for i, k in enumerate(kind):
         x[:, i + 1] = transition[k] @ x[:, i] + held[k] * u[i] + ramp[k] * rise[i]
     return x
+
+
+def recur(pole: complex, forced: ArrayLike) -> NDArray[Any]:
+    """Return y_k = pole · y_{k−1} + forced_k from rest, along the first axis of one column or of several."""
+    forced = np.asarray(forced)
+    is_complex = np.iscomplexobj(pole) or np.iscomplexobj(forced)
+    columns = forced.astype(complex if is_complex else float).reshape(len(forced), -1)
+    band = np.ones((2, len(columns)), order="F", dtype=columns.dtype)
+    band[1] = -pole
+    solve = scipy.linalg.lapack.ztbtrs if is_complex else scipy.linalg.lapack.dtbtrs
+    return np.asarray(solve(band, columns, uplo="L", diag="U")[0]).reshape(forced.shape)

@@ -9,9 +9,9 @@ import scipy
 from numpy.typing import ArrayLike
 
 from thermal.errors import ThermalError
-from thermal.forcing import boundary_forcing, find_corners, initial_state
 from thermal.network import Array, Network
 from thermal.profile import Profile
+from thermal.steady import boundary_forcing, find_corners, initial_state
 from thermal.sweeping import SweepError, sweep
 from thermal.transient import Transient, propagate
 

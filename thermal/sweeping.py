@@ -17,11 +17,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from thermal.errors import ThermalError
-from thermal.forcing import MOST_ROWS, find_corners, initial_state
 from thermal.lag import scan
 from thermal.network import Array, Network, linearise
 from thermal.profile import Profile
 from thermal.relaxation import Relaxation, find_relaxation
+from thermal.steady import MOST_ROWS, find_corners, initial_state
 from thermal.transient import Transient, propagate
 
 MOST_SWEEPS = 60

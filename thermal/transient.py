@@ -7,11 +7,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from thermal.errors import ThermalError
-from thermal.forcing import boundary_forcing, find_corners, initial_state
 from thermal.lag import scan
 from thermal.network import Array, Network
 from thermal.profile import Profile
 from thermal.relaxation import find_relaxation
+from thermal.steady import boundary_forcing, find_corners, initial_state
 
 BLOCK = 1 << 16  # rows evaluated at a time; bounds the memory of long outputs
 

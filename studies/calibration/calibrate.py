@@ -11,12 +11,11 @@ from numpy.typing import NDArray
 from shell.errors import ShellError
 from studies.calibration.agreement import keep_agreeing, put_back
 from studies.calibration.ahead import BIAS
-from studies.calibration.estimates import Estimate, estimate, find_groups
+from studies.calibration.estimates import Estimate, estimate, find_groups, posterior_card
 from studies.calibration.fit import CardFit, fit, whitened
 from studies.calibration.ladder import Rung, build_ladder, noise_rms, spread_of, usual_mean
 from studies.calibration.misreading import check_readings
 from studies.calibration.observed import HOUSING, QUADRATURE, RESPONSES, SETTLED, ObservedRun, SettledTable, observe
-from studies.calibration.posterior import posterior_card
 from studies.calibration.priors import Priors, check_exact, gather_priors
 from studies.calibration.problem import CardProblem, State, wide_law
 from studies.calibration.remarks import warn

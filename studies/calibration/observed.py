@@ -13,8 +13,7 @@ from compensation.spikes import find_spikes
 from shell.constants import zero_Celsius
 from studies.errors import InputError
 from studies.record import Record, place_in_time, read_frequency_table, reading_resolution
-from studies.simulation.drive import COLUMN, Drive, drive_by_record
-from studies.simulation.holes import bridge_holes
+from studies.simulation.drive import COLUMN, Drive, bridge_holes, drive_by_record
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.intp]

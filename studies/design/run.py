@@ -10,12 +10,11 @@ from studies.design.task import Task, read_task
 from studies.files.writing import write_text
 from studies.instrument.card import Instrument, load_card, save_card
 from studies.progress import Progress
-from studies.sweeps.canonical import digest
 from studies.sweeps.engine import hire
 from studies.sweeps.evaluate import WorkPlan
 from studies.sweeps.opening import claim_store
 from studies.sweeps.parameters import set_parameters
-from studies.sweeps.provenance import describe_environment
+from studies.sweeps.provenance import describe_environment, digest
 from studies.sweeps.run import describe_study, physics_of
 from studies.sweeps.search import Explorer
 from studies.sweeps.store import Store, memory_store

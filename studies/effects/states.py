@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from compensation.recursion import recur
+from compensation.transfer import recur
 
 FloatArray = NDArray[np.float64]
 
@@ -97,3 +97,18 @@ def play(drive: FloatArray, radius: float | Sequence[float], start: float = 0.0)
             out[begin + 1 : end + 1] = np.maximum(branch - radii, state) if up else np.minimum(branch + radii, state)
             state = out[end]
     return out[:, 0] if np.ndim(radius) == 0 else out
+
+
+ORDERS = 12
+"""A knee of a tenth of the range is followed, fringes of a sixth of it are not."""
+
+
+def waves(x: FloatArray, low: float, high: float, orders: int = ORDERS) -> FloatArray:
+    """Return cos(k π u), k = 2 … orders, of u = (x − low)/(high − low) held to the range: (N, orders − 1)."""
+    u = np.clip((x - low) / max(high - low, 1e-9), 0.0, 1.0)
+    return np.asarray(np.cos(np.pi * u[:, None] * np.arange(2, orders + 1)))
+
+
+def smoothness(size: float, orders: int = ORDERS) -> tuple[float, ...]:
+    """Return prior standard deviations of the waves, falling as k⁻²: the curve has a slope, and finite bends."""
+    return tuple(float(size * (2.0 / k) ** 2) for k in range(2, orders + 1))

@@ -21,8 +21,8 @@ from studies.errors import InputError, MissingEnvironment, nearest
 from studies.files.reading import PORTION, opened
 from studies.importing.formats import KINDS, READERS, Channel, Clock
 from studies.importing.mapping import FileMap
-from studies.importing.raw import name_columns, shorten
-from studies.importing.tables import Part, RawTable
+from studies.importing.raw import TextTable, name_columns, read_plain, read_raw, shorten
+from studies.importing.tables import ParsedTable, Part, RawTable
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -202,3 +202,24 @@ def _digest(path: str | Path) -> str:
         while portion := file.read(PORTION):
             found.update(portion)
     return found.hexdigest()
+
+
+def read_parts(paths: Sequence[str | Path], file: FileMap) -> RawTable:
+    """Read raw files that continue one another as one table."""
+    if is_container(paths[0]):
+        return read_channel_table(paths, file)
+    import pandas as pd
+
+    plain = [table for table in (read_plain(path, file) for path in paths) if table is not None]
+    if len(plain) == len(paths) == 1:
+        return plain[0]
+    if len(plain) == len(paths) and all(list(table.columns) == list(plain[0].columns) for table in plain):
+        columns = {name: np.concatenate([table.columns[name] for table in plain]) for name in plain[0].columns}
+        return ParsedTable(tuple(part for table in plain for part in table.parts), file.missing, columns)
+    tables = [read_raw(path, file) for path in paths]
+    first = tables[0]
+    for other in tables[1:]:
+        if list(other.cells) != list(first.cells):
+            raise InputError(f"{other.path}: has other columns than {first.path}; give it its own [[file]] table.")
+    cells = pd.concat([table.cells for table in tables], ignore_index=True)
+    return TextTable(tuple(part for table in tables for part in table.parts), first.missing, cells, first.decimal)

@@ -9,12 +9,11 @@ from typing import TYPE_CHECKING
 
 from studies.errors import InputError
 from studies.importing.channels import is_container, open_channels, sort_groups
-from studies.importing.look import Look, as_number, is_stamp, look_at, look_at_group
+from studies.importing.look import Look, as_number, find_nominal, find_period, is_stamp, look_at, look_at_group
 from studies.importing.mapping import NUMERIC_TIMES, SCHEMA, TABLE_TARGETS, FileMap, ImportMap
 from studies.importing.meaning import Meaning, find_meanings, find_unit
 from studies.importing.offset import estimate_offset
 from studies.importing.raw import shorten
-from studies.importing.stated import find_nominal, find_period
 from studies.importing.timing import TIME_WORDS, find_time
 from studies.importing.units import units_of
 from studies.schema.reader import read_keys

@@ -11,10 +11,10 @@ import numpy as np
 
 from compensation.decimation import average_groups
 from studies.errors import InputError
+from studies.importing.channels import read_parts
 from studies.importing.clock import drop_repeated, read_times, seconds_between
 from studies.importing.doubtful import drop_doubtful, find_repeats
 from studies.importing.mapping import OWN, TABLE_TARGETS, ColumnMap, FileMap, LoadedMap
-from studies.importing.parts import read_parts
 from studies.importing.tables import RawTable
 from studies.record import Record, check_plausible
 

@@ -7,16 +7,17 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from studies.calibration.fit import LASTING
 from studies.diagnosis.constants import CONSTANTS
 from studies.diagnosis.verdict import NINETY, Cause, Interval, same_cause, weigh
 from studies.effects import library
 from studies.effects.effect import UNITS
-from studies.inference.apart import with_levels
-from studies.inference.clock import settle
+from studies.inference.generic_forms import offsets
 from studies.inference.heat_path import LAGS, SHARE
 from studies.inference.inferred import Inferred
 from studies.inference.model import Background, Term
-from studies.inference.records import REFERENCE
+from studies.inference.records import REFERENCE, settle
+from studies.inference.search import MARGIN, Hypothesis, Outcome, Search
 from studies.inference.signatures import Signatures
 
 Array = NDArray[np.float64]
@@ -227,3 +228,20 @@ def _clock_cause(found: Inferred) -> list[Cause]:
     (response,) = effect.sizes
     (name,) = effect.coefficient_names(response)
     return [Cause(effect.name, response, _within(slope / sd), (), {name: Interval.about(slope, sd)}, (slope / sd) ** 2)]
+
+
+def with_levels(search: Search, now: Hypothesis, name: str) -> Hypothesis:
+    """Return a model with a level of every run of a response, where that is more probable by far; else the model."""
+    problem = search.linear.problem
+    if problem.instrument.polynomial is None or len(problem.runs) == 1 or name not in LASTING:
+        return now
+    form = offsets(len(problem.runs))
+    bank = search.shapes_of([(form, name)])
+    tried = [search.settle((*now.terms, one.term), one.noise, [name]) for one in search.scan(now, bank)]
+    best = max(tried, key=lambda one: one.score, default=now)
+    return best if best.score > now.score + MARGIN else now
+
+
+def only_apart(search: Search, outcome: Outcome, k: int) -> bool:
+    """Whether levels of the runs are far likelier where a cause stands."""
+    return with_levels(search, outcome.without[k], outcome.final.terms[k].response).score > outcome.final.score + MARGIN

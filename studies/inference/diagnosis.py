@@ -20,8 +20,8 @@ from studies.calibration.observed import HOUSING, RESPONSES, observe
 from studies.calibration.priors import gather_priors
 from studies.calibration.problem import CardProblem, wide_law
 from studies.diagnosis.constants import CONSTANTS
-from studies.diagnosis.seen import SeenResponse
-from studies.inference.apart import only_apart, with_levels
+from studies.diagnosis.response import SeenResponse
+from studies.inference.causes import only_apart, with_levels
 from studies.inference.heat_path import FREQUENCY, HeatPath, evidence_of, find_heat_path, residual_of, slow_share
 from studies.inference.held_out import Kept, Model, Rows
 from studies.inference.housing import set_housing_apart

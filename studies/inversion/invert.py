@@ -14,8 +14,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from studies.calibration.estimates import NINETY, Estimate, find_groups
-from studies.calibration.posterior import posterior_card
+from studies.calibration.estimates import NINETY, Estimate, find_groups, posterior_card
 from studies.calibration.priors import Priors, check_exact, from_standard, gather_priors
 from studies.errors import InputError
 from studies.instrument.card import Instrument

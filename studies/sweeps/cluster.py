@@ -190,7 +190,7 @@ def describe_code() -> str:
     from importlib.metadata import version
 
     from studies.cli.guard import find_name_clash
-    from studies.sweeps.canonical import PHYSICS_VERSION
+    from studies.sweeps.provenance import PHYSICS_VERSION
 
     words = ", ".join(f"{name} {version(name)}" for name in ("hrg-workbench", "numpy", "scipy"))
     return find_name_clash() or f"{words}, physics {PHYSICS_VERSION}"

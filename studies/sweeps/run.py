@@ -13,7 +13,6 @@ import numpy as np
 from studies.errors import InputError
 from studies.progress import Progress
 from studies.sweeps.block import Batch
-from studies.sweeps.canonical import PHYSICS_VERSION, digest, spell, spell_material
 from studies.sweeps.child import check_function
 from studies.sweeps.cluster import check_private
 from studies.sweeps.definition import FREE, Study
@@ -22,7 +21,7 @@ from studies.sweeps.engine import BATCH, BATCH_VECTORISED, compute, hire, missin
 from studies.sweeps.evaluate import WorkPlan, evaluate_task
 from studies.sweeps.families import Families, choose_solver, why_not
 from studies.sweeps.opening import claim_store
-from studies.sweeps.provenance import describe_environment
+from studies.sweeps.provenance import PHYSICS_VERSION, describe_environment, digest, spell, spell_material
 from studies.sweeps.results import Results, open_results
 from studies.sweeps.search import name_search, run_searches
 from studies.sweeps.spec import read_study

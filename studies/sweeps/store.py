@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from studies.errors import InputError, MissingEnvironment
 from studies.sweeps.block import Array, Cases, pack, unpack, unpack_head
-from studies.sweeps.canonical import digest, find_changes, spell
+from studies.sweeps.provenance import digest, find_changes, spell
 from studies.sweeps.sealed import SealedFile
 
 FILE = "study.store"

@@ -13,8 +13,7 @@ from studies.calibration.estimates import NINETY, estimate
 from studies.calibration.fit import CardFit, stated_noise, whitened
 from studies.calibration.observed import observe
 from studies.calibration.priors import Priors
-from studies.calibration.problem import CardProblem, State
-from studies.calibration.start import MOST_SPREAD, start_spread
+from studies.calibration.problem import MOST_SPREAD, CardProblem, State, start_spread
 from studies.instrument.card import load_card
 from studies.instrument.tables.noise import NoiseKeys
 from studies.instrument.uncertain import UncertainValue

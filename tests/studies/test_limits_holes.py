@@ -14,7 +14,7 @@ from studies.calibration.problem import CardProblem, wide_law
 from studies.instrument.card import load_card
 from studies.record import Record
 from studies.simulation.chamber import load_profile
-from studies.simulation.holes import PARTS, bridge_holes
+from studies.simulation.drive import PARTS, bridge_holes
 from studies.simulation.virtual_gyro import simulate_run
 from thermal.profile import Profile
 

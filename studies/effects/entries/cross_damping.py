@@ -4,9 +4,8 @@ import numpy as np
 
 from compensation.wave import see_across
 from shell.constants import zero_Celsius
-from studies.effects.curves import ORDERS, smoothness, waves
 from studies.effects.effect import Coefficient, Effect, Parameter, Shape, Span
-from studies.effects.states import FloatArray, States, lag
+from studies.effects.states import ORDERS, FloatArray, States, lag, smoothness, waves
 
 
 def columns(states: States, shape: Shape, response: str) -> FloatArray:

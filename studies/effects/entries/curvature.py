@@ -3,9 +3,8 @@
 import numpy as np
 
 from shell.constants import zero_Celsius
-from studies.effects.curves import smoothness, waves
 from studies.effects.effect import Coefficient, Effect, Parameter, Shape, Span
-from studies.effects.states import FloatArray, States
+from studies.effects.states import FloatArray, States, smoothness, waves
 
 
 def columns(states: States, shape: Shape, response: str) -> FloatArray:

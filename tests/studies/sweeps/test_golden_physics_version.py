@@ -12,7 +12,7 @@ import pytest
 from shell.elastic import Elastic
 from shell.meridian import hemisphere
 from shell.modes import solve_modes
-from studies.sweeps.canonical import PHYSICS_VERSION
+from studies.sweeps.provenance import PHYSICS_VERSION
 
 SILICA = Elastic(72.7e9, 0.17, 2203.0)
 GOLDEN = {"1": {"shell": 4595.565413, "solid": 4596.414085}, "2": {"shell": 4595.540583, "solid": 4596.414085}}
