@@ -31,16 +31,11 @@ def draw_job(folder: str) -> None:
     )
     half_height = 0.0  # of the picture, m, in which every swinging resonator fits above the legend
     for scene in scenes:
-        _, up, right = _axes(scene, view)
+        _, up, right = look(scene, view)
         corners = np.concatenate([scene.points + sign * scene.displacement for sign in (-1, 1)])
         high, wide = float(np.ptp(corners @ up)), float(np.ptp(corners @ right))
         half_height = max(half_height, high / (2 * ROOM), 1.08 * wide / (2 * window[0] / window[1]))
-    # one colour scale for all; a few values at a sharp corner (theory: infinite) do not set it
-    every = np.concatenate([scene.values for scene in scenes])
-    usual, top = float(np.percentile(every, 99.5)), float(every.max())
-    top = usual if top > 4 * usual > 0 else top
-    low = float(min(every.min(), 0.0 if every.min() < 0.5 * top else every.min()))
-    limits = low, top if top > low else low + 1.0
+    limits = scale(np.concatenate([scene.values for scene in scenes]))
     moving = []
     for k, scene in enumerate(scenes):
         plotter.subplot(0, k)
@@ -52,6 +47,14 @@ def draw_job(folder: str) -> None:
         plotter.render()
         plotter.screenshot(Path(folder, f"{number}.png"))
     plotter.close()
+
+
+def scale(values: Array) -> tuple[float, float]:
+    """Return the ends of the colour scale; a few values at a sharp corner (theory: infinite) do not set it."""
+    usual, top = float(np.percentile(values, 99.5)), float(values.max())
+    top = usual if top > 4 * usual > 0 else top
+    low = float(min(values.min(), 0.0 if values.min() < 0.5 * top else values.min()))
+    return low, top if top > low else low + 1.0
 
 
 def _fill(plotter: Any, scene: Scene, limits: tuple[float, float], first: bool) -> list[tuple[Any, Array, Array]]:
@@ -134,7 +137,7 @@ def _split_sharp(scene: Scene, faces: Array) -> tuple[Any, NDArray[np.int64]]:
     return split, np.asarray(split["origin"], dtype=np.int64)
 
 
-def _axes(scene: Scene, view: str) -> tuple[Array, Array, Array]:
+def look(scene: Scene, view: str) -> tuple[Array, Array, Array]:
     """Unit vectors towards the eye, upwards and to the right on the screen: from the open end, the axis upright."""
     side = 1.0 if scene.opens_up else -1.0
     eye, up = {
@@ -150,7 +153,7 @@ def _axes(scene: Scene, view: str) -> tuple[Array, Array, Array]:
 
 def _aim(plotter: Any, scene: Scene, view: str, half_height: float) -> None:
     """Look at the resonator from the view's direction, without perspective; it stands in the upper part of the picture."""
-    away, up, right = _axes(scene, view)
+    away, up, right = look(scene, view)
     corners = np.concatenate([scene.points + sign * scene.displacement for sign in (-1, 1)])
     middle = sum((corners @ axis).max() / 2 * axis + (corners @ axis).min() / 2 * axis for axis in (away, up, right))
     target = middle - (1 - ROOM - 0.12) * half_height * up

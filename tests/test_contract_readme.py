@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from shell.render import NoOpenGL
 from studies.cli import main
 from tests.compensation.two_oscillators import Gyro, noisy
 
@@ -48,10 +47,6 @@ def folder(tmp_path_factory):
     return made
 
 
-def no_picture(*_):
-    raise NoOpenGL("left out")
-
-
 def test_the_first_block_holds_the_two_commands():
     kind, text = BLOCKS[0]
     lines = text.splitlines()
@@ -71,10 +66,7 @@ def test_commands_of_the_first_hour_run_in_order(folder, monkeypatch, capsys):
         assert program == "hrg"
         if words[:1] == ["optimise"]:
             continue  # a minute; tests/studies/design runs this task
-        with monkeypatch.context() as patch:
-            if words[0] == "study":  # its pictures are those of render, each a process
-                patch.setattr("shell.render.render_png", no_picture)
-            status = main(words)
+        status = main(words)
         said, told = capsys.readouterr()
         if status == 3 and "OpenGL" in told:
             continue

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from shell.constants import zero_Celsius
 from studies.errors import InputError
 from studies.instrument.card import Instrument
-from studies.results import Blocks, Chapter, Sentence
+from studies.results import Blocks, Chapter
 
 if TYPE_CHECKING:
     from shell.imperfection import Imperfection, Split
@@ -187,14 +187,13 @@ def mode_blocks(instrument: "Instrument", harmonics: Sequence[int] = (2, 3)) -> 
 
 def draw_still(shown: ModeScene) -> bytes:
     """Return the PNG that stands behind an interactive view."""
-    from shell.render import render_png
+    from shell.still import draw_still as draw
 
-    return render_png(shown.scene())
+    return draw(shown.scene())
 
 
 def view_blocks(shown: "Sequence[ModeScene]", remark: str = "") -> "list[Block]":
     """Return the interactive view of modes of one instrument at one temperature."""
-    from shell.render import NoOpenGL
     from studies.reports.webgl import Drawn, view_modes
 
     first = shown[0]
@@ -210,14 +209,10 @@ def view_blocks(shown: "Sequence[ModeScene]", remark: str = "") -> "list[Block]"
                 f" n = {one.mode.harmonic}: the slower mode of the pair, which is split by {1e3 * one.split.hertz:.4g} mHz, on its"
                 f" axis at {degrees(one.split.slow_axis):.4g}°{larger}."
             )
-    blocks: list[Block] = []
-    try:
-        png = draw_still(first)
-    except NoOpenGL as error:
-        png = None
-        blocks.append(Sentence(f"The still picture of the mode is missing: {error}", "warning"))
     lobes = 2 * first.mode.harmonic
     alt = f"The resonator with its rim bent into {lobes} lobes, nodes between them."
     splits = [None if one.split is None else Drawn(one.split, one.imperfection, one.exaggeration) for one in shown]
-    view = view_modes(first.resonator, [one.mode for one in shown], first.title, png, alt, caption, splits)
-    return [view, *blocks]
+    view = view_modes(
+        first.resonator, [one.mode for one in shown], first.title, draw_still(first), alt, caption, splits
+    )
+    return [view]

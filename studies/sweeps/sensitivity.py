@@ -113,7 +113,7 @@ def _derivative(x: Array, y: Array) -> float:
 
 def linear_shares(results: "Results", column: str) -> LinearShares | None:
     """Return the linear influence of every numeric parameter over a sample; None of too few cases or a constant column."""
-    from scipy.stats import t
+    from scipy.special import stdtrit
 
     study = results.study
     numeric = [p.name for p in study.parameters if not isinstance(p.nominal, str)]
@@ -137,7 +137,7 @@ def linear_shares(results: "Results", column: str) -> LinearShares | None:
         residual -= step @ X
         slopes += step
     deviation = np.sqrt(residual @ residual / free * np.diag(inverse))
-    half = t.ppf(0.95, free) * deviation
+    half = stdtrit(free, 0.95) * deviation
     share = slopes**2 / y.var()
     return LinearShares(tuple(numeric), slopes / spread, half / spread, share, float(1 - residual.var() / y.var()))
 

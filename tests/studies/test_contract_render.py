@@ -10,9 +10,7 @@ import pytest
 from studies.cli import main
 from studies.errors import InputError
 from studies.instrument.card import load_card
-from studies.reports.scenes import mode_blocks, read_field, show_mode
-from studies.results import Sentence
-from studies.results.page import Embedded
+from studies.reports.scenes import read_field, show_mode
 
 
 def hrg_render(*words):
@@ -32,14 +30,12 @@ def test_without_opengl_a_picture_is_status_3_and_nothing_is_left(tmp_path, caps
     assert list(tmp_path.iterdir()) == []
 
 
-def test_without_opengl_the_page_is_interactive_still_and_says_what_is_missing(tmp_path, no_opengl):
+def test_without_opengl_the_page_has_its_view_and_a_still_picture(tmp_path, no_opengl):
     page = tmp_path / "mode.html"
     assert hrg_render("free-dome", "--theory", "shell", "--harmonic", "2", "3", "--out", page) == 0
     text = page.read_text()
     assert "webgl2" in text
-    assert "apt install libegl1" in text
-    blocks = mode_blocks(load_card("free-dome"))
-    assert [type(block) for block in blocks] == [Embedded, Sentence]
+    assert len(text.partition("data:image/png;base64,")[2].partition('"')[0]) > 50_000
 
 
 def test_a_mesh_for_slicers_is_the_undeformed_solid_in_mm(tmp_path, capsys):
