@@ -1,6 +1,7 @@
 """Clocks of loggers: their stamps become seconds, and seconds of several clocks become those of one."""
 
 import datetime
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -10,7 +11,6 @@ from studies.errors import InputError
 from studies.importing.mapping import NUMERIC_TIMES, OWN, SECONDS, UNIX, FileMap
 from studies.importing.raw import shorten
 from studies.importing.tables import RawTable
-from studies.importing.zone import place_in_zone
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -38,8 +38,6 @@ def read_times(table: RawTable, file: "FileMap") -> Times:
     form = file.time_format
     origin, notes = file.start, []
     if file.sample_period is not None:
-        import numpy as np
-
         rows = np.arange(table.rows, dtype=np.float64)
         return Times(np.asarray(file.sample_period * rows + file.clock_offset), origin)
     if form in NUMERIC_TIMES and len(file.time) > 1:
@@ -227,3 +225,50 @@ def _spread(t: "Array") -> "Array":
     width = np.append(np.diff(stamps), usual)
     within = np.arange(len(t)) - np.repeat(first, count)
     return np.asarray(t + within * np.repeat(width / count, count))
+
+
+def place_in_zone(
+    origin: datetime.datetime, seconds: "Array", zone: str, place: Callable[[int], str]
+) -> "tuple[datetime.datetime, Array, int]":
+    """Return the origin with its offset from UTC, true seconds (N,) after it, and how many rows lie in an hour that comes twice."""
+    rows = np.flatnonzero(np.isfinite(seconds))
+    ahead, doubtful = _utc_offsets(origin, seconds[rows], zone)
+    skipped = np.flatnonzero(np.isnan(ahead))
+    if len(skipped):
+        raise InputError(
+            f"{place(int(rows[skipped[0]]))}: this time does not exist in {zone}, whose clocks skip that hour; a logger that"
+            " stays on winter time needs a fixed zone, such as timezone = 'Etc/GMT-1' for one hour ahead of UTC."
+        )
+    true = seconds.copy()
+    true[rows] -= ahead - ahead[0]
+    return origin.replace(tzinfo=datetime.timezone(datetime.timedelta(seconds=float(ahead[0])))), true, doubtful
+
+
+def _utc_offsets(origin: datetime.datetime, seconds: "Array", zone: str) -> "tuple[Array, int]":
+    """Return by how many seconds the zone's clocks are ahead of UTC at each local time; NaN where the time does not exist."""
+    import pandas as pd
+
+    wall = pd.DatetimeIndex(np.datetime64(origin, "us") + np.round(1e6 * seconds).astype("timedelta64[us]"))
+
+    def ahead(summer: bool) -> "Array":
+        placed = wall.tz_localize(zone, ambiguous=np.full(len(wall), summer), nonexistent="NaT")
+        return np.asarray((wall - placed.tz_convert(None)) / pd.Timedelta(seconds=1), dtype=float)
+
+    first, second = ahead(summer=True), ahead(summer=False)
+    twice = np.flatnonzero(first > second)
+    for block in np.split(twice, np.flatnonzero(np.diff(twice) > 1) + 1) if len(twice) else []:
+        start = _second_pass(seconds, int(block[0]), int(block[-1]))
+        first[start : block[-1] + 1] = second[start : block[-1] + 1]
+    return first, len(twice)
+
+
+def _second_pass(seconds: "Array", begin: int, end: int) -> int:
+    """Return the row of a block in the repeated hour that begins the second pass: where stamps step back, else by the
+    smaller step beside it.
+    """
+    back = np.flatnonzero(np.diff(seconds[begin : end + 1]) < 0)
+    if len(back):
+        return begin + int(back[0]) + 1
+    before = seconds[begin] - seconds[begin - 1] if begin else np.inf
+    after = seconds[end + 1] - seconds[end] if end + 1 < len(seconds) else np.inf
+    return begin if after < before else end + 1
