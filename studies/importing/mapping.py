@@ -104,9 +104,7 @@ class FileMap(Keys, frozen=True, kw_only=True):
     separator: Annotated[Literal[";", ",", "tab", "|", "space"], says("between cells")] = ","
     decimal: Annotated[Literal[".", ","], says("of numbers")] = "."
     encoding: Annotated[Literal["utf-8", "utf-16", "cp1252", "latin-1"], says("of the file")] = "utf-8"
-    header_line: Annotated[
-        int, number("with the column names; 0: the columns are 'column 1', 'column 2', ...", least=0, most=LAST)
-    ] = 1
+    header_line: Annotated[int, number("with column names; 0: 'column 1', 'column 2', ...", least=0, most=LAST)] = 1
     first_line: (
         Annotated[int, number("first line with numbers; the one after the header unless given", least=1, most=LAST)]
         | None
@@ -144,7 +142,7 @@ class FileMap(Keys, frozen=True, kw_only=True):
     longest_gap: (
         Annotated[float, number("longer gaps are not interpolated; 10 steps unless given", above=0.0)] | None
     ) = msgspec.field(name="longest_gap_s", default=None)
-    columns: Annotated[tuple[ColumnMap, ...], says("of the raw file that the record gets", least=1)] = msgspec.field(
+    columns: Annotated[tuple[ColumnMap, ...], says("of the raw file, for the record", least=1)] = msgspec.field(
         name="column"
     )
 

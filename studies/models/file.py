@@ -93,10 +93,8 @@ class ModelKeys(Keys, frozen=True, kw_only=True):
     validity: Annotated[
         dict[str, tuple[float, float]], says("lowest and highest value of each variable in the fitted data")
     ] = msgspec.field(default_factory=dict)
-    parts: Annotated[tuple[ModelPart, ...], says("what was fitted together; one or more", least=1)] = msgspec.field(
-        name="part"
-    )
-    sources: Annotated[tuple[ModelSource, ...], says("the records that it was fitted to")] = msgspec.field(
+    parts: Annotated[tuple[ModelPart, ...], says("one or more, fitted together", least=1)] = msgspec.field(name="part")
+    sources: Annotated[tuple[ModelSource, ...], says("records that were fitted")] = msgspec.field(
         name="source", default=()
     )
 

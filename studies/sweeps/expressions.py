@@ -26,9 +26,7 @@ class Derived(Keys, frozen=True, kw_only=True):
     """A key of the card that follows from others."""
 
     name: Annotated[str, says("a key of the card", example="resonator.stem.end_mm")]
-    expression: Annotated[
-        str, says("numbers, names of parameters and keys, + - * / ** and brackets", example="4 - radius_mm")
-    ]
+    expression: Annotated[str, says("numbers, parameters, keys, + - * / ** and brackets", example="4 - radius_mm")]
 
     def __post_init__(self) -> None:
         parse(self.expression)

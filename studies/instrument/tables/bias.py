@@ -32,9 +32,7 @@ class Bias(Keys, frozen=True, kw_only=True):
     damping_anisotropy: Annotated[float, number("Δ(1/τ) over the mean 1/τ = π f/Q", least=0.0, relative_sd=1.0)] = 0.01
     damping_axis_deg: Annotated[float, number("θ_τ; ± 13 means unknown (its period is 45°)", sd=13.0)] = 0.0
     pattern_angle_deg: Annotated[float, number("θ of the standing wave, as commanded")] = 22.5
-    k1_deg_per_h_per_Hz: Annotated[
-        float, number("of f, the change of frequency from the reference temperature", sd=1.0)
-    ] = 0.0
+    k1_deg_per_h_per_Hz: Annotated[float, number("of f, the change of frequency from the reference", sd=1.0)] = 0.0
     k2_deg_per_h_per_Hz2: Annotated[float, number("of f²", sd=0.1)] = 0.0
     k3_deg_per_h_per_Hz3: Annotated[float, number("of f³", sd=0.01)] = 0.0
     k4_deg_per_h_s_per_Hz: Annotated[float, number("of ḟ, its rate")] = 0.0

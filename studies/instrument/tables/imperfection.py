@@ -54,22 +54,16 @@ class MapKeys(Keys, frozen=True, kw_only=True):
     """A table of measured departures."""
 
     of: Annotated[Literal["wall", "outer", "inner", "offset"], says("surface that departs; offset: the middle surface")]
-    file: Annotated[
-        str, says("µm over position and azimuth, beside the card (hrg scan reads the same tables)", example="outer.csv")
-    ]
+    file: Annotated[str, says("µm over position and azimuth, beside the card (as for hrg scan)", example="outer.csv")]
 
 
 class SplitKeys(Keys, frozen=True, kw_only=True):
     """A measured split of one harmonic."""
 
     harmonic: Annotated[int, number("waves around", least=1, most=12)] = 2
-    split_Hz: Annotated[
-        float, number("at the reference temperature, of any cause, in addition to the above", least=0.0, example=0.12)
-    ]
+    split_Hz: Annotated[float, number("at the reference temperature, of any cause, besides", least=0.0, example=0.12)]
     slow_axis_deg: Annotated[float, number("azimuth of an antinode of the slower mode", example=31.0)]
-    split_error_Hz: Annotated[
-        float, number("standard error of the measurement, along the axis and across", least=0.0)
-    ] = 0.0
+    split_error_Hz: Annotated[float, number("standard error, along the axis and across", least=0.0)] = 0.0
 
 
 WavePart = Annotated[float, number("of the wall, Σ c cos mθ + s sin mθ, in addition to the waves: for studies")]

@@ -48,12 +48,8 @@ class LawKeys(Keys, frozen=True, kw_only=True):
         | None
     ) = None
     chamber_lag_s: Annotated[float, number("of the housing behind its chamber", above=0.0, relative_sd=1.0)] = 600.0
-    delay_s: Annotated[float, number("of the resonator beside its lag, less that of the housing's sensor", sd=10.0)] = (
-        0.0
-    )
-    bias_bend: Annotated[
-        float, number("part of the bend of f that the bias follows: 1 f, as in eq. 21; 0 T alone", sd=0.5)
-    ] = 1.0
+    delay_s: Annotated[float, number("beside the resonator's lag, less that of the housing's sensor", sd=10.0)] = 0.0
+    bias_bend: Annotated[float, number("part of the bend of f that the bias follows: 1 f, eq. 21; 0 T", sd=0.5)] = 1.0
     note: Note = ""
 
     def __post_init__(self) -> None:

@@ -29,7 +29,7 @@ class Loop(Keys, frozen=True, kw_only=True):
     pickoff_phase_deg: Annotated[float, number("phase error of both", above=-25.0, below=25.0, sd=0.5)] = 0.0
     pickoff_phase_difference_deg: Annotated[float, number("between the two", above=-25.0, below=25.0, sd=0.1)] = 0.0
     pickoff_skew_mrad: Annotated[
-        float, number("deviation of the two axes from 90°, in n θ", above=-400.0, below=400.0, sd=1.0)
+        float, number("of the two axes from 90°, in n θ", above=-400.0, below=400.0, sd=1.0)
     ] = 0.0
     drive_gain_ratio: Annotated[float, number("the same of the drives", above=-0.5, below=0.5, sd=0.005)] = 0.0
     drive_phase_deg: Annotated[float, number("likewise", above=-25.0, below=25.0, sd=0.5)] = 0.0
@@ -52,9 +52,9 @@ class Loop(Keys, frozen=True, kw_only=True):
     quadrature_range_Hz: Annotated[float, number("largest split that the stiffness nulls", above=0.0)] = 1.0
     dac_bits: Annotated[int, number("over ± that range", least=2, most=32)] = 16
     drive_noise_ppm_per_rt_Hz: Annotated[float, number("of that range", least=0.0)] = 0.0
-    drive_headroom: Annotated[
-        float, number("largest drive over the steady-state drive at the reference temperature", above=1.0)
-    ] = 20.0
+    drive_headroom: Annotated[float, number("largest drive over the steady-state drive, at reference", above=1.0)] = (
+        20.0
+    )
     start_offset_Hz: Annotated[float, number("of the resonance from the oscillator at the start")] = 1.0
     vibration_um: (
         Annotated[float, number("with modal_mass_mg: thermomechanical noise is known", above=0.0, example=1.0)] | None

@@ -70,9 +70,7 @@ class Deviation(Keys, frozen=True, kw_only=True):
 class Crystal(Keys, frozen=True, kw_only=True):
     """Elastic constants of a cubic crystal."""
 
-    C11_GPa: Annotated[
-        float, number("of a cubic crystal with [001] along the axis; density_kg_m3 is given above", above=0.0)
-    ]
+    C11_GPa: Annotated[float, number("of a cubic crystal, [001] along the axis; density_kg_m3 above", above=0.0)]
     C12_GPa: Annotated[float, number("likewise")]
     C44_GPa: Annotated[float, number("likewise", above=0.0)]
 

@@ -97,9 +97,7 @@ class Hemisphere(Stemmed, frozen=True, kw_only=True, tag="hemisphere"):
 
     radius_mm: Annotated[Length, says("of the middle surface")]
     rim_angle_deg: Annotated[float, number("polar angle where the meridian ends", above=0.0, most=180.0)] = 90.0
-    pole_angle_deg: Annotated[
-        float, number("polar angle where it starts; above 0 the pole is open", least=0.0, below=180.0)
-    ] = 0.0
+    pole_angle_deg: Annotated[float, number("where it starts; above 0 the pole is open", least=0.0, below=180.0)] = 0.0
 
     def __post_init__(self) -> None:
         super().__post_init__()

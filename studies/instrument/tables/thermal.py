@@ -22,19 +22,17 @@ class Thermal(Keys, frozen=True, kw_only=True):
         ),
     ] = 0.03
     base_heat_capacity_J_per_K: Annotated[
-        float, number("base with electrodes: about 34 g of silica", above=0.0, relative_sd=0.5)
+        float, number("with electrodes: 34 g of silica", above=0.0, relative_sd=0.5)
     ] = 25.0
     housing_heat_capacity_J_per_K: Annotated[float, number("about 150 g of steel", above=0.0, relative_sd=0.5)] = 70.0
-    chamber_conductance_W_per_K: Annotated[
-        float, number("moving air, 10 W/(m² K) on 100 cm²", above=0.0, relative_sd=0.5)
-    ] = 0.1
+    chamber_conductance_W_per_K: Annotated[float, number("air, 10 W/(m² K) on 100 cm²", above=0.0, relative_sd=0.5)] = (
+        0.1
+    )
     mount_conductance_W_per_K: Annotated[
         float,
         number("base to housing; identified from the settling of the HRG paper's Figure 3", above=0.0, relative_sd=0.5),
     ] = IDENTIFIED_MOUNT
-    mount_exchange_cm2: Annotated[
-        float, number("base to housing, area × effective emissivity", least=0.0, relative_sd=1.0)
-    ] = 10.0
+    mount_exchange_cm2: Annotated[float, number("base to housing, × emissivity", least=0.0, relative_sd=1.0)] = 10.0
     drive_power_mW: Annotated[float, number("heat of the vibration, spread over the shell", least=0.0)] = 0.0
     radiation: Annotated[bool, says("false: linearised at the reference temperature")] = True
     cells: Annotated[float, number("of the shell's meridian; 1 makes it a lump", least=1.0, most=400.0)] = 24
