@@ -8,9 +8,7 @@ class BryanFactor(OvertoneQuantity, frozen=True, kw_only=True, tag="bryan-factor
     """Precession of the standing wave per angle of rotation."""
 
     def list_columns(self) -> tuple[Column, ...]:
-        """Return the column of the factor."""
         return (Column(self.stem("bryan_factor"), "1", f"Bryan factor, {self.words}"),)
 
     def evaluate(self, case: Case) -> tuple[Number, ...]:
-        """Return the factor."""
         return (Number(self.mode(case).bryan_factor),)

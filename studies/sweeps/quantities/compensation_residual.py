@@ -26,7 +26,6 @@ class CompensationResidual(HarmonicQuantity, frozen=True, kw_only=True, tag="com
             )
 
     def list_columns(self) -> tuple[Column, ...]:
-        """Return the columns of the residual and of the error."""
         words = f"polynomial of order {self.order}, {self.words}"
         return (
             Column(self.stem("compensation_residual"), "Hz", f"rms residual of a {words}"),
@@ -34,7 +33,6 @@ class CompensationResidual(HarmonicQuantity, frozen=True, kw_only=True, tag="com
         )
 
     def evaluate(self, case: Case) -> tuple[Number, ...]:
-        """Return both."""
         from compensation.frequency import fit_frequency
 
         T = np.linspace(self.from_degC, self.to_degC, self.points)

@@ -8,10 +8,8 @@ class Frequency(OvertoneQuantity, frozen=True, kw_only=True, tag="frequency"):
     """Frequency of a mode, without the stress from the [mount], which tcf includes."""
 
     def list_columns(self) -> tuple[Column, ...]:
-        """Return the column of the frequency."""
         return (Column(self.stem("frequency"), "Hz", f"frequency, {self.words}"),)
 
     def evaluate(self, case: Case) -> tuple[Number, ...]:
-        """Return the frequency."""
         mode = self.mode(case)
         return (Number(mode.frequency, mode.frequency * mode.relative_error_estimate),)

@@ -15,7 +15,6 @@ class LoadsOfDesign(Quantity, frozen=True, kw_only=True, tag="loads"):
     shock_g: Annotated[float, number("acceleration for which the stress is given", above=0.0)] = 100.0
 
     def list_columns(self) -> tuple[Column, ...]:
-        """Return the columns of shift, tilt and stress."""
         n = self.harmonic
         return (
             Column(f"acceleration_shift_n{n}", "ppb/g", f"shift by an acceleration along the axis, n = {n}"),
@@ -24,7 +23,6 @@ class LoadsOfDesign(Quantity, frozen=True, kw_only=True, tag="loads"):
         )
 
     def evaluate(self, case: Case) -> tuple[Number, ...]:
-        """Return the three."""
         from shell.loads import Kind, Loads
         from studies.resonator.loads import STANDARD_GRAVITY
 

@@ -11,7 +11,6 @@ class LoopDrift(Quantity, frozen=True, kw_only=True, tag="loop-drift"):
     temperature_degC: Temperature | None = None
 
     def list_columns(self) -> tuple[Column, ...]:
-        """Return the columns of bias, spread and walk."""
         return (
             Column("loop_bias", "°/h", "bias of the closed loops"),
             Column("loop_bias_sd", "°/h", "standard deviation of the bias, by the card's uncertain values"),

@@ -29,13 +29,11 @@ class Loss(ModeQuantity, frozen=True, kw_only=True, tag="loss"):
     anchor: Annotated[bool, says("compute the anchor loss of a balanced mode, half a second per design")] = True
 
     def list_columns(self) -> tuple[Column, ...]:
-        """Return the columns of the sum and of its parts."""
         stem, words = self.stem("inverse_q"), self.words
         parts = [Column(f"{stem}_{part}", "1", f"1/Q by {name}, {words}") for part, name in PARTS.items()]
         return (Column(stem, "1", f"1/Q, {words}"), *parts)
 
     def evaluate(self, case: Case) -> tuple[Number, ...]:
-        """Return the sum and its parts."""
         found = dict.fromkeys(PARTS, 0.0)
         for part in find_budget(case, self, self.anchor).parts:
             found[_kind(part.name)] += float(part.inverse_q[0])

@@ -8,11 +8,9 @@ class Mass(Quantity, frozen=True, kw_only=True, tag="mass"):
     """Mass of the resonator, its stem included, and the height of its centre of mass."""
 
     def list_columns(self) -> tuple[Column, ...]:
-        """Return the columns of mass and centre."""
         return Column("mass", "g", "mass"), Column("center", "mm", "height of the centre of mass")
 
     def evaluate(self, case: Case) -> tuple[Number, ...]:
-        """Return both."""
         from shell.inertia import weigh
 
         resonator, elastic = case.instrument.at(case.instrument.reference_temperature)

@@ -22,7 +22,6 @@ class ModeSeparation(ModeQuantity, frozen=True, kw_only=True, tag="mode-separati
     distances: Annotated[bool, says("an extra column for the distance to each of these modes")] = False
 
     def list_columns(self) -> tuple[Column, ...]:
-        """Return the columns of the distance and of the other mode's harmonic."""
         stem = self.stem("separation")
         each = [
             Column(f"{stem}_of_n{n}_{k}", "Hz", f"distance of n = {n}, mode {k} from {self.words}")
@@ -42,7 +41,6 @@ class ModeSeparation(ModeQuantity, frozen=True, kw_only=True, tag="mode-separati
         ]
 
     def evaluate(self, case: Case) -> tuple[Number, ...]:
-        """Return distance and harmonic."""
         from shell.modes import nearest_mode
 
         at = case.temperature(self.temperature_degC)

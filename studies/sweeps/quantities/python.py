@@ -20,12 +20,10 @@ class Python(Quantity, frozen=True, kw_only=True, tag="python"):
             raise ValueError(f'function = \'{self.function}\' must be "package.module:name" or "file.py:name".')
 
     def list_columns(self) -> tuple[Column, ...]:
-        """Return the column of the value that it returns."""
         name = self.function.rpartition(":")[2]
         return (Column(name, self.unit, name.replace("_", " ")),)
 
     def evaluate(self, case: Case) -> tuple[Number, ...]:
-        """Return what it returns."""
         from studies.sweeps.child import ask
 
         return (Number(ask(self.function, self.time_limit_s, case)),)

@@ -14,7 +14,6 @@ class QualityFactor(ModeQuantity, frozen=True, kw_only=True, tag="q"):
     anchor: Annotated[bool, says("compute the anchor loss of a balanced mode, half a second per design")] = False
 
     def list_columns(self) -> tuple[Column, ...]:
-        """Return the columns of Q and of the share of heat."""
         stem = self.stem("q")
         return (
             Column(stem, "1", f"Q, {self.words}"),
@@ -22,7 +21,6 @@ class QualityFactor(ModeQuantity, frozen=True, kw_only=True, tag="q"):
         )
 
     def evaluate(self, case: Case) -> tuple[Number, ...]:
-        """Return both."""
         budget = find_budget(case, self, self.anchor)
         total = float(budget.inverse_q[0])
         warm = sum(float(part.inverse_q[0]) for part in budget.parts if part.name == "thermoelastic")

@@ -17,14 +17,12 @@ class Split(ModeQuantity, frozen=True, kw_only=True, tag="split"):
     ] = "first"
 
     def list_columns(self) -> tuple[Column, ...]:
-        """Return the columns of split and azimuth."""
         return (
             Column(self.stem("split"), "Hz", f"split, {self.words}"),
             Column(self.stem("slow_axis"), "°", f"azimuth of the slower mode, {self.words}"),
         )
 
     def evaluate(self, case: Case) -> tuple[Number, ...]:
-        """Return both."""
         from studies.resonator.splitting import SplitPair
 
         T = case.temperature(self.temperature_degC)

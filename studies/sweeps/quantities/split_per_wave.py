@@ -19,7 +19,6 @@ class SplitPerWave(ModeQuantity, frozen=True, kw_only=True, tag="split-per-wave"
     order: Annotated[int, number("crests around; 2n splits by itself", least=1, most=40)] = 4
 
     def list_columns(self) -> tuple[Column, ...]:
-        """Return the column of the split."""
         words = f"split per µm of wave {self.order} of the {self.of}, {self.words}"
         return (Column(f"{self.stem('split')}_{self.of}_{self.order}", "Hz/µm", words),)
 

@@ -12,13 +12,11 @@ class TemperatureCoefficient(ModeQuantity, frozen=True, kw_only=True, tag="tcf")
     """Relative slope of the frequency over temperature and its five parts."""
 
     def list_columns(self) -> tuple[Column, ...]:
-        """Return the columns of the sum and of its parts."""
         stem, words = self.stem("tcf"), f"TCF, {self.words}"
         parts = [Column(f"{stem}_{part}", "ppm/°C", f"{words}, part of {part}") for part in PARTS]
         return (Column(stem, "ppm/°C", words), *parts)
 
     def evaluate(self, case: Case) -> tuple[Number, ...]:
-        """Return the sum and its parts."""
         check_slope_known(case.instrument)
         T = case.temperature(self.temperature_degC)
         case.require_lowest(self.harmonic, self.theory, T)

@@ -14,14 +14,12 @@ class ThermalTimeConstants(Quantity, frozen=True, kw_only=True, tag="thermal-tim
     temperature_degC: Temperature | None = None
 
     def list_columns(self) -> tuple[Column, ...]:
-        """Return the columns of the path's and of the shell's time constants."""
         path = [
             Column(f"time_constant_{k + 1}", "s", f"time constant {k + 1} of the heat path") for k in range(self.count)
         ]
         return (*path, Column("time_constant_shell", "s", "slowest time constant of shell and stem alone"))
 
     def evaluate(self, case: Case) -> tuple[Number, ...]:
-        """Return them, the slowest first."""
         from studies.simulation.heat_path import build_network, build_shell_and_stem
         from thermal.relaxation import find_relaxation
 
