@@ -80,9 +80,9 @@ class Actuators:
             rate, quadrature = rate * self.force / size, quadrature * self.force / size
         return np.array([amplitude, phase, rate, quadrature])
 
-    def is_near(self, *commands: Array) -> bool:
-        """Whether any of the commands is near a limit."""
-        return any(self.use(c[2], c[3], c[0]).worst > NEAR for c in commands)
+    def is_near(self, commands: Array) -> bool:
+        """Whether any of the commands (N, 4) is near a limit."""
+        return self.use(commands[:, 2], commands[:, 3], commands[:, 0]).worst > NEAR
 
 
 UNLIMITED = Actuators()  # forces without limits, for quadrature too

@@ -10,7 +10,7 @@ term is absent. Loops that need more than the actuators give do not hold the wav
 beyond the range for a while turns the wave by n k ∫(Ω − Ω_max) dt, until it is back or lost.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,6 +26,7 @@ from compensation.samples import require_regular
 from compensation.wave import PHYSICAL, StandingWave, turn
 
 LOST = 0.3  # node over antinode at which a wave that its force cannot hold has left its azimuth
+TELL = 500  # rows from one word on the progress to the next
 ALIKE = 0.01
 """Part of 1/τ, and of n k per rad/s, within which rows share one matrix; what drives the wave is exact in every row."""
 
@@ -55,6 +56,7 @@ def simulate_rebalance(
     rate: ArrayLike = 0.0,
     angle: ArrayLike = 0.0,
     generator: np.random.Generator | None = None,
+    progress: Callable[[float], None] = lambda part: None,
 ) -> LoopRun:
     """Run a gyro in force-to-rebalance mode, settled where the commanded `angle` (rad) changes; `rate` (rad/s) is linear between rows."""
     t = np.asarray(time, dtype=float)
@@ -83,13 +85,15 @@ def simulate_rebalance(
         row, at = loop.row(samples), loop.places
         draws = generator.standard_normal((block.stop - block.start, loop.size)) if generator is not None else None
         for n in range(block.start, block.stop):
+            if n % TELL == 0:
+                progress(n / len(t))
             later = min(n + 1, len(t) - 1)
             end = forcing[later] if azimuth[later] == azimuth[n] else forcing[n]
             begun = row.start(state, (forcing[n], end), (offset, offset), samples * loops.step)
             state = row.map @ begun
             if draws is not None:
                 state += row.root @ draws[n - block.start]
-            if limits.finite and limits.is_near(state[at["sum"]] / samples, state[at["sent"]][:4]):
+            if limits.finite and limits.is_near(np.array([state[at["sum"]] / samples, state[at["sent"]][:4]])):
                 state, at_limit = loop.follow(begun, samples, generator)
                 limited += at_limit
                 if at_limit and abs(state[at["wave"]][2]) > LOST:

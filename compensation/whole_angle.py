@@ -10,6 +10,7 @@ order there, and exactly in the measured azimuth.
 
 import cmath
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,7 +21,7 @@ from compensation.arrays import Array
 from compensation.closed_loop import ClosedLoop, RowMap
 from compensation.controllers import Loops, require_stable
 from compensation.electronics import Electronics
-from compensation.rebalance import LoopRun, samples_in_row
+from compensation.rebalance import TELL, LoopRun, samples_in_row
 from compensation.wave import StandingWave
 
 TURN = 0.1  # largest turn of 2ψ (rad) in one step
@@ -39,6 +40,7 @@ def simulate_whole_angle(
     precession: ArrayLike = 0.0,
     angle: float = 0.0,
     generator: np.random.Generator | None = None,
+    progress: Callable[[float], None] = lambda part: None,
 ) -> LoopRun:
     """Run a gyro in whole-angle mode, its loops settled at the first row; the run's `angle` is measured at rows, all
     else means to the next.
@@ -62,6 +64,8 @@ def simulate_whole_angle(
     readout = math.sqrt(noise.measurement_variance(loops.sampling) * loops.smoothing / (2 - loops.smoothing))
     commands, measured = np.empty((len(t), 4)), np.empty(len(t))
     for n in range(len(t)):
+        if n % TELL == 0:
+            progress(n / len(t))
         measured[n] = course.measured(psi) + (generator.normal(0, readout) if generator is not None else 0.0)
         pieces = min(samples, math.ceil(2 * abs(course.turn(n, 0.0, psi, means)) * h / TURN) or 1)
         total = np.zeros(4)

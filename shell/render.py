@@ -7,7 +7,7 @@ import subprocess
 import sys
 import tempfile
 import threading
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import fields
 from math import pi
 from pathlib import Path
@@ -42,12 +42,14 @@ def render_animation(
     height: int = 520,
     frames: int = 24,
     period: float = 1.2,
+    progress: Callable[[float], None] = lambda part: None,
 ) -> bytes:
-    """Return a looping WebP or GIF of one period of the swing, which lasts `period` seconds."""
+    """Return a looping WebP or GIF of one period of the swing, which lasts `period` seconds; `progress` is told which part is drawn."""
     from PIL import Image
 
     swings = [float(np.cos(2 * pi * k / frames)) for k in range(frames)]
-    drawn = [Image.open(io.BytesIO(png)).convert("RGB") for png in _draw(scenes, view, (width, height), swings)]
+    pictures = _draw(scenes, view, (width, height), swings, progress)
+    drawn = [Image.open(io.BytesIO(png)).convert("RGB") for png in pictures]
     buffer = io.BytesIO()
     more: dict[str, Any] = {"quality": 80, "method": 4} if kind == "webp" else {"optimize": True}
     drawn[0].save(
@@ -78,7 +80,10 @@ def can_draw() -> tuple[bool, str]:
     return True, ""
 
 
-def _draw(scenes: Scene | Sequence[Scene], view: View, window: tuple[int, int], swings: list[float]) -> list[bytes]:
+def _draw(
+    scenes: Scene | Sequence[Scene], view: View, window: tuple[int, int], swings: list[float],
+    progress: Callable[[float], None] = lambda part: None,
+) -> list[bytes]:  # fmt: skip
     """Have a child process draw one PNG for every swing (-1 ... 1)."""
     together = [scenes] if isinstance(scenes, Scene) else list(scenes)
     if view not in VIEWS:
@@ -88,11 +93,21 @@ def _draw(scenes: Scene | Sequence[Scene], view: View, window: tuple[int, int], 
         for k, scene in enumerate(together):
             job |= {f"{field.name}_{k}": getattr(scene, field.name) for field in fields(Scene)}
         np.savez(Path(folder, "job.npz"), **job)
-        _run_child(folder, 60 + PER_FRAME * len(swings))
+        done = threading.Event()
+        threading.Thread(target=_watch, args=(folder, len(swings), progress, done), daemon=True).start()
+        try:
+            _run_child(folder, 60 + PER_FRAME * len(swings))
+        finally:
+            done.set()
         pictures = [Path(folder, f"{k}.png") for k in range(len(swings))]
         if not all(picture.exists() for picture in pictures):
             raise NoOpenGL(REMEDY)
         return [picture.read_bytes() for picture in pictures]
+
+
+def _watch(folder: str, count: int, progress: Callable[[float], None], done: threading.Event) -> None:
+    while not done.wait(0.5):
+        progress(len([*Path(folder).glob("*.png")]) / count)
 
 
 def _run_child(folder: str, seconds: float) -> None:

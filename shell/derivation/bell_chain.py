@@ -1,5 +1,7 @@
 """The bell's theory as one numbered chain of equations: BVG paper eqs. (1)–(22), beside what its copy prints."""
 
+from collections.abc import Iterator
+
 import sympy as sp
 from sympy.core.function import AppliedUndef
 
@@ -9,9 +11,11 @@ from shell.derivation.coriolis import pattern_coefficients
 from shell.derivation.symbols import n, omega, phi
 
 
-def bell_steps() -> list[Row]:
-    """Return the chain in the paper's order; a step that the copy prints otherwise says how."""
-    return [*_body(), *_motion(), *_model()]
+def bell_steps() -> Iterator[Row]:
+    """Yield the chain in the paper's order; a step that the copy prints otherwise says how."""
+    yield from _body()
+    yield from _motion()
+    yield from _model()
 
 
 def shorten(equation: sp.Expr) -> sp.Expr:

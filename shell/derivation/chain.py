@@ -1,5 +1,6 @@
 """The derivation as one numbered chain of equations: rows of number, title, left sides and right sides; 0 says that these vanish."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
@@ -52,9 +53,11 @@ class DerivedCase:
         return frequency.log_derivatives().phi_2.subs(values)
 
 
-def steps(case: DerivedCase) -> list[Row]:
-    """Return the whole chain, HRG paper eqs. (1)–(15), for any n, with the numbers of one case before (15)."""
-    return [*_elasticity(), *_mode(), *_frequency(case)]
+def steps(case: DerivedCase) -> Iterator[Row]:
+    """Yield the whole chain, HRG paper eqs. (1)–(15), for any n, with the numbers of one case before (15)."""
+    yield from _elasticity()
+    yield from _mode()
+    yield from _frequency(case)
 
 
 def _elasticity() -> list[Row]:

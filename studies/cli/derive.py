@@ -10,25 +10,29 @@ With --dynamics: schema hrg.derive-dynamics/1, `equations` and, with --code, `co
 CVG paper on demodulated dynamics.
 """
 
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from math import radians
 from typing import TYPE_CHECKING, Any, Literal
 
 from shell.rayleigh import rayleigh_integrals
-from studies.cli.output import answers, say
+from studies.cli.output import answers
 from studies.errors import InputError
 from studies.files.writing import write_text
 from studies.papers.bvg_theory import compare_bell_theory
+from studies.progress import tell
 from studies.results import Chapter, Result, Sentence, Table
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from shell.derivation.chain import Row
     from studies.derivation import Step
 
 HRG_TITLE = "Rayleigh's inextensional shell, HRG paper equations (1)-(15)"
 BELL_TITLE = "The bell's theory, BVG paper equations (1)-(22)"
 DYNAMICS_TITLE = "Averaged dynamics of a Coriolis vibratory gyro"
+DERIVING, ROWS = "deriving the equations", 30  # of the longest chain
 MOST_HARMONIC = 100  # the closed forms of higher ones take minutes
 
 
@@ -54,7 +58,7 @@ def derive(
         dynamics: Derive the averaged dynamics of the vibration (Lynch's form; the CVG paper's equations 7 to 25), its
             transfer functions and poles, and its optimal filters (35, 36).
         bell: Derive the theory of the bell (BVG paper, equations 1 to 22), beside the published equations, and compare
-            its frequency with the solver on the card bvg-bell; about 20 seconds.
+            its frequency with the solver on the card bvg-bell.
         latex: Print a LaTeX fragment (amsmath) instead.
         code: Print the frequency, Bryan factor and derivatives as self-contained code instead.
         harmonic: Circumferential harmonic n of the closed forms and of the code, at least 2.
@@ -85,6 +89,7 @@ def derive(
     if harmonic > MOST_HARMONIC:
         raise InputError(f"--harmonic {harmonic}: closed forms are derived up to n = {MOST_HARMONIC}.")
     shape = rayleigh_integrals(harmonic, radians(pole_angle_deg), radians(rim_angle_deg))
+    tell(DERIVING, 0.0)
     case = DerivedCase.from_degrees(harmonic, pole_angle_deg, rim_angle_deg)
     closed_forms = {"I": case.bending, "J": case.mass, "bryan_factor": case.precession}
     # On a cap of a thousandth of a degree a hundred digits do not suffice to evaluate the closed forms.
@@ -100,11 +105,16 @@ def derive(
         **{name: {"closed_form": str(one), "value": float(one.evalf(20))} for name, one in closed_forms.items()},
         "d_ln_f_d_rim_angle_per_rad": float(case.rim_derivative.evalf(20)),
     }
-    say("deriving the equations ...")
     lead = f"HRG paper, equations (1) to (15), closed forms for n = {harmonic} from {pole_angle_deg:g}° to {rim_angle_deg:g}°."
     emitted = {"language": code, "text": emit_code(case, code)} if code else None
     title = "Frequency of the inextensional shell"
-    return _keep(_answer(payload, read_chain(steps(case)), HRG_TITLE, latex, title, lead, emitted), out)
+    return _keep(_answer(payload, read_chain(_told(steps(case), 0.6)), HRG_TITLE, latex, title, lead, emitted), out)
+
+
+def _told(rows: Iterable["Row"], behind: float = 0.0) -> "Iterator[Row]":
+    for k, row in enumerate(rows):
+        tell(DERIVING, behind + (1.0 - behind) * k / ROWS)
+        yield row
 
 
 def _keep(found: Result, out: str | None) -> Result:
@@ -127,17 +137,18 @@ def _derive_dynamics(latex: bool, code: Literal["python", "c"] | None) -> Result
     lead = "Averaged equations of amplitude, quadrature, precession and phase of the standing wave."
     emitted = {"language": code, "text": emit_code(code)} if code else None
     schema = {"schema": "hrg.derive-dynamics/1"}
-    return _answer(schema, read_chain(steps()), DYNAMICS_TITLE, latex, "Dynamics of the standing wave", lead, emitted)
+    return _answer(
+        schema, read_chain(_told(steps())), DYNAMICS_TITLE, latex, "Dynamics of the standing wave", lead, emitted
+    )
 
 
 def _derive_bell(latex: bool) -> Result:
     from shell.derivation.bell_chain import bell_steps, shorten
     from studies.derivation import read_chain
 
-    say("deriving the bell's equations ...")
     payload: dict[str, Any] = {"schema": "hrg.derive-bell/1", "numbers": None}
     lead = "BVG paper, equations (1) to (22), beside what is printed."
-    found = _answer(payload, read_chain(bell_steps(), shorten), BELL_TITLE, latex, "Theory of the bell", lead)
+    found = _answer(payload, read_chain(_told(bell_steps()), shorten), BELL_TITLE, latex, "Theory of the bell", lead)
     if latex:
         return found
     theory = compare_bell_theory()

@@ -48,7 +48,8 @@ def fit_thermal(
     if not data:
         raise InputError("name at least one record (CSV) with a step, a ramp or a cycle of temperature.")
     records = [read_record(path) for path in data]
-    with Told("heat path") as told:
+    stages = {"one lag": 0.05, "a heat path with 1": 0.15, "a heat path with 2": 0.25, "a heat path with 3": 0.8}
+    with Told("heat path", stages) as told:
         found = fit_thermal_constants(records, load_card(card) if card else None, lags, confidence, told)
     for note in found.notes:
         say(f"note: {note}")

@@ -1,6 +1,7 @@
 """`hrg render`: a mode shape as picture, animation, interactive page or mesh."""
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Annotated, Any, Literal
 
 from cyclopts import Parameter
@@ -13,6 +14,7 @@ from studies.cli.output import answers
 from studies.errors import InputError, MissingEnvironment
 from studies.files.writing import written_whole
 from studies.instrument.card import load_card
+from studies.progress import tell
 from studies.reports.scenes import Colour, ModeScene, ShellTemperature, read_field, show_mode, view_blocks
 from studies.results import Blocks, Chapter, Result, Sentence, Table, row_of
 from studies.results.page import render_result
@@ -110,7 +112,8 @@ def _picture(
     try:
         if kind == ".png":
             return render_png(scenes, view)
-        return render_animation(scenes, "webp" if kind == ".webp" else "gif", view)
+        told = partial(tell, "drawing")
+        return render_animation(scenes, "webp" if kind == ".webp" else "gif", view, progress=told)
     except NoOpenGL as error:
         raise MissingEnvironment(f"{error} An .html page or a mesh needs none.") from None
 

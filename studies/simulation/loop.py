@@ -1,6 +1,7 @@
 """The loops of a card's gyro: its standing wave and electronics in SI units, what they say settled, and over a run."""
 
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,6 +15,7 @@ from compensation.settled_turn import read_turning, turn_settled
 from compensation.wave import StandingWave
 from compensation.whole_angle import WITHOUT_RATE, simulate_whole_angle
 from studies.errors import InputError, naming
+from studies.progress import tell
 from studies.record import place_of_largest
 from studies.resonator.splitting import reference_split
 
@@ -233,6 +235,7 @@ def run_loops(
     angle = np.radians(instrument.bias.pattern_angle_deg) if pattern_angle is None else np.asarray(pattern_angle)
     wave = wave_of(instrument, frequency, inverse_q, bryan_factor, damping=damping)
     electronics = electronics_of(loop, wave, instrument.reference_temperature)
+    told = partial(tell, "the loops, row by row")
     back = both_ways & (np.arange(len(time)) >= len(time) // 2)
     with naming(f"{instrument.path} [loop]"):
         if loop.mode == "whole-angle":
@@ -245,5 +248,8 @@ def run_loops(
                 precession=np.radians(loop.self_precession_deg_per_s) * np.where(back, -1.0, 1.0),
                 angle=float(np.ravel(angle)[0]),
                 generator=generator,
+                progress=told,
             )
-        return simulate_rebalance(wave, electronics, loops_of(loop), time, rate=rate, angle=angle, generator=generator)
+        return simulate_rebalance(
+            wave, electronics, loops_of(loop), time, rate=rate, angle=angle, generator=generator, progress=told
+        )
