@@ -93,7 +93,7 @@ def _judge(
             )
     resonator = np.concatenate([path.states.resonator for path in found.search.signatures.paths])
     if np.ptp(resonator) < NARROW_RANGE:
-        remark = f"the resonator's temperature changes by only {np.ptp(resonator):.2g} K: what follows it cannot show"
+        remark = f"the resonator's temperature changes by {np.ptp(resonator):.2g} K only: what follows it cannot show"
     else:
         remark = ""
     return ("not-identifiable", doubt_of(left.input, left.evidence)) if left.doubtful else ("adequate", remark)
