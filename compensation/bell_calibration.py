@@ -8,10 +8,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from compensation.arrays import Array
-from compensation.bell import BellChain, PolynomialCurve
+from compensation.bell import BellChain, PolynomialCurve, design_smoother
 from compensation.constants import zero_Celsius
 from compensation.errors import CompensationError
-from compensation.fir import design_smoother
 from compensation.noise_regression import correlated_covariance
 from compensation.polynomial import fit_polynomial
 from compensation.samples import own_columns, read_columns, require_regular

@@ -21,13 +21,12 @@ from studies.reports import style
 from studies.results import Column, Drawing, Figure, Result, Table, rows_of
 from studies.simulation.chamber import check_profile, load_profile
 from studies.simulation.heat_path import build_network, build_shell_and_stem
-from thermal.balance import check_energy
 from thermal.network import Network
 from thermal.profile import Profile
 from thermal.radiative import simulate
 from thermal.relaxation import find_relaxation, time_constant_sensitivities
 from thermal.resonator import shell_weights
-from thermal.transient import Transient
+from thermal.transient import Transient, check_energy
 
 
 @answers("hrg.thermal/1")

@@ -16,8 +16,8 @@ from studies.importing.offset import estimate_offset
 from studies.importing.raw import shorten
 from studies.importing.timing import TIME_WORDS, find_time
 from studies.importing.units import units_of
+from studies.schema.keys import spell_value
 from studies.schema.reader import read_keys
-from studies.schema.spelling import spell_value
 
 if TYPE_CHECKING:
     from studies.importing.join import ClockedFile

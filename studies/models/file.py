@@ -13,9 +13,8 @@ from studies.errors import InputError
 from studies.files.writing import write_text
 from studies.instrument.units import unit_of
 from studies.record import Record
-from studies.schema.keys import Keys, number, says
+from studies.schema.keys import Keys, number, says, spell_value
 from studies.schema.reader import read_file, read_keys
-from studies.schema.spelling import spell_value
 
 SCHEMA = "hrg.model/1"
 WIDENED = 0.05  # of a fitted range, on each side

@@ -7,9 +7,8 @@ from importlib.resources import files
 import numpy as np
 
 from compensation.arrays import Array
-from compensation.bell import BellChain, PolynomialCurve, apply_chain, invert_chain
+from compensation.bell import BellChain, PolynomialCurve, apply_chain, design_smoother, invert_chain
 from compensation.bell_calibration import BellRun, fit_chain
-from compensation.fir import design_smoother
 from compensation.linearity import measure_nonlinearity
 from compensation.stability import allan_deviation
 from shell.constants import zero_Celsius

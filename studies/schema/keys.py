@@ -112,3 +112,16 @@ def priors(node: inspect.Type, raw: Any, before: Path = ()) -> Iterator[tuple[Pa
                         yield from priors(bare.item_type, member, (*path, place))
                 elif isinstance(inner, Mapping) and structs(bare):
                     yield from priors(bare, inner, path)
+
+
+def spell_value(value: Any) -> str:
+    """Return a text, a truth, a number, a list or a table as TOML on one line, with every digit."""
+    import tomli_w
+
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(map(spell_value, value))}]"
+    if isinstance(value, dict):
+        return f"{{ {', '.join(f'{key} = {spell_value(one)}' for key, one in value.items())} }}"
+    if isinstance(value, float):
+        return repr(float(value))
+    return tomli_w.dumps({"x": value}).removeprefix("x = ").rstrip("\n")

@@ -7,9 +7,8 @@ from typing import Any
 from msgspec import NODEFAULT, inspect
 
 from studies.instrument.units import unit_of
-from studies.schema.keys import bounds, describe, number_in, options, structs
+from studies.schema.keys import bounds, describe, number_in, options, spell_value, structs
 from studies.schema.reader import BOUNDS, spell_wanted
-from studies.schema.spelling import spell_value
 
 
 def list_keys(keys: Any, table: str = "") -> Iterator[dict[str, Any]]:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from compensation.bell import BellChain, PolynomialCurve, apply_chain, invert_chain
+from compensation.bell import BellChain, PolynomialCurve, apply_chain, design_smoother, invert_chain, smooth
 from compensation.bell_calibration import (
     BellRun,
     fit_bias,
@@ -13,7 +13,6 @@ from compensation.bell_calibration import (
     fit_scale_over_temperature,
 )
 from compensation.errors import CompensationError
-from compensation.fir import design_smoother, smooth
 from compensation.linearity import measure_nonlinearity
 from compensation.polynomial import fit_polynomial
 

@@ -239,7 +239,7 @@ def test_paper_twin():
 
 def test_filter_reduces_the_allan_deviation_as_predicted():
     """The factor against the Allan deviation of filtered white noise."""
-    from compensation.fir import design_smoother, smooth
+    from compensation.bell import design_smoother, smooth
     from compensation.stability import allan_deviation
 
     taps = design_smoother(0.1, 0.5)

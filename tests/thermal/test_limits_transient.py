@@ -7,13 +7,12 @@ from hypothesis import strategies as st
 from scipy.constants import Stefan_Boltzmann
 
 from thermal import sweeping
-from thermal.balance import check_energy
 from thermal.lag import lag, scan
 from thermal.network import Boundary, Conductor, Node, Radiator, Source, assemble, linearise
 from thermal.profile import Profile, constant, parse_profile
 from thermal.radiative import integrate, simulate
 from thermal.sweeping import sweep
-from thermal.transient import propagate
+from thermal.transient import check_energy, propagate
 
 LINEAR = (
     Boundary("chamber"),
