@@ -1,7 +1,7 @@
 """The command line `hrg`: one file per command, loaded only when that command runs.
 
-Exit status: 0 done, 1 a fault of the program, 2 unusable input or arguments, 3 the environment,
-4 a study finished with failed cases, 130 interrupted and resumable.
+Exit status: 0 done, 1 a fault of the program, 2 unusable input or arguments, 3 the environment, 4 a study finished with failed cases, 130 interrupted
+and resumable.
 """
 
 import gc

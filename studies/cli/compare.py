@@ -1,7 +1,6 @@
 """`hrg compare`: designs side by side.
 
-With --json one object, schema `hrg.compare/1`: `cards`, `figures` (name, unit, values, uncertainties), `differing` (card key to
-its values, null where a card has none).
+Schema hrg.compare/1: `cards`, `figures` (name, unit, values, uncertainties), `differing` (card key to its values, null where a card has none).
 """
 
 from math import isfinite

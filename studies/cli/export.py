@@ -1,6 +1,6 @@
 """`hrg export`: a record for other programs: MATLAB, TDMS, MDF, HDF5, Parquet, with units and what the record's header says.
 
-With --json one object, schema `hrg.export/1`: `record`, `to`, `out`, `rows`, `columns`.
+Schema hrg.export/1: `record`, `to`, `out`, `rows`, `columns`.
 """
 
 from collections.abc import Callable, Mapping

@@ -1,7 +1,7 @@
 """`hrg fit whole-angle`: splits, axes, gain ratio and phase error from a whole-angle run.
 
-With --json one object, schema `hrg.fit-whole-angle/1`: `data`, `confidence`, `estimates` (by the card's keys: `value`,
-`sd`, `low`, `high`), `undetermined` (sentences), `saved` (path or null).
+Schema hrg.fit-whole-angle/1: `data`, `confidence`, `estimates` (by the card's keys: `value`, `sd`, `low`, `high`), `undetermined` (sentences),
+`saved` (path or null).
 """
 
 from math import degrees, pi

@@ -1,8 +1,7 @@
 """`hrg import`: laboratory files into the record format, by a map that states every change.
 
-With --json one object, schema `hrg.import/1`: `start` (of the clock, or null), `record`, `rows`, `columns` (each with `missing` values),
-`notes` (every change), and `axes` (name to record) where the columns name several. With --draft schema `hrg.import-draft/1`: `map`,
-`mapped`, `left_over`.
+Schema hrg.import/1: `start` (of the clock, or null), `record`, `rows`, `columns` (each with `missing` values), `notes` (every change), and `axes`
+(name to record) where the columns name several. With --draft schema `hrg.import-draft/1`: `map`, `mapped`, `left_over`.
 """
 
 import os

@@ -1,11 +1,11 @@
 """`hrg modes`: frequencies, Bryan factors and sensitivities of a card's modes.
 
 Where the card has imperfections or charged electrodes, the pairs n >= 1 have `split` in the JSON besides: `split_Hz`, `slow_Hz`, `fast_Hz`,
-`slow_axis_deg` (azimuth of an antinode of the slower mode), `shift_ppm` of the mean, all to first order, and `every_order_split_Hz`; and
-`parts`, split_Hz, slow_axis_deg and shift_ppm by the imperfection, the measured split and the electrodes alone.
-Where the card has a [mount] the pairs of n >= 1 have `mount`: `strain_ppm` of the base, `shift_ppm`, `slope_ppm_per_degC`, `per_strain`.
-Where the card has films ([[loss.film]]), modes have `films`: `film`, `shift_ppm`, and the `missing` keys where that is null. Where its material is
-a crystal, the lowest pairs of n = 2, 3, 5, 6, 7, 9 … have `crystal`: `antinode_along_100_Hz`, `other_Hz`, `split_Hz`, `relative_split`.
+`slow_axis_deg` (azimuth of an antinode of the slower mode), `shift_ppm` of the mean, all to first order, and `every_order_split_Hz`; and `parts`,
+split_Hz, slow_axis_deg and shift_ppm by the imperfection, the measured split and the electrodes alone. Where the card has a [mount] the pairs of n >=
+1 have `mount`: `strain_ppm` of the base, `shift_ppm`, `slope_ppm_per_degC`, `per_strain`. Where the card has films ([[loss.film]]), modes have
+`films`: `film`, `shift_ppm`, and the `missing` keys where that is null. Where its material is a crystal, the lowest pairs of n = 2, 3, 5, 6, 7, 9 …
+have `crystal`: `antinode_along_100_Hz`, `other_Hz`, `split_Hz`, `relative_split`.
 """
 
 from math import degrees
