@@ -17,7 +17,7 @@ from shell.resonator import Resonator
 from shell.solution import Solution, total
 from shell.system import ShellGroup, SolidGroup, System
 
-GROWTH = 3.0  # of the cells away from the stem
+GROWTH = 6.0  # of the cells away from the stem
 PER_WAVE = 3  # cells over a shear wavelength
 LAYER = 3  # cells across the absorbing layer
 

@@ -20,7 +20,7 @@ from shell.elastic import Elastic
 from shell.errors import ShellError
 from shell.kernel import lame
 from shell.quadrature import Array
-from shell.sparse import assemble_elements, factor_symmetric
+from shell.sparse import Index, assemble_elements, factor_symmetric
 from shell.system import ShellGroup, SolidGroup, System
 
 Complex = NDArray[np.complex128]
@@ -141,28 +141,30 @@ def _matrices(
         return (lam * trace + G * sheared).astype(complex), (body.rho * mass).astype(complex)
     E, nu, rho = (np.where(base, getattr(materials[1], x), getattr(materials[0], x)) for x in ("E", "nu", "rho"))
     lam, G = lame(E, nu, False)
-    products = _products(group, base, layer)
-    absorbs = np.flatnonzero(products.imag.any(axis=(1, 2)))
-    real, imaginary = np.ascontiguousarray(products.real), np.ascontiguousarray(products.imag[absorbs])
-    K, M = cell_stiffness(real, lam, G, n).astype(complex), cell_mass(real).astype(complex)
-    K[absorbs] += 1j * cell_stiffness(imaginary, lam[absorbs], G[absorbs], n)
-    M[absorbs] += 1j * cell_mass(imaginary)
+    K, M = (one.astype(complex) for one in (cell_stiffness(group.products, lam, G, n), cell_mass(group.products)))
+    absorbs, products = _absorbing(group, base, layer)
+    parts = [(1, np.ascontiguousarray(products.real)), (1j, np.ascontiguousarray(products.imag))]
+    K[absorbs] = sum(unit * cell_stiffness(part, lam[absorbs], G[absorbs], n) for unit, part in parts)
+    M[absorbs] = sum(unit * cell_mass(part) for unit, part in parts)
     return K, rho[:, None, None] * M
 
 
-def _products(group: SolidGroup, base: Mask, layer: Layer) -> Complex:
-    """See `CellTable.products`; in the absorbing layer with complex coordinates."""
-    table, grid = group.table, group.mesh.grid
+def _absorbing(group: SolidGroup, base: Mask, layer: Layer) -> tuple[Index, Complex]:
+    """The cells of the absorbing layer, and their `CellTable.products` in complex coordinates."""
+    grid = group.mesh.grid
     degree = grid.shape[2] - 1
     place = at_gauss_points(degree, degree, degree + 2)
     z = (place.along.values @ grid[1] @ place.across.values.T).reshape(len(base), -1)
     depth = (layer.surface - z) if layer.below else (z - layer.surface)
-    by_r, to_r = layer.stretch(np.where(base[:, None], table.radius, 0.0))
+    by_r, to_r = layer.stretch(np.where(base[:, None], group.table.radius, 0.0))
     by_z, _ = layer.stretch(np.where(base[:, None], depth, 0.0))
-    radius = table.radius + to_r
-    scale = np.stack([1 / by_r, 1 / by_z, table.radius / radius], axis=1)[..., None]
-    gradients = table.gradients * scale * group.signs[:, None, None]
-    volume = table.volume[:, 0] * by_r * by_z * radius / table.radius
+    absorbs = np.flatnonzero((by_r.imag != 0).any(axis=1) | (by_z.imag != 0).any(axis=1))
+    by_r, to_r, by_z = by_r[absorbs], to_r[absorbs], by_z[absorbs]
+    r, volume = group.table.radius[absorbs], group.table.volume[absorbs, 0]
+    radius = r + to_r
+    scale = np.stack([1 / by_r, 1 / by_z, r / radius], axis=1)[..., None]
+    gradients = group.table.gradients[absorbs] * scale * group.signs[absorbs][:, None, None]
+    volume = volume * by_r * by_z * radius / r
     cells, _, _, functions = gradients.shape
     found = np.empty((cells, 10, functions, functions), dtype=complex)
     np.matmul(
@@ -172,4 +174,4 @@ def _products(group: SolidGroup, base: Mask, layer: Layer) -> Complex:
     )
     moved = gradients[:, 2] * radius[..., None]
     np.matmul(np.swapaxes(moved, 1, 2), moved * volume[..., None], out=found[:, 9])
-    return np.asarray(found.reshape(cells, 10, functions**2), dtype=complex)
+    return absorbs, found.reshape(cells, 10, functions**2)

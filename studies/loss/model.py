@@ -57,15 +57,15 @@ class LossModel:
 
 
 def loss_model(
-    instrument: "Instrument", harmonic: int = 2, theory: "Theory" = "solid", anchor: bool = False
+    instrument: "Instrument", harmonic: int = 2, theory: "Theory" = "solid", anchor: bool = False, mode: "Mode | None" = None
 ) -> LossModel:
     """Solve the lowest mode of a harmonic and gather its causes of loss; the `anchor`, what a stem sends into its base,
-    takes a second or two.
+    takes a second or two. `mode`: where it is known, at the reference temperature.
     """
     from shell.damping.faces import Vibration
 
     T0, material = instrument.reference_temperature, instrument.material
-    mode = solve_lowest(instrument.resonator, material.elastic(T0), harmonic, theory)
+    mode = mode or solve_lowest(instrument.resonator, material.elastic(T0), harmonic, theory)
     vibration = Vibration.of(mode, material, T0)
     parts: LossParts = instrument.part("loss", "loss_parts")
     spread = _relative_sds(instrument)
@@ -201,11 +201,11 @@ def solve_lowest(resonator: "Resonator", elastic: "Elastic", harmonic: int, theo
 
 
 @lru_cache(maxsize=8)
-def _unbalance(resonator: "Resonator", elastic: "Elastic") -> "Unbalance":
-    """What an unbalanced rim costs the mode n = 2."""
+def _unbalance(mode: "Mode", elastic: "Elastic") -> "Unbalance":
+    """What an unbalanced rim costs the mode n = 2; kept, since many values of a card leave it as it is."""
     from shell.damping.anchor import unbalance_loss
 
-    return unbalance_loss(solve_lowest(resonator, elastic, 2, "solid"), elastic)
+    return unbalance_loss(mode, elastic)
 
 
 def _others(
@@ -249,7 +249,7 @@ def _anchor(
     if balanced:
         causes.append(constant_cause("anchor", anchor_loss(mode, elastic).inverse_q, 0.5, source, MOUNT_ADVICE))
     if any(rim) and mode.harmonic == 2:
-        found = _unbalance(instrument.resonator, elastic)
+        found = _unbalance(mode, elastic)
         loss, wave = found.inverse_q(*rim), found.wave(*rim)
         # the squares of the masses count
         sd = 2 * max(spread.get(f"loss.{key}", 0.0) for key in ("unbalance_mg", "third_unbalance_mg"))

@@ -69,10 +69,14 @@ class Case:
 
         return follow(solve, solve(0.0, index + 1)[index])
 
-    def require_lowest(self, harmonic: int, theory: "Theory", temperature: float) -> None:
-        """Refuse a design in which another mode has come below the followed one: what is asked is of the lowest."""
-        if self.on_the_way is not None and (k := self.mode(harmonic, 0, theory, temperature).index):
-            raise InputError(f"the mode n = {harmonic} of the start is no longer the lowest but number {k + 1}.")
+    def require_lowest(self, harmonic: int, theory: "Theory", temperature: float) -> "Mode | None":
+        """Return the followed mode; refuse a design in which another has come below it: what is asked is of the lowest."""
+        if self.on_the_way is None:
+            return None
+        found = self.mode(harmonic, 0, theory, temperature)
+        if found.index:
+            raise InputError(f"the mode n = {harmonic} of the start is no longer the lowest but number {found.index + 1}.")
+        return found
 
 
 @lru_cache(maxsize=32)

@@ -43,10 +43,11 @@ class Loss(ModeQuantity, frozen=True, kw_only=True, tag="loss"):
 def find_budget(case: Case, asked: ModeQuantity, anchor: bool) -> "Budget":
     """Return the loss budget of a design; the anchor of a stem is computed where the card states none."""
     T, instrument = case.temperature(asked.temperature_degC), case.instrument
-    case.require_lowest(asked.harmonic, asked.theory, T)
+    followed = case.require_lowest(asked.harmonic, asked.theory, T)
     stem, stated = instrument.resonator.stem, instrument.part("loss", "loss_parts").anchor_inverse_q
     computed = anchor and stem is not None and len(stem.roots) == 1 and stated is None
-    return loss_model(instrument, asked.harmonic, asked.theory, computed).budget(T)
+    known = followed if T == instrument.reference_temperature else None
+    return loss_model(instrument, asked.harmonic, asked.theory, computed, known).budget(T)
 
 
 def _kind(name: str) -> str:
