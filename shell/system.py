@@ -143,6 +143,12 @@ class System:
 
     @cached_property
     def _elements(self) -> tuple[Pattern, list["ToFree"]]:
+        pattern = find_pattern([at.free for at in self.to_free], self.constraint.shape[1])
+        return pattern, [at.reordered(order) for at, order in zip(self.to_free, pattern.order, strict=True)]
+
+    @cached_property
+    def to_free(self) -> list["ToFree"]:
+        """From the unknowns of every element to its free ones, in their own order."""
         P = self._choice
         uses = np.diff(P.indptr)
         maps: list[ToFree] = []
@@ -161,8 +167,7 @@ class System:
                     matrix[np.repeat(np.arange(size), terms), place] = factors
                     maps.append(ToFree(free.astype(np.intp), None, matrix))
                 first += size
-        pattern = find_pattern([at.free for at in maps], self.constraint.shape[1])
-        return pattern, [at.reordered(order) for at, order in zip(maps, pattern.order, strict=True)]
+        return maps
 
     @cached_property
     def is_small(self) -> bool:

@@ -98,7 +98,7 @@ def _stand(mode: Mode, elastic: Elastic | VaryingElastic, base: Elastic | None, 
         level = replace(level, block=4, rings=2)
     layout = lay_resonator(resonator, n, level)
     (root, tied), *others = layout.solids
-    r, z = mesh_solid(root, level.block).points
+    r, z = mesh_solid(root, 1).points
     at_end = np.sort(r[abs(z - end) < 1e-9 * r.max()])  # radii where the cells of the stem meet at its end
     radii = [0.0, *at_end[at_end > 1e-9 * r.max()].tolist()]
     wavelength = float(np.sqrt(base.G / base.rho)) / mode.frequency

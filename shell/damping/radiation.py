@@ -69,7 +69,7 @@ class RadiatingBody:
     def factor(self, shift: complex) -> Callable[[Complex], Complex]:
         """The solution of (K - shift M) x = b as a function of b."""
         elements = (one for K, M in zip(self.stiffness, self.mass, strict=True) for one in K - shift * M)
-        maps = self.system.maps
+        maps = self.system.to_free
         free = [at.restrict(one) for at, one in zip(maps, elements, strict=True)]
         size = self.system.constraint.shape[1]
         return factor_symmetric(assemble_elements([at.free for at in maps], free, size), 1e-3)
