@@ -119,15 +119,17 @@ class Search:
         return max(hopeful, key=lambda x: float(np.linalg.norm(self.x - x, axis=1).min()))
 
     def descend(self, scalar: Scalar, best: int, boxes: Sequence[float] = BOXES, known: Sequence[int] = ()) -> int:
-        """Improve a design within boxes that move with it and shrink, until it meets one `known` before; return the place of the best one."""
+        """Improve a design within boxes that move with it and shrink, until it meets one `known` before; return the place of the best one.
+
+        Boxes of the first size have no star.
+        """
         first = best
         for half in boxes:
-            strict = half == BOXES[-1]
+            strict, rough = half == BOXES[-1], half == BOXES[0]
             centre, idle, reach = np.full_like(self.start, np.inf), 0, WIDER * half
             for _ in range(REFINED):
-                if np.abs(self.x[best] - centre).max() > half and (
-                    idle == PATIENCE - 1 or not (known or np.isfinite(centre).all())
-                ):
+                aside = np.abs(self.x[best] - centre).max() > half
+                if aside and not rough and (idle == PATIENCE - 1 or not np.isfinite(centre).all()):
                     centre = self.x[best]  # steps that keep what the interpolant said need no new star
                     self.margins = self.goals.margins(self.values[best], self.slopes(best, half))
                 surface = self.local(self.x[best], half)
@@ -138,7 +140,11 @@ class Search:
                 idle = 0 if self._is_better(self._worth(best, scalar, strict), before) else idle + 1
                 far_off = np.abs(self.x[best] - here).max() > half
                 reach = min(WIDER * reach, BOXES[0]) if far_off and not idle else WIDER * half
-                if self.spent or idle == PATIENCE or any(np.abs(self.x[best] - self.x[k]).max() < half for k in known):
+                if (
+                    self.spent
+                    or idle == PATIENCE - rough
+                    or any(np.abs(self.x[best] - self.x[k]).max() < half for k in known)
+                ):
                     break
         return best if self._merit(best, scalar) <= self._merit(first, scalar) or not strict else first
 
