@@ -76,7 +76,7 @@ def loss(
         [
             *_parts(payload, model, budget, stated, at),
             Chapter("In a simulation", [_simulated(instrument)]),
-            live_chapter(instrument, harmonic, theory),
+            live_chapter(instrument, harmonic, theory, anchor=anchor),
         ],
     )
 

@@ -3,9 +3,9 @@
 The page carries the interpolant of a family (`shell.family`), Newton's form on a sparse grid, and Chebyshev series of what the
 material adds over temperature, m(T) = ½ ln(E/ρ) − ln g, and of ν(T):
 
-    ln f = ln F(dimensions, ν(T)) + m(T),      d ln f/dT = m' + ∂ ln F/∂ν ν'.
+    ln f = ln F(dimensions, ν(T)) + m(T) + s(dimensions) ε(T),      d ln f/dT = m' + ∂ ln F/∂ν ν' + s ε'.
 
-Loss, split and outline have an interpolant of their own (`studies.reports.live_fields`).
+Loss, split, the stress s by the base and outline have an interpolant of their own (`studies.reports.live_fields`).
 """
 
 import hashlib
@@ -48,11 +48,11 @@ MARGIN = 1e-3  # of ν beyond its range over temperature
 
 def live_blocks(
     instrument: Instrument, harmonic: int = 2, theory: Theory = "solid", names: Sequence[str] = (),
-    derived: Sequence[Derived] = (),
+    derived: Sequence[Derived] = (), anchor: bool = False,
 ) -> list[Block]:  # fmt: skip
     """Return sliders for keys of the card (main dimensions unless given) and temperature, or a sentence why not; they move the view above."""
     try:
-        data, missing = describe_live(instrument, harmonic, theory, names, derived)
+        data, missing = describe_live(instrument, harmonic, theory, names, derived, anchor)
     except UNUSABLE_INPUT as error:
         return [Sentence(f"No sliders: {error}", "note")]
     identity = "live-" + hashlib.sha256(repr(data).encode()).hexdigest()[:12]
@@ -60,13 +60,14 @@ def live_blocks(
     words = {
         "loss": "1/Q to {:.2g} %",
         "wave": "the split to {:.2g} % of its largest value",
+        "base": "the part of f by the stress of the base to {:.2g} % of f",
         "outline": "the displacements shown to {:.2g} % of the largest",
     }
     errors = [f"f to {1e6 * f:.2g} ppm", f"the other modes to {100 * max(others, default=0.0):.2g} %"]
     errors += [words[name].format(100 * error) for name, error in data["fields"]["errors"].items()]
     caption = (
         f"Interpolated between full solves ({theory} theory) and checked against others within the sliders' ranges: {', '.join(errors)}."
-        " f: without imperfection, electrodes and mount stress. The picture shows the reference temperature. Other modes: of n = 0 …"
+        " f: without imperfection and electrodes. The picture shows the reference temperature. Other modes: of n = 0 …"
         f" {HIGHEST}, those nearest to f at the card's values or at an end of a slider. {' '.join(missing)}"
     )
     return [Embedded(fill_template("live.html", id=identity, data=data), caption)]
@@ -74,6 +75,7 @@ def live_blocks(
 
 def describe_live(
     instrument: Instrument, harmonic: int, theory: Theory, names: Sequence[str] = (), derived: Sequence[Derived] = (),
+    anchor: bool = False,
 ) -> tuple[dict[str, Any], tuple[str, ...]]:  # fmt: skip
     """Return what the page computes with (axes, modes, material, loss, split and outline), and what it does not have."""
     keys = list(names) or [f"resonator.{key}" for key in DIMENSIONS]
@@ -90,7 +92,7 @@ def describe_live(
             if part == RANGES[-1]:
                 raise
     tell("sliders", 1 - 1 / (len(families) + len(lost) + 1))
-    fields = explore_fields(designs.at_point, len(axes), harmonic, theory, T, instrument)
+    fields = explore_fields(designs.at_point, len(axes), harmonic, theory, T, instrument, anchor)
     labels = [re.sub("[_.]", " ", key.removeprefix("resonator.").replace("_mm", "")) for key, _ in varied]
     indices = [index for one in (*(one.polynomial for one in families), fields.polynomial) for index in one.indices]
     data = {
@@ -192,19 +194,25 @@ def _temperatures(instrument: Instrument) -> tuple[float, float]:
 
 
 def _series(instrument: Instrument, T: tuple[float, float]) -> dict[str, list[float]]:
-    """Return the Chebyshev coefficients of m(T) and ν(T)."""
+    """Return the Chebyshev coefficients of m(T), ν(T) and the strain ε(T) of the base."""
     material, at = instrument.material, instrument.reference_temperature
 
     def m(x: Array) -> Array:
         grown = np.log(material.growth(x, at)) if T[0] < T[1] else 0.0
         return np.asarray(0.5 * np.log(material.value("youngs_modulus", x) / material.value("density", x)) - grown)
 
+    mount = instrument.part("mount")
+
+    def base(x: Array) -> Array:
+        return np.zeros_like(x) if mount is None else np.asarray(mount.strain(material, x))
+
     def nu(x: Array) -> Array:
         return material.value("poisson_ratio", x)
 
+    laws = {"m": m, "nu": nu, "base": base}
     if T[0] == T[1]:
-        return {"m": [float(m(np.array(at)))], "nu": [float(nu(np.array(at)))]}
-    return {name: Chebyshev.interpolate(f, DEGREE, T).coef.tolist() for name, f in (("m", m), ("nu", nu))}
+        return {name: [float(f(np.array(at)))] for name, f in laws.items()}
+    return {name: Chebyshev.interpolate(f, DEGREE, T).coef.tolist() for name, f in laws.items()}
 
 
 def _spell(family: Family) -> dict[str, Any]:

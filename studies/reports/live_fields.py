@@ -1,9 +1,11 @@
-"""What a page computes of the swinging mode beside its frequency: the parts of 1/Q, the split and the outline, over dimensions.
+"""What a page computes of the swinging mode beside its frequency: the parts of 1/Q, the split, the base's stress and the outline.
 
 One interpolant over the dimensions (`shell.interpolation`) carries all of it. What depends on the temperature is a Chebyshev
 series, whose coefficients are interpolated:
 
     ln(1/Q_i) = Σ_k L_ik(dimensions) T_k(x),      wave = (f_fast − f_slow)/f exp(2 i n α) = Σ_k w_k(dimensions) T_k(x).
+
+A base that expands otherwise adds s(dimensions) ε(T) to ln f (`shell.law`).
 """
 
 import base64
@@ -19,10 +21,12 @@ from shell.family import SAFETY, Range, unseen_points
 from shell.interpolation import Exploration, SparsePolynomial
 from shell.layout import Theory
 from shell.modes import Mode
+from shell.prestress import Prestress
 from studies.errors import UNUSABLE_INPUT, InputError
 from studies.instrument.card import Instrument
-from studies.loss.model import loss_model, solve_lowest
+from studies.loss.model import LossModel, loss_model, solve_lowest
 from studies.reports.webgl import outline_rows
+from studies.resonator.law import mount_of
 from studies.resonator.splitting import SplitPair
 
 LOSS_DEGREE, WAVE_DEGREE = 12, 1  # over temperature
@@ -39,7 +43,9 @@ class Fields:
 
     polynomial: SparsePolynomial
     blocks: dict[str, int]  # how many numbers each has, by name
-    errors: dict[str, float]  # of each: of ln(1/Q), of the wave over its largest, of displacements over the largest
+    errors: dict[
+        str, float
+    ]  # of each: ln(1/Q), wave over its largest, ln f by the base, displacements over the largest
     losses: tuple[str, ...]  # names of the parts of 1/Q
     per_micrometre: bool  # whether the split is that of 1 µm of the wall's wave 2n, which splits by itself
     missing: tuple[str, ...]  # reasons
@@ -54,16 +60,18 @@ class Fields:
             "outline": base64.b64encode(points.astype("<f4").tobytes()).decode(),
             "losses": self.losses,
             "waves": self.blocks.get("wave", 0) // 2,
+            "base": self.blocks.get("base", 0),
             "per_micrometre": self.per_micrometre,
             "errors": self.errors,
         }
 
 
 def explore_fields(
-    build: Callable[[Array], Instrument], dimensions: int, harmonic: int, theory: Theory, T: Range, nominal: Instrument
-) -> Fields:
+    build: Callable[[Array], Instrument], dimensions: int, harmonic: int, theory: Theory, T: Range, nominal: Instrument,
+    anchor: bool = False,
+) -> Fields:  # fmt: skip
     """Interpolate what can be computed of the nominal design over the cube; `build` makes the instrument of a point."""
-    found = _Measures(nominal, harmonic, theory, T)
+    found = _Measures(nominal, harmonic, theory, T, anchor)
     while True:
         grid = Exploration(lambda point: np.concatenate(list(found(build(point)).values())), dimensions)
         unseen = unseen_points(dimensions)
@@ -93,6 +101,7 @@ class _Measures:
     harmonic: int
     theory: Theory
     T: Range
+    anchor: bool
     missing: dict[str, str] = field(default_factory=dict)
     losses: tuple[str, ...] = ()
 
@@ -101,7 +110,7 @@ class _Measures:
         rows = outline_rows(self.nominal.resonator, mode, self.size)
         self.places, self.shape = [_arc(run) for run in rows], np.concatenate(rows)
         try:
-            model = loss_model(self.nominal, self.harmonic, self.theory)
+            model = self._model(self.nominal)
             parts = model.budget(_nodes(self.T, LOSS_DEGREE)).parts
             absent = [sentence.partition(":")[0] for sentence in model.left_out]
             self.missing["rest"] = f"Not in 1/Q: {', '.join(absent)} (see hrg loss)." if absent else ""
@@ -112,10 +121,16 @@ class _Measures:
             self._wave(self.nominal)
         except UNUSABLE_INPUT as error:
             self.missing["wave"] = f"There is no split: {error}"
+        try:
+            self.mount = mount_of(self.nominal, self.theory, self.harmonic)
+        except UNUSABLE_INPUT as error:
+            self.mount, self.missing["base"] = None, f"f is without the stress of the base: {error}"
+        if self.mount is None:
+            self.missing.setdefault("base", "")
 
     def __call__(self, instrument: Instrument) -> dict[str, Array]:
         """Return the blocks of a design; the first number steers the interpolant."""
-        blocks = {"loss": self._loss, "wave": self._wave, "outline": self._outline}
+        blocks = {"loss": self._loss, "wave": self._wave, "base": self._base, "outline": self._outline}
         return {name: block(instrument) for name, block in blocks.items() if name not in self.missing}
 
     def error(self, name: str, told: Array, known: Array) -> float:
@@ -125,8 +140,12 @@ class _Measures:
         if name == "wave":
             return SAFETY * float(abs(told - known).sum(axis=1).max() / max(np.linalg.norm(known, axis=1).max(), SMALL))
         T = np.linspace(*self.T, BETWEEN)
+        if name == "base":
+            assert self.mount is not None
+            strain = self.mount.strain(self.nominal.material, T)
+            return float(SAFETY * abs(told - known).max() * abs(strain).max())
         series = self._log_loss(self._loss(self.nominal)[None], T)
-        full = np.log(loss_model(self.nominal, self.harmonic, self.theory).budget(T).inverse_q)
+        full = np.log(self._model(self.nominal).budget(T).inverse_q)
         over_designs = abs(self._log_loss(told, T) - self._log_loss(known, T)).max()
         return float(SAFETY * over_designs + abs(series - full).max())
 
@@ -140,8 +159,11 @@ class _Measures:
         resonator, elastic = instrument.at(instrument.reference_temperature if T is None else T)
         return solve_lowest(resonator, elastic, self.harmonic, self.theory)
 
+    def _model(self, instrument: Instrument) -> LossModel:
+        return loss_model(instrument, self.harmonic, self.theory, self.anchor)
+
     def _loss(self, instrument: Instrument) -> Array:
-        budget = loss_model(instrument, self.harmonic, self.theory).budget(_nodes(self.T, LOSS_DEGREE))
+        budget = self._model(instrument).budget(_nodes(self.T, LOSS_DEGREE))
         parts = {part.name: part.inverse_q for part in budget.parts}
         return _series(np.log([parts[name] for name in self.losses])).ravel()
 
@@ -154,6 +176,10 @@ class _Measures:
         nodes = _nodes(self.T, WAVE_DEGREE).tolist()
         found = np.array([SplitPair(instrument, self._mode(instrument, T), T).split.wave for T in nodes])
         return np.concatenate([_series(found.real), _series(found.imag)])
+
+    def _base(self, instrument: Instrument) -> Array:
+        """Return ∂ ln f by the strain of the base beyond the resonator's own."""
+        return np.array([Prestress(self._mode(instrument)).by_base])
 
     def _outline(self, instrument: Instrument) -> Array:
         """Return the outline at the same parts of its runs as in the nominal design, and in its sense."""

@@ -142,23 +142,24 @@ def _show_split(
 
 
 def live_chapter(
-    instrument: Instrument, harmonic: int, theory: "Theory", view: "Callable[[], list[Block]] | None" = None
-) -> Chapter:
+    instrument: Instrument, harmonic: int, theory: "Theory", view: "Callable[[], list[Block]] | None" = None,
+    anchor: bool = False,
+) -> Chapter:  # fmt: skip
     """Return a mode that swings and sliders that move it; of Rayleigh's closed form the `view` alone, where there is one."""
-    live = Blocks(lambda: moving_mode(instrument, harmonic, theory, view=view))  # type: ignore[arg-type]
+    live = Blocks(lambda: moving_mode(instrument, harmonic, theory, view=view, anchor=anchor))  # type: ignore[arg-type]
     still = Blocks(view) if view else None
     return Chapter("Mode shape over dimensions and temperature", [still if theory == "rayleigh" else live])
 
 
 def moving_mode(
     instrument: Instrument, harmonic: int = 2, theory: "Literal['solid', 'shell']" = "solid", names: Sequence[str] = (),
-    derived: "Sequence[Derived]" = (), view: "Callable[[], list[Block]] | None" = None,
+    derived: "Sequence[Derived]" = (), view: "Callable[[], list[Block]] | None" = None, anchor: bool = False,
 ) -> "list[Block]":  # fmt: skip
     """Return the view of the lowest mode of a harmonic, or the `view` that a page has of it and others, and sliders that move it."""
     from studies.reports.live import live_blocks
 
     shown = view() if view else view_blocks([show_mode(instrument, harmonic, theory=theory)])
-    return [*shown, *live_blocks(instrument, harmonic, theory, names, derived)]
+    return [*shown, *live_blocks(instrument, harmonic, theory, names, derived, anchor)]
 
 
 def read_field(path: str | Path) -> ShellTemperature:

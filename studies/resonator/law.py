@@ -10,6 +10,7 @@ from studies.errors import InputError, naming
 if TYPE_CHECKING:
     from shell.law import FrequencyLaw
     from shell.layout import Theory
+    from shell.material import Mount
     from studies.instrument.card import Instrument
 
 SLOPE_KEYS = {"youngs_modulus": "log_slope_per_K", "shear_modulus": "log_slope_per_K", "expansion": "value"}
@@ -21,13 +22,9 @@ def law_of(
     """Build the frequency law of an instrument between two temperatures (K), within its material's range: over all of it unless given."""
     if instrument.polynomial is not None:
         return cast("FrequencyLaw", instrument.polynomial.between(lowest, highest))
-    from shell.law import build_law, check_mount
+    from shell.law import build_law
 
-    T0, material, mount = instrument.reference_temperature, instrument.material, instrument.part("mount")
-    if mount is not None:
-        with naming(f"{instrument.path} [mount]"):
-            check_mount(instrument.resonator, theory, harmonic)
-            material.check(mount.joined_at)
+    T0, material, mount = instrument.reference_temperature, instrument.material, mount_of(instrument, theory, harmonic)
     given = next((one for one in instrument.uncertain if one.name == "material.poisson_ratio"), None)
     if given is None:
         return build_law(instrument.resonator, material, T0, lowest, highest, theory, harmonic, mount)
@@ -36,6 +33,18 @@ def law_of(
     open_one = replace(material, properties={**material.properties, "poisson_ratio": ratio})
     law = build_law(instrument.resonator, open_one, T0, lowest, highest, theory, harmonic, mount)
     return law.with_material(material)
+
+
+def mount_of(instrument: "Instrument", theory: "Theory", harmonic: int) -> "Mount | None":
+    """Return the base that an instrument is joined to, of a mode whose stress by it can be computed; None without one."""
+    from shell.law import check_mount
+
+    mount: Mount | None = instrument.part("mount")
+    if mount is not None:
+        with naming(f"{instrument.path} [mount]"):
+            check_mount(instrument.resonator, theory, harmonic)
+            instrument.material.check(mount.joined_at)
+    return mount
 
 
 def unknown_slope(instrument: "Instrument") -> str:

@@ -15,6 +15,7 @@ from studies.reports import live
 from studies.reports.live import COLDEST, TOLERANCE, Designs, describe_live
 from studies.reports.live_fields import explore_fields
 from studies.reports.scenes import moving_mode
+from studies.resonator.law import law_of
 from studies.resonator.splitting import SplitPair
 from studies.results import Chapter
 from studies.results.page import render_page
@@ -30,6 +31,7 @@ addEventListener("load", () => {
   const root = document.querySelector(".live-numbers"), seen = {};
   seen.answers = DESIGNS.map(([h, R, T]) => root.evaluate([h, R], T + 273.15));
   seen.measured = DESIGNS.map(([h, R, T]) => root.measure([h, R], T + 273.15));
+  seen.mounted = document.querySelectorAll(".live-numbers")[1].evaluate([14.6], 330)[0];
   seen.drawn = DESIGNS.map(([h, R]) => [...root.draw([h, R])]);
   const canvas = document.querySelector("canvas"), look = () => { document.querySelector(".amplitude").dispatchEvent(new Event("input")); return canvas.toDataURL("image/png"); }, option = () => document.querySelector(".mode option").text;
   const text = () => [...root.querySelectorAll("dd")].map(one => one.textContent);
@@ -83,6 +85,9 @@ def test_a_material_at_one_temperature_gets_no_slider_of_temperature():
 @pytest.mark.slow
 @pytest.mark.skipif(BROWSER is None, reason="no Chromium or Chrome on this machine")
 def test_the_browser_computes_what_python_computes(tmp_path, monkeypatch):
+    held = load_card("free-dome").with_values({"resonator.support": "clamped-rim"})
+    held = held.with_table("mount", {"expansion_per_K": 5.1e-6})
+    mounted = live.live_blocks(held, names=["resonator.radius_mm"])
     made = {}
 
     def keep(name, whole):
@@ -91,7 +96,7 @@ def test_the_browser_computes_what_python_computes(tmp_path, monkeypatch):
     for name in ("describe_live", "explore_fields", "_families"):  # what the page carries
         keep(name, getattr(live, name))
     card = load_card("free-dome")
-    text = render_page("Live", "lead", [Chapter("Numbers", moving_mode(card))])
+    text = render_page("Live", "lead", [Chapter("Numbers", [*moving_mode(card), *mounted])])
     page = tmp_path / "page.html"
     page.write_text(text.replace("</body>", ASK.replace("DESIGNS", json.dumps(DESIGNS)) + "</body>"))
     seen = browse(page, *SOFTWARE_GL)
@@ -103,6 +108,10 @@ def test_the_browser_computes_what_python_computes(tmp_path, monkeypatch):
     assert float(seen["before"][0].removesuffix(" Hz")) == pytest.approx(4599.68, abs=0.2)
 
     from studies.sweeps.parameters import set_parameters
+
+    law = law_of(set_parameters(held, {"resonator.radius_mm": 14.6}))  # the stress of the base: 170 ppm of f, 5 ppm/K
+    assert seen["mounted"]["frequency"] == pytest.approx(float(law.frequency(330.0)), rel=TOLERANCE)
+    assert seen["mounted"]["slope"] == pytest.approx(float(law.slope(330.0)), abs=2e-8)
 
     (data, _), fields, ((family, *_), _) = made["describe_live"], made["explore_fields"], made["_families"]
     names = [axis["key"] for axis in data["axes"]]
