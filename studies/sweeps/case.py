@@ -75,7 +75,9 @@ class Case:
             return None
         found = self.mode(harmonic, 0, theory, temperature)
         if found.index:
-            raise InputError(f"the mode n = {harmonic} of the start is no longer the lowest but number {found.index + 1}.")
+            raise InputError(
+                f"the mode n = {harmonic} of the start is no longer the lowest but number {found.index + 1}."
+            )
         return found
 
 
