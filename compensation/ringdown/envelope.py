@@ -106,7 +106,7 @@ def mix_down(time: ArrayLike, channels: ArrayLike, carrier: float | None = None)
         values = total[:, keep] / weight[keep]
     return Envelope(
         middle[keep], values, carrier, size * step, _clipped(x),
-        1 - float(np.sum(weight)) / int(block[-1] * size + size), (size * step) ** 2 / 12,
+        1 - float(np.sum(weight)) / int(rows[-1] + 1), (size * step) ** 2 / 12,
     )  # fmt: skip
 
 

@@ -220,7 +220,7 @@ def _fit_from(envelope: Envelope, terms: Terms, guess: Guess) -> DecayFit:
             xtol=1e-11,
             ftol=1e-11,
             gtol=1e-11,
-            max_nfev=15 if terms.curved else 60,
+            max_nfev=15 if terms.curved else 25,
         )
         point = np.asarray(solved.x)
         r = data - tell(point)[0]

@@ -8,7 +8,7 @@ from compensation.ringdown.terms import Found, fit_terms, is_plain
 from compensation.samples import block_means
 
 LATER = (0.6, 0.35, 0.15)  # parts of the record after which a free decay is looked for, where the whole is none
-EASY = 3  # terms that are tried on the whole before
+EASY, NEXT = 3, 1  # terms that are tried on the whole before, and beside those known of a part
 HALVINGS = 4
 LEAST_ROWS = 64
 SEARCH_ROWS, ROWS = 300, 1024
@@ -60,7 +60,7 @@ def find_free(whole: Envelope) -> Found:
         if tried.time.size < LEAST_ROWS:
             return None
         found = fit_terms(
-            tried, None if known is None else (known.fit.terms, carry_over(known.fit, tried)), EASY if known else most
+            tried, None if known is None else (known.fit.terms, carry_over(known.fit, tried)), NEXT if known else most
         )
         judged.append((found.left.widening + (10.0 if found.left.early else 0.0), start, found))
         return found if is_plain(found.left) else None
