@@ -105,7 +105,7 @@ def differentiate(decay: Decay, time: Array, start: Complex) -> tuple[Complex, d
 
 
 def swing(decays: "list[Decay]", time: Array, starts: Complex) -> Complex:
-    """Return z (decays, channels, rows) of decays with κ and γ from their start amplitudes, integrated in the same steps.
+    """Return z (decays, channels, rows) of decays with κ and γ from their start amplitudes (decays, channels).
 
     With e = |z|² and P = ∫e dt of z without γ, z = e^{(iδ−1/τ)t} (1+2γP)^{−½} e^{iκΦ} u, Φ = ln(1+2γP)/2γ: what all patterns share.
     Beside it κ turns a pattern by ⅔κS, S = Im(z₁* z₂) the area of its ellipse: u = e^{At} w with

@@ -1,16 +1,23 @@
 """Output files appear whole or not at all: written beside their place, then renamed into it."""
 
 import errno
+import importlib
+import importlib.util
 import os
 import shutil
 import tempfile
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import IO
+from typing import IO, TYPE_CHECKING
 
 from studies.errors import InputError
 from studies.files.paths import claim
+
+if TYPE_CHECKING:
+    from studies.files.parquet import Table
+
+MANY = 200_000  # rows of a portion
 
 
 @contextmanager
@@ -83,6 +90,29 @@ def write_text(path: str | Path, text: str) -> None:
 def write_csv(path: str | Path, head: Iterable[str], rows: Iterable[Iterable[str]]) -> None:
     """Write a table whose cells are text, whole or not at all."""
     write_text(path, "".join(f"{','.join(row)}\n" for row in (head, *rows)))
+
+
+def write_rows(file: IO[bytes], columns: "Table") -> Iterator[float]:
+    """Write numbers as lines of cells that read back to the last digit, missing ones empty; yield the part that is done.
+
+    Many rows go by pyarrow where it is installed, which writes 5.0 as 5 and is five times as fast.
+    """
+    rows = max(map(len, columns.values()), default=0)
+    spell = _spell_fast if rows > MANY and importlib.util.find_spec("pyarrow") else _spell
+    for begin in range(0, rows, MANY):
+        spell(file, {name: values[begin : begin + MANY] for name, values in columns.items()})
+        yield min(begin + MANY, rows) / rows
+
+
+def _spell(file: IO[bytes], columns: "Table") -> None:
+    cells = [map(repr, values.tolist()) for values in columns.values()]
+    file.write(("\n".join(map(",".join, zip(*cells, strict=True))).replace("nan", "") + "\n").encode())
+
+
+def _spell_fast(file: IO[bytes], columns: "Table") -> None:
+    arrow, csv = importlib.import_module("pyarrow"), importlib.import_module("pyarrow.csv")
+    table = arrow.table({name: arrow.array(values, from_pandas=True) for name, values in columns.items()})
+    csv.write_csv(table, file, csv.WriteOptions(include_header=False))
 
 
 def _umask() -> int:

@@ -11,11 +11,11 @@ from studies.errors import InputError
 from studies.importing.channels import is_container, open_channels, sort_groups
 from studies.importing.look import Look, as_number, find_nominal, find_period, is_stamp, look_at, look_at_group
 from studies.importing.mapping import NUMERIC_TIMES, SCHEMA, TABLE_TARGETS, FileMap, ImportMap
-from studies.importing.meaning import Meaning, find_meanings, find_unit
+from studies.importing.meaning import BRACKETED, Meaning, find_meanings, find_unit
 from studies.importing.offset import estimate_offset
 from studies.importing.raw import shorten
 from studies.importing.timing import TIME_WORDS, find_time
-from studies.importing.units import units_of
+from studies.importing.units import split_nominal, units_of
 from studies.schema.keys import spell_value
 from studies.schema.reader import read_keys
 
@@ -306,6 +306,7 @@ def _draft_column(
             "offset = 0.0    # CHECK",
         ]
     for key in units[unit].settings:
+        nominal = next((f for one in re.findall(BRACKETED, hint) if (f := split_nominal(one)[1])), nominal)
         stated_here = key == "nominal_Hz" and nominal is not None
         value, said = (nominal, "stated in the file; ") if stated_here else (0.0, "")
         lines.append(f"{key} = {value!r}    # CHECK: {said}{_SETTING_WORDS[key]}")

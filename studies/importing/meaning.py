@@ -4,7 +4,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from studies.importing.units import TARGETS, units_of
+from studies.importing.units import TARGETS, find_spelling, split_nominal, units_of
 
 BIDS: tuple[tuple[str, str, int], ...] = (
     # (pattern in the lower-case name, column of the record, weight)
@@ -60,7 +60,7 @@ UNIT_WORDS: tuple[tuple[str, str], ...] = (
     (r"^q|q[ _-]*fact", "Q"),
     (r"counts?\b", "counts"),
 )
-BRACKETED = r"[\[(]\s*([^\])]{1,12}?)\s*[\])]"
+BRACKETED = r"[\[(]\s*([^\])]{1,24}?)\s*[\])]"
 AXIS = re.compile(r"^(.*?)([xyz])((?:[^a-z].*)?)$", re.IGNORECASE)
 
 
@@ -96,7 +96,10 @@ def find_unit(target: str, hint: str) -> str | None:
     units = units_of(target)
     if hint.strip().lower() == target.lower():
         return next(iter(units))
-    return next((unit for pattern, unit in UNIT_WORDS if unit in units and re.search(pattern, hint.lower())), None)
+    spelled = find_spelling(target, split_nominal(stated[-1])[0]) if (stated := re.findall(BRACKETED, hint)) else None
+    return spelled or next(
+        (u for pattern, u in UNIT_WORDS if u in units and re.search(rf"(?<![a-zµμ])({pattern})", hint.lower())), None
+    )
 
 
 def _bids(hint: str) -> dict[str, int]:
@@ -118,7 +121,7 @@ def _unit_fits(target: str, hint: str) -> bool | None:
     """Tell whether the stated unit can belong to a column of the record; None where none is stated."""
     stated = re.findall(BRACKETED, hint)
     if stated:
-        return find_unit(target, stated[-1]) is not None or find_unit(target, hint.lower()) == "period-counts"
+        return find_unit(target, f"[{stated[-1]}]") is not None or find_unit(target, hint.lower()) == "period-counts"
     return True if find_unit(target, hint) is not None else None
 
 

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 
 from studies.importing.look import is_stamp
 from studies.importing.mapping import SECONDS
+from studies.importing.meaning import find_meanings
 
 STAMPS = (
     "%Y-%m-%d %H:%M:%S",
@@ -51,7 +52,8 @@ def find_time(
             if form:
                 return list(columns), form, unsure
         return stamped[:1], "iso", "no known form fits; write the pattern"
-    rising = [name for name in names if _rises(numbers[name])]
+    meant = find_meanings(hints)  # a temperature that only rises is no clock
+    rising = [name for name in names if _rises(numbers[name]) and name not in meant]
     if not named and (evenly or not rising):
         return [], "", "no column is a time; by how many seconds do the rows lie apart?"
     time = named[0] if named else rising[0]

@@ -39,10 +39,12 @@ _TEMPERATURE = {
     "degC": _SAME,
     "K": Unit(lambda x: x - zero_Celsius, "x - 273.15"),
     "mdegC": _times(1e-3, "x / 1000"),
+    "mK": Unit(lambda x: 1e-3 * x - zero_Celsius, "x / 1000 - 273.15"),
     "degF": Unit(lambda x: (x - 32) / 1.8, "(x - 32) / 1.8"),
 }
 _FREQUENCY = {
     "Hz": Unit(lambda x: x, "x", never_zero=True),
+    "mHz": Unit(lambda x: 1e-3 * x, "x / 1000", never_zero=True),
     "kHz": Unit(lambda x: 1e3 * x, "1000 x", never_zero=True),
     "MHz": Unit(lambda x: 1e6 * x, "1e6 x", never_zero=True),
     "rad/s": Unit(lambda x: x / (2 * pi), "x / 2 pi", never_zero=True),
@@ -59,8 +61,11 @@ _FREQUENCY = {
 _RATE_PER_H = {
     "deg/h": _SAME,
     "deg/s": _times(3600.0, "3600 x"),
+    "mdeg/h": _times(1e-3, "x / 1000"),
     "mdeg/s": _times(3.6, "3.6 x"),
     "rad/s": _times(3600 * 180 / pi, "3600 (180 / pi) x"),
+    "mrad/s": _times(3.6 * 180 / pi, "3.6 (180 / pi) x"),
+    "urad/s": _times(3.6e-3 * 180 / pi, "0.0036 (180 / pi) x"),
     "arcsec/s": _SAME,
 }
 _RATE_PER_S = {
@@ -68,6 +73,8 @@ _RATE_PER_S = {
     "mdeg/s": _times(1e-3, "x / 1000"),
     "deg/h": _times(1 / 3600, "x / 3600"),
     "rad/s": _times(180 / pi, "(180 / pi) x"),
+    "mrad/s": _times(0.18 / pi, "(0.18 / pi) x"),
+    "urad/s": _times(0.18e-3 / pi, "(0.00018 / pi) x"),
     "rpm": _times(6.0, "6 x"),
 }
 _VOLTAGE = {"V": _SAME, "mV": _times(1e-3, "x / 1000"), "uV": _times(1e-6, "x / 1e6"), "kV": _times(1e3, "1000 x")}
@@ -107,7 +114,7 @@ _SPELLINGS = (
     (r"(?<=/)(hours?|hr)$", "h"),
     (r"^(turn|rev|revolutions?)$", "turns"),
 )
-_NOMINAL = re.compile(r"(pp[mb])\s+of\s+(.*?)\s*(?:hz)?", re.IGNORECASE)
+_NOMINAL = re.compile(r"(pp[mb])\s+of\s+(.*?)\s*(k?)(?:hz)?", re.IGNORECASE)
 
 
 def find_spelling(column: str, text: str) -> str | None:
@@ -122,12 +129,12 @@ def find_spelling(column: str, text: str) -> str | None:
 
 
 def split_nominal(text: str) -> tuple[str, float | None]:
-    """Return the unit and the nominal frequency (Hz) of "ppm of 4432.07 Hz"; other texts as they are, without one."""
+    """Return the unit and the nominal frequency (Hz) of "ppm of 4432.07 Hz" or "of 8 kHz"; other texts as they are, without one."""
     found = _NOMINAL.fullmatch(text.strip())
     if not found:
         return text, None
     try:
-        return found[1].lower(), float(found[2])
+        return found[1].lower(), float(found[2]) * (1e3 if found[3] else 1.0)
     except ValueError:  # "ppm of f0": nominal_Hz must say it
         return found[1].lower(), None
 

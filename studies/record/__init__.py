@@ -12,7 +12,7 @@ from compensation.arrays import Array
 from studies.errors import InputError, nearest
 from studies.files.columns import Columns, read_columns, read_header
 from studies.files.parquet import is_parquet, write_table
-from studies.files.writing import written_whole
+from studies.files.writing import write_rows, written_whole
 from studies.progress import tell
 from studies.results import Drawing
 
@@ -257,13 +257,8 @@ def write_record(record: Record, path: str | Path) -> None:
             write_table(file, record.columns, notes, path)
             return
         file.write("".join(f"{note}\n" for note in [*(f"# {n}" for n in notes), ",".join(record.columns)]).encode())
-        rows = max(map(len, record.columns.values()), default=0)
-        for begin in range(0, rows, 100_000):
-            part = np.column_stack([values[begin : begin + 100_000] for values in record.columns.values()])
-            cells = iter(map(repr, part.ravel().tolist()))
-            lines = "\n".join(map(",".join, zip(*[cells] * part.shape[1], strict=True)))
-            file.write((lines.replace("nan", "") + "\n").encode())
-            tell(f"writing {path}", (begin + len(part)) / rows)
+        for part in write_rows(file, record.columns):
+            tell(f"writing {path}", part)
 
 
 def check_plausible(columns: Mapping[str, Array], where: Callable[[int], str]) -> None:

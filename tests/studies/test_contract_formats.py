@@ -281,3 +281,11 @@ def test_contract_doubtful_readings_are_offered_as_missing_and_never_changed(tmp
     kept = read_record("run.csv")["frequency_Hz"]
     assert np.isnan(kept).sum() == 31
     assert "spikes: 1, made missing" in capsys.readouterr().out
+
+
+def test_contract_a_long_csv_is_written_in_portions_and_reads_back_to_the_last_digit(record, tmp_path, monkeypatch):
+    pytest.importorskip("pyarrow")
+    monkeypatch.setattr("studies.files.writing._spell", None)  # none of it goes the slow way
+    monkeypatch.setattr("studies.files.writing.MANY", 3)
+    write_record(record, tmp_path / "long.csv")
+    assert same(record, read_record(tmp_path / "long.csv"))

@@ -248,6 +248,7 @@ def test_every_unit_of_every_column_is_right(target):
         "period-s": 1 / 4430.0, "period-ms": 1e3 / 4430.0, "period-us": 1e6 / 4430.0,
         "period-counts": 1000 * 10e6 / 4430.0, "gate-counts": 44300.0,
         "deg/h": 15.0, "arcsec/s": 15.0, "deg/s": 15.0 / 3600, "mdeg/s": 15.0 / 3.6, "rad/s of rate": np.deg2rad(15.0) / 3600,
+        "mdeg/h": 15e3, "mrad/s": np.deg2rad(15.0) / 3.6, "urad/s": np.deg2rad(15.0) / 3.6e-3, "mK": 298150.0, "mHz": 4430e3,
         "rpm": 15.0 / 3600 / 6, "V": 0.25, "mV": 250.0, "uV": 250e3, "kV": 0.25e-3,
         "deg": 45.0, "rad": np.pi / 4, "turns": 0.125, "counts": 17.0, "1/Q": 1e-7, "Q": 1e7,
         "ppm": 0.1 if target == "inverse_q" else 1e6 * (4430.0 / 4400.0 - 1), "ppb": 1e9 * (4430.0 / 4400.0 - 1),
@@ -578,6 +579,8 @@ def test_columns_of_one_quantity_tell_the_offset_before_others(tmp_path):
         ("quadrature_V", "µV", 5.0, 5e-6),
         ("pattern_angle_deg", "°", 45.0, 45.0),
         ("frequency_Hz", "ppm of 4400 Hz", 10.0, 4400.044),
+        ("frequency_Hz", "ppm of 8 kHz", 10.0, 8000.08),
+        ("frequency_Hz", "mHz", 4e6, 4000.0),
     ],
 )
 def test_units_as_people_write_them(tmp_path, target, unit, reading, value):
@@ -586,9 +589,31 @@ def test_units_as_people_write_them(tmp_path, target, unit, reading, value):
 
 
 @pytest.mark.parametrize(
+    ("name", "drafted"),
+    [
+        ("f [ppm of 8 kHz]", 'unit = "ppm"\nnominal_Hz = 8000.0'),
+        ("frequency [mHz]", 'unit = "mHz"'),
+        ("bias [mdeg/h]", 'unit = "mdeg/h"'),
+        ("rate [µrad/s]", 'unit = "urad/s"'),
+        ("Temperature [mK]", 'unit = "mK"'),
+        ("rate [nrad/s]", '# to = "..."\n# unit'),  # a size that nobody knows is no rad/s
+    ],
+)
+def test_a_draft_takes_the_unit_in_brackets_with_its_prefix(tmp_path, name, drafted):
+    (tmp_path / "a.csv").write_text(f"time_s,{name}\n" + "".join(f"{k},{3 + k % 7}.5\n" for k in range(30)))
+    assert drafted in draft_map([str(tmp_path / "a.csv")]).text
+
+
+def test_a_column_that_rises_and_has_a_meaning_is_no_clock(tmp_path):
+    (tmp_path / "a.csv").write_text("freq [Hz],quad [V]\n" + "".join(f"{4600 + k / 8},{k % 7}\n" for k in range(30)))
+    text = draft_map([str(tmp_path / "a.csv")]).text
+    assert "sample_period_s = 0.0    # CHECK" in text
+    assert 'to = "frequency_Hz"' in text
+
+
+@pytest.mark.parametrize(
     ("target", "unit", "part"),
     [
-        ("frequency_Hz", "mHz", "'mHz' is unknown"),
         ("quadrature_V", "MV", "'MV' is unknown"),
         ("bias_deg_per_h", "°/min", "'°/min' is unknown"),
         ("frequency_Hz", "ppm of f0", "nominal_Hz"),
