@@ -30,6 +30,7 @@ SCALES = (1, 8, 64)  # rows whose means are looked at for steps
 STANDS_OUT = 8.0  # robust standard deviations of what two such lines differ by elsewhere
 EVIDENCE = 35.0  # twice the logarithm of the likelihood by which a step exceeds a bend
 AT_ONCE = 0.6  # of a step, within two rows of it
+BRIDGED = 3  # rows: a hole up to the next is drawn across
 SEGMENTS = 8  # of a series, whose periodograms are averaged
 MOST_FREQUENCIES = 4096
 CANDIDATES = 2000  # places where a step is looked for, the likeliest first
@@ -249,24 +250,41 @@ def _find_edge(values: Array, at: int, rows: int) -> int | None:
 
 
 def find_density(time: Array, values: Array) -> Density | None:
-    """Return the spectral density of a column, its mean and slope taken off: Welch's of even rows, Lomb's of uneven ones."""
-    if np.isfinite(values).all() and is_regular(time):
-        step = float(time[-1] - time[0]) / (len(time) - 1)
-        length = max(FEWEST, 2 * len(values) // (SEGMENTS + 1))
-        parts = sliding_window_view(values, min(length, len(values)))[:: length - length // 2]
-        x = np.arange(parts.shape[1]) - (parts.shape[1] - 1) / 2
-        window = np.cos(np.pi * (x - 0.5) / len(x)) ** 2  # Hann's; scipy.signal takes 0.4 s to load
-        rests = parts - parts.mean(axis=1)[:, None] - np.outer(parts @ x / (x @ x), x)
-        S = step / (window @ window) * np.mean(np.abs(np.fft.rfft(rests * window)) ** 2, axis=0)
-        S[1 : (len(x) + 1) // 2] *= 2
-        return _thin_out(np.fft.rfftfreq(len(x), step)[1:].astype(float), S[1:], even=True)
-    t, y, step = average_evenly(time, values)
-    if step <= 0:
-        return None
+    """Return the spectral density of a column, its mean and slope taken off: Welch's of even rows, gaps left out, Lomb's of uneven ones."""
+    known = np.isfinite(values)
+    t, y = time[known], values[known]
+    step = float(np.median(np.diff(t)))
+    place = (t - t[0]) / step if step > 0 else np.zeros(1)
+    rows = np.rint(place).astype(np.intp)
+    if step > 0 and rows[-1] < 2 * len(t) and np.max(np.abs(place - rows * (place[-1] / rows[-1]))) < 0.01:
+        step = float(t[-1] - t[0]) / rows[-1]
+        grid = np.arange(rows[-1] + 1)
+        near = np.diff(rows, prepend=0)[np.searchsorted(rows, grid)] <= BRIDGED
+        even = np.where(near, np.interp(grid, rows, y), np.nan)
+        length = max(FEWEST, 2 * len(even) // (SEGMENTS + 1))
+        while True:
+            parts = sliding_window_view(even, min(length, len(even)))[:: length - length // 2]
+            parts = parts[np.isfinite(parts).all(axis=1)]
+            if 2 * parts.size > len(y) or length <= FEWEST:
+                break
+            length //= 2
+        if parts.size:
+            return _average_periodograms(parts, step)
+    t, y, _ = average_evenly(time, values, MOST_FREQUENCIES)
     y = y - np.polyval(np.polyfit(t - t[0], y, 1), t - t[0])
-    f = np.linspace(1.0, len(y) // 2, min(len(y) // 2, MOST_FREQUENCIES // 2)) / float(t[-1] - t[0])
+    f = np.linspace(1.0, len(y) // 2, len(y) // 2) / float(t[-1] - t[0])
     power = scipy.signal.lombscargle(t - t[0], y, 2 * np.pi * f)
     return _thin_out(f, 2 * float(t[-1] - t[0]) / len(y) * power, even=False)
+
+
+def _average_periodograms(parts: Array, step: float) -> Density:
+    """Return the mean over parts of a series (rows of equal length), each under Hann's window, its mean and slope taken off."""
+    x = np.arange(parts.shape[1]) - (parts.shape[1] - 1) / 2
+    window = np.cos(np.pi * (x - 0.5) / len(x)) ** 2  # scipy.signal takes 0.4 s to load
+    rests = parts - parts.mean(axis=1)[:, None] - np.outer(parts @ x / (x @ x), x)
+    S = step / (window @ window) * np.mean(np.abs(np.fft.rfft(rests * window)) ** 2, axis=0)
+    S[1 : (len(x) + 1) // 2] *= 2
+    return _thin_out(np.fft.rfftfreq(len(x), step)[1:].astype(float), S[1:], even=True)
 
 
 def _thin_out(frequency: Array, density: Array, even: bool) -> Density:
