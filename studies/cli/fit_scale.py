@@ -127,6 +127,8 @@ def _law_words(law: RateLaw) -> str:
     if alike and law.chosen.name != "line":
         words += f" These rates do not separate it from: {', '.join(alike)}."
     left = "It leaves structure beyond the errors of the means: more rates, or another form, are needed."
+    if law.chosen.name in ("cubic", "sine", "dead band"):
+        words += " The model below, the paper's quadratic, cannot follow it: do not trust it between these rates."
     return f"{words} {left if law.structure else 'What it leaves is within the errors of the means.'}"
 
 

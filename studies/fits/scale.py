@@ -148,6 +148,7 @@ ROUGH = "at rest and then at one rate"
 """The paper's run for the rough null and scale, equation (33); without one they come from the run of several rates."""
 TABLES = "of several rates over temperature"  # for the law over rate and temperature only, as are further ones at one temperature
 FEWEST = 20  # rows of a table that make a run
+SPANS = 40  # means of a hold that show how far its temperature went
 PLATEAU = 0.05  # part of a run's rows from which an applied rate counts as a plateau
 KINDS = {
     "of several rates at one temperature": "equation (35)",
@@ -176,31 +177,55 @@ def _parts_of(table: BellRun) -> dict[str, BellRun]:
 
 
 def read_law(runs: Sequence[BellRun]) -> RateLaw | None:
-    """Return the law of the raw output over rate (°/s) and temperature, from the mean of every hold within a kelvin."""
-    means: list[tuple[float, ...]] = []
-    scatter: list[float] = []
+    """Return the law of the raw output over rate (°/s) and temperature, from the mean of every hold within a kelvin.
+
+    It warms or cools as the temperature moves in it, or last moved before it: settled ones, too, are reached from below or above.
+    """
+    rate, output, temperature, scatter, warming = ([np.zeros(0)] for _ in range(5))
     for run in runs:
-        level = same_rate(run.rate)
         sweeps = float(np.ptp(run.temperature)) > SWEPT
-        half = 25 + level.size // 100
-        padded = np.pad(run.temperature, half, "edge")
-        course = np.convolve(padded[half:] - padded[:-half], np.ones(half + 1), "valid")
-        kelvin = np.floor(run.temperature) if sweeps else np.zeros_like(level)
-        key = np.stack([level, kelvin, np.sign(course) if sweeps else kelvin])
-        for rows in np.split(np.arange(level.size), np.flatnonzero(np.any(np.diff(key) != 0, axis=0)) + 1):
-            if len(rows) < 4 * BLOCKS:
-                continue
-            fifths = np.array([run.output[part].mean() for part in np.array_split(rows, BLOCKS)])
-            trend = np.polyval(np.polyfit(np.arange(BLOCKS), fifths, 1), np.arange(BLOCKS))
-            scatter.append(float(np.sum((fifths - trend) ** 2)) / (BLOCKS - 2))
-            middle = float(np.mean(run.temperature[rows]))
-            means.append((float(np.mean(run.rate[rows])) / DEG, float(fifths.mean()), middle, float(key[2, rows[0]])))
-    if not means:
+        holds = []
+        for hold in np.split(np.arange(run.time.size), np.flatnonzero(np.diff(same_rate(run.rate))) + 1):
+            course = [run.temperature[part].mean() for part in np.array_split(hold, min(len(hold), SPANS))]
+            holds += np.array_split(hold, 1 + int(np.ptp(course)) if sweeps else 1)
+        fifths = [rows[: len(rows) // BLOCKS * BLOCKS].reshape(BLOCKS, -1) for rows in holds if len(rows) >= 4 * BLOCKS]
+        if not fifths:
+            continue
+        y, T = (np.array([x[rows].mean(axis=1) for rows in fifths]) for x in (run.output, run.temperature))
+        rate.append(np.array([run.rate[rows].mean() for rows in fifths]) / DEG)
+        output.append(y.mean(axis=1))
+        temperature.append(T.mean(axis=1))
+        scatter.append(_off_line(y))
+        warming.append(_directions(T) * sweeps)
+    level, middle, squares = (np.concatenate(one) for one in (rate, output, scatter))
+    if not level.size:
         return None
-    rate, output, temperature, warming = np.array(means).T
-    # one error of all, of many fifths
-    error = np.sqrt(np.mean(scatter) / BLOCKS) * np.ones(len(means))
-    return fit_rate_law(rate, output, error, temperature, warming)
+    error = np.sqrt(np.mean(squares) / BLOCKS) * np.ones(level.size)  # one error of all, of many fifths
+    return fit_rate_law(level, middle, error, np.concatenate(temperature), np.concatenate(warming))
+
+
+def _off_line(values: Array, degree: int = 1) -> Array:
+    """Variance of the means of each row (holds, blocks) about the line, or parabola, through them."""
+    x, P = np.arange(BLOCKS), np.polynomial.polynomial
+    rest = values - P.polyval(x, P.polyfit(x, values.T, degree))
+    return np.asarray(np.sum(rest**2, axis=1) / (BLOCKS - 1 - degree))
+
+
+def _directions(T: Array) -> Array:
+    """Course of the temperature in holds (holds, blocks): 1 where it rises or last rose, −1, between them where it turns.
+
+    It moves, and turns, by six times the scatter of the means of blocks.
+    """
+    least, last, way = 6 * float(np.sqrt(np.mean(_off_line(T, 2)))), float(T[0].mean()), 0.0
+    found: list[float] = []
+    for one in T:
+        low, high = sorted(one[[0, -1]])
+        moved = next((by for by in (one[-1] - one[0], one.mean() - last) if abs(by) > least), 0.0)
+        way, last = (float(np.sign(moved)), float(one.mean())) if moved else (way, last)
+        turns = max(one.max() - high, low - one.min()) > least
+        found.append(float(np.mean(np.sign(np.diff(one)))) if turns else way)
+    begin = next((one for one in found if one), 0.0)  # before the first move as after it
+    return np.where(np.cumsum(np.abs(found)) == 0, begin, found)
 
 
 def _classify(run: BellRun, path: str) -> str:

@@ -96,11 +96,16 @@ def test_the_form_over_rate_is_chosen_by_evidence_and_rates_left_out():
     assert wavy.structure
 
 
-def test_a_rate_table_over_temperature_tells_warming_from_cooling():
-    """Thirteen rates again and again in a chamber that warms and cools: what null and scale were given comes back."""
+@pytest.mark.parametrize("settled", [False, True])
+def test_a_rate_table_over_temperature_tells_warming_from_cooling(settled):
+    """Thirteen rates again and again in a chamber that warms and cools, or at temperatures reached by either: what was planted comes back."""
     rng, time = np.random.default_rng(4), 0.1 * np.arange(26 * 130)
     rate = np.repeat(np.tile(np.linspace(-300.0, 300.0, 13), 10), 26)
     away, warming = 15 * np.sin(2 * np.pi * time / time[-1]), np.sign(np.cos(2 * np.pi * time / time[-1]))
+    if settled:
+        up, down = range(-15, 16, 6), range(9, -10, -6)
+        away = np.repeat([*up, *down], 13 * 26) + 0.01 * rng.standard_normal(time.size)
+        warming = np.repeat([1.0] * len(up) + [-1.0] * len(down), 13 * 26)
     output = -690 + 40 * rate + 2 * away + 0.01 * away * rate + 3 * warming + 0.5 * rng.standard_normal(time.size)
     law = read_law([BellRun(time, output, 293.15 + away, rate * DEG)])
     assert law.chosen.name == "line"
