@@ -42,8 +42,7 @@ def acceptance(card: Card, *runs: Records, limits: str | None = None, output: st
     judged only if the whole interval lies on one side of it.
 
     Args:
-        limits: Limits (TOML, schema hrg.limits/1): a table [limits] with keys such as bias_deg_per_h; hrg keys limits
-            lists them.
+        limits: Limits (TOML, schema hrg.limits/1): a table [limits] with keys such as bias_deg_per_h (hrg keys limits).
         output: Column with the zero-rate output to judge, such as compensated_bias_deg_per_h.
     """
     instrument = load_card(card)

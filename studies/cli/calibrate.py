@@ -47,8 +47,7 @@ def calibrate(
         save: Write the calibrated card: most probable values with their posterior widths. Not saved, with exit status
             2, if the rows of a table follow no law of temperature, or the fit did not converge, determined no value, or
             moved one by more than 6 of the card's standard deviations.
-        hold_out: Number of the record, from 1, to predict by a second calibration without it; 0: the last, if there are
-            several.
+        hold_out: Number of the record, from 1, that a second calibration predicts; 0: the last of several.
         exact: A value to keep fixed, such as thermal.film_emissivity; may be given more than once.
     """
     if not data:

@@ -48,8 +48,7 @@ def compensate(
         model: A model file (TOML) written with --save.
         run: The record (CSV) to compensate.
         out: Write the record with the added columns.
-        extrapolate: Apply the model outside its fitted range too; in a record without a thermometer, leave those rows
-            empty.
+        extrapolate: Apply the model outside its fitted range too; without a thermometer, leave those rows empty.
         emit: Write the model as C99 source for firmware.
     """
     loaded = models.read_model(model)

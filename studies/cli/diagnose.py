@@ -45,9 +45,8 @@ def diagnose(
         save: Save the extended model as a card (TOML): the card with the causes found. Without --card it is a card with a
             polynomial law ([law]); the records are diagnosed again with it, and causes may differ from those without
             --save. Not saved, with exit status 2, if its calibration does not converge.
-        plan: Chamber profiles of a planned campaign, as text or as files, one for each run: predict which effects the
-            campaign can identify with the gyro of --card, and how small they may be. Further profiles may follow
-            without --plan.
+        plan: Chamber profiles of a planned campaign, text or files, one a run: predict which effects it can identify
+            with the gyro of --card, and how small they may be. Further profiles may follow without --plan.
         next_: Propose the next run: the profile that best separates the remaining candidates, or else narrows the
             intervals of the causes found, per hour of chamber time.
         chamber: Limits of the chamber, such as "rate 3 range -40 85" (K/min, °C), for --plan and for the next run.

@@ -27,8 +27,7 @@ def export(run: Run, *, to: Literal["parquet", "mat", "tdms", "csv", "mf4", "hdf
     """Write a record for other programs; 'hrg import' reads all of these formats back to the last digit.
 
     Args:
-        to: Format: Parquet, MATLAB (.mat, version 5), TDMS, CSV, MDF 4 or HDF5. Units and notes of the record go with
-            it.
+        to: Format: Parquet, MATLAB (.mat, version 5), TDMS, CSV, MDF 4 or HDF5, with units and notes of the record.
     """
     if Path(out).suffix.lower() not in ENDINGS[to]:
         raise InputError(f"--out {out}: give a name that ends in {ENDINGS[to][0]} for --to {to}.")

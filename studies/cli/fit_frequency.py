@@ -42,9 +42,8 @@ def fit_frequency(
     """Fit a polynomial to frequency over temperature and invert it (HRG paper, equations 16 to 18, Table 2).
 
     Args:
-        table: A CSV file with the columns temperature_degC,frequency_Hz, or a record. The settled parts (soaks) of a
-            record become the points of the fit; a hold that ends shortly before it settles is extrapolated along its
-            exponential.
+        table: A CSV file with the columns temperature_degC,frequency_Hz, or a record: its settled parts (soaks) become
+            the points; a hold that ends shortly before it settles is extrapolated along its exponential.
         more: More records of the same gyro.
         time_constant: Slowest time constant of the gyro in s, used to judge whether a record has settled; hrg fit
             thermal measures it. If the records show a longer one, that one is used.

@@ -28,9 +28,8 @@ def fleet(
     Run it again to resume, or after adding devices: only new or changed devices are computed.
 
     Args:
-        folder: Folder of the lot: a folder for each device, named by its serial number, with the device's records (CSV)
-            and, if it has its own, its card (TOML). A file lot.csv with the columns serial, date, batch may stand
-            beside them.
+        folder: Folder of the lot: a folder for each device, named by its serial number, with its records (CSV) and
+            perhaps its card (TOML). A file lot.csv has the columns serial, date, batch.
         out: Folder for the results: lot.html, lot.json, and a page and a result for each device in devices/.
         card: The card of the design. Without it each device gets a polynomial card from its records.
         workers: Devices processed at the same time, some 500 MB each.

@@ -49,8 +49,7 @@ def import_(
     counted and left as they are, unless the map says drop. An --out that ends in .parquet is a Parquet file.
 
     Args:
-        raw: Raw files: text with any separator, Excel workbooks, TDMS, MDF, HDF5, MATLAB or Parquet files; in the order
-            of the map's [[file]] tables.
+        raw: Text with any separator, Excel workbooks, TDMS, MDF, HDF5, MATLAB or Parquet, in the map's order.
         map_: The map (schema hrg.map/1): columns, units, signs, clocks, resampling.
         out: The record to write (.csv or .parquet).
         draft: Draft a map from the files instead; an existing file is not overwritten.

@@ -18,8 +18,7 @@ def keys(kind: str = "card", *, table: str = "") -> Result:
     """List the keys of a file with their units, defaults, bounds and meaning.
 
     Args:
-        kind: card, study, design (of hrg optimise), map (of hrg import), model (of hrg fit and hrg compensate) or
-            limits (of hrg acceptance).
+        kind: card, study, design (hrg optimise), map (hrg import), model (hrg fit) or limits (hrg acceptance).
         table: Only the keys of this table and the tables in it, such as thermal or loss.film.
     """
     if kind not in KINDS:

@@ -67,8 +67,7 @@ def loads(
     """Show frequency shift, stress and displacement of a held resonator under loads, its sensitivity to 1 g, and Duffing's coefficient.
 
     Args:
-        along: Acceleration of the base along the axis, from the rim of a dome to its pole, in g; 1 g is a gyro that
-            stands upright.
+        along: Acceleration of the base along the axis, from rim to pole of a dome, in g; 1: the gyro stands upright.
         across: Acceleration of the base across the axis in g.
         rotation: Rate of rotation about the axis in °/s.
         pressure: Pressure of the gas around the resonator in kPa.

@@ -54,8 +54,7 @@ def loop(
     Args:
         rate: Applied rate in °/s, within the range of the actuators.
         out: Simulate a run and write it as a record.
-        state_space: Write the wave and the closed loops as A, B, C, D, and each loop's transfer function: a .json or a
-            .mat file.
+        state_space: Write wave and closed loops as A, B, C, D, and each loop's transfer function: .json or .mat.
         hours: Length of the run; 1 unless --hours or --profile is given.
         row: Time between rows of the run in s; 1 unless given.
         profile: Chamber profile of the run, in words or as a file with time_s, chamber_temperature_degC and optionally

@@ -27,8 +27,7 @@ def materials(name: str = "", *, compare: bool = False, card: Card = "", harmoni
 
     Args:
         name: Show one material's laws with their properties, sources and ranges.
-        compare: Compare all laws in the geometry of --card (free-dome unless given): frequency, TCF, thermoelastic Q,
-            and the surface loss worth reaching.
+        compare: Compare all laws in the geometry of --card: frequency, TCF, thermoelastic Q, worthwhile surface loss.
     """
     if card and not compare:
         raise InputError(f"--card {card}: it belongs to --compare; add that.")

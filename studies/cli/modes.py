@@ -91,8 +91,7 @@ def modes(
         harmonic: One or more circumferential harmonics n, for example --harmonic 0 1 2 3.
         count: Number of modes of each harmonic.
         tolerance: Largest relative discretization error of the frequency.
-        sensitivities: Show the sensitivities of each frequency to E, ν, ρ, thickness and radius, and where its energy
-            is.
+        sensitivities: Show sensitivities to E, ν, ρ, thickness and radius, and where the energy is.
     """
     instrument, T, resonator, elastic = open_resonator(card, temperature)
     detailed = theory != "rayleigh"

@@ -56,8 +56,7 @@ def render(
         colour: What the colour shows: displacement, strain-energy density, or a temperature field.
         field: Table with position (0 ... 1 along the meridian) and temperature_degC, for --colour temperature.
         view: oblique into the open end, along the axis, or from the side.
-        swing_mm: Displacement at the antinode in mesh files; unless given, .stl and .ply are undeformed and .glb moves
-            visibly.
+        swing_mm: Displacement at the antinode in mesh files; else .stl and .ply are undeformed, .glb moves visibly.
     """
     kind = ending_of(out, KINDS)
     if len(harmonic) > 1 and kind != ".html":

@@ -142,8 +142,8 @@ def export(folder: Folder, *, out: str | None = None, part_rows: Annotated[int, 
     """Write the results as CSV or Parquet, and the unit of every column to a JSON file.
 
     Args:
-        out: A .csv or .parquet file, or, a name without an ending, a folder for a data set of Parquet files; default:
-            results.csv in the folder.
+        out: A .csv or .parquet file, or without an ending a folder of Parquet files; default: results.csv in the
+            folder.
         part_rows: Designs in each file of a data set.
     """
     results = open_results(folder)

@@ -75,15 +75,13 @@ def trim(
     predictable. An edge cut ends along the normal of the wall; ground flat, parallel to the rim, it changes the split 4 to 6 % less.
 
     Args:
-        split: Measured splits in Hz, one for each --harmonic; by default that of the card, as hrg fit ringdown --save
-            writes it.
+        split: Measured splits in Hz, one for each --harmonic; by default the card's (hrg fit ringdown --save).
         axis: Azimuth in degrees of an antinode of the slower mode, one for each split.
         harmonic: Harmonic n of each split.
         reading_error: Standard error of the splits in Hz; by default that of the ring-down in the card, else 0.0001.
         scan: Output of hrg scan --json, instead of --split and --axis: the splits of --harmonic and their intervals.
         goal: Largest acceptable split in Hz.
-        cut: mass (unstrained mass, such as teeth or lumps), edge (from the rim edge, through the wall), inner or outer (from
-            that face).
+        cut: mass (unstrained, such as teeth or lumps), edge (from the rim, through the wall), inner or outer face.
         position: Permitted positions of cuts along the meridian, 0 ... 1 (rim).
         width_mm: Width of a cut along the circumference.
         length_mm: Length of a cut along the meridian.
@@ -91,12 +89,10 @@ def trim(
         teeth: Number of teeth at the rim; cuts are then made on teeth only.
         tooth_azimuth: Azimuth of the first tooth in degrees.
         tooth_limit_ug: Largest mass to remove from a tooth.
-        unbalance: Known mass imbalance to correct, by harmonic, such as 1:120@35 (k = 1, 120 µg at 35°); other
-            harmonics are preserved.
+        unbalance: Known mass imbalance to correct, by harmonic: 1:120@35 (k = 1, 120 µg at 35°); others are kept.
         removal_error: Relative standard error of the mass of each cut.
         gain_error: Relative standard error common to all cuts.
-        gain: Measured over predicted change of the split in the last round; negative if the split changed in the
-            opposite direction.
+        gain: Measured over predicted change of the split in the last round; negative if in the opposite direction.
         out: Write the cuts as CSV, for the machine.
     """
     instrument, T, resonator, elastic = open_resonator(card, temperature)

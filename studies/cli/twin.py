@@ -41,10 +41,8 @@ def twin(
     Parameters are named as in the card; shape, material laws, the number of cells, and [law] with its lags are fixed when the twin is written.
 
     Args:
-        fmu: The FMU to write, with its sources; it holds a binary for 64-bit Linux if a C compiler is found (the
-            variable CC, cc or gcc).
-        c: A folder for the C sources, created if it does not exist. main.c runs a profile (CSV) and writes a record: cc
-            -std=c11 -O2 *.c -lm -o twin
+        fmu: The FMU to write, with sources, and a binary for 64-bit Linux if there is a compiler (CC, cc or gcc).
+        c: Folder for the C sources. main.c runs a profile (CSV): cc -std=c11 -O2 *.c -lm -o twin
         fmi: Version of the FMU.
         boundary: Input temperature: that of the chamber, or of the housing.
     """
