@@ -74,6 +74,10 @@ def mix_down(time: ArrayLike, channels: ArrayLike, carrier: float | None = None)
     least = max(t.size / MOST_BLOCKS, 8 * period)
     sizes = np.arange(int(np.ceil(least)), int(np.ceil(1.3 * least + 2 * period)) + 1)
     size = int(sizes[int(np.argmin(np.abs(np.sin(2 * np.pi * sizes / period)) / sizes))])
+    if 2 * min(carrier, rate / 2 - carrier) * size < 0.5 * rate:
+        raise CompensationError(
+            f"the line at {carrier:.6g} Hz and its image in samples at {rate:.6g} Hz fall together; sample at another rate."
+        )
     block = rows // size
     count = int(block[-1]) + 1
     level = np.nanmean(x, axis=1, keepdims=True)

@@ -77,6 +77,10 @@ def analyse_trace(time: ArrayLike, amplitude: ArrayLike, frequency: float | None
         )
     elif last < t.size:
         said.append(f"The last {t[-1] - t[last - 1]:.4g} s are below {FLOOR:g} times the noise and are left out.")
+    if sd > 3 * bound:
+        said.append(
+            f"Poor fit: the interval is {sd / bound:.2g} times as wide as white noise makes it; a floor may bend the decay."
+        )
     if x[-1] * -slope < 0.5:
         said.append("The amplitude falls by less than 40 %: a decay that is not exponential is not seen.")
     window = (float(t[first]), float(t[last - 1]))

@@ -46,8 +46,10 @@ def find_jump(envelope: Envelope) -> float | None:
     steady &= loud > 0.5 * level  # the phase of a beat turns by itself where it is low
     limit = np.maximum(JUMP, 8 * np.maximum(1.4826 * float(np.median(np.abs(away))), usual / np.maximum(loud, 1e-300)))
     jumps = steady & (np.abs(away) > limit)
-    both = np.flatnonzero(jumps[1:] & jumps[:-1] & (np.abs(away[1:] - away[:-1]) < 0.2))
-    return float(t[pairs[both[-1]] + 2]) if both.size else None
+    # a jump within a row shares itself out between the pair that ends and the pair that begins with it
+    whole = np.abs(away[:-2] + away[2:] - away[1:-1]) < 0.2
+    found = np.flatnonzero(jumps[1:-1] & whole)
+    return float(t[pairs[found[-1] + 1 - (found[-1] - 1 in found)] + 2]) if found.size else None
 
 
 def find_free(whole: Envelope) -> Found:

@@ -31,35 +31,16 @@ FITTING_UNIT = 2
 OWN_NAME = 100
 """Weight of a column's name in a record."""
 UNIT_WORDS: tuple[tuple[str, str], ...] = (
-    (r"kelvin|(^|[^a-z])k($|[^a-z])", "K"),
-    (r"°\s*f|deg ?f\b|fahrenheit", "degF"),
-    (r"m(°|deg) ?c\b|millicelsius", "mdegC"),
-    (r"°\s*c|deg ?c\b|celsius|(^|[^a-z])c($|[^a-z])", "degC"),
-    (r"mhz", "MHz"),
-    (r"khz", "kHz"),
-    (r"ppm", "ppm"),
-    (r"ppb", "ppb"),
     (r"period.*count|count.*period", "period-counts"),
     (r"gate|counts?\b", "gate-counts"),
     (r"period.*(us|µs|μs)\b|(us|µs|μs)\b.*period", "period-us"),
     (r"period.*\bms\b", "period-ms"),
     (r"period", "period-s"),
-    (r"rad/s", "rad/s"),
-    (r"\bhz", "Hz"),
-    (r"mdeg/s|mdps|m°/s", "mdeg/s"),
-    (r"(deg|°)[ _]?(/|per)[ _]?h|dph", "deg/h"),
-    (r"(deg|°)[ _]?(/|per)[ _]?s|dps", "deg/s"),
-    (r"rpm", "rpm"),
-    (r"arcsec", "arcsec/s"),
-    (r"\bmv\b", "mV"),
-    (r"\b(uv|µv|μv)\b", "uV"),
-    (r"\bkv\b", "kV"),
-    (r"\bv\b|volt", "V"),
-    (r"\brad\b", "rad"),
     (r"1/q|inv", "1/Q"),
     (r"^q|q[ _-]*fact", "Q"),
     (r"counts?\b", "counts"),
 )
+"""Units that are described rather than spelled; the first that fits is taken."""
 BRACKETED = r"[\[(]\s*([^\])]{1,24}?)\s*[\])]"
 AXIS = re.compile(r"^(.*?)([xyz])((?:[^a-z].*)?)$", re.IGNORECASE)
 
@@ -96,10 +77,12 @@ def find_unit(target: str, hint: str) -> str | None:
     units = units_of(target)
     if hint.strip().lower() == target.lower():
         return next(iter(units))
-    spelled = find_spelling(target, split_nominal(stated[-1])[0]) if (stated := re.findall(BRACKETED, hint)) else None
-    return spelled or next(
-        (u for pattern, u in UNIT_WORDS if u in units and re.search(rf"(?<![a-zµμ])({pattern})", hint.lower())), None
-    )
+    stated = re.findall(BRACKETED, hint)
+    words = re.split(r"[\s_]+", re.sub(BRACKETED, " ", hint).strip())
+    texts = stated[-1:] or [" ".join(words[k:]) for k in range(len(words))]
+    spelled = (find_spelling(target, split_nominal(text)[0]) for text in texts)
+    described = (unit for pattern, unit in UNIT_WORDS if unit in units and re.search(pattern, hint.lower()))
+    return next(filter(None, (*spelled, *described)), None)
 
 
 def _bids(hint: str) -> dict[str, int]:

@@ -89,9 +89,13 @@ def tables(rows: list[dict]) -> Iterator[str]:
     for kind in WELL:
         some = groups[kind]
         if some:
-            yield f"\n{kind}: coverage (%), rms error over the Cramér–Rao bound, largest error"
+            yield f"\n{kind}: coverage (%), rms error over the Cramér–Rao bound, largest error; axes where they are said to be determined"
         for name in PAIRS if some else ():
-            known = [r["judged"][name] for r in some if name in r["judged"]]
+            known = [
+                e
+                for r in some
+                if (e := r["judged"].get(name)) and (e["high"] - e["low"] < 0.98 * AXIS or "_deg" not in name)
+            ]
             ratio = np.array([e["error"] / e["bound"] for e in known])
             yield (
                 f"  {name:20} n {len(known):4d}  {100 * np.mean([not misses(e, 1) for e in known]):5.1f}  "

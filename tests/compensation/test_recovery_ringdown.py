@@ -234,3 +234,29 @@ def test_a_record_that_ends_within_a_block_has_lost_nothing():
     time = np.arange(20_050) / 1e5
     samples = np.exp(-time / 0.09) * np.cos(2 * np.pi * 7000 * time)
     assert mix_down(time, samples).lost == 0
+
+
+def test_a_phase_jump_within_a_block_of_raw_samples_is_named_and_left_behind():
+    random, time = np.random.default_rng(8), np.arange(80_000) / 10e3
+    gyro = Gyro(2000.25, 1999.75, 1.5e4, 1.6e4, 0.4, 1.1)
+    amplitudes = np.array([1.0, 0.7j])
+    samples = gyro.samples(time, amplitudes)
+    samples[:, 20_011:] = gyro.samples(time, amplitudes * np.exp(1.1j))[:, 20_011:]
+    found = analyse_decay(mix_down(time, samples + 2e-3 * random.standard_normal(samples.shape)))
+    assert found.remarks[0].startswith("The phase jumps at 2.0")
+    z, _ = misses(found, truth_of(gyro))
+    assert max(map(abs, z.values())) < 4
+
+
+def test_a_line_at_half_the_sampling_rate_is_refused():
+    time = np.arange(20_000) / 2e3
+    with pytest.raises(CompensationError, match="its image in samples at 2000 Hz fall together"):
+        mix_down(time, np.exp(-time / 3) * np.cos(2 * np.pi * 6999.9 * time))
+
+
+def test_a_floor_of_power_that_bends_a_trace_is_warned_of():
+    """Its interval misses τ = 455 s."""
+    time = np.arange(2000.0)
+    power = 12.5 * np.exp(-2 * time / 455) + 1e-3
+    found = analyse_trace(time, np.sqrt(power) * np.exp(0.006 * np.random.default_rng(1).standard_normal(time.size)))
+    assert any("floor may bend" in one for one in found.remarks)
