@@ -55,15 +55,22 @@ def test_the_door_has_every_public_name_and_says_what_it_lacks():
 
 
 def test_published_designs_beside_ours(printed):
-    """Q of the birdbath as printed; the slope of the HRG by two standard deviations of the law; its Q, bare, at the lower end of what is told."""
+    """Q of the birdbath as printed; the slope of the HRG by two standard deviations of the law; its Q, bare, at the lower end of what is told.
+
+    The oxide shell, of which no dimension is fitted, comes within 20 %; bare it has more Q than with platinum on it.
+    """
     text = printed("published_designs")
-    hrg30, birdbath = text.split("birdbath-5mm")
+    hrg30, rest = text.split("birdbath-5mm")
+    birdbath, oxide = rest.split("free-dome")
     for part in (hrg30, birdbath):
         f, known = numbers(r"f ([\d.]+) Hz \(printed ([\d.]+)\)", part)
         assert f == pytest.approx(known, rel=1e-4)
     interval = r"90 % from ([\d.e+]+) to ([\d.e+]+) \(printed ([\d.e+]+) to ([\d.e+]+)\)"
     low, high, q, _ = numbers(interval, birdbath)
     assert low < q < high
+    f, known = numbers(r"f ([\d.]+) Hz \(printed ([\d.]+)\)", oxide)
+    assert f == pytest.approx(known, rel=0.2)
+    assert numbers(interval, oxide)[0] > 19100
     low, high, least, most = numbers(interval, hrg30)
     assert low < most
     assert high > least
