@@ -21,6 +21,7 @@ class Published:
     q: tuple[float, float]
     slope: tuple[float, float] | None
     source: str
+    name: str = ""  # where it is not the card's
     values: Mapping[str, float] = field(default_factory=dict)  # printed dimensions, in place of the card's
 
 
@@ -37,7 +38,7 @@ DESIGNS = (
         "free-dome", 19170.0, (19100.0, 19100.0), None,
         "oxide shell, 910 µm across, 2.6 µm thick; Q printed with 30 nm of platinum on it, ours bare: Electrical characterization of"
         " ALD-coated silicon dioxide micro-hemispherical shell resonators, 2014 (abstract: acemap.info/paper/276657221)",
-        {"resonator.radius_mm": 0.4537, "resonator.thickness_mm": 0.0026},
+        "oxide-1mm", {"resonator.radius_mm": 0.4537, "resonator.thickness_mm": 0.0026},
     ),
 )  # fmt: skip
 
@@ -64,7 +65,7 @@ if __name__ == "__main__":
             beside(design),
             "nothing printed" if design.slope is None else f"printed {design.slope[0]:g} to {design.slope[1]:g}",
         )
-        print(f"{design.card}: f {ours['frequency']:.1f} Hz (printed {design.frequency:g})")
+        print(f"{design.name or design.card}: f {ours['frequency']:.1f} Hz (printed {design.frequency:g})")
         print(
             f"  Q {ours['q']:.3g}, 90 % from {ours['low']:.3g} to {ours['high']:.3g} (printed {design.q[0]:.3g} to {design.q[1]:.3g})"
         )

@@ -61,7 +61,7 @@ def test_published_designs_beside_ours(printed):
     """
     text = printed("published_designs")
     hrg30, rest = text.split("birdbath-5mm")
-    birdbath, oxide = rest.split("free-dome")
+    birdbath, oxide = rest.split("oxide-1mm")
     for part in (hrg30, birdbath):
         f, known = numbers(r"f ([\d.]+) Hz \(printed ([\d.]+)\)", part)
         assert f == pytest.approx(known, rel=1e-4)
