@@ -10,7 +10,7 @@ import pytest
 from compensation.noise import Noise
 from studies.cli import main
 from studies.effects import library
-from studies.instrument.card import load_card, save_card, shipped_cards
+from studies.instrument.card import load_card, save_card
 from studies.record import read_record
 from studies.twin.plan import plan_twin
 from studies.twin.source import exposed
@@ -31,7 +31,7 @@ HERE = Path(__file__).parent
 HOUR = 3600.0
 TEN_HOURS = {
     "time_s": [0.0, 0.0, 5 * HOUR, 5 * HOUR + 3000.0, 10 * HOUR],
-    "chamber_temperature_degC": [20.0, -10.0, -10.0, 40.0, 40.0],
+    "chamber_temperature_degC": [20.0, -20.0, -20.0, 40.0, 40.0],
 }
 RAMPS = {
     "time_s": np.array([0.0, 600.0, 4000.0, 4600.0, 9000.0]),
@@ -57,7 +57,7 @@ def folder(tmp_path_factory):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("card", sorted(shipped_cards()))
+@pytest.mark.parametrize("card", ["birdbath-5mm", "cvg-25mm", "hrg-30mm-loops"])
 def test_limits_shipped_card_over_ten_hours(card, folder):
     """A step, a ramp and soaks, ten hours in rows of 12 s: every column to 1e-9 of its largest value."""
     instrument = load_card(card)
@@ -127,7 +127,7 @@ ERRORS |= {"drive_phase_difference_deg": 0.02}
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("precession", "control"), [(0.0, "force"), (0.5, "force"), (-0.05, "stiffness")])
+@pytest.mark.parametrize(("precession", "control"), [(0.5, "force"), (-0.05, "stiffness")])
 def test_limits_wave_that_turns_freely(precession, control, folder):
     """Whole angle with every error of the electronics, ten hours, at a rate and by its command: up to fifty turns."""
     loop = {**ERRORS, "mode": "whole-angle", "self_precession_deg_per_s": precession, "quadrature_control": control}
@@ -183,7 +183,7 @@ def test_limits_everything_at_once(folder):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("cells", [1, 24, 60])
+@pytest.mark.parametrize("cells", [1, 60])
 def test_limits_imperfect_card(cells, folder):
     """Imperfection, charged electrodes at a commanded voltage, a mount, the parts of a loss budget; few cells of the shell and many."""
     instrument = load_card(HERE.parents[1] / "golden" / "inputs" / "busy.toml").with_values({"thermal.cells": cells})
@@ -229,9 +229,9 @@ def test_limits_card_without_a_geometry(share, delay, folder):
     card.write_text(LAW.format(share=share, delay=delay))
     instrument = load_card(card)
     profile = write_profile(folder / "ten.csv", TEN_HOURS)
-    found = run_twin(compile_twin(instrument, folder / "law", SANITIZED), profile, 12.0)
+    found = run_twin(compile_twin(instrument, folder / "law", SANITIZED), profile, 6.0)
     chamber = Profile(np.array(TEN_HOURS["time_s"]), 273.15 + np.array(TEN_HOURS["chamber_temperature_degC"]))
-    expected = simulated(instrument, chamber, 12.0)
+    expected = simulated(instrument, chamber, 6.0)
     known = np.all(
         [(found["time_s"] < t + min(delay, 0.0)) | (found["time_s"] > t) for t in TEN_HOURS["time_s"]], axis=0
     )
