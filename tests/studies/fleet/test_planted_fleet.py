@@ -124,7 +124,7 @@ def test_a_device_of_another_design_is_put_aside():
 
 @pytest.mark.slow
 def test_the_odd_device_and_the_bad_batch_of_a_small_lot(tmp_path):
-    planted = make_lot(tmp_path, 8, [1], [5, 6, 7], seed=2, batch_size=5, columns=(*QUICK, "inverse_q"))
+    planted = make_lot(tmp_path, 8, [1], [5, 6, 7], seed=2, batch_size=5, columns=(*QUICK, "inverse_q"), row=180.0)
     lot = run_lot(read_lot(str(tmp_path), "hrg-30mm"))
     assert tuple(lot.odd) == planted.odd
     assert set(lot.bad_batches) == {planted.batch}

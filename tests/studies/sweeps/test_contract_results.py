@@ -147,7 +147,7 @@ def started(file: Path, protocol: str = "tcp", *given: str):
         for words in commands
     ]  # fmt: skip
     until = time.monotonic() + 120
-    while not file.exists() and time.monotonic() < until:
+    while not (file.exists() and file.read_text().endswith("}")) and time.monotonic() < until:
         time.sleep(0.1)
     try:
         yield json.loads(file.read_text())["address"], *processes
