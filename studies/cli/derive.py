@@ -118,12 +118,8 @@ def _told(rows: Iterable["Row"], behind: float = 0.0) -> "Iterator[Row]":
 def _keep(found: Result, out: str | None) -> Result:
     if out is None:
         return found
-    (shown,) = (
-        [found.printed]
-        if found.printed is not None
-        else [part.text for part in found.parts if isinstance(part, Sentence)]
-    )
-    write_text(out, shown)
+    said = (part.text for part in found.parts if isinstance(part, Sentence))
+    write_text(out, next(said) if found.printed is None else found.printed)
     return replace(found, printed=f"wrote {out}\n")
 
 

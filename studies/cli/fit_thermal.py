@@ -76,7 +76,8 @@ def fit_thermal(
         for name, e in estimates.items()
     ]  # fmt: skip
     columns = f"Constant | shown in low … high: Value | low … high: {100 * confidence:g} % interval .0 | Unit"
-    groups = (" and ".join(_lower(NAMES[name][0]) for name in group) for group in found.undetermined if len(group) > 1)
+    tied = [[NAMES[name][0] for name in group] for group in found.undetermined if len(group) > 1]
+    groups = (" and ".join(words[0].lower() + words[1:] for words in group) for group in tied)
     return Result(
         payload,
         "Thermal time constants",
@@ -93,10 +94,6 @@ def fit_thermal(
             Figure(lambda: _draw(found), "Residual of the frequency in each run."),
         ],
     )
-
-
-def _lower(words: str) -> str:
-    return words[:1].lower() + words[1:]
 
 
 def _draw(found: ThermalFit) -> Drawing:

@@ -94,9 +94,8 @@ def _caveats_of(paths: Iterable[Path]) -> list[str]:
     for path in paths:
         if path.suffix != ".toml":
             continue
-        with suppress(
-            OSError, ValueError, RecursionError, InputError, ShellError
-        ):  # the command says what is wrong with it
+        # the command says what is wrong with it
+        with suppress(OSError, ValueError, RecursionError, InputError, ShellError):
             if tomllib.loads(path.read_text(encoding="utf-8-sig")).get("schema") == SCHEMA:
                 found |= dict.fromkeys(load_card(path).material.caveats)
     return list(found)
