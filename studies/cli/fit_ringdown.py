@@ -200,6 +200,8 @@ def _law_chapter(laws: dict[str, Law], decays: "Decays") -> Chapter:
             level = f"{law.level.value:.4g} ± {law.level.sd:.2g}"
             note = f"1/Q without these: {level}. Scatter: {100 * law.scatter:.2g} %."
         rows, over = [_shown(name, term, law) for term in law.terms], f"{TITLES[name]} over many decays"
+        if not rows:
+            parts.append(f"{over}: no condition explains it, nor does time. {note}")
         parts.append(Table(over, rows, TERM, note + " ±: one standard deviation, from the scatter of the decays."))
         parts += [f"{TITLES[name]}: {words}" for words in _remarks(law)]
         caption = f"{TITLES[name]} of every decay and the law (orange crosses)."

@@ -14,6 +14,7 @@ import pytest
 from scipy.special import ellipk
 
 from studies.calibration.observed import observe
+from studies.cli import main
 from studies.record import read_record
 
 MEASURED = Path(os.environ.get("HRG_MEASURED", "missing"))
@@ -70,6 +71,13 @@ def test_a_step_between_sessions_is_a_step_and_ageing_is_ageing(tmp_path, ask):
         assert term in law
         assert abs(law[term]["value"] - (-6e-6 if term == "step 2" else 2e-7)) < 4 * law[term]["sd"]
         assert ("time" in law) == (term == "time")
+
+
+def test_decays_that_depend_on_nothing_tell_their_level_and_scatter(tmp_path, capsys):
+    random = np.random.default_rng(6)
+    columns = {"time_s": 900.0 * np.arange(40), "frequency_Hz": 7000 + 1e-3 * random.standard_normal(40)}
+    assert main(["fit", "ringdown", write(tmp_path / "still.csv", columns)]) == 0
+    assert "no condition explains it, nor does time. Level: 7000.0" in capsys.readouterr().out
 
 
 def test_viscous_gas_goes_with_the_root_of_the_pressure(tmp_path, ask):
