@@ -155,6 +155,8 @@ def swing(decays: "list[Decay]", time: Array, starts: Complex) -> Complex:
         if not np.max(np.abs(w - old)) > CLOSE * np.max(np.abs(starts)):
             break
     known, slopes = np.concatenate([w, P[None]]), np.concatenate([slope, power[None]]) * end
+    if not (np.all(1 + 2 * loss * P > 0) and np.all(np.isfinite(known)) and np.all(np.isfinite(slopes))):
+        return np.full((len(decays), channels, time.size), np.nan + 0j)  # a trial point that grows without limit
     told = np.asarray(scipy.interpolate.CubicHermiteSpline(x / end, known, slopes, axis=-1)(time / end))
     held = told[2].real
     left = 2 * loss * held

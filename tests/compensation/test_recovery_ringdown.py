@@ -1,5 +1,7 @@
 """Ring-downs of two coupled oscillators whose values are known: recovered, with intervals that hold, or warned of."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -227,6 +229,8 @@ def test_limits_a_swing_with_cubic_terms_is_that_of_a_step_by_step_integration()
     np.testing.assert_allclose(there, exact, atol=2e-5)
     back = swing([decay], -time[-1:], there[None, :, -1])[0, :, 0]
     np.testing.assert_allclose(back, start, atol=1e-4)
+    grows = swing([replace(decay, thickening=-40.0)], time, start[None])
+    assert not np.isfinite(grows).any(), "what grows without limit is not followed, and is no fault"
 
 
 def test_a_record_that_ends_within_a_block_has_lost_nothing():
