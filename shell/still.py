@@ -10,11 +10,8 @@ from shell.scene import Scene
 
 LIGHT = (0.25, 0.45, 0.86)  # to the right, upwards, towards the eye
 GHOST = "#e9ebee"
-LIFT, THICK, DOT = (
-    0.02,
-    0.006,
-    0.012,
-)  # of lines over their surface, of their width and of the dots, in parts of the size
+LIFT, THICK, DOT = 0.02, 0.006, 0.012  # lines over their surface, their width, dots; in parts of the size
+PIECES = 40  # of a long line, each in front of what is behind it
 ROUND = np.linspace(0.0, 2 * np.pi, 13)
 
 
@@ -42,12 +39,11 @@ def draw_still(scene: Scene, view: str = "oblique", width: int = 900, height: in
     ghost = (scene.points @ seen)[triangles] - [0.0, 0.0, 9.0 * size]
     marks = [(_ribbon(bent[line[line >= 0]], THICK * size), NODE) for line in scene.nodes]
     marks += [(_dot(bent[k], DOT * size), ANTINODE) for k in scene.antinodes]
-    marks += [
-        (_ribbon(line @ seen, THICK * size), SLOW if 2 * k < len(scene.axes) else FAST)
-        for k, line in enumerate(scene.axes)
-    ]
-    lifted = [np.add(mark, (0.0, 0.0, LIFT * size)) for mark, _ in marks]
-    flat = [(ghost, GHOST), *((mark, name) for mark, (_, name) in zip(lifted, marks, strict=True))]
+    names = np.repeat([SLOW, FAST], len(scene.axes) // 2)
+    ends = scene.axes @ seen
+    lines = np.linspace(ends[:, 0], ends[:, 1], PIECES, axis=1)
+    marks += [(_ribbon(line, THICK * size), name) for line, name in zip(lines, names, strict=True)]
+    flat = [(ghost, GHOST), *((np.add(mark, (0.0, 0.0, LIFT * size)), name) for mark, name in marks)]
     painted = [colour, *(np.broadcast_to(colors.to_rgb(name), mark.shape) for mark, name in flat)]
     corners = np.concatenate([faces, *(mark for mark, _ in flat)])
     order = np.argsort(corners[:, :, 2].mean(axis=1))
@@ -74,13 +70,8 @@ def _ribbon(line: Array, width: float) -> Array:
     """Triangles (k, 3, 3) of a line of a width on the screen."""
     along = np.diff(line, axis=0)[:, [1, 0, 2]] * [-1.0, 1.0, 0.0]
     aside = along * (width / 2 / np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-300))
-    start, end = line[:-1], line[1:]
-    return np.concatenate(
-        [
-            np.stack([start + aside, start - aside, end + aside], axis=1),
-            np.stack([end + aside, start - aside, end - aside], axis=1),
-        ]
-    )
+    sides = line[:-1] + aside, line[:-1] - aside, line[1:] + aside, line[1:] - aside
+    return np.concatenate([np.stack(sides[k : k + 3], axis=1) for k in (0, 1)])
 
 
 def _dot(point: Array, radius: float) -> Array:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shell.constants import zero_Celsius
+from shell.still import draw_still
 from studies.errors import InputError
 from studies.instrument.card import Instrument
 from studies.results import Blocks, Chapter
@@ -186,13 +187,6 @@ def mode_blocks(instrument: "Instrument", harmonics: Sequence[int] = (2, 3)) -> 
     return view_blocks([show_mode(instrument, n) for n in harmonics])
 
 
-def draw_still(shown: ModeScene) -> bytes:
-    """Return the PNG that stands behind an interactive view."""
-    from shell.still import draw_still as draw
-
-    return draw(shown.scene())
-
-
 def view_blocks(shown: "Sequence[ModeScene]", remark: str = "") -> "list[Block]":
     """Return the interactive view of modes of one instrument at one temperature."""
     from studies.reports.webgl import Drawn, view_modes
@@ -214,6 +208,6 @@ def view_blocks(shown: "Sequence[ModeScene]", remark: str = "") -> "list[Block]"
     alt = f"The resonator with its rim bent into {lobes} lobes, nodes between them."
     splits = [None if one.split is None else Drawn(one.split, one.imperfection, one.exaggeration) for one in shown]
     view = view_modes(
-        first.resonator, [one.mode for one in shown], first.title, draw_still(first), alt, caption, splits
+        first.resonator, [one.mode for one in shown], first.title, draw_still(first.scene()), alt, caption, splits
     )
     return [view]

@@ -35,7 +35,7 @@ class Drawn:
 
 
 def view_modes(
-    resonator: "Resonator", modes: "Sequence[Mode]", title: str, png: bytes | None, alt: str, caption: str = "",
+    resonator: "Resonator", modes: "Sequence[Mode]", title: str, png: bytes, alt: str, caption: str = "",
     splits: "Sequence[Drawn | None]" = (),
 ) -> Embedded:  # fmt: skip
     """Return an interactive view of modes (solid or shell) of one resonator; `png` stands in where WebGL2 is missing, and on paper."""
@@ -59,7 +59,7 @@ def view_modes(
         title=title,
         data=data,
         alt=alt,
-        picture="data:image/png;base64," + base64.b64encode(png).decode() if png else "",
+        picture="data:image/png;base64," + base64.b64encode(png).decode(),
         still="The interactive view needs a browser with scripts and WebGL2.",
     )
     return Embedded(html, caption)
