@@ -8,6 +8,7 @@ import numpy as np
 
 from shell.constants import zero_Celsius
 from studies.errors import InputError, naming
+from studies.progress import told
 from studies.resonator.law import law_of
 from studies.results.shown import Shown
 
@@ -64,7 +65,7 @@ def compare(instruments: "Sequence[Instrument]") -> Comparison:
     differing = {name: tuple(one.get(name) for one in keys) for name in names}
     return Comparison(
         tuple(one.name for one in instruments),
-        tuple(zip(*(tuple(_figures(one)) for one in instruments), strict=True)),
+        tuple(zip(*(tuple(_figures(one)) for one in told(instruments, "designs")), strict=True)),
         {name: values for name, values in differing.items() if any(value != values[0] for value in values)},
     )
 

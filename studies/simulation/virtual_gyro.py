@@ -10,6 +10,7 @@ from compensation.noise import Noise
 from shell.constants import zero_Celsius
 from studies.effects import find_effect
 from studies.instrument.tables.noise import SILENT
+from studies.progress import tell
 from studies.record import Record
 from studies.resonator.law import unknown_slope
 from studies.simulation.chamber import check_profile
@@ -75,7 +76,9 @@ def simulate_run(
     if instrument.loop is not None:
         frequency = float(law.frequency(instrument.reference_temperature))
         require_stable_loops(instrument, frequency, instrument.loss.inverse_q)
+    tell("the run", 0.2)
     prediction = predict(instrument, drive, law=law, longest=_longest_step(drive))
+    tell("the run", 0.7)
     true = dict(prediction.columns)
     if instrument.loop is not None:
         wave = wave_of(instrument, true["frequency_Hz"], true["inverse_q"], law.bryan_factor)
