@@ -61,7 +61,7 @@ def resolve_limits(results: "Results", requirement: "Requirement") -> Requiremen
 
 def find_yield(results: "Results", requirements: "tuple[Requirement, ...]") -> Yield:
     """Return the share of sampled designs that meet all the requirements."""
-    from scipy.stats import binomtest
+    from scipy.special import ndtri
 
     limits = tuple(resolve_limits(results, requirement) for requirement in requirements)
     good, unknown = _judge(results, limits)
@@ -71,9 +71,10 @@ def find_yield(results: "Results", requirements: "tuple[Requirement, ...]") -> Y
     n, passed, open_ = len(good), int(good.sum()), int(unknown.sum())
     if results.study.sampling.method not in DRAWN or n == 0:
         return Yield(limits, n, passed, open_, None, None)
-    low = binomtest(passed, n).proportion_ci(0.9, "wilson").low
-    high = binomtest(passed + open_, n).proportion_ci(0.9, "wilson").high
-    return Yield(limits, n, passed, open_, float(low), float(high))
+    ends = []
+    for count, z in ((passed, -ndtri(0.95)), (passed + open_, ndtri(0.95))):  # Wilson's interval
+        ends.append((count + z**2 / 2 + z * np.sqrt(count * (n - count) / n + z**2 / 4)) / (n + z**2))
+    return Yield(limits, n, passed, open_, float(ends[0]), float(ends[1]))
 
 
 def find_reach(results: "Results", requirements: "tuple[Requirement, ...]") -> Reach:
