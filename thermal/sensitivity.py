@@ -7,7 +7,7 @@ With S = ∂T/∂p, L, R, C, q the network's conduction, radiation, capacities a
 linear in S, along the temperatures that `thermal.sweeping` has found; it is swept in the same way, all constants at once.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -21,6 +21,7 @@ from thermal.sweeping import MOST_SWEEPS, Sweep, SweepError, capacity_ratio, her
 from thermal.transient import BLOCK
 
 RELATIVE_TOLERANCE = 1e-7  # of the derivatives, at the last sweep
+TWO = (293.15, 303.15)  # K, where a capacity that changes shows it
 CAPACITY_STEP = 0.5  # K, half the central difference of a capacity over temperature
 
 
@@ -30,16 +31,21 @@ class NetworkChange:
 
     conduction: Array  # conduction, radiation: arrays (N, N), ∂L/∂p and ∂R/∂p over nodes and boundaries
     radiation: Array
-    capacity: Array  # array (n,), ∂ ln C/∂p of the nodes
+    capacity: Callable[[Array], Array]  # ∂ ln C/∂p of the nodes (n, ...) at their temperatures (n, ...)
     power: Array  # array (n,), ∂q/∂p
     # mapping of a boundary's name to the change of its profile, on rows as long as the run
     boundaries: Mapping[str, Profile] = field(default_factory=dict)
     initial: Array | None = None  # array (n,), ∂T(0)/∂p beyond what a settled start does (K)
 
     @property
+    def capacity_at_two(self) -> Array:
+        """∂ ln C/∂p at two temperatures, (n, 2)."""
+        return self.capacity(np.full((len(self.power), 2), TWO))
+
+    @property
     def moves(self) -> bool:
         """Whether it changes any temperature."""
-        matrices = (self.conduction, self.radiation, self.capacity, self.power)
+        matrices = (self.conduction, self.radiation, self.capacity_at_two, self.power)
         return bool(self.boundaries) or self.initial is not None or any(part.any() for part in matrices)
 
 
@@ -49,18 +55,19 @@ def no_change(
     """Return a change that leaves the network as it is: of the boundaries or of the initial state alone."""
     n, N = network.count, len(network.names)
     zero = np.zeros((N, N))
-    return NetworkChange(zero, zero, np.zeros(n), np.zeros(n), boundaries or {}, initial)
+    return NetworkChange(zero, zero, np.zeros_like, np.zeros(n), boundaries or {}, initial)
 
 
-def difference(
-    above: Network, below: Network, step: float, time: float = 0.0, temperature: float = 293.15
-) -> NetworkChange:
+def difference(above: Network, below: Network, step: float, time: float = 0.0) -> NetworkChange:
     """Change from two networks of the same nodes built half a `step` above and below a value."""
-    C1, C0 = (network.capacities(np.full(network.count, temperature)) for network in (above, below))
+
+    def capacity(temperature: Array) -> Array:
+        return np.asarray(np.log(above.capacities(temperature) / below.capacities(temperature)) / step)
+
     return NetworkChange(
         (above.conduction - below.conduction) / step,
         (above.radiation - below.radiation) / step,
-        np.log(C1 / C0) / step,
+        capacity,
         (above.power(time) - below.power(time)) / step,
     )
 
@@ -162,8 +169,15 @@ class _Slopes:
             push -= swept.everything @ change.conduction[:n].T
         if change.radiation.any():
             push -= Stefan_Boltzmann * (swept.everything**4 @ change.radiation[:n].T)
-        forcing: Array = self.ratio * (push + change.power) - change.capacity * self.flow
+        forcing: Array = self.ratio * (push + change.power) - self._heavier(change) * self.flow
         return forcing
+
+    def _heavier(self, change: NetworkChange) -> Array:
+        """∂ ln C/∂p at all moments, (3, K, n), or (n,) where it does not depend on temperature."""
+        cold, warm = change.capacity_at_two.T
+        if np.allclose(cold, warm, rtol=1e-6, atol=0.0):
+            return np.asarray(cold)
+        return np.moveaxis(change.capacity(np.moveaxis(self.swept.everything[..., : self.count], -1, 0)), 0, -1)
 
     def _beyond(self, S: Array, held: Array) -> Array:
         """Derivative of b(T) along S, (3, K, p, n)."""

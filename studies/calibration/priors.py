@@ -83,6 +83,13 @@ class Priors:
         )
 
     @property
+    def free_ends(self) -> tuple[Array, Array]:
+        """Bounds of the independent coordinates of values that go with no others; none of the rest."""
+        alone = np.count_nonzero(self.root, axis=0) + np.count_nonzero(self.root, axis=1) == 2
+        low, high = self._ends
+        return np.where(alone, low, -np.inf), np.where(alone, high, np.inf)
+
+    @property
     def _ends(self) -> tuple[Array, Array]:
         ends = np.array([[to_standard(v, v.low), to_standard(v, v.high)] for v in self.values]).reshape(-1, 2)
         ends[self.pair] = [-np.inf, np.inf]

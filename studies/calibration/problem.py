@@ -107,9 +107,13 @@ class CardProblem:
 
     @cached_property
     def ends(self) -> tuple[Array, Array]:
-        """Least and largest coordinates: a jump was after the row before it and not after its own, where the model has a kink."""
-        jumps = np.array([False] * len(self.priors.values) + [name.startswith(JUMP) for _, name, _ in self.starts])
-        return np.where(jumps, -np.sqrt(3.0), -np.inf), np.where(jumps, 0.0, np.inf)
+        """Least and largest coordinates: those of values, and of a jump that was after the row before it and not after its own, where the model has a kink."""
+        jumps = np.array([name.startswith(JUMP) for _, name, _ in self.starts], dtype=bool)
+        low, high = self.priors.free_ends
+        return (
+            np.append(low, np.where(jumps, -np.sqrt(3.0), -np.inf)),
+            np.append(high, np.where(jumps, 0.0, np.inf)),
+        )
 
     @cached_property
     def responses(self) -> tuple[str, ...]:

@@ -19,6 +19,10 @@ from studies.results import Drawing, Figure, Result, Sentence, Table, row_of
 NAMES = {
     **{f"time_constant_{k}": (f"Time constant {k}", "s") for k in (1, 2, 3)},
     "radiated_share": ("Radiated share of the heat exchange at 20 °C", ""),
+    "direct_share": ("Part of that between housing and resonator", ""),
+    "base_radiated_share": ("Radiated share between housing and base", ""),
+    "capacity_ratio": ("Heat capacity of the resonator over that of the base", ""),
+    "capacity_slope_per_K": ("Relative slope of the resonator's heat capacity", "1/K"),
     "offset": ("Frequency at the reference temperature", "Hz"),
     "slope": ("Slope of the frequency", "Hz/K"),
     "curvature": ("Second-order coefficient", "Hz/K²"),

@@ -1,7 +1,7 @@
 """Thermal time constants of a resonator from records of its frequency and the temperature of its housing.
 
 The calibration of a polynomial card: f = f₀ (1 + a₁ x + a₂ x²), x = T_r − T_ref, the resonator behind its housing through lags in series
-that share a radiated part (`studies.inference.heat_path`), each run with a start of its own, in noise that may drift.
+with radiation along or past them (`studies.inference.heat_path`), each run with a start of its own, in noise that may drift.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -16,7 +16,7 @@ from studies.calibration.fit import fit
 from studies.calibration.priors import from_standard
 from studies.errors import InputError
 from studies.inference.diagnosis import build_problem
-from studies.inference.heat_path import LAGS, SHARE, HeatPath, find_heat_path, slow_share
+from studies.inference.heat_path import LAGS, OF_LUMPS, SHARE, HeatPath, find_heat_path, slow_share
 from studies.inference.polynomial_card import polynomial_card
 from studies.inference.records import driving, make_ready
 from studies.instrument.card import Instrument
@@ -24,7 +24,7 @@ from studies.record import Record
 from studies.resonator.law import law_of
 
 NAMES = {f"law.{key}": f"time_constant_{k}" for k, key in enumerate(LAGS, 1)} | {
-    SHARE: "radiated_share", "law.f0_Hz": "offset", "law.a1_per_K": "slope", "law.a2_per_K2": "curvature"
+    SHARE: "radiated_share", **{f"law.{key}": key for key in OF_LUMPS}, "law.f0_Hz": "offset", "law.a1_per_K": "slope", "law.a2_per_K2": "curvature"
 }  # fmt: skip
 
 RESTS = 1.0

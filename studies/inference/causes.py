@@ -13,7 +13,7 @@ from studies.diagnosis.verdict import NINETY, Cause, Interval, same_cause, weigh
 from studies.effects import library
 from studies.effects.effect import UNITS
 from studies.inference.generic_forms import offsets
-from studies.inference.heat_path import LAGS, SHARE
+from studies.inference.heat_path import DIRECT, LAGS, SHARE
 from studies.inference.inferred import Inferred
 from studies.inference.model import Background, Term
 from studies.inference.records import REFERENCE, settle
@@ -185,13 +185,16 @@ def _path_causes(found: Inferred) -> list[Cause]:
     if path.radiates:
         share, sd = path.value(SHARE)
         own = min((share / sd) ** 2, evidence) if causes else evidence
+        numbers = {
+            key.removeprefix("law."): Interval.about(*path.value(key)) for key in (SHARE, DIRECT)[: min(path.lags, 2)]
+        }
         causes.append(
             Cause(
                 names[SHARE.removeprefix("law.")],
                 name,
                 probability,
                 (),
-                {"radiated_share": Interval.about(share, sd)},
+                numbers,
                 own,
                 peak=peak,
                 together=True,

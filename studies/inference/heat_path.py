@@ -1,6 +1,6 @@
-"""A heat path longer than one lag, of a gyro without a card: lags in series, part of whose heat is radiated, as a card of its own."""
+"""A heat path longer than one lag, of a gyro without a card: lumps in series, with radiation along and past them, as a card of its own."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,16 +15,31 @@ from studies.instrument.card import Instrument
 Array = NDArray[np.float64]
 FREQUENCY = "frequency_Hz"
 LAGS = ("lag_s", "second_lag_s", "third_lag_s")
-SHARE = "law.radiated_share"
-PARTS = ((1.0,), (0.7, 0.3), (0.65, 0.3, 0.05))
-"""Lags in series over the one lag that stood for them, where their priors are centred."""
+SHARE, DIRECT = "law.radiated_share", "law.direct_share"
+PLAIN, FULL = False, True
+PATHS = (
+    ((1.0,), PLAIN),
+    ((0.7, 0.3), PLAIN),
+    ((0.7, 0.3), FULL),
+    ((0.3, 0.7), FULL),
+    ((0.65, 0.05, 0.3), FULL),
+)
+"""Lags in series over the one lag that stood for them, where their priors are centred, and whether they have what `OF_LUMPS` says."""
 LAG_WIDTH = 0.7
 """Standard deviation of the logarithm of each."""
-RADIATED = {"value": 0.2, "sd": 0.2}
+RADIATED = {"value": 0.3, "sd": 0.3}
 """What is known of the radiated share."""
+OF_LUMPS = {
+    "direct_share": {"value": 0.5, "sd": 0.5},
+    "base_radiated_share": {"value": 0.2, "sd": 0.2},
+    "capacity_ratio": {"value": 0.1, "sd": 0.1},
+    "capacity_slope_per_K": {"value": 1e-3, "sd": 1e-3},
+}
+"""The same of what lumps have besides, where plain lags in series leave slow noise."""
 WORTH = 10.0
 """Log evidence that one more lag must bring."""
-
+FOLLOWED = 3.0
+"""Slow noise within a run over that of a row, up to which no more is asked of a path."""
 SURE_SHARE = 3.0
 """Standard deviations from which on a radiated share is named."""
 
@@ -65,13 +80,15 @@ class HeatPath:
         return priors.at(self.fit.point[:count])[name], sd
 
 
-def with_lags(card: Instrument, lag: float, lags: int) -> Instrument:
-    """Return a polynomial card with so many lags in series where one of `lag` s stood, and a radiated share."""
-    given = {
-        key: {"value": part * lag, "sd": LAG_WIDTH * part * lag}
-        for key, part in zip(LAGS, PARTS[lags - 1], strict=False)
-    }
-    return card.with_table("law", {**card.content["law"], **given, "radiated_share": dict(RADIATED)})
+def with_lags(card: Instrument, lags: Sequence[float], full: bool = PLAIN) -> Instrument:
+    """Return a polynomial card with such lags (s) in series, and radiation; a `full` one with all that lumps have, and a cubic law."""
+    law = dict(card.content["law"])
+    law |= {key: {"value": lag, "sd": LAG_WIDTH * lag} for key, lag in zip(LAGS, lags, strict=False)}
+    law |= {"radiated_share": dict(RADIATED)} | (OF_LUMPS if full else {})
+    slope, bend = (law.get(key, {}).get("sd", 0.0) for key in ("a1_per_K", "a2_per_K2"))
+    if full and slope and bend:
+        law["a3_per_K3"] = {"value": 0.0, "sd": bend**2 / slope}
+    return card.with_table("law", law)
 
 
 def find_heat_path(
@@ -82,13 +99,14 @@ def find_heat_path(
     lean = replace(whole, runs=tuple(run.explaining((FREQUENCY,)) for run in whole.runs))
     lag = whole.priors.at(baseline.point[: len(whole.priors.values)])["law.lag_s"]
     best: HeatPath | None = None
-    for number in (lags,) if lags else range(1, len(LAGS) + 1):
+    for parts, full in PATHS:
+        number = len(parts)
+        if lags not in (None, number) or (best is not None and slow_share(best.fit) < FOLLOWED):
+            continue
         progress(f"a heat path with {number} {'lag' if number == 1 else 'lags in series'} and radiation")
-        path = _calibrated(lean, with_lags(whole.instrument, lag, number))
-        if best is None or path.evidence > best.evidence + WORTH:
+        path = _calibrated(lean, with_lags(whole.instrument, [part * lag for part in parts], full))
+        if best is None or path.evidence > best.evidence + WORTH * (path.lags - best.lags):
             best = path
-        elif number > 2:
-            break
     assert best is not None
     if whole.responses == lean.responses or not (best.lags > 1 or best.radiates):
         return best

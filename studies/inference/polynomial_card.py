@@ -93,10 +93,7 @@ def polynomial_card(records: Sequence[Record], name: str = "") -> Instrument:
                 "k2_deg_per_h_per_Hz2": {"value": 0.0, "sd": BENT[column] * spread / changes**2},
                 "k3_deg_per_h_per_Hz3": {"value": 0.0, "sd": BENT[column] * spread / changes**3},
             }
-            content["noise"] |= {
-                "bias_white_deg_per_rt_h": _white(runs, column) / 60.0,
-                "bias_turn_on_deg_per_h": WIDE * spread if len(runs) > 1 else 0.0,
-            }
+            content["noise"]["bias_white_deg_per_rt_h"] = _white(runs, column) / 60.0
     return build_instrument(content, "the records")
 
 

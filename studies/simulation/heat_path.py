@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from studies.effects.effect import AROUND
 from studies.errors import naming
-from studies.instrument.tables.law import BETWEEN
+from studies.instrument.tables.law import BETWEEN, NO_LOAD
 from thermal.constants import Stefan_Boltzmann
 from thermal.meridian import cell_names
 from thermal.network import Boundary, Conductor, Network, Node, Part, Radiator, assemble, linearise
@@ -18,6 +18,7 @@ from thermal.resonator import describe_resonator, describe_shell_and_stem
 
 if TYPE_CHECKING:
     from studies.instrument.card import Instrument
+    from studies.instrument.tables.law import PolynomialLaw
 
 SENSOR = "sensor"
 """Node of the sensor on a housing that is predicted; its reading at the start may depart from the housing."""
@@ -28,8 +29,7 @@ LEAST_LAG, UNREAD = 1e-3, 1.0  # s; of a sensor without a lag, whose reading is 
 def build_network(instrument: "Instrument", radiation: bool | None = None, boundary: str = "chamber") -> Network:
     """Build the heat path from the "chamber", or "housing", to the cells of the shell; without radiation it is linear about the reference."""
     if instrument.polynomial is not None:
-        law = instrument.polynomial
-        network = lags_in_series(law.lags, law.chamber_lag, law.radiated_share if radiation is not False else 0.0)
+        network = lags_in_series(instrument.polynomial, radiation is not False)
         return behind_housing(network) if boundary == "housing" else network
     with naming(f"{instrument.path} [thermal]"):
         network = assemble(describe_resonator(instrument.heat_path))
@@ -47,18 +47,25 @@ def behind_housing(network: Network) -> Network:
     return replace(assemble(parts), radiators=network.radiators)
 
 
-def lags_in_series(lags: Sequence[float], chamber_lag: float, radiated_share: float = 0.0) -> Network:
-    """Return lumps behind a housing behind a chamber, by their time constants (s); a share of the heat exchange at 20 °C is radiated."""
+def lags_in_series(law: "PolynomialLaw", radiation: bool = True) -> Network:
+    """Return the lumps of `[law]`, by their time constants, behind a housing behind a chamber; a negative share is as good a number."""
     (cell,) = cell_names(1)
-    parts: list[Part] = [Boundary("chamber"), Node("housing", 1.0), Conductor("chamber", "housing", 1.0 / chamber_lag)]
+    parts: list[Part] = [
+        Boundary("chamber"),
+        Node("housing", 1.0),
+        Conductor("chamber", "housing", 1.0 / law.chamber_lag),
+    ]
     radiators: list[Radiator] = []
     before, capacity = "housing", 1.0
-    for name, lag in zip([*BETWEEN[: len(lags) - 1], cell], lags, strict=True):
-        capacity *= SENSOR_SHARE
-        whole = capacity / lag
-        parts += [Node(name, capacity), Conductor(before, name, (1.0 - radiated_share) * whole)]
-        if radiated_share:
-            radiators.append(Radiator(before, name, radiated_share * whole / (4.0 * Stefan_Boltzmann * AROUND**3)))
+    for name, lag in zip([*BETWEEN[: len(law.lags) - 1], cell], law.lags, strict=True):
+        capacity *= law.capacity_ratio if name == cell and before != "housing" else NO_LOAD
+        along, past = law.radiated_shares(name == cell) if radiation else (0.0, 0.0)
+        parts += [
+            Node(name, law.capacity(capacity) if name == cell else capacity),
+            Conductor(before, name, (1.0 - along - past) * capacity / lag),
+        ]
+        area = capacity / lag / (4.0 * Stefan_Boltzmann * AROUND**3)
+        radiators += [Radiator(one, name, share * area) for one, share in ((before, along), ("housing", past)) if share]
         before = name
     return replace(assemble(parts), radiators=tuple(radiators))
 

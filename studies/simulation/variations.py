@@ -114,8 +114,8 @@ class Variations:
         if name.partition(".")[0] not in HEATED:
             return None
         below, above = self.sides(name)
-        step, T0 = above.distance - below.distance, self.here.instrument.reference_temperature
-        change = difference(above.driven(drive.boundary), below.driven(drive.boundary), step, temperature=T0)
+        step = above.distance - below.distance
+        change = difference(above.driven(drive.boundary), below.driven(drive.boundary), step)
         return change if change.moves else None
 
     def _build(self, name: str) -> tuple[Side, Side]:

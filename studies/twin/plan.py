@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from studies.instrument.units import unit_of
 from studies.resonator.splitting import mean_shift, reference_split
 from studies.simulation.heat_path import SENSOR, behind_housing, build_network, slowest_lag, with_sensor
 from studies.simulation.response import observed_rows
+from thermal.meridian import cell_names
 from thermal.network import assemble
 from thermal.resonator import describe_resonator
 
@@ -84,8 +86,9 @@ class Plan:
     @property
     def key_of(self) -> dict[str, str]:
         """The parameter that scales a capacity, link or radiator, by its name; of shell and stem, by "shell"."""
-        if self.instrument.polynomial is not None:
-            return dict.fromkeys(("radiated", "conducted", "shell"), ONE)
+        if (law := self.instrument.polynomial) is not None:
+            own = {cell_names(1)[0]: "thermal.heat_capacity_J_per_kg_K"} if law.capacity_slope else {}
+            return dict.fromkeys(("radiated", "conducted", "shell"), ONE) | own
         return {
             "housing": "thermal.housing_heat_capacity_J_per_K",
             SENSOR: "thermal.housing_heat_capacity_J_per_K",
@@ -195,9 +198,14 @@ def _splines(instrument: "Instrument", law: "FrequencyLaw") -> dict[str, Spline]
     from studies.loss.damping_law import NODE_STEP, damping_law
 
     found: dict[str, Spline] = {}
-    if instrument.polynomial is None and callable(instrument.heat_path.volumetric_capacity):
+    if (own := instrument.polynomial) is not None:
+        capacity = own.capacity(1.0)
+    else:
+        varies = callable(instrument.heat_path.volumetric_capacity)
+        capacity = partial(instrument.material.value, "heat_capacity") if varies else 1.0
+    if callable(capacity):
         T = np.arange(law.lowest, law.highest + CAPACITY_STEP, CAPACITY_STEP)
-        found["heat_capacity"] = _spline(CubicSpline(T, instrument.material.value("heat_capacity", T)))
+        found["heat_capacity"] = _spline(CubicSpline(T, capacity(T)))
     damping = damping_law(instrument, law.lowest, law.highest)
     if damping is not None:
         T = np.linspace(law.lowest, law.highest, 4 * math.ceil((law.highest - law.lowest) / NODE_STEP))

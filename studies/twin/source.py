@@ -7,6 +7,7 @@ from importlib.resources import files
 
 import numpy as np
 
+from studies.effects.effect import AROUND
 from studies.simulation.heat_path import LEAST_LAG, SENSOR, SENSOR_SHARE
 from studies.simulation.virtual_gyro import COMMAND_DIGITS, DIGITS
 from studies.twin.plan import EFFECTS, MEMORY, PAST, PRECESSION, Plan, Spline, input_starts
@@ -126,7 +127,7 @@ def card_body(plan: Plan) -> str:
             "TwinCapacity",
             "twin_capacities",
             "TWIN_NODES",
-            [capacity(n.name, n.capacity_at(0.0)) for n in network.nodes],
+            [capacity(n.name, n.capacity_at(AROUND)) for n in network.nodes],
         ),
         _table("double", "twin_power_shares", "TWIN_NODES", [_number(v) for v in power]),
         _table("double", "twin_rows", "5][TWIN_NODES", [_braced([_number(v) for v in row]) for row in plan.rows]),

@@ -1,5 +1,7 @@
 """Derivatives of transients against a closed form and against central differences; sweeps against integration."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 
@@ -115,3 +117,18 @@ def test_radiation_too_strong_for_sweeps_is_integrated():
         sweep(network, jump)
     t = np.linspace(0.0, 36000.0, 20)
     assert np.array_equal(simulate(network, jump).at(t), integrate(network, jump).at(t))
+
+
+def test_a_heat_capacity_that_grows_with_temperature_against_central_differences():
+    """C = C₀ exp(c (T − T₀)): ∂ ln C/∂c is T − T₀, another number at every moment."""
+    t, profile, step = np.linspace(0.0, 7200.0, 200), {"b": parse_profile("step 20 -30 2h")}, 1e-5
+
+    def lump(c: float) -> Network:
+        capacity = partial(lambda T, c: 2.0 * np.exp(c * (T - 293.15)), c=c)
+        return assemble([Boundary("b"), Node("n", capacity), Conductor("n", "b", 1e-3)])
+
+    above, here, below = (lump(c) for c in (2e-3 + step / 2, 2e-3, 2e-3 - step / 2))
+    found = respond(here, profile, t, np.eye(1), [difference(above, below, step)]).slope[0, :, 0]
+    T1, T0 = (respond(one, profile, t, np.eye(1)).temperature[:, 0] for one in (above, below))
+    assert np.abs(found).max() > 50.0
+    assert found == pytest.approx((T1 - T0) / step, abs=1e-3)

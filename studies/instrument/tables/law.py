@@ -1,13 +1,17 @@
 """`[law]`: a gyro without geometry, its frequency a polynomial of the temperature that follows the housing through lags in series.
 
     f = f₀ (1 + a₁ x + a₂ x² + a₃ x³),   x = T − T_ref,   T(t) = T_r(t − delay),
-    lag_j dT_j/dt = (1 − ρ + ρ g_j) (T_{j−1} − T_j),   g_j = (T_{j−1} + T_j)(T_{j−1}² + T_j²)/(4 T₀³),   T₀ = 20 °C,
+    lag_j c_j dT_j/dt = (1 − ρ_j) (T_{j−1} − T_j) + ρ_j (1 − δ) g(T_{j−1}, T_j) + ρ_j δ g(T_h, T_j),   g(T, T') = (T⁴ − T'⁴)/(4 T₀³),
 
-from the housing, j = 0, to the resonator: one lag, unless `second_lag_s` and `third_lag_s` are given; ρ of the heat is radiated.
+from the housing, T_h, to the resonator, T_r: one lag, unless `second_lag_s` and `third_lag_s` are given; T₀ = 20 °C. Of the heat exchange
+ρ is radiated, `radiated_share` of the resonator's and `base_radiated_share` (the same unless given) of that between; δ, `direct_share`, is the part of the
+resonator's radiation that is with the housing, 0 between. c = exp(`capacity_slope_per_K` (T_r − T₀)), 1 between. The lump before the
+resonator gives what the resonator takes, by `capacity_ratio`; no other takes heat from the one before it.
 
 It stands in place of `[resonator]`, `[material]` and `[thermal]`.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Annotated
 
@@ -15,12 +19,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from shell.errors import ShellError
+from studies.effects.effect import AROUND
 from studies.instrument.registry import CardPlace, CardTable
 from studies.schema.keys import Keys, Note, number
 
 Array = NDArray[np.float64]
 BETWEEN = ("base", "stem")
 """What lies between the housing and the resonator where there are two lags and more."""
+NO_LOAD = 1e-8
+"""Ratio of heat capacities of lumps that take no heat from what they follow."""
 LEAST = 1e-3
 """Of f over f₀: a polynomial is no law down to 0."""
 
@@ -47,6 +54,10 @@ class LawKeys(Keys, frozen=True, kw_only=True):
         ]
         | None
     ) = None
+    direct_share: Annotated[float, number("of the resonator's radiation, with the housing and past the lags between", least=0.0, most=1.0, sd=0.5)] | None = None  # fmt: skip
+    base_radiated_share: Annotated[float, number("of the heat exchange of the lags between at 20 °C", least=-0.5, most=0.95, sd=0.3)] | None = None  # fmt: skip
+    capacity_ratio: Annotated[float, number("heat capacity of the resonator over that of the lump before it", above=0.0, most=10.0, sd=0.3)] | None = None  # fmt: skip
+    capacity_slope_per_K: Annotated[float, number("relative, of the resonator's heat capacity; about 2e-3 of fused silica", least=-5e-3, most=5e-3, sd=1e-3)] | None = None  # fmt: skip
     chamber_lag_s: Annotated[float, number("of the housing behind its chamber", above=0.0, relative_sd=1.0)] = 600.0
     delay_s: Annotated[float, number("beside the resonator's lag, less that of the housing's sensor", sd=10.0)] = 0.0
     bias_bend: Annotated[float, number("part of the bend of f that the bias follows: 1 f, eq. 21; 0 T", sd=0.5)] = 1.0
@@ -67,7 +78,11 @@ class PolynomialLaw:
     # reference_temperature, lowest, highest: K
     reference_temperature: float
     lags: tuple[float, ...]  # in series, from the housing to the resonator, s
-    radiated_share: float
+    radiated_share: float  # of the resonator's heat exchange, at 20 °C
+    direct_share: float  # of that with the housing
+    base_radiated_share: float  # of what lies between
+    capacity_ratio: float  # of the resonator to the lump before it
+    capacity_slope: float  # relative, of the resonator, 1/K
     # chamber_lag, delay: s
     chamber_lag: float
     delay: float = 0.0
@@ -100,6 +115,18 @@ class PolynomialLaw:
         """Return the change of frequency (Hz) that the bias follows: f₀ a₁ x, and its part of the rest."""
         straight = self.f0 * self.coefficients[0] * (temperature - self.reference_temperature)
         return np.asarray(straight + self.bias_bend * (change - straight))
+
+    def radiated_shares(self, last: bool) -> tuple[float, float]:
+        """Return the parts of the heat exchange of the resonator, or of a lump between, that are radiation with the one before it and with the housing."""
+        if not last:
+            return self.base_radiated_share, 0.0
+        return self.radiated_share * (1.0 - self.direct_share), self.radiated_share * self.direct_share
+
+    def capacity(self, at_20_degC: float) -> float | Callable[[Array], Array]:
+        """Return the heat capacity of the resonator, a number or over temperature (K)."""
+        if self.capacity_slope == 0.0:
+            return at_20_degC
+        return lambda T: at_20_degC * np.exp(self.capacity_slope * (T - AROUND))
 
     @property
     def absent(self) -> tuple[str, ...]:
@@ -141,6 +168,10 @@ def build(keys: LawKeys, place: CardPlace) -> PolynomialLaw | None:
         place.reference_temperature,
         tuple(lag for lag in (keys.lag_s, keys.second_lag_s, keys.third_lag_s) if lag is not None),
         keys.radiated_share or 0.0,
+        keys.direct_share or 0.0,
+        keys.radiated_share or 0.0 if keys.base_radiated_share is None else keys.base_radiated_share,
+        keys.capacity_ratio or NO_LOAD,
+        keys.capacity_slope_per_K or 0.0,
         keys.chamber_lag_s,
         keys.delay_s,
         keys.bias_bend,

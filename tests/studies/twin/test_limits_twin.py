@@ -207,7 +207,11 @@ a3_per_K3 = -4e-10
 lag_s = 1400.0
 second_lag_s = 220.0
 third_lag_s = 31.0
-radiated_share = {share}
+radiated_share = 0.4
+direct_share = {direct}
+base_radiated_share = 0.2
+capacity_ratio = 0.2
+capacity_slope_per_K = 2e-3
 chamber_lag_s = 500.0
 delay_s = {delay}
 bias_bend = 0.3
@@ -219,14 +223,14 @@ k4_deg_per_h_s_per_Hz = 30.0
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("share", "delay"), [(0.4, 31.0), (0.4, -31.0)])
-def test_limits_card_without_a_geometry(share, delay, folder):
-    """A polynomial law behind three lags, one of them radiating, bias that follows part of its bend, a resonator that is late or early.
+@pytest.mark.parametrize(("delay", "direct", "most"), [(31.0, 0.0, 1e-9), (-31.0, 0.3, 1e-7)])
+def test_limits_card_without_a_geometry(delay, direct, most, folder):
+    """A polynomial law behind three lumps that radiate, bias that follows part of its bend, a resonator that is late or early.
 
-    The twin does not know a corner of the chamber before it comes.
+    What is radiated past the lumps between makes the rate, of which k₄ is a part of the bias, 2e-9 K/s less sure. The twin does not know a corner of the chamber before it comes.
     """
     card = folder / "law.toml"
-    card.write_text(LAW.format(share=share, delay=delay))
+    card.write_text(LAW.format(direct=direct, delay=delay))
     instrument = load_card(card)
     profile = write_profile(folder / "ten.csv", TEN_HOURS)
     found = run_twin(compile_twin(instrument, folder / "law", SANITIZED), profile, 6.0)
@@ -236,7 +240,7 @@ def test_limits_card_without_a_geometry(share, delay, folder):
         [(found["time_s"] < t + min(delay, 0.0)) | (found["time_s"] > t) for t in TEN_HOURS["time_s"]], axis=0
     )
     errors = worst({k: v[known] for k, v in found.items()}, {k: v[known] for k, v in expected.items()})
-    assert {name: error for name, error in errors.items() if error > 1e-9} == {}
+    assert {name: error for name, error in errors.items() if error > most} == {}
     assert not [key for key in instrument_keys(instrument) if key.startswith(("thermal.", "law."))]
 
 
