@@ -104,6 +104,7 @@ def differentiate(decay: Decay, time: Array, start: Complex) -> tuple[Complex, d
     return z, by, units
 
 
+@np.errstate(all="ignore")  # of trial points that grow
 def swing(decays: "list[Decay]", time: Array, starts: Complex) -> Complex:
     """Return z (decays, channels, rows) of decays with κ and γ from their start amplitudes (decays, channels).
 

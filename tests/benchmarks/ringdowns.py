@@ -38,6 +38,7 @@ def ask(decay: Decay, folder: Path) -> dict[str, object]:
             status = main(["fit", "ringdown", str(path), "--json"])
         except SystemExit as end:
             status = end.code
+    assert status in (0, 2), said.getvalue()  # a fault is no refusal
     return json.loads(out.getvalue())["decays"][0] if not status else {"refused": said.getvalue()}
 
 
