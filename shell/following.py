@@ -25,7 +25,7 @@ SPARE = 4  # modes above that are looked at
 DEEPEST = 6  # halvings of the way
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=16)  # a mode holds its solution
 def _motion(mode: Mode) -> tuple[Array, Array]:
     """Displacement (3, positions) along r, θ and z of the middle surface, NaN in solid parts, and radius (positions,)."""
     if mode.solution is None or mode.resonator is None:
