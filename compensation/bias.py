@@ -140,7 +140,9 @@ def average_run(time: ArrayLike, state: ArrayLike, bias: ArrayLike, width: float
             f"averaging over {width:g} s leaves {rows} rows, but at least three are needed; record longer or average less."
         )
     if np.ptp(blocks.columns["bias"]) <= 1e-13 * np.max(np.abs(blocks.columns["bias"])):
-        raise CompensationError(f"the bias is constant ({blocks.columns['bias'][0]:g}): there is nothing to fit.")
+        raise CompensationError(
+            f"the bias is constant ({blocks.columns['bias'][0]:g}): there is nothing to fit; check the column."
+        )
     return blocks
 
 

@@ -46,7 +46,9 @@ def average_blocks(time: ArrayLike, columns: Mapping[str, ArrayLike], width: flo
         raise CompensationError(f"the length of a block must be positive, not {width:g} s.")
     present = np.all([np.isfinite(column) for column in arrays.values()], axis=0)
     if np.count_nonzero(present) < NEIGHBOURS:
-        raise CompensationError(f"only {np.count_nonzero(present)} rows have a value in each of {', '.join(arrays)}.")
+        raise CompensationError(
+            f"only {np.count_nonzero(present)} rows have a value in each of {', '.join(arrays)}; record more."
+        )
     keep = present.copy()
     for column in arrays.values():
         keep[present] &= ~find_spikes(column[present])

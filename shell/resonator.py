@@ -249,7 +249,9 @@ def _check_support(resonator: Resonator) -> None:
     if resonator.support == "clamped-pole" and resonator.starts_on_axis:
         raise ShellError("a closed pole has no edge to clamp: open it (a pole angle above 0) or use a stem.")
     if resonator.support == "clamped-rim" and resonator.ends_on_axis:
-        raise ShellError("a closed shell has no rim to clamp: end the meridian before the axis.")
+        raise ShellError(
+            "a closed shell has no rim to clamp: end the meridian before the axis, or choose another support."
+        )
     if (resonator.support == "stem") != (resonator.stem is not None):
         raise ShellError("a stem belongs to the support 'stem', and the support 'stem' needs a stem.")
     for start, on_axis in ((True, resonator.starts_on_axis), (False, resonator.ends_on_axis)):

@@ -82,7 +82,9 @@ def analyse_trace(time: ArrayLike, amplitude: ArrayLike, frequency: float | None
             f"Poor fit: the interval is {sd / bound:.2g} times as wide as white noise makes it; a floor may bend the decay."
         )
     if x[-1] * -slope < 0.5:
-        said.append("The amplitude falls by less than 40 %: a decay that is not exponential is not seen.")
+        said.append(
+            "The amplitude falls by less than 40 %: a decay that is not exponential is not seen; record longer."
+        )
     window = (float(t[first]), float(t[last - 1]))
     fitted = 20 / np.log(10) * (level + slope * (whole - t[first]))
     fitted[(whole < window[0]) | (whole > window[1])] = np.nan

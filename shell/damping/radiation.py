@@ -119,7 +119,9 @@ def radiating_mode(waves: RadiatingBody, frequency: float) -> Radiating:
                 break
             before = now
         shift = before
-    raise ShellError(f"no mode of the resonator on its base converges near {frequency:.6g} Hz.")
+    raise ShellError(
+        f"no mode of the resonator on its base converges near {frequency:.6g} Hz: use another stem or base."
+    )
 
 
 def assemble_waves(system: System, materials: Sequence[Elastic], bases: Sequence[Mask], layer: Layer) -> RadiatingBody:

@@ -115,7 +115,9 @@ def measure_temperature(records: "Sequence[Record]", output: str) -> Found:
         if output in record:
             blocks = average_blocks(record["time_s"], {"output": record[output], "T": record[column]}, BLOCK)
             if len(blocks.time) < 10:
-                raise InputError(f"{record.path}: a test over temperature needs ten averages of {BLOCK:g} s or more.")
+                raise InputError(
+                    f"{record.path}: a test over temperature needs ten averages of {BLOCK:g} s or more; record longer."
+                )
             T = blocks.columns["T"]
             columns["output"].append(blocks.columns["output"])
             columns["temperature"].append(T)

@@ -85,7 +85,9 @@ def derive(
             "be 0 or more and below the rim angle, the rim angle below 180 degrees."
         )
     if harmonic > MOST_HARMONIC:
-        raise InputError(f"--harmonic {harmonic}: closed forms are derived up to n = {MOST_HARMONIC}.")
+        raise InputError(
+            f"--harmonic {harmonic}: closed forms are derived up to n = {MOST_HARMONIC}; choose a lower n."
+        )
     shape = rayleigh_integrals(harmonic, radians(pole_angle_deg), radians(rim_angle_deg))
     tell(DERIVING, 0.0)
     case = DerivedCase.from_degrees(harmonic, pole_angle_deg, rim_angle_deg)

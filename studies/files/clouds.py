@@ -123,7 +123,7 @@ def _read_grid(path: Path, skipped: int) -> FaceGrid:
         )
     values = 1e-6 * table.to_numpy()[order]
     if not np.isfinite(values).any():
-        raise InputError(f"{path}: every cell of the table is empty; there is nothing to fit.")
+        raise InputError(f"{path}: every cell of the table is empty; there is nothing to fit; check the column.")
     if np.nanmax(abs(values)) > 2e-3:
         raise InputError(f"{path}: up to {1e3 * np.nanmax(abs(values)):.3g} mm; the cells of the table must be in µm.")
     return FaceGrid(position[order], azimuth, values)

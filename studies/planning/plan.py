@@ -220,7 +220,9 @@ def stated_noises(card: Instrument, records: Sequence[Record]) -> dict[str, Nois
     """Return the noise of every response as the card states it."""
     for response, key in WHITE.items():
         if getattr(card.noise, key) <= 0:
-            raise InputError(f"{card.path or card.name} [noise]: {key} is 0, but a plan needs the noise of {response}.")
+            raise InputError(
+                f"{card.path or card.name} [noise]: {key} is 0, but a plan needs the noise of {response}; state it."
+            )
     loss = float(np.median(np.concatenate([record["inverse_q"] for record in records])))
     return {
         "frequency_Hz": frequency_noise(card.noise),

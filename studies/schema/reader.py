@@ -42,7 +42,9 @@ def read_toml(path: str | FilePath, schema: str | None = None) -> dict[str, Any]
         raise InputError(f"{path}: not valid TOML: nested too deeply.") from None
     for key, said in _texts(content):
         if said != printable(said):
-            raise InputError(f"{path}: {printable(key)} holds a control character ({printable(said)!s:.60}).")
+            raise InputError(
+                f"{path}: {printable(key)} holds a control character ({printable(said)!s:.60}); remove it."
+            )
     if schema is not None:
         found = content.get("schema")
         if not text.strip():

@@ -123,7 +123,7 @@ def _find_ends(where: str, keys: ParameterKeys, middle: float) -> tuple[float, f
     if not low < high:
         raise InputError(f"{where}: low must be below high, not {low:g} and {high:g}.")
     if not low <= middle <= high:
-        raise InputError(f"{where}: the nominal value {middle:g} is outside {low:g} to {high:g}.")
+        raise InputError(f"{where}: the nominal value {middle:g} is outside {low:g} to {high:g}; correct one of them.")
     return low, high
 
 
