@@ -56,7 +56,7 @@ class BellChain:
     scale: float  # S₁ (rad/s per count)
     rough_covariance: Array  # array (2, 2), covariance of null and scale
     bias: PolynomialCurve  # N(T), rad/s over kelvin: eq. (34)
-    scale_over_rate: PolynomialCurve  # rate (rad/s) over rate (rad/s): eq. (35)
+    scale_over_rate: PolynomialCurve  # rate (rad/s) over rate (rad/s): eq. (35), or a `rate_law.RateCurve`
     scale_over_temperature: PolynomialCurve  # factor (1) over kelvin: eq. (36)
     taps: Array  # array, FIR coefficients, empty for none
     sampling: float  # step (s) that the taps were designed for
@@ -99,7 +99,7 @@ def apply_chain(
 
 
 def invert_chain(chain: BellChain, rate: ArrayLike, temperature: ArrayLike) -> Array:
-    """Return the raw output (counts) that the chain, without its filter, turns into this rate (rad/s), on (35)'s rising branch."""
+    """Return the raw output (counts) that the chain, without its filter, turns into this rate (rad/s), on the rising branch of (35)'s parabola."""
     T = np.asarray(temperature, dtype=float)
     target = np.asarray(rate, dtype=float) / chain.scale_over_temperature.value(T)
     c0, c1, c2 = np.pad(chain.scale_over_rate.coefficients, (0, 3))[:3]

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, TypeVar
 
 import numpy as np
@@ -13,6 +14,7 @@ from compensation.constants import zero_Celsius
 from compensation.errors import CompensationError
 from compensation.noise_regression import correlated_covariance
 from compensation.polynomial import fit_polynomial
+from compensation.rate_law import fit_rate_curve
 from compensation.samples import own_columns, read_columns, require_regular
 
 Fitted = TypeVar("Fitted")
@@ -71,19 +73,22 @@ def fit_chain(
     cutoff: float | None = 1.0,
     order: int = 50,
     sampling: float | None = None,
+    form: str | None = None,
 ) -> BellChain:
     """Fit all steps in the paper's order.
 
     `rates` has several at one temperature (35); `rest` is over temperature (34), `turning` one rate over temperature
     (36), `rough` at rest and turning (33); what is missing changes nothing. The FIR filter has a `cutoff` (Hz; None:
-    none), an `order` and a step (s).
+    none), an `order` and a step (s); `form` is a law of `compensation.rate_law` instead of (35)'s parabola.
     """
     null, scale, covariance = _step("rough null and scale (33)", fit_rough, rates if rough is None else rough)
     bias = _nothing(rates, 0.0)
     if rest is not None:
         bias = _step("bias over temperature (34)", fit_bias, rest.temperature, scale * (rest.output - null))
     straight = scale * (rates.output - null) - bias.value(rates.temperature)
-    over_rate = _step("scale over rate (35)", fit_scale_over_rate, straight, rates.rate)
+    averaged = 1.0 if sampling is None else max(float(np.median(np.diff(rates.time))) / sampling, 1.0)
+    fit = fit_scale_over_rate if form is None else partial(fit_rate_curve, form, averaged)
+    over_rate = _step("scale over rate (35)", fit, straight, rates.rate)
     over_temperature = _nothing(rates, 1.0)
     if turning is not None:
         constant = over_rate.value(scale * (turning.output - null) - bias.value(turning.temperature))

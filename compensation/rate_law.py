@@ -10,7 +10,7 @@
 on the means of the held rates. Null and scale may go with the temperature (a line or a square, from its mean) and be others while it
 rises than while it falls: y + a_T ΔT + k_T ΔT Ω, and the same with ΔT² and with ±1. The form with the least N ln(mean square) + p ln N
 is taken, with the conditions that lower it; a richer form than the line must be better on rates held out of the fit, too, all means of
-one rate at a time.
+one rate at a time. A form beyond the paper's parabola is a step of the chain too, read backwards: `RateCurve`.
 """
 
 from collections.abc import Mapping
@@ -18,12 +18,18 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy
+from numpy.typing import ArrayLike
 
 from compensation.arrays import Array
+from compensation.bell import PolynomialCurve
+from compensation.errors import CompensationError
 from compensation.linearity import same_rate
+from compensation.noise_regression import correlated_covariance
+from compensation.regression import fit_linear
 
 SURE = 6.0  # fall of N ln(mean square) + p ln N below the line's for which another form is taken (20:1)
 LEAST = 6
+BLIND = 5.0  # deviations of a row by which an output must leave a dead band to tell the sign of the rate
 
 
 @dataclass(frozen=True)
@@ -46,6 +52,52 @@ class RateLaw:
     forms: tuple[RateForm, ...]
     chosen: RateForm
     structure: bool
+
+
+@dataclass(frozen=True)
+class RateCurve(PolynomialCurve):
+    """y = a + k f(Ω) read backwards: Ω over the measured rate y; `coefficients` are a, k and that of the form.
+
+    With u = (y − a)/k: cubic Ω = 2 t sin(⅓ arcsin(3u/2t)), t² = −k/3c (sinh for c > 0); sine A arcsin(u/A); at most to where y turns.
+    Dead band: u + sign(u) d, but unknown (NaN) where |u| ≤ `blind`, where noise makes the sign.
+    """
+
+    form: str = "cubic"
+    blind: float = 0.0  # rate units
+
+    def value(self, x: ArrayLike) -> Array:
+        """Return the rate that the output x tells."""
+        a, k, s = self.coefficients
+        u = np.asarray((np.asarray(x, dtype=float) - a) / k)
+        if self.form == "directions":
+            return np.asarray(np.where(u < 0, u, u / (1 + s / k)))
+        if self.form == "dead band":
+            return np.where(np.abs(u) <= self.blind, np.nan, u + np.sign(u) * s)
+        if self.form == "sine":
+            return np.asarray(s * np.arcsin(np.clip(u / s, -1, 1)))
+        w = 3 * u / (2 * (t := turn(k, s)))
+        return np.asarray(2 * t * (np.sinh(np.arcsinh(w) / 3) if s > 0 else np.sin(np.arcsin(np.clip(w, -1, 1)) / 3)))
+
+
+def turn(k: float, c: float) -> float:
+    """Return the rate t = √(k/3|c|) at which a cubic with c < 0 turns back."""
+    return float(np.sqrt(k / (3 * max(abs(c), 1e-30))))
+
+
+def fit_rate_curve(form: str, averaged: float, measured: Array, rate: Array) -> RateCurve:
+    """Fit a form to the measured over the applied rate, means of so many rows; errors as of the linear form nearby."""
+    values, _ = _fit(form, rate, measured, {})
+    _, k, s = found = np.array([values[name] for name in ("a", *NAMES[form])])
+    if form == "cubic" and s < 0 and turn(k, s) < np.max(np.abs(rate)):
+        raise CompensationError(
+            f"the output turns back at {np.degrees(turn(k, s)):.4g} °/s; leave out the rates beyond."
+        )
+    columns = _columns(form, s, rate)
+    if form in SHAPED:
+        columns.append(k * (_columns(form, s * (1 + 1e-4), rate)[0] - columns[0]) / (1e-4 * s))
+    near = fit_linear(np.stack(columns, axis=1), measured, NAMES[form])
+    blind = BLIND * near.standard_deviation * np.sqrt(averaged) / k if form == "dead band" else 0.0
+    return RateCurve(found, correlated_covariance(near), 0.0, measured.min(), measured.max(), form, blind)
 
 
 def fit_rate_law(
@@ -112,14 +164,14 @@ NAMES = {
     "dead band": ("k", "d"),
 }
 
-
+CARRIED = tuple(name for name in NAMES if name != "quadratic")  # a chain takes a line and a square as (35)'s parabola
+SHAPED = ("sine", "dead band")  # not linear in their last value
 SUFFIX = {"temperature": "_T", "temperature squared": "_TT", "warming": "_warming"}
 
 
 def _value(name: str, values: dict[str, float], x: Array, over: list[Array]) -> Array:
     names = ("a", *NAMES.get(name, ("k",)))
-    shaped = name in ("sine", "dead band")
-    columns = [np.ones_like(x), *_columns(name, values[names[-1]] if shaped else 1.0, x)]
+    columns = [np.ones_like(x), *_columns(name, values[names[-1]] if name in SHAPED else 1.0, x)]
     told = sum(values[one] * column for one, column in zip(names, columns, strict=False))
     rest = [value for one, value in values.items() if one not in names]
     return np.asarray(told + np.concatenate([np.zeros((len(x), 0)), *over], axis=1) @ np.array(rest))
@@ -134,16 +186,15 @@ def _fit(name: str, x: Array, y: Array, over: Mapping[str, Array]) -> tuple[dict
 
     shape = 1.0
     names = ["a", *NAMES.get(name, ("k",))]
-    conditions = [f"{one}{SUFFIX[key]}" for key in over for one in "ak"]
-    if name in ("sine", "dead band"):
+    if name in SHAPED:
         most = float(np.max(np.abs(x)))
         grid = most * (np.geomspace(0.65, 30, 40) if name == "sine" else np.r_[1e-4, np.linspace(0, 0.5, 41)[1:]])
         costs = [float(np.sum((y - solve(one)[1]) ** 2)) for one in grid]
         at = int(np.argmin(costs))
         ends = grid[max(at - 1, 0)], grid[min(at + 1, len(grid) - 1)]
         cost = lambda s: float(np.sum((y - solve(s)[1]) ** 2))  # noqa: E731
-        shape = float(scipy.optimize.minimize_scalar(cost, bounds=ends, method="bounded").x)
-        b, fitted = solve(shape)
-        return dict(zip([*names[:2], *conditions, names[2]], [*b.tolist(), shape], strict=True)), fitted
+        shape = float(scipy.optimize.minimize_scalar(cost, bounds=ends, options={"xatol": 1e-8 * most}).x)
+    last = [names.pop()] if name in SHAPED else []
+    names += [*(f"{one}{SUFFIX[key]}" for key in over for one in "ak"), *last]
     b, fitted = solve(shape)
-    return dict(zip([*names, *conditions], b.tolist(), strict=True)), fitted
+    return dict(zip(names, [*b.tolist(), shape], strict=False)), fitted

@@ -114,7 +114,7 @@ def _show(record: Record, result: Record, columns: dict[str, dict[str, Any]], wo
     which = "Before, after" if any(one["stability_before"] is not None for one in rows) else "After"
     note = f"{which}: standard deviation of {AVERAGE:g} s averages."
     if any(one["rows_not_compensated"] for one in rows):
-        note += " Empty rows: an input is missing, or there are too few earlier samples for its rate."
+        note += " Empty rows: an input is missing, too few samples come before, or the output is within a dead band."
     for words in worse:
         say(f"warning: {words}")
     parts: list[Part] = [*(Sentence(words, "warning", "page") for words in worse)]

@@ -3,7 +3,8 @@
 import re
 from typing import Any
 
-from compensation.rate_law import SURE, RateLaw
+from compensation.bell import PolynomialCurve
+from compensation.rate_law import CARRIED, SURE, RateCurve, RateLaw
 from shell.constants import zero_Celsius
 from studies.cli.arguments import Records, SaveModel
 from studies.cli.output import answers, keep_model
@@ -25,7 +26,7 @@ STEPS = {
 FORMS = "Form | gain: Evidence over the line .3 | over: Null and scale over | held_out_deg_per_s: Error on rates left out (°/s) .2 | chosen: "
 FORM_NOTE = (
     "Evidence: fall of N ln(mean square) + p ln N; above 6 is 20:1. Directions: different scales for positive and negative rates. The"
-    " coefficients below follow the paper's quadratic form."
+    " model takes the chosen form, a line and a square as the paper's parabola."
 )
 COEFFICIENTS = "Step | name: Coefficient | value ± standard_error: Value | Unit"
 NOTE = (
@@ -97,7 +98,7 @@ def fit_scale(
             ]),
             Chapter("Law over rate", [
                 Table("Forms of the raw output over rate", payload["rate_law"]["forms"] if law else [], FORMS, FORM_NOTE),
-                _law_words(law) if law else None,
+                _law_words(law, study.chain.scale_over_rate) if law else None,
             ]),
             Chapter("Coefficients", [Table("Coefficients", rows, COEFFICIENTS, NOTE)]),
         ],
@@ -120,15 +121,20 @@ def _law_row(law: RateLaw | None) -> dict[str, Any] | None:
     }  # fmt: skip
 
 
-def _law_words(law: RateLaw) -> str:
+def _law_words(law: RateLaw, curve: PolynomialCurve) -> str:
     rivals = [form for form in law.forms if form.name not in (law.chosen.name, "line")]
     alike = [form.name for form in rivals if abs(form.gain - law.chosen.gain) < SURE]
     words = f"The output over rate follows this form: {law.chosen.name}."
     if alike and law.chosen.name != "line":
         words += f" These rates do not separate it from: {', '.join(alike)}."
     left = "It leaves structure beyond the errors of the means: more rates, or another form, are needed."
-    if law.chosen.name in ("cubic", "sine", "dead band"):
-        words += " The model below, the paper's quadratic, cannot follow it: do not trust it between these rates."
+    if law.chosen.name in CARRIED and not isinstance(curve, RateCurve):
+        words += " The run at one temperature has too few rates for it: the model keeps the paper's parabola."
+    if isinstance(curve, RateCurve) and curve.blind:
+        words += f" Within ±{law.chosen.values['d']:.2g} °/s the output does not tell the rate: the model leaves such rows empty, and"
+        words += " the errors and spreads here are without them."
+    if "warming" in law.chosen.over:
+        words += " The model takes warming and cooling as one."
     return f"{words} {left if law.structure else 'What it leaves is within the errors of the means.'}"
 
 

@@ -12,7 +12,7 @@ from compensation.bell import BellChain, apply_chain
 from compensation.bell_calibration import BellRun, fit_chain
 from compensation.decimation import average_blocks
 from compensation.linearity import measure_nonlinearity, same_rate
-from compensation.rate_law import RateLaw, fit_rate_law
+from compensation.rate_law import CARRIED, LEAST, RateLaw, fit_rate_law
 from compensation.samples import is_regular
 from compensation.stability import allan_deviation
 from shell.constants import zero_Celsius
@@ -79,7 +79,10 @@ def judge_steps(
     for step in STEPS if even else STEPS[:-1]:
         at_rates, at_rest, at_turning = (None if one is None else np.asarray(getattr(one, step)) for one in outputs)
         steady, nonlinearity = settled_rows(rates.rate, len(chain.taps) if step == "filtered" else 0), None
-        if at_rates is not None and len(np.unique(same_rate(rates.rate)[steady])) > 2:
+        assert at_rates is not None
+        steady &= np.isfinite(at_rates)  # a dead band tells no rate, and no spread at rest
+        at_rest, at_turning = (None if one is None or np.isnan(one).any() else one for one in (at_rest, at_turning))
+        if len(np.unique(same_rate(rates.rate)[steady])) > 2:
             nonlinearity = measure_nonlinearity(rates.rate[steady], at_rates[steady])
         spreads = (None if one is None else float(np.std(one)) / DEG for one in (at_rest, at_turning))
         allan: tuple[float | None, ...] = (None, None, None)
@@ -134,13 +137,15 @@ def study_scale(records: "Sequence[Record]", cutoff: float | None, order: int) -
     if cutoff is not None and order >= shortest:
         raise InputError(f"a FIR filter of order {order} is longer than a run of {shortest} rows; lower --order.")
     thin = (_thin(rates), rest and _thin(rest), turning and _thin(turning))
+    law = read_law([*([] if several in from_table else [rates]), *tables])
+    found = law.chosen.name if law and len(np.unique(same_rate(rates.rate))) >= LEAST else ""
+    form = found if found in CARRIED else None
     with naming(", ".join(path for _, path in sorted_runs.values())):
-        chain = fit_chain(*thin, rough=rough, cutoff=cutoff, order=order, sampling=sampling)
-        before, after = _hold_out(thin, rough)
+        chain = fit_chain(*thin, rough=rough, cutoff=cutoff, order=order, sampling=sampling, form=form)
+        before, after = _hold_out(thin, rough, form)
         figures = judge_steps(chain, rates, rest, turning)
     averaged = sum(len(run.time) for run in thin if run is not None) < sum(len(run.time) for run in there)
-    own = [] if several in from_table else [rates]
-    judged = (figures, before, after, averaged, rough is not None, read_law([*own, *tables]), tuple(from_table))
+    judged = (figures, before, after, averaged, rough is not None, law, tuple(from_table))
     return ScaleStudy(chain, runs, output, column, left_out, *judged)
 
 
@@ -274,18 +279,19 @@ def _thin(run: BellRun) -> BellRun:
     return BellRun(*(values[steady] for values in (blocks.time, mean["output"], mean["temperature"], mean["rate"])))
 
 
-def _hold_out(runs: Runs, rough: BellRun | None = None) -> tuple[float, float]:
-    """Rms error (°/s) of the rough and of the compensated rate on held-out fifths of every run."""
+def _hold_out(runs: Runs, rough: BellRun | None = None, form: str | None = None) -> tuple[float, float]:
+    """Rms error (°/s) of the rough and of the compensated rate on held-out fifths of every run, where the output tells it."""
     before, after = [], []
     for block in range(BLOCKS):
         (first, one), *rest = [(None, None) if run is None else _cut(run, block) for run in runs]
         assert first is not None
-        chain = fit_chain(first, *(seen for seen, _ in rest), rough=rough, cutoff=None)
+        chain = fit_chain(first, *(seen for seen, _ in rest), rough=rough, cutoff=None, form=form)
         for run in (unseen for unseen in (one, *(own for _, own in rest)) if unseen is not None):
             result = apply_chain(chain, run.time, run.output, run.temperature, extrapolate=True)
             before.append(result.rough - run.rate)
             after.append(result.temperature_compensated - run.rate)
-    errors = [float(np.sqrt(np.mean(np.concatenate(parts) ** 2))) / DEG for parts in (before, after)]
+    known = np.isfinite(np.concatenate(after))  # not within a dead band
+    errors = [float(np.sqrt(np.mean(np.concatenate(parts)[known] ** 2))) / DEG for parts in (before, after)]
     return errors[0], errors[1]
 
 

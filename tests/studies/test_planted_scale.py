@@ -34,10 +34,10 @@ from tests.compiled import compile_c
 STRIDE = 20
 
 
-def write(path, run, missing=()):
+def write(path, run, missing=(), stride=STRIDE):
     """Every twentieth row of a run as a record of 10 Hz; the rows in `missing` lose their output."""
     lines = ["time_s,housing_temperature_degC,output_counts,rate_deg_per_s"]
-    for i, row in enumerate(range(0, len(run.time), STRIDE)):
+    for i, row in enumerate(range(0, len(run.time), stride)):
         output = "" if i in missing else f"{run.output[row]:.6f}"
         lines.append(f"{0.1 * i:.1f},{run.temperature[row] - 273.15:.6f},{output},{run.rate[row] / DEG:.9g}")
     path.write_text("\n".join(lines) + "\n")
@@ -119,6 +119,42 @@ def test_a_rate_table_over_temperature_tells_warming_from_cooling(settled):
         ("k_warming", 0, 1e-3),
     ):
         assert law.chosen.values[name] == pytest.approx(value, abs=within)
+
+
+@pytest.mark.parametrize("planted", ["cubic", "rising cubic", "sine", "dead band", "directions"])
+def test_the_saved_model_takes_the_law_that_was_chosen(planted, tmp_path, ask):
+    """Other rates than those of the fit come back to the noise (0.05 °/s), in C too; within a dead band no rate is made up."""
+    output_of = {
+        "cubic": lambda x: x - 4e-7 * x**3,
+        "rising cubic": lambda x: x + 2e-6 * x**3,
+        "sine": lambda x: 320 * np.sin(x / 320),
+        "dead band": lambda x: np.sign(x) * np.maximum(np.abs(x) - 1.5, 0),
+        "directions": lambda x: x + 4e-3 * np.maximum(x, 0),
+    }[planted]
+    rng = np.random.default_rng(3)
+
+    def table(name, rates):
+        rate, rows = np.repeat(rates, 200), np.arange(200 * len(rates))
+        counts = -690 + 40 * (output_of(rate) + 0.05 * rng.standard_normal(rate.size))
+        run = BellRun(0.1 * rows, counts, np.full(rate.size, 298.15) + 0.01 * np.sin(rows), rate * DEG)
+        return write(tmp_path / name, run, stride=1), rate
+
+    seen, _ = table("seen.csv", np.r_[-300.0, -200:201:50, 300, -20, -8, -4, 4, 8, 20])
+    unseen, rate = table("unseen.csv", np.r_[-270.0, -170, -70, -30, -6, 0, 6, 30, 70, 170, 270])
+    found = ask(["fit", "scale", seen, "--no-filter", "--save", str(tmp_path / "m.toml")])
+    assert found["rate_law"]["chosen"] == planted.removeprefix("rising ")
+    model, record = read_model(tmp_path / "m.toml"), read_record(unseen)
+    column = compensate(model, record)["compensated_measured_rate_deg_per_s"]
+    hidden = (rate == 0) & (planted == "dead band")
+    assert np.array_equal(np.isnan(column), hidden)
+    noise = 0.05 / np.gradient(output_of(rate[~hidden] + np.array([[-1e-3], [1e-3]])), 2e-3, axis=0)[0]
+    error = (column - rate)[~hidden] / noise
+    assert np.sqrt(np.mean(error**2)) == pytest.approx(1, abs=0.05)
+    assert np.max(np.abs(error.reshape(-1, 200).mean(axis=1))) < 0.5
+    library = compile_c(emit_c(model), tmp_path)
+    library.hrg_rate.restype, library.hrg_rate.argtypes = ctypes.c_double, [ctypes.c_double] * 2
+    rows = zip(record["output_counts"], record["housing_temperature_degC"], strict=True)
+    np.testing.assert_allclose([library.hrg_rate(*row) for row in rows], column, rtol=1e-9, atol=1e-11)
 
 
 def test_saved_model_is_the_fitted_chain_and_compensates(records, fitted):

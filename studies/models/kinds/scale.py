@@ -1,8 +1,10 @@
 """Models of kind `scale`: the compensation chain (32)–(36) of the BVG paper, and its C code.
 
 The file has the parts "rough" (null, scale), "bias", "scale_over_rate" and "scale_over_temperature" (c0, c1, c2 in °C
-and °/s), and the settings `fir_taps` and `sampling_s` (empty and 0 without a filter) and `temperature_column`. Ranges are
-those of the fit, widened by 5 % of their length, because readings scatter; outliers, which the fit leaves out, are not judged.
+and °/s), and the settings `fir_taps` and `sampling_s` (empty and 0 without a filter) and `temperature_column`. With the setting
+`rate_form`, "scale_over_rate" is that law of `compensation.rate_law`: a, k, and c, A, d or k_positive_more, in °/s; a dead band has
+`blind_deg_per_s`, within which of its null the output tells no rate (NaN). Ranges are those of the fit, widened by 5 % of their
+length, because readings scatter; outliers, which the fit leaves out, are not judged.
 """
 
 import math
@@ -15,7 +17,7 @@ from numpy.typing import NDArray
 from shell.constants import zero_Celsius
 from studies.errors import InputError
 from studies.models.c_source import head, polynomial
-from studies.models.file import Model, ModelPart, ModelSource, make_part, widen
+from studies.models.file import Model, ModelPart, ModelSource, Setting, make_part, widen
 from studies.record import COMPENSATED, Record
 from studies.record.rest import celsius_range, drop_spikes
 
@@ -26,31 +28,43 @@ DEG = math.radians(1.0)
 RAW = ("output_counts", "measured_rate_deg_per_s")
 """Columns that can be the raw output; the first needs the rough scale, the second is a rate already."""
 RATE = "measured_rate_deg_per_s"
+FORM, BLIND = "rate_form", "blind_deg_per_s"
+FORMS = {  # a rate law's own coefficient: its unit, the power of an angle in it; and Ω over u = (y − a)/k in C
+    "directions": ("1", 0.0, "u / (u < 0.0 ? 1.0 : 1.0 + {s} / {k})"),
+    "cubic": ("s^2/deg^2", -2.0, "2.0 * {t} * ({s} > 0.0 ? sinh(asinh({w}) / 3.0) : sin(asin(fmax(-1.0, fmin(1.0, {w}))) / 3.0))"),
+    "sine": ("deg/s", 1.0, "{s} * asin(fmax(-1.0, fmin(1.0, u / {s})))"),
+    "dead band": ("deg/s", 1.0, "fabs(u) <= {blind} ? NAN : u + copysign({s}, u)"),
+}  # fmt: skip
 
 
 def save_scale(
     chain: "BellChain", output: str, temperature_column: str, sources: tuple[ModelSource, ...], made_by: str
 ) -> Model:
     """Return a fitted chain as a model that compensates the column `output`."""
+    from compensation.rate_law import RateCurve
+
     raw = "counts" if output == "output_counts" else "deg/s"
     covariance = np.diag([1.0, 1 / DEG]) @ chain.rough_covariance @ np.diag([1.0, 1 / DEG])
     rough = make_part(
         "rough", ("null", "scale"), (chain.null, chain.scale / DEG), (raw, f"deg/s per {raw}"), covariance
     )
     over_temperature = ("1/degC", "1/degC^2")
+    curve = chain.scale_over_rate
+    law: dict[str, Setting] = {FORM: curve.form, BLIND: curve.blind / DEG} if isinstance(curve, RateCurve) else {}
     return Model(
         kind="scale",
         compensates=output,
         parts=(
             rough,
             _save_curve("bias", chain.bias, 1.0, 0.0, ("deg/s", "deg/s/degC", "deg/s/degC^2")),
-            _save_curve("scale_over_rate", chain.scale_over_rate, 1.0, 1.0, ("deg/s", "1", "s/deg")),
+            _save_curve("scale_over_rate", curve, 1.0, 1.0, ("deg/s", "1", "s/deg")),
             _save_curve("scale_over_temperature", chain.scale_over_temperature, 0.0, 0.0, ("1", *over_temperature)),
         ),
         settings={
             "temperature_column": temperature_column,
             "sampling_s": chain.sampling,
             "fir_taps": tuple(float(tap) for tap in chain.taps),
+            **law,
         },
         validity={
             temperature_column: widen(
@@ -149,16 +163,14 @@ double hrg_smooth(hrg_smoother *state, double rate) {{
     return sum;
 }}
 """
-    curves = "\n\n".join(
-        polynomial(f"hrg_{name}", variable, model.part(name).values)
-        for name, variable in (
-            ("bias", "temperature_degC"),
-            ("scale_over_rate", "rate"),
-            ("scale_over_temperature", "temperature_degC"),
-        )
-    )
+    T = "temperature_degC"
+    variables = {"bias": T, "scale_over_rate": "rate", "scale_over_temperature": T}
+    curves = {name: polynomial(f"hrg_{name}", x, model.part(name).values) for name, x in variables.items()}
+    if model.settings.get(FORM):
+        curves["scale_over_rate"] = _emit_law(model)
+    functions = "\n\n".join(curves.values())
     return f"""{head(model)}
-{curves}
+{functions}
 
 /* Compensated rate (deg/s) for the raw {model.compensates} and the temperature. */
 double hrg_rate(double output, double temperature_degC) {{
@@ -170,21 +182,49 @@ double hrg_rate(double output, double temperature_degC) {{
 
 def _save_curve(name: str, curve: "PolynomialCurve", y: float, x: float, units: Sequence[str]) -> ModelPart:
     """A curve in degrees: y and x are the powers of an angle in its value and its variable."""
-    order = len(curve.coefficients) - 1
-    size = DEG ** (x * np.arange(order + 1) - y)
-    names = [f"c{i}" for i in range(order + 1)]
-    more = [f"{units[-1]} per power" for _ in range(order - 2)]
+    from compensation.rate_law import NAMES, RateCurve
+
+    power = x * np.arange(len(curve.coefficients)) - y
+    names = [f"c{i}" for i in range(len(power))]
+    if isinstance(curve, RateCurve):
+        unit, own, _ = FORMS[curve.form]
+        names, units, power = ["a", *NAMES[curve.form]], ("deg/s", "1", unit), -np.array([1.0, 0.0, own])
+    size = DEG**power
+    more = [f"{units[-1]} per power" for _ in power[3:]]
     covariance = size[:, None] * curve.covariance * size
-    return make_part(name, names, size * curve.coefficients, [*units, *more][: order + 1], covariance)
+    return make_part(name, names, size * curve.coefficients, [*units, *more][: len(power)], covariance)
 
 
 def _load_curve(
     model: Model, name: str, y: float, x: float, reference: float, limits: tuple[float, float]
 ) -> "PolynomialCurve":
     from compensation.bell import PolynomialCurve
+    from compensation.rate_law import NAMES, RateCurve
 
-    part = model.part(name)
-    model.check_names(part, "c")
-    size = DEG ** (y - x * np.arange(len(part.values)))
+    part, form = model.part(name), str(model.settings.get(FORM, "")) if name == "scale_over_rate" else ""
+    power = y - x * np.arange(len(part.values))
+    if not form:
+        model.check_names(part, "c")
+    elif form in FORMS and part.names == ("a", *NAMES[form]) and part["k"] > 0:
+        power = np.array([1.0, 0.0, FORMS[form][1]])
+    else:
+        laws = "; ".join(f"{one}: a, {', '.join(NAMES[one])}" for one in FORMS)
+        raise InputError(f"{model.where}: {FORM} and the coefficients of {name} must be one of {laws}; k above 0.")
+    size = DEG**power
     covariance = np.array(part.covariance) if part.covariance else np.zeros((len(part.values),) * 2)
-    return PolynomialCurve(size * np.array(part.values), size[:, None] * covariance * size, reference, *limits)
+    found = size * np.array(part.values), size[:, None] * covariance * size, reference, *limits
+    return RateCurve(*found, form, model.number(BLIND, least=0) * DEG) if form else PolynomialCurve(*found)
+
+
+def _emit_law(model: Model) -> str:
+    from compensation.rate_law import turn
+
+    form, (a, k, s) = str(model.settings[FORM]), model.part("scale_over_rate").values
+    t, blind = turn(k, s), model.number(BLIND)
+    told = FORMS[form][-1].format(k=k, s=f"({s!r})", t=t, w=f"1.5 * u / {t!r}", blind=blind)
+    said = ", NAN where the output does not tell the rate" if blind else ""
+    return f"""/* Law over rate: {form}{said}. */
+static double hrg_scale_over_rate(double rate) {{
+    double u = (rate - ({a!r})) / {k!r};
+    return {told};
+}}"""
