@@ -1,5 +1,6 @@
 """`hrg fit scale`: bias and scale of a bell-shaped gyro, step by step."""
 
+import math
 import re
 from typing import Any
 
@@ -131,8 +132,8 @@ def _law_words(law: RateLaw, curve: PolynomialCurve) -> str:
     if law.chosen.name in CARRIED and not isinstance(curve, RateCurve):
         words += " The run at one temperature has too few rates for it: the model keeps the paper's parabola."
     if isinstance(curve, RateCurve) and curve.blind:
-        words += f" Within ±{law.chosen.values['d']:.2g} °/s the output does not tell the rate: the model leaves such rows empty, and"
-        words += " the errors and spreads here are without them."
+        d = math.degrees(curve.coefficients[2] + curve.blind)  # the band, and what noise hides beside it
+        words += f" Within ±{d:.2g} °/s the output does not tell the rate: such rows stay empty, and errors here are without them."
     if "warming" in law.chosen.over:
         words += " The model takes warming and cooling as one."
     return f"{words} {left if law.structure else 'What it leaves is within the errors of the means.'}"
