@@ -13,8 +13,9 @@ is taken, with the conditions that lower it; a richer form than the line must be
 one rate at a time. A form beyond the paper's parabola is a step of the chain too, read backwards: `RateCurve`.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import scipy
@@ -30,6 +31,32 @@ from compensation.regression import fit_linear
 SURE = 6.0  # fall of N ln(mean square) + p ln N below the line's for which another form is taken (20:1)
 LEAST = 6
 BLIND = 5.0  # deviations of a row by which an output must leave a dead band to tell the sign of the rate
+
+
+class Form(NamedTuple):
+    """The name of a form's own coefficient s, its columns of k and s, and Ω over u = (y − a)/k, k, s if a chain takes it."""
+
+    own: tuple[str, ...]
+    columns: Callable[[Array, float], list[Array]]
+    rate: Callable[[Array, float, float], Array] = lambda u, k, s: u
+
+
+def _cubic(u: Array, k: float, c: float) -> Array:
+    """For c < 0, which turns back at t² = k/3|c|, Ω = 2t sin φ gives u = ⅔ t sin 3φ; for c > 0 the same with sinh."""
+    w = 1.5 * u / (t := np.sqrt(k / (3 * max(abs(c), 1e-30))))
+    return np.asarray(2 * t * (np.sinh(np.arcsinh(w) / 3) if c > 0 else np.sin(np.arcsin(np.clip(w, -1, 1)) / 3)))
+
+
+FORMS = {
+    "line": Form((), lambda x, s: [x]),
+    "directions": Form(("k_positive_more",), lambda x, s: [x, np.maximum(x, 0)], lambda u, k, s: u / np.where(u < 0, 1, 1 + s / k)),
+    "quadratic": Form(("c",), lambda x, s: [x, x**2]),
+    "cubic": Form(("c",), lambda x, s: [x, x**3], _cubic),
+    "sine": Form(("A",), lambda x, s: [s * np.sin(x / s)], lambda u, k, s: s * np.arcsin(np.clip(u / s, -1, 1))),
+    "dead band": Form(("d",), lambda x, s: [np.sign(x) * np.maximum(np.abs(x) - s, 0)], lambda u, k, s: u + np.sign(u) * s),
+}  # fmt: skip
+CARRIED = ("directions", "cubic", "sine", "dead band")  # by a chain; a line and a square are (35)'s parabola
+SHAPED = ("sine", "dead band")  # not linear in their last value
 
 
 @dataclass(frozen=True)
@@ -56,10 +83,9 @@ class RateLaw:
 
 @dataclass(frozen=True)
 class RateCurve(PolynomialCurve):
-    """y = a + k f(Ω) read backwards: Ω over the measured rate y; `coefficients` are a, k and that of the form.
+    """y = a + k f(Ω) read backwards: Ω over the measured rate y; `coefficients` are a, k and the form's own.
 
-    With u = (y − a)/k: cubic Ω = 2 t sin(⅓ arcsin(3u/2t)), t² = −k/3c (sinh for c > 0); sine A arcsin(u/A); at most to where y turns.
-    Dead band: u + sign(u) d, but unknown (NaN) where |u| ≤ `blind`, where noise makes the sign.
+    With u = (y − a)/k unknown (NaN) where |u| < `blind`: beside a dead band noise makes the sign.
     """
 
     form: str = "cubic"
@@ -68,34 +94,21 @@ class RateCurve(PolynomialCurve):
     def value(self, x: ArrayLike) -> Array:
         """Return the rate that the output x tells."""
         a, k, s = self.coefficients
-        u = np.asarray((np.asarray(x, dtype=float) - a) / k)
-        if self.form == "directions":
-            return np.asarray(np.where(u < 0, u, u / (1 + s / k)))
-        if self.form == "dead band":
-            return np.where(np.abs(u) <= self.blind, np.nan, u + np.sign(u) * s)
-        if self.form == "sine":
-            return np.asarray(s * np.arcsin(np.clip(u / s, -1, 1)))
-        w = 3 * u / (2 * (t := turn(k, s)))
-        return np.asarray(2 * t * (np.sinh(np.arcsinh(w) / 3) if s > 0 else np.sin(np.arcsin(np.clip(w, -1, 1)) / 3)))
-
-
-def turn(k: float, c: float) -> float:
-    """Return the rate t = √(k/3|c|) at which a cubic with c < 0 turns back."""
-    return float(np.sqrt(k / (3 * max(abs(c), 1e-30))))
+        u = (np.asarray(x, dtype=float) - a) / k
+        return np.where(np.abs(u) < self.blind, np.nan, FORMS[self.form].rate(u, k, s))
 
 
 def fit_rate_curve(form: str, averaged: float, measured: Array, rate: Array) -> RateCurve:
     """Fit a form to the measured over the applied rate, means of so many rows; errors as of the linear form nearby."""
     values, _ = _fit(form, rate, measured, {})
-    _, k, s = found = np.array([values[name] for name in ("a", *NAMES[form])])
-    if form == "cubic" and s < 0 and turn(k, s) < np.max(np.abs(rate)):
-        raise CompensationError(
-            f"the output turns back at {np.degrees(turn(k, s)):.4g} °/s; leave out the rates beyond."
-        )
-    columns = _columns(form, s, rate)
+    _, k, s = found = np.array([values[name] for name in ("a", "k", *FORMS[form].own)])
+    if form == "cubic" and k + 3 * s * np.max(rate**2) < 0:
+        turn = np.degrees(np.sqrt(-k / (3 * s)))
+        raise CompensationError(f"the output turns back at {turn:.4g} °/s; leave out the rates beyond.")
+    columns = FORMS[form].columns(rate, s)
     if form in SHAPED:
-        columns.append(k * (_columns(form, s * (1 + 1e-4), rate)[0] - columns[0]) / (1e-4 * s))
-    near = fit_linear(np.stack(columns, axis=1), measured, NAMES[form])
+        columns.append(k * (FORMS[form].columns(rate, s * (1 + 1e-4))[0] - columns[0]) / (1e-4 * s))
+    near = fit_linear(np.stack(columns, axis=1), measured, ("k", *FORMS[form].own))
     blind = BLIND * near.standard_deviation * np.sqrt(averaged) / k if form == "dead band" else 0.0
     return RateCurve(found, correlated_covariance(near), 0.0, measured.min(), measured.max(), form, blind)
 
@@ -119,7 +132,7 @@ def fit_rate_law(
 
     forms: list[RateForm] = []
     base = 0.0
-    for name in ("line", "directions", "quadratic", "cubic", "sine", "dead band"):
+    for name in FORMS:
         over: tuple[str, ...] = ()
         best = judge(name, over)
         base = base or best[0]
@@ -144,34 +157,12 @@ def fit_rate_law(
     return RateLaw(rate, tuple(forms), chosen, structure)
 
 
-def _columns(name: str, shape: float, x: Array) -> list[Array]:
-    rows = {
-        "line": [x],
-        "directions": [x, np.maximum(x, 0.0)],
-        "quadratic": [x, x**2],
-        "cubic": [x, x**3],
-        "sine": [shape * np.sin(x / shape)],
-        "dead band": [np.sign(x) * np.maximum(np.abs(x) - shape, 0.0)],
-    }
-    return rows[name]
-
-
-NAMES = {
-    "directions": ("k", "k_positive_more"),
-    "quadratic": ("k", "c"),
-    "cubic": ("k", "c"),
-    "sine": ("k", "A"),
-    "dead band": ("k", "d"),
-}
-
-CARRIED = tuple(name for name in NAMES if name != "quadratic")  # a chain takes a line and a square as (35)'s parabola
-SHAPED = ("sine", "dead band")  # not linear in their last value
 SUFFIX = {"temperature": "_T", "temperature squared": "_TT", "warming": "_warming"}
 
 
 def _value(name: str, values: dict[str, float], x: Array, over: list[Array]) -> Array:
-    names = ("a", *NAMES.get(name, ("k",)))
-    columns = [np.ones_like(x), *_columns(name, values[names[-1]] if name in SHAPED else 1.0, x)]
+    names = ("a", "k", *FORMS[name].own)
+    columns = [np.ones_like(x), *FORMS[name].columns(x, values[names[-1]])]
     told = sum(values[one] * column for one, column in zip(names, columns, strict=False))
     rest = [value for one, value in values.items() if one not in names]
     return np.asarray(told + np.concatenate([np.zeros((len(x), 0)), *over], axis=1) @ np.array(rest))
@@ -179,13 +170,13 @@ def _value(name: str, values: dict[str, float], x: Array, over: list[Array]) -> 
 
 def _fit(name: str, x: Array, y: Array, over: Mapping[str, Array]) -> tuple[dict[str, float], Array]:
     def solve(shape: float) -> tuple[Array, Array]:
-        X = np.column_stack([np.ones_like(x), *_columns(name, shape, x), *over.values()])
+        X = np.column_stack([np.ones_like(x), *FORMS[name].columns(x, shape), *over.values()])
         scale = np.maximum(np.max(np.abs(X), axis=0), 1e-300)
         b = np.linalg.lstsq(X / scale, y, rcond=None)[0] / scale
         return b, X @ b
 
     shape = 1.0
-    names = ["a", *NAMES.get(name, ("k",))]
+    names = ["a", "k", *FORMS[name].own]
     if name in SHAPED:
         most = float(np.max(np.abs(x)))
         grid = most * (np.geomspace(0.65, 30, 40) if name == "sine" else np.r_[1e-4, np.linspace(0, 0.5, 41)[1:]])

@@ -29,11 +29,11 @@ RAW = ("output_counts", "measured_rate_deg_per_s")
 """Columns that can be the raw output; the first needs the rough scale, the second is a rate already."""
 RATE = "measured_rate_deg_per_s"
 FORM, BLIND = "rate_form", "blind_deg_per_s"
-FORMS = {  # a rate law's own coefficient: its unit, the power of an angle in it; and Ω over u = (y − a)/k in C
+C_FORMS = {  # a rate law's own coefficient: its unit, the power of an angle in it; and Ω over u = (y − a)/k in C
     "directions": ("1", 0.0, "u / (u < 0.0 ? 1.0 : 1.0 + {s} / {k})"),
     "cubic": ("s^2/deg^2", -2.0, "2.0 * {t} * ({s} > 0.0 ? sinh(asinh({w}) / 3.0) : sin(asin(fmax(-1.0, fmin(1.0, {w}))) / 3.0))"),
     "sine": ("deg/s", 1.0, "{s} * asin(fmax(-1.0, fmin(1.0, u / {s})))"),
-    "dead band": ("deg/s", 1.0, "fabs(u) <= {blind} ? NAN : u + copysign({s}, u)"),
+    "dead band": ("deg/s", 1.0, "fabs(u) < {blind} ? NAN : u + copysign({s}, u)"),
 }  # fmt: skip
 
 
@@ -182,13 +182,13 @@ double hrg_rate(double output, double temperature_degC) {{
 
 def _save_curve(name: str, curve: "PolynomialCurve", y: float, x: float, units: Sequence[str]) -> ModelPart:
     """A curve in degrees: y and x are the powers of an angle in its value and its variable."""
-    from compensation.rate_law import NAMES, RateCurve
+    from compensation.rate_law import FORMS, RateCurve
 
     power = x * np.arange(len(curve.coefficients)) - y
     names = [f"c{i}" for i in range(len(power))]
     if isinstance(curve, RateCurve):
-        unit, own, _ = FORMS[curve.form]
-        names, units, power = ["a", *NAMES[curve.form]], ("deg/s", "1", unit), -np.array([1.0, 0.0, own])
+        unit, own, _ = C_FORMS[curve.form]
+        names, units, power = ["a", "k", *FORMS[curve.form].own], ("deg/s", "1", unit), -np.array([1.0, 0.0, own])
     size = DEG**power
     more = [f"{units[-1]} per power" for _ in power[3:]]
     covariance = size[:, None] * curve.covariance * size
@@ -199,16 +199,16 @@ def _load_curve(
     model: Model, name: str, y: float, x: float, reference: float, limits: tuple[float, float]
 ) -> "PolynomialCurve":
     from compensation.bell import PolynomialCurve
-    from compensation.rate_law import NAMES, RateCurve
+    from compensation.rate_law import FORMS, RateCurve
 
     part, form = model.part(name), str(model.settings.get(FORM, "")) if name == "scale_over_rate" else ""
     power = y - x * np.arange(len(part.values))
     if not form:
         model.check_names(part, "c")
-    elif form in FORMS and part.names == ("a", *NAMES[form]) and part["k"] > 0:
-        power = np.array([1.0, 0.0, FORMS[form][1]])
+    elif form in C_FORMS and part.names == ("a", "k", *FORMS[form].own) and part["k"] > 0:
+        power = np.array([1.0, 0.0, C_FORMS[form][1]])
     else:
-        laws = "; ".join(f"{one}: a, {', '.join(NAMES[one])}" for one in FORMS)
+        laws = "; ".join(f"{one}: a, k, {FORMS[one].own[0]}" for one in C_FORMS)
         raise InputError(f"{model.where}: {FORM} and the coefficients of {name} must be one of {laws}; k above 0.")
     size = DEG**power
     covariance = np.array(part.covariance) if part.covariance else np.zeros((len(part.values),) * 2)
@@ -217,13 +217,10 @@ def _load_curve(
 
 
 def _emit_law(model: Model) -> str:
-    from compensation.rate_law import turn
-
     form, (a, k, s) = str(model.settings[FORM]), model.part("scale_over_rate").values
-    t, blind = turn(k, s), model.number(BLIND)
-    told = FORMS[form][-1].format(k=k, s=f"({s!r})", t=t, w=f"1.5 * u / {t!r}", blind=blind)
-    said = ", NAN where the output does not tell the rate" if blind else ""
-    return f"""/* Law over rate: {form}{said}. */
+    t = math.sqrt(k / (3 * max(abs(s), 1e-30)))
+    told = C_FORMS[form][-1].format(k=k, s=f"({s!r})", t=t, w=f"1.5 * u / {t!r}", blind=model.number(BLIND))
+    return f"""/* Law over rate: {form}; NAN where the output does not tell the rate. */
 static double hrg_scale_over_rate(double rate) {{
     double u = (rate - ({a!r})) / {k!r};
     return {told};
