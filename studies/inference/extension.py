@@ -27,7 +27,11 @@ def extend(found: Inference, progress: Callable[[str], None] = lambda words: Non
 
     progress("calibrating the extended card")
     named = [entry_of(found, k) for k, term in enumerate(found.final.terms) if not term.effect.once]
-    card = found.card.with_table("effect", [*found.card.content.get("effect", []), *named])
+    card = found.card
+    if card.polynomial is not None:  # begin in the valley that was found: what is known beforehand is wide
+        priors = found.search.linear.problem.priors
+        card = card.with_values(priors.at(found.numbers.point[: len(priors.values)]))
+    card = card.with_table("effect", [*card.content.get("effect", []), *named])
     return calibrate(card, without_events(found), profile=False, progress=progress, keep=False)
 
 
