@@ -336,7 +336,15 @@ def _confirmed(
         beside = Background(search.linear, final.terms, final.noise)
         model = Model(search.linear, search.signatures, final.terms, final.noise)
         more = bool(final.terms) or longer
-        rows = model.residuals(model.kept(model.mean())) if more else alone
+        rows = alone
+        if more:
+            try:
+                rows = model.residuals(model.kept(model.mean()))
+            except IMPOSSIBLE:  # where its straight lines end there is no prediction
+                if final.terms:
+                    gone = min(range(len(final.terms)), key=lambda k: final.score - outcome.without[k].score)
+                    outcome = _left_out(search, outcome, gone)
+                    continue
         after = model.held_out(by_record, rows) if more else before
         weak = [
             k
