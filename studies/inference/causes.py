@@ -185,21 +185,10 @@ def _path_causes(found: Inferred) -> list[Cause]:
     if path.radiates:
         share, sd = path.value(SHARE)
         own = min((share / sd) ** 2, evidence) if causes else evidence
-        numbers = {
-            key.removeprefix("law."): Interval.about(*path.value(key)) for key in (SHARE, DIRECT)[: min(path.lags, 2)]
-        }
-        causes.append(
-            Cause(
-                names[SHARE.removeprefix("law.")],
-                name,
-                probability,
-                (),
-                numbers,
-                own,
-                peak=peak,
-                together=True,
-            )
-        )
+        told = [key for key in (SHARE, DIRECT) if key in path.fit.problem.priors.names]  # plain lags have one share
+        numbers = {key.removeprefix("law."): Interval.about(*path.value(key)) for key in told}
+        radiation = names[SHARE.removeprefix("law.")]
+        causes.append(Cause(radiation, name, probability, (), numbers, own, peak=peak, together=True))
     return causes
 
 

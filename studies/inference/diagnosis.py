@@ -5,7 +5,6 @@ again.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -326,30 +325,21 @@ def _confirmed(
     """Leave out faint causes of no definite size, and those whose model predicts unseen rows no better than the card alone, the weakest first."""
     events = any(term.effect.event for term in outcome.final.terms)
     by_record = len(search.linear.problem.runs) > 1 and not events
-    alone = calibrated
-    if not longer:
-        with suppress(*IMPOSSIBLE):  # a straight line may lead where there is no prediction
-            alone = plain.residuals(plain.kept(plain.mean()))
+    alone = calibrated if longer else _rows_of(plain) or calibrated
     before = plain.held_out(by_record, alone)
     while True:
         final = outcome.final
         beside = Background(search.linear, final.terms, final.noise)
         model = Model(search.linear, search.signatures, final.terms, final.noise)
         more = bool(final.terms) or longer
-        rows = alone
-        if more:
-            try:
-                rows = model.residuals(model.kept(model.mean()))
-            except IMPOSSIBLE:  # where its straight lines end there is no prediction
-                if final.terms:
-                    gone = min(range(len(final.terms)), key=lambda k: final.score - outcome.without[k].score)
-                    outcome = _left_out(search, outcome, gone)
-                    continue
+        told = _rows_of(model) if more else alone
+        rows = told or alone
         after = model.held_out(by_record, rows) if more else before
         weak = [
             k
             for k, name in enumerate(term.response for term in final.terms)
-            if _worse(*before[name].beside(after[name]))
+            if told is None
+            or _worse(*before[name].beside(after[name]))
             or rows[name].rms > alone[name].rms
             or (final.score - outcome.without[k].score < FAINT and not beside.sized(k))
             or is_rounding(search.linear.problem, name, alone[name])
@@ -359,6 +349,14 @@ def _confirmed(
             return outcome, {name: before[name].beside(after[name]) for name in before}, rows
         gone = min(weak, key=lambda k: final.score - outcome.without[k].score)
         outcome = _left_out(search, outcome, gone)
+
+
+def _rows_of(model: Model) -> dict[str, Rows] | None:
+    """What a model leaves of the records; None where its straight lines end and there is no prediction."""
+    try:
+        return model.residuals(model.kept(model.mean()))
+    except IMPOSSIBLE:
+        return None
 
 
 def _left_out(search: Search, outcome: Outcome, gone: int) -> Outcome:

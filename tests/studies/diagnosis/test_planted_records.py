@@ -265,6 +265,20 @@ def test_two_lumps_behind_noisy_thermometers_are_diagnosed():
 
 
 @pytest.mark.slow
+def test_plain_lags_in_series_that_radiate_along_are_told_with_their_one_share():
+    """The cause asked a path without a direct share for it, and the diagnosis ended in a fault."""
+    law = LUMPS["law"] | {"lag_s": 1500.0, "second_lag_s": 400.0, "radiated_share": 0.4}
+    card, noise, runs = build_instrument(LUMPS | {"law": law}), np.random.default_rng(3), []
+    for words in ("step 20 -40 3h then step -40 50 4h", "cycle 20 -10 40 1 30min 2"):
+        run = simulate_run(card, parse_profile(words), 1 / 30, noise=False).record
+        spread = {"time_s": 0.0, "housing_temperature_degC": 1e-3, "frequency_Hz": 2e-3}
+        runs.append(Record({k: run[k] + noise.normal(0.0, s, len(run)) for k, s in spread.items()}))
+    named = {cause.effect: cause.parameters for cause in diagnose_records(runs).verdict.causes}
+    assert named["radiation"]["radiated_share"].value == pytest.approx(0.4, abs=0.02)
+    assert "direct_share" not in named["radiation"]
+
+
+@pytest.mark.slow
 def test_a_chamber_logged_by_another_clock_in_one_run_is_found():
     """30 s in one of three runs whose rows are 20 s apart: the chamber moves smoothly, so its clock is known better than its rows."""
     made = []
