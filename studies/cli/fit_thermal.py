@@ -42,7 +42,7 @@ def fit_thermal(
     """Find the time constants with which the resonator follows its housing, with intervals, and what the records do not determine.
 
     The records need time_s, frequency_Hz and housing_temperature_degC (or chamber_temperature_degC). The model is a series of
-    lags with heat exchange by conduction and radiation. The initial temperatures of each run are fitted, and the noise may
+    lags with heat exchange by conduction and radiation; where these leave slow noise, of lumps that may also radiate past one another. The initial temperatures of each run are fitted, and the noise may
     drift. The intervals hold only for a gyro that fits this model; slow noise well above that of a row shows a misfit.
 
     Args:
