@@ -8,6 +8,8 @@ from studies.cli.arguments import COUNT, Quiet
 from studies.cli.output import answers, dump_json, say
 from studies.errors import InputError
 from studies.files.writing import write_text
+from studies.fleet.folder import read_lot
+from studies.instrument.card import load_card
 from studies.progress import Progress
 from studies.reports import fleet as parts
 from studies.results import Result
@@ -36,9 +38,7 @@ def fleet(
         scheduler: Address of a Dask scheduler (tcp://HOST:8786), as for hrg study run, instead of processes here; every
             worker must see both folders under the same paths.
     """
-    from studies.fleet.folder import read_lot
     from studies.fleet.run import run_lot
-    from studies.instrument.card import load_card
     from studies.results.page import render_result
     from studies.sweeps.engine import hire
 

@@ -6,18 +6,17 @@ each with `command`, `line`, `ready` and `missing`.
 """
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from studies.cli.arguments import Records
 from studies.cli.output import answers
 from studies.errors import InputError
 from studies.instrument.display import display_name
+from studies.record import read_record
+from studies.record.survey import Survey, survey_record
+from studies.record.uses import find_uses
 from studies.reports import survey as parts
 from studies.reports.digits import plain
 from studies.results import Facts, Result, Sentence, Table, row_of
-
-if TYPE_CHECKING:
-    from studies.record.survey import Survey
 
 
 @answers("hrg.show/1")
@@ -27,10 +26,6 @@ def show(*runs: Records) -> Result:
     Needs no card and fits no model of the gyro. The page has every column over time and over temperature, spectra and Allan
     deviations; its figures show values under the pointer and can be enlarged.
     """
-    from studies.record import read_record
-    from studies.record.survey import survey_record
-    from studies.record.uses import find_uses
-
     if not runs:
         raise InputError("no record given: hrg show RUN.csv [RUN.csv ...].")
     records = [read_record(path) for path in runs]
@@ -61,7 +56,7 @@ def _title(names: list[str]) -> str:
     return f"Record{'s' * (len(names) > 1)} {', '.join(names[: 3 if more else 4])}{more}"
 
 
-def _facts(survey: "Survey") -> list[tuple[str, str, str]]:
+def _facts(survey: Survey) -> list[tuple[str, str, str]]:
     record, time = survey.record, survey.record["time_s"]
     even = "regular" if survey.even else "irregular or with gaps"
     about = " ".join(filter(None, (record.instrument, record.start.isoformat() if record.start else "")))
@@ -72,7 +67,7 @@ def _facts(survey: "Survey") -> list[tuple[str, str, str]]:
     ]
 
 
-def _warnings(surveys: "list[Survey]") -> list[Sentence]:
+def _warnings(surveys: list[Survey]) -> list[Sentence]:
     found = [
         f"{survey.record.path}, {display_name(column.name)}: {words}: {count}"
         for survey in surveys

@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 
 from compensation.wave import StandingWave
 from shell.damping.anisotropy import describe_wave
+from shell.damping.budget import Budget
 
 if TYPE_CHECKING:
-    from shell.damping.budget import Budget
     from studies.instrument.card import Instrument
     from studies.loss.model import LossModel
 
@@ -26,7 +26,7 @@ class DampingAround:
     drift: Array
 
 
-def damping_around(model: "LossModel", budget: "Budget") -> DampingAround | None:
+def damping_around(model: "LossModel", budget: Budget) -> DampingAround | None:
     """Return what varies around; None where nothing does."""
     if not model.ripples:
         return None

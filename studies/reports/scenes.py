@@ -10,18 +10,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shell.constants import zero_Celsius
+from shell.layout import Theory
+from shell.resonator import Resonator
+from shell.scene import Scene, compose_scene
 from shell.still import draw_still
+from shell.surface import Surface, build_surface
 from studies.errors import InputError
 from studies.instrument.card import Instrument
 from studies.results import Blocks, Chapter
 
 if TYPE_CHECKING:
     from shell.imperfection import Imperfection, Split
-    from shell.layout import Theory
     from shell.modes import Mode
-    from shell.resonator import Resonator
-    from shell.scene import Scene
-    from shell.surface import Surface
     from studies.results.page import Block
     from studies.sweeps.expressions import Derived
 
@@ -41,9 +41,9 @@ class ModeScene:
 
     instrument: Instrument
     temperature: float
-    resonator: "Resonator"
+    resonator: Resonator
     mode: "Mode"
-    surface: "Surface"
+    surface: Surface
     split: "Split | None" = None
     exaggeration: float = 0.0
 
@@ -76,10 +76,8 @@ class ModeScene:
             raise InputError("the colour 'temperature' needs a field along the meridian: give --field FIELD.csv.")
         return np.interp(self.surface.position, field.position, field.temperature)
 
-    def scene(self, colour: Colour = "displacement", field: "ShellTemperature | None" = None) -> "Scene":
+    def scene(self, colour: Colour = "displacement", field: "ShellTemperature | None" = None) -> Scene:
         """Return the scene for `shell.render`."""
-        from shell.scene import compose_scene
-
         axes = None
         if self.split is not None:
             from shell.imperfection.surface import draw_axes
@@ -116,7 +114,6 @@ def show_mode(
 ) -> ModeScene:
     """Solve one mode (at K, or the reference) and build its surface; of an imperfect card the slower mode, departures `exaggerated` or not."""
     from shell.modes import solve_modes
-    from shell.surface import build_surface
 
     T = instrument.reference_temperature if temperature is None else temperature
     resonator, elastic = instrument.at(T)
@@ -128,7 +125,7 @@ def show_mode(
 
 
 def _show_split(
-    instrument: Instrument, T: float, resonator: "Resonator", mode: "Mode", surface: "Surface", exaggerated: bool
+    instrument: Instrument, T: float, resonator: Resonator, mode: "Mode", surface: Surface, exaggerated: bool
 ) -> ModeScene:
     """The slower mode of the pair on its own axis, the shell with its departures exaggerated."""
     from shell.imperfection.surface import depart_surface, turn_surface
@@ -143,7 +140,7 @@ def _show_split(
 
 
 def live_chapter(
-    instrument: Instrument, harmonic: int, theory: "Theory", view: "Callable[[], list[Block]] | None" = None,
+    instrument: Instrument, harmonic: int, theory: Theory, view: "Callable[[], list[Block]] | None" = None,
     anchor: bool = False,
 ) -> Chapter:  # fmt: skip
     """Return a mode that swings and sliders that move it; of Rayleigh's closed form the `view` alone, where there is one."""
@@ -153,7 +150,7 @@ def live_chapter(
 
 
 def moving_mode(
-    instrument: Instrument, harmonic: int = 2, theory: "Literal['solid', 'shell']" = "solid", names: Sequence[str] = (),
+    instrument: Instrument, harmonic: int = 2, theory: Literal['solid', 'shell'] = "solid", names: Sequence[str] = (),
     derived: "Sequence[Derived]" = (), view: "Callable[[], list[Block]] | None" = None, anchor: bool = False,
 ) -> "list[Block]":  # fmt: skip
     """Return the view of the lowest mode of a harmonic, or the `view` that a page has of it and others, and sliders that move it."""
@@ -182,12 +179,12 @@ THEORIES = {
 }
 
 
-def mode_blocks(instrument: "Instrument", harmonics: Sequence[int] = (2, 3)) -> "list[Block]":
+def mode_blocks(instrument: Instrument, harmonics: Sequence[int] = (2, 3)) -> "list[Block]":
     """Return the interactive view of the lowest mode of each harmonic, with the picture of the first one behind it."""
     return view_blocks([show_mode(instrument, n) for n in harmonics])
 
 
-def view_blocks(shown: "Sequence[ModeScene]", remark: str = "") -> "list[Block]":
+def view_blocks(shown: Sequence[ModeScene], remark: str = "") -> "list[Block]":
     """Return the interactive view of modes of one instrument at one temperature."""
     from studies.reports.webgl import Drawn, view_modes
 

@@ -6,6 +6,7 @@ from math import atan2, degrees, hypot
 import numpy as np
 
 from shell.loads import Loads
+from shell.modes import solve_modes
 from studies.instrument.card import Instrument
 from studies.loss.damping_law import settled_loss
 from studies.resonator.law import law_of
@@ -26,8 +27,6 @@ class BiasSensitivity:
 
 def loads_of(instrument: Instrument, temperature: float, harmonic: int = 2) -> Loads:
     """Return the loads of a card's resonator on its lowest mode of a harmonic at a temperature (K)."""
-    from shell.modes import solve_modes
-
     resonator, elastic = instrument.at(temperature)
     return Loads(solve_modes(resonator, elastic, harmonic)[0], elastic)
 

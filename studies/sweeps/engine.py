@@ -16,15 +16,14 @@ from numpy.typing import NDArray
 
 from studies.errors import MissingEnvironment
 from studies.sweeps.block import Batch, Cases, join
+from studies.sweeps.design import Design
 from studies.sweeps.evaluate import WorkPlan, evaluate_task, failed_cases
-from studies.sweeps.workers import Here, Pool, cores, say_gone
+from studies.sweeps.workers import Here, Pool, Workers, cores, say_gone
 
 if TYPE_CHECKING:
     from studies.progress import Progress
     from studies.sweeps.definition import Study
-    from studies.sweeps.design import Design
     from studies.sweeps.store import Store
-    from studies.sweeps.workers import Workers
 
 TASK_SECONDS = 1.0  # a task should last so long: long against its cost, short against what kill -9 may lose
 BATCH, BATCH_VECTORISED = 8, 16384  # cases, where the spec says nothing
@@ -46,7 +45,7 @@ class _Task:
 class Batches:
     """Batches of a design still to be computed, made when they are taken: `places` of the unique designs in each."""
 
-    design: "Design"
+    design: Design
     places: deque[NDArray[np.intp]]
 
     def __len__(self) -> int:
@@ -58,7 +57,7 @@ class Batches:
         return Batch(places, self.design.values[self.design.unique[places]])
 
 
-def missing_batches(study: "Study", design: "Design", store: "Store", vectorised: bool) -> Batches:
+def missing_batches(study: "Study", design: Design, store: "Store", vectorised: bool) -> Batches:
     """Return, in order, the cases that the store lacks, in the batches that the spec fixes."""
     count, done = len(design.unique), store.done
     lacking = np.ones(count, dtype=bool)
@@ -73,7 +72,7 @@ def batch_size(study: "Study", vectorised: bool) -> int:
     return study.sampling.batch or (BATCH_VECTORISED if vectorised else BATCH)
 
 
-def hire(workers: int | None, scheduler: str | None = None) -> "Workers":
+def hire(workers: int | None, scheduler: str | None = None) -> Workers:
     """Return the workers of a Dask scheduler, or so many here, one for every core unless given."""
     if scheduler is not None:
         from studies.sweeps.cluster import Cluster
@@ -84,7 +83,7 @@ def hire(workers: int | None, scheduler: str | None = None) -> "Workers":
 
 
 def compute(
-    plan: WorkPlan, batches: "Batches | deque[Batch]", workers: "Workers", store: "Store", progress: "Progress"
+    plan: WorkPlan, batches: Batches | deque[Batch], workers: Workers, store: "Store", progress: "Progress"
 ) -> None:
     """Evaluate all batches and keep their rows; returns when every case is in the store."""
     suspects: deque[_Task] = deque()
@@ -130,7 +129,7 @@ def compute(
             size = max(1, min(int(TASK_SECONDS / max(each, 1e-9)), ceil(len(batches) / (8 * workers.count))))
 
 
-def _submit(task: _Task, plan: WorkPlan, workers: "Workers", running: dict[Future[Any], _Task]) -> None:
+def _submit(task: _Task, plan: WorkPlan, workers: Workers, running: dict[Future[Any], _Task]) -> None:
     running[workers.submit(evaluate_task, plan, task.batches)] = task
 
 

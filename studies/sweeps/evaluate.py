@@ -16,12 +16,12 @@ from studies.sweeps.block import Batch, Cases, Remark, decode, each_design, join
 from studies.sweeps.case import Case
 from studies.sweeps.child import FunctionFailed, FunctionLost
 from studies.sweeps.design import coding
+from studies.sweeps.expressions import Derived
 from studies.sweeps.parameters import set_parameters
 from studies.sweeps.quantity import HarmonicQuantity, Number, Quantity
 
 if TYPE_CHECKING:
     from studies.sweeps.definition import Study
-    from studies.sweeps.expressions import Derived
     from studies.sweeps.families import Families
 
 
@@ -41,9 +41,9 @@ class WorkPlan:
 
     instrument: Instrument
     coding: tuple[tuple[str, tuple[str, ...]], ...]
-    asked: "tuple[Quantity, ...]"
+    asked: tuple[Quantity, ...]
     families: "Families | None" = None
-    derived: "tuple[Derived, ...]" = ()
+    derived: tuple[Derived, ...] = ()
     start: Mapping[str, Any] | None = None
 
     @classmethod

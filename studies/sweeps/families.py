@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 from shell.constants import zero_Celsius
 from shell.family import MOST_SOLVES, Axis, Family, FamilyResult, build_family
 from shell.law import slope_parts
+from shell.material import Material
+from shell.resonator import Resonator
 from studies.errors import UNUSABLE_INPUT, InputError
 from studies.instrument.card import Instrument
 from studies.sweeps.block import Array
@@ -19,8 +21,6 @@ from studies.sweeps.quantities.tcf import PARTS, STEEPEST
 from studies.sweeps.quantity import ModeQuantity, Quantity
 
 if TYPE_CHECKING:
-    from shell.material import Material
-    from shell.resonator import Resonator
     from studies.sweeps.definition import Study
     from studies.sweeps.design import Design
 
@@ -83,9 +83,9 @@ class _Nodes:
     names: tuple[str, ...]
     low: Array
     high: Array
-    materials: "tuple[Material, ...]"
+    materials: tuple[Material, ...]
 
-    def parts(self, designs: Designs) -> "tuple[list[_Part], NDArray[np.bool_]]":
+    def parts(self, designs: Designs) -> tuple[list[_Part], NDArray[np.bool_]]:
         """Return the materials with their weights, and the designs that lie within the nodes' ranges."""
         at = np.array([designs[name] for name in self.names], dtype=float)
         inside = np.asarray(((at.T >= self.low) & (at.T <= self.high)).all(axis=1))
@@ -104,7 +104,7 @@ def _choices(count: int) -> Iterator[tuple[int, ...]]:
     return product(range(len(NODES)), repeat=count)
 
 
-def _build_nodes(study: "Study", design: "Design") -> "_Nodes | None":
+def _build_nodes(study: "Study", design: "Design") -> _Nodes | None:
     """Return materials at nodes where many designs have one of their own; None where these are few, or not followed."""
     places = [k for k, p in enumerate(study.parameters) if p.name.startswith(MATERIAL)]
     if not 0 < len(places) <= MOST_AXES or any(isinstance(study.parameters[k].nominal, str) for k in places):
@@ -146,7 +146,7 @@ def why_not(study: "Study") -> str:
     return ""
 
 
-def build_families(study: "Study", design: "Design", most: int = MOST_SOLVES) -> "Families | str":
+def build_families(study: "Study", design: "Design", most: int = MOST_SOLVES) -> Families | str:
     """Build the families that a study asks for, or say why it must be computed design by design."""
     reason = why_not(study)
     if reason:
@@ -155,7 +155,7 @@ def build_families(study: "Study", design: "Design", most: int = MOST_SOLVES) ->
         Axis(p.name, *_range(study, design, k)) for k, p in enumerate(study.parameters) if p.name.startswith(DIMENSIONS)
     ]
 
-    def build(values: Array) -> "Resonator":
+    def build(values: Array) -> Resonator:
         named = {axis.name: float(value) for axis, value in zip(axes, values, strict=True)}
         return set_parameters(study.instrument, named).resonator
 
@@ -184,7 +184,7 @@ def build_families(study: "Study", design: "Design", most: int = MOST_SOLVES) ->
     return Families(study.instrument, study.asked, members, _build_nodes(study, design))
 
 
-def choose_solver(study: "Study", design: "Design") -> "Families | None":
+def choose_solver(study: "Study", design: "Design") -> Families | None:
     """Return the families where the spec asks for them or lets them be, None where every design is solved in full."""
     wanted, count = study.sampling.solver, len(design.unique)
     if wanted == "full" or (wanted == "auto" and count < FEWEST):

@@ -8,10 +8,9 @@ import msgspec
 from studies.schema.keys import Keys, number, says
 from studies.sweeps.expressions import Derived
 from studies.sweeps.quantities import library
+from studies.sweeps.quantity import Quantity
 
 if TYPE_CHECKING:
-    from studies.sweeps.quantity import Quantity
-
     AnyQuantity = Quantity
 else:
     AnyQuantity = Union[tuple(library().values())]  # noqa: UP007

@@ -11,14 +11,14 @@ from studies.progress import Progress
 from studies.sweeps.block import Array, Batch, decode, each_design
 from studies.sweeps.design import draw, nominal_row
 from studies.sweeps.engine import BATCH_VECTORISED, compute
+from studies.sweeps.evaluate import WorkPlan
 from studies.sweeps.keys import Search, ToleranceSearch, WorstCase
 from studies.sweeps.tolerance import place_limits
+from studies.sweeps.workers import Workers
 
 if TYPE_CHECKING:
     from studies.sweeps.definition import Study, StudyParameter
-    from studies.sweeps.evaluate import WorkPlan
     from studies.sweeps.store import Store, Stored
-    from studies.sweeps.workers import Workers
 
 STEP = 1e-2  # of a range, for differences: large against the solver's noise
 MOST_FACTORS = 20  # factors of the tolerances that are tried
@@ -35,8 +35,8 @@ class Explorer:
     def __init__(
         self,
         study: "Study",
-        plan: "WorkPlan",
-        workers: "Workers",
+        plan: WorkPlan,
+        workers: Workers,
         store: "Store",
         progress: Progress = Progress(),  # noqa: B008 that shows nothing
     ) -> None:
@@ -68,7 +68,7 @@ class Explorer:
         return each_design(decode(self.plan.coding, design[None]), 1)[0]
 
 
-def run_searches(study: "Study", plan: "WorkPlan", workers: "Workers", store: "Store") -> None:
+def run_searches(study: "Study", plan: WorkPlan, workers: Workers, store: "Store") -> None:
     """Compute the nominal design and every search of a study, and keep what they find."""
     explorer = Explorer(study, plan, workers, store)
     explorer.cases(nominal_row(study)[None])

@@ -7,10 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studies.errors import InputError
-from studies.sweeps.keys import DRAWN
+from studies.sweeps.keys import DRAWN, Requirement
 
 if TYPE_CHECKING:
-    from studies.sweeps.keys import Requirement
     from studies.sweeps.results import Results
 
 
@@ -50,7 +49,7 @@ class Reach:
     inside: int
 
 
-def resolve_limits(results: "Results", requirement: "Requirement") -> RequirementLimits:
+def resolve_limits(results: "Results", requirement: Requirement) -> RequirementLimits:
     """Return the limits of a requirement; without a target they lie about the nominal design's value."""
     place = [column.name for column in results.study.columns].index(requirement.column)
     low, high = requirement.limits(float(results.nominal.values[place]) if results.nominal is not None else np.nan)
@@ -59,7 +58,7 @@ def resolve_limits(results: "Results", requirement: "Requirement") -> Requiremen
     return RequirementLimits(requirement.column, low, high)
 
 
-def find_yield(results: "Results", requirements: "tuple[Requirement, ...]") -> Yield:
+def find_yield(results: "Results", requirements: tuple[Requirement, ...]) -> Yield:
     """Return the share of sampled designs that meet all the requirements."""
     from scipy.special import ndtri
 
@@ -77,7 +76,7 @@ def find_yield(results: "Results", requirements: "tuple[Requirement, ...]") -> Y
     return Yield(limits, n, passed, open_, float(ends[0]), float(ends[1]))
 
 
-def find_reach(results: "Results", requirements: "tuple[Requirement, ...]") -> Reach:
+def find_reach(results: "Results", requirements: tuple[Requirement, ...]) -> Reach:
     """Return the largest box about the nominal design, in parts of the asked ranges, without a failing design; no value is a failure."""
     limits = tuple(resolve_limits(results, requirement) for requirement in requirements)
     good, _ = _judge(results, limits)
