@@ -1,6 +1,8 @@
-"""Pieces of C99 source that every emitted model shares: the head comment, polynomials with all digits."""
+"""C99 source of emitted models from the files of `sources`: the head comment, polynomials with all digits, the test."""
 
 from collections.abc import Sequence
+from importlib.resources import files
+from string import Template
 
 from studies.models.file import Model
 
@@ -13,6 +15,12 @@ def head(model: Model) -> str:
         *(f"Valid for {name} from {low:.9g} to {high:.9g}." for name, (low, high) in model.validity.items()),
     ]
     return "\n".join(f"/* {_one_comment(line)} */" for line in lines) + "\n#include <math.h>\n"
+
+
+def write_c(name: str, **values: object) -> str:
+    """Return one of the `sources` with its $words filled in."""
+    source = (files("studies.models") / "sources" / f"{name}.c").read_text(encoding="utf-8")
+    return Template(source).substitute(values)
 
 
 def polynomial(name: str, variable: str, coefficients: Sequence[float]) -> str:
@@ -31,23 +39,4 @@ def self_test(rows: Sequence[Sequence[float]], meaning: str, step: str) -> str:
     """Return a `main` under HRG_SELF_TEST that compares the code with rows of what Python computes, by C statements on `row`."""
     width = len(rows[0])
     table = ",\n".join("    {" + ", ".join("NAN" if x != x else repr(float(x)) for x in row) + "}" for row in rows)
-    return f"""/* Test: cc -std=c99 -DHRG_SELF_TEST this_file.c -lm && ./a.out; columns: {meaning}. */
-#ifdef HRG_SELF_TEST
-#include <stdio.h>
-static const double hrg_rows[][{width}] = {{
-{table}
-}};
-
-static int hrg_differs(const double *row) {{
-{step}
-    return !(fabs(found - expected) <= 1e-9 * (1.0 + fabs(expected)));
-}}
-
-int main(void) {{
-    int wrong = 0, count = (int)(sizeof hrg_rows / sizeof hrg_rows[0]);
-    for (int k = 0; k < count; ++k) wrong += hrg_differs(hrg_rows[k]);
-    printf("%d rows, %d differ\\n", count, wrong);
-    return wrong != 0;
-}}
-#endif
-"""
+    return write_c("self_test", meaning=meaning, width=width, table=table, step=step)

@@ -7,7 +7,7 @@ import numpy as np
 from studies.diagnosis.response import RESPONSES
 from studies.diagnosis.verdict import ResponseResult
 from studies.reports.digits import plain
-from studies.reports.style import BLACK, BLUE, ORANGE, VERMILION, figure, panels
+from studies.reports.style import BLACK, BLUE, ORANGE, VERMILION, few_rows, figure, panels
 from studies.results import Drawing
 
 if TYPE_CHECKING:
@@ -28,13 +28,8 @@ def ladder(diagnosis: "Inference") -> Drawing:
             for k, (_, value) in enumerate(steps):
                 label = f"{plain(value * response.scale)} {response.shown}"
                 kelvin = as_temperature(diagnosis, column, value)
-                axis.annotate(
-                    label if kelvin is None else f"{label}\n{kelvin}",
-                    (k, values[k]),
-                    ha="center",
-                    va="bottom",
-                    fontsize=8,
-                )
+                words = label if kelvin is None else f"{label}\n{kelvin}"
+                axis.annotate(words, (k, values[k]), ha="center", va="bottom", fontsize=8)
             axis.set_xticks(range(len(steps)), [word.replace(" ", "\n") for word, _ in steps], fontsize=8)
             axis.set_ylim(0.0, 1.3 * max(values, default=1.0))
             axis.set_title(f"{response.word} ({response.shown})", loc="left", fontsize=10)
@@ -61,13 +56,8 @@ def as_temperature(diagnosis: "Inference", column: str, value: float) -> str | N
     if not RESPONSES[column].thermometer:
         return None
     slope = diagnosis.seen(column).slope
-    return (
-        None
-        if not slope
-        else f"{plain(1e3 * value / slope, 2)} mK"
-        if value < 0.1 * slope
-        else f"{plain(value / slope, 2)} K"
-    )
+    size, unit = (1e3, "mK") if value < 0.1 * slope else (1.0, "K")
+    return f"{plain(size * value / slope, 2)} {unit}" if slope else None
 
 
 def before_and_after(diagnosis: "Inference", response: str) -> Drawing:
@@ -82,8 +72,8 @@ def before_and_after(diagnosis: "Inference", response: str) -> Drawing:
         for axis, (residuals, title, colour) in zip(axes, strips, strict=True):
             begin = 0.0
             for rows, rest in zip(seen.time, residuals, strict=True):
-                time, values = _thinned(rows, rest * unit.scale)
-                axis.plot((begin + time - time[0]) / 3600.0, values, color=colour, linewidth=0.6)
+                few = few_rows(len(rows))
+                axis.plot((begin + rows[few] - rows[0]) / 3600.0, rest[few] * unit.scale, color=colour, linewidth=0.6)
                 begin += float(rows[-1] - rows[0])
                 axis.axvline(begin / 3600.0, color="#b0b6bd", linewidth=0.8)
             axis.axhspan(-2 * noise, 2 * noise, color=ORANGE, alpha=0.25, label="noise, ±2 rms")
@@ -92,11 +82,6 @@ def before_and_after(diagnosis: "Inference", response: str) -> Drawing:
         axes[0].legend(loc="upper right")
         axes[-1].set_xlabel("time, runs in sequence (h)")
         return canvas
-
-
-def _thinned(time: np.ndarray, values: np.ndarray, most: int = 500) -> tuple[np.ndarray, np.ndarray]:
-    step = max(1, time.size // most)
-    return time[::step], values[::step]
 
 
 def residual_views(diagnosis: "Inference", response: str) -> Drawing:
@@ -123,10 +108,8 @@ def next_run_picture(run: "NextRun") -> Drawing:
     """Draw the suggested run: the chamber's temperature, and the drives that step."""
     rows = 1 + len(run.drives)
     heights = [2.0] + [0.7] * len(run.drives)
-    with figure(rows, 1, height=1.1 + sum(heights), sharex=True, squeeze=False, height_ratios=heights) as (
-        canvas,
-        axes,
-    ):
+    tall = 1.1 + sum(heights)
+    with figure(rows, 1, tall, sharex=True, squeeze=False, height_ratios=heights) as (canvas, axes):
         axes[0, 0].plot(run.time_h, run.temperature_degC, color=VERMILION)
         axes[0, 0].set_ylabel("chamber (°C)")
         for axis, (column, steps) in zip(axes[1:, 0], run.drives.items(), strict=True):

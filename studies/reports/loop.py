@@ -10,20 +10,14 @@ from studies.instrument.display import display_name
 from studies.instrument.units import unit_of
 from studies.record import Record
 from studies.reports import style
+from studies.reports.columns import draw_columns
 from studies.reports.digits import plain, to_error
 from studies.results import Chapter, Column, Drawing, Facts, Figure, Sentence, Table
 from studies.simulation.loop_study import BiasSlope, LoopStudy, answer_steps, bias_around, bias_slopes, noise_over
 
 LENGTHS = tuple(np.geomspace(0.01, 1e4, 25))
-COLUMNS = {
-    # of a run, as far as it has them: label of the axis
-    "bias_deg_per_h": "bias (°/h)",
-    "measured_rate_deg_per_s": "rate (°/s)",
-    "pattern_angle_deg": "azimuth (°)",
-    "quadrature_V": "quadrature (V)",
-    "frequency_Hz": "frequency (Hz)",
-}
-MOST_POINTS = 3000  # drawn of a run; longer ones are averaged
+COLUMNS = ("time_s", "bias_deg_per_h", "measured_rate_deg_per_s", "pattern_angle_deg", "quadrature_V", "frequency_Hz")
+MOST_POINTS = 3000  # drawn of a start
 NAMES = {
     # of sources in the JSON: what people read
     "pickoff": "pick-off noise",
@@ -55,6 +49,7 @@ def loop_parts(study: LoopStudy, payload: dict[str, Any], run: Record | None) ->
     def named(key: str) -> list[dict[str, Any]]:
         return [one | {"name": NAMES.get(one["source"], one["source"])} for one in payload[key]]
 
+    shown = {name: run[name] for name in COLUMNS if name in run} if run is not None else {}
     slopes = bias_slopes(study)
     moving = [asdict(s) | {"effect": s.effect} for s in slopes if s.effect > SMALLEST * slopes[0].effect]
     headroom, offset = study.instrument.loop.drive_headroom, study.instrument.loop.start_offset_Hz  # type: ignore[union-attr]
@@ -93,7 +88,7 @@ def loop_parts(study: LoopStudy, payload: dict[str, Any], run: Record | None) ->
             "Command of each loop after a unit step of its input: rate, quadrature, resonance frequency, amplitude disturbance.")]),
         Chapter("Start-up", [start, Figure(lambda: _start(study),
             f"Start from rest, the oscillator {offset:g} Hz and 90° off resonance. Dotted: amplitude within 1 %; phase locked.")]),
-        *([] if run is None else [Chapter("Simulated run", [Figure(lambda: _course(run), f"The record {run.path}.")])]),
+        *([] if run is None else [Chapter("Simulated run", [Figure(lambda: draw_columns(shown), f"The record {run.path}.")])]),
     ]  # fmt: skip
 
 
@@ -223,22 +218,4 @@ def _start(study: LoopStudy) -> Drawing:
         right.plot(start.time[early], np.degrees(start.phase_error[early]), color=style.VERMILION)
         right.axvline(start.locked, color=style.BLACK, linestyle=":", linewidth=1.0)
         right.set(xlabel="time (s)", ylabel="phase error (°)")
-        return made
-
-
-def _course(run: Record) -> Drawing:
-    names = [name for name in COLUMNS if name in run]
-    time = run["time_s"] / 3600
-    width = max(len(time) // MOST_POINTS, 1)
-    count = len(time) // width * width
-
-    def thinned(values: np.ndarray) -> np.ndarray:
-        return np.asarray(values[:count].reshape(-1, width).mean(axis=1))
-
-    with style.figure(len(names), 1, height=1.35 * len(names) + 0.5, sharex=True, squeeze=False) as (made, axes):
-        for k, (axis, name) in enumerate(zip(axes[:, 0], names, strict=True)):
-            axis.plot(thinned(time), thinned(run[name]), linewidth=0.8, color=style.COLOURS[k])
-            axis.set_ylabel(COLUMNS[name], fontsize=9)
-            axis.ticklabel_format(axis="y", useOffset=False)
-        axes[-1, 0].set_xlabel("time (h)")
         return made

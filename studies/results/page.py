@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from markupsafe import Markup
 
 PACKAGES = ("numpy", "scipy", "sympy", "pandas", "pyvista", "trimesh")
-OPEN_HEIGHT = 4600  # px: chapters that would end below, on a screen 1280 px wide or on a phone, are folded
+OPEN_HEIGHT = 4600  # px: chapters that would end below are folded
 LONG_TABLE = 15  # rows; longer tables are folded, except in the first chapter, which is the answer
 LONG_ANSWER = 40  # rows of a table in the first chapter
 LONG_WORD = 15  # letters
@@ -192,41 +192,27 @@ def _stacked(table: Cells) -> bool:
 
 def _folded(chapters: Sequence[Sequence[Block]]) -> list[bool]:
     """Return which chapters are folded: from the first on that would end below `OPEN_HEIGHT`, never the first two."""
-    reached = {False: 260.0 + 26 * len(chapters), True: 420.0 + 26 * len(chapters)}  # on a screen, and on a phone
-    folded: list[bool] = []
+    reached, folded = 340.0 + 26 * len(chapters), False
+    found: list[bool] = []
     for k, chapter in enumerate(chapters):
-        for phone in reached:
-            reached[phone] += 80 + sum(_height(block, k == 0, phone) for block in chapter)
-        folded.append((k > 1 and max(reached.values()) > OPEN_HEIGHT) or any(folded))
-    return folded
+        reached += 80 + sum(_height(block, k == 0) for block in chapter)
+        folded = folded or (k > 1 and reached > OPEN_HEIGHT)
+        found.append(folded)
+    return found
 
 
-def _height(block: Block, answer: bool, phone: bool) -> float:
-    """Return about how many pixels a block is high, at a width of 1280 px or on a phone of 390 px."""
+def _height(block: Block, answer: bool) -> float:
+    """Return about how many pixels a block is high, between a screen 1280 px wide and a phone."""
     match block:
-        case Sentence(text, "source") if not phone:
-            return 25 * len(text.splitlines()) + 25
-        case Sentence(text):
-            return 25 * (1 + len(text) / 40) + 12 if phone else 25 * (1 + len(text) / 95) + 25
-        case Cells(rows=rows) if len(rows) > (LONG_ANSWER if answer else LONG_TABLE):
-            return 60
-        case Cells(columns=columns, rows=rows, note=note):
-            widest = (max((len(str(cell)) for cell in row), default=0) for row in rows)
-            if not phone:
-                share = max(28.0, 110 / max(1, len(columns)))
-                return 100 + 33 * sum(1 + wide // share for wide in widest) + len(note) / 4
-            headings = sum(map(len, columns)) + 3 * len(columns)
-            stacked = (1 + (sum(len(str(cell)) for cell in row) + headings) / 46 for row in rows)
-            return (
-                70
-                + 24 * (sum(stacked) if _stacked(block) else sum(1 + wide // 25 for wide in widest) + 2)
-                + len(note) / 2
-            )
+        case Sentence(text, kind):
+            return 25 * max(1 + len(text) / 60, len(text.splitlines()) * (kind == "source")) + 20
+        case Cells(rows=rows):
+            return 60 if len(rows) > (LONG_ANSWER if answer else LONG_TABLE) else 120 + 45 * len(rows)
         case Picture():
-            return 0.51 * block.height + 45 + 0.6 * len(block.caption) if phone else block.height + 70
+            return 0.8 * block.height + 70
         case Facts(facts):
-            return 100.0 * len(facts) if phone else 110.0 * (1 + len(facts) // 5)
-    return 450 if phone else 700
+            return 60 + 50.0 * len(facts)
+    return 600
 
 
 def draw(figure: Drawing, caption: str, alt: str) -> Picture:

@@ -6,6 +6,8 @@ one when it is 0. A temperature may act behind `memory_lag_s` and `play_degC`. R
 causal model holds what ten-second blocks gave until the next is complete, in Python as in C.
 """
 
+from math import ceil
+
 import numpy as np
 from msgspec.structs import replace
 from numpy.typing import NDArray
@@ -16,7 +18,7 @@ from compensation.derivative import differentiate
 from compensation.memory import NO_MEMORY, Memory, follow_lag, follow_play
 from compensation.samples import check_time
 from studies.errors import InputError, nearest
-from studies.models.bias_c import CausalBias, write_c
+from studies.models.c_source import head, self_test, write_c
 from studies.models.file import Model, ModelSource, Setting, make_part, widen
 from studies.record import COMPENSATED, Record
 
@@ -63,23 +65,36 @@ def compensate(model: Model, record: Record, *, extrapolate: bool) -> dict[str, 
 
 def emit_c(model: Model) -> str:
     """Return the model as C99 for firmware, with a table of its own to test it."""
-    terms, coefficients = read_terms(model)
-    column = variable_column(model)
-    law = CausalBias(
-        column=column,
-        unit=OUTPUTS[model.compensates],
-        reference=reference_of(model),
-        terms=terms,
-        coefficients=tuple(coefficients.tolist()),
-        memory=memory_of(model),
-        window=model.number("rate_window_s", above=0),
-        lag=model.number("rate_lag_s", least=0),
-        block=block_length(model),
-        blocks=LEAST_BLOCKS,
-        values=model.range_of(column),
-        rates=model.range_of(rate_name(column)),
-    )
-    return write_c(model, law, _test_rows(model))
+    terms, (constant, *coefficients) = read_terms(model)
+    column, memory = variable_column(model), memory_of(model)
+    window, length = model.number("rate_window_s", above=0), block_length(model)
+    (low, high), (r_low, r_high) = model.range_of(column), model.range_of(rate_name(column))
+    products = (f"({value!r}){_product(name)}" for name, value in zip(terms, map(float, coefficients), strict=True))
+    uncausal = " The model was fitted with a centred rate: fit it with --causal to match this code."
+    code = write_c(
+        "bias",
+        column=column, unit=OUTPUTS[model.compensates], reference=repr(reference_of(model)),
+        total="\n        + ".join([f"({float(constant)!r})", *products]),
+        length=f"{length:g}", window=f"{window:g}", late=f"{window / 2:g}",
+        warning="" if model.number("rate_lag_s", least=0) else uncausal,
+        exact_length=repr(length), exact_window=repr(window), lag=repr(memory.lag), play=repr(memory.play),
+        blocks=ceil(window / length) + 2, least=LEAST_BLOCKS - 1,
+        low=repr(low), high=repr(high), r_low=repr(r_low), r_high=repr(r_high),
+    )  # fmt: skip
+    return f"{head(model)}\n{code}{self_test(_test_rows(model), 'time_s, output, value, expected (NaN: not ok)', STEP)}"
+
+
+STEP = """    static hrg_bias_state state;
+    int ok;
+    double found = hrg_compensate(&state, row[0], row[1], row[2], &ok), expected = row[3];
+    if (!ok) return expected == expected;"""
+
+
+def _product(name: str) -> str:
+    if name == PLAY:
+        return " * play"
+    a, b = TERMS[name]
+    return " * f" * a + " * r" * b
 
 
 def _predict_centred(model: Model, time: Array, values: Array, extrapolate: bool) -> Array:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from compensation.cross_damping import CrossDampingModel
 from shell.constants import zero_Celsius
 from studies.errors import InputError
-from studies.models.c_source import head, polynomial, self_test
+from studies.models.c_source import head, polynomial, self_test, write_c
 from studies.models.file import Model, ModelPart, ModelSource, make_part, widen
 from studies.record import COMPENSATED, Record
 from studies.record.rest import celsius_range
@@ -85,31 +85,13 @@ def emit_c(model: Model) -> str:
     part, unit = _part(model), OUTPUTS[model.compensates]
     pole = 2 * math.pi * model.number("frequency_Hz", above=0) * model.number("relative_damping", above=0)
     gain = 2 * (2 * math.pi * model.number("frequency_Hz", above=0)) / model.number("g2", above=0) / unit
-    return f"""{head(model)}
-/* Call with every temperature reading, {model.temperature_column}; the temperature counts as linear between readings. */
-typedef struct {{
-    double target, value;
-}} hrg_cross_damping_state;
-
-{polynomial("hrg_cross_damping", "shift", part.values)}
-
-/* Set the state as if temperature_degC had lasted; call with the first reading. Returns the error of {model.compensates}. */
-double hrg_cross_damping_settle(hrg_cross_damping_state *state, double temperature_degC) {{
-    state->target = {gain!r} * hrg_cross_damping(temperature_degC - ({model.number("calibration_temperature_degC")!r}));
-    state->value = state->target;
-    return state->value;
-}}
-
-/* Error of {model.compensates} at this reading, dt_s seconds after the last: subtract it from the output. */
-double hrg_cross_damping_step(hrg_cross_damping_state *state, double temperature_degC, double dt_s) {{
-    double before = state->target, value = state->value, x = {pole!r} * dt_s, rise;
-    hrg_cross_damping_settle(state, temperature_degC);
-    rise = x > 0.0 ? (state->target - before) * (-expm1(-x) / x) : 0.0;
-    state->value = state->target - rise + (value - before) * exp(-x);
-    return state->value;
-}}
-
-{self_test(_test_rows(model), "dt_s (0: settle), temperature_degC, expected", STEP)}"""
+    code = write_c(
+        "cross_damping",
+        polynomial=polynomial("hrg_cross_damping", "shift", part.values),
+        column=model.temperature_column, output=model.compensates, gain=repr(gain), pole=repr(pole),
+        reference=repr(model.number("calibration_temperature_degC")),
+    )  # fmt: skip
+    return f"{head(model)}\n{code}{self_test(_test_rows(model), 'dt_s (0: settle), temperature_degC, expected', STEP)}"
 
 
 STEP = """    static hrg_cross_damping_state state;

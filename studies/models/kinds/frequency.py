@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studies.errors import InputError, naming
-from studies.models.c_source import head, polynomial, self_test
+from studies.models.c_source import head, polynomial, self_test, write_c
 from studies.models.file import Model, ModelSource, make_part, widen
 from studies.record import COMPENSATED, RESONATOR, Record
 from studies.record.plausible import check_model_frequency
@@ -94,33 +94,15 @@ def emit_c(model: Model) -> str:
     """Return `hrg_frequency(T)` and `hrg_temperature(f, &ok)`, the inverse by bracketed bisection, in C99."""
     low, high = model.range_of(VARIABLE)
     reference = model.number("reference_temperature_degC")
-    turns = (
-        ""
-        if _is_monotonic(model)
-        else "\n   The curve has a turning point in this range: there is no inverse, *ok is always 0."
-    )
-    return f"""{head(model)}
-{polynomial("hrg_frequency_about", "shift", model.part("frequency").values)}
-
-/* Resonance frequency (Hz) at temperature_degC; valid from {low:.9g} to {high:.9g} degC. */
-double hrg_frequency(double temperature_degC) {{
-    return hrg_frequency_about(temperature_degC - ({reference!r}));
-}}
-
-/* Temperature (degC) at which the resonator has this frequency (Hz); *ok is 0 outside the calibrated range.{turns} */
-double hrg_temperature(double frequency, int *ok) {{
-    double low = {low!r}, high = {high!r};
-    double sign = hrg_frequency(high) > hrg_frequency(low) ? 1.0 : -1.0;
-    *ok = {int(_is_monotonic(model))} && sign * (frequency - hrg_frequency(low)) >= 0.0
-          && sign * (hrg_frequency(high) - frequency) >= 0.0;
-    for (int k = 0; k < 60; ++k) {{
-        double middle = 0.5 * (low + high);
-        if (sign * (hrg_frequency(middle) - frequency) < 0.0) low = middle; else high = middle;
-    }}
-    return 0.5 * (low + high);
-}}
-
-{self_test(_test_rows(model), "temperature_degC, frequency", STEP)}"""
+    none = "\n   The curve has a turning point in this range: there is no inverse, *ok is always 0."
+    turns = "" if _is_monotonic(model) else none
+    code = write_c(
+        "frequency",
+        polynomial=polynomial("hrg_frequency_about", "shift", model.part("frequency").values),
+        lowest=f"{low:.9g}", highest=f"{high:.9g}", low=repr(low), high=repr(high), reference=repr(reference), turns=turns,
+        has_inverse=int(_is_monotonic(model)),
+    )  # fmt: skip
+    return f"{head(model)}\n{code}{self_test(_test_rows(model), 'temperature_degC, frequency', STEP)}"
 
 
 STEP = """    double found = hrg_frequency(row[0]), expected = row[1];

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from shell.constants import zero_Celsius
 from studies.errors import InputError
-from studies.models.c_source import head, polynomial
+from studies.models.c_source import head, polynomial, write_c
 from studies.models.file import Model, ModelPart, ModelSource, Setting, make_part, widen
 from studies.record import COMPENSATED, Record
 from studies.record.rest import celsius_range, drop_spikes
@@ -146,38 +146,17 @@ def emit_c(model: Model) -> str:
     smoother = ""
     if len(taps):
         values = ",\n    ".join(repr(float(tap)) for tap in taps)
-        smoother = f"""
-#define HRG_TAPS {len(taps)}
-static const double hrg_taps[HRG_TAPS] = {{
-    {values}
-}};
-typedef struct {{ double past[HRG_TAPS]; int filled; }} hrg_smoother;
-
-/* Filtered rate, one sample every {model.number("sampling_s", least=0):g} s; set state.filled = 0 before the first. */
-double hrg_smooth(hrg_smoother *state, double rate) {{
-    double sum = 0.0;
-    for (int k = HRG_TAPS - 1; k > 0; --k) state->past[k] = state->filled ? state->past[k - 1] : rate;
-    state->past[0] = rate;
-    state->filled = 1;
-    for (int k = 0; k < HRG_TAPS; ++k) sum += hrg_taps[k] * state->past[k];
-    return sum;
-}}
-"""
+        sampling = f"{model.number('sampling_s', least=0):g}"
+        smoother = "\n" + write_c("smoother", count=len(taps), taps=values, sampling=sampling)
     T = "temperature_degC"
     variables = {"bias": T, "scale_over_rate": "rate", "scale_over_temperature": T}
     curves = {name: polynomial(f"hrg_{name}", x, model.part(name).values) for name, x in variables.items()}
     if model.settings.get(FORM):
         curves["scale_over_rate"] = _emit_law(model)
     functions = "\n\n".join(curves.values())
-    return f"""{head(model)}
-{functions}
-
-/* Compensated rate (deg/s) for the raw {model.compensates} and the temperature. */
-double hrg_rate(double output, double temperature_degC) {{
-    double rate = {rough["scale"]!r} * (output - ({rough["null"]!r})) - hrg_bias(temperature_degC);
-    return hrg_scale_over_rate(rate) * hrg_scale_over_temperature(temperature_degC);
-}}
-{smoother}"""
+    null, scale = repr(rough["null"]), repr(rough["scale"])
+    code = write_c("scale", functions=functions, output=model.compensates, null=null, scale=scale, smoother=smoother)
+    return f"{head(model)}\n{code}"
 
 
 def _save_curve(name: str, curve: "PolynomialCurve", y: float, x: float, units: Sequence[str]) -> ModelPart:
