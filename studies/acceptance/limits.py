@@ -70,10 +70,7 @@ ELSEWHERE = (
 class WarmUp(Keys, frozen=True, kw_only=True):
     """When the output counts as settled."""
 
-    band_deg_per_h: (
-        Annotated[float, number("about the final output; three times the scatter of its means unless given", above=0.0)]
-        | None
-    ) = None
+    band_deg_per_h: Annotated[float, number("about the final output; three times the scatter of its means unless given", above=0.0)] | None = None  # fmt: skip
 
 
 def _declare_quantities() -> Any:

@@ -43,9 +43,7 @@ class Head(Keys, frozen=True, kw_only=True):
     schema: Annotated[str, says("kind of file", example=SCHEMA)]
     name: Annotated[str, says("of the instrument", example="free-dome")]
     note: Note = ""
-    reference_temperature_degC: Annotated[
-        float, number("dimensions and given material values hold here", least=-200.0, most=200.0)
-    ] = 20.0
+    reference_temperature_degC: Annotated[float, number("dimensions and given material values hold here", least=-200.0, most=200.0)] = 20.0  # fmt: skip
 
 
 class Said(Generic[T]):

@@ -86,16 +86,10 @@ class ModelKeys(Keys, frozen=True, kw_only=True):
     kind: Annotated[str, says("frequency, bias, scale or cross-damping", example="bias")]
     compensates: Annotated[str, says("the column of a record that gets a compensated copy", example="bias_deg_per_h")]
     made_by: Annotated[str, says("the command that fitted it")] = ""
-    settings: Annotated[dict[str, Setting], says("settings of the formula besides its coefficients")] = msgspec.field(
-        default_factory=dict
-    )
-    validity: Annotated[
-        dict[str, tuple[float, float]], says("lowest and highest value of each variable in the fitted data")
-    ] = msgspec.field(default_factory=dict)
+    settings: Annotated[dict[str, Setting], says("settings of the formula besides its coefficients")] = msgspec.field(default_factory=dict)  # fmt: skip
+    validity: Annotated[dict[str, tuple[float, float]], says("lowest and highest value of each variable in the fitted data")] = msgspec.field(default_factory=dict)  # fmt: skip
     parts: Annotated[tuple[ModelPart, ...], says("one or more, fitted together", least=1)] = msgspec.field(name="part")
-    sources: Annotated[tuple[ModelSource, ...], says("records that were fitted")] = msgspec.field(
-        name="source", default=()
-    )
+    sources: Annotated[tuple[ModelSource, ...], says("records that were fitted")] = msgspec.field(name="source", default=())  # fmt: skip
 
     def __post_init__(self) -> None:
         for key, (low, high) in self.validity.items():

@@ -41,16 +41,8 @@ class Sampling(Keys, frozen=True, kw_only=True):
         | None
     ) = msgspec.field(name="cases", default=None)
     seed: Annotated[int, number("of what is drawn", least=0, most=2**63 - 1)] = 0
-    batch: (
-        Annotated[
-            int, number("cases computed and kept together; 8, or 16384 of a family", least=1, most=10**6, example=8)
-        ]
-        | None
-    ) = None
-    solver: Annotated[
-        Literal["auto", "full", "family"],
-        says("family: interpolated between full solves, with its error; full: every design by the solver"),
-    ] = "auto"
+    batch: Annotated[int, number("cases computed and kept together; 8, or 16384 of a family", least=1, most=10**6, example=8)] | None = None  # fmt: skip
+    solver: Annotated[Literal["auto", "full", "family"], says("family: interpolated between full solves, with its error; full: every design by the solver")] = "auto"  # fmt: skip
 
     def __post_init__(self) -> None:
         if self.method not in DRAWN and self.stated_cases is not None:
@@ -72,16 +64,11 @@ class Sampling(Keys, frozen=True, kw_only=True):
 class ParameterKeys(Keys, frozen=True, kw_only=True):
     """What is varied, in the unit of its name."""
 
-    name: Annotated[
-        str,
-        says("a key of the card, temperature_degC, or user.NAME for your function", example="resonator.thickness_mm"),
-    ]
+    name: Annotated[str, says("a key of the card, temperature_degC, or user.NAME for your function", example="resonator.thickness_mm")]  # fmt: skip
     tolerance: Annotated[float, number("nominal ± tolerance", above=0.0, example=0.005)] | None = None
     low: Annotated[float, number("instead of tolerance", example=0.85)] | None = None
     high: Annotated[float, number("with low", example=0.95)] | None = None
-    values: (
-        Annotated[tuple[float | str, ...], says("instead, of grid and list", least=1, example=[0.85, 0.9, 0.95])] | None
-    ) = None
+    values: Annotated[tuple[float | str, ...], says("instead, of grid and list", least=1, example=[0.85, 0.9, 0.95])] | None = None  # fmt: skip
     nominal: Annotated[float | str, says("the card's value unless given", example=0.9)] | None = None
     stated_distribution: (
         Annotated[

@@ -75,10 +75,7 @@ class HarmonicQuantity(Quantity, frozen=True, kw_only=True):
     """A quantity of one harmonic."""
 
     harmonic: Annotated[int, number("circumferential harmonic n", least=0, most=100)] = 2
-    theory: Annotated[
-        Literal["solid", "shell", "rayleigh"],
-        says("solid (three-dimensional), shell (Naghdi) or rayleigh (closed form)"),
-    ] = "solid"
+    theory: Annotated[Literal["solid", "shell", "rayleigh"], says("solid (three-dimensional), shell (Naghdi) or rayleigh (closed form)")] = "solid"  # fmt: skip
 
     def list_modes(self) -> "Iterable[tuple[int, int, float]]":
         """Return what it solves at least: harmonic, number of modes, tolerance."""

@@ -36,13 +36,7 @@ class ElectrodeKeys(Keys, frozen=True, kw_only=True):
         tuple[float, ...],
         says("added in squares: what each has besides, in order; 0 where the list ends", example=[0.0, 30.0]),
     ] = ()
-    resistance_ohm: (
-        Annotated[
-            float,
-            number("in series with each electrode (film, lead, source): bias currents damp", above=0.0, example=1e4),
-        ]
-        | None
-    ) = None
+    resistance_ohm: Annotated[float, number("in series with each electrode (film, lead, source): bias currents damp", above=0.0, example=1e4)] | None = None  # fmt: skip
     gap_expansion_per_K: Annotated[float, number("(1/g) dg/dT")] = 0.0
     gap_wave: tuple[GapWave, ...] = ()
     note: Note = ""

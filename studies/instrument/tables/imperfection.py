@@ -20,18 +20,12 @@ SHARES = {"density": "density", "modulus": "modulus"}
 class WaveKeys(Keys, frozen=True, kw_only=True):
     """A wave around of a length or of a property of the material."""
 
-    of: Annotated[
-        Literal["wall", "outer", "inner", "offset", "rim", "density", "modulus"],
-        says("offset: of the middle surface; rim: of its edge"),
-    ] = "wall"
+    of: Annotated[Literal["wall", "outer", "inner", "offset", "rim", "density", "modulus"], says("offset: of the middle surface; rim: of its edge")] = "wall"  # fmt: skip
     order: Annotated[int, number("crests around", least=0, most=40, example=4)]
     amplitude_um: Annotated[float, number("of lengths", example=0.3)] | None = None
     amplitude_ppm: Annotated[float, number("of density and modulus", example=100.0)] | None = None
     azimuth_deg: Annotated[float, number("of a crest")] = 0.0
-    power: Annotated[
-        float,
-        number("grows as position to this power, 0 where the meridian starts and 1 at the rim", least=0.0, most=40.0),
-    ] = 0.0
+    power: Annotated[float, number("grows as position to this power, 0 where the meridian starts and 1 at the rim", least=0.0, most=40.0)] = 0.0  # fmt: skip
 
     def __post_init__(self) -> None:
         right, wrong = ("amplitude_um", "amplitude_ppm") if self.of in LENGTHS else ("amplitude_ppm", "amplitude_um")

@@ -42,18 +42,7 @@ class LawKeys(Keys, frozen=True, kw_only=True):
     lag_s: Annotated[float, number("of the resonator behind its housing", above=0.0, relative_sd=1.0)] = 1500.0
     second_lag_s: Annotated[float, number("in series with it", above=0.0, relative_sd=1.0)] | None = None
     third_lag_s: Annotated[float, number("in series with both", above=0.0, relative_sd=1.0)] | None = None
-    radiated_share: (
-        Annotated[
-            float,
-            number(
-                "of the heat exchange at 20 °C; below 0 where conductance falls with temperature",
-                least=-0.5,
-                most=0.95,
-                sd=0.3,
-            ),
-        ]
-        | None
-    ) = None
+    radiated_share: Annotated[float, number("of the heat exchange at 20 °C; below 0 where conductance falls with temperature", least=-0.5, most=0.95, sd=0.3)] | None = None  # fmt: skip
     direct_share: Annotated[float, number("of the resonator's radiation, with the housing and past the lags between", least=0.0, most=1.0, sd=0.5)] | None = None  # fmt: skip
     base_radiated_share: Annotated[float, number("of the heat exchange of the lags between at 20 °C", least=-0.5, most=0.95, sd=0.3)] | None = None  # fmt: skip
     capacity_ratio: Annotated[float, number("heat capacity of the resonator over that of the lump before it", above=0.0, most=10.0, sd=0.3)] | None = None  # fmt: skip

@@ -16,18 +16,7 @@ class FilmKeys(Keys, frozen=True, kw_only=True):
 
     material: Annotated[str, says("of the table (gold, chromium, …), or with its own numbers", example="gold")]
     thickness_nm: Annotated[float, number("of the film", above=0.0, relative_sd=0.1, example=100.0)]
-    loss: (
-        Annotated[
-            float,
-            number(
-                "its own loss angle; no source states that of an evaporated metal",
-                least=0.0,
-                relative_sd=1.0,
-                example=0.0001,
-            ),
-        ]
-        | None
-    ) = None
+    loss: Annotated[float, number("its own loss angle; no source states that of an evaporated metal", least=0.0, relative_sd=1.0, example=0.0001)] | None = None  # fmt: skip
     face: Annotated[Literal["inner", "outer", "both"], says("of the shell")] = "both"
     from_position: Annotated[Share, says("of the meridian, 0 … 1")] = 0.0
     to_position: Annotated[Share, says("likewise")] = 1.0
@@ -46,9 +35,7 @@ class FilmKeys(Keys, frozen=True, kw_only=True):
         | None
     ) = None
     anisotropy_angle_deg: Annotated[float, number("azimuth of its crest", sd=13.0)] = 0.0
-    youngs_modulus_GPa: (
-        Annotated[Positive, says("of the film table unless given, as the next ones", example=80.0)] | None
-    ) = None
+    youngs_modulus_GPa: Annotated[Positive, says("of the film table unless given, as the next ones", example=80.0)] | None = None  # fmt: skip
     poisson_ratio: Annotated[float, number("of the film", above=-1.0, below=0.5, example=0.42)] | None = None
     expansion_per_K: Annotated[float, number("of the film", example=1.4e-05)] | None = None
     conductivity_W_per_m_K: Annotated[Positive, says("of the film", example=300.0)] | None = None
@@ -73,12 +60,7 @@ class ActivatedKeys(Keys, frozen=True, kw_only=True):
 class LossParts(Keys, frozen=True, kw_only=True):
     """What a loss budget is made of beside geometry and material."""
 
-    pressure_Pa: (
-        Annotated[
-            float, number("gas sealed in, at the reference temperature", least=0.0, relative_sd=0.5, example=0.001)
-        ]
-        | None
-    ) = None
+    pressure_Pa: Annotated[float, number("gas sealed in, at the reference temperature", least=0.0, relative_sd=0.5, example=0.001)] | None = None  # fmt: skip
     gas: Annotated[Gas, says("in the housing")] = "air"
     accommodation: Annotated[Share, says("share of molecules that leave a wall diffusely")] = 1.0
     bulk_coefficient: (
@@ -94,26 +76,10 @@ class LossParts(Keys, frozen=True, kw_only=True):
         | None
     ) = None
     bulk_exponent: Annotated[float, number("b; of the loss table unless given", example=0.77)] | None = None
-    surface_layer_pm: (
-        Annotated[
-            float,
-            number(
-                "depth times loss of the damaged surface; of the loss table unless given",
-                least=0.0,
-                relative_sd=0.2,
-                example=5.2,
-            ),
-        ]
-        | None
-    ) = None
-    surface_anisotropy: (
-        Annotated[float, number("wave 2n of the surface loss", least=0.0, most=1.0, relative_sd=1.0, example=0.01)]
-        | None
-    ) = None
+    surface_layer_pm: Annotated[float, number("depth times loss of the damaged surface; of the loss table unless given", least=0.0, relative_sd=0.2, example=5.2)] | None = None  # fmt: skip
+    surface_anisotropy: Annotated[float, number("wave 2n of the surface loss", least=0.0, most=1.0, relative_sd=1.0, example=0.01)] | None = None  # fmt: skip
     surface_anisotropy_angle_deg: Annotated[float, number("azimuth of its crest", sd=13.0)] = 0.0
-    anchor_inverse_q: (
-        Annotated[float, number("loss through the mount", least=0.0, relative_sd=1.0, example=1e-09)] | None
-    ) = None
+    anchor_inverse_q: Annotated[float, number("loss through the mount", least=0.0, relative_sd=1.0, example=1e-09)] | None = None  # fmt: skip
     unbalance_mg: (
         Annotated[
             float,
@@ -127,18 +93,7 @@ class LossParts(Keys, frozen=True, kw_only=True):
         | None
     ) = None
     unbalance_azimuth_deg: Annotated[float, number("of that mass")] = 0.0
-    third_unbalance_mg: (
-        Annotated[
-            float,
-            number(
-                "the third, Σ m exp(3iθ); both together damp the patterns unequally",
-                least=0.0,
-                relative_sd=0.5,
-                example=0.1,
-            ),
-        ]
-        | None
-    ) = None
+    third_unbalance_mg: Annotated[float, number("the third, Σ m exp(3iθ); both together damp the patterns unequally", least=0.0, relative_sd=0.5, example=0.1)] | None = None  # fmt: skip
     third_unbalance_azimuth_deg: Annotated[float, number("of that mass")] = 0.0
     film: tuple[FilmKeys, ...] = ()
     activated: tuple[ActivatedKeys, ...] = ()

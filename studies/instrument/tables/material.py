@@ -81,12 +81,7 @@ class MaterialKeys(Keys, frozen=True, kw_only=True):
     name: Annotated[str, says("of the material table, or of one's own with given values", example="fused-silica")]
     law: Annotated[str, says("which published temperature law")] = "default"
     file: Annotated[str, says("a user's own material table, beside the card", example="mine.toml")] | None = None
-    youngs_modulus_GPa: (
-        Annotated[
-            float, number("at the reference temperature; rescales the law of a table's name", above=0.0, example=72.6)
-        ]
-        | None
-    ) = None
+    youngs_modulus_GPa: Annotated[float, number("at the reference temperature; rescales the law of a table's name", above=0.0, example=72.6)] | None = None  # fmt: skip
     poisson_ratio: Annotated[float, number("likewise", above=-1.0, below=0.5, example=0.17)] | None = None
     density_kg_m3: Annotated[float, number("likewise", above=0.0, example=2200.0)] | None = None
     crystal: Crystal | None = None

@@ -28,18 +28,7 @@ class MountKeys(Keys, frozen=True, kw_only=True):
         ]
         | None
     ) = None
-    joined_at_degC: (
-        Annotated[
-            float,
-            number(
-                "where the joint is free of stress; the reference temperature unless given",
-                least=-273.15,
-                most=1500.0,
-                example=20.0,
-            ),
-        ]
-        | None
-    ) = None
+    joined_at_degC: Annotated[float, number("where the joint is free of stress; the reference temperature unless given", least=-273.15, most=1500.0, example=20.0)] | None = None  # fmt: skip
     note: Note = ""
 
     def __post_init__(self) -> None:

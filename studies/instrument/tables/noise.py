@@ -19,9 +19,7 @@ class NoiseKeys(Keys, frozen=True, kw_only=True):
     bias_walk_deg_per_h_per_rt_h: Annotated[Level, says("rate random walk: sd of the change in 1 h")] = 0.01
     bias_turn_on_deg_per_h: Annotated[Level, says("sd of the offset from run to run; 0: not specified")] = 0.0
     inverse_q_white: Annotated[Level, says("relative, Allan deviation at 1 s")] = 0.01
-    pattern_angle_white_deg: Annotated[
-        Level, says("of a measured azimuth (whole angle), Allan deviation at 1 s; it also walks as the bias does")
-    ] = 3e-5
+    pattern_angle_white_deg: Annotated[Level, says("of a measured azimuth (whole angle), Allan deviation at 1 s; it also walks as the bias does")] = 3e-5  # fmt: skip
     quadrature_white_V: Annotated[Level, says("Allan deviation at 1 s, of a card with loops")] = 1e-4
     housing_white_K: Annotated[Level, says("of the housing sensor, Allan deviation at 1 s")] = 5e-3
     housing_lag_s: Annotated[float, number("of the housing sensor", least=0.0, relative_sd=0.5)] = 10.0

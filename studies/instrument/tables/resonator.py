@@ -48,10 +48,7 @@ class StemKeys(Keys, frozen=True, kw_only=True):
 class Shape(Keys, frozen=True, kw_only=True, tag_field="shape"):
     """What every shape has: a number, or [position, value] pairs that are joined linearly from 0 (start) to 1 (rim)."""
 
-    thickness_mm: Annotated[
-        Thickness,
-        says("a number, or [position, value] pairs, linear between; 0 where the meridian starts, 1 at the rim"),
-    ]
+    thickness_mm: Annotated[Thickness, says("a number, or [position, value] pairs, linear between; 0 where the meridian starts, 1 at the rim")]  # fmt: skip
 
     def __post_init__(self) -> None:
         places = [s for s, _ in self.thickness_mm] if isinstance(self.thickness_mm, list) else []

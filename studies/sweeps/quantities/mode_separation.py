@@ -16,9 +16,7 @@ class ModeSeparation(ModeQuantity, frozen=True, kw_only=True, tag="mode-separati
 
     highest: Annotated[int, number("highest harmonic that is searched", least=0, most=20)] = 4
     each: Annotated[int, number("least number of modes solved for each harmonic", least=1, most=10)] = 2
-    tolerance: Annotated[float, number("relative error allowed of the other harmonics", least=1e-8, most=1e-2)] = (
-        TOLERANCE
-    )
+    tolerance: Annotated[float, number("relative error allowed of the other harmonics", least=1e-8, most=1e-2)] = TOLERANCE  # fmt: skip
     distances: Annotated[bool, says("an extra column for the distance to each of these modes")] = False
 
     def list_columns(self) -> tuple[Column, ...]:

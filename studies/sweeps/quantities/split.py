@@ -12,9 +12,7 @@ class Split(ModeQuantity, frozen=True, kw_only=True, tag="split"):
     """Frequency split of a pair and the azimuth of its slower mode."""
 
     theory: Annotated[Literal["solid", "shell"], says("solid (three-dimensional) or shell (Naghdi)")] = "solid"
-    order: Annotated[
-        Literal["first", "every"], says("first order in the imperfection, or every order with the harmonics coupled")
-    ] = "first"
+    order: Annotated[Literal["first", "every"], says("first order in the imperfection, or every order with the harmonics coupled")] = "first"  # fmt: skip
 
     def list_columns(self) -> tuple[Column, ...]:
         return (
