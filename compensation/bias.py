@@ -158,19 +158,10 @@ def rate_run(blocks: Blocks, f: Array, window: float, *, causal: bool, variable:
             f"no stretch of the run fills the window of {window:g} s over which the rate is taken; shorten the window or record longer."
         )
     return BiasRun(
-        time=blocks.time[ok],
-        state=f[ok],
-        rate=derivative.slope[ok],
-        play=play[ok],
-        bias=blocks.columns["bias"][ok],
-        width=blocks.width,
-        window=window,
-        lag=derivative.lag,
-        missing=blocks.missing,
-        spikes=blocks.spikes,
-        variable=variable,
-        memory=memory,
-    )
+        time=blocks.time[ok], state=f[ok], rate=derivative.slope[ok], play=play[ok],
+        bias=blocks.columns["bias"][ok], width=blocks.width, window=window, lag=derivative.lag,
+        missing=blocks.missing, spikes=blocks.spikes, variable=variable, memory=memory,
+    )  # fmt: skip
 
 
 def _check_seconds(name: str, seconds: float) -> None:

@@ -74,13 +74,9 @@ def start_up(
         course[n] = abs(Z), phase, nu
     time = np.asarray(T * np.arange(1, steps + 1), dtype=float)
     return StartUp(
-        time,
-        course[:, 0],
-        course[:, 1],
-        course[:, 2],
-        _since(time, np.abs(course[:, 1]) < LOCKED),
+        time, course[:, 0], course[:, 1], course[:, 2], _since(time, np.abs(course[:, 1]) < LOCKED),
         _since(time, np.abs(course[:, 0] - 1) < SETTLED),
-    )
+    )  # fmt: skip
 
 
 def _since(time: Array, holds: NDArray[np.bool_]) -> float:

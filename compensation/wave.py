@@ -138,12 +138,6 @@ def from_quality(
         raise CompensationError("frequency and quality factor must be positive.")
     decay = np.pi * frequency / quality
     return StandingWave(
-        2 * np.pi * frequency,
-        1 / decay,
-        damping_anisotropy * decay,
-        damping_axis,
-        2 * np.pi * frequency_split,
-        frequency_axis,
-        harmonic,
-        bryan_factor,
-    )
+        2 * np.pi * frequency, 1 / decay, damping_anisotropy * decay, damping_axis,
+        2 * np.pi * frequency_split, frequency_axis, harmonic, bryan_factor,
+    )  # fmt: skip

@@ -153,13 +153,9 @@ class Reference:
             return np.asarray((f[:, None, i] * g[None, :, j]).reshape(-1, len(i)))
 
         return cls(
-            weights.ravel(),
-            nodal(sides, xi),
-            nodal(sides, eta),
-            product(one.values, two.values),
-            product(one.slopes, two.values),
-            product(one.values, two.slopes),
-        )
+            weights.ravel(), nodal(sides, xi), nodal(sides, eta), product(one.values, two.values),
+            product(one.slopes, two.values), product(one.values, two.slopes),
+        )  # fmt: skip
 
     def chosen(self, functions: Index) -> "Reference":
         """The same with some of the functions."""

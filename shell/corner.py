@@ -53,13 +53,9 @@ def lay_corner(
     outer = r_1 + x * a, z_1 + x * b
     cells = rings(shrinking(ring_count))
     kite = Patch(
-        straight(meeting, feet[0]),
-        straight(feet[1], outer),
-        straight(meeting, feet[1]),
-        straight(feet[0], outer),
-        cells,
-        "corner",
-    )
+        straight(meeting, feet[0]), straight(feet[1], outer), straight(meeting, feet[1]),
+        straight(feet[0], outer), cells, "corner",
+    )  # fmt: skip
     ends = (_strip_end(resonator, joint, s_1, -1), _strip_end(resonator, joint + 1, s_2, 1))
     if stiff_ties:
         cells = narrowed(cells, NARROW)

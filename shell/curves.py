@@ -127,13 +127,9 @@ class Arc(Curve):
         psi = self.first_angle + turn * x
         sine, cosine = self.radius * np.sin(psi), self.radius * np.cos(psi)
         return Jet(
-            self.center[0] + sine,
-            self.center[1] + cosine,
-            turn * cosine,
-            -turn * sine,
-            -(turn**2) * sine,
+            self.center[0] + sine, self.center[1] + cosine, turn * cosine, -turn * sine, -(turn**2) * sine,
             -(turn**2) * cosine,
-        )
+        )  # fmt: skip
 
     def at_length(self, s: Array) -> Jet:
         """Position and derivatives at arc lengths s (m)."""

@@ -84,17 +84,9 @@ def _fill(plotter: Any, scene: Scene, limits: tuple[float, float], first: bool) 
         "height": 0.12,
     }
     plotter.add_mesh(
-        body,
-        scalars=scene.legend,
-        cmap="cividis",
-        clim=limits,
-        smooth_shading=True,
-        show_scalar_bar=bool(scene.legend),
-        scalar_bar_args=bar,
-        ambient=0.38,
-        diffuse=0.72,
-        specular=0.1,
-    )
+        body, scalars=scene.legend, cmap="cividis", clim=limits, smooth_shading=True,
+        show_scalar_bar=bool(scene.legend), scalar_bar_args=bar, ambient=0.38, diffuse=0.72, specular=0.1,
+    )  # fmt: skip
     moving = [(body, body.points.copy(), scene.displacement[origin])]
     for line in scene.nodes:
         members = line[line >= 0]

@@ -154,18 +154,11 @@ def solve_modes(
         )
     return tuple(
         Mode(
-            harmonic,
-            k,
-            sqrt(solution.eigenvalue) / (2 * pi),
-            theory,
-            error,
-            solution.bryan_factor,
-            _label(solution),
-            solution,
-            resonator,
+            harmonic, k, sqrt(solution.eigenvalue) / (2 * pi), theory, error, solution.bryan_factor,
+            _label(solution), solution, resonator,
         )
         for k, (solution, error) in enumerate(zip(solutions, errors, strict=True))
-    )
+    )  # fmt: skip
 
 
 def nearest_mode(

@@ -53,14 +53,9 @@ def render_animation(
     buffer = io.BytesIO()
     more: dict[str, Any] = {"quality": 80, "method": 4} if kind == "webp" else {"optimize": True}
     drawn[0].save(
-        buffer,
-        kind.upper(),
-        save_all=True,
-        append_images=drawn[1:],
-        duration=round(1000 * period / frames),
-        loop=0,
-        **more,
-    )
+        buffer, kind.upper(), save_all=True, append_images=drawn[1:], duration=round(1000 * period / frames),
+        loop=0, **more,
+    )  # fmt: skip
     return buffer.getvalue()
 
 

@@ -95,14 +95,9 @@ def revolve(outlines: Sequence[Outline], count: int, n: int) -> Surface:
         triangles.append(_triangulate(grid, closed=not line.on_axis))
         grids.append(grid)
     return Surface(
-        np.concatenate(points),
-        np.concatenate(moved),
-        np.concatenate(energy),
-        np.concatenate(position),
-        np.concatenate(triangles),
-        tuple(grids),
-        n,
-    )
+        np.concatenate(points), np.concatenate(moved), np.concatenate(energy), np.concatenate(position),
+        np.concatenate(triangles), tuple(grids), n,
+    )  # fmt: skip
 
 
 def _triangulate(grid: Triangles, closed: bool) -> Triangles:

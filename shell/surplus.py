@@ -251,15 +251,9 @@ def _extend_shell(resonator: Resonator, group: ShellGroup, n: int, level: Level)
         units.append(tuple(kind[e].take(where, mode="clip") for kind in kinds))
     is_deep = ~is_old[used % width]
     return ShellExtension(
-        table,
-        is_old,
-        is_deep,
-        values_to_hierarchic(p),
-        pattern,
-        tuple(places),
-        tuple(units),
+        table, is_old, is_deep, values_to_hierarchic(p), pattern, tuple(places), tuple(units),
         _count(resonator, chain, level),
-    )
+    )  # fmt: skip
 
 
 def _count(resonator: Resonator, chain: Chain, level: Level) -> float:

@@ -71,16 +71,9 @@ def integrate(
             return matrix
 
         solution = scipy.integrate.solve_ivp(
-            rate,
-            (start, end),
-            T,
-            method="Radau",
-            jac=jacobian,
-            dense_output=True,
-            rtol=relative_tolerance,
-            atol=1e-3 * relative_tolerance,
-            max_step=longest,
-        )
+            rate, (start, end), T, method="Radau", jac=jacobian, dense_output=True, rtol=relative_tolerance,
+            atol=1e-3 * relative_tolerance, max_step=longest,
+        )  # fmt: skip
         if not solution.success:
             raise ThermalError(f"the integration stopped at {solution.t[-1]:g} s: {solution.message}")
         T = solution.y[:, -1]

@@ -47,14 +47,9 @@ def describe_shell_and_stem(path: HeatPath) -> list[Part]:
     half_resistance = path.stem_length / 2 / (path.conductivity * section)
     stem = scale(path.volumetric_capacity, section * path.stem_length)
     shell = describe_meridian(
-        path.cells,
-        "stem",
-        path.volumetric_capacity,
-        path.conductivity,
-        root_resistance=half_resistance,
-        exchange=2 * path.emissivity,
-        surroundings="base",
-    )
+        path.cells, "stem", path.volumetric_capacity, path.conductivity, root_resistance=half_resistance,
+        exchange=2 * path.emissivity, surroundings="base",
+    )  # fmt: skip
     return [Node("stem", stem), Conductor("base", "stem", 1 / half_resistance), *shell]
 
 

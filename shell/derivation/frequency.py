@@ -100,13 +100,9 @@ def log_derivatives() -> LogDerivatives:
     }
     rim = sum(sp.simplify(logarithm.diff(integral)) * slope for integral, slope in at_rim.items())
     return LogDerivatives(
-        E=by_logarithm[E],
-        nu=sp.factor(logarithm.diff(nu)),
-        rho=by_logarithm[rho],
-        h=by_logarithm[h],
-        r=by_logarithm[r],
-        phi_2=rim,
-    )
+        E=by_logarithm[E], nu=sp.factor(logarithm.diff(nu)), rho=by_logarithm[rho], h=by_logarithm[h],
+        r=by_logarithm[r], phi_2=rim,
+    )  # fmt: skip
 
 
 @cache

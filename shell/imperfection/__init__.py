@@ -13,14 +13,6 @@ from shell.imperfection.pair import Pair
 from shell.imperfection.split import Split, find_split
 
 __all__ = [
-    "CoupledHarmonics",
-    "Field",
-    "Imperfection",
-    "Pair",
-    "PointMass",
-    "Split",
-    "Sum",
-    "Waves",
-    "find_split",
+    "CoupledHarmonics", "Field", "Imperfection", "Pair", "PointMass", "Split", "Sum", "Waves", "find_split",
     "wave",
-]
+]  # fmt: skip

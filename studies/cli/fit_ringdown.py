@@ -142,15 +142,10 @@ def _row(decay: Decay) -> dict[str, Any]:
             if name in estimates
         ],
         **row_of(
-            decay,
-            "noise",
-            "widening",
-            "remarks",
-            frequency_Hz="frequency",
-            interference_Hz="interference",
+            decay, "noise", "widening", "remarks", frequency_Hz="frequency", interference_Hz="interference",
             window_s="window",
         ),
-    }
+    }  # fmt: skip
 
 
 def _draw(decay: Decay) -> Drawing:

@@ -13,13 +13,6 @@ from studies.effects.effect import (
 from studies.effects.states import States
 
 __all__ = [
-    "Coefficient",
-    "Effect",
-    "Parameter",
-    "Span",
-    "States",
-    "apply_effect",
-    "apply_effects",
-    "find_effect",
+    "Coefficient", "Effect", "Parameter", "Span", "States", "apply_effect", "apply_effects", "find_effect",
     "library",
-]
+]  # fmt: skip

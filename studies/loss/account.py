@@ -33,13 +33,9 @@ def damping_around(model: "LossModel", budget: Budget) -> DampingAround | None:
     split, axis = describe_wave(model.wave(budget), model.harmonic)
     omega = model.vibration.omega(budget.temperatures)
     wave = StandingWave(
-        omega,
-        2 / (omega * budget.inverse_q),
-        omega * split / 2,
-        axis,
-        harmonic=model.harmonic,
+        omega, 2 / (omega * budget.inverse_q), omega * split / 2, axis, harmonic=model.harmonic,
         bryan_factor=model.bryan_factor,
-    )
+    )  # fmt: skip
     worst = np.degrees(wave.drift(axis + np.pi / (4 * model.harmonic))) * 3600
     return DampingAround(split, axis, worst)
 

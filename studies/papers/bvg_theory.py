@@ -129,16 +129,9 @@ def read_planted_rate(planted: float = 2.0) -> LoopReading:
             K = scale_of_rebalance(bell, omega, float(abs(P[-1])))
             by_scale = K * float(np.real(F[-1] / (1j * P[-1] / abs(P[-1]))))
     return LoopReading(
-        planted,
-        found["open"],
-        found["rebalance"],
-        by_scale / planted - 1,
-        2 * np.arcsin(0.1) / np.pi,
-        found["second"],
-        found["charges"],
-        abs(1e-6 / ring.scales[0]),
-        share,
-    )
+        planted, found["open"], found["rebalance"], by_scale / planted - 1, 2 * np.arcsin(0.1) / np.pi,
+        found["second"], found["charges"], abs(1e-6 / ring.scales[0]), share,
+    )  # fmt: skip
 
 
 def _bell_with_elements() -> "tuple[BellResonator, PiezoRing, float]":

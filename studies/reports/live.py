@@ -155,15 +155,9 @@ def _families(
             return designs.make(values).resonator
 
         return build_family(
-            resonator,
-            designs.axes,
-            nu=span,
-            harmonic=n,
-            index=index,
-            theory=theory,
-            tolerance=tolerance,
+            resonator, designs.axes, nu=span, harmonic=n, index=index, theory=theory, tolerance=tolerance,
             most=MOST_SOLVES,
-        )
+        )  # fmt: skip
 
     tell("sliders", 0.0)
     families, lost = [build(harmonic, 0, TOLERANCE)], []

@@ -116,12 +116,8 @@ def _summarise(parts: Reproduction) -> dict[str, Any]:
         "schema": "hrg.reproduce/1",
         "cubic": {
             **row_of(
-                fit,
-                "reference_temperature_degC",
-                "coefficients",
-                "standard_errors",
-                "largest_residual_of_span",
-                **fitted,
+                fit, "reference_temperature_degC", "coefficients", "standard_errors",
+                "largest_residual_of_span", **fitted,
             ),
             "largest_residual_Hz": float(np.abs(fit.residuals).max()),
         },
@@ -142,7 +138,7 @@ def _summarise(parts: Reproduction) -> dict[str, Any]:
         "diagnosis_of_table1": parts.diagnosis.as_dict(),
         "card": physics.instrument.name,
         **parts.gyro_summary,
-    }
+    }  # fmt: skip
 
 
 def _facts(parts: Reproduction) -> Facts:

@@ -30,26 +30,16 @@ class FunctionLost(RuntimeError):
     """Somebody else ended the process of the user's function (out of memory, kill): that is no result of the case."""
 
 
-STOPPED = (
-    signal.SIGKILL,
-    signal.SIGTERM,
-    signal.SIGHUP,
-    signal.SIGINT,
-)  # signals that a process does not raise by a fault
+# signals that a process does not raise by a fault
+STOPPED = (signal.SIGKILL, signal.SIGTERM, signal.SIGHUP, signal.SIGINT)
 
 
 class Child:
     """One process that holds one user function."""
 
     def __init__(self, function: str) -> None:
-        command = [
-            sys.executable,
-            "-P",
-            "-c",
-            "from studies.sweeps.child import serve; serve()",
-            function,
-            str(os.getpid()),
-        ]
+        start = "from studies.sweeps.child import serve; serve()"
+        command = [sys.executable, "-P", "-c", start, function, str(os.getpid())]
         path = os.pathsep.join([str(Path(__file__).parents[2]), *filter(None, [os.environ.get("PYTHONPATH")])])
         self.function = function
         self.asked = 0
@@ -246,9 +236,9 @@ def _answer(function: str, call: Any, build: Any, request: dict[str, Any]) -> di
         value = float(value)
     except Exception as error:
         return {"problem": _describe(function, error)}
-    return (
-        {"value": value} if math.isfinite(value) else {"problem": f"{function} returned {value}, not a finite number."}
-    )
+    if not math.isfinite(value):
+        return {"problem": f"{function} returned {value}, not a finite number."}
+    return {"value": value}
 
 
 def _describe(function: str, error: BaseException) -> str:

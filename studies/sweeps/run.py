@@ -28,6 +28,7 @@ from studies.sweeps.spec import read_study
 from studies.sweeps.store import FILE, Store, memory_store
 from studies.sweeps.workers import Here, Workers, cores
 
+INSTRUMENT = ("name", "reference_temperature", "content", "path")  # what a store keeps of it
 STORE_SECONDS = 3e-5  # for one case to be hashed, committed and counted
 
 
@@ -173,12 +174,7 @@ def describe_study(store: Store, study: Study, identity: Mapping[str, Any], desi
             "identity": identity,
             "spec": study.content,
             "spec_text": study.text,
-            "instrument": {
-                "name": instrument.name,
-                "reference_temperature": instrument.reference_temperature,
-                "content": instrument.content,
-                "path": instrument.path,
-            },
+            "instrument": {name: getattr(instrument, name) for name in INSTRUMENT},
             "folder": study.folder,
             "cases": 0 if design is None else len(design.unique),
             "repeats": design.inverse.tolist() if design and len(design.unique) < len(design.values) else [],
@@ -214,14 +210,8 @@ def _describe_families(families: Families | None) -> Any:
     if families is None:
         return "full"
     return [
-        [
-            *key,
-            [[axis.name, axis.low, axis.high] for axis in family.axes],
-            family.nu,
-            family.solver_tolerance,
-            family.solves,
-        ]
-        for key, family in families.members.items()
+        [*key, [[a.name, a.low, a.high] for a in one.axes], one.nu, one.solver_tolerance, one.solves]
+        for key, one in families.members.items()
     ]
 
 
