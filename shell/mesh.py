@@ -3,8 +3,6 @@
 >>> data = encode_mesh(build_surface(resonator), "stl")
 """
 
-import json
-import struct
 from math import pi
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -12,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shell.errors import ShellError
-from shell.quadrature import Array
 from shell.surface import Surface
 
 if TYPE_CHECKING:
@@ -21,7 +18,7 @@ if TYPE_CHECKING:
 MM_PER_M = 1e3
 KEYS = 17  # key frames of one period
 PERIOD = 1.4  # s, of the swing in a viewer
-FLOAT, BYTE, INT = 5126, 5121, 5125  # glTF component types
+FLOAT = 5126  # of glTF
 UPRIGHT = [-(0.5**0.5), 0.0, 0.0, 0.5**0.5]  # glTF has y up; the axis of the resonator is z
 
 MeshKind = Literal["stl", "ply", "glb"]
@@ -55,87 +52,37 @@ def encode_animation(
     surface: Surface, swing: float, colours: "NDArray[np.uint8] | None" = None, animated: bool = True
 ) -> bytes:
     """Return a GLB in which the mode swings, one morph target of weight cos ωt (glTF 2.0), or the still solid at its largest swing."""
+    import trimesh
+    from trimesh.exchange.gltf import export_glb
+
     if animated and swing == 0:
         raise ShellError("an animation needs a swing other than 0.")
-    buffers = _Buffers()
-    rest = surface.points if animated else surface.points + swing * surface.displacement
-    attributes = {"POSITION": buffers.add(rest, FLOAT, "VEC3", bounds=True)}
-    if colours is not None:
-        padded = np.full((len(colours), 4), 255, dtype=np.uint8)
-        padded[:, : colours.shape[1]] = colours
-        attributes["COLOR_0"] = buffers.add(padded, BYTE, "VEC4", normalized=True)
-    primitive: dict[str, Any] = {
-        "attributes": attributes,
-        "indices": buffers.add(surface.triangles.reshape(-1), INT, "SCALAR"),
-        "material": 0,
-    }
-    mesh: dict[str, Any] = {"primitives": [primitive]}
-    document: dict[str, Any] = {
-        "asset": {"version": "2.0", "generator": "hrg-workbench"},
-        "scene": 0,
-        "scenes": [{"nodes": [0]}],
-        "nodes": [{"mesh": 0, "rotation": UPRIGHT}],
-        "meshes": [mesh],
-        "materials": [{"pbrMetallicRoughness": {"metallicFactor": 0.0, "roughnessFactor": 0.7}}],
-    }
+    moved = swing * surface.displacement
+    rest = surface.points if animated else surface.points + moved
+    mesh = trimesh.Trimesh(rest, surface.triangles, vertex_colors=colours, process=False)
     if animated:
-        primitive["targets"] = [{"POSITION": buffers.add(swing * surface.displacement, FLOAT, "VEC3", bounds=True)}]
-        mesh["weights"] = [1.0]
+        mesh.vertex_attributes["moved"] = moved
+
+    def finish(buffers: dict[str, bytes], document: dict[str, Any]) -> None:
+        (shape,) = document["meshes"]
+        (primitive,) = shape["primitives"]
+        primitive["material"] = 0
+        document["materials"] = [{"pbrMetallicRoughness": {"metallicFactor": 0.0, "roughnessFactor": 0.7}}]
+        document["asset"]["generator"] = "hrg-workbench"
+        document |= {"scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0, "rotation": UPRIGHT}]}
+        if not animated:
+            return
+        primitive["targets"] = [{"POSITION": primitive["attributes"].pop("_moved")}]
+        shape["weights"] = [1.0]
+        sampler: dict[str, Any] = {"interpolation": "LINEAR"}
         turn = np.linspace(0, 1, KEYS)
-        sampler = {
-            "input": buffers.add(turn * PERIOD, FLOAT, "SCALAR", bounds=True),
-            "output": buffers.add(np.cos(2 * pi * turn), FLOAT, "SCALAR"),
-            "interpolation": "LINEAR",
-        }
+        for name, values in (("input", turn * PERIOD), ("output", np.cos(2 * pi * turn))):
+            row = values.astype("<f4")
+            about = {"bufferView": len(buffers), "componentType": FLOAT, "type": "SCALAR", "count": KEYS}
+            sampler[name] = len(document["accessors"])
+            document["accessors"][name] = {**about, "min": [float(row.min())], "max": [float(row.max())]}
+            buffers[name] = row.tobytes()
         channel = {"sampler": 0, "target": {"node": 0, "path": "weights"}}
         document["animations"] = [{"name": "mode", "samplers": [sampler], "channels": [channel]}]
-    return buffers.pack(document)
 
-
-class _Buffers:
-    """The binary chunk of a GLB while it grows, with its views and accessors."""
-
-    def __init__(self) -> None:
-        self.data = bytearray()
-        self.views: list[dict[str, Any]] = []
-        self.accessors: list[dict[str, Any]] = []
-
-    def add(
-        self, values: "Array | NDArray[Any]", component: int, kind: str, bounds: bool = False, normalized: bool = False
-    ) -> int:
-        """Append an array and return the number of its accessor."""
-        packed = np.ascontiguousarray(values, dtype={FLOAT: "<f4", BYTE: "u1", INT: "<u4"}[component])
-        self.views.append({"buffer": 0, "byteOffset": len(self.data), "byteLength": packed.nbytes})
-        self.data += packed.tobytes()
-        self.data += bytes(-len(self.data) % 4)
-        accessor: dict[str, Any] = {
-            "bufferView": len(self.views) - 1,
-            "componentType": component,
-            "count": len(packed),
-            "type": kind,
-        }
-        if normalized:
-            accessor["normalized"] = True
-        if bounds:
-            flat = packed.reshape(len(packed), -1)
-            accessor |= {"min": flat.min(axis=0).tolist(), "max": flat.max(axis=0).tolist()}
-        self.accessors.append(accessor)
-        return len(self.accessors) - 1
-
-    def pack(self, document: dict[str, Any]) -> bytes:
-        """Return header, JSON chunk and binary chunk."""
-        whole = {
-            **document,
-            "buffers": [{"byteLength": len(self.data)}],
-            "bufferViews": self.views,
-            "accessors": self.accessors,
-        }
-        text = json.dumps(whole, separators=(",", ":")).encode()
-        text += b" " * (-len(text) % 4)
-        chunks = (
-            struct.pack("<I4s", len(text), b"JSON")
-            + text
-            + struct.pack("<I4s", len(self.data), b"BIN\0")
-            + bytes(self.data)
-        )
-        return struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks
+    return bytes(export_glb(mesh, include_normals=False, buffer_postprocessor=finish))
