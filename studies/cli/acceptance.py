@@ -1,9 +1,4 @@
-"""`hrg acceptance`: the tests of IEEE Std 1431 in its order, as far as records go, against limits.
-
-Schema hrg.acceptance/1: `card`, `verdict` ("pass", "fail", "incomplete": a limit undecided or without a record), `confidence`, `quantities` (in the
-order of the standard: `key`, `section`, `unit`, `value`, `low`, `high`, `limit`, `bound` ("most" or "least"), `verdict`, `records`, `needs` where it
-is missing), `elsewhere` (tests that ask for more than records), `records` (path: the test that it served), `warm_up_band_deg_per_h`, `report`.
-"""
+"""`hrg acceptance`: the tests of IEEE Std 1431 in its order, as far as records go, against limits."""
 
 from typing import Any
 

@@ -1,15 +1,4 @@
-"""`hrg calibrate`: the card's uncertain values from records, with intervals and shifts.
-
-Schema hrg.calibration/1: `card`, `records`; `values`: `[{parameter, unit, card, value, low, high, shift_sd, width, told_by, bound, interval}]`, `low`
-and `high` a 90 % interval, `shift_sd` the move in prior standard deviations, `width` posterior over prior standard deviation, `told_by` "data",
-"prior" or "both", `bound` "low", "high" or null, `interval` "normal" or "profile"; `inseparable`: groups of parameters that the data ties together
-but cannot tell apart; `responses`: by name `unit`, `as_shipped`, `calibrated`, `noise` (rms of block averages about the mean of each run; of tables,
-of the rows), `run_offset` (rms of the means) and `outliers`; `held_out`: null, or `record` and by response `chamber` and `housing` (`as_shipped`,
-`calibrated`, null where not measured) beside `noise` and `stated` (rms standard deviation that the calibrated values, the run's start and its turn-on
-leave from the chamber, or null); `settled`: for each steady-state table `temperature_degC`, `level_Hz` and `slope_ppm_per_degC` (or null), each
-`measured`, `predicted` by the card as given, `sd` and `away_sd`; `converged`; `warnings`; `calibrated_card`: path of the saved card, or null where it
-was not asked for or is refused. A table of modes is answered with hrg.mode-calibration/1 (`studies.cli.calibrate_modes`).
-"""
+"""`hrg calibrate`: the card's uncertain values from records, with intervals and shifts."""
 
 from typing import Any
 

@@ -1,11 +1,7 @@
 """`hrg calibrate CARD modes.csv`: elastic values, wall and stem from the frequencies of many modes.
 
 The table has the columns `harmonic` (empty: n is not known), `frequency_Hz` and, if wanted, `index` (0 for the lowest of its n), `sd_Hz`,
-`temperature_degC`. Schema hrg.mode-calibration/1: `card`, `table`; `values` as in hrg.calibration/1; `modes`: `[{line, harmonic, index, frequency_Hz,
-predicted_Hz, residual_ppm, sd_ppm, chance, rivals}]`, `chance` the probability of the assignment, `rivals` other modes that the reading may be,
-`[{harmonic, index, chance}]`; `decided`: whether every chance is above 95 %; `next_modes`: by value the mode to measure next, `[{parameter, harmonic,
-index, frequency_Hz, sd, sd_then}]`; `inseparable`: groups of values that are known no better than one of them that the modes do not tell; `misfit`:
-squared residuals and shifts over what is expected; `warnings`; `calibrated_card`.
+`temperature_degC`.
 """
 
 from collections.abc import Sequence

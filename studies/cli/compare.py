@@ -1,7 +1,4 @@
-"""`hrg compare`: designs side by side.
-
-Schema hrg.compare/1: `cards`, `figures` (name, unit, values, uncertainties), `differing` (card key to its values, null where a card has none).
-"""
+"""`hrg compare`: designs side by side."""
 
 from math import isfinite
 

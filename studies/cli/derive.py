@@ -1,12 +1,4 @@
-"""`hrg derive`: the symbolic derivation of the HRG paper's equations (1)–(15), for people and for design code.
-
-Schema hrg.derive/1: `harmonic`, `pole_angle_deg`, `rim_angle_deg`; `I`, `J` and `bryan_factor`, each with its `closed_form` (text) and `value`;
-`d_ln_f_d_rim_angle_per_rad`; `equations`, a list in the order of the derivation with `number` in the paper (null where it has none), `title`, and the
-equations of the step in `latex` and in `plain` text; with --code also `code` with its `language` and `text`.
-
-With --bell: schema hrg.derive-bell/1, `equations` as above and `numbers`, the theory's frequencies beside the solver's. With --dynamics: schema
-hrg.derive-dynamics/1, `equations` and, with --code, `code` as above; the numbers are those of the CVG paper on demodulated dynamics.
-"""
+"""`hrg derive`: the symbolic derivation of the HRG paper's equations (1)–(15), for people and for design code."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import replace

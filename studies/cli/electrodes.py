@@ -1,10 +1,4 @@
-"""`hrg electrodes`: what the card's electrodes do to a pair, and the trim voltages that null a split.
-
-Schema hrg.electrodes/1: `card`, `temperature_degC`, `harmonic`, `frequency_Hz`; `softening_ppm` and `split_Hz`, `slow_axis_deg` by the card's
-voltages; `per_volt_ppm` when all change by one volt; `per_kelvin_ppm` by the expansion of the gap; `pull_in_factor` by which all voltages could grow
-(null without voltages); `reach_Hz`, the split that can be nulled whatever its axis within `limit_V`; `trim`, null unless a split was given:
-{voltages_V, left_Hz, shift_ppm}.
-"""
+"""`hrg electrodes`: what the card's electrodes do to a pair, and the trim voltages that null a split."""
 
 import math
 from math import isinf

@@ -1,7 +1,4 @@
-"""`hrg export`: a record for other programs: MATLAB, TDMS, MDF, HDF5, Parquet, with units and what the record's header says.
-
-Schema hrg.export/1: `record`, `to`, `out`, `rows`, `columns`.
-"""
+"""`hrg export`: a record for other programs: MATLAB, TDMS, MDF, HDF5, Parquet, with units and what the record's header says."""
 
 from collections.abc import Callable, Mapping
 from io import BytesIO

@@ -1,10 +1,4 @@
-"""`hrg fit bias`: the zero-rate output as a function of the gyro's own frequency and its rate of change.
-
-Schema hrg.fit-bias/1. `methods.guarded` and `methods.paper` hold coefficients in the unit of `output` per powers of Hz and Hz/s, the `path` of the
-selection, and stability `before` and `after` with their ratio, on the fitted data and held out (null when nothing can be held out). `over` is the
-column that the bias is a function of, `reference` its value from which changes are counted; a temperature acts behind `lag_s` and a hysteresis loop
-of `play_half_width_degC` (0: none). `allan` is of the longest run, N in unit·√s, B in unit, K in unit/√s; null for runs too short for it.
-"""
+"""`hrg fit bias`: the zero-rate output as a function of the gyro's own frequency and its rate of change."""
 
 from typing import Any, Literal
 

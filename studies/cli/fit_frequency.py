@@ -1,9 +1,4 @@
-"""`hrg fit frequency`: f(T) and its inverse from a steady-state table, or from the settled parts of records.
-
-Schema hrg.fit-frequency/1; from records also `soaks`: `[{record, start_s, end_s, temperature_degC, frequency_Hz, error_Hz, left_K, extrapolated_K}]`
-and `time_constant_s`. `left_K` is the settling error; `extrapolated_K` is the distance from the last reading to the settled state of a hold that was
-extrapolated along its exponential (0 otherwise).
-"""
+"""`hrg fit frequency`: f(T) and its inverse from a steady-state table, or from the settled parts of records."""
 
 from pathlib import Path
 

@@ -1,10 +1,4 @@
-"""`hrg fit ringdown`: frequencies, Q and axes from free decays.
-
-Schema hrg.fit-ringdown/3: `decays` (a list: `data`, `window_s`, `frequency_Hz`, `q` with `q_low` and `q_high`, `estimates` (rows of `name`, `value`,
-`sd`, `low`, `high`), `noise`, `widening` of the Cramér–Rao bound, `interference_Hz`, `remarks`), `laws` (of four decays or more: `frequency_Hz`,
-relative, and `inverse_q`, each with `level`, `terms` (rows of `term`, `value`, `sd`, `low`, `high`, per K, Pa, squared amplitude or day),
-`sessions_s`, `scatter` and `left_out_rows`), `saved`.
-"""
+"""`hrg fit ringdown`: frequencies, Q and axes from free decays."""
 
 from functools import partial
 from pathlib import Path

@@ -1,9 +1,4 @@
-"""`hrg fit thermal`: time constants of the resonator behind its housing, from records.
-
-Schema hrg.fit-thermal/2: `data`, `confidence`, `estimates` (by name: `value`, null where not `determined`, `low`, `high`), `undetermined` (groups of
-constants that the records cannot separate), `initial_departure_K` per run (lumps between housing and resonator first), `reference_temperature_degC`
-of the law, `residual_rms_Hz`, `notes`.
-"""
+"""`hrg fit thermal`: time constants of the resonator behind its housing, from records."""
 
 from shell.constants import zero_Celsius
 from studies.cli.arguments import Confidence, Records

@@ -1,8 +1,4 @@
-"""`hrg fit whole-angle`: splits, axes, gain ratio and phase error from a whole-angle run.
-
-Schema hrg.fit-whole-angle/1: `data`, `confidence`, `estimates` (by the card's keys: `value`, `sd`, `low`, `high`), `undetermined` (sentences),
-`saved` (path or null).
-"""
+"""`hrg fit whole-angle`: splits, axes, gain ratio and phase error from a whole-angle run."""
 
 from math import degrees, pi
 

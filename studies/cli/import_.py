@@ -1,8 +1,4 @@
-"""`hrg import`: laboratory files into the record format, by a map that states every change.
-
-Schema hrg.import/1: `start` (of the clock, or null), `record`, `rows`, `columns` (each with `missing` values), `notes` (every change), and `axes`
-(name to record) where the columns name several. With --draft schema `hrg.import-draft/1`: `map`, `mapped`, `left_over`.
-"""
+"""`hrg import`: laboratory files into the record format, by a map that states every change."""
 
 import os
 from collections.abc import Mapping, Sequence

@@ -1,12 +1,4 @@
-"""`hrg loads`: what acceleration, rotation, pressure and an uneven temperature do to a held resonator.
-
-Schema hrg.loads/1: `card`, `temperature_degC`, `harmonic`, `frequency_Hz`; `loads`, a row of each load that was asked, and of all together (`load`,
-`amount`, `unit`, `shift_ppm`, `tension_MPa`, `mises_MPa`, `part`, `rim_axial_um`, `rim_lateral_um`, `rim_tilt_urad`); `stem_MPa` (null without a
-single stem) and `safety` (null without --strength); `per_g` with `axial_ppb`, `rim_axial_nm`, `rim_lateral_nm`, `tilt_urad`; `bias` (null without
-[loop] and charged [electrodes]) with `deg_per_h_per_g`, `azimuth_deg`, `gap_nm_per_g`; `waves` (null without --rotation), `lower_Hz` and `upper_Hz`
-of the travelling waves, and `stress_ppm`, `centrifugal_ppm`, `coriolis_ppm` of the shift; `amplitude`, over `temperature_degC`: `shift_Hz_per_um2`,
-its parts `static_…` and `inertial_…`, and its relative `change_ppm_per_degC` (Duffing).
-"""
+"""`hrg loads`: what acceleration, rotation, pressure and an uneven temperature do to a held resonator."""
 
 from math import pi, radians
 from typing import Annotated, Any

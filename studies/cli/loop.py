@@ -1,11 +1,4 @@
-"""`hrg loop`: the control loops of a card: margins, bias and noise by source, start-up, and a run through them.
-
-Schema hrg.loop/1: `card`, `mode`, `temperature_degC`, `frequency_Hz`, `quality_factor`, `bryan_factor`; `settled` (columns of a record, at rest);
-`bias` (list of `source`, `deg_per_h`, `sd_deg_per_h`; the last is "all"); `noise` (list of `source`, `deg_per_h_over_1s`, `deg_per_rt_h`); `margins`
-(list of `loop`, `paper`, `crossover_Hz`, `phase_margin_deg`, `gain_margin_dB`, `reversal_Hz`, the phase crossover); `start` (`locked_s`, `ready_s`);
-`range` (parts of the actuators' ranges in use: `rate`, `quadrature`, `drive`, `across`: rate and quadrature together where quadrature is nulled by a
-force); `out` and `rows` of the run, or null. --state-space writes another object, schema `hrg.state-space/1` (see `studies.simulation.state_space`).
-"""
+"""`hrg loop`: the control loops of a card: margins, bias and noise by source, start-up, and a run through them."""
 
 from math import degrees, log10
 from typing import Annotated, Any

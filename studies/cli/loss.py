@@ -1,11 +1,4 @@
-"""`hrg loss`: 1/Q over temperature as a sum of its parts, and which part to attack first.
-
-Schema hrg.loss/1: `card`, `harmonic`, `theory`, `frequency_Hz`; over `temperature_degC`: `inverse_q` with its 90 % interval `inverse_q_low`,
-`inverse_q_high`, `q`, `slope_per_K` (d ln(1/Q)/dT); `parts`, largest first, each with `name`, `inverse_q`, `low`, `high`, `slope_per_K`,
-`relative_sd`, `source`; `attack_first` with `part`, `q_without`, `advice`; `least_known`; `anisotropy` (null where nothing varies around) with
-`inverse_q_split`, `damping_axis_deg`, `largest_drift_deg_per_h`; `left_out`, sentences; `stated` (null where the card states no 1/Q) with
-`inverse_q`, and the `explained` share of it with `explained_low`, `explained_high`.
-"""
+"""`hrg loss`: 1/Q over temperature as a sum of its parts, and which part to attack first."""
 
 from typing import Any
 

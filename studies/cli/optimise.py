@@ -1,12 +1,4 @@
-"""`hrg optimise`: dimensions for objectives under constraints, with tolerances.
-
-Schema hrg.optimise/1: `design`, `card`, `evaluations`, `failed`; `parameters`: rows of `name`, `start`, `best`, `low`, `high`, `at_bound`; `columns`:
-rows of `column`, `label`, `unit`, `start`, `interpolant`, `best` and `verified` (solved once more from the card); `constraints`: rows of `column`,
-`kind` (least or most), `limit`, `value`, `room`, `margin`, `active`, `price` (what the objective gains for one unit of the column; of several
-objectives in parts of their ranges; null where the limit holds nothing back); `front`: rows by the names of parameters and wanted columns;
-`tolerances`: rows of `column`, `value`, `worst_case` (±, first order), `sd`, `low` and `high` of the full solves that check it, `passed`; `out`,
-`best_card`.
-"""
+"""`hrg optimise`: dimensions for objectives under constraints, with tolerances."""
 
 from collections import Counter
 from operator import itemgetter

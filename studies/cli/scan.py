@@ -1,11 +1,4 @@
-"""`hrg scan`: wall maps, circumferential harmonics and frequency splits from measured faces of a shell.
-
-Schema hrg.scan/1: `card`, `temperature_degC`; `faces` of inner and outer with `file`, `points`, `outliers`, `noise_um` of one point, `position`
-covered, `offset_um`, `tilt_deg` of the alignment, `told` (which of x, y, z and the tilts the shape determines); `splits`, one per harmonic, with
-`split_Hz`, `relative_ppm`, `slow_axis_deg` as {value, low, high} (90 %; the axis null where the split is not significant), `shift_ppm`, and
-`every_order` {split_Hz, slow_axis_deg, shift_ppm} of the coupled harmonics; `waves` of each face, the wall and the offset {quantity, order, position,
-amplitude_um {value, low, high}, azimuth_deg}; `roundness` {face, position, peak_to_valley_um, rms_um}.
-"""
+"""`hrg scan`: wall maps, circumferential harmonics and frequency splits from measured faces of a shell."""
 
 from pathlib import Path
 from typing import Annotated, Any, Literal

@@ -1,9 +1,4 @@
-"""`hrg show`: records looked at without a card and without a fit.
-
-Schema hrg.show/1: `records`, each with `path`, `rows`, `span_s`, `step_s`, `even`, `columns` (range, `missing`, `gaps`, `spikes`, `stuck`, `zeros`,
-`steps`, `noise` as levels of white noise at 1 s, flicker and walk in the column's unit, `line`), `steps`, `settled` and `correlations`; and `uses`,
-each with `command`, `line`, `ready` and `missing`.
-"""
+"""`hrg show`: records looked at without a card and without a fit."""
 
 from pathlib import Path
 

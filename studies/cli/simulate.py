@@ -1,10 +1,4 @@
-"""`hrg simulate`: a virtual run in the record format.
-
-Schema hrg.simulate/1: `card`, `out`, `rows`, `columns`, `rate_Hz`, `boundary` (what is imposed: "chamber" or "housing"), `seed` (null without noise),
-`frequency_Hz` (`first`, `last`), `solver_relative_error` (of the shell solver against its theory), `interpolation_relative_error` (of the frequency
-model against the solver), `spread` (null, or with --spread by column the standard deviation, rms over the run, that the card's uncertainties leave),
-`warnings`.
-"""
+"""`hrg simulate`: a virtual run in the record format."""
 
 from typing import Annotated, Literal
 

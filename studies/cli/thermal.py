@@ -1,9 +1,4 @@
-"""`hrg thermal`: temperatures of the heat path for a chamber profile.
-
-Schema hrg.thermal/1: `card`, `radiation`, `time_constants_s` of the whole heat path and `shell_and_stem_time_constants_s`, slowest first, at the
-card's reference temperature; `slowest_time_constant_sensitivity`, relative change per relative change of each constant; `energy_balance_error`,
-relative; `time_s`, `chamber_temperature_degC`, and `temperature_degC` of housing, base, stem, shell (its mean) and rim.
-"""
+"""`hrg thermal`: temperatures of the heat path for a chamber profile."""
 
 import re
 from typing import Annotated, Any

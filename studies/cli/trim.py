@@ -1,11 +1,4 @@
-"""`hrg trim`: a plan of trimming cuts from measured frequency splits.
-
-Schema hrg.trim/1: `card`, `temperature_degC`, `goal_Hz`, `cut`; `before` and the round's `after`, lists of {harmonic, frequency_Hz, split_Hz,
-error_Hz, most_Hz, slow_axis_deg}, `most_Hz` not exceeded in 95 of 100 cases; `rounds` of {share, mass_ug, cuts, after, unbalance}, `cuts` of
-{azimuth_deg, position, height_mm, mass_ug, depth_um (null for teeth and masses)}; `mass_ug`; `gains`, for each position and n the change of the split
-by the planned groove over that by the shape derivative, with its 90 % interval; `other_cuts`, what one kilogram does as another kind of cut over what
-it does as this one; `measure`, what to measure after the round, in sentences. `rounds` holds one: the next is planned from what is measured after it.
-"""
+"""`hrg trim`: a plan of trimming cuts from measured frequency splits."""
 
 from collections.abc import Sequence
 from math import degrees

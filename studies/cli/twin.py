@@ -1,9 +1,4 @@
-"""`hrg twin`: the virtual gyro of a card as C11 and as an FMU, with the numbers of `hrg simulate` and no Python inside.
-
-Schema hrg.twin/1: `card`, `boundary` (what is an input: "chamber" or "housing"), `fmu` and `c` (what was written, or null), `fmi` (the version, or
-null), `compiled` (whether the FMU holds a binary; null without an FMU), `bytes` (of the FMU, or null), `inputs` and `parameters` (lists of `name`,
-`unit`, `start`), `outputs` (list of `name`, `unit`).
-"""
+"""`hrg twin`: the virtual gyro of a card as C11 and as an FMU, with the numbers of `hrg simulate` and no Python inside."""
 
 import os
 from typing import Literal
