@@ -153,13 +153,10 @@ def _strip(
 
     start, stop = resonator.at([s], segment), resonator.at([end], segment)
     return Patch(
-        straight(_face(start, near), _face(start, far)),
-        straight(_face(stop, near), _face(stop, far)),
-        along(resonator.surface(near, segment), s, end),
-        along(resonator.surface(far, segment), s, end),
-        cells,
-        "corner",
-    )
+        straight(_face(start, near), _face(start, far)), straight(_face(stop, near), _face(stop, far)),
+        along(resonator.surface(near, segment), s, end), along(resonator.surface(far, segment), s, end),
+        cells, "corner",
+    )  # fmt: skip
 
 
 def _face(points: MeridianPoints, eta: float) -> Spot:

@@ -71,18 +71,10 @@ def _fill(plotter: Any, scene: Scene, limits: tuple[float, float], first: bool) 
     body, origin = _split_sharp(scene, faces)
     body[scene.legend] = scene.values[origin]
     bar = {
-        "title": scene.legend + "\n",
-        "color": "black",
-        "fmt": "%.3g",
-        "vertical": False,
-        "title_font_size": 15,
-        "label_font_size": 14,
-        "n_labels": 5,
-        "width": 0.6,
-        "position_x": 0.2,
-        "position_y": 0.05,
-        "height": 0.12,
-    }
+        "title": scene.legend + "\n", "color": "black", "fmt": "%.3g", "vertical": False,
+        "title_font_size": 15, "label_font_size": 14, "n_labels": 5, "width": 0.6, "position_x": 0.2,
+        "position_y": 0.05, "height": 0.12,
+    }  # fmt: skip
     plotter.add_mesh(
         body, scalars=scene.legend, cmap="cividis", clim=limits, smooth_shading=True,
         show_scalar_bar=bool(scene.legend), scalar_bar_args=bar, ambient=0.38, diffuse=0.72, specular=0.1,

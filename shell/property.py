@@ -20,14 +20,9 @@ from shell.constants import zero_Celsius
 Array = NDArray[np.float64]
 ROOM = 20.0 + zero_Celsius
 PROPERTIES = {
-    "shear_modulus": "Pa",
-    "youngs_modulus": "Pa",
-    "poisson_ratio": "1",
-    "density": "kg/m³",
-    "expansion": "1/K",
-    "conductivity": "W/(m K)",
-    "heat_capacity": "J/(kg K)",
-}
+    "shear_modulus": "Pa", "youngs_modulus": "Pa", "poisson_ratio": "1", "density": "kg/m³",
+    "expansion": "1/K", "conductivity": "W/(m K)", "heat_capacity": "J/(kg K)",
+}  # fmt: skip
 SIGNED = ("poisson_ratio", "expansion")  # properties whose deviation is a difference, not a factor
 STEP = 5.0  # K, of the differences that give slope and curvature of a form
 

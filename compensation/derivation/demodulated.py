@@ -39,16 +39,11 @@ def slow_rates() -> sp.Matrix:
     order = sp.Symbol("epsilon", positive=True)
     slow = [sp.Symbol(f"{name}{dots}") for name in "XY" for dots in ("", "'", "''")]
     scaled = {
-        A1(t).diff(t, 2): order**2 * slow[2],
-        A2(t).diff(t, 2): order**2 * slow[5],
-        A1(t).diff(t): order * slow[1],
-        A2(t).diff(t): order * slow[4],
-        rate.diff(t): order**2 * sp.Symbol("Omega'"),
-        A1(t): slow[0],
-        A2(t): slow[3],
-        rate: order * Omega,
+        A1(t).diff(t, 2): order**2 * slow[2], A2(t).diff(t, 2): order**2 * slow[5],
+        A1(t).diff(t): order * slow[1], A2(t).diff(t): order * slow[4],
+        rate.diff(t): order**2 * sp.Symbol("Omega'"), A1(t): slow[0], A2(t): slow[3], rate: order * Omega,
         q_10: order * q_10,
-    }
+    }  # fmt: skip
     damping = order / tau, order * delta_tau / 2
     detuned = {k_1: omega + order * delta_omega / 2, k_2: omega - order * delta_omega / 2}
     rows = []

@@ -118,18 +118,10 @@ def loads(
         "tilt_urad": 1e6 * aside.tilt,
     }
     payload = {
-        "card": instrument.name,
-        "temperature_degC": T - zero_Celsius,
-        "harmonic": harmonic,
-        "frequency_Hz": mode.frequency,
-        "loads": rows,
-        "stem_MPa": 1e-6 * stem or None,
-        "safety": safety,
-        "per_g": per_g,
-        "waves": waves,
-        "bias": bias,
-        "amplitude": nonlinear,
-    }
+        "card": instrument.name, "temperature_degC": T - zero_Celsius, "harmonic": harmonic,
+        "frequency_Hz": mode.frequency, "loads": rows, "stem_MPa": 1e-6 * stem or None, "safety": safety,
+        "per_g": per_g, "waves": waves, "bias": bias, "amplitude": nonlinear,
+    }  # fmt: skip
     beam = f"The stem as a beam has {1e-6 * stem:.3g} MPa at its clamped end, by its axial force and its bending moment under these accelerations."
     return Result(
         payload,

@@ -52,15 +52,9 @@ def tcf(
     points, moves = _points(law, T), _moves(law, T)
     local, source = _measured_slopes(instrument.name, measured)
     payload = {
-        "card": instrument.name,
-        "theory": theory,
-        "harmonic": harmonic,
-        "law": instrument.material.law,
-        "relative_error": law.error,
-        "points": points,
-        "prior": moves,
-        "measured": local,
-    }
+        "card": instrument.name, "theory": theory, "harmonic": harmonic, "law": instrument.material.law,
+        "relative_error": law.error, "points": points, "prior": moves, "measured": local,
+    }  # fmt: skip
     parts = [name for name in PARTS if name != "base" or law.mount]
     note = f"Slopes in ppm/°C; ±: one standard deviation, from the stated uncertainty of the material law ({instrument.material.law})."
     if law.mount:

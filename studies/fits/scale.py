@@ -267,12 +267,9 @@ def _thin(run: BellRun) -> BellRun:
     width = (run.time[-1] - run.time[0]) / MOST_ROWS
     level = same_rate(run.rate)
     columns = {
-        "output": run.output,
-        "temperature": run.temperature,
-        "rate": run.rate,
-        "level": level,
+        "output": run.output, "temperature": run.temperature, "rate": run.rate, "level": level,
         "square": level**2,
-    }
+    }  # fmt: skip
     blocks = average_blocks(run.time, columns, width)
     mean = blocks.columns
     steady = mean["square"] - mean["level"] ** 2 <= 1e-9 * np.max(level**2, initial=1e-30)

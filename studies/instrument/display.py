@@ -47,12 +47,9 @@ ERRORS = {
 }
 ORDERS = {"slope": "temperature slope of {}", "curvature": "temperature curvature of {}", "value": "{}"}
 PROPERTIES = {
-    "youngs_modulus": "Young's modulus",
-    "shear_modulus": "the shear modulus",
-    "poisson_ratio": "Poisson's ratio",
-    "density": "the density",
-    "expansion": "the thermal expansion",
-}
+    "youngs_modulus": "Young's modulus", "shear_modulus": "the shear modulus",
+    "poisson_ratio": "Poisson's ratio", "density": "the density", "expansion": "the thermal expansion",
+}  # fmt: skip
 NODES = {"conductance": "conductance", "exchange": "radiative exchange", "capacity": "heat capacity"}
 
 

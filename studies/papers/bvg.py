@@ -24,12 +24,9 @@ LOWEST, HIGHEST, ROOM = -45.0, 55.0, 25.0
 SWEEP, DWELL = 10_000.0, 60.0  # length (s) of a temperature sweep at 0.6 °C/min and of one applied rate: assumed
 CUTOFF, ORDER = 1.0, 50
 PRINTED = {
-    "nonlinearity": (0.002, 0.0003),
-    "deviation_at_rest": (0.1624, 0.0619),
-    "deviation_turning": (0.1663, 0.0638),
-    "bias_instability": (20.5, 4.67),
-    "random_walk": (2.7821, 0.6982),
-}
+    "nonlinearity": (0.002, 0.0003), "deviation_at_rest": (0.1624, 0.0619),
+    "deviation_turning": (0.1663, 0.0638), "bias_instability": (20.5, 4.67), "random_walk": (2.7821, 0.6982),
+}  # fmt: skip
 
 
 def read_printed_chain() -> BellChain:

@@ -16,13 +16,9 @@ from studies.results import Chapter, Column, Drawing, Facts, Figure, Sentence, T
 
 NAMES = {name: word[0].upper() + word[1:] for name, word in WORDS.items()}
 SHOWN = {
-    "frequency_Hz": ("mHz", 1e3),
-    "bias_deg_per_h": ("°/h", 1.0),
-    "inverse_q": ("ppb", 1e9),
-    QUADRATURE: ("mV", 1e3),
-    HOUSING: ("mK", 1e3),
-    SETTLED: ("mHz", 1e3),
-}
+    "frequency_Hz": ("mHz", 1e3), "bias_deg_per_h": ("°/h", 1.0), "inverse_q": ("ppb", 1e9),
+    QUADRATURE: ("mV", 1e3), HOUSING: ("mK", 1e3), SETTLED: ("mHz", 1e3),
+}  # fmt: skip
 """Unit in which small numbers of a response are shown, and how many of it make one."""
 VALUE = ("parameter", "unit", "card", "value", "low", "high", "shift_sd", "width", "told_by", "bound", "interval")
 """What is told of each value in the JSON."""

@@ -120,12 +120,9 @@ def response_table(verdict: Verdict) -> Table:
     rows = []
     for name, one in verdict.responses.items():
         numbers: Mapping[str, float | None] = {
-            "baseline": one.baseline[1],
-            "extended": (one.extended or (None, None))[1],
-            "noise": one.noise,
-            "white": one.white,
-            "wander": one.wander,
-        }
+            "baseline": one.baseline[1], "extended": (one.extended or (None, None))[1], "noise": one.noise,
+            "white": one.white, "wander": one.wander,
+        }  # fmt: skip
         rows.append({
             **{key: None if value is None else value * RESPONSES[name].scale for key, value in numbers.items()},
             "response": f"{NAMES[name]} ({RESPONSES[name].shown})",

@@ -171,10 +171,6 @@ def _unique(values: Array) -> Design:
 
 
 SAMPLERS = {
-    "grid": _grid,
-    "list": _listed,
-    "latin-hypercube": _hypercube,
-    "sobol": _sobol,
-    "sensitivity": _saltelli,
+    "grid": _grid, "list": _listed, "latin-hypercube": _hypercube, "sobol": _sobol, "sensitivity": _saltelli,
     "one-at-a-time": _one_at_a_time,
-}
+}  # fmt: skip

@@ -40,11 +40,8 @@ EFFECT = Effect(
     isolate="repeat in another chamber or with a second thermometer; fast and slow ramps distinguish it from a curvature of f",
     sensor="a second thermometer on the housing",
     coefficients=(
-        Coefficient("quadratic_K_per_10K2"),
-        Coefficient("cubic_K_per_10K3", (0.3,)),
-        Coefficient("quartic_K_per_10K4", (0.05,)),
-        Coefficient("slope_K_per_10K"),
-        Coefficient("zero_K"),
+        Coefficient("quadratic_K_per_10K2"), Coefficient("cubic_K_per_10K3", (0.3,)),
+        Coefficient("quartic_K_per_10K4", (0.05,)), Coefficient("slope_K_per_10K"), Coefficient("zero_K"),
     ),
     columns=columns,
     grid=grid,
@@ -54,4 +51,4 @@ EFFECT = Effect(
     steady=steady,
     steady_grid=lambda low, high: [(3.0,), (4.0,)],
     steady_words="thermometer error up to order {0:.0f}",
-)
+)  # fmt: skip

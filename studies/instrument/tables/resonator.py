@@ -109,12 +109,9 @@ class Hemisphere(Stemmed, frozen=True, kw_only=True, tag="hemisphere"):
         from shell.meridian import hemisphere
 
         return hemisphere(
-            radius=self.radius_mm * MM,
-            thickness=self.thickness,
-            rim_angle=math.radians(self.rim_angle_deg),
-            pole_angle=math.radians(self.pole_angle_deg),
-            **self.held,
-        )
+            radius=self.radius_mm * MM, thickness=self.thickness, rim_angle=math.radians(self.rim_angle_deg),
+            pole_angle=math.radians(self.pole_angle_deg), **self.held,
+        )  # fmt: skip
 
 
 class Cylinder(Shape, frozen=True, kw_only=True, tag="cylinder"):
@@ -151,13 +148,10 @@ class Bell(Stemmed, frozen=True, kw_only=True, tag="bell"):
         from shell.meridian import bell
 
         return bell(
-            radius=self.radius_mm * MM,
-            thickness=self.thickness,
-            cylinder_height=self.cylinder_height_mm * MM,
-            hyperbola_height=self.hyperbola_height_mm * MM,
-            mouth_radius=self.mouth_radius_mm * MM,
-            **self.held,
-        )
+            radius=self.radius_mm * MM, thickness=self.thickness,
+            cylinder_height=self.cylinder_height_mm * MM, hyperbola_height=self.hyperbola_height_mm * MM,
+            mouth_radius=self.mouth_radius_mm * MM, **self.held,
+        )  # fmt: skip
 
 
 class LineKeys(Keys, frozen=True, kw_only=True, tag_field="kind", tag="line"):
