@@ -18,9 +18,10 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Array = NDArray[np.float64]
+from compensation.arrays import Array
+
 FLAT = math.sqrt(2 * math.log(2) / math.pi)
 """Allan deviation of flicker noise of bias instability B = 1."""
 FLICKER_TIMES = np.asarray(60.0 * 4.0 ** np.arange(-11, 7), dtype=np.float64)

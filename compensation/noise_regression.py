@@ -13,11 +13,10 @@ from functools import lru_cache
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from compensation.regression import LinearFit, fit_linear
 
-Array = NDArray[np.float64]
 Runs = Sequence[slice]
 GAP = 1.5
 """A step of more than this many usual ones is a gap: the memory of the noise is not carried across it."""

@@ -18,10 +18,10 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from compensation.errors import CompensationError
 from compensation.noise import SLOW_TIMES, Noise, flicker, random_walk
 
-Array = NDArray[np.float64]
 COARSE = 150
 """Most rows of a run from which noise is estimated in a model with many unknowns."""
 LEAST, MOST = -7.0, 8.0  # ln of the rms of slow noise within a run over that of a row's white noise

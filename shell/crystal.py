@@ -14,7 +14,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from shell.property import STEP, Array, Property
+from shell.property import STEP, Property
+from shell.quadrature import Array
 
 SYSTEMS = {"cubic": ("C11", "C12", "C44"), "trigonal": ("C11", "C12", "C13", "C14", "C33", "C44")}
 AXES = {"cubic": ("[001]", "[111]"), "trigonal": ("c",)}

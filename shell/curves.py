@@ -7,12 +7,10 @@ from math import atan2, hypot, pi
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from shell.errors import ShellError, mm
-from shell.quadrature import gauss
+from shell.quadrature import Array, gauss
 
-Array = NDArray[np.float64]
 Point = tuple[float, float]
 
 

@@ -17,16 +17,16 @@ from itertools import product
 from math import isfinite
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from shell.elastic import Elastic
 from shell.errors import ShellError
 from shell.interpolation import Exploration, SparsePolynomial
 from shell.layout import Theory
 from shell.modes import Mode, TheoryRangeWarning, solve_modes
+from shell.quadrature import Array
 from shell.resonator import Resonator
 
-Array = NDArray[np.float64]
 Range = tuple[float, float]
 Builder = Callable[[Array], Resonator]
 SOLVER_TOLERANCES = (1e-5, 1e-6, 1e-7, 1e-8)  # a finer one where the elements differ between designs

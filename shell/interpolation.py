@@ -14,9 +14,9 @@ from dataclasses import dataclass, field
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from shell.quadrature import Array
+
 Index = tuple[int, ...]
 MOST_POINTS = 33  # along one axis
 

@@ -19,7 +19,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from shell.constants import zero_Celsius
 from shell.elastic import Elastic
@@ -29,6 +29,7 @@ from shell.material import Material, Mount
 from shell.modes import Mode, solve_modes
 from shell.prestress import Prestress
 from shell.property import coefficient_names, powers
+from shell.quadrature import Array
 from shell.resonator import Resonator
 from shell.shape_factor import ShapeFactor, interpolate_shape, shape_of
 from shell.solution import AlongMeridian
@@ -36,7 +37,6 @@ from shell.solution import AlongMeridian
 if TYPE_CHECKING:
     from scipy.interpolate import CubicSpline
 
-Array = NDArray[np.float64]
 REACH = 5.0  # standard deviations of Poisson's ratio that Φ covers beside the law's own range
 WIDEST = 0.04  # and not more than this
 SPACING = 1.0  # K, of the knots of ln f(T)

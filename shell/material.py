@@ -12,8 +12,8 @@ from shell.constants import zero_Celsius
 from shell.crystal import Crystal
 from shell.elastic import Elastic
 from shell.errors import ShellError, nearest
-from shell.property import PROPERTIES, ROOM, SIGNED, Array, Property, coefficient_names
-from shell.quadrature import gauss
+from shell.property import PROPERTIES, ROOM, SIGNED, Property, coefficient_names
+from shell.quadrature import Array, gauss
 
 if TYPE_CHECKING:
     from shell.cubic import Cubic

@@ -13,11 +13,11 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from shell.constants import zero_Celsius
+from shell.quadrature import Array
 
-Array = NDArray[np.float64]
 ROOM = 20.0 + zero_Celsius
 PROPERTIES = {
     "shear_modulus": "Pa", "youngs_modulus": "Pa", "poisson_ratio": "1", "density": "kg/m³",

@@ -13,8 +13,9 @@ from typing import Literal, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from shell.curves import Array, Curve
+from shell.curves import Curve
 from shell.errors import ShellError, mm
+from shell.quadrature import Array
 
 Support: TypeAlias = Literal["free", "clamped-pole", "clamped-rim", "stem", "clamped-face"]
 LONGEST_STEM = 100.0  # stem lengths over its radius that are meshed as a solid

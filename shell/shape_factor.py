@@ -7,15 +7,14 @@ from functools import cached_property
 import numpy as np
 from numpy.polynomial import Chebyshev
 from numpy.polynomial.chebyshev import chebfit, chebpts1
-from numpy.typing import NDArray
 
 from shell.curves import Arc
 from shell.elastic import Elastic
 from shell.modes import Mode
+from shell.quadrature import Array
 from shell.rayleigh import rayleigh_log_derivatives
 from shell.resonator import Resonator
 
-Array = NDArray[np.float64]
 NODES = (5, 8, 12)  # Poisson's ratios tried, until the error is small enough
 CLOSE = 1e-9  # wanted error of ln Φ between them
 

@@ -10,9 +10,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from compensation.arrays import Array
+
 KEPT = 3000
 GATE = 36.0  # e² over its variance, beyond which a mode is out of question
 

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from studies.calibration.estimates import NINETY, Estimate, find_groups, posterior_card
 from studies.calibration.priors import Priors, check_exact, from_standard, gather_priors
 from studies.errors import InputError
@@ -22,7 +22,6 @@ from studies.inversion.assignment import assign
 from studies.inversion.model import ModeFit, ModeModel, Which
 from studies.inversion.readings import USUAL, ModeReadings
 
-Array = NDArray[np.float64]
 Progress = Callable[[str], None]
 ACTING = ("resonator.", "material.")
 IDLE = ("conductivity", "heat_capacity")

@@ -10,15 +10,14 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from studies.calibration.priors import Priors
 
 if TYPE_CHECKING:
     from shell.modes import Mode
     from studies.instrument.card import Instrument
 
-Array = NDArray[np.float64]
 STEP = 0.1  # prior standard deviations, of differences by a dimension
 
 

@@ -3,13 +3,12 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from shell.constants import zero_Celsius
 from studies.errors import InputError
 from studies.files.columns import read_columns, read_header
 
-Array = NDArray[np.float64]
 COLUMNS = ("harmonic", "index", "frequency_Hz", "sd_Hz", "temperature_degC")
 USUAL = 1e-6
 """Relative standard deviation of a frequency where the table states none."""

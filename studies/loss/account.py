@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from compensation.wave import StandingWave
 from shell.damping.anisotropy import describe_wave
 from shell.damping.budget import Budget
@@ -13,8 +13,6 @@ from shell.damping.budget import Budget
 if TYPE_CHECKING:
     from studies.instrument.card import Instrument
     from studies.loss.model import LossModel
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

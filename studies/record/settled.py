@@ -12,6 +12,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from compensation.decimation import average_blocks
 from compensation.errors import CompensationError
 from compensation.noise import white_rms
@@ -19,7 +20,6 @@ from compensation.samples import check_time
 from studies.errors import InputError
 from studies.record import Record
 
-Array = NDArray[np.float64]
 BLOCK = 60.0  # s
 REACH = 5  # blocks to either side, over which slopes are taken in a quiet record
 FARTHEST = 60  # the same in a noisy one

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from studies.errors import InputError
-from studies.sweeps.block import Array
 from studies.sweeps.keys import MOST_CASES
 
 if TYPE_CHECKING:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from shell.constants import zero_Celsius
 from shell.family import MOST_SOLVES, Axis, Family, FamilyResult, build_family
 from shell.law import slope_parts
@@ -15,7 +16,6 @@ from shell.material import Material
 from shell.resonator import Resonator
 from studies.errors import UNUSABLE_INPUT, InputError
 from studies.instrument.card import Instrument
-from studies.sweeps.block import Array
 from studies.sweeps.parameters import TEMPERATURE, set_parameters
 from studies.sweeps.quantities.tcf import PARTS, STEEPEST
 from studies.sweeps.quantity import ModeQuantity, Quantity

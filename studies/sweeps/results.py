@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from studies.instrument.card import build_instrument
 from studies.results.shown import Shown
-from studies.sweeps.block import Array, decode
+from studies.sweeps.block import decode
 from studies.sweeps.definition import Study
 from studies.sweeps.design import coding, nominal_row
 from studies.sweeps.opening import open_store

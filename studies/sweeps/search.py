@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from compensation.arrays import Array
 from studies.progress import Progress
-from studies.sweeps.block import Array, Batch, decode, each_design
+from studies.sweeps.block import Batch, decode, each_design
 from studies.sweeps.design import draw, nominal_row
 from studies.sweeps.engine import BATCH_VECTORISED, compute
 from studies.sweeps.evaluate import WorkPlan

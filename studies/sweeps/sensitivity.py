@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from compensation.arrays import Array
 from studies.errors import InputError
-from studies.sweeps.block import Array
 
 if TYPE_CHECKING:
     from studies.sweeps.results import Results

@@ -13,8 +13,9 @@ from weakref import finalize
 import numpy as np
 from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from studies.errors import InputError, MissingEnvironment
-from studies.sweeps.block import Array, Cases, pack, unpack, unpack_head
+from studies.sweeps.block import Cases, pack, unpack, unpack_head
 from studies.sweeps.provenance import digest, find_changes, spell
 from studies.sweeps.sealed import SealedFile
 

@@ -5,11 +5,11 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from compensation.wave import feign_rate, see_across
 from studies.instrument.registry import CardTable
 from studies.schema.keys import Keys, Note, number
 
-Array = NDArray[np.float64]
 DEG_PER_H = np.degrees(1.0) * 3600.0  # of 1 rad/s
 TERMS = {
     # key: powers of f and of its rate (HRG paper eq. 21)

@@ -16,14 +16,14 @@ from dataclasses import dataclass, replace
 from typing import Annotated
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from compensation.arrays import Array
 from shell.errors import ShellError
 from studies.effects.effect import AROUND
 from studies.instrument.registry import CardPlace, CardTable
 from studies.schema.keys import Keys, Note, number
 
-Array = NDArray[np.float64]
 BETWEEN = ("base", "stem")
 """What lies between the housing and the resonator where there are two lags and more."""
 NO_LOAD = 1e-8

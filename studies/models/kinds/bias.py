@@ -12,6 +12,7 @@ import numpy as np
 from msgspec.structs import replace
 from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from compensation.bias import FREQUENCY, PLAY, TEMPERATURE, TERMS, BiasFit, BiasRun, Variable, term_columns
 from compensation.decimation import average_blocks
 from compensation.derivative import differentiate
@@ -22,7 +23,6 @@ from studies.models.c_source import head, self_test, write_c
 from studies.models.file import Model, ModelSource, Setting, make_part, widen
 from studies.record import COMPENSATED, Record
 
-Array = NDArray[np.float64]
 OUTPUTS = {"bias_deg_per_h": "deg/h", "measured_rate_deg_per_s": "deg/s"}
 BLOCK = 10.0  # s over which the frequency is averaged before it is used
 TEST_ROWS = 80  # of the emitted code

@@ -8,8 +8,8 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from studies.errors import InputError, naming
 from studies.models.c_source import head, polynomial, self_test, write_c
 from studies.models.file import Model, ModelSource, make_part, widen
@@ -20,7 +20,6 @@ from studies.record.rest import TEMPERATURES
 if TYPE_CHECKING:
     from compensation.frequency import FrequencyFit
 
-Array = NDArray[np.float64]
 VARIABLE = "temperature_degC"
 
 
