@@ -93,6 +93,5 @@ def require_range(use: RangeUse, context: str) -> None:
     if use.worst > 1:
         raise CompensationError(
             f"{context}: the loops need {100 * use.worst:.0f} % of the actuators' range (rate {100 * float(np.max(use.rate)):.3g} %,"
-            f" quadrature {100 * float(np.max(use.quadrature)):.3g} %, drive {100 * float(np.max(use.drive)):.3g} % of their ranges); the"
-            " wave cannot be held."
+            f" quadrature {100 * float(np.max(use.quadrature)):.3g} %, drive {100 * float(np.max(use.drive)):.3g} % of their ranges); the wave cannot be held."
         )

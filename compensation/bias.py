@@ -197,8 +197,7 @@ class BiasDesign:
             self.constants[rows, k] = 1.0
         if np.ptp(self.state) <= 1e-12 * np.max(np.abs(self.state)):
             raise CompensationError(
-                f"the {self.variable.name} is constant ({self.state[0]:g} {self.variable.unit}): there is nothing to fit;"
-                " record a run in which the temperature changes."
+                f"the {self.variable.name} is constant ({self.state[0]:g} {self.variable.unit}): there is nothing to fit; record a run in which the temperature changes."
             )
         if self.bias.size <= len(runs) + len(self.names):
             raise CompensationError(

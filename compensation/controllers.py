@@ -116,10 +116,8 @@ def require_stable(loops: Loops, decay: float, names: tuple[str, ...] = Loops.NA
                 if calm.gain >= 2 and calm.phase >= np.pi / 4:
                     break
             raise CompensationError(
-                f"the {margin.loop} loop ({Loops.PAPER[margin.loop]}) is unstable: gain margin"
-                f" {20 * np.log10(margin.gain):.1f} dB at {margin.reversal:.3g} Hz, phase margin"
-                f" {np.degrees(margin.phase):.0f}° at {margin.crossover:.3g} Hz; lower its bandwidth to about {most:.2g} Hz,"
-                " shorten the delay or sample faster."
+                f"the {margin.loop} loop ({Loops.PAPER[margin.loop]}) is unstable: gain margin {20 * np.log10(margin.gain):.1f} dB at {margin.reversal:.3g} Hz, phase margin"
+                f" {np.degrees(margin.phase):.0f}° at {margin.crossover:.3g} Hz; lower its bandwidth to about {most:.2g} Hz, shorten the delay or sample faster."
             )
     return margins
 

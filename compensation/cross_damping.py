@@ -85,8 +85,7 @@ class CrossDampingModel:
         low, high, lowest, highest = (x - zero_Celsius for x in (T.min(), T.max(), self.lowest, self.highest))
         if not extrapolate and (low < lowest or high > highest):
             raise CompensationError(
-                f"the temperature runs from {low:.2f} to {high:.2f} °C, but the model was fitted between {lowest:.2f} and"
-                f" {highest:.2f} °C; allow extrapolation or fit a wider record."
+                f"the temperature runs from {low:.2f} to {high:.2f} °C, but the model was fitted between {lowest:.2f} and {highest:.2f} °C; allow extrapolation or fit a wider record."
             )
         return simulate_bias(t, self.cross_damping(T), self.k, self.zeta, self.g2)
 

@@ -145,8 +145,7 @@ def invert(curve: Callable[[Array], Array], span: tuple[float, float], frequency
     turn = find_turn(curve, span)
     if turn is not None:
         raise CompensationError(
-            f"the curve has a turning point at {turn:.1f} °C: two temperatures have the same frequency there, so it cannot"
-            " be inverted. Fit a narrower range of temperature or another order."
+            f"the curve has a turning point at {turn:.1f} °C: two temperatures have the same frequency there, so it cannot be inverted. Fit a narrower range of temperature or another order."
         )
     low, high = np.sort(curve(np.array(span)))
     known = np.isfinite(frequency)
@@ -154,8 +153,7 @@ def invert(curve: Callable[[Array], Array], span: tuple[float, float], frequency
     if np.any(outside):
         raise CompensationError(
             f"the frequency runs from {np.nanmin(frequency):.8g} to {np.nanmax(frequency):.8g} Hz and lies outside {low:.8g}"
-            f" to {high:.8g} Hz ({span[0]:.1f} to {span[1]:.1f} °C), over which the curve was fitted, in"
-            f" {100 * np.mean(outside):.1f} % of the readings; calibrate over that range."
+            f" to {high:.8g} Hz ({span[0]:.1f} to {span[1]:.1f} °C), over which the curve was fitted, in {100 * np.mean(outside):.1f} % of the readings; calibrate over that range."
         )
 
     from scipy.optimize.elementwise import find_root

@@ -64,7 +64,6 @@ def require_regular(time: NDArray[np.float64], purpose: str) -> float:
         steps = np.diff(time)
         row = int(np.argmax(np.abs(steps - np.median(steps))))
         raise CompensationError(
-            f"{purpose} needs even sampling, but the step after row {row + 1} is {steps[row]:g} s where "
-            f"{np.median(steps):g} s is usual; resample the record or cut it at its gaps."
+            f"{purpose} needs even sampling, but the step after row {row + 1} is {steps[row]:g} s where {np.median(steps):g} s is usual; resample the record or cut it at its gaps."
         )
     return step

@@ -77,8 +77,7 @@ def factorise(even: ArrayLike) -> Array:
     if np.any(on_axis):
         at = float(np.sqrt(np.abs(squares[on_axis][0])))
         raise CompensationError(
-            f"a spectral density is zero or infinite at {at:g} rad/s, so it has no stable factor; "
-            "add a little white noise, or give a drift a corner frequency."
+            f"a spectral density is zero or infinite at {at:g} rad/s, so it has no stable factor; add a little white noise, or give a drift a corner frequency."
         )
     factor = np.poly(-np.sqrt(squares.astype(complex))).real
     return np.asarray(np.sqrt(abs(p[0])) * np.atleast_1d(factor), dtype=float)

@@ -95,8 +95,7 @@ def lay_resonator(resonator: Resonator, n: int, level: Level, alongside: tuple[i
         corner, (before, after) = lay_corner(resonator, joint, level.rings, not whole_section)
         if not before > start:
             raise ShellError(
-                f"the corner or clamp that ends at {mm(start)} of the meridian overlaps the next, which begins at "
-                f"{mm(before)}: lengthen the segment between them or make the clamp shorter."
+                f"the corner or clamp that ends at {mm(start)} of the meridian overlaps the next, which begins at {mm(before)}: lengthen the segment between them or make the clamp shorter."
             )
         chains.append(lay_chain(resonator, start, before, (first, "tied"), highest, level))
         solids.append((corner, ((len(chains) - 1, 1), (len(chains), 0))))

@@ -53,8 +53,7 @@ def cut(resonator: Resonator, system: System, position: float, heights: Array) -
         table = shell_table(section, system.n, system.level.through, (heights, np.ones(len(heights))), along)
         return CrossSection(number, element, np.stack([along.values[0], along.slopes[0]]), section, table)
     raise ShellError(
-        f"the position {position:g} ({mm(s)} along the meridian) lies in a solid root, corner or clamp, where no mass can be "
-        "placed: choose one on the shell, 1 for the rim."
+        f"the position {position:g} ({mm(s)} along the meridian) lies in a solid root, corner or clamp, where no mass can be placed: choose one on the shell, 1 for the rim."
     )
 
 

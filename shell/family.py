@@ -122,8 +122,7 @@ class Family:
             slack = 1e-9 * max(abs(axis.low), abs(axis.high))
             if not (column.min() >= axis.low - slack and column.max() <= axis.high + slack):
                 raise ShellError(
-                    f"the family holds for {axis.name} from {axis.low:g} to {axis.high:g}, not for {column.min():g} to"
-                    f" {column.max():g}: build it with wider ranges."
+                    f"the family holds for {axis.name} from {axis.low:g} to {axis.high:g}, not for {column.min():g} to {column.max():g}: build it with wider ranges."
                 )
         inside = zip((*self.axes, Axis("", *self.nu)), (*columns, poisson), strict=True)
         unit = [

@@ -194,8 +194,7 @@ class FrequencyLaw:
         low, high = self.shape.lowest, self.shape.highest
         if not (nu.min() >= low - 1e-9 and nu.max() <= high + 1e-9):
             raise ShellError(
-                f"Poisson's ratio {nu.min():.4f} to {nu.max():.4f} leaves the range {low:.4f} to {high:.4f} for which this"
-                " frequency law was solved: build the law anew with this material."
+                f"Poisson's ratio {nu.min():.4f} to {nu.max():.4f} leaves the range {low:.4f} to {high:.4f} for which this frequency law was solved: build the law anew with this material."
             )
         return replace(self, material=material)
 

@@ -94,10 +94,7 @@ class Mode:
 
     def __repr__(self) -> str:
         kind = f", {self.label}" if self.label else ""
-        return (
-            f"Mode(n = {self.harmonic}, {self.frequency:.3f} Hz{kind}, Bryan factor {self.bryan_factor:.4f},"
-            f" {self.theory}, relative error {self.relative_error_estimate:.1e})"
-        )
+        return f"Mode(n = {self.harmonic}, {self.frequency:.3f} Hz{kind}, Bryan factor {self.bryan_factor:.4f}, {self.theory}, relative error {self.relative_error_estimate:.1e})"
 
     def _solved(self) -> Solution:
         if self.solution is None:

@@ -272,8 +272,7 @@ def _check_stem(resonator: Resonator, stem: Stem) -> None:
         r, z = (coordinate[:, 0] for coordinate in points.at_heights([face]))
         if not stem.radius + stem.fillet < 0.9 * r.max():
             raise ShellError(
-                f"the stem (radius {mm(stem.radius)}, fillet {mm(stem.fillet)}) is larger than the dome it stands on "
-                f"(radius {mm(r.max())}): make it thinner."
+                f"the stem (radius {mm(stem.radius)}, fillet {mm(stem.fillet)}) is larger than the dome it stands on (radius {mm(r.max())}): make it thinner."
             )
         at_root = float(np.interp(stem.radius + stem.fillet, r[: r.argmax() + 1], z[: r.argmax() + 1]))
         if abs(end - at_root) > LONGEST_STEM * stem.radius:
@@ -284,6 +283,5 @@ def _check_stem(resonator: Resonator, stem: Stem) -> None:
         base = max(at_root, float(z[0])) if face > 0 else at_root  # the dome bulges into an outer stem
         if not face * (end - base) > stem.fillet + 0.1 * stem.radius:
             raise ShellError(
-                f"the {'outer' if face > 0 else 'inner'} stem ends at {mm(end)}, not clear of the dome at {mm(base)}: move its "
-                "end away from the dome."
+                f"the {'outer' if face > 0 else 'inner'} stem ends at {mm(end)}, not clear of the dome at {mm(base)}: move its end away from the dome."
             )

@@ -44,8 +44,7 @@ class SplitWave:
             )
         if split < 2 * error:
             raise ShellError(
-                f"the split of n = {harmonic}, {1e3 * split:.3g} mHz, cannot be distinguished from its reading error of {1e3 * error:.3g} mHz: "
-                "measure more accurately before cutting."
+                f"the split of n = {harmonic}, {1e3 * split:.3g} mHz, cannot be distinguished from its reading error of {1e3 * error:.3g} mHz: measure more accurately before cutting."
             )
         return cls(
             harmonic, frequency, complex(-split / frequency * np.exp(2j * harmonic * slow_axis)), error / frequency
@@ -198,7 +197,6 @@ def _least_mass(
         room, need = 1e6 * float(capacity.sum()), 1e6 * size
         raise ShellError(
             f"the cuts would be deeper than allowed: about {need:.3g} mg must be removed near the antinodes, but the {count} sites "
-            f"give {room:.3g} mg in all, at most {1e9 * float(capacity.max()):.3g} µg each, with the balance preserved. "
-            "Allow longer, wider or more cuts. Is the split in Hz?"
+            f"give {room:.3g} mg in all, at most {1e9 * float(capacity.max()):.3g} µg each, with the balance preserved. Allow longer, wider or more cuts. Is the split in Hz?"
         )
     return np.asarray(np.maximum(found.x[:count], 0.0) * size)

@@ -94,8 +94,7 @@ class Profile:
         if outside.size:
             k = int(outside[0])
             raise ThermalError(
-                f"the profile reaches {self.value[k] - zero_Celsius:.6g} °C at {self.time[k]:g} s, outside "
-                f"{what} ({low - zero_Celsius:.6g} to {high - zero_Celsius:.6g} °C)."
+                f"the profile reaches {self.value[k] - zero_Celsius:.6g} °C at {self.time[k]:g} s, outside {what} ({low - zero_Celsius:.6g} to {high - zero_Celsius:.6g} °C)."
             )
 
 

@@ -88,10 +88,7 @@ def acceptance(card: Card, *runs: Records, limits: str | None = None, output: st
             *(Sentence(f"{decay.path}: {' '.join(decay.remarks)}", "warning") for decay in decays if decay.remarks),
         ]),
     ]  # fmt: skip
-    lead = (
-        f"{len(runs)} record{'s' * (len(runs) != 1)} of {instrument.name}, judged in the order of section 12 of IEEE"
-        f" Std 1431-2004. Intervals are 90 %; the zero-rate output is {output}."
-    )
+    lead = f"{len(runs)} record{'s' * (len(runs) != 1)} of {instrument.name}, judged in the order of section 12 of IEEE Std 1431-2004. Intervals are 90 %; the zero-rate output is {output}."
     return Result(payload, f"Acceptance of {instrument.name}: {found.verdict}", lead, parts)
 
 

@@ -18,10 +18,7 @@ from studies.results import Drawing, Figure, Part, Result, Sentence, Table
 
 AVERAGE = 100.0  # s
 NOISE = 0.02  # relative: what the noise of a model's inputs may add to a record that has nothing to compensate
-WORSE = (
-    "{} is worse than the record: the standard deviation of {:g} s averages increases from {:.4g} to {:.4g}. Use it only if the model"
-    " is of this gyro."
-)
+WORSE = "{} is worse than the record: the standard deviation of {:g} s averages increases from {:.4g} to {:.4g}. Use it only if the model is of this gyro."
 OPPOSITE = 0.5  # of the record's deviation: what a correction of the opposite sign leaves where the output's is changed
 SIGN = (
     "{}: the correction of {} has the wrong sign for this record: it would increase the standard deviation of {:g} s averages from {:.4g}"

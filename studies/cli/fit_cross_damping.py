@@ -28,10 +28,7 @@ LABELS = {
     "held_out_averages_100s": "held out, 100 s averages",
 }
 COEFFICIENTS = "name: Coefficient | value ± error: Value | Unit | ratio: Ratio to ζ₀"
-USELESS = (
-    "On held-out data the compensation does not improve the output: beyond its noise, this record shows no cross-damping that varies"
-    " with temperature."
-)
+USELESS = "On held-out data the compensation does not improve the output: beyond its noise, this record shows no cross-damping that varies with temperature."
 SCALE = (
     "The output depends only on the product of cross-damping and frequency, so an error of the given frequency scales all coefficients."
     " A constant bias of any other origin is included in ζ₀."

@@ -35,10 +35,7 @@ QUANTITIES = {
     "thickening_per_s": "extra damping due to amplitude, at the start (1/s)",
 }
 ESTIMATE = "quantity | value ± sd: value | low … high ± sd: 90 % interval"
-DECAY = (
-    "file | frequency_Hz: f (Hz) .9 | q: Q .6 | q_low … q_high: 90 % interval of Q .6"
-    " | window_s.0 … window_s.1: free decay (s) | widening: interval / Cramér–Rao bound .2"
-)
+DECAY = "file | frequency_Hz: f (Hz) .9 | q: Q .6 | q_low … q_high: 90 % interval of Q .6 | window_s.0 … window_s.1: free decay (s) | widening: interval / Cramér–Rao bound .2"
 
 
 @answers("hrg.fit-ringdown/3")

@@ -30,10 +30,7 @@ FORM_NOTE = (
     " model takes the chosen form, a line and a square as the paper's parabola."
 )
 COEFFICIENTS = "Step | name: Coefficient | value ± standard_error: Value | Unit"
-NOTE = (
-    "Each step is fitted to the output of the steps before it; its errors assume that those are exact, and allow for white noise plus"
-    " a random walk. Temperature in °C, rate in °/s."
-)
+NOTE = "Each step is fitted to the output of the steps before it; its errors assume that those are exact, and allow for white noise plus a random walk. Temperature in °C, rate in °/s."
 
 
 @answers("hrg.fit-scale/1")

@@ -54,8 +54,7 @@ def fit_thermal(
         say(f"note: {note}")
     if found.estimates["time_constant_1"].value is None:
         raise InputError(
-            f"{data[0]}: the records determine no time constant. Record steps or ramps of 10 K or more that last"
-            " at least five times the resonator's time constant."
+            f"{data[0]}: the records determine no time constant. Record steps or ramps of 10 K or more that last at least five times the resonator's time constant."
         )
     reference = found.path.card.reference_temperature - zero_Celsius
     estimates = {

@@ -30,13 +30,11 @@ from studies.results import Facts, Result, Table, row_of
 LINEAR = 0.1  # strain and relative shift of f: no solid bears so much (ideal strength E/10), nor is it a small change
 ABROAD = (
     "Shift of the mean frequency of the pair, in the frame of the resonator. An acceleration across the axis shifts it only in second order."
-    " Stresses: the largest tensile and the largest von Mises stress in the wall{root}; at sharp corners and at the clamp a linear elastic"
-    " stress is not finite, so they are not counted."
+    " Stresses: the largest tensile and the largest von Mises stress in the wall{root}; at sharp corners and at the clamp a linear elastic stress is not finite, so they are not counted."
 )
 COLUMNS = (
     "load | amount: amount .6g | unit | shift_ppm: shift of f (ppm) +.4g | tension_MPa: largest tension (MPa) .3"
-    " | mises_MPa: von Mises (MPa) .3 | part: where | rim_axial_um: rim along the axis (µm) +.3g"
-    " | rim_lateral_um: rim across (µm) +.3g | rim_tilt_urad: tilt of the rim (µrad) +.3g"
+    " | mises_MPa: von Mises (MPa) .3 | part: where | rim_axial_um: rim along the axis (µm) +.3g | rim_lateral_um: rim across (µm) +.3g | rim_tilt_urad: tilt of the rim (µrad) +.3g"
 )
 
 
@@ -144,8 +142,7 @@ WAVES = (
 )
 AMPLITUDE = (
     "temperature_degC: T (°C) .1f | shift_Hz_per_um2: shift per square of the largest displacement (Hz/µm²) +.5g"
-    " | static_Hz_per_um2: static part (Hz/µm²) +.5g | inertial_Hz_per_um2: inertial part (Hz/µm²) +.5g"
-    " | change_ppm_per_degC: relative change from the first row (ppm/°C) +.3g"
+    " | static_Hz_per_um2: static part (Hz/µm²) +.5g | inertial_Hz_per_um2: inertial part (Hz/µm²) +.5g | change_ppm_per_degC: relative change from the first row (ppm/°C) +.3g"
 )
 PARTS = {"shift": "total", "static": "static", "inertial": "inertial"}
 NONLINEAR = (

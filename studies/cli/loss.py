@@ -20,8 +20,7 @@ from studies.results import Chapter, Drawing, Facts, Figure, Result, Sentence, T
 DEG = float(np.degrees(1))
 WALL = (
     "The effect of a surface depends on its position: a damaged layer or a film dissipates in proportion to the strain energy, heat"
-    " flow in a film to the square of the area strain, gas damping to the square of the normal motion. A film or a scratch does least"
-    " harm where these curves are low."
+    " flow in a film to the square of the area strain, gas damping to the square of the normal motion. A film or a scratch does least harm where these curves are low."
 )
 SQUEEZE = (
     "the share of elastic energy with volume change, relative to a bent beam; twist and pure shear produce no heat."
@@ -146,8 +145,7 @@ def _parts(
         ]),
         Chapter("Around the axis", [
             Table("Damping anisotropy", damped,
-                "T: T (°C) .1f | inverse_q_split: Δ(1/Q) (1e-9) ×1e9 .3g | damping_axis_deg: axis (°) .2f"
-                " | largest_drift_deg_per_h: largest drift (°/h)",
+                "T: T (°C) .1f | inverse_q_split: Δ(1/Q) (1e-9) ×1e9 .3g | damping_axis_deg: axis (°) .2f | largest_drift_deg_per_h: largest drift (°/h)",
                 "Axis: azimuth of the pattern with the largest damping. The drift is proportional to sin 2n of the angle from it."),
         ]),
         Chapter("Not included", [

@@ -56,8 +56,7 @@ def materials(name: str = "", *, compare: bool = False, card: Card = "", harmoni
 
 
 COMPARED = (
-    "material | law | frequency_Hz ± frequency_sd_Hz: f (Hz)"
-    " | slope_ppm_per_degC ± slope_sd_ppm_per_degC: TCF (ppm/°C) | thermoelastic_q: thermoelastic Q .3"
+    "material | law | frequency_Hz ± frequency_sd_Hz: f (Hz) | slope_ppm_per_degC ± slope_sd_ppm_per_degC: TCF (ppm/°C) | thermoelastic_q: thermoelastic Q .3"
     " | surface_q: surface Q .3 | surface_layer_pm: break-even surface (pm) .3g"
 )
 WORTH = (

@@ -56,10 +56,7 @@ def optimise(design: str, *, out: str, workers: Workers = None, quiet: Quiet = F
         "best_card": str(Path(out) / CARD),
     }
     count = len(found.task.keys.objective)
-    lead = (
-        f"{_number(found.task.free, 'parameter')}, {_number(count, 'objective')}, {_number(len(found.limits), 'limit')}:"
-        f" {found.evaluations} designs solved in full."
-    )
+    lead = f"{_number(found.task.free, 'parameter')}, {_number(count, 'objective')}, {_number(len(found.limits), 'limit')}: {found.evaluations} designs solved in full."
     return Result(payload, f"Design {found.task.name}", lead, _parts(found, payload))
 
 
@@ -144,8 +141,7 @@ def _parts(found: Answer, payload: dict[str, Any]) -> list[Any]:
         Chapter("Tolerances", [
             Table("Effect of the tolerances", payload["tolerances"], [
                 Column(lambda row: named(row["column"]), "quantity"),
-                "value: value .6 | worst_case: worst case ± .3 | sd: standard deviation .3 | low … high: full solves .6"
-                " | passed: within limits (%) ×100 .1f",
+                "value: value .6 | worst_case: worst case ± .3 | sd: standard deviation .3 | low … high: full solves .6 | passed: within limits (%) ×100 .1f",
             ], "Worst case and standard deviation to first order; full solves: the extremes among the worst corners and designs drawn from the tolerances."),
         ]),
         Chapter("Search", [

@@ -40,8 +40,7 @@ def reproduce(*, out: str = "report") -> Result:
     write_text(folder / "report.html", render_result(result))
     sensitivity = result.payload["sensitivity_ppm_per_degC"]
     told = (
-        f"slope at 20 °C: measured {sensitivity['measured']:.1f}, predicted {sensitivity['simulated']:.1f}"
-        f" ± {sensitivity['uncertainty']:.1f} ppm/°C; largest temperature error in Table 2"
+        f"slope at 20 °C: measured {sensitivity['measured']:.1f}, predicted {sensitivity['simulated']:.1f} ± {sensitivity['uncertainty']:.1f} ppm/°C; largest temperature error in Table 2"
         f" {max(abs(study.error_degC)):.3f} °C.\nreport: {folder / 'report.html'}\n"
     )
     return replace(result, printed=told)

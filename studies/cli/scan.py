@@ -28,10 +28,7 @@ SPLITS = (
     " | every_order.split_Hz: split, all orders (mHz) ×1e3 | every_order.slow_axis_deg: slow axis, all orders (°) .2f"
 )
 NAMES = {"wall": "wall", "offset": "middle surface", "inner": "inner face", "outer": "outer face"}
-HARMONICS = (
-    "order: harmonic | amplitude_um.value: amplitude (µm) .3f"
-    " | amplitude_um.low … amplitude_um.high: 90 % interval (µm) .3f | crest: azimuth of a crest (°) .1f"
-)
+HARMONICS = "order: harmonic | amplitude_um.value: amplitude (µm) .3f | amplitude_um.low … amplitude_um.high: 90 % interval (µm) .3f | crest: azimuth of a crest (°) .1f"
 FACES = (
     "face | file | points | outliers | noise_um: noise (nm) ×1e3 .1f | position.0 … position.1: positions .3f"
     " | offset_um.0: offset x (µm) .1f | offset_um.1: offset y (µm) .1f | offset_um.2: offset z (µm) .1f | tilt_deg: tilt (°) .3f"

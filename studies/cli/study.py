@@ -201,8 +201,7 @@ def _estimate_words(estimate: Effort) -> str:
     why = f" ({estimate.why_full})" if estimate.why_full else ""
     return (
         f"{estimate.cases} cases in {estimate.batches} batch{'es' * (estimate.batches != 1)}, {SOLVERS[estimate.solver]}{why};"
-        f" {estimate.seconds_each:.3g} s per case, about {_duration(estimate.seconds)} in total; memory about {estimate.memory_MB:.0f} MB."
-        " Nothing was saved."
+        f" {estimate.seconds_each:.3g} s per case, about {_duration(estimate.seconds)} in total; memory about {estimate.memory_MB:.0f} MB. Nothing was saved."
     )
 
 

@@ -13,10 +13,7 @@ from studies.results import Drawing, Facts, Figure, Result, Sentence
 
 SOURCES = ("Wang X. et al., Sensors 2012, 12, 6434 (the HRG paper), eqs. (16)–(18), Table 2, figure 5.",)
 FAR = 3.0  # uncertainties of the curve from which on a known temperature contradicts it
-NOTE = (
-    "The curve was fitted to settled readings. The frequency shows the resonator's own temperature, weighted by the mode; the housing"
-    " leads it while the temperature changes."
-)
+NOTE = "The curve was fitted to settled readings. The frequency shows the resonator's own temperature, weighted by the mode; the housing leads it while the temperature changes."
 
 
 @answers("hrg.temperature/1")

@@ -25,10 +25,7 @@ KINDS = {
     "outer": "from the outer face",
 }
 CUTS = "number: cut | azimuth_deg: azimuth (°) .2f | height_mm: height z (mm) .3f | mass_ug: mass (µg) .3f | depth_um: depth (µm) .3f | done"
-STATES = (
-    "state | harmonic: n | split_Hz: split (mHz) ×1e3 .3f | error_Hz: standard error (mHz) ×1e3 .3f"
-    " | most_Hz: 95 % upper limit (mHz) ×1e3 .3f | slow_axis_deg: slow axis (°) .2f"
-)
+STATES = "state | harmonic: n | split_Hz: split (mHz) ×1e3 .3f | error_Hz: standard error (mHz) ×1e3 .3f | most_Hz: 95 % upper limit (mHz) ×1e3 .3f | slow_axis_deg: slow axis (°) .2f"
 
 CELLS = {"azimuth_deg": ".4f", "position": ".6f", "height_mm": ".4f", "mass_ug": ".5f", "depth_um": ".4f"}  # of --out
 UNLIKELY = 5.0  # standard errors of the prediction, by which a measured gain is doubted

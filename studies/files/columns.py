@@ -169,8 +169,7 @@ def _check_names(
             raise InputError(f"{where}: the column '{name}' appears twice; remove one.")
         if name == "time_s" and name not in known:
             raise InputError(
-                f"{where}: this is a record (it has time_s), but a table of settled points is needed ({', '.join(required)});"
-                " 'hrg fit frequency' makes one from a record."
+                f"{where}: this is a record (it has time_s), but a table of settled points is needed ({', '.join(required)}); 'hrg fit frequency' makes one from a record."
             )
         if name not in known and not any(name.startswith(prefix) for prefix in prefixes):
             raise InputError(f"{where}: unknown column '{name}'{nearest(name, known)}{IMPORT}")
@@ -265,8 +264,7 @@ def _parse_by_line(path: str | Path, body: str, names: list[str], first_line: in
                 raise InputError(f"{path}, line {number}: comments are allowed only above the header; move it there.")
             if len(cells) != len(names):
                 raise InputError(
-                    f"{path}, line {number}: {len(cells)} values where the header has {len(names)} columns"
-                    f" ({', '.join(names)}); decimal commas must become points."
+                    f"{path}, line {number}: {len(cells)} values where the header has {len(names)} columns ({', '.join(names)}); decimal commas must become points."
                 )
             rows.append([_number(path, number, name, cell) for name, cell in zip(names, cells, strict=True)])
     except csv.Error as error:

@@ -156,8 +156,7 @@ def check_lengths(records: Sequence[Record]) -> None:
                 lasts < AVERAGING
             )
             raise InputError(
-                f"{record.path or 'record'}: lasts {lasts:.3g} s; bias stability is judged on averages over {AVERAGING:g} s, of"
-                f" which a run needs {FEWEST} or more.{hint}"
+                f"{record.path or 'record'}: lasts {lasts:.3g} s; bias stability is judged on averages over {AVERAGING:g} s, of which a run needs {FEWEST} or more.{hint}"
             )
 
 

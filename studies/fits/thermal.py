@@ -82,8 +82,7 @@ def fit_thermal_constants(
     for record in records:
         if "frequency_Hz" not in record:
             raise InputError(
-                f"{record.path}: thermal constants need frequency_Hz and housing_temperature_degC (or"
-                f" chamber_temperature_degC); it has {', '.join(record.columns)}."
+                f"{record.path}: thermal constants need frequency_Hz and housing_temperature_degC (or chamber_temperature_degC); it has {', '.join(record.columns)}."
             )
     others = ("bias_deg_per_h", "measured_rate_deg_per_s", "inverse_q")
     campaign = make_ready(

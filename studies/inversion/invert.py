@@ -122,8 +122,7 @@ def _priors(instrument: Instrument, exact: Sequence[str]) -> Priors:
     priors = gather_priors(instrument, (*exact, *idle))
     if not priors.values:
         raise InputError(
-            f"{instrument.path}: no dimension and no elastic value is uncertain; give one, such as [resonator] thickness_mm ="
-            " { value = …, sd = … }."
+            f"{instrument.path}: no dimension and no elastic value is uncertain; give one, such as [resonator] thickness_mm = {{ value = …, sd = … }}."
         )
     return priors
 
@@ -255,8 +254,7 @@ def warn(fit: ModeFit, readings: ModeReadings, misfit: float, doubted: bool, rel
     solver = np.sqrt(np.maximum(fit.noise**2 - relative**2, 0.0))
     if (solver > relative).any():
         found.append(
-            f"the solver's own error, up to {1e6 * solver.max():.2g} ppm, is larger than the readings' and counts as noise; a stem with a"
-            " fillet is solved more accurately."
+            f"the solver's own error, up to {1e6 * solver.max():.2g} ppm, is larger than the readings' and counts as noise; a stem with a fillet is solved more accurately."
         )
     return found
 

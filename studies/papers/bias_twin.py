@@ -135,8 +135,7 @@ def twin_chapters(twins: Twins) -> list[Chapter]:
         f" with typical loss, gradients, hysteresis and noise replace them; nothing was tuned to the published figures (median"
         f" {before:.2g} → {after:.2g} °/h). On a second cooling run the same models reduce the bias variation by a factor of"
         f" {cooling:.2f} (median). On a warming run they make {harmed} of the {len(twins)} gyros worse than without"
-        f" compensation. Models fitted to three runs (cooling and warming), with terms selected for autocorrelated noise, make"
-        f" {mended or 'none'} of the {len(twins)} gyros worse."
+        f" compensation. Models fitted to three runs (cooling and warming), with terms selected for autocorrelated noise, make {mended or 'none'} of the {len(twins)} gyros worse."
     )
     caption = "Each marker is one virtual gyro, fitted to one cooling run as in the paper. Below the dotted line compensation makes the bias worse."
     alt = "Improvement on held-out runs against improvement on the training run."

@@ -150,13 +150,11 @@ NAMES = {
 ERRORS = "Rate error after the first step (rough) and after all steps (compensated), before the filter."
 ALLAN = (
     "Allan deviation at rest during the temperature ramp, with its 68 % band. The dotted line marks the filter length; at longer"
-    " averaging times filtering changes nothing, so it cannot reduce a random walk read there. The run was used for the fit, which"
-    " lowers the curve at the longest times."
+    " averaging times filtering changes nothing, so it cannot reduce a random walk read there. The run was used for the fit, which lowers the curve at the longest times."
 )
 STEP_COLUMNS = (
     Column(lambda figures: NAMES[figures.step], "After"),
-    "nonlinearity: Nonlinearity (%) ×100 .4f | at_rest: σ at rest (°/s) .4f"
-    " | turning: σ at constant rate (°/s) .4f | bias_instability: Bias instability (°/h) .2f"
+    "nonlinearity: Nonlinearity (%) ×100 .4f | at_rest: σ at rest (°/s) .4f | turning: σ at constant rate (°/s) .4f | bias_instability: Bias instability (°/h) .2f"
     " | random_walk_1s: Random walk at 1 s (°/√h) .3f | random_walk_100s: Random walk at 100 s (°/√h) .3f",
 )
 

@@ -183,16 +183,14 @@ COEFFICIENTS = (
         " + 6G (½ W cos φ/((ρ₂ + υ) sin φ) + ½ W/(ρ₁ + υ)) cos φ + (2V/(ρ₁ + υ) + (2 sin φ V 4W)/((ρ₂ + υ) sin φ)) λ ]"
         " + 1/(ρ₁ + υ) [ G (2V′ W sin φ 4U + …) … ], G (W cos φ/((ρ₂ + υ) sin φ) + W/(ρ₁ + υ)) (dρ₁/dφ)/(ρ₁ + υ)² }",
         "π ∫ { E h/(1−ν²) [ε_s² + ε_θ² + 2ν ε_s ε_θ + (1−ν)/2 γ²] + E h³/(12(1−ν²)) [κ_s² + κ_θ² + 2ν κ_s κ_θ + …] } r ds",
-        "stress at one point of the wall (Pa/m per metre of amplitude), neither multiplied by the pattern nor integrated over the"
-        " wall; no power of h, hence no bending",
+        "stress at one point of the wall (Pa/m per metre of amplitude), neither multiplied by the pattern nor integrated over the wall; no power of h, hence no bending",
     ),
     (
         "c₁",
         "π [ 10 G U cos φ/((ρ₂ + υ) sin φ) + 2λ (U/(ρ₁ + υ) U cos φ/((ρ₂ + υ) sin φ))/((ρ₂ + υ) sin φ)"
         " + 2G U (dρ₁/dφ)/((ρ₂ + υ)(ρ₁ + υ)² sin φ) + 2G (W cos φ/((ρ₂ + υ) sin φ) W/(ρ₁ + υ)) + … ]",
         "zero",
-        "on a body of revolution every circumferential integral between two patterns a quarter wave apart vanishes; the terms come from"
-        " the exchanged parity in (16)",
+        "on a body of revolution every circumferential integral between two patterns a quarter wave apart vanishes; the terms come from the exchanged parity in (16)",
     ),
 )  # fmt: skip
 
@@ -206,8 +204,7 @@ PATTERNS = (
 PATTERNS_NOTE = "First three rows: (21), (22) with m₀, b and c₀ computed for the assumed pattern. Stretching the wall is of order (R/h)² stiffer than bending it."
 SYMBOLS_NOTE = (
     "U: along the meridian, V: circumferential, W: normal, with the parity of (16) corrected; ε, κ, γ: the strains (5), (6) of the"
-    " pattern. Our copy of the paper lacks fraction bars, most minus signs and derivative marks: a blank between two terms"
-    " is a missing sign, and … marks illegible parts."
+    " pattern. Our copy of the paper lacks fraction bars, most minus signs and derivative marks: a blank between two terms is a missing sign, and … marks illegible parts."
 )
 CHECKED = "0: Equation | 1: Content | 2: Result of the check"
 CORRECTED = "0:  | 1: Printed, as far as legible | 2: Corrected (U, V, W as in (19)) | 3: Difference"

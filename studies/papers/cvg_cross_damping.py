@@ -144,10 +144,7 @@ def twin_chapters(twin: CrossDampingTwin) -> list[Chapter]:
 def _determinants_table(twin: CrossDampingTwin) -> Table:
     rows = [(lag, *ratios) for lag, ratios in zip(twin.lags, twin.table, strict=True)]
     noises = [f"{k}: {noise:g} °/√h .1f" for k, noise in enumerate(twin.noises, 1)]
-    note = (
-        "Median over noise seeds, on held-out runs. Without a lag, the random walk of the bias sets the limit; with a lag, the"
-        " temperature difference between sensor and resonator."
-    )
+    note = "Median over noise seeds, on held-out runs. Without a lag, the random walk of the bias sets the limit; with a lag, the temperature difference between sensor and resonator."
     columns = ["0: Lag (s) g", *noises]
     return Table("Improvement factor by resonator lag and white noise", rows, columns, note)
 

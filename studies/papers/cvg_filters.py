@@ -171,14 +171,8 @@ WIENER_NOTE = (
     "Error variance divided by the variance of the rate. The printed filters are the optimum scaled to G(0) W(0) = 1, which removes"
     " the error for a constant rate but increases the mean square error."
 )
-BY_STEP = (
-    "0.0: Step (ms) ×1e3 g | 1.1: Noise of the estimate (rad/s) .4f | 0.1.lag_error: Lag error (rad/s) .3f"
-    " | 0.1.output_error: Lag error of the output (rad/s) .3f"
-)
-STEPS_NOTE = (
-    "Noise: standard deviation of the settled filter, from its Riccati equation. Lag errors: rms for pulses of 0.25 s."
-    " The paper gives Q per step but not the step."
-)
+BY_STEP = "0.0: Step (ms) ×1e3 g | 1.1: Noise of the estimate (rad/s) .4f | 0.1.lag_error: Lag error (rad/s) .3f | 0.1.output_error: Lag error of the output (rad/s) .3f"
+STEPS_NOTE = "Noise: standard deviation of the settled filter, from its Riccati equation. Lag errors: rms for pulses of 0.25 s. The paper gives Q per step but not the step."
 
 
 def filter_chapters(study: FilterStudy, error_map: ErrorMap) -> list[Chapter]:
@@ -187,13 +181,11 @@ def filter_chapters(study: FilterStudy, error_map: ErrorMap) -> list[Chapter]:
     pulses = (
         "Square pulses through the full dynamics (1) with white noise (γ = 0.1, B = 3 Hz), filtered by eq. (35)."
         f" Noise {five.noise_before:.3f} → {five.noise_after:.3f} rad/s (factor {five.noise_before / five.noise_after:.1f});"
-        f" error relative to the true rate {five.error_before:.3f} → {five.error_after:.3f} rad/s, of which {five.lag_error:.3f}"
-        " from the lag of the filter."
+        f" error relative to the true rate {five.error_before:.3f} → {five.error_after:.3f} rad/s, of which {five.lag_error:.3f} from the lag of the filter."
     )
     kalman = (
         f"Kalman filter with the paper's Q and R, sampled every {1e3 * (six.time[1] - six.time[0]):g} ms: output noise"
-        f" {six.noise_before:.4f} → {output_noise:.4f} rad/s once settled (factor {six.noise_before / output_noise:.0f}); noise of the"
-        f" rate estimate {rate_noise:.4f} rad/s."
+        f" {six.noise_before:.4f} → {output_noise:.4f} rad/s once settled (factor {six.noise_before / output_noise:.0f}); noise of the rate estimate {rate_noise:.4f} rad/s."
     )
     steps = list(zip(study.by_step, study.settled_noise, strict=True))
     return [

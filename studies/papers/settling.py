@@ -141,8 +141,7 @@ def _law(instrument: "Instrument") -> FrequencyLaw:
 COLOURS = {"radiative": (style.BLUE, "-"), "linear": (style.ORANGE, "--"), "shell and stem alone": (style.GREEN, ":")}
 NO_HEAT_PATH = (
     "The paper gives no heat path. Shell and stem follow from geometry and material. One constant, the conductance between base and"
-    " housing, is identified from the statement that a step is 95 % complete after 9 000 s. The model then predicts that less than"
-    " 1 % remains after 15 000 s, as the paper states."
+    " housing, is identified from the statement that a step is 95 % complete after 9 000 s. The model then predicts that less than 1 % remains after 15 000 s, as the paper states."
 )
 STEPS = (
     Column(lambda curve: f"20 → {curve.target_degC:g} °C", "Step"),
@@ -154,10 +153,7 @@ STEPS = (
 )
 IDENTIFIED = "The mount conductance is identified from the mean of the two radiative steps at 9 000 s; all other values are predictions."
 SOAKS = "Soak | network: Heat path | slope: Slope at 20 °C (ppm/°C) +.3f | curvature: Curvature (ppm/°C²) +.4f"
-QUADRATIC = (
-    "From a quadratic fitted to the logarithms of the seven frequencies. From room: each point starts at room temperature; upwards:"
-    " each point starts at the one before."
-)
+QUADRATIC = "From a quadratic fitted to the logarithms of the seven frequencies. From room: each point starts at room temperature; upwards: each point starts at the one before."
 
 
 def settling_chapter(study: SettlingStudy) -> Chapter:
@@ -229,8 +225,7 @@ def soak_sentence(study: SettlingStudy) -> str:
     return (
         f"An incomplete soak from room temperature reduces the slope by at most {abs(largest.slope):.2f} ppm/°C here, of"
         f" the {abs(study.measured_slope - study.law_slope):.1f} ppm/°C between measurement and prediction at"
-        " 20 °C (both slopes of quadratics through ln f; elsewhere the measured slope is that of the cubic)."
-        f" With a linear heat path it hardly changes the curvature (by up to"
+        f" 20 °C (both slopes of quadratics through ln f; elsewhere the measured slope is that of the cubic). With a linear heat path it hardly changes the curvature (by up to"
         f" {max(abs(soak.curvature) for soak in linear):.4f} ppm/°C², from the curvature of the law itself). Radiation adds"
         f" {largest.curvature:+.4f} ppm/°C², {against} the difference of {missing:+.3f} ppm/°C² to be explained. With points taken"
         f" in ascending order the slope changes by at most {max((s.slope for s in upwards), key=abs):+.3f} ppm/°C and the curvature by"

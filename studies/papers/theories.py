@@ -69,10 +69,7 @@ def slopes_by_theory(ratio: float = 0.06, temperature: float = 293.15) -> dict[s
     }
 
 
-FREQUENCIES = (
-    "ratio: h/R g | rayleigh: Rayleigh (Hz) .3f | shell: Shell (Hz) .3f | solid: Solid (Hz) .3f"
-    " | excess: Rayleigh above solid (%) ×100 +.2f | coefficient: Relative excess / √(h/R) .3f"
-)
+FREQUENCIES = "ratio: h/R g | rayleigh: Rayleigh (Hz) .3f | shell: Shell (Hz) .3f | solid: Solid (Hz) .3f | excess: Rayleigh above solid (%) ×100 +.2f | coefficient: Relative excess / √(h/R) .3f"
 SLOPES = "Theory | slope: Slope ×1e6 .2f"
 
 
@@ -84,8 +81,7 @@ def theories_chapter() -> Chapter:
     slopes = [{"theory": theory, "slope": slope} for theory, slope in slopes_by_theory().items()]
     return Chapter("Comparison of theories", [
         f"Rayleigh's closed form, equation (13) of the paper, ignores the free edge. At h/R = 0.06 it is {100 * at.excess:.1f} % above the"
-        f" solid model. The excess falls only as √(h/R), with a coefficient that tends to {limit:.2f}. All other frequencies and slopes of"
-        " silica on this page come from the solid model.",
+        f" solid model. The excess falls only as √(h/R), with a coefficient that tends to {limit:.2f}. All other frequencies and slopes of silica on this page come from the solid model.",
         Table("Free hemisphere of 15 mm radius, n = 2", rows, FREQUENCIES),
         Figure(lambda: _draw(rows, limit),
             "The excess of Rayleigh's form falls as √(h/R); shell theory is within 0.1 % of the solid model everywhere.",

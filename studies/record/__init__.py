@@ -271,8 +271,7 @@ def check_plausible(columns: Mapping[str, Array], where: Callable[[int], str]) -
             kelvin = name.endswith("_degC") and 200 < values[row] < 500
             hint = "it looks like kelvin, subtract 273.15" if kelvin else "check its unit"
             raise InputError(
-                f"{where(row)}: {name} = {values[row]:g} is not a possible reading (allowed: {low:g} to {high:g}); {hint}, or"
-                " leave the cell empty where the value is missing."
+                f"{where(row)}: {name} = {values[row]:g} is not a possible reading (allowed: {low:g} to {high:g}); {hint}, or leave the cell empty where the value is missing."
             )
 
 

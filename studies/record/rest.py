@@ -115,13 +115,11 @@ def check_temperatures(record: "Record") -> str:
     lasts, spread = max(float(np.ptp(time)), 1e-9), float(np.subtract(*np.percentile(T, [99.5, 0.5])))
     if spread > FASTEST * lasts:
         raise InputError(
-            f"{where}: the temperature changes by {np.ptp(T):.3g} K within {lasts:.3g} s, faster than any chamber."
-            " time_s must be in seconds: is it in minutes or hours?"
+            f"{where}: the temperature changes by {np.ptp(T):.3g} K within {lasts:.3g} s, faster than any chamber. time_s must be in seconds: is it in minutes or hours?"
         )
     if name != TEMPERATURES[2] and (change := _fastest_change(time, T)):
         raise InputError(
-            f"{where}: {name} changes by {change[0]:.3g} K within {change[1]:.3g} s, faster than any housing."
-            " time_s must be in seconds: is it in minutes or hours?"
+            f"{where}: {name} changes by {change[0]:.3g} K within {change[1]:.3g} s, faster than any housing. time_s must be in seconds: is it in minutes or hours?"
         )
     if spread < LEAST_SPREAD:
         return ""
@@ -152,8 +150,7 @@ def _check_signs(record: "Record", where: str) -> None:
     against = np.nanmean(np.prod(both - np.nanmean(both, axis=1, keepdims=True), axis=0))
     if apart > max(OPPOSITE, (FOLLOWS_NOT if against < -1.0 else STANDS) * turned):
         raise InputError(
-            f"{where}: {DRIVING[0]} is {apart:.3g} K away from {DRIVING[1]} (median), and {turned:.3g} K with the sign"
-            " changed. Correct the column that has the opposite sign."
+            f"{where}: {DRIVING[0]} is {apart:.3g} K away from {DRIVING[1]} (median), and {turned:.3g} K with the sign changed. Correct the column that has the opposite sign."
         )
 
 

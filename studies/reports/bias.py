@@ -33,13 +33,9 @@ Method = Literal["guarded", "paper"]
 PATH_NOTE = (
     "The paper's selection treats all averages as independent. Drift and flicker noise correlate neighbouring averages, so this"
     " selection finds terms in pure noise. The guarded selection estimates the correlation time of the noise and divides the"
-    " significance level among the candidates. A term can enter only after the lower-order terms that it contains. BIC is comparable"
-    " only within one selection."
+    " significance level among the candidates. A term can enter only after the lower-order terms that it contains. BIC is comparable only within one selection."
 )
-NO_TERMS = (
-    "These data support no term: a constant describes the bias just as well. Compensation brings no improvement; the saved model only"
-    " removes the mean."
-)
+NO_TERMS = "These data support no term: a constant describes the bias just as well. Compensation brings no improvement; the saved model only removes the mean."
 STEP_COLUMNS = "Step | action: Term | F: F .2f | p | bic: BIC .2f | score: Held out .3f | Model"
 COEFFICIENTS = (
     "number: No. | Term | value ± error: Value | naive: Error if rows were independent .2 | Unit | printed: In eq. (22)"
@@ -96,8 +92,7 @@ def doubts(study: BiasStudy) -> list[Sentence]:
     if study.opposite is not None:
         which = "One of the two runs" if len(study.runs) == 2 else study.opposite
         found.append(
-            f"{which} has a bias of the opposite sign: with its sign changed, the terms fit all runs at least twice as well."
-            " Check the sign of the output in the files."
+            f"{which} has a bias of the opposite sign: with its sign changed, the terms fit all runs at least twice as well. Check the sign of the output in the files."
         )
     return [Sentence(text, "warning") for text in found]
 
@@ -165,10 +160,7 @@ def coefficients_table(judged: Judged, output: str) -> Table:
     unit = fit.variable.unit
     per, words = (60.0, "K/min") if unit == "°C" else (1.0, f"{unit}/s")
     (low, high), (slow, fast) = widen(*fit.state_range), (plain(per * end) for end in widen(*fit.rate_range))
-    note = (
-        f"Valid from {plain(low, 8)} to {plain(high, 8)} {unit} and from {slow} to {fast} {words}. Whiteness of the residual:"
-        f" θ = {fit.theta:.3f} (1: white, 0: random walk)."
-    )
+    note = f"Valid from {plain(low, 8)} to {plain(high, 8)} {unit} and from {slow} to {fast} {words}. Whiteness of the residual: θ = {fit.theta:.3f} (1: white, 0: random walk)."
     if judged.method == "guarded" and fit.theta < 0.99:
         note += " The errors include the drift of the bias."
     return Table(f"Coefficients, {METHOD[judged.method]}", rows, COEFFICIENTS, note)

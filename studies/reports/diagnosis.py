@@ -24,10 +24,7 @@ WORDS = {
 }
 UNDECIDED = "Not decided: these data neither confirm the simulation nor name a cause."
 EVIDENCE = "Evidence: twice the logarithm of the Bayes factor against no effect."
-CAUSES = (
-    "cause | or: or equally | response | peak: peak to peak | probability: probability .2f | name: parameter"
-    " | value in low … high: value | low … high: 90 % interval .0"
-)
+CAUSES = "cause | or: or equally | response | peak: peak to peak | probability: probability .2f | name: parameter | value in low … high: value | low … high: 90 % interval .0"
 RESULTS = (
     "response | verdict | baseline: baseline .3 | extended: with causes .3 | noise: noise .3 | white: white noise .3"
     " | wander: coloured noise .3 | gain: gain .3 | explained_share: explained (%) ×100 .1f | left: lack of fit"

@@ -9,8 +9,7 @@ from studies.results import Chapter, Drawing, Facts, Figure, Sentence, Table
 
 CANDIDATES = "0: candidate | 1: sum of squares (Hz²) .3 | 2: leave-one-out (Hz) .3 | 3: evidence .3"
 EVIDENCE = (
-    "Evidence: twice the logarithm of the Bayes factor, the ratio of the probabilities of the readings with and without the candidate,"
-    " averaged over its size."
+    "Evidence: twice the logarithm of the Bayes factor, the ratio of the probabilities of the readings with and without the candidate, averaged over its size."
     f" From {-2.0 * CONSTANTS['log_prior_effect']:.0f} it proves a cause; with less, causes are given only for a residual that is no noise."
 )
 

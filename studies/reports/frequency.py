@@ -50,10 +50,7 @@ def inverse_table(study: FrequencyStudy) -> Table:
     actual = np.round(study.temperature_degC, 3)
     found = row_of(study, "frequency", calculated="calculated_degC", error="error_degC", residual="fit.residuals")
     rows = rows_of({"actual": actual, **found})
-    columns = (
-        "frequency: Frequency (Hz) .2f | actual: Actual (°C) g | calculated: Calculated (°C) .3f"
-        " | error: Error (K) +.3f | residual: Fit residual (Hz) +.4f"
-    )
+    columns = "frequency: Frequency (Hz) .2f | actual: Actual (°C) g | calculated: Calculated (°C) .3f | error: Error (K) +.3f | residual: Fit residual (Hz) +.4f"
     return Table("Temperature from frequency", rows, columns, "Error: actual minus calculated temperature.")
 
 
@@ -78,10 +75,7 @@ def order_sentence(study: FrequencyStudy) -> str:
         other = name_order(order + 1 if asked == order else order)
         return f"A {name_order(asked)} is sufficient: a {other} is not significantly better."
     before, after = (study.orders.fits[n - 1].leave_one_out_rms for n in (order, asked))
-    return (
-        f"A {name_order(order)} is not sufficient: a {name_order(asked)} is significantly better. The leave-one-out error changes"
-        f" from {before:.4f} to {after:.4f} Hz."
-    )
+    return f"A {name_order(order)} is not sufficient: a {name_order(asked)} is significantly better. The leave-one-out error changes from {before:.4f} to {after:.4f} Hz."
 
 
 def order_parts(study: FrequencyStudy) -> list[Part]:

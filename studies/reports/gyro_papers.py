@@ -9,8 +9,7 @@ from studies.results import Chapter, Column, Table, row_of
 
 CLAIMS_SOURCES = (
     "Lynch D., Vibratory gyro analysis by the method of averaging, St. Petersburg 1995; IEEE Std 1431-2004, Annex B.",
-    "Micromachines 2021, 12, 266 (Q, split, open and closed loop of a quartz gyro); Microsystems & Nanoengineering 2025,"
-    " s41378-025-00872-z (abstract).",
+    "Micromachines 2021, 12, 266 (Q, split, open and closed loop of a quartz gyro); Microsystems & Nanoengineering 2025, s41378-025-00872-z (abstract).",
 )
 CLAIMS = ("Verdict", Column(lambda one: f"{one.claim} ({one.source})", "Claim and source"), "twin: Simulation")
 SOURCES = (*cvg_cross_damping.SOURCES, *cvg_filters.SOURCES, *bvg.SOURCES, *CLAIMS_SOURCES)
@@ -71,8 +70,7 @@ def _claims_chapter(found: LoopClaims) -> Chapter:
     (drift, drift_closed), (mean, mean_closed) = found.drift, found.mean_rate
     text = (
         f"A damping anisotropy of 1 % at Q = 1e7 causes a drift of {drift:.3f} °/h in the simulation ({drift_closed:.3f} in closed form)."
-        f" At the earth rate of 15.041 °/h a free wave indicates {mean:.3f} °/h on average ({mean_closed:.3f} in closed form). Below"
-        " the drift rate the wave is locked and shows no rate."
+        f" At the earth rate of 15.041 °/h a free wave indicates {mean:.3f} °/h on average ({mean_closed:.3f} in closed form). Below the drift rate the wave is locked and shows no rate."
     )
     title = "Control loops: published claims and simulation"
     return Chapter(title, [text, Table("Published claims", found.claims, CLAIMS)])

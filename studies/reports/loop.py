@@ -77,8 +77,7 @@ def loop_parts(study: LoopStudy, payload: dict[str, Any], run: Record | None) ->
         ]),
         Chapter("Stability and range", [
             Table("Stability margins", payload["margins"],
-                "loop | paper: symbol in the BVG paper | crossover_Hz: gain crossover (Hz) .3g"
-                " | phase_margin_deg: phase margin (°) .0f | gain_margin_dB: gain margin (dB) .1f"
+                "loop | paper: symbol in the BVG paper | crossover_Hz: gain crossover (Hz) .3g | phase_margin_deg: phase margin (°) .0f | gain_margin_dB: gain margin (dB) .1f"
                 " | reversal_Hz: phase crossover (Hz) .3g"),
             Figure(lambda: _bode(study), "Open-loop frequency response. Dots: gain crossover; squares: phase crossover (−180°)."),
             Table("Actuator range in use", _ranges(study, payload),
@@ -136,8 +135,7 @@ def _largest(slopes: tuple[BiasSlope, ...], sd: float) -> list[str]:
     share, each = 100 * (effect / sd) ** 2 if sd > 0 else 0.0, " each" * (len(equal) > 1)
     return [
         f"Largest contribution{'s' * (len(equal) > 1)} to the uncertainty of the bias: {names}, {effect:.3g} °/h{each}, {share:.0f} % of the"
-        f" variance{each}. A constant bias can be calibrated out; drift of these values with age or temperature changes the bias in"
-        " proportion to the slopes."
+        f" variance{each}. A constant bias can be calibrated out; drift of these values with age or temperature changes the bias in proportion to the slopes."
     ]
 
 

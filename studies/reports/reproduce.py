@@ -166,8 +166,7 @@ def _short(parts: Reproduction) -> list[Part]:
             "The two published coefficients of the cubic are reproduced to the last digit, and the temperatures of Table 2 to within"
             f" {farthest:.4f} K. At −10 °C the columns of the paper disagree: it gives −10.058 °C but an error of 0.0578 K"
             f" (here {study.error_degC[1]:.4f} K). The paper concludes that higher orders have little effect; this is not reproduced."
-            f" The residual sum of squares is {better.sum_of_squares:.1e} Hz² for a quartic and"
-            f" {study.fit.sum_of_squares:.2e} Hz² for the cubic, and the quartic predicts omitted points"
+            f" The residual sum of squares is {better.sum_of_squares:.1e} Hz² for a quartic and {study.fit.sum_of_squares:.2e} Hz² for the cubic, and the quartic predicts omitted points"
             f" {study.fit.leave_one_out_rms / better.leave_one_out_rms:.1f} times better."
         ),
         Sentence(

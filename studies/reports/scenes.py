@@ -197,10 +197,7 @@ def view_blocks(shown: Sequence[ModeScene], remark: str = "") -> "list[Block]":
         if one.split is not None:
             times = f"{one.exaggeration:.0f} times as large"
             larger = f"; the departures of the shape are drawn {times}" if one.exaggeration else ""
-            caption += (
-                f" n = {one.mode.harmonic}: the slower mode of the pair, which is split by {1e3 * one.split.hertz:.4g} mHz, on its"
-                f" axis at {degrees(one.split.slow_axis):.4g}°{larger}."
-            )
+            caption += f" n = {one.mode.harmonic}: the slower mode of the pair, which is split by {1e3 * one.split.hertz:.4g} mHz, on its axis at {degrees(one.split.slow_axis):.4g}°{larger}."
     lobes = 2 * first.mode.harmonic
     alt = f"The resonator with its rim bent into {lobes} lobes, nodes between them."
     splits = [None if one.split is None else Drawn(one.split, one.imperfection, one.exaggeration) for one in shown]

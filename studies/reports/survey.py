@@ -44,10 +44,7 @@ NOISE_NOTE = (
 )
 USES = "Command | Gives | ready: Possible | Missing"
 STEPS = (Column("column", "Column", spell=display_name), "time_s: At (s) .1f | Size")
-SETTLED = (
-    "start_s: From (s) .0f | end_s: To (s) .0f | temperature_degC: Temperature (°C) .3f"
-    " | frequency_Hz: Frequency (Hz) .6f | left_K: Remaining settling, at most (K) .2"
-)
+SETTLED = "start_s: From (s) .0f | end_s: To (s) .0f | temperature_degC: Temperature (°C) .3f | frequency_Hz: Frequency (Hz) .6f | left_K: Remaining settling, at most (K) .2"
 CORRELATIONS = (
     Column("one", "Column", spell=display_name),
     Column("two", "With", spell=display_name),

@@ -18,10 +18,7 @@ from studies.sweeps.tolerance import Yield, find_reach, find_yield, resolve_limi
 
 SOBOL = "Parameter | first: First order .4f | first_low … first_high: 90 % interval .4f | total: Total .4f | total_low … total_high: 90 % interval .4f"
 SHARES = "Parameter | slope: Slope .6g | half_width: ± .2g | Unit | share: Share of variance (%) ×100 .2f"
-YIELD = (
-    "Requirement | from: From .8g | to: To .8g | share: Designs that meet it (%) ×100 .2f"
-    " | low … high: 90 % interval (%) ×100 .2f | unknown: Without a result"
-)
+YIELD = "Requirement | from: From .8g | to: To .8g | share: Designs that meet it (%) ×100 .2f | low … high: 90 % interval (%) ×100 .2f | unknown: Without a result"
 TOLERANCES = "label: Parameter | asked: Specified | Found"
 
 
@@ -81,10 +78,7 @@ def _shares(results: Results, column: Output) -> list[Part]:
     units = _slope_units(results, column)
     rows = rows_of({"parameter": found.parameters, **row_of(found, "slope", "half_width", "share")})
     rows = [row | {"parameter": figures.label(row["parameter"], "1"), "unit": units[row["parameter"]]} for row in rows]
-    note = (
-        f"A linear model explains {100 * found.r_squared:.2f} % of the variance. ± is half of the 90 % interval; a slope"
-        " smaller than ± is not significant."
-    )
+    note = f"A linear model explains {100 * found.r_squared:.2f} % of the variance. ± is half of the 90 % interval; a slope smaller than ± is not significant."
     return [Table(f"Linear influence on {column.label}", rows, SHARES, note, sortable=True)]
 
 

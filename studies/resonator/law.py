@@ -58,10 +58,8 @@ def unknown_slope(instrument: "Instrument") -> str:
     said = "no source states" if instrument.material.name in read_materials() else "the card does not say"
     keys = {name: f"[material.deviation.{name}] {key} (1/K)" for name, key in SLOPE_KEYS.items()}
     return (
-        f"{said} how the {' and the '.join(named[name] for name in missing)} of"
-        f" '{instrument.material.name}' change{'s' if len(missing) == 1 else ''} with temperature, so the slope of the"
-        f" frequency is not known. Give {' and '.join(keys[name] for name in missing)}, or a material of the table"
-        " (hrg materials) or of your own ('file')."
+        f"{said} how the {' and the '.join(named[name] for name in missing)} of '{instrument.material.name}' change{'s' if len(missing) == 1 else ''} with temperature, so the slope of the"
+        f" frequency is not known. Give {' and '.join(keys[name] for name in missing)}, or a material of the table (hrg materials) or of your own ('file')."
     )
 
 

@@ -73,8 +73,7 @@ class PlannedCut:
         if SURE * self.error > LEAST_KNOWN:
             raise ShellError(
                 f"a cut {1e3 * self.groove.width:.3g} mm wide and {1e6 * self.groove.depth:.3g} µm deep at this place changes the split by "
-                f"{self.gain(next(iter(self.splits))):.2f} ± {100 * SURE * self.error:.0f} % of the change by a shallow cut: mass removal and stress "
-                f"relief nearly cancel. {WIDER}"
+                f"{self.gain(next(iter(self.splits))):.2f} ± {100 * SURE * self.error:.0f} % of the change by a shallow cut: mass removal and stress relief nearly cancel. {WIDER}"
             )
 
 
@@ -134,8 +133,7 @@ def tooth_sites(pairs: Mapping[int, Pair], teeth: Teeth) -> Sites:
     """One site on every tooth."""
     if not (4 <= teeth.count <= MOST_TEETH and 0 < teeth.limit < np.inf and np.isfinite(teeth.azimuth)):
         raise InputError(
-            f"--teeth {teeth.count}, --tooth-limit-ug {1e9 * teeth.limit:g}: there must be 4 to {MOST_TEETH} teeth, and the largest mass"
-            " to remove from each must be positive."
+            f"--teeth {teeth.count}, --tooth-limit-ug {1e9 * teeth.limit:g}: there must be 4 to {MOST_TEETH} teeth, and the largest mass to remove from each must be positive."
         )
     around = (teeth.azimuth + 2 * pi * np.arange(teeth.count) / teeth.count) % (2 * pi)
     along = np.ones(teeth.count)

@@ -55,10 +55,7 @@ def _problem(study: "Study", values: Mapping[str, Any]) -> str:
     ratio = float(max(h for _, h in instrument.resonator.thickness) / instrument.resonator.size)
     theories = [asked.options["theory"] for asked in study.asked if asked.options.get("theory", "solid") != "solid"]
     if theories and ratio > THICKEST_SHELL:
-        return (
-            f"with {words or 'the card itself'} h/R is {ratio:.3g}, beyond {THICKEST_SHELL:g} up to which theory ="
-            f" '{theories[0]}' is valid; narrow the range or take theory = 'solid'."
-        )
+        return f"with {words or 'the card itself'} h/R is {ratio:.3g}, beyond {THICKEST_SHELL:g} up to which theory = '{theories[0]}' is valid; narrow the range or take theory = 'solid'."
     return ""
 
 

@@ -134,8 +134,7 @@ def build_material(keys: MaterialKeys, place: CardPlace) -> "Material":
             missing = [name for name, _ in GIVEN.values() if name not in given]
             if missing:
                 raise InputError(
-                    f"{place.where}: '{keys.name}' is not in the material table, so all of youngs_modulus_GPa,"
-                    f" poisson_ratio and density_kg_m3 must be given; missing: {', '.join(missing)}."
+                    f"{place.where}: '{keys.name}' is not in the material table, so all of youngs_modulus_GPa, poisson_ratio and density_kg_m3 must be given; missing: {', '.join(missing)}."
                 )
             material = constant_material(keys.name, **given)
         else:

@@ -119,8 +119,7 @@ def compensate(model: Model, record: Record, *, extrapolate: bool) -> dict[str, 
     if len(chain.taps) and not np.all(complete):
         row = int(np.flatnonzero(~complete)[0])
         raise InputError(
-            f"{output} or {column} is empty in row {row + 1} of the table, but the FIR filter needs every sample;"
-            " fill the gap, or fit the chain without a filter (--no-filter)."
+            f"{output} or {column} is empty in row {row + 1} of the table, but the FIR filter needs every sample; fill the gap, or fit the chain without a filter (--no-filter)."
         )
     if np.count_nonzero(complete) < 2:
         raise InputError(f"no two rows have both {output} and {column}; nothing can be compensated.")

@@ -21,8 +21,7 @@ class CompensationResidual(HarmonicQuantity, frozen=True, kw_only=True, tag="com
     def __post_init__(self) -> None:
         if not self.to_degC > self.from_degC or self.points <= self.order + 1:
             raise ValueError(
-                f"compensation-residual needs from_degC < to_degC and more than {self.order + 1} points, not"
-                f" {self.from_degC:g} to {self.to_degC:g} °C with {self.points}."
+                f"compensation-residual needs from_degC < to_degC and more than {self.order + 1} points, not {self.from_degC:g} to {self.to_degC:g} °C with {self.points}."
             )
 
     def list_columns(self) -> tuple[Column, ...]:
