@@ -175,9 +175,7 @@ def solve_lower(root: Array, columns: Array, transposed: bool = False) -> Array:
     """Return L⁻¹ or L⁻ᵀ times columns, (N,) or (N, p)."""
     if not columns.size:
         return columns
-    return np.asarray(scipy.linalg.lapack.dtrtrs(root, columns, lower=1, trans=int(transposed))[0]).reshape(
-        columns.shape
-    )
+    return np.asarray(scipy.linalg.lapack.dtrtrs(root, columns, lower=1, trans=transposed)[0]).reshape(columns.shape)
 
 
 @dataclass(frozen=True)
@@ -223,9 +221,7 @@ def estimate_noise(
     size[size == 0] = 1.0
     lam = np.zeros(X.shape[1]) if precision is None else precision
     X, lam = X / size, lam / size**2
-    free_part = np.linalg.lstsq(
-        np.vstack([X, np.diag(np.sqrt(lam))]), np.append(target, np.zeros(len(lam))), rcond=None
-    )[0]
+    free_part = np.linalg.lstsq(np.vstack([X, np.diag(np.sqrt(lam))]), np.append(target, np.zeros(len(lam))))[0]
     rest = target - X @ free_part
     step = np.concatenate([np.diff(rest[s]) for s in rows.slices])
     spread = float(np.median(np.abs(step))) / 0.954 if step.size else 0.0

@@ -73,9 +73,7 @@ class PiezoRing:
     def displacements(self, voltages: ArrayLike) -> tuple[NDArray[np.generic], NDArray[np.generic]]:
         """Return p and q (m) from the voltages (8, ...) of all amplifiers: eq. (28)."""
         V = np.asarray(voltages)
-        p, q = (
-            scale * sum(V[i - 1] for i in pair) for scale, pair in zip(self.scales, (SENSE_P, SENSE_Q), strict=True)
-        )
+        p, q = (gain * sum(V[i - 1] for i in pair) for gain, pair in zip(self.scales, (SENSE_P, SENSE_Q), strict=True))
         return p, q
 
     def forces(self, voltages: ArrayLike) -> Array:

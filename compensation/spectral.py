@@ -136,9 +136,7 @@ def require_possible(one: Spectrum, other: Spectrum, cross: CrossSpectrum | None
     tops = multiply(mixed, reflect(mixed), np.array(one.denominator), np.array(other.denominator))
     bottoms = multiply(below, reflect(below), np.array(one.numerator), np.array(other.numerator))
     top, bottom = (np.trim_zeros(p[::2] * (-1.0) ** np.arange(len(p[::2]))[::-1], "f") for p in (tops, bottoms))
-    slope = np.asarray(
-        np.polysub(np.polymul(np.polyder(top), bottom), np.polymul(top, np.polyder(bottom))), dtype=float
-    )
+    slope = np.asarray(np.polysub(np.polymul(np.polyder(top), bottom), np.polymul(top, np.polyder(bottom))), float)
     roots = np.roots(np.trim_zeros(slope, "f"))
     still = roots.real[(np.abs(roots.imag) <= 1e-6 * np.abs(roots)) & (roots.real > 0)]
     scale = float(np.max(np.abs(np.r_[np.roots(top), np.roots(bottom)]), initial=1.0))

@@ -90,9 +90,7 @@ class StandingWave:
 
     def over_rows(self, count: int) -> "StandingWave":
         """Return the wave with every physical value as an array of rows."""
-        rows: dict[str, Any] = {
-            name: np.broadcast_to(np.asarray(getattr(self, name), float), count) for name in PHYSICAL
-        }
+        rows: dict[str, Any] = {name: np.broadcast_to(np.array(getattr(self, name), float), count) for name in PHYSICAL}
         return replace(self, **rows)
 
     def at_row(self, row: int) -> "StandingWave":

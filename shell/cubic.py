@@ -117,9 +117,7 @@ def _lowest(systems: list[System], harmonics: list[int], crystal: Cubic, n: int,
     waves: dict[int, Array] = {}
     for system, k, a, b in zip(systems, harmonics, ends, ends[1:], strict=False):
         # K with λ = C₁₂ and G = C₄₄, and M, of the free unknowns of one harmonic
-        elements, mass = system.operators(
-            [find_constants(group.table.position, part, False) for group in system.groups]
-        )
+        elements, mass = system.operators([find_constants(one.table.position, part, False) for one in system.groups])
         elastic = assemble_elements(system.pattern.unknowns, elements, b - a).toarray()
         axial, around, across, shear = _strains(system)
         K[a:b, a:b] = elastic + crystal.excess * (axial.T @ axial + around.T @ around / 2)

@@ -89,9 +89,7 @@ def lay_chain(resonator: Resonator, start: float, stop: float, ends: tuple[End, 
         if end != "pole":
             wanted += _layers(resonator, edge, inward, end)
     for joint in joints:
-        wanted += [
-            (width, joint + side * width) for side in (-1, 1) for width, _ in _layers(resonator, joint, side, "tied")
-        ]
+        wanted += [(w, joint + side * w) for side in (-1, 1) for w, _ in _layers(resonator, joint, side, "tied")]
     for width, s in sorted(wanted):
         if min(abs(s - other) for other in firm) > 0.4 * width and start < s < stop:
             firm = sorted([*firm, s])

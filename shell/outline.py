@@ -74,9 +74,7 @@ def trace_outlines(resonator: Resonator, spacing: float, mode: "Mode | None" = N
         in_plane = np.hypot(u_r, u_z)
         largest = max(largest, float(np.max(np.maximum(in_plane, abs(u_t)) if system.n else np.hypot(in_plane, u_t))))
     scale = 1 / largest if largest > 0 else 1.0
-    return tuple(
-        replace(line, displacement=line.displacement * scale, energy=line.energy * scale**2) for line in turned
-    )
+    return tuple(replace(one, displacement=one.displacement * scale, energy=one.energy * scale**2) for one in turned)
 
 
 @dataclass(frozen=True, eq=False)

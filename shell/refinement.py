@@ -60,9 +60,7 @@ def refine(
         lacking = estimate_errors(resonator, elastic, solutions)
         if before:  # by how much what was raised since was farther off than was said
             stated = before[1][[KINDS.index(kind) for kind in raised]].sum(axis=0)
-            moved = [
-                abs(then.eigenvalue / now.eigenvalue - 1) / 2 for then, now in zip(before[0], solutions, strict=True)
-            ]
+            moved = [abs(a.eigenvalue / b.eigenvalue - 1) / 2 for a, b in zip(before[0], solutions, strict=True)]
             lacking *= np.clip(moved / stated, 1.0, DOUBT)
         lacking *= [1.0 if not k or _is_resolved(one) else DOUBT for k, one in enumerate(solutions)]
         before = solutions, lacking
@@ -157,9 +155,7 @@ def _solve(
     system: System, size: float, elastic: Elastic | VaryingElastic, count: int, accuracy: float
 ) -> tuple[list[Solution], list[float], Factor]:
     """The modes of one system, what the iteration left undone of each, and the factor of its stiffness over `_density`."""
-    constants = tuple(
-        find_constants(group.table.position, elastic, group.table.plane_stress) for group in system.groups
-    )
+    constants = tuple(find_constants(one.table.position, elastic, one.table.plane_stress) for one in system.groups)
     # a small shift factors the rigid motions and leaves the elastic modes in order
     shift = 1e-2 * constants[0].wave_speed_squared / size**2 if system.rigid_motions else 0.0
     wanted = count + system.rigid_motions

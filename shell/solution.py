@@ -178,10 +178,7 @@ class Solution:
                 columns = [
                     group.table.position[:1, :1],
                     np.zeros(1),
-                    *(
-                        np.array([np.sum(values) / scale])
-                        for values, scale in ((elastic, U), (kinetic, T), (nu, 2 * U))
-                    ),
+                    *(np.array([np.sum(one) / scale]) for one, scale in ((elastic, U), (kinetic, T), (nu, 2 * U))),
                     np.zeros(1),
                 ]
             rows.append([np.ravel(column) for column in columns])

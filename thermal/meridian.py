@@ -103,9 +103,7 @@ def describe_meridian(
     ends = zip([root, *names[:-1]], names, resistance, strict=True)
     parts += [Conductor(one, other, 1 / float(R)) for one, other, R in ends]
     if exchange:
-        parts += [
-            Radiator(name, surroundings, exchange * float(area)) for name, area in zip(names, cells.area, strict=True)
-        ]
+        parts += [Radiator(name, surroundings, exchange * float(A)) for name, A in zip(names, cells.area, strict=True)]
     return parts
 
 

@@ -128,9 +128,7 @@ def check_energy(network: Network, boundaries: Mapping[str, Profile], transient:
         turnover += float((weight @ np.abs(inflow)).sum())
     first, last = transient.at(transient.knots[[0, -1]])
     T = first + np.outer((x + 1) / 2, last - first)
-    capacity = np.array(
-        [[node.capacity_at(float(one)) for node, one in zip(network.nodes, row, strict=True)] for row in T]
-    )
+    capacity = np.array([[node.capacity_at(float(t)) for node, t in zip(network.nodes, row, strict=True)] for row in T])
     stored = (last - first) / 2 * (w @ capacity)
     turnover += float(np.abs(stored).sum())
     return EnergyBalance(float(np.sum(stored)), received, turnover)

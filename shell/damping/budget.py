@@ -66,9 +66,7 @@ class Budget:
     @property
     def sd(self) -> Array:
         """Standard uncertainty of the sum, the parts taken as independent."""
-        squares = sum(
-            ((part.relative_sd * part.inverse_q) ** 2 for part in self.parts), np.zeros(len(self.temperatures))
-        )
+        squares = sum(((one.relative_sd * one.inverse_q) ** 2 for one in self.parts), np.zeros(len(self.temperatures)))
         return np.asarray(np.sqrt(squares))
 
     @property

@@ -126,9 +126,7 @@ def radiating_mode(waves: RadiatingBody, frequency: float) -> Radiating:
 
 def assemble_waves(system: System, materials: Sequence[Elastic], bases: Sequence[Mask], layer: Layer) -> RadiatingBody:
     """Stiffness and mass of body and base; `bases` says of every group which of its elements belong to the base."""
-    found = [
-        _matrices(group, materials, base, layer, system.n) for group, base in zip(system.groups, bases, strict=True)
-    ]
+    found = [_matrices(one, materials, base, layer, system.n) for one, base in zip(system.groups, bases, strict=True)]
     return RadiatingBody(system, [K for K, _ in found], [M for _, M in found], bases)
 
 

@@ -65,9 +65,7 @@ def find_split(pair: Pair, imperfection: Imperfection) -> Split:
         if field is not None
     ]
     if inner is not None or outer is not None:
-        terms += [
-            (density, field) for density, field in zip(pair.faces, (inner, outer), strict=True) if field is not None
-        ]
+        terms += [(rho, field) for rho, field in zip(pair.faces, (inner, outer), strict=True) if field is not None]
     if imperfection.rim is not None:
         terms.append((pair.rim(), imperfection.rim))
     for density, field in terms:

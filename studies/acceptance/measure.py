@@ -138,11 +138,7 @@ def measure_temperature(records: "Sequence[Record]", output: str) -> Found:
         names = [*(f"offset {k + 1}" for k in range(len(runs))), "temperature", "rate of temperature"]
         with naming(", ".join(paths)):
             fit = fit_coloured(X, y, names, runs)
-        b, sd, free = (
-            fit.regression.coefficients,
-            np.sqrt(np.diag(fit.regression.covariance)),
-            max(len(y) - X.shape[1], 1),
-        )
+        b, sd, free = fit.regression.coefficients, fit.regression.standard_errors, max(len(y) - X.shape[1], 1)
         found["bias_temperature_slope_deg_per_h_per_K"] = within(float(b[-2]), float(sd[-2]), paths, free)
         found["bias_temperature_rate_deg_per_h_s_per_K"] = within(float(b[-1]), float(sd[-1]), paths, free)
         left = fit.residuals - offsets @ np.array([fit.residuals[rows].mean() for rows in runs])

@@ -174,9 +174,7 @@ class Instrument:
         return _reread(self, content, {name.split(".")[0] for name in values}) if values else self
 
     def __getstate__(self) -> dict[str, Any]:
-        return {
-            key: value for key, value in self.__dict__.items() if key not in ("heat_path", "uncertain", "correlation")
-        }
+        return {k: v for k, v in self.__dict__.items() if k not in ("heat_path", "uncertain", "correlation")}
 
 
 def load_card(card: str | Path) -> Instrument:

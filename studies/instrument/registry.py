@@ -91,9 +91,7 @@ def _read_absent(name: str, reference_temperature: float) -> ReadTable:
 
 def find_home(key: str) -> str:
     """Say to which table of a card a key belongs that stands in another, or "" where there is no such table."""
-    tables = (
-        (name, [known_keys(describe(entry.keys)) for entry in entries]) for name, entries in card_tables().items()
-    )
+    tables = ((name, [known_keys(describe(one.keys)) for one in entries]) for name, entries in card_tables().items())
     home = next((name for name, found in tables if key == name or any(key in keys for keys in found)), "")
     return f"; it belongs to the table [{home}]: add that line above it." if home else ""
 

@@ -96,9 +96,7 @@ def invert(
         readings,
         best,
         estimates,
-        tuple(
-            group for group in find_groups(priors, covariance) if {"data", "prior"} <= {told[name] for name in group}
-        ),
+        tuple(one for one in find_groups(priors, covariance) if {"data", "prior"} <= {told[name] for name in one}),
         tuple(found[mode] for found, mode in zip(chances, best.modes, strict=True)),
         tuple(
             tuple((m.harmonic, m.index, p) for m, p in found.items() if m != mode and p > UNDECIDED)
@@ -264,9 +262,7 @@ def unexplained(
 ) -> str:
     """Say which reading is farthest from every mode that it may be."""
     wide = np.linalg.norm(J, axis=1)
-    away = [
-        min(((abs(y[i] - g[m]) / wide[m], m) for m in found), default=(np.inf, -1)) for i, found in enumerate(allowed)
-    ]
+    away = [min(((abs(y[i] - g[m]) / wide[m], m) for m in own), default=(np.inf, -1)) for i, own in enumerate(allowed)]
     i = max(range(len(away)), key=lambda i: away[i][0])
     distance, m = away[i]
     near = "; the card has no such mode near it"

@@ -285,6 +285,4 @@ ON_RIM = 0.95  # position beyond which a small mass moves as the rim does
 
 def _relative_sds(instrument: "Instrument") -> dict[str, float]:
     """Return the relative standard deviation of every uncertain number of `[loss]` by its dotted key."""
-    return {
-        one.name: one.sd / abs(one.value) for one in instrument.uncertain if one.name.startswith("loss.") and one.value
-    }
+    return {v.name: v.sd / abs(v.value) for v in instrument.uncertain if v.name.startswith("loss.") and v.value}

@@ -212,11 +212,7 @@ def format_model(model: Model) -> str:
         rows = ",\n    ".join(spell_value(row) for row in part.covariance)
         lines += ["]", f"covariance = [\n    {rows},\n]" if rows else "covariance = []"]
     for source in model.sources:
-        lines += [
-            "",
-            "[[source]]",
-            *(f"{key} = {spell_value(getattr(source, key))}" for key in source.__struct_fields__),
-        ]
+        lines += ["", "[[source]]", *(f"{k} = {spell_value(getattr(source, k))}" for k in source.__struct_fields__)]
     return "\n".join(lines) + "\n"
 
 

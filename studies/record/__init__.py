@@ -206,9 +206,7 @@ def repeats(one: Record, two: Record) -> bool:
     """Whether two records are of one run: of the shorter, most rows stand in the other too, whatever their time, or one output scatters as the other does; noise never repeats itself."""
     if one.sha256 and one.sha256 == two.sha256:
         return True
-    if len(one) == len(two) and any(
-        _same_noise(one[name], two[name]) for name in OUTPUTS if name in one and name in two
-    ):
+    if len(one) == len(two) and any(_same_noise(one[key], two[key]) for key in OUTPUTS if key in one and key in two):
         return True
     short, long = (dict(own.columns) for own in sorted((one, two), key=len))
     if not set(short) <= set(long):

@@ -19,7 +19,7 @@ from numpy.polynomial import Chebyshev
 
 from compensation.arrays import Array
 from shell.constants import zero_Celsius
-from shell.family import Axis, Family, build_family
+from shell.family import Axis, Family, Range, build_family
 from shell.interpolation import leja_points
 from shell.layout import Theory
 from shell.modes import Mode, nearest_mode
@@ -132,9 +132,7 @@ class Designs:
         )
 
 
-def _families(
-    designs: Designs, harmonic: int, theory: Theory, T: tuple[float, float]
-) -> tuple[list[Family], list[str]]:
+def _families(designs: Designs, harmonic: int, theory: Theory, T: Range) -> tuple[list[Family], list[str]]:
     """Return the families of the lowest mode of a harmonic and, roughly, of those that come nearest to it, and which are left out."""
     nu = designs.instrument.material.value("poisson_ratio", np.linspace(*T, 33))
     ends = [end for unit in np.eye(len(designs.axes)) for end in (unit, -unit)]

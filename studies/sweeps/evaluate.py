@@ -98,9 +98,7 @@ def _evaluate_together(plan: WorkPlan, batch: Batch) -> Cases:
         if len(batch) == 1:
             return failed_cases(plan, batch, "failed", str(error))
         middle = len(batch) // 2
-        return join(
-            [_evaluate_together(plan, part) for part in (batch.part(0, middle), batch.part(middle, len(batch)))]
-        )
+        return join([_evaluate_together(plan, one) for one in (batch.part(0, middle), batch.part(middle, len(batch)))])
     return Cases(batch, values, errors, time.perf_counter() - began)
 
 

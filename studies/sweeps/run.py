@@ -199,9 +199,7 @@ def _tell_other_versions(store: Store) -> None:
     """Warn when earlier results come from other versions of what computes: digits may differ between them."""
     now = describe_environment()["packages"]
     then = store.runs[-1]["provenance"].get("packages", now) if store.runs else now
-    others = [
-        f"{name} {then.get(name)} then, {now[name]} now" for name in ("numpy", "scipy") if then.get(name) != now[name]
-    ]
+    others = [f"{key} {then.get(key)} then, {now[key]} now" for key in ("numpy", "scipy") if then.get(key) != now[key]]
     if others:
         warnings.warn(f"earlier results were computed with {', '.join(others)}; last digits may differ.", stacklevel=3)
 

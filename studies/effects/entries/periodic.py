@@ -25,9 +25,7 @@ def columns(states: States, shape: Shape, response: str) -> FloatArray:
 def grid(span: Span, response: str) -> list[tuple[float, ...]]:
     """Periods from hardly more than two steps of the grid to a third of a run, spaced finer than a phase slip of 1/4 turn."""
     slowest, fastest = CYCLES / span.longest_run, 1.0 / (FASTEST * span.step)
-    forms: list[tuple[float, ...]] = [
-        (float(1.0 / f), 1.0) for f in np.arange(slowest, fastest, 0.35 / span.longest_run)
-    ]
+    forms: list[tuple[float, ...]] = [(float(1 / f), 1.0) for f in np.arange(slowest, fastest, 0.35 / span.longest_run)]
     own = [(period, OWN) for period, _ in forms] if 1 < span.runs <= MOST_RUNS else []
     if span.runs > 1 and span.timed:
         apart = max(0.4 / span.campaign_length, (fastest - slowest) / MOST)
