@@ -135,9 +135,7 @@ def fit_cross_damping(
         raise CompensationError(f"the polynomial of eq. (10) needs an order of 1 or more, not {order}.")
     if not runs:
         raise CompensationError("the cross-damping fit needs at least one run of the gyro at rest.")
-    time, rate, temperature = (
-        np.concatenate([getattr(run, name) for run in runs]) for name in ("time", "rate", "temperature")
-    )
+    time, rate, temperature = (np.concatenate([getattr(r, n) for r in runs]) for n in ("time", "rate", "temperature"))
     refuse_constant_columns(temperature[:, None], ["temperature"])
     if len(rate) < order + 2:
         raise CompensationError(f"order {order} needs at least {order + 2} rows, not {len(rate)}; lower it.")

@@ -41,9 +41,7 @@ def compare_outputs(times: Sequence[Array], before: Sequence[Array], after: Sequ
         starts = np.flatnonzero(np.diff(np.floor((t - t[0]) / AVERAGING), prepend=-1))
         for found, y in zip(means, outputs, strict=True):
             found.append(np.add.reduceat(y, starts) / np.diff(np.append(starts, y.size)))
-    return Improvement(
-        _compare(np.concatenate(before), np.concatenate(after)), _compare(*(np.concatenate(one) for one in means))
-    )
+    return Improvement(_compare(np.concatenate(before), np.concatenate(after)), _compare(*map(np.concatenate, means)))
 
 
 def hold_out(runs: Sequence[Run], compensate: Callable[[Sequence[Run], Run], Array]) -> list[Array]:

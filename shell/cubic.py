@@ -99,9 +99,7 @@ def solve_cubic(resonator: Resonator, crystal: Cubic, harmonic: int = 2, toleran
     found, errors = [], []
     for sign in (1, -1):
         # the last harmonic shows what those beyond it would do
-        fewer, all_ = (
-            _lowest(systems[:count], harmonics[:count], crystal, harmonic, sign, shift) for count in (-1, len(systems))
-        )
+        fewer, all_ = (_lowest(systems[:k], harmonics[:k], crystal, harmonic, sign, shift) for k in (-1, len(systems)))
         found.append(all_)
         errors.append(abs(fewer / all_ - 1))
     return CubicPair(harmonic, found[0], found[1], mode.relative_error_estimate + max(errors))

@@ -125,11 +125,7 @@ class Family:
                     f"the family holds for {axis.name} from {axis.low:g} to {axis.high:g}, not for {column.min():g} to {column.max():g}: build it with wider ranges."
                 )
         inside = zip((*self.axes, Axis("", *self.nu)), (*columns, poisson), strict=True)
-        unit = [
-            (2 * column - axis.low - axis.high) / (axis.high - axis.low)
-            for axis, column in inside
-            if axis.high > axis.low
-        ]
+        unit = [(2 * c - axis.low - axis.high) / (axis.high - axis.low) for axis, c in inside if axis.high > axis.low]
         return np.stack(unit, axis=1) if unit else np.zeros((count, 0)), poisson
 
 

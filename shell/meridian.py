@@ -63,11 +63,7 @@ def cylinder(
     middle = bottom_thickness / 2
     length = radius + height - middle
     foot = radius / length
-    profile = (
-        (0.0, bottom_thickness),
-        (foot, bottom_thickness),
-        *((foot + (1 - foot) * position, value) for position, value in wall),
-    )
+    profile = ((0.0, bottom_thickness), (foot, bottom_thickness), *((foot + (1 - foot) * x, h) for x, h in wall))
     plate, tube = Line((0.0, middle), (radius, middle)), Line((radius, middle), (radius, height))
     return Resonator((plate, tube), profile, "clamped-face" if clamp_radius else "free", None, clamp_radius)
 

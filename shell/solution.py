@@ -77,10 +77,7 @@ class Solution:
     @cached_property
     def stress(self) -> list[Array]:
         """Stresses (elements, stations, 6, points) of every group, Pa."""
-        return [
-            c.stress(group.table, e)
-            for c, group, e in zip(self.constants, self.system.groups, self.strain, strict=True)
-        ]
+        return [c.stress(g.table, e) for c, g, e in zip(self.constants, self.system.groups, self.strain, strict=True)]
 
     @cached_property
     def force(self) -> list[Array]:
@@ -103,10 +100,7 @@ class Solution:
     @cached_property
     def elastic(self) -> list[Array]:
         """Twice the strain energy of every station, a sum of squares and so free of cancellation."""
-        return [
-            c.lame[0] * trace + c.lame[1] * shear
-            for c, (trace, shear) in zip(self.constants, self.squares, strict=True)
-        ]
+        return [c.lame[0] * t + c.lame[1] * shear for c, (t, shear) in zip(self.constants, self.squares, strict=True)]
 
     @cached_property
     def kinetic(self) -> list[Array]:

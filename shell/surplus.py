@@ -47,10 +47,7 @@ BLUNT = 2.0  # 4 λ of the blunt corner where the slope of the thickness jumps
 
 def estimate_errors(resonator: Resonator, elastic: Elastic | VaryingElastic, solutions: Sequence[Solution]) -> Array:
     """Relative errors of the frequencies of modes of one system, by what they come from (`layout.KINDS`): (kinds, modes)."""
-    answers = [
-        extension.answer(solutions, part, elastic)
-        for part, extension in enumerate(extend(resonator, solutions[0].system))
-    ]
+    answers = [one.answer(solutions, part, elastic) for part, one in enumerate(extend(resonator, solutions[0].system))]
     S, C, T, shares = (np.sum(kind, axis=0) for kind in zip(*answers, strict=True))
     values = np.array([solution.eigenvalue for solution in solutions])
     mass = np.array([total(solution.kinetic) for solution in solutions])

@@ -63,10 +63,7 @@ def surface_energy_density() -> sp.Expr:
     layer = thin_energy_density().subs(hooke()).subs(dict(zip(STRAIN, thin_layer_strains(DEFORMATION), strict=True)))
     integral = sp.expand(sp.integrate(sp.expand(layer), (z, -h / 2, h / 2)))
     membrane, bending = E * h / 2 / (1 - nu**2), E * h**3 / 24 / (1 - nu**2)
-    brackets = [
-        sp.expand(sp.cancel(integral.coeff(h, power) * h**power / scale))
-        for power, scale in ((1, membrane), (3, bending))
-    ]
+    brackets = [sp.expand(sp.cancel(integral.coeff(h, p) * h**p / scale)) for p, scale in ((1, membrane), (3, bending))]
     shears = [DEFORMATION.epsilon_phitheta**2, DEFORMATION.tau**2]
     stretching, curving = (sp.collect(bracket, shears) for bracket in brackets)
     return membrane * stretching + bending * curving

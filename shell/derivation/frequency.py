@@ -94,10 +94,7 @@ def log_derivatives() -> LogDerivatives:
     """Return d ln f by d ln E, dν, d ln ρ, d ln h, d ln r and dφ₂; ∂I/∂φ₂ is the integrand of I at φ₂ (Leibniz), the same for J."""
     logarithm = sp.log(frequency())
     by_logarithm = {symbol: sp.simplify(symbol * logarithm.diff(symbol)) for symbol in (E, rho, h, r)}
-    at_rim = {
-        integral: integrand.subs(phi, phi_2)
-        for integral, integrand in ((I, bending_integrand()), (J, mass_integrand()))
-    }
+    at_rim = {one: integrand.subs(phi, phi_2) for one, integrand in ((I, bending_integrand()), (J, mass_integrand()))}
     rim = sum(sp.simplify(logarithm.diff(integral)) * slope for integral, slope in at_rim.items())
     return LogDerivatives(
         E=by_logarithm[E], nu=sp.factor(logarithm.diff(nu)), rho=by_logarithm[rho], h=by_logarithm[h],

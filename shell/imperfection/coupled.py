@@ -90,11 +90,7 @@ class CoupledHarmonics:
     def cores(self) -> tuple[Core, ...]:
         """The solid parts."""
         groups = self.system(self.n).groups
-        return tuple(
-            Core(number, self.constants[number])
-            for number, group in enumerate(groups)
-            if not isinstance(group, ShellGroup)
-        )
+        return tuple(Core(k, self.constants[k]) for k, group in enumerate(groups) if not isinstance(group, ShellGroup))
 
     def together(self, harmonics: tuple[int, ...]) -> Together:
         """Several of them side by side."""

@@ -65,10 +65,7 @@ class Together:
 
     def answer(self, loads: Array) -> Array:
         """-(K - λ M)⁻¹ of loads in every harmonic; in the pair's own without the pair, for which it is singular."""
-        parts = [
-            block.answer(loads[rows].reshape(block.size, -1))
-            for block, rows in zip(self.blocks, self.rows, strict=True)
-        ]
+        parts = [one.answer(loads[at].reshape(one.size, -1)) for one, at in zip(self.blocks, self.rows, strict=True)]
         return -np.concatenate(parts).reshape(loads.shape)
 
     def weigh(self, number: int, plain: Array) -> Array:
@@ -90,10 +87,7 @@ class Together:
     @cached_property
     def _masses(self) -> dict[int, Array]:
         """Of the amplitudes at every station of the chains, (elements, stations, amplitudes, amplitudes)."""
-        return {
-            number: station_mass(self._chain(number).table) * self.constants[number].rho[..., None, None]
-            for number in self.spreads
-        }
+        return {k: station_mass(self._chain(k).table) * self.constants[k].rho[..., None, None] for k in self.spreads}
 
     def _chain(self, number: int) -> ShellGroup:
         group = self.groups[number]

@@ -69,10 +69,7 @@ def write_tdms(record: "Record", file: IO[bytes]) -> None:
     """A TDMS file: one group with a channel for each column."""
     nptdms = load_library("nptdms", "--to tdms", "TDMS")
     about = {"instrument": record.instrument, "source": record.source, "notes": "\n".join(record.notes)}
-    channels = [
-        nptdms.ChannelObject(GROUP, name, values, {"unit_string": _unit(name)})
-        for name, values in record.columns.items()
-    ]
+    channels = [nptdms.ChannelObject(GROUP, key, y, {"unit_string": _unit(key)}) for key, y in record.columns.items()]
     with nptdms.TdmsWriter(file) as writer:
         writer.write_segment([nptdms.RootObject(about), nptdms.GroupObject(GROUP), *channels])
 

@@ -112,11 +112,7 @@ def _priors(instrument: Instrument, exact: Sequence[str]) -> Priors:
     check_exact(instrument, exact)
     if instrument.polynomial is not None:
         raise InputError(f"{instrument.path}: a polynomial [law] has no modes; give [resonator] and [material].")
-    idle = [
-        one.name
-        for one in instrument.uncertain
-        if not one.name.startswith(ACTING) or any(word in one.name for word in IDLE)
-    ]
+    idle = [v.name for v in instrument.uncertain if not v.name.startswith(ACTING) or any(w in v.name for w in IDLE)]
     priors = gather_priors(instrument, (*exact, *idle))
     if not priors.values:
         raise InputError(

@@ -144,11 +144,7 @@ def response_table(verdict: Verdict) -> Table:
 
 def remarks(verdict: Verdict) -> list[Sentence]:
     """Return remarks on responses, and the notes."""
-    found = [
-        f"{NAMES[name][:1].upper()}{NAMES[name][1:]}: {one.remark}."
-        for name, one in verdict.responses.items()
-        if one.remark
-    ]
+    found = [f"{NAMES[n][:1].upper()}{NAMES[n][1:]}: {r.remark}." for n, r in verdict.responses.items() if r.remark]
     return [Sentence(words, "note") for words in (*found, *verdict.notes)]
 
 

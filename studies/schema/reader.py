@@ -112,11 +112,7 @@ class _Reader:
             if key not in fields and key != table.tag_field:
                 known = known_keys(table)
                 raise InputError(f"{spell_table(self.where, path)}: unknown key '{key}'{nearest(key, known)}")
-        given = {
-            fields[key].name: self.read(fields[key].type, value, (*path, key))
-            for key, value in raw.items()
-            if key in fields
-        }
+        given = {fields[k].name: self.read(fields[k].type, v, (*path, k)) for k, v in raw.items() if k in fields}
         for field in table.fields:
             if field.required and field.name not in given:
                 raise self._lacking(path, field.encode_name)

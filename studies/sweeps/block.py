@@ -113,10 +113,7 @@ def unpack(content: bytes, columns: Sequence[int]) -> Array:
 
 def decode(coding: Sequence[tuple[str, Sequence[str]]], designs: Array) -> dict[str, NDArray[Any]]:
     """Return the parameters of designs by name, arrays (m,); `coding`: names, each with its texts, the nominal one last."""
-    return {
-        name: np.array(texts)[designs[:, k].astype(int)] if texts else designs[:, k]
-        for k, (name, texts) in enumerate(coding)
-    }
+    return {name: np.array(t)[designs[:, k].astype(int)] if t else designs[:, k] for k, (name, t) in enumerate(coding)}
 
 
 def each_design(columns: Mapping[str, NDArray[Any]], count: int) -> list[dict[str, Any]]:

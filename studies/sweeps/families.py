@@ -280,7 +280,4 @@ def _ends(study: "Study", design: "Design") -> dict[str, NDArray[Any]]:
             choices[p.name] = p.values if isinstance(p.nominal, str) else _range(study, design, k)
     reference = study.instrument.reference_temperature - zero_Celsius
     choices[TEMPERATURE] = [*choices.get(TEMPERATURE, [reference]), *fixed]
-    return {
-        name: np.array(column)
-        for name, column in zip(choices, zip(*product(*choices.values()), strict=True), strict=True)
-    }
+    return {n: np.array(one) for n, one in zip(choices, zip(*product(*choices.values()), strict=True), strict=True)}

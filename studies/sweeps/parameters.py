@@ -84,12 +84,7 @@ def _moved(instrument: Instrument, name: str, value: Any) -> dict[str, Any]:
 
 def _named(instrument: Instrument) -> list[str]:
     """Return the dotted name of every number and text in the tables of a card."""
-    return [
-        name
-        for table in instrument.tables
-        if table in instrument.content
-        for name in names(instrument.content[table], f"{table}.")
-    ]
+    return [n for t in instrument.tables if t in instrument.content for n in names(instrument.content[t], f"{t}.")]
 
 
 def _default(instrument: Instrument, table: str, key: str) -> float | str | None:

@@ -43,9 +43,7 @@ def _problem(study: "Study", values: Mapping[str, Any]) -> str:
     """Return what makes a design impossible, or nothing."""
     from shell.modes import THICKEST_SHELL
 
-    words = ", ".join(
-        f"{name} = {value:g}" if isinstance(value, float) else f"{name} = {value}" for name, value in values.items()
-    )
+    words = ", ".join(f"{key} = {v:g}" if isinstance(v, float) else f"{key} = {v}" for key, v in values.items())
     try:
         instrument = set_parameters(study.instrument, values, study.derived)
         if any(name.startswith("thermal.") for name in values):

@@ -60,11 +60,7 @@ class Deviation(Keys, frozen=True, kw_only=True):
     def coefficients(self) -> dict[str, float]:
         """Coefficients by their names in `Material.with_coefficients`."""
         tables = {name: table for name in self.__struct_fields__ if (table := getattr(self, name)) is not None}
-        return {
-            f"{name}.{key}": number
-            for name, table in tables.items()
-            for key, number in msgspec.structs.asdict(table).items()
-        }
+        return {f"{n}.{key}": v for n, table in tables.items() for key, v in msgspec.structs.asdict(table).items()}
 
 
 class Crystal(Keys, frozen=True, kw_only=True):
