@@ -65,16 +65,9 @@ def fit_scale_over_temperature(
 
 
 def fit_chain(
-    rates: BellRun,
-    rest: BellRun | None = None,
-    turning: BellRun | None = None,
-    *,
-    rough: BellRun | None = None,
-    cutoff: float | None = 1.0,
-    order: int = 50,
-    sampling: float | None = None,
-    form: str | None = None,
-) -> BellChain:
+    rates: BellRun, rest: BellRun | None = None, turning: BellRun | None = None, *, rough: BellRun | None = None,
+    cutoff: float | None = 1.0, order: int = 50, sampling: float | None = None, form: str | None = None,
+) -> BellChain:  # fmt: skip
     """Fit all steps in the paper's order.
 
     `rates` has several at one temperature (35); `rest` is over temperature (34), `turning` one rate over temperature

@@ -110,16 +110,9 @@ class BiasFit:
 
 
 def prepare_run(
-    time: ArrayLike,
-    state: ArrayLike,
-    bias: ArrayLike,
-    width: float = 100.0,
-    window: float = 300.0,
-    *,
-    causal: bool = False,
-    variable: Variable = FREQUENCY,
-    memory: Memory = NO_MEMORY,
-) -> BiasRun:
+    time: ArrayLike, state: ArrayLike, bias: ArrayLike, width: float = 100.0, window: float = 300.0, *,
+    causal: bool = False, variable: Variable = FREQUENCY, memory: Memory = NO_MEMORY,
+) -> BiasRun:  # fmt: skip
     """Decimate one run to blocks of a width (s), and add the rate over a window (s), `causal` (lag window/2) or not, behind `memory`."""
     blocks = average_run(time, state, bias, width, variable)
     lagged = follow_lag(blocks.time, blocks.columns[variable.name], memory.lag)
@@ -209,12 +202,9 @@ class BiasDesign:
 
 
 def fit_terms(
-    design: BiasDesign,
-    terms: tuple[str, ...],
-    theta: float | None = None,
-    selection: StepwiseSelection | None = None,
-    scores: tuple[float, ...] = (),
-) -> BiasFit:
+    design: BiasDesign, terms: tuple[str, ...], theta: float | None = None,
+    selection: StepwiseSelection | None = None, scores: tuple[float, ...] = (),
+) -> BiasFit:  # fmt: skip
     """Fit the given terms by least squares, with errors for independent and for correlated rows, of noise `theta` or as estimated."""
     X = np.column_stack([design.constants, design.candidates[:, [design.names.index(name) for name in terms]]])
     count = design.constants.shape[1]

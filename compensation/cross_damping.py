@@ -122,14 +122,9 @@ class RestRun:
 
 
 def fit_cross_damping(
-    runs: Sequence[RestRun],
-    *,
-    k: float,
-    zeta: float,
-    g2: float = 2.0,
-    calibration_temperature: float = 293.15,
+    runs: Sequence[RestRun], *, k: float, zeta: float, g2: float = 2.0, calibration_temperature: float = 293.15,
     order: int = 3,
-) -> CrossDampingModel:
+) -> CrossDampingModel:  # fmt: skip
     """Fit ζ₁₂(T) to a gyro at rest, eq. (10) through eq. (9): columns Tⁱ after the filter, errors that wander (see `correlated`)."""
     if order < 1:
         raise CompensationError(f"the polynomial of eq. (10) needs an order of 1 or more, not {order}.")

@@ -130,14 +130,9 @@ class ErrorMap:
 
 
 def map_integral_error(
-    frequency_ratio: ArrayLike,
-    damping_ratio: ArrayLike,
-    *,
-    k: float,
-    zeta: float,
-    rate: float = 1.0,
+    frequency_ratio: ArrayLike, damping_ratio: ArrayLike, *, k: float, zeta: float, rate: float = 1.0,
     settling_times: float = 5.0,
-) -> ErrorMap:
+) -> ErrorMap:  # fmt: skip
     """Judge the simplified transfer function (24) on mistuned gyros by its integral error: eq. (26), figure 3.
 
     J(δk, δζ) = ∫₀ᵀ [A₂₀ − A₂₀*]² dt / ∫ A₂₀*² dt after a step of the rate, A₂₀* from (1) for k₂ = δk k, ζ₂ = δζ ζ, the

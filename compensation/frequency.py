@@ -168,12 +168,9 @@ def invert(curve: Callable[[Array], Array], span: tuple[float, float], frequency
 
 
 def fit_frequency(
-    temperature_degC: ArrayLike,
-    frequency: ArrayLike,
-    order: int = 3,
-    reference_temperature_degC: float = 0.0,
+    temperature_degC: ArrayLike, frequency: ArrayLike, order: int = 3, reference_temperature_degC: float = 0.0,
     resolution: float | None = None,
-) -> FrequencyFit:
+) -> FrequencyFit:  # fmt: skip
     """Fit f(T) by least squares, HRG paper eqs. (16)–(18); rounding to `resolution` (Hz) has the variance resolution²/12."""
     T, f = np.asarray(temperature_degC, dtype=np.float64), np.asarray(frequency, dtype=np.float64)
     if resolution is not None and not (np.isfinite(resolution) and resolution > 0):
@@ -202,13 +199,9 @@ def fit_frequency(
 
 
 def compare_orders(
-    temperature_degC: ArrayLike,
-    frequency: ArrayLike,
-    highest: int = 5,
-    reference_temperature_degC: float = 0.0,
-    resolution: float | None = None,
-    level: float = 0.05,
-) -> OrderComparison:
+    temperature_degC: ArrayLike, frequency: ArrayLike, highest: int = 5, reference_temperature_degC: float = 0.0,
+    resolution: float | None = None, level: float = 0.05,
+) -> OrderComparison:  # fmt: skip
     """Fit every order up to `highest` and test each against the next: F(1, m − p) = (SSE_k − SSE_{k+1}) / (SSE_{k+1} / (m − p))."""
     readings = count_apart(temperature_degC)
     highest = min(highest, readings - 2)

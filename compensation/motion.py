@@ -47,14 +47,9 @@ def write_dynamics(
 
 
 def propagate_envelope(
-    element: SensitiveElement,
-    time: ArrayLike,
-    rate: ArrayLike,
-    *,
-    zeta12: ArrayLike | None = None,
-    zeta21: ArrayLike | None = None,
-    from_rest: bool = False,
-) -> Motion:
+    element: SensitiveElement, time: ArrayLike, rate: ArrayLike, *, zeta12: ArrayLike | None = None,
+    zeta21: ArrayLike | None = None, from_rest: bool = False,
+) -> Motion:  # fmt: skip
     """Propagate the complex amplitudes of equation (2), x = Im{A e^{jωt}}, from one sample to the next, nothing neglected.
 
     ẏ = (M(t) − jω) y + (0, 0, q₁₀, 0) by matrix exponentials: where the rate changes, by the fourth-order Magnus

@@ -203,14 +203,9 @@ class Whitener:
 
 
 def estimate_noise(
-    rows: NoiseRows,
-    target: Array,
-    columns: Array | None = None,
-    precision: Array | None = None,
-    kinds: Sequence[str] = KINDS,
-    near: Noise | None = None,
-    stated: Noise | None = None,
-) -> Noise:
+    rows: NoiseRows, target: Array, columns: Array | None = None, precision: Array | None = None,
+    kinds: Sequence[str] = KINDS, near: Noise | None = None, stated: Noise | None = None,
+) -> Noise:  # fmt: skip
     """Estimate the levels of the noise by its marginal likelihood.
 
     `target` (M,) are residuals of all runs, `columns` (M, p) what else is unknown, of prior `precision`; `kinds`:

@@ -48,16 +48,10 @@ class LoopRun:
 
 
 def simulate_rebalance(
-    wave: StandingWave,
-    electronics: Electronics,
-    loops: Loops,
-    time: ArrayLike,
-    *,
-    rate: ArrayLike = 0.0,
-    angle: ArrayLike = 0.0,
-    generator: np.random.Generator | None = None,
+    wave: StandingWave, electronics: Electronics, loops: Loops, time: ArrayLike, *, rate: ArrayLike = 0.0,
+    angle: ArrayLike = 0.0, generator: np.random.Generator | None = None,
     progress: Callable[[float], None] = lambda part: None,
-) -> LoopRun:
+) -> LoopRun:  # fmt: skip
     """Run a gyro in force-to-rebalance mode, settled where the commanded `angle` (rad) changes; `rate` (rad/s) is linear between rows."""
     t = np.asarray(time, dtype=float)
     samples = samples_in_row(t, loops)

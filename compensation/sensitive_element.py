@@ -52,14 +52,9 @@ def tune(k: float, zeta: float, *, q10: float = 1.0) -> SensitiveElement:
 
 
 def translate(
-    frame: float,
-    proof_mass: float,
-    k: tuple[float, float],
-    zeta: tuple[float, float],
-    omega: float,
-    *,
+    frame: float, proof_mass: float, k: tuple[float, float], zeta: tuple[float, float], omega: float, *,
     q10: float = 1.0,
-) -> SensitiveElement:
+) -> SensitiveElement:  # fmt: skip
     """Return a proof mass in a decoupling frame, eq. (1): d₁ = d₂ = 1, d₃ = m₂/(m₁ + m₂), g₁ = 2 m₂/(m₁ + m₂), g₂ = 2."""
     if not (frame >= 0 and proof_mass > 0):
         raise CompensationError(f"the proof mass must be positive, the frame 0 or more: {proof_mass:g}, {frame:g} kg.")

@@ -29,14 +29,9 @@ SETTLED, MOST = 1e-14, 60  # rad, of the azimuth from one round to the next; rou
 
 
 def turn_settled(
-    wave: StandingWave,
-    electronics: Electronics,
-    time: ArrayLike,
-    *,
-    rate: ArrayLike = 0.0,
-    precession: ArrayLike = 0.0,
-    angle: float = 0.0,
-) -> LoopRun:
+    wave: StandingWave, electronics: Electronics, time: ArrayLike, *, rate: ArrayLike = 0.0,
+    precession: ArrayLike = 0.0, angle: float = 0.0,
+) -> LoopRun:  # fmt: skip
     """Return the output of settled loops, without noise, for a wave that `rate` and `precession` (rad/s, linear) turn from `angle`."""
     t = np.asarray(time, dtype=float)
     if t.ndim != 1 or not (np.diff(t) > 0).all():
@@ -51,14 +46,9 @@ def turn_settled(
 
 
 def read_turning(
-    wave: StandingWave,
-    electronics: Electronics,
-    angle: Array,
-    *,
-    rate: ArrayLike = 0.0,
-    precession: ArrayLike | None = None,
-    time: Array | None = None,
-) -> LoopRun:
+    wave: StandingWave, electronics: Electronics, angle: Array, *, rate: ArrayLike = 0.0,
+    precession: ArrayLike | None = None, time: Array | None = None,
+) -> LoopRun:  # fmt: skip
     """Return the output of settled loops for a wave at measured azimuths (N,), rad, turned by `precession` or as the time shows."""
     k = wave.bryan_factor
     if precession is None:

@@ -69,12 +69,9 @@ class NoiseCoefficients:
 
 
 def allan_deviation(
-    rate: ArrayLike,
-    step: float,
-    points_per_octave: int = 3,
-    confidence: float = 0.683,
+    rate: ArrayLike, step: float, points_per_octave: int = 3, confidence: float = 0.683,
     factors: Sequence[int] | None = None,
-) -> AllanDeviation:
+) -> AllanDeviation:  # fmt: skip
     """σ²(m τ₀) = Σ (x_{i+2m} − 2 x_{i+m} + x_i)² / (2 (m τ₀)² (n + 1 − 2m)), x the integral of even samples; τ to a third of them."""
     y = np.asarray(rate, dtype=np.float64)
     if y.ndim != 1 or y.size < 9:

@@ -27,15 +27,9 @@ class StartUp:
 
 
 def start_up(
-    tau: float,
-    loops: Loops,
-    *,
-    headroom: float = 20.0,
-    offset: float = 0.0,
-    amplitude: float = 1e-4,
-    seconds: float | None = None,
-    most_steps: int = 200_000,
-) -> StartUp:
+    tau: float, loops: Loops, *, headroom: float = 20.0, offset: float = 0.0, amplitude: float = 1e-4,
+    seconds: float | None = None, most_steps: int = 200_000,
+) -> StartUp:  # fmt: skip
     """Start the vibration from almost nothing, a quarter cycle off: nothing is linearised here.
 
     Ż = −Z/τ − i (ν − ω + ω_n) Z + u, the drive u at most `headroom` times what holds the amplitude.

@@ -44,16 +44,10 @@ class StepwiseSelection:
 
 
 def select_stepwise(
-    forced: Array,
-    candidates: Array,
-    y: Array,
-    names: Sequence[str],
-    parents: Mapping[str, Sequence[str]] | None = None,
-    enter: float = 0.05,
-    remove: float = 0.10,
-    *,
+    forced: Array, candidates: Array, y: Array, names: Sequence[str],
+    parents: Mapping[str, Sequence[str]] | None = None, enter: float = 0.05, remove: float = 0.10, *,
     shared: bool = False,
-) -> StepwiseSelection:
+) -> StepwiseSelection:  # fmt: skip
     """Select candidate columns by partial F-tests after the forced ones and a term's parents; `shared`: candidates share the level."""
     if not 0 < enter <= remove < 1:
         raise CompensationError(f"levels must satisfy 0 < entry ≤ removal < 1, not {enter:g} and {remove:g}.")

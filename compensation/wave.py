@@ -121,16 +121,9 @@ def turn(angle: float) -> Array:
 
 
 def from_quality(
-    frequency: float,
-    quality: float,
-    *,
-    damping_anisotropy: float = 0.0,
-    damping_axis: float = 0.0,
-    frequency_split: float = 0.0,
-    frequency_axis: float = 0.0,
-    harmonic: int = 2,
-    bryan_factor: float = 0.277,
-) -> StandingWave:
+    frequency: float, quality: float, *, damping_anisotropy: float = 0.0, damping_axis: float = 0.0,
+    frequency_split: float = 0.0, frequency_axis: float = 0.0, harmonic: int = 2, bryan_factor: float = 0.277,
+) -> StandingWave:  # fmt: skip
     """Return the wave of a data sheet: frequencies (Hz), Q (1/τ = π f/Q), Δ(1/τ) over 1/τ, axes (rad)."""
     if not (frequency > 0 and quality > 0):
         raise CompensationError("frequency and quality factor must be positive.")

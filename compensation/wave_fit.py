@@ -46,20 +46,11 @@ class WaveFit:
 
 
 def fit_whole_angle(
-    time: ArrayLike,
-    angle: ArrayLike,
-    rate: ArrayLike,
-    *,
-    coupling: float,
-    harmonic: int = 2,
-    applied: ArrayLike = 0.0,
-    decay: ArrayLike | None = None,
-    frequency: ArrayLike | None = None,
-    quadrature: ArrayLike | None = None,
-    drive_gain_ratio: float = 0.0,
-    drive_skew: float = 0.0,
+    time: ArrayLike, angle: ArrayLike, rate: ArrayLike, *, coupling: float, harmonic: int = 2,
+    applied: ArrayLike = 0.0, decay: ArrayLike | None = None, frequency: ArrayLike | None = None,
+    quadrature: ArrayLike | None = None, drive_gain_ratio: float = 0.0, drive_skew: float = 0.0,
     confidence: float = 0.95,
-) -> WaveFit:
+) -> WaveFit:  # fmt: skip
     """Fit splits, axes, gain ratio, skew and phase error to a whole-angle run: measured `angle` (rad), `rate` less the command, n k."""
     t, theta, indicated = read_columns(time=time, angle=angle, rate=rate)
     step = require_regular(t, "the fit of a whole-angle run")
@@ -170,13 +161,9 @@ def _driven(
 
 
 def _detuned(
-    x: _Turn,
-    t: Array,
-    frequency: ArrayLike | None,
-    quadrature: ArrayLike | None,
-    leaks: list[Array],
+    x: _Turn, t: Array, frequency: ArrayLike | None, quadrature: ArrayLike | None, leaks: list[Array],
     undetermined: list[str],
-) -> tuple[Array, Array] | None:
+) -> tuple[Array, Array] | None:  # fmt: skip
     """Return W and its covariance from frequency and quadrature, weighed by their precision."""
     ones, slope = np.ones(len(t) - 1), (t[:-1] - t.mean()) / np.ptp(t)
     names = [*LEAKS[: len(leaks)]]
@@ -198,15 +185,9 @@ def _detuned(
 
 
 def _turned(
-    t: Array,
-    x: Array,
-    true: _Turn,
-    phi: Array,
-    command: Array,
-    own: tuple[float, float],
-    turns: list[Array],
+    t: Array, x: Array, true: _Turn, phi: Array, command: Array, own: tuple[float, float], turns: list[Array],
     both_ways: bool,
-) -> tuple[tuple[float, float], Array, Array, tuple[tuple[float, float], tuple[float, float]]]:
+) -> tuple[tuple[float, float], Array, Array, tuple[tuple[float, float], tuple[float, float]]]:  # fmt: skip
     """Return the mean turn, (S_sin, S_cos) of the damping with their covariance, and (δ, κ) with deviations."""
     step = (t[-1] - t[0]) / (len(t) - 1)
 

@@ -31,17 +31,10 @@ WITHOUT_RATE = ("amplitude", "phase", "quadrature")
 
 
 def simulate_whole_angle(
-    wave: StandingWave,
-    electronics: Electronics,
-    loops: Loops,
-    time: ArrayLike,
-    *,
-    rate: ArrayLike = 0.0,
-    precession: ArrayLike = 0.0,
-    angle: float = 0.0,
-    generator: np.random.Generator | None = None,
+    wave: StandingWave, electronics: Electronics, loops: Loops, time: ArrayLike, *, rate: ArrayLike = 0.0,
+    precession: ArrayLike = 0.0, angle: float = 0.0, generator: np.random.Generator | None = None,
     progress: Callable[[float], None] = lambda part: None,
-) -> LoopRun:
+) -> LoopRun:  # fmt: skip
     """Run a gyro in whole-angle mode, its loops settled at the first row; the run's `angle` is measured at rows, all
     else means to the next.
     """

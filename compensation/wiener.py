@@ -38,13 +38,9 @@ class WienerFilter:
 
 
 def design_wiener_filter(
-    gyro: TransferFunction,
-    rate: Spectrum,
-    noise: Spectrum,
-    wanted: TransferFunction = UNITY,
-    weight: Spectrum | None = None,
-    cross: CrossSpectrum | None = None,
-) -> WienerFilter:
+    gyro: TransferFunction, rate: Spectrum, noise: Spectrum, wanted: TransferFunction = UNITY,
+    weight: Spectrum | None = None, cross: CrossSpectrum | None = None,
+) -> WienerFilter:  # fmt: skip
     """Return the causal filter of least error variance behind `gyro`, eqs. (31)–(34); `wanted` H(s), `weight` R(s), `cross` S_φΩ(s).
 
     ε = (G W − H) Ω + G φ: G = Γ⁻¹ (T₀ + T₊) D⁻¹, D D* = W S_Ω W* + W S_φΩ + S_Ωφ W* + S_φ, Γ Γ* = R, T = Γ H (S_Ω W* + S_φΩ)/D*.
@@ -89,13 +85,9 @@ def design_wiener_filter(
 
 
 def judge_filter(
-    candidate: TransferFunction,
-    gyro: TransferFunction,
-    rate: Spectrum,
-    noise: Spectrum,
-    wanted: TransferFunction = UNITY,
-    cross: CrossSpectrum | None = None,
-) -> WienerFilter:
+    candidate: TransferFunction, gyro: TransferFunction, rate: Spectrum, noise: Spectrum,
+    wanted: TransferFunction = UNITY, cross: CrossSpectrum | None = None,
+) -> WienerFilter:  # fmt: skip
     """Return any filter behind the gyro with its error variances: eqs. (30), (31), without weight."""
     require_possible(rate, noise, cross)
     n, d = np.real(candidate.numerator), np.real(candidate.denominator)

@@ -140,14 +140,9 @@ def _strip_end(resonator: Resonator, segment: int, s: float, direction: int) -> 
 
 
 def _strip(
-    resonator: Resonator,
-    segment: int,
-    s: float,
-    end: float,
-    near: float,
-    cells: tuple[Cell, ...],
+    resonator: Resonator, segment: int, s: float, end: float, near: float, cells: tuple[Cell, ...],
     far: float | None = None,
-) -> Patch:
+) -> Patch:  # fmt: skip
     """The shell from s to `end`, from the face η = near to η = far (the other face if not given)."""
     far = -near if far is None else far
 

@@ -43,13 +43,9 @@ class Electrode:
 
 
 def ring_of_electrodes(
-    count: int,
-    coverage: float,
-    voltage: float | Sequence[float],
-    azimuth: float = 0.0,
-    first: float = 0.0,
+    count: int, coverage: float, voltage: float | Sequence[float], azimuth: float = 0.0, first: float = 0.0,
     last: float = 1.0,
-) -> tuple[Electrode, ...]:
+) -> tuple[Electrode, ...]:  # fmt: skip
     """Equal electrodes around, the first one centred at `azimuth`, which cover a share of the circle."""
     if not (count >= 1 and 0 < coverage <= 1):
         raise ShellError(f"electrodes cover a share of the circle above 0 and up to 1, not {coverage:g}.")

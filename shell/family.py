@@ -130,17 +130,9 @@ class Family:
 
 
 def build_family(
-    build: Builder,
-    axes: Sequence[Axis],
-    *,
-    nu: Range,
-    harmonic: int = 2,
-    index: int = 0,
-    theory: Theory = "solid",
-    slopes: bool = False,
-    tolerance: float = 1e-6,
-    most: int = MOST_SOLVES,
-) -> Family:
+    build: Builder, axes: Sequence[Axis], *, nu: Range, harmonic: int = 2, index: int = 0, theory: Theory = "solid",
+    slopes: bool = False, tolerance: float = 1e-6, most: int = MOST_SOLVES,
+) -> Family:  # fmt: skip
     """Interpolate one mode over ranges of dimensions and of Poisson's ratio.
 
     `build`: (axes,) -> Resonator; `slopes`: ∂ ln f/∂ν and ∂ ln f/∂ ln h too; `tolerance` relative to the full solve;

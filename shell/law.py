@@ -267,15 +267,9 @@ class FrequencyLaw:
 
 
 def build_law(
-    resonator: Resonator,
-    material: Material,
-    reference_temperature: float,
-    lowest: float,
-    highest: float,
-    theory: Theory = "solid",
-    harmonic: int = 2,
-    mount: Mount | None = None,
-) -> FrequencyLaw:
+    resonator: Resonator, material: Material, reference_temperature: float, lowest: float, highest: float,
+    theory: Theory = "solid", harmonic: int = 2, mount: Mount | None = None,
+) -> FrequencyLaw:  # fmt: skip
     """Solve the mode at a few Poisson's ratios and build its frequency law over the wanted range (K), within the material's.
 
     A range of one temperature takes a single solve. The mount's expansion is for the solid theory and n >= 1.

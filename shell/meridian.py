@@ -15,13 +15,9 @@ SUPPORTS = ("free", "clamped-pole", "clamped-rim", "stem")
 
 
 def hemisphere(
-    radius: float,
-    thickness: Profile,
-    rim_angle: float = pi / 2,
-    pole_angle: float = 0.0,
-    support: Support = "free",
+    radius: float, thickness: Profile, rim_angle: float = pi / 2, pole_angle: float = 0.0, support: Support = "free",
     stem: Stem | None = None,
-) -> Resonator:
+) -> Resonator:  # fmt: skip
     """A spherical dome between two polar angles.
 
     Args:
@@ -69,14 +65,9 @@ def cylinder(
 
 
 def bell(
-    radius: float,
-    thickness: Profile,
-    cylinder_height: float,
-    hyperbola_height: float,
-    mouth_radius: float,
-    support: Support = "free",
-    stem: Stem | None = None,
-) -> Resonator:
+    radius: float, thickness: Profile, cylinder_height: float, hyperbola_height: float, mouth_radius: float,
+    support: Support = "free", stem: Stem | None = None,
+) -> Resonator:  # fmt: skip
     """The bell: hemisphere, cylinder and hyperbola joined smoothly, BVG paper eq. (1), lengths in m.
 
     x² + z² = R²;  x = R for -L <= z < 0;  x²/R² - (R_b² - R²)(z + L)²/(R² S²) = 1 below, to the mouth x = R_b >= R. L

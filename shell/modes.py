@@ -114,13 +114,9 @@ class Sensitivities:
 
 
 def solve_modes(
-    resonator: Resonator,
-    elastic: Elastic | VaryingElastic,
-    harmonic: int = 2,
-    count: int = 1,
-    theory: Theory = "solid",
-    tolerance: float = 1e-5,
-) -> tuple[Mode, ...]:
+    resonator: Resonator, elastic: Elastic | VaryingElastic, harmonic: int = 2, count: int = 1,
+    theory: Theory = "solid", tolerance: float = 1e-5,
+) -> tuple[Mode, ...]:  # fmt: skip
     """The lowest modes of one circumferential harmonic, without rigid motions.
 
     Orders rise until what the next functions would still change lies within the relative `tolerance`: the error

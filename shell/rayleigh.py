@@ -38,15 +38,9 @@ class RayleighLogDerivatives:
 
 
 def rayleigh_frequency(
-    n: int,
-    E: ArrayLike,
-    nu: ArrayLike,
-    rho: ArrayLike,
-    h: ArrayLike,
-    R: ArrayLike,
-    phi_1: float = 0.0,
+    n: int, E: ArrayLike, nu: ArrayLike, rho: ArrayLike, h: ArrayLike, R: ArrayLike, phi_1: float = 0.0,
     phi_2: float = pi / 2,
-) -> NDArray[np.float64]:
+) -> NDArray[np.float64]:  # fmt: skip
     """Return the natural frequency of the inextensional mode of a spherical shell, lengths in m, angles in rad; all but n broadcast.
 
     HRG paper eq. (13): ω² = n²(n²−1)² E h² I / (3 (1+ν) ρ R⁴ J): it measures the shear modulus, E/(1+ν) = 2G. With an

@@ -35,15 +35,9 @@ def render_png(scenes: Scene | Sequence[Scene], view: View = "oblique", width: i
 
 
 def render_animation(
-    scenes: Scene | Sequence[Scene],
-    kind: Literal["webp", "gif"],
-    view: View = "oblique",
-    width: int = 640,
-    height: int = 520,
-    frames: int = 24,
-    period: float = 1.2,
-    progress: Callable[[float], None] = lambda part: None,
-) -> bytes:
+    scenes: Scene | Sequence[Scene], kind: Literal["webp", "gif"], view: View = "oblique", width: int = 640,
+    height: int = 520, frames: int = 24, period: float = 1.2, progress: Callable[[float], None] = lambda part: None,
+) -> bytes:  # fmt: skip
     """Return a looping WebP or GIF of one period of the swing, which lasts `period` seconds; `progress` is told which part is drawn."""
     from PIL import Image
 

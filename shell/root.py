@@ -206,16 +206,9 @@ def _base(resonator: Resonator, contact: Contact, radii: tuple[float, ...]) -> B
 
 
 def _fillet(
-    contact: Contact,
-    radius: float,
-    cross: Path,
-    roof: Path,
-    floor: Path,
-    wall: Path,
-    over: Spot,
-    steps: tuple[float, ...],
-    cuts: tuple[float, ...],
-) -> list[Patch]:
+    contact: Contact, radius: float, cross: Path, roof: Path, floor: Path, wall: Path, over: Spot,
+    steps: tuple[float, ...], cuts: tuple[float, ...],
+) -> list[Patch]:  # fmt: skip
     """Two patches that meet on the line from the middle of the fillet to X."""
     (r, z), (first, turn) = contact.center, contact.turn
     middle = first + turn / 2

@@ -113,14 +113,9 @@ class TrimPlan:
 
 
 def plan_trim(
-    readings: Sequence[SplitWave],
-    sites: Sites,
-    *,
-    goal: float,
-    removal_error: float = 0.02,
-    gain_error: float = 0.03,
-    unbalance: Mapping[int, complex] | None = None,
-) -> TrimPlan:
+    readings: Sequence[SplitWave], sites: Sites, *, goal: float, removal_error: float = 0.02,
+    gain_error: float = 0.03, unbalance: Mapping[int, complex] | None = None,
+) -> TrimPlan:  # fmt: skip
     """The next round of cuts, which brings the splits towards the goal (Hz each) and not beyond.
 
     Relative standard errors: `removal_error` of each cut's mass, `gain_error` common to all; `unbalance`: k -> Σ m exp(i k θ), kg.

@@ -83,14 +83,9 @@ def lump(cells: MeridianCells) -> MeridianCells:
 
 
 def describe_meridian(
-    cells: MeridianCells,
-    root: str,
-    volumetric_capacity: Capacity,
-    conductivity: float,
-    root_resistance: float = 0.0,
-    exchange: float = 0.0,
-    surroundings: str = "",
-) -> list[Part]:
+    cells: MeridianCells, root: str, volumetric_capacity: Capacity, conductivity: float, root_resistance: float = 0.0,
+    exchange: float = 0.0, surroundings: str = "",
+) -> list[Part]:  # fmt: skip
     """Return the parts "shell-1" (joined to `root`) … "shell-N" (at the rim); `exchange` is the radiating area per
     middle surface, both faces.
     """

@@ -83,14 +83,9 @@ class ObservedSums:
 
 
 def respond(
-    network: Network,
-    boundaries: Mapping[str, Profile],
-    time: ArrayLike,
-    weights: Array,
-    changes: Sequence[NetworkChange] = (),
-    departure: Array | None = None,
-    longest: float | None = None,
-) -> ObservedSums:
+    network: Network, boundaries: Mapping[str, Profile], time: ArrayLike, weights: Array,
+    changes: Sequence[NetworkChange] = (), departure: Array | None = None, longest: float | None = None,
+) -> ObservedSums:  # fmt: skip
     """Temperatures at the rows, weighed (sums, n), with derivatives by every change; departures (n,) are from the first steady state."""
     rows = np.asarray(time, dtype=float)
     first = {name: float(profile.value[0]) for name, profile in boundaries.items()}

@@ -154,14 +154,9 @@ def most_waves(count: int) -> int:
 
 
 def survey(
-    points: Array,
-    side: int,
-    motion: RigidMotion,
-    projector: Projector,
-    name: str,
-    highest: int = 12,
+    points: Array, side: int, motion: RigidMotion, projector: Projector, name: str, highest: int = 12,
     degree: int = DEGREE,
-) -> Face:
+) -> Face:  # fmt: skip
     """The waves of a face from its points (count, 3), m, in their own frame."""
 
     def place(some: Array) -> Points:
@@ -234,15 +229,9 @@ def _sum_cells(waves: WaveBasis, rough: Array, limit: float, portions: Iterable[
 
 
 def _finish(
-    waves: WaveBasis,
-    sums: Array,
-    rough: Array,
-    side: int,
-    numbers: tuple[int, int],
-    motion: RigidMotion | None,
-    name: str,
-    turning: tuple[float, float] | None = None,
-) -> Face:
+    waves: WaveBasis, sums: Array, rough: Array, side: int, numbers: tuple[int, int], motion: RigidMotion | None,
+    name: str, turning: tuple[float, float] | None = None,
+) -> Face:  # fmt: skip
     full = sums[0] > 0
     count = sums[0, full]
     x, theta, left = sums[1:4, full] / count

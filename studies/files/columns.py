@@ -148,13 +148,9 @@ def _split_header(path: str | Path, line: str, number: int) -> list[str]:
 
 
 def _check_names(
-    path: str | Path,
-    header: list[str],
-    header_line: int,
-    known: Collection[str],
-    required: Collection[str],
+    path: str | Path, header: list[str], header_line: int, known: Collection[str], required: Collection[str],
     prefixes: Collection[str],
-) -> list[str]:
+) -> list[str]:  # fmt: skip
     names = [name.strip() for name in header]
     where = f"{path}, line {header_line}" if header_line else str(path)
     if len(names) == 1 and (";" in names[0] or "\t" in names[0]):

@@ -76,15 +76,9 @@ class BiasStudy:
 
 
 def study_bias(
-    records: Sequence[Record],
-    method: Method = "guarded",
-    width: float | None = None,
-    window: float | None = None,
-    *,
-    causal: bool = False,
-    over: Over = "auto",
-    progress: Callable[[str], None] = lambda _: None,
-) -> BiasStudy:
+    records: Sequence[Record], method: Method = "guarded", width: float | None = None, window: float | None = None, *,
+    causal: bool = False, over: Over = "auto", progress: Callable[[str], None] = lambda _: None,
+) -> BiasStudy:  # fmt: skip
     """Fit the bias model to records of a gyro at rest while its temperature changes; `width` and `window` of averages and rate in s."""
     records = records_of_one_gyro(records, progress)
     check_lengths(records)

@@ -70,12 +70,9 @@ class ThermalFit:
 
 
 def fit_thermal_constants(
-    records: Sequence[Record],
-    instrument: Instrument | None = None,
-    lags: int | None = None,
-    confidence: float = 0.9,
+    records: Sequence[Record], instrument: Instrument | None = None, lags: int | None = None, confidence: float = 0.9,
     progress: Callable[[str], None] = lambda _: None,
-) -> ThermalFit:
+) -> ThermalFit:  # fmt: skip
     """Find the lags of the resonator behind its housing, as many as the records support, each run with an initial state of its own."""
     if lags is not None and not 1 <= lags <= len(LAGS):
         raise InputError(f"--lags {lags}: the number of lags lies between 1 and {len(LAGS)}.")

@@ -56,13 +56,9 @@ def film_shifts(instrument: "Instrument", mode: "Mode") -> tuple[FilmShift, ...]
 
 
 def film_losses(
-    keys: "FilmKeys",
-    vibration: "Vibration",
-    heat: "Callable[[float], Heat] | None",
-    where: str,
-    name: str,
+    keys: "FilmKeys", vibration: "Vibration", heat: "Callable[[float], Heat] | None", where: str, name: str,
     spread: Mapping[str, float],
-) -> "tuple[list[LossCause], list[Ripple]]":
+) -> "tuple[list[LossCause], list[Ripple]]":  # fmt: skip
     """Return a film's causes of loss, and how they vary around."""
     from shell.damping.anisotropy import Ripple, film_weight
     from shell.damping.budget import film_causes

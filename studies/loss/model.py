@@ -57,12 +57,9 @@ class LossModel:
 
 
 def loss_model(
-    instrument: "Instrument",
-    harmonic: int = 2,
-    theory: "Theory" = "solid",
-    anchor: bool = False,
+    instrument: "Instrument", harmonic: int = 2, theory: "Theory" = "solid", anchor: bool = False,
     mode: "Mode | None" = None,
-) -> LossModel:
+) -> LossModel:  # fmt: skip
     """Solve the lowest mode of a harmonic and gather its causes of loss; the `anchor`, what a stem sends into its base,
     takes a second or two. `mode`: where it is known, at the reference temperature.
     """

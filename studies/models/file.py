@@ -177,12 +177,9 @@ def widen(low: float, high: float) -> tuple[float, float]:
 
 
 def make_part(
-    name: str,
-    names: Sequence[str],
-    values: Sequence[float] | NDArray[np.float64],
-    units: Sequence[str],
+    name: str, names: Sequence[str], values: Sequence[float] | NDArray[np.float64], units: Sequence[str],
     covariance: NDArray[np.float64] | None = None,
-) -> ModelPart:
+) -> ModelPart:  # fmt: skip
     """Build a part from arrays."""
     columns = zip(names, map(float, values), units, strict=True)
     return ModelPart(

@@ -90,12 +90,9 @@ def printed_table2() -> tuple[Array, Array]:
 
 
 def study_table(
-    temperature_degC: Array,
-    frequency: Array,
-    order: int = 3,
-    reference_temperature_degC: float = 0.0,
+    temperature_degC: Array, frequency: Array, order: int = 3, reference_temperature_degC: float = 0.0,
     resolution: float | None = None,
-) -> FrequencyStudy:
+) -> FrequencyStudy:  # fmt: skip
     """Fit a steady-state table as the paper does (eqs. 16-18), invert it (Table 2), and test the next orders."""
     ascending = np.argsort(temperature_degC)
     T, f = temperature_degC[ascending], frequency[ascending]

@@ -105,13 +105,9 @@ class ShellTemperature:
 
 
 def show_mode(
-    instrument: Instrument,
-    harmonic: int = 2,
-    index: int = 0,
-    temperature: float | None = None,
-    theory: Literal["solid", "shell"] = "solid",
-    exaggerated: bool = True,
-) -> ModeScene:
+    instrument: Instrument, harmonic: int = 2, index: int = 0, temperature: float | None = None,
+    theory: Literal["solid", "shell"] = "solid", exaggerated: bool = True,
+) -> ModeScene:  # fmt: skip
     """Solve one mode (at K, or the reference) and build its surface; of an imperfect card the slower mode, departures `exaggerated` or not."""
     from shell.modes import solve_modes
 

@@ -94,17 +94,10 @@ def combine(parts: "dict[str, Array]", quantity: str) -> Array:
 
 
 def scan_faces(
-    resonator: "Resonator",
-    elastic: "Elastic",
-    files: dict[str, str],
-    *,
-    unit: Unit = "mm",
-    frames: Literal["own", "common"] = "own",
-    harmonics: tuple[int, ...] = (1, 2, 3, 4),
-    highest: int = 12,
-    theory: Literal["solid", "shell"] = "solid",
-    say: Callable[[str], None] = lambda _: None,
-) -> Scan:
+    resonator: "Resonator", elastic: "Elastic", files: dict[str, str], *, unit: Unit = "mm",
+    frames: Literal["own", "common"] = "own", harmonics: tuple[int, ...] = (1, 2, 3, 4), highest: int = 12,
+    theory: Literal["solid", "shell"] = "solid", say: Callable[[str], None] = lambda _: None,
+) -> Scan:  # fmt: skip
     """Read, align ("own" frames or one "common") and fit the faces up to the `highest` wave, and find the splits of harmonics n."""
     if 2 * max(harmonics) > highest:
         needed = f"the split of n = {max(harmonics)} needs harmonic {2 * max(harmonics)} of the faces"

@@ -96,15 +96,9 @@ NARROWEST = 1e-6  # m: no tool cuts a groove that is narrower
 
 
 def rim_sites(
-    resonator: "Resonator",
-    pairs: Mapping[int, Pair],
-    density: float,
-    axis: float,
-    *,
-    heights: Sequence[float] = (1.0,),
-    tool: Tool = TOOL,
-    kind: CutKind = "mass",
-) -> Sites:
+    resonator: "Resonator", pairs: Mapping[int, Pair], density: float, axis: float, *,
+    heights: Sequence[float] = (1.0,), tool: Tool = TOOL, kind: CutKind = "mass",
+) -> Sites:  # fmt: skip
     """Grooves around the shell, a multiple of 4n for every n, one on the antinode at `axis` (rad), at positions of the meridian."""
     if not (tool.width >= NARROWEST and NARROWEST <= tool.length < np.inf and 0 < tool.depth_limit < 1):
         raise InputError(
@@ -160,20 +154,11 @@ def _gains(pairs: Mapping[int, Pair], position: Array, kind: CutKind = "mass") -
 
 
 def plan_for_card(
-    resonator: "Resonator",
-    elastic: "Elastic",
-    measured: Sequence[tuple[int, float, float, float]],
-    *,
-    goal: float,
-    heights: Sequence[float] = (1.0,),
-    tool: Tool = TOOL,
-    kind: CutKind = "mass",
-    teeth: Teeth | None = None,
-    removal_error: float = 0.02,
-    gain_error: float = 0.03,
-    gain: float = 1.0,
+    resonator: "Resonator", elastic: "Elastic", measured: Sequence[tuple[int, float, float, float]], *, goal: float,
+    heights: Sequence[float] = (1.0,), tool: Tool = TOOL, kind: CutKind = "mass", teeth: Teeth | None = None,
+    removal_error: float = 0.02, gain_error: float = 0.03, gain: float = 1.0,
     unbalance: Mapping[int, complex] | None = None,
-) -> CardPlan:
+) -> CardPlan:  # fmt: skip
     """A plan for splits (harmonic, Hz, slow axis in rad, reading error in Hz) by cuts at `heights`; `gain` of the last round; `plan_trim`."""
     if not 0 < goal < np.inf:
         raise InputError(f"--goal {goal:g}: must be a positive split in Hz.")

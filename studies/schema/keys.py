@@ -15,16 +15,9 @@ class Keys(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
 
 
 def number(
-    meaning: str = "",
-    *,
-    above: float | None = None,
-    least: float | None = None,
-    below: float | None = None,
-    most: float | None = None,
-    sd: float | None = None,
-    relative_sd: float | None = None,
-    example: Any = None,
-) -> msgspec.Meta:
+    meaning: str = "", *, above: float | None = None, least: float | None = None, below: float | None = None,
+    most: float | None = None, sd: float | None = None, relative_sd: float | None = None, example: Any = None,
+) -> msgspec.Meta:  # fmt: skip
     """Annotate a number with its meaning, its bounds in the unit of the key, and its uncertainty where a card states none (else exact)."""
     prior = {key: value for key, value in (("sd", sd), ("relative_sd", relative_sd)) if value is not None}
     ends: Any = {"gt": above, "ge": least, "lt": below, "le": most}

@@ -33,16 +33,10 @@ STORE_SECONDS = 3e-5  # for one case to be hashed, committed and counted
 
 
 def run_study(
-    source: str | Path | Mapping[str, Any],
-    out: str | Path | None = None,
-    *,
-    card: str | None = None,
-    workers: int | None = None,
-    scheduler: str | None = None,
-    allow_python: bool = False,
-    retry_failed: bool = False,
+    source: str | Path | Mapping[str, Any], out: str | Path | None = None, *, card: str | None = None,
+    workers: int | None = None, scheduler: str | None = None, allow_python: bool = False, retry_failed: bool = False,
     show_progress: bool = False,
-) -> Results:
+) -> Results:  # fmt: skip
     """Run a study (path, name or mapping), or resume it where an earlier run stopped, and return its results.
 
     >>> results = run_study("tolerance.toml", "tolerance")          # doctest: +SKIP

@@ -49,16 +49,9 @@ class Bias(Keys, frozen=True, kw_only=True):
         return {powers: k for key, powers in TERMS.items() if (k := getattr(self, key))}
 
     def at(
-        self,
-        change: Array,
-        rate: Array,
-        frequency: Array,
-        inverse_q: Array,
-        bryan_factor: float,
-        harmonic: int = 2,
-        pattern_angle: Array | None = None,
-        wave: NDArray[np.complex128] | None = None,
-    ) -> Array:
+        self, change: Array, rate: Array, frequency: Array, inverse_q: Array, bryan_factor: float, harmonic: int = 2,
+        pattern_angle: Array | None = None, wave: NDArray[np.complex128] | None = None,
+    ) -> Array:  # fmt: skip
         """Zero-rate output (deg/h) at changes and rates (N,) of frequency, Hz and Hz/s, and losses.
 
         B = Δ(1/τ) sin 2n(θ − θ_τ) / (2 n k) (averaged equations of Lynch 1995), 1/τ = π f/Q, plus Σ k fⁱ ḟʲ. `wave`,
