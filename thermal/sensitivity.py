@@ -4,7 +4,7 @@ With S = ∂T/∂p, L, R, C, q the network's conduction, radiation, capacities a
 
     C dS/dt = −(L + 4σ R diag T³) S + ∂q/∂p − ∂L/∂p T − σ ∂R/∂p T⁴ − (∂ln C/∂p + C'/C S) C dT/dt,
 
-linear in S, along the temperatures that `thermal.sweeping` has found; it is swept in the same way, all constants at once.
+linear in S, along the temperatures that `thermal.sweeping` has found: solved interval by interval, all constants at once.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -17,10 +17,9 @@ from thermal.constants import Stefan_Boltzmann
 from thermal.network import Array, Network
 from thermal.profile import Profile
 from thermal.steady import find_steady_state
-from thermal.sweeping import MOST_SWEEPS, Sweep, SweepError, capacity_ratio, hermite, hold, run_sweeps
+from thermal.sweeping import Sweep, capacity_ratio, hermite, hold, run_sweeps
 from thermal.transient import BLOCK
 
-RELATIVE_TOLERANCE = 1e-7  # of the derivatives, at the last sweep
 TWO = (293.15, 303.15)  # K, where a capacity that changes shows it
 CAPACITY_STEP = 0.5  # K, half the central difference of a capacity over temperature
 
@@ -137,16 +136,9 @@ class _Slopes:
         held = np.stack([self._hold(change) for change in changes], axis=2)
         forcing = np.stack([self._force(change) for change in changes], axis=2) - held @ linear.conduction[n:, :n]
         start = np.stack([_initial_slope(network, steady, change) for change in changes])
-        S = np.zeros((*everything.shape[:2], len(changes), n))
-        for _ in range(MOST_SWEEPS):
-            last = S
-            push = forcing + self._beyond(S, held)
-            S = swept.grid.answer(push, start)
-            size = np.abs(S).max(axis=(0, 1, 3))
-            if (np.abs(S - last).max(axis=(0, 1, 3)) <= RELATIVE_TOLERANCE * size).all():
-                self.slope, self.rate = S, swept.grid.rates(push, start)
-                return
-        raise SweepError("the derivatives of the temperatures do not converge; the radiation is too strong.")
+        feedback = self._feedback()
+        forcing += held @ feedback[:, :, n:]
+        self.slope, self.rate = swept.grid.answer_with(forcing, feedback[:, :, :n], start)
 
     def _hold(self, change: NetworkChange) -> Array:
         """Changes of the boundaries at all moments, (3, K, boundaries)."""
@@ -174,16 +166,13 @@ class _Slopes:
             return np.asarray(cold)
         return np.moveaxis(change.capacity(np.moveaxis(self.swept.everything[..., : self.count], -1, 0)), 0, -1)
 
-    def _beyond(self, S: Array, held: Array) -> Array:
-        """Derivative of b(T) along S, (3, K, p, n)."""
+    def _feedback(self) -> Array:
+        """∂b/∂T at all moments, (3, K, N, n): by rows what a kelvin of each node or boundary does to the powers of the nodes (W/K)."""
         network, linear, n = self.swept.network, self.swept.linear, self.count
-        both = np.concatenate([S, held], axis=3)
-        result: Array = both @ (linear.conduction - network.conduction)[:, :n]
-        if network.radiators:
-            result -= (self.cube[:, :, None] * both) @ network.radiation[:, :n]
+        result = (linear.conduction - network.conduction)[:, :n] - self.cube[..., None] * network.radiation[:, :n]
         if self.varies:
-            drained = result - both @ linear.conduction[:, :n]
-            result += (self.ratio[:, :, None] - 1) * drained - (self.flow * self.log_slope)[:, :, None] * S
+            result += (self.ratio[:, :, None] - 1) * (result - linear.conduction[:, :n])
+            result[..., np.arange(n), np.arange(n)] -= self.flow * self.log_slope
         return result
 
     def at(self, rows: Array, weights: Array) -> tuple[Array, Array]:

@@ -27,6 +27,9 @@ from thermal.transient import Transient, propagate
 MOST_SWEEPS = 60
 SWEEP_TOLERANCE = 1e-7  # K
 LONGEST_ROW = 60.0  # s, between which what radiation adds is a parabola
+MEAN_LINE = np.array([[2.0, 2.0, -1.0], [-1.0, 2.0, 2.0]])[:, :, None, None] / 3
+"""Both ends of the straight line of a parabola's mean, from its values at start, middle and end."""
+INTERVALS = 32  # solved together: their matrices stay in the cache
 MOST_CORNERS = 200  # of profiles whose every corner is a knot; a measured column of more rows is averaged for δ
 
 
@@ -53,17 +56,16 @@ class Grid:
         return np.array([start, (start + end) / 2, end])
 
     @cached_property
-    def _weights(self) -> tuple[Array, ...]:
-        """Decay, and weights of the forcing at both ends, over a half and over a whole interval; each (K, n)."""
+    def _weights(self) -> tuple[Array, Array]:
+        """Decay over a half and over a whole interval, (2, K, n), and weights there of the power at its three moments, (2, 3, K, n)."""
         rate = 1 / self.modes.time_constants
-        weights: list[Array] = []
-        for part in (0.5, 1.0):
-            h = part * self.length[:, None]
-            decay = np.exp(-rate * h)
-            even = (1 - decay) / rate  # ∫ e^(−λ(h − s)) ds
-            slanted = (h - even) / (rate * h)  # ∫ e^(−λ(h − s)) s/h ds
-            weights += [decay, even - slanted, slanted]
-        return tuple(weights)
+        h = np.multiply.outer([0.5, 1.0], self.length)[..., None]
+        decay = np.exp(-rate * h)
+        even = (1 - decay) / rate  # ∫ e^(−λ(h − s)) ds
+        far = (h - even) / (rate * h)  # ∫ e^(−λ(h − s)) s/h ds
+        near = even - far
+        near[0], far[0] = near[0] + far[0] / 2, far[0] / 2  # over a half: to the middle of the straight line
+        return decay, near[:, None] * MEAN_LINE[0] + far[:, None] * MEAN_LINE[1]
 
     def answer(self, power: Array, start: Array) -> Array:
         """Temperatures at all moments, (3, K, p, n), for power (W) at all moments, from `start` (p, n)."""
@@ -74,14 +76,36 @@ class Grid:
         u = power @ self.modes.shapes
         return np.asarray((u - self._states(u, start) / self.modes.time_constants) @ self.modes.shapes.T)
 
+    def _forced(self, u: Array) -> Array:
+        """What power in the modes, (3, K, p, n), makes over a half and over a whole interval, (2, K, p, n)."""
+        return np.asarray(sum(w[:, :, None] * own for w, own in zip(self._weights[1].swapaxes(0, 1), u, strict=True)))
+
     def _states(self, u: Array, start: Array) -> Array:
         """Amplitudes of the modes at all moments, for the power in each of them."""
-        shift = (2 * u[1] - u[0] - u[2]) / 3  # straight lines of the parabola's mean
-        u0, u1 = u[0] + shift, u[2] + shift
-        decay2, near2, far2, decay, near, far = (w[:, None, :] for w in self._weights)
-        x = scan(decay[:, 0], near * u0 + far * u1, (start * self.modes.capacity) @ self.modes.shapes)
-        half = decay2 * x[:-1] + near2 * u0 + far2 * (u0 + u1) / 2
-        return np.array([x[:-1], half, x[1:]])
+        (decay2, decay), (half, whole) = self._weights[0], self._forced(u)
+        x = scan(decay, whole, (start * self.modes.capacity) @ self.modes.shapes)
+        return np.array([x[:-1], decay2[:, None] * x[:-1] + half, x[1:]])
+
+    def answer_with(self, power: Array, feedback: Array, start: Array) -> tuple[Array, Array]:
+        """Temperatures and rates where the power is itself `power` + T · `feedback`, (3, K, n, n): in every interval three moments at once."""
+        shapes, n = self.modes.shapes, start.shape[1]
+        u, (decay, weights), now = power @ shapes, self._weights, (start * self.modes.capacity) @ shapes
+        forced, x, gain = self._forced(u), np.empty_like(u), np.empty_like(u)
+        for first in range(0, u.shape[1], INTERVALS):
+            at = slice(first, first + INTERVALS)
+            F = shapes.T @ feedback[:, at] @ shapes
+            # x_h = decay_h x_0 + Σ_j w_hj (u_j + x_j F_j) of h = half, whole; x_1 and x_2 by x_0 and by what is forced
+            own = weights[:, :, at, :, None] * F
+            matrix = np.eye(2 * n) - np.concatenate([np.concatenate([*own[:, j]], axis=-1) for j in (1, 2)], axis=-2)
+            begin = np.concatenate([*(own[:, 0] + decay[:, at, None] * np.eye(n))], axis=-1)
+            right = np.concatenate([begin, np.concatenate([*forced[:, at]], axis=-1)], axis=-2)
+            both = np.linalg.solve(matrix.swapaxes(-1, -2), right.swapaxes(-1, -2)).swapaxes(-1, -2)
+            for k, step in enumerate(both, first):
+                after = now @ step[:n] + step[n:]
+                x[:, k] = now, after[:, :n], after[:, n:]
+                now = after[:, n:]
+            gain[:, at] = u[:, at] + x[:, at] @ F
+        return x @ shapes.T, (gain - x / self.modes.time_constants) @ shapes.T
 
 
 @dataclass(frozen=True)

@@ -28,7 +28,7 @@ from studies.inference.inferred import Inferred
 from studies.inference.lack_of_fit import generic_bank, is_rounding, look
 from studies.inference.model import Background, Linear, Term
 from studies.inference.records import Campaign
-from studies.inference.relinearise import IMPOSSIBLE, columns_of, relinearise
+from studies.inference.relinearise import IMPOSSIBLE, relinearise
 from studies.inference.search import MARGIN, SUSPICIOUS, Hypothesis, Outcome, Search, Shapes
 from studies.inference.sharp import RESOLVED, fast_line, longest_resolved
 from studies.inference.signatures import Signatures
@@ -45,6 +45,8 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 Report = Callable[[str], None]
+Left = tuple[dict[str, Rows], Mapping[str, Array]]
+"""What a model leaves of the rows of every response, and of its blocks."""
 BLOCKS, BLOCKS_OF_RUN = 800, (100, 400)
 """Block averages of a campaign, and fewest and most of a run."""
 AGAIN, SETTLING = 7, 4
@@ -192,11 +194,11 @@ def infer(card: "Instrument", campaign: Campaign, progress: Report = lambda _: N
     alone = outcome.plain.noise if path is None else found.noise
     plain = Model(Linear.of(found, told), Signatures.at(problem, found.point), (), alone)
     shipped = {name: rows.rms for name, rows in plain.residuals(Kept(np.zeros(problem.count), ())).items()}
-    calibrated = plain.residuals(Kept(found.point, ()))
+    calibrated, blocks = plain.residuals(Kept(found.point, ())), found.state.residual
     if path is not None:
         card, found = path.card, path.fit
     progress("held-out rows")
-    outcome, held, rows = _confirmed(search, outcome, plain, calibrated, path is not None)
+    outcome, held, rows = _confirmed(search, outcome, plain, (calibrated, blocks), path is not None)
     progress("lack of fit")
     without, levelled = outcome.plain, outcome.final
     for name in search.linear.responses:
@@ -262,18 +264,12 @@ def _from(start: CardFit, told: Array | None, progress: Report, least: float | N
     def holds(final: Hypothesis) -> bool:
         """Whether the straight lines are those of the simulation where they end."""
         model = Model(search.linear, search.signatures, final.terms, final.noise)
-        linear, mean, there = model.linear, model.mean(), reached(final)
         try:
-            state = problem.evaluate(there, slopes=False)
-            paths = Signatures.at(problem, there) if final.terms else search.signatures
+            left = model.left()
         except IMPOSSIBLE:
             return False
-        apart = {
-            n: linear.target[n] - linear.columns(final.terms, n) @ mean - state.residual[n] for n in linear.responses
-        }
-        for term, size in zip(final.terms, model.kept(mean).coefficients, strict=True):
-            for n, columns in columns_of(paths, term).items():
-                apart[n] = apart[n] + columns @ size
+        linear, mean = model.linear, model.mean()
+        apart = {n: linear.target[n] - linear.columns(final.terms, n) @ mean - left[n] for n in linear.responses}
         return STRAYED > sum(np.sum(linear.rows[n].whiten(own, final.noise[n]) ** 2) for n, own in apart.items())
 
     def linearise(
@@ -320,29 +316,29 @@ def _from(start: CardFit, told: Array | None, progress: Report, least: float | N
 
 
 def _confirmed(
-    search: Search, outcome: Outcome, plain: Model, calibrated: dict[str, Rows], longer: bool
+    search: Search, outcome: Outcome, plain: Model, calibrated: Left, longer: bool
 ) -> tuple[Outcome, dict[str, tuple[float | None, float | None]], dict[str, Rows]]:
     """Leave out faint causes of no definite size, and those whose model predicts unseen rows no better than the card alone, the weakest first."""
     events = any(term.effect.event for term in outcome.final.terms)
     by_record = len(search.linear.problem.runs) > 1 and not events
-    alone = calibrated if longer else _rows_of(plain) or calibrated
-    before = plain.held_out(by_record, alone)
+    alone = calibrated if longer else _left_by(plain) or calibrated
+    before = plain.held_out(by_record, alone[0])
     while True:
         final = outcome.final
         beside = Background(search.linear, final.terms, final.noise)
         model = Model(search.linear, search.signatures, final.terms, final.noise)
         more = bool(final.terms) or longer
-        told = _rows_of(model) if more else alone
-        rows = told or alone
+        told = _left_by(model) if more else alone
+        rows, blocks = told or alone
         after = model.held_out(by_record, rows) if more else before
         weak = [
             k
             for k, name in enumerate(term.response for term in final.terms)
             if told is None
             or _worse(*before[name].beside(after[name]))
-            or rows[name].rms > alone[name].rms
+            or beside.size(name, blocks) > beside.size(name, alone[1])
             or (final.score - outcome.without[k].score < FAINT and not beside.sized(k))
-            or is_rounding(search.linear.problem, name, alone[name])
+            or is_rounding(search.linear.problem, name, alone[0][name])
             or only_apart(search, outcome, k)
         ]
         if not weak:
@@ -351,10 +347,10 @@ def _confirmed(
         outcome = _left_out(search, outcome, gone)
 
 
-def _rows_of(model: Model) -> dict[str, Rows] | None:
-    """What a model leaves of the records; None where its straight lines end and there is no prediction."""
+def _left_by(model: Model) -> Left | None:
+    """What a model leaves of the records' rows and of their blocks; None where its straight lines end and there is no prediction."""
     try:
-        return model.residuals(model.kept(model.mean()))
+        return model.residuals(model.kept(model.mean())), model.left()
     except IMPOSSIBLE:
         return None
 

@@ -116,6 +116,16 @@ class Model:
                 found[name][1].append(rest)
         return {name: Rows(tuple(t), tuple(r)) for name, (t, r) in found.items() if r}
 
+    def left(self) -> dict[str, Array]:
+        """Return what the simulation leaves of the blocks of every response at the most probable coordinates, not what its straight lines do."""
+        numbers = self.kept(self.mean())
+        left = dict(self.problem.evaluate(numbers.point, slopes=False).residual)
+        there = Signatures.at(self.problem, numbers.point) if self.terms else self.signatures
+        for term, size in zip(self.terms, numbers.coefficients, strict=True):
+            for name, columns in there.columns_of(term).items():
+                left[name] = left[name] - columns @ size
+        return left
+
     def change(self, term: Term, values: Array, k: int, path: Path | None = None) -> dict[str, Array]:
         """Return what a term makes of the responses of a part at its predicted rows, along the path where it is linearised unless given."""
         path = path or self.signatures.paths[k]

@@ -295,6 +295,10 @@ class Background:
         own = np.sum(root**2, axis=0) - np.sum((base[name].T @ root) ** 2, axis=0)
         return np.asarray(root.T @ left[name] / own)
 
+    def size(self, name: str, left: Mapping[str, Array]) -> float:
+        """Return the square of what is left of a response in this noise."""
+        return float(np.sum(self._whiteners[name](left[name]) ** 2))
+
     def residual(self, name: str) -> Array:
         """Return what the most probable model leaves of a response."""
         return np.asarray(self._bent.target[name] - self._bent.columns(self.terms, name) @ self.posterior[0])

@@ -61,7 +61,7 @@ def relinearise(
             except IMPOSSIBLE:
                 continue
             here = Linear.of(replace(start, state=state), linear.told)
-            fresh = tuple(replace(one, columns=columns_of(there, one), bend={}) for one in terms)
+            fresh = tuple(replace(one, columns=there.columns_of(one), bend={}) for one in terms)
             left, sizes = _left(here, trial, fresh, noise)
             if left < best:
                 break
@@ -91,7 +91,7 @@ def _bent(start: CardFit, point: Array, terms: Sequence[Term], sizes: Sequence[A
         for places, paths in zip(directions, moved, strict=True):
             if places[0] < len(names) and names[places[0]].startswith("law.a") and not term.effect.thermal:
                 continue
-            for response, columns in columns_of(paths, term).items():
+            for response, columns in paths.columns_of(term).items():
                 change = (columns @ size - own[response]) / STEP
                 for k in places:
                     bend[response][_rows_of(start, response, k), k] = change[_rows_of(start, response, k)]
@@ -109,11 +109,6 @@ def _rows_of(start: CardFit, response: str, k: int) -> slice:
     own = problem.parts[problem.starts[k - len(problem.priors.names)][0]]
     members = problem.members(response)
     return start.rows[response].slices[members.index(own)] if own in members else slice(0, 0)
-
-
-def columns_of(signatures: Signatures, term: Term) -> dict[str, Array]:
-    """Return the columns of a term along some paths."""
-    return signatures.of_term(term.effect, term.shape, term.response, term.members, term.starts)
 
 
 def _left(linear: Linear, point: Array, terms: Sequence[Term], noise: Mapping[str, Noise]) -> tuple[float, list[Array]]:

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
     from shell.law import FrequencyLaw
+    from studies.inference.model import Term
     from studies.instrument.card import Instrument
 
 Array = NDArray[np.float64]
@@ -247,6 +248,10 @@ class Signatures:
     ) -> dict[str, Array]:
         """Return what some members make of each response, beside them what every run began with where the effect remembers it."""
         return self.columns(replace(effect, columns=self.on_grid(effect, members, starts)), shape, response)
+
+    def columns_of(self, term: "Term") -> dict[str, Array]:
+        """Return the columns of a term along these paths."""
+        return self.of_term(term.effect, term.shape, term.response, term.members, term.starts)
 
     def on_grid(
         self, effect: Effect, members: Sequence[int], starts: bool

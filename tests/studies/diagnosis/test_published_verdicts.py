@@ -99,15 +99,9 @@ def test_the_thermometer_of_a_crystal_is_slower_than_the_crystal(tmp_path):
     column = '# unknown column: "column 3"'
     named = '[[file.column]]\nfrom = "column 3"\nto = "frequency_Hz"\nunit = "ppm"\nnominal_Hz = 25e6\n'
     verdict = diagnose(bring_in("dcxo_gps.txt", tmp_path, (column, named)))
-    if not verdict.causes:  # beside this slow noise the rms of rows says little of which model follows them
-        assert verdict.verdict == "unexplained"
-        pytest.xfail("found with log evidence 35, and left out: the card alone, linearised there, leaves less rms")
     cause = verdict.causes[0]
     assert "thermometer-lag" in {cause.effect, *cause.equivalent}
-    if cause.probability <= 0.8:  # structure in rate and temperature is left beside it, and takes the rest
-        pytest.xfail(
-            f"named with probability {cause.probability:.2f}; 0.8 was asked and held with the noise law before"
-        )
+    assert cause.probability > 0.8
 
 
 @pytest.mark.slow
