@@ -136,9 +136,18 @@ class _Slopes:
         held = np.stack([self._hold(change) for change in changes], axis=2)
         forcing = np.stack([self._force(change) for change in changes], axis=2) - held @ linear.conduction[n:, :n]
         start = np.stack([_initial_slope(network, steady, change) for change in changes])
+        # what departs at the start may fade within a part of an interval: so far as the network is linear, it fades by its modes
+        modes, departures = swept.grid.modes, [np.zeros(n) if one.initial is None else one.initial for one in changes]
+        self.departing = (np.stack(departures) * modes.capacity) @ modes.shapes
+        fading = self.departing * self._faded(swept.grid.moments)[:, :, None] @ modes.shapes.T
         feedback = self._feedback()
-        forcing += held @ feedback[:, :, n:]
+        forcing += np.concatenate([fading, held], axis=3) @ feedback
         self.slope, self.rate = swept.grid.answer_with(forcing, feedback[:, :, :n], start)
+
+    def _faded(self, time: Array) -> Array:
+        """What is left of the modes since the start, (..., n)."""
+        grid = self.swept.grid
+        return np.asarray(np.exp(-(time - grid.knots[0])[..., None] / grid.modes.time_constants))
 
     def _hold(self, change: NetworkChange) -> Array:
         """Changes of the boundaries at all moments, (3, K, boundaries)."""
@@ -177,17 +186,23 @@ class _Slopes:
 
     def at(self, rows: Array, weights: Array) -> tuple[Array, Array]:
         """Sums over the nodes at the rows, (changes, M, sums), and their rates."""
-        slope, rate = hermite(self.swept.grid, rows, self.slope @ weights.T, self.rate @ weights.T)
-        return np.moveaxis(slope, 1, 0), np.moveaxis(rate, 1, 0)
+        both = hermite(self.swept.grid, rows, self.slope @ weights.T, self.rate @ weights.T)
+        slope, rate = (np.moveaxis(own, 1, 0) for own in both)
+        modes = self.swept.grid.modes
+        for k, begin in enumerate(self.departing):
+            if begin.any():
+                seen, left = begin[:, None] * (weights @ modes.shapes).T, self._faded(rows)
+                slope[k] += left @ seen
+                rate[k] -= left @ (seen / modes.time_constants[:, None])
+        return slope, rate
 
 
 def _initial_slope(network: Network, steady: Array, change: NetworkChange) -> Array:
-    """∂T(0)/∂p (n,), of the steady state before the profiles begin and of the departure from it."""
+    """∂T(0)/∂p (n,), of the steady state before the profiles begin."""
     n = network.count
     held = np.zeros(len(network.names))
     for name, profile in change.boundaries.items():
         held[network.index(name)] = profile.value[0]
     slope: Array = network.outflow_slope(steady)
     push: Array = change.power - (change.conduction @ steady + Stefan_Boltzmann * (change.radiation @ steady**4))[:n]
-    settled: Array = np.asarray(np.linalg.solve(slope[:n, :n], push - (slope @ held)[:n]))
-    return settled if change.initial is None else np.asarray(settled + change.initial)
+    return np.asarray(np.linalg.solve(slope[:n, :n], push - (slope @ held)[:n]))

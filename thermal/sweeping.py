@@ -95,7 +95,7 @@ class Grid:
             at = slice(first, first + INTERVALS)
             F = shapes.T @ feedback[:, at] @ shapes
             # x_h = decay_h x_0 + Σ_j w_hj (u_j + x_j F_j) of h = half, whole; x_1 and x_2 by x_0 and by what is forced
-            own = weights[:, :, at, :, None] * F
+            own = weights[:, :, at, None] * F
             matrix = np.eye(2 * n) - np.concatenate([np.concatenate([*own[:, j]], axis=-1) for j in (1, 2)], axis=-2)
             begin = np.concatenate([*(own[:, 0] + decay[:, at, None] * np.eye(n))], axis=-1)
             right = np.concatenate([begin, np.concatenate([*forced[:, at]], axis=-1)], axis=-2)

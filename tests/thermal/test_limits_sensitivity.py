@@ -9,7 +9,7 @@ from thermal.network import Boundary, Conductor, Network, Node, Part, Radiator, 
 from thermal.profile import Profile, parse_profile
 from thermal.radiative import integrate, simulate
 from thermal.sensitivity import NetworkChange, difference, no_change, respond
-from thermal.sweeping import SweepError, sweep
+from thermal.sweeping import SweepError, run_sweeps, sweep
 
 VALUES = {"air": 0.1, "mount": 0.012, "exchange": 1e-3, "film": 8e-5, "base": 25.0, "shell": 2.0, "power": 5e-3}
 CHAMBER = {"chamber": parse_profile("step 20 -10 1h then ramp -10 40 1 then soak 35 1h")}
@@ -94,6 +94,27 @@ def test_boundary_and_initial_state_against_central_differences():
         )
         expected = (up - down) / 0.2
         assert found.slope[k] == pytest.approx(expected, abs=3e-3 * np.abs(expected).max())
+
+
+def test_a_departure_that_fades_between_two_knots_fades_in_the_derivative():
+    """Of a sensor of 5 s on the housing, e^(−t/5 s); a cubic between knots 60 s apart once made −90 K s of its 5."""
+    plain, t = build(VALUES), np.arange(0.0, 600.0, 0.5)
+    parts: list[Part] = [*plain.nodes, Node("sensor", 1e-6), *plain.boundaries, *plain.sources, *plain.conductors]
+    network = assemble([*parts, *plain.radiators, Conductor("housing", "sensor", 1e-6 / 5.0)])
+    found = respond(network, CHAMBER, t, np.eye(4), [no_change(network, initial=np.array([0.0, 0.0, 0.0, 1.0]))])
+    assert found.slope[0, :, 3] == pytest.approx(np.exp(-t / 5.0), abs=1e-6)
+    assert found.rate_slope[0, :, 3] == pytest.approx(-np.exp(-t / 5.0) / 5.0, abs=1e-6)
+
+
+def test_power_that_goes_with_the_temperatures_is_answered_as_sweeps_would_answer_it():
+    grid = run_sweeps(build(VALUES), CHAMBER).grid
+    rng = np.random.default_rng(5)
+    power, start = rng.standard_normal((3, len(grid.length), 2, 3)), rng.standard_normal((2, 3))
+    feedback = 1e-4 * rng.standard_normal((3, len(grid.length), 3, 3))
+    T, rate = grid.answer_with(power, feedback, start)
+    own = power + T @ feedback
+    assert pytest.approx(grid.answer(own, start), abs=1e-9 * np.abs(T).max()) == T
+    assert rate == pytest.approx(grid.rates(own, start), abs=1e-9 * np.abs(rate).max())
 
 
 def test_the_rate_is_that_of_the_temperature():
