@@ -38,6 +38,7 @@ PERIOD = 90.0  # ° of azimuth, of what a turning wave of n = 2 meets
 ROWS_PER_PERIOD, BLOCKS_PER_PERIOD = 120, 6  # of that; the mean over a row is then within 1e-4 of its middle
 TURNED_MOST = 10  # times as many rows, and three times as many blocks, for waves that turn often
 LEAST_ROWS = 10
+GAP = 3.0  # usual distances of predicted rows, across which a curve's bend is not known
 MOST_KINKS = 24  # of a run
 LEAST_KINK = 1e-3  # K
 THERMOMETER = 0.3  # K, error of a settled temperature that nothing else tells
@@ -58,17 +59,21 @@ class BlockMeans:
     time: Array
     value: Array
     spikes: int  # number of values left out
-    step: float  # usual time from one predicted row to the next, s
+    predicted: Array  # array, times of the predicted rows, s
+    width: Array  # array, standard deviation of the times of the record's rows that each of these is the mean of, s
 
     def average(self, column: Array) -> Array:
-        """Means of a predicted column over the same values, along the first axis."""
+        """Means of a predicted column over the same values, along the first axis: of a curve y behind a row, y + σ² y''/2."""
+        if self.width.any():
+            behind = (slice(None), *[None] * (column.ndim - 1))
+            column = column + 0.5 * self.width[behind] ** 2 * _curvature(self.predicted, column)
         total = np.add.reduceat(column[self.rows], self.edges, axis=0)
         return np.asarray(total / self.counts.reshape(-1, *[1] * (total.ndim - 1)))
 
     @property
     def span(self) -> Array:
         """Seconds of each block that have values."""
-        return np.asarray(self.counts * self.step)
+        return np.asarray(self.counts * float(np.median(np.diff(self.predicted))))
 
 
 @dataclass(frozen=True)
@@ -173,7 +178,7 @@ def _observe(record: Record, start: float, named: Sequence[str], turning: bool, 
     fewest = min(MOST_ROWS, MOST_ROWS * most // MOST_BLOCKS)
     most_rows = int(np.clip(ROWS_PER_PERIOD * periods, fewest, TURNED_MOST * fewest))
     most_blocks = int(np.clip(BLOCKS_PER_PERIOD * periods, most, 3 * most))
-    time, columns = _fine_rows(record, (*named, HOUSING), most_rows)
+    time, width, columns = _fine_rows(record, (*named, HOUSING), most_rows)
     if len(time) < LEAST_ROWS:
         raise InputError(f"{record.path}: {len(time)} rows are too few; a run needs at least {LEAST_ROWS}.")
     centre = time + 0.5 * float(np.median(np.diff(record["time_s"]))) if turning else time
@@ -186,7 +191,9 @@ def _observe(record: Record, start: float, named: Sequence[str], turning: bool, 
     if inner.boundary == "housing" and COLUMN["chamber"] in record and np.isfinite(record[COLUMN["chamber"]]).sum() > 1:
         outer = replace(drive_by_record(record, "chamber", time=time), start=start)
     wanted = [name for name in named if name in columns] + ([HOUSING] if outer is not None else [])
-    responses = {name: blocks for name in wanted if (blocks := _block(time, columns[name], most_blocks)) is not None}
+    responses = {
+        name: blocks for name in wanted if (blocks := _block(time, width, columns[name], most_blocks)) is not None
+    }
     if not any(name in responses for name in named):
         raise InputError(f"{record.path}: none of {', '.join(named)} has values; there is nothing to calibrate with.")
     return ObservedRun(record, inner, outer, responses, holes if outer is None else _find_kinks(inner, outer) | holes)
@@ -208,12 +215,12 @@ def _periods(record: Record) -> float:
     return float(np.nansum(np.abs(np.diff(record["pattern_angle_deg"])))) / PERIOD
 
 
-def _fine_rows(record: Record, named: Sequence[str], most: int) -> tuple[Array, dict[str, Array]]:
-    """Rows to predict: those of the record, of very many rows the means of groups of equal duration."""
+def _fine_rows(record: Record, named: Sequence[str], most: int) -> tuple[Array, Array, dict[str, Array]]:
+    """Rows to predict: those of the record, of very many rows the means of groups of equal duration, and how wide these are."""
     time = record["time_s"]
     names = [name for name in named if name in record]
     if len(time) <= most:
-        return time, {name: record[name] for name in names}
+        return time, np.zeros(len(time)), {name: record[name] for name in names}
     width = float(np.ptp(time)) / most
     group = np.minimum(((time - time[0]) / width).astype(np.intp), most - 1)
     present = np.unique(group)
@@ -227,10 +234,22 @@ def _fine_rows(record: Record, named: Sequence[str], most: int) -> tuple[Array, 
         # what is missing of a group is on the line between its neighbours: else its mean would be of another moment
         whole = average_groups(np.interp(time, time[keep], values[keep]), group)[present]
         columns[name] = np.where(np.bincount(group[keep], minlength=most)[present] > 0, whole, np.nan)
-    return average_groups(time, group)[present], columns
+    middle = average_groups(time, group)
+    variance = average_groups((time - middle[group]) ** 2, group)
+    return middle[present], np.sqrt(variance[present]), columns
 
 
-def _block(time: Array, column: Array, most: int) -> BlockMeans | None:
+def _curvature(time: Array, column: Array) -> Array:
+    """Second derivative of columns (N,) or (N, p) over uneven times, by three points; none across a gap."""
+    step = np.diff(time)
+    usual = (step < GAP * np.median(step)).astype(float)
+    behind = (slice(None), *[None] * (column.ndim - 1))
+    slope = np.diff(column, axis=0) / step[behind]
+    inner = 2.0 * np.diff(slope, axis=0) / (step[1:] + step[:-1])[behind] * (usual[1:] * usual[:-1])[behind]
+    return np.concatenate([inner[:1], inner, inner[-1:]])
+
+
+def _block(time: Array, grouped: Array, column: Array, most: int) -> BlockMeans | None:
     keep = np.isfinite(column)
     if np.count_nonzero(keep) < LEAST_ROWS:
         return None
@@ -252,5 +271,6 @@ def _block(time: Array, column: Array, most: int) -> BlockMeans | None:
         mean(time[rows]),
         middle + mean(column[rows] - middle),
         int(spikes.sum()),
-        float(np.median(np.diff(time))),
+        time,
+        grouped,
     )

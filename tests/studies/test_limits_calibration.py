@@ -29,6 +29,9 @@ from thermal.lag import lag
 from thermal.profile import Profile
 
 LEVEL = {"bias_white_deg_per_rt_h": 0.0, "bias_flicker_deg_per_h": 0.0, "bias_walk_deg_per_h_per_rt_h": 0.0}
+OF_RECORD = [
+    f"noise.{key}" for key in ("frequency_white_Hz", "frequency_flicker_Hz", "frequency_walk_Hz", "housing_white_K")
+]
 TWO = {"thermal.mount_conductance_W_per_K": 1e-4, "bias.k1_deg_per_h_per_Hz": 0.02}
 
 
@@ -229,6 +232,19 @@ def test_a_measured_housing_drives_the_frequency_as_its_chamber_did(tau):
     per_area = np.abs(law.slope(293.15) * law.frequency(293.15)) / slowest_lag(found.network, 293.15)  # Hz/(K s)
     error = np.abs(again.columns["frequency_Hz"] - found.columns["frequency_Hz"])
     assert error.max() < 0.05 * missed_by_lines * per_area
+
+
+def test_means_of_a_long_record_are_predicted_as_means():
+    """The mean over a row of width w of a curve is w²/24 of its bend beside its middle: of a ramp that begins, 0.7 mK of a housing here."""
+    card = load_card("hrg-30mm").with_values(dict.fromkeys(OF_RECORD, 0.0))
+    record = simulate_run(card, load_profile("cycle 20 -5 40 0.6 4h 1"), 0.1).record
+    (run,) = observe([record])
+    assert len(record) > 1.5 * len(run.inner.time)  # it is averaged
+    law = law_of(card, 240.0, 340.0)
+    left = CardProblem(card, Priors((), np.eye(0)), (run,), law)
+    left = left.evaluate(np.zeros(left.count), slopes=False).residual
+    assert np.abs(left["frequency_Hz"]).max() < 1e-6
+    assert np.abs(left["housing_temperature_degC"]).max() < 5e-5
 
 
 def test_a_jump_is_free_up_to_a_row_earlier_but_not_at_the_first_row():
