@@ -190,12 +190,9 @@ def fit_frequency(
     coefficients, covariance = polynomial.about(reference_temperature_degC)
     return FrequencyFit(
         reference_temperature_degC=float(reference_temperature_degC),
-        temperature_range_degC=(float(T.min()), float(T.max())),
-        coefficients=coefficients,
-        covariance=covariance,
-        resolution=resolution,
-        polynomial=polynomial,
-    )
+        temperature_range_degC=(float(T.min()), float(T.max())), coefficients=coefficients,
+        covariance=covariance, resolution=resolution, polynomial=polynomial,
+    )  # fmt: skip
 
 
 def compare_orders(

@@ -134,15 +134,10 @@ def fit_linear(
     root = T[:, order] @ scipy.linalg.solve_triangular(R, np.eye(R.shape[0]))
     coefficients, residuals = _solve(Q, R, root, design, y)
     return LinearFit(
-        names=labels,
-        coefficients=coefficients,
-        fitted=y - residuals,
-        residuals=residuals,
-        leverage=np.minimum(np.einsum("ij,ij->i", Q, Q), 1.0),
-        design=design,
-        bread=root @ root.T,
+        names=labels, coefficients=coefficients, fitted=y - residuals, residuals=residuals,
+        leverage=np.minimum(np.einsum("ij,ij->i", Q, Q), 1.0), design=design, bread=root @ root.T,
         least_variance=least_variance,
-    )
+    )  # fmt: skip
 
 
 def refuse_constant_columns(X: Array, names: Sequence[str]) -> None:

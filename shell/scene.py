@@ -39,14 +39,6 @@ def compose_scene(surface: Surface, values: Array, legend: str, title: str = "",
     opens_up = bool(surface.points[rim, 2].mean() > surface.points[:, 2].mean()) if rim.any() else False
     swing = surface.displacement * EXAGGERATION * surface.size
     return Scene(
-        surface.points,
-        swing,
-        surface.triangles,
-        np.asarray(values, dtype=float),
-        legend,
-        title,
-        nodes,
-        surface.antinodes,
-        opens_up,
-        np.zeros((0, 2, 3)) if axes is None else axes,
-    )
+        surface.points, swing, surface.triangles, np.asarray(values, dtype=float), legend, title, nodes,
+        surface.antinodes, opens_up, np.zeros((0, 2, 3)) if axes is None else axes,
+    )  # fmt: skip

@@ -181,13 +181,9 @@ def _least_mass(
     most += [(0.0, abs(unbalance.get(k, 0.0)) / size) for k in BALANCED]
     cost = np.concatenate([np.ones(count), np.full(len(BALANCED), 0.05)])
     found = scipy.optimize.linprog(
-        cost,
-        A_eq=padded,
-        b_eq=np.array(wanted) / size,
-        A_ub=np.array(limits) if limits else None,
-        b_ub=np.array(bounds) if limits else None,
-        bounds=most,
-    )
+        cost, A_eq=padded, b_eq=np.array(wanted) / size, A_ub=np.array(limits) if limits else None,
+        b_ub=np.array(bounds) if limits else None, bounds=most,
+    )  # fmt: skip
     if found.x is None:
         room, need = 1e6 * float(capacity.sum()), 1e6 * size
         raise ShellError(

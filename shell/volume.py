@@ -56,13 +56,10 @@ class Volume:
         kept, numbers = np.unique(np.concatenate([hexahedra.ravel(), wedges.ravel()]), return_inverse=True)
         cut = hexahedra.size
         return replace(
-            self,
-            nodes=self.nodes[kept],
-            hexahedra=numbers[:cut].reshape(hexahedra.shape),
-            wedges=numbers[cut:].reshape(wedges.shape),
-            held_quadrilaterals=np.searchsorted(kept, faces),
+            self, nodes=self.nodes[kept], hexahedra=numbers[:cut].reshape(hexahedra.shape),
+            wedges=numbers[cut:].reshape(wedges.shape), held_quadrilaterals=np.searchsorted(kept, faces),
             held_triangles=np.searchsorted(kept, self.held_triangles),
-        )
+        )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)

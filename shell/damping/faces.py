@@ -149,12 +149,9 @@ def _sides(solution: Solution, group: SolidGroup, c: Constants, q: Array) -> lis
         if not cells:
             continue
         place = Reference.at(
-            points if xi is None else np.array([xi]),
-            points if eta is None else np.array([eta]),
-            weights,
-            degree,
-            degree,
-        )
+            points if xi is None else np.array([xi]), points if eta is None else np.array([eta]), weights,
+            degree, degree,
+        )  # fmt: skip
         table = tabulate_cells(mesh.grid[:, cells], place, solution.system.n, float(group.table.position[0, 0]))
         along = place.along.slopes if xi is None else place.along.values
         across = place.across.slopes if eta is None else place.across.values

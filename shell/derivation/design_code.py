@@ -20,22 +20,12 @@ def emit_code(case: DerivedCase, language: Literal["python", "c"]) -> str:
     omega_squared = frequency.omega_squared().subs(n, case.harmonic)
     by = frequency.log_derivatives()
     return template.substitute(
-        n=case.harmonic,
-        start=_degrees(case.start),
-        end=_degrees(case.end),
-        defect=_defect(case),
-        equation="(14)" if case.harmonic == 2 else "(13)",
-        I=_digits(case.bending),
-        J=_digits(case.mass),
-        K=_digits(case.precession),
-        omega_squared=write(omega_squared.subs(given)),
-        by_E=_digits(by.E),
-        by_nu=write(by.nu),
-        by_rho=_digits(by.rho),
-        by_h=_digits(by.h),
-        by_r=_digits(by.r),
+        n=case.harmonic, start=_degrees(case.start), end=_degrees(case.end), defect=_defect(case),
+        equation="(14)" if case.harmonic == 2 else "(13)", I=_digits(case.bending), J=_digits(case.mass),
+        K=_digits(case.precession), omega_squared=write(omega_squared.subs(given)), by_E=_digits(by.E),
+        by_nu=write(by.nu), by_rho=_digits(by.rho), by_h=_digits(by.h), by_r=_digits(by.r),
         by_phi_2=_digits(case.rim_derivative),
-    )
+    )  # fmt: skip
 
 
 def _defect(case: DerivedCase) -> str:

@@ -50,13 +50,9 @@ def beside(design: Published) -> dict[str, float]:
     budget, law = model.budget(ROOM), hrg.law_of(card, ROOM, ROOM)
     low, high = (1 / float(end[0]) for end in reversed(budget.interval))
     return {
-        "frequency": model.frequency,
-        "q": 1 / float(budget.inverse_q[0]),
-        "low": low,
-        "high": high,
-        "slope": 1e6 * float(law.slope([ROOM])[0]),
-        "sd": 1e6 * float(law.slope_uncertainty([ROOM])[0]),
-    }
+        "frequency": model.frequency, "q": 1 / float(budget.inverse_q[0]), "low": low, "high": high,
+        "slope": 1e6 * float(law.slope([ROOM])[0]), "sd": 1e6 * float(law.slope_uncertainty([ROOM])[0]),
+    }  # fmt: skip
 
 
 if __name__ == "__main__":

@@ -101,13 +101,7 @@ def _build_film(keys: "FilmKeys", numbers: Mapping[str, Any]) -> "Film":
     if capacity is not None and all(numbers[key] is not None for key in THERMAL):
         heat = Heat(numbers["expansion_per_K"], capacity, numbers["conductivity_W_per_m_K"])
     return Film(
-        1e-9 * keys.thickness_nm,
-        1e9 * numbers["youngs_modulus_GPa"],
-        numbers["poisson_ratio"],
-        numbers["loss"] or 0.0,
-        heat,
-        ("inner", "outer") if keys.face == "both" else (keys.face,),
-        (keys.from_position, keys.to_position),
-        keys.coverage,
-        numbers["density_kg_m3"] or 0.0,
-    )
+        1e-9 * keys.thickness_nm, 1e9 * numbers["youngs_modulus_GPa"], numbers["poisson_ratio"],
+        numbers["loss"] or 0.0, heat, ("inner", "outer") if keys.face == "both" else (keys.face,),
+        (keys.from_position, keys.to_position), keys.coverage, numbers["density_kg_m3"] or 0.0,
+    )  # fmt: skip

@@ -169,16 +169,9 @@ def build_families(study: "Study", design: "Design", most: int = MOST_SOLVES) ->
             key = harmonic, index, theory = _key(one)
             if key not in members:
                 members[key] = build_family(
-                    build,
-                    axes,
-                    nu=(float(nu.min()) - beyond, float(nu.max()) + beyond),
-                    harmonic=harmonic,
-                    index=index,
-                    theory=theory,
-                    slopes=key in sloped,
-                    tolerance=TOLERANCE,
-                    most=most,
-                )
+                    build, axes, nu=(float(nu.min()) - beyond, float(nu.max()) + beyond), harmonic=harmonic,
+                    index=index, theory=theory, slopes=key in sloped, tolerance=TOLERANCE, most=most,
+                )  # fmt: skip
     except UNUSABLE_INPUT as error:
         return str(error).rstrip(".")
     return Families(study.instrument, study.asked, members, _build_nodes(study, design))

@@ -115,14 +115,10 @@ def estimate_study(study: Study, workers: int | None = None) -> Effort:
     processes = 1 if families else 1 + count
     row = 16 * (len(study.parameters) + len(study.columns))  # the designs, and what is read back
     return Effort(
-        cases=cases,
-        batches=-(-cases // (study.sampling.batch or size)),
-        seconds_each=each,
-        seconds=training + each * cases / count,
-        memory_MB=resident * processes + row * cases / 1e6,
-        solver="family" if families else "full",
-        why_full="" if families else why_not(study),
-    )
+        cases=cases, batches=-(-cases // (study.sampling.batch or size)), seconds_each=each,
+        seconds=training + each * cases / count, memory_MB=resident * processes + row * cases / 1e6,
+        solver="family" if families else "full", why_full="" if families else why_not(study),
+    )  # fmt: skip
 
 
 def _nominal(study: Study, count: int) -> Batch:

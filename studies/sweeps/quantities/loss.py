@@ -11,15 +11,10 @@ if TYPE_CHECKING:
     from shell.damping.budget import Budget
 
 PARTS = {
-    "thermoelastic": "heat conduction through the wall",
-    "bulk": "the bulk",
-    "surface": "the surface",
-    "gas": "gas",
-    "mount": "the mount",
-    "films": "films",
-    "activated": "activated losses",
+    "thermoelastic": "heat conduction through the wall", "bulk": "the bulk", "surface": "the surface",
+    "gas": "gas", "mount": "the mount", "films": "films", "activated": "activated losses",
     "electrodes": "bias currents of electrodes",
-}
+}  # fmt: skip
 MOUNT = ("mount", "anchor", "imbalance")
 
 
