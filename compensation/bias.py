@@ -50,9 +50,7 @@ TEMPERATURE = Variable("temperature", "°C", "T", -zero_Celsius)
 
 @dataclass(frozen=True)
 class BiasRun:
-    """One run, decimated to blocks (b,) of a `width` (s): `state` (Hz or °C, behind `memory`), its `rate` over a
-    `window`, late by `lag` (s).
-    """
+    """One run, decimated to blocks (b,) of a `width` (s): `state` (Hz or °C, behind `memory`), its `rate` over a `window`, late by `lag` (s)."""
 
     time: Array
     state: Array

@@ -95,9 +95,7 @@ class FrequencyFit:
         )
 
     def temperature(self, frequency: ArrayLike) -> Array:
-        """Return the temperature (°C) whose frequency this is: the inverse of f(T), HRG paper Table 2, at most three
-        residuals out of range.
-        """
+        """Return the temperature (°C) whose frequency this is: the inverse of f(T), HRG paper Table 2, at most three residuals out of range."""
         frequency = np.asarray(frequency, dtype=np.float64)
         if not np.all(np.isfinite(frequency)):
             raise CompensationError("a frequency is missing or infinite; remove those rows.")

@@ -22,16 +22,12 @@ from numpy.typing import ArrayLike
 
 from compensation.arrays import Array
 
-FLAT = math.sqrt(2 * math.log(2) / math.pi)
-"""Allan deviation of flicker noise of bias instability B = 1."""
-FLICKER_TIMES = np.asarray(60.0 * 4.0 ** np.arange(-11, 7), dtype=np.float64)
-"""Correlation times of flicker noise, s."""
+FLAT = math.sqrt(2 * math.log(2) / math.pi)  # Allan deviation of flicker noise of bias instability B = 1
+FLICKER_TIMES = np.asarray(60.0 * 4.0 ** np.arange(-11, 7), dtype=np.float64)  # correlation times of flicker noise, s
 SLOW_TIMES = 7
 """How many of them are a minute and longer: flicker noise of a = 1 has this variance in rows of some seconds to minutes."""
-FORGOTTEN = 40.0
-"""Correlation times after which nothing is left to double precision."""
-BRIEF = 50.0
-"""Correlation times in a span beyond which a row remembers its neighbours only."""
+FORGOTTEN = 40.0  # correlation times after which nothing is left to double precision
+BRIEF = 50.0  # correlation times in a span beyond which a row remembers its neighbours only
 
 
 @dataclass(frozen=True)

@@ -18,10 +18,8 @@ from compensation.arrays import Array
 from compensation.regression import LinearFit, fit_linear
 
 Runs = Sequence[slice]
-GAP = 1.5
-"""A step of more than this many usual ones is a gap: the memory of the noise is not carried across it."""
-ROUNDING = 1e-12
-"""Residuals below this part of the observations are rounding, which remembers nothing."""
+GAP = 1.5  # a step of more than this many usual ones is a gap: the memory of the noise is not carried across it
+ROUNDING = 1e-12  # residuals below this part of the observations are rounding, which remembers nothing
 
 
 @dataclass(frozen=True)

@@ -22,8 +22,7 @@ from compensation.arrays import Array
 from compensation.errors import CompensationError
 from compensation.noise import SLOW_TIMES, Noise, flicker, random_walk
 
-COARSE = 150
-"""Most rows of a run from which noise is estimated in a model with many unknowns."""
+COARSE = 150  # most rows of a run from which noise is estimated in a model with many unknowns
 LEAST, MOST = -7.0, 8.0  # ln of the rms of slow noise within a run over that of a row's white noise
 KINDS = ("white", "flicker", "walk", "offset")
 WHITE = -0.3  # ln of white noise over the scatter of neighbouring rows, where the search begins

@@ -35,9 +35,7 @@ def simulate_whole_angle(
     precession: ArrayLike = 0.0, angle: float = 0.0, generator: np.random.Generator | None = None,
     progress: Callable[[float], None] = lambda part: None,
 ) -> LoopRun:  # fmt: skip
-    """Run a gyro in whole-angle mode, its loops settled at the first row; the run's `angle` is measured at rows, all
-    else means to the next.
-    """
+    """Run a gyro in whole-angle mode, its loops settled at the first row; the run's `angle` is measured at rows, all else means to the next."""
     t = np.asarray(time, dtype=float)
     samples = samples_in_row(t, loops)
     require_stable(loops, float(np.max(1 / np.asarray(wave.tau))), WITHOUT_RATE)

@@ -104,9 +104,7 @@ def find_boundary(mesh: Mesh, solid: Solid, ties: tuple[Tie, ...]) -> Support:
 
 
 def number_functions(mesh: Mesh, degree: int) -> tuple[Index, Array, int]:
-    """Numbers and signs (cells, functions) of the hierarchic functions: of vertices, edges (odd ones backwards: −),
-    insides; and their count.
-    """
+    """Numbers and signs (cells, functions) of the hierarchic functions: of vertices, edges (odd ones backwards: −), insides; and their count."""
     inside = degree - 1
     cells, vertices = len(mesh.vertices), mesh.points.shape[1]
     numbers = np.zeros((cells, degree + 1, degree + 1), dtype=np.intp)

@@ -39,9 +39,7 @@ RELIEF_ERROR = (
 
 @dataclass(frozen=True)
 class Groove:
-    """A cut with sharp corners off the rim's edge, through the wall, or off a face, at a position 0 ... 1; lengths in m
-    at the middle surface.
-    """
+    """A cut with sharp corners off the rim's edge, through the wall, or off a face, at a position 0 ... 1; lengths in m at the middle surface."""
 
     face: Face
     position: float

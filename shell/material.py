@@ -175,9 +175,7 @@ class Material:
         return self.properties[name].deviation[coefficient_names(name).index(coefficient)]
 
     def rescaled(self, reference: float, **given: float) -> "Material":
-        """Return the material with `given` values (`youngs_modulus`, `poisson_ratio`, `density`) at the reference, from
-        which deviations count.
-        """
+        """Return the material with `given` values (`youngs_modulus`, `poisson_ratio`, `density`) at the reference, from which deviations count."""
         target = dict(given)
         properties = dict(self.properties)
         stated = [name for name in ELASTIC if name in properties]

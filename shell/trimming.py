@@ -62,9 +62,7 @@ class SplitWave:
 
     @property
     def most(self) -> float:
-        """The split that is not exceeded in 95 of 100 cases, Hz: both parts of the wave have the error, so |wave|²/error² is
-        a non-central χ² of two degrees of freedom.
-        """
+        """The split that is not exceeded in 95 of 100 cases, Hz: both parts of the wave have the error, so |wave|²/error² is a non-central χ² of two degrees of freedom."""
         size = abs(self.wave) / self.error if self.error > 0 else np.inf
         if size > FAR:
             return self.frequency * (abs(self.wave) + ONE_SIDED * self.error)

@@ -45,8 +45,7 @@ class Told:
             print("\r\x1b[2K", end="", file=sys.stderr, flush=True)
 
 
-TELLING: list[Told] = []
-"""Who tells now; the last one does."""
+TELLING: list[Told] = []  # who tells now; the last one does
 
 
 class Stages(Told):

@@ -86,9 +86,7 @@ def describe_meridian(
     cells: MeridianCells, root: str, volumetric_capacity: Capacity, conductivity: float, root_resistance: float = 0.0,
     exchange: float = 0.0, surroundings: str = "",
 ) -> list[Part]:  # fmt: skip
-    """Return the parts "shell-1" (joined to `root`) … "shell-N" (at the rim); `exchange` is the radiating area per
-    middle surface, both faces.
-    """
+    """Return the parts "shell-1" (joined to `root`) … "shell-N" (at the rim); `exchange` is the radiating area per middle surface, both faces."""
     names = cell_names(cells.count)
     parts: list[Part] = [
         Node(name, scale(volumetric_capacity, float(volume))) for name, volume in zip(names, cells.volume, strict=True)

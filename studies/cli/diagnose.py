@@ -14,8 +14,7 @@ from studies.progress import Told
 from studies.reports.diagnosis import diagnosis_parts, headline
 from studies.results import Result
 
-PLANNED = "hrg-30mm"
-"""Card of a plan without --card."""
+PLANNED = "hrg-30mm"  # card of a plan without --card
 STAGES = {
     "step 1:": 0.05, "all effects in all shapes": 0.2, "what could stand in the place of": 0.6,
     "held-out rows": 0.93, "lack of fit": 0.96, "calibrating the extended card": 0.97,

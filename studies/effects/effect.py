@@ -12,8 +12,7 @@ from studies.effects.states import FloatArray, States
 from studies.errors import InputError, nearest
 
 UNITS = {"frequency_Hz": "Hz", "bias_deg_per_h": "deg_per_h", "inverse_q": "1"}
-AROUND = 293.15
-"""Temperature at which coefficients count that would otherwise hang on the range a campaign covers, K."""
+AROUND = 293.15  # temperature at which coefficients count that would otherwise hang on the range a campaign covers, K
 Shape = Sequence[float]
 Numbers = float | Sequence[float]
 
@@ -72,10 +71,8 @@ class Span:
     tau: float
     runs: int
     bins: tuple[FloatArray, ...] = ()
-    turns: bool = False
-    """Whether the wave stands at several azimuths."""
-    timed: bool = True
-    """Whether the starts of the runs are known, so that time goes on from run to run."""
+    turns: bool = False  # whether the wave stands at several azimuths
+    timed: bool = True  # whether the starts of the runs are known, so that time goes on from run to run
 
     @property
     def temperature_range(self) -> float:

@@ -68,9 +68,7 @@ def remembered(runs: Sequence[States]) -> list[FloatArray]:
 
 
 def lag(drive: FloatArray, step: float, tau: float, start: float | None = None) -> FloatArray:
-    """Return the response of a first-order lag, τ y′ = u − y, to drives (N,) or (N, m) linear between samples; settled
-    at first, or from a value.
-    """
+    """Return the response of a first-order lag, τ y′ = u − y, to drives (N,) or (N, m) linear between samples; settled at first, or from a value."""
     ratio = step / tau
     decay = np.exp(-ratio)
     ramp = -np.expm1(-ratio) / ratio if ratio > 1e-12 else 1.0
@@ -99,8 +97,7 @@ def play(drive: FloatArray, radius: float | Sequence[float], start: float = 0.0)
     return out[:, 0] if np.ndim(radius) == 0 else out
 
 
-ORDERS = 12
-"""A knee of a tenth of the range is followed, fringes of a sixth of it are not."""
+ORDERS = 12  # a knee of a tenth of the range is followed, fringes of a sixth of it are not
 
 
 def waves(x: FloatArray, low: float, high: float, orders: int = ORDERS) -> FloatArray:

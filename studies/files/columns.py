@@ -22,16 +22,12 @@ if TYPE_CHECKING:
 
     Table: TypeAlias = dict[str, NDArray[np.float64]]
 
-LARGEST = 1e20
-"""No reading of an instrument, time or count is larger; what is larger would overflow in its powers."""
+LARGEST = 1e20  # no reading of an instrument, time or count is larger; what is larger would overflow in its powers
 _SOMETHING = re.compile(rb"\S")
 IMPORT = " 'hrg import' brings laboratory files with other names, units and notations into this form."
-HEAD = 1 << 20
-"""Bytes in which comments and header are looked for first."""
-FEW = 400_000
-"""Numbers that are read before pandas, which reads faster, is loaded."""
-ROWS_AT_ONCE = 200_000
-"""Rows that are parsed at once, so that a large table costs its numbers and little more."""
+HEAD = 1 << 20  # bytes in which comments and header are looked for first
+FEW = 400_000  # numbers that are read before pandas, which reads faster, is loaded
+ROWS_AT_ONCE = 200_000  # rows that are parsed at once, so that a large table costs its numbers and little more
 
 
 @dataclass(frozen=True)

@@ -10,11 +10,9 @@ from typing import IO, Any
 
 from studies.errors import InputError, MissingEnvironment, nearest
 
-MOST_BYTES = 2 * 1024**3
-"""A record at 200 Hz over a month is smaller; a table of numbers takes about as much in memory."""
+MOST_BYTES = 2 * 1024**3  # a record at 200 Hz over a month is smaller; a table of numbers takes about as much in memory
 
-PORTION = 1 << 23
-"""Bytes that are looked through at once."""
+PORTION = 1 << 23  # bytes that are looked through at once
 
 
 def read_bytes(path: str | Path, most: int = MOST_BYTES, first: int = -1) -> bytes:

@@ -159,9 +159,7 @@ class Instrument:
         return _reread(self, {**self.content, name: raw}, {name})
 
     def with_values(self, values: Mapping[str, Any]) -> "Instrument":
-        """Return a new instrument with other values at dotted keys of the card; a number keeps the uncertainty,
-        {"value", "sd"} replaces it.
-        """
+        """Return a new instrument with other values at dotted keys of the card; a number keeps the uncertainty, {"value", "sd"} replaces it."""
         content: Mapping[str, Any] = self.content
         for name, value in values.items():
             table = name.split(".")[0]

@@ -52,9 +52,7 @@ class CardTable:
 
 @dataclass(frozen=True)
 class ReadTable:
-    """What one table of a card says: `keys` as they stand, `parts` built from them, uncertain numbers, and those
-    `stated` so, exact ones too.
-    """
+    """What one table of a card says: `keys` as they stand, `parts` built from them, uncertain numbers, and those `stated` so, exact ones too."""
 
     keys: Mapping[str, Any]
     parts: Mapping[str, Any]

@@ -10,8 +10,7 @@ from studies.errors import InputError
 from studies.files.columns import read_columns, read_header
 
 COLUMNS = ("harmonic", "index", "frequency_Hz", "sd_Hz", "temperature_degC")
-USUAL = 1e-6
-"""Relative standard deviation of a frequency where the table states none."""
+USUAL = 1e-6  # relative standard deviation of a frequency where the table states none
 HIGHEST = 20
 
 

@@ -136,9 +136,7 @@ def reference_split(instrument: "Instrument", harmonic: int = 2) -> SplitPair:
 
 
 def mean_shift(instrument: "Instrument", temperature: Array, voltage_squared: Array | None = None) -> Array | float:
-    """What imperfection and electrodes, as V²/g³ with a common V² or the card's voltages, add to the mean frequency of
-    the n = 2 pair, relative.
-    """
+    """What imperfection and electrodes, as V²/g³ with a common V² or the card's voltages, add to the mean frequency of the n = 2 pair, relative."""
     electrodes: CardElectrodes = instrument.part("electrodes")
     card: CardImperfection = instrument.part("imperfection")
     if not electrodes.are_charged and card.fields is None:

@@ -121,9 +121,7 @@ def find_worst_case(explorer: Explorer, search: WorstCase) -> dict[str, Any]:
 
 
 def find_tolerance(explorer: Explorer, search: ToleranceSearch) -> dict[str, Any]:
-    """Find by which factor tolerances may be wider, or must be narrower, for a share of designs to meet the
-    requirements, with an interval.
-    """
+    """Find by which factor tolerances may be wider, or must be narrower, for a share of designs to meet the requirements, with an interval."""
     from scipy.stats import binom
 
     study = explorer.study

@@ -31,10 +31,8 @@ def grid(span: Span, response: str) -> list[tuple[float, ...]]:
     return [(*ends, pole, axis) for pole in POLES for axis in axes]
 
 
-POLES = (0.0, 20.0, 60.0)
-"""Time constants of the loop, s."""
-STILL = -90.0
-"""Axis of a wave that stands still: none."""
+POLES = (0.0, 20.0, 60.0)  # time constants of the loop, s
+STILL = -90.0  # axis of a wave that stands still: none
 FIXED = np.array([0.0] * 4 + [1.0] * (4 + ORDERS - 1))
 """At one azimuth the baseline has the terms up to the third order."""
 

@@ -24,8 +24,7 @@ def steady(x: FloatArray, shape: Shape) -> FloatArray:
     return np.stack([(x / 10.0) ** power for power in range(3, int(shape[0]) + 1)], axis=1)
 
 
-FINE = 20
-"""Half waves over the range: a frequency is measured so finely that a knee of a twentieth of it shows."""
+FINE = 20  # half waves over the range: a frequency is measured so finely that a knee of a twentieth of it shows
 
 
 EFFECT = Effect(

@@ -43,10 +43,8 @@ def steady(x: FloatArray, shape: Shape) -> FloatArray:
 WIDEST = 0.25
 """Largest half width, in parts of the covered range: the play of a wider loop hardly moves, and less the temperature it is a
 static curve."""
-KEPT = 2.0
-"""Initial memory that stands for what the runs before have left."""
-ENVELOPE = 8
-"""Half waves over the covered range that the width of a loop may follow."""
+KEPT = 2.0  # initial memory that stands for what the runs before have left
+ENVELOPE = 8  # half waves over the covered range that the width of a loop may follow
 RATIOS = (1.0, 0.4, 0.7, 1.5, 2.2)
 
 

@@ -34,8 +34,7 @@ def grid(span: Span, response: str) -> list[tuple[float, ...]]:
     ]
 
 
-RELAXING = (300.0, 1000.0, 3000.0)
-"""Time constants of what relaxes after the jump, s."""
+RELAXING = (300.0, 1000.0, 3000.0)  # time constants of what relaxes after the jump, s
 
 
 EFFECT = Effect(

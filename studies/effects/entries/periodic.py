@@ -45,13 +45,10 @@ def near(span: Span, response: str, shape: Shape) -> list[tuple[float, ...]]:
     return forms
 
 
-CYCLES = 3.0
-"""Periods in the longest run that make a line: with fewer, a wandering response looks the same."""
+CYCLES = 3.0  # periods in the longest run that make a line: with fewer, a wandering response looks the same
 MOST = 1500
-FASTEST = 2.05
-"""Steps of the grid to a period: one of two steps or fewer is folded back to a slower one."""
-LOBE = 0.6
-"""Turns over a run by which two periods may differ and still look alike in it."""
+FASTEST = 2.05  # steps of the grid to a period: one of two steps or fewer is folded back to a slower one
+LOBE = 0.6  # turns over a run by which two periods may differ and still look alike in it
 OWN, MOST_RUNS = 2.0, 12
 HARMONICS = (1.0, 0.3, 0.1)
 

@@ -12,8 +12,7 @@ def columns(states: States, shape: Shape, response: str) -> FloatArray:
     return np.stack([states.rate, states.rate * states.excess, late - states.rate], axis=1)
 
 
-LATE = 300.0
-"""A gradient takes its time to build up, s."""
+LATE = 300.0  # a gradient takes its time to build up, s
 
 
 EFFECT = Effect(

@@ -24,12 +24,9 @@ from studies.effects.effect import AROUND
 from studies.instrument.registry import CardPlace, CardTable
 from studies.schema.keys import Keys, Note, number
 
-BETWEEN = ("base", "stem")
-"""What lies between the housing and the resonator where there are two lags and more."""
-NO_LOAD = 1e-8
-"""Ratio of heat capacities of lumps that take no heat from what they follow."""
-LEAST = 1e-3
-"""Of f over f₀: a polynomial is no law down to 0."""
+BETWEEN = ("base", "stem")  # what lies between the housing and the resonator where there are two lags and more
+NO_LOAD = 1e-8  # ratio of heat capacities of lumps that take no heat from what they follow
+LEAST = 1e-3  # of f over f₀: a polynomial is no law down to 0
 
 
 class LawKeys(Keys, frozen=True, kw_only=True):
@@ -78,8 +75,7 @@ class PolynomialLaw:
     bias_bend: float = 1.0  # part of its bend that the bias follows
     lowest: float = 0.0
     highest: float = np.inf
-    bryan_factor: float = 0.2774
-    """Of a thin hemisphere."""
+    bryan_factor: float = 0.2774  # of a thin hemisphere
 
     def frequency(self, temperature: ArrayLike, *, extrapolate: bool = False) -> Array:
         """Frequency (Hz) at temperatures (K)."""
