@@ -123,9 +123,7 @@ def design_smoother(sampling: float, cutoff: float, order: int = 50) -> Array:
     if order < 1 or sampling <= 0:
         raise CompensationError("a FIR filter needs an order of 1 or more and a positive sampling step.")
     if not 0 < cutoff < 0.5 / sampling:
-        raise CompensationError(
-            f"a cut-off of {cutoff:g} Hz is impossible at an output every {sampling:g} s: it must lie below {0.5 / sampling:g} Hz."
-        )
+        raise CompensationError(f"a cut-off of {cutoff:g} Hz is impossible at an output every {sampling:g} s: it must lie below {0.5 / sampling:g} Hz.")  # fmt: skip
     return np.asarray(firwin(order + 1, cutoff, fs=1 / sampling), dtype=float)
 
 

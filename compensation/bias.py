@@ -127,13 +127,9 @@ def average_run(time: ArrayLike, state: ArrayLike, bias: ArrayLike, width: float
     blocks = average_blocks(t, {variable.name: state, "bias": bias}, width)
     rows = blocks.time.size
     if rows < 3:
-        raise CompensationError(
-            f"averaging over {width:g} s leaves {rows} rows, but at least three are needed; record longer or average less."
-        )
+        raise CompensationError(f"averaging over {width:g} s leaves {rows} rows, but at least three are needed; record longer or average less.")  # fmt: skip
     if np.ptp(blocks.columns["bias"]) <= 1e-13 * np.max(np.abs(blocks.columns["bias"])):
-        raise CompensationError(
-            f"the bias is constant ({blocks.columns['bias'][0]:g}): there is nothing to fit; check the column."
-        )
+        raise CompensationError(f"the bias is constant ({blocks.columns['bias'][0]:g}): there is nothing to fit; check the column.")  # fmt: skip
     return blocks
 
 
@@ -145,9 +141,7 @@ def rate_run(blocks: Blocks, f: Array, window: float, *, causal: bool, variable:
     derivative = differentiate(blocks.time, f, window, causal=causal)
     ok = derivative.complete
     if np.count_nonzero(ok) < 3:
-        raise CompensationError(
-            f"no stretch of the run fills the window of {window:g} s over which the rate is taken; shorten the window or record longer."
-        )
+        raise CompensationError(f"no stretch of the run fills the window of {window:g} s over which the rate is taken; shorten the window or record longer.")  # fmt: skip
     return BiasRun(
         time=blocks.time[ok], state=f[ok], rate=derivative.slope[ok], play=play[ok],
         bias=blocks.columns["bias"][ok], width=blocks.width, window=window, lag=derivative.lag,

@@ -44,9 +44,7 @@ class Loops:
             raise CompensationError(f"the delay of the loops must lie between 0 and 1 s, not {self.delay:g}.")
         for name in self.NAMES:
             if not getattr(self, name) < self.sampling / 2:
-                raise CompensationError(
-                    f"the {name} loop's {getattr(self, name):g} Hz is not below half the sampling rate."
-                )
+                raise CompensationError(f"the {name} loop's {getattr(self, name):g} Hz is not below half the sampling rate.")  # fmt: skip
 
     @property
     def step(self) -> float:

@@ -49,9 +49,7 @@ def _drive_by_damping(element: SensitiveElement) -> complex:
 def relate_cross_damping_to_rate_when_tuned(k: float, zeta: float, g2: float = 2.0) -> TransferFunction:
     """W(s) = 2 k² ζ / (g₂ (s + k ζ)), rad/s per unit ζ₁₂, for equal modes driven at resonance: eq. (9)."""
     if not (0 < k < 1e12 and 0 < zeta < 1 and g2 != 0):
-        raise CompensationError(
-            "eq. (9) needs a positive natural frequency that a resonator can have, damping between 0 and 1, and g2 not zero."
-        )
+        raise CompensationError("eq. (9) needs a positive natural frequency that a resonator can have, damping between 0 and 1, and g2 not zero.")  # fmt: skip
     return TransferFunction((2 * k**2 * zeta / g2,), (1.0, k * zeta))
 
 

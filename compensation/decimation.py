@@ -46,9 +46,7 @@ def average_blocks(time: ArrayLike, columns: Mapping[str, ArrayLike], width: flo
         raise CompensationError(f"the length of a block must be positive, not {width:g} s.")
     present = np.all([np.isfinite(column) for column in arrays.values()], axis=0)
     if np.count_nonzero(present) < NEIGHBOURS:
-        raise CompensationError(
-            f"only {np.count_nonzero(present)} rows have a value in each of {', '.join(arrays)}; record more."
-        )
+        raise CompensationError(f"only {np.count_nonzero(present)} rows have a value in each of {', '.join(arrays)}; record more.")  # fmt: skip
     keep = present.copy()
     for column in arrays.values():
         keep[present] &= ~find_spikes(column[present])

@@ -30,9 +30,7 @@ def differentiate(time: ArrayLike, values: ArrayLike, window: float, *, causal: 
         raise CompensationError("a derivative needs one finite value for each time; remove missing values first.")
     step = float(np.median(np.diff(t)))
     if t.size < 3 or window < 2 * step * (1 - 1e-9):
-        raise CompensationError(
-            f"a derivative window of {window:g} s holds fewer than three samples at {step:g} s apart; take at least {2 * step:g} s, or record longer."
-        )
+        raise CompensationError(f"a derivative window of {window:g} s holds fewer than three samples at {step:g} s apart; take at least {2 * step:g} s, or record longer.")  # fmt: skip
     before, after = (window, 0.0) if causal else (window / 2, window / 2)
     slack = 1e-6 * step
     first = np.searchsorted(t, t - before - slack)

@@ -106,9 +106,7 @@ class FrequencyFit:
         low, high = self.temperature_range_degC
         outside = np.isnan(T) | np.less(T, low) | np.greater(T, high)
         if not extrapolate and np.any(outside):
-            raise CompensationError(
-                f"{T[outside][0]:g} °C lies outside the fitted range {low:g} to {high:g} °C; measure there, or ask for extrapolation."
-            )
+            raise CompensationError(f"{T[outside][0]:g} °C lies outside the fitted range {low:g} to {high:g} °C; measure there, or ask for extrapolation.")  # fmt: skip
         return T
 
     def _bracket(self) -> tuple[float, float]:
@@ -174,9 +172,7 @@ def fit_frequency(
     if resolution is not None and not (np.isfinite(resolution) and resolution > 0):
         raise CompensationError(f"the resolution of the readings must be positive, not {resolution:g} Hz.")
     if not abs(reference_temperature_degC) <= FARTHEST_REFERENCE:
-        raise CompensationError(
-            f"a reference temperature of {reference_temperature_degC:g} °C is impossible; take one near those measured."
-        )
+        raise CompensationError(f"a reference temperature of {reference_temperature_degC:g} °C is impossible; take one near those measured.")  # fmt: skip
     if resolution is not None and f.size and not np.finfo(float).eps * np.max(f) <= resolution < np.max(f):
         raise CompensationError(f"readings of up to {np.max(f):g} Hz cannot have a resolution of {resolution:g} Hz.")
     rounding = 0.0 if resolution is None else resolution**2 / 12

@@ -74,9 +74,7 @@ def read_rate_from_drive(
     """
     r = resonator
     if np.any(np.asarray(q) == 0):
-        raise CompensationError(
-            "the axis q does not vibrate: where the loop holds q at rest, the rate cannot be found from the drive force."
-        )
+        raise CompensationError("the axis q does not vibrate: where the loop holds q at rest, the rate cannot be found from the drive force.")  # fmt: skip
     # (23) is the same for the two axes exchanged and the rate reversed
     return -read_rate_from_loop(r, omega, time, q, p, force)
 

@@ -40,9 +40,7 @@ class PiezoRing:
 
     def __post_init__(self) -> None:
         if not (self.area > 0 and self.capacitance > 0 and 0 < self.arc <= 2 * np.pi / COUNT):
-            raise CompensationError(
-                "piezo elements need a positive area and capacitance, and an arc of 45° at most: there are eight of them."
-            )
+            raise CompensationError("piezo elements need a positive area and capacitance, and an arc of 45° at most: there are eight of them.")  # fmt: skip
         if not self.stress * self.d31:
             raise CompensationError("piezo elements need a stress of the wall and a d31 other than zero.")
 

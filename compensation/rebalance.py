@@ -144,9 +144,7 @@ def samples_in_row(time: Array, loops: Loops) -> int:
     step = require_regular(time, "the simulation of the loops")
     samples = round(step * loops.sampling)
     if samples < 1 or abs(samples - step * loops.sampling) > 1e-6 * samples:
-        raise CompensationError(
-            f"a row of {step:g} s is not a whole number of the loops' samples of {loops.step:g} s; change one of them."
-        )
+        raise CompensationError(f"a row of {step:g} s is not a whole number of the loops' samples of {loops.step:g} s; change one of them.")  # fmt: skip
     return samples
 
 

@@ -84,9 +84,7 @@ class LinearFit:
         """Errors of predicting each observation from all the others, e / (1 − leverage), shape (m,)."""
         alone = np.flatnonzero(self.leverage > 1 - 1e-10)
         if alone.size:
-            raise CompensationError(
-                f"row {alone[0] + 1} alone fixes one of the coefficients, so it cannot be predicted from the others; lower the order or measure more."
-            )
+            raise CompensationError(f"row {alone[0] + 1} alone fixes one of the coefficients, so it cannot be predicted from the others; lower the order or measure more.")  # fmt: skip
         return self.residuals / (1.0 - self.leverage)
 
     @property
@@ -112,9 +110,7 @@ def fit_linear(
     X, y = _check(X, y, names)
     m, k = X.shape
     if m < k + constant + 1:
-        raise CompensationError(
-            f"{k + constant} coefficients need at least {k + constant + 1} rows, not {m}; record more or ask for fewer terms."
-        )
+        raise CompensationError(f"{k + constant} coefficients need at least {k + constant + 1} rows, not {m}; record more or ask for fewer terms.")  # fmt: skip
     shift = X.mean(axis=0) if constant else np.zeros(k)
     Z = X - shift
     labels = tuple(names)
@@ -144,9 +140,7 @@ def refuse_constant_columns(X: Array, names: Sequence[str]) -> None:
     """Raise a CompensationError that names the first column of X (m, k) without variation."""
     for name, column in zip(names, X.T, strict=True):
         if np.ptp(column) <= 1e-13 * np.max(np.abs(column)):
-            raise CompensationError(
-                f"column '{name}' is constant ({column[0]:g}): it determines nothing; leave it out or record data in which it varies."
-            )
+            raise CompensationError(f"column '{name}' is constant ({column[0]:g}): it determines nothing; leave it out or record data in which it varies.")  # fmt: skip
 
 
 def compare_nested(small: LinearFit, large: LinearFit) -> FTest:
@@ -166,15 +160,11 @@ def _check(X: ArrayLike, y: ArrayLike, names: Sequence[str]) -> tuple[Array, Arr
     X = np.asarray(X, dtype=np.float64)
     y = np.asarray(y, dtype=np.float64)
     if X.ndim != 2 or y.shape != (X.shape[0],) or len(names) != X.shape[1]:
-        raise CompensationError(
-            f"a fit needs one row per observation and one name per column: X is {X.shape}, y is {y.shape}, {len(names)} names."
-        )
+        raise CompensationError(f"a fit needs one row per observation and one name per column: X is {X.shape}, y is {y.shape}, {len(names)} names.")  # fmt: skip
     for name, column in zip([*names, "y"], [*X.T, y], strict=True):
         bad = np.flatnonzero(~np.isfinite(column))
         if bad.size:
-            raise CompensationError(
-                f"column '{name}' has {bad.size} missing or infinite values (first in row {bad[0] + 1}); remove those rows."
-            )
+            raise CompensationError(f"column '{name}' has {bad.size} missing or infinite values (first in row {bad[0] + 1}); remove those rows.")  # fmt: skip
     return X, y
 
 

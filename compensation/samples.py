@@ -18,9 +18,7 @@ def read_columns(**columns: ArrayLike) -> list[NDArray[np.float64]]:
             raise CompensationError(f"'{name}' has shape {values.shape}, but there are {len(arrays[0])} rows.")
         holes = np.flatnonzero(~np.isfinite(values))
         if len(holes):
-            raise CompensationError(
-                f"'{name}' has {len(holes)} missing or infinite values, the first in row {holes[0] + 1}; fill them or leave these rows out."
-            )
+            raise CompensationError(f"'{name}' has {len(holes)} missing or infinite values, the first in row {holes[0] + 1}; fill them or leave these rows out.")  # fmt: skip
     return arrays
 
 
@@ -39,9 +37,7 @@ def block_means(values: NDArray[Any], size: int) -> NDArray[Any]:
 def check_time(time: NDArray[np.float64]) -> None:
     """Raise unless `time` (s) has two rows or more, all finite, and increases strictly."""
     if len(time) < 2:
-        raise CompensationError(
-            f"'time' has {len(time)} {'row' if len(time) == 1 else 'rows'}; two or more are needed."
-        )
+        raise CompensationError(f"'time' has {len(time)} {'row' if len(time) == 1 else 'rows'}; two or more are needed.")  # fmt: skip
     if not np.all(np.isfinite(time)):
         row = int(np.flatnonzero(~np.isfinite(time))[0])
         raise CompensationError(f"'time' is missing or infinite in row {row + 1}; every row needs its time.")

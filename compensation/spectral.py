@@ -117,9 +117,7 @@ class CrossSpectrum:
         p = np.trim_zeros(np.asarray(self.denominator, dtype=float), "f")
         roots = np.roots(p)
         if np.any(np.abs(roots.real) <= 1e-9 * np.abs(roots)):
-            raise CompensationError(
-                "a cross-spectral density has a pole on the imaginary axis; give it a corner frequency."
-            )
+            raise CompensationError("a cross-spectral density has a pole on the imaginary axis; give it a corner frequency.")  # fmt: skip
         left, right = (np.atleast_1d(np.poly(roots[side]).real) for side in (roots.real < 0, roots.real > 0))
         return np.asarray(p[0] * left, dtype=float), np.asarray(right, dtype=float)
 

@@ -125,9 +125,7 @@ def equivalent_freedom(noise: NoiseKind, n: int, m: int) -> float:
 def fit_noise(allan: AllanDeviation) -> NoiseCoefficients:
     """Fit N, B, K by non-negative least squares on σ²/σ²_fit, weights EDF/2; errors know shared samples and grow with the misfit."""
     if allan.tau.size < 5:
-        raise CompensationError(
-            f"fitting N, B and K needs five values of τ or more, not {allan.tau.size}; record longer."
-        )
+        raise CompensationError(f"fitting N, B and K needs five values of τ or more, not {allan.tau.size}; record longer.")  # fmt: skip
     A, variance = np.stack([one.allan_variance(allan.tau) for one in UNITS], axis=-1), allan.deviation**2
     fitted, c = variance, np.zeros(3)
     for _ in range(50):

@@ -53,9 +53,7 @@ def select_stepwise(
         raise CompensationError(f"levels must satisfy 0 < entry ≤ removal < 1, not {enter:g} and {remove:g}.")
     m, q = forced.shape
     if m < q + len(names) + 1:
-        raise CompensationError(
-            f"{len(names)} candidate terms and {q} constants need at least {q + len(names) + 1} rows, not {m}; record longer or average less."
-        )
+        raise CompensationError(f"{len(names)} candidate terms and {q} constants need at least {q + len(names) + 1} rows, not {m}; record longer or average less.")  # fmt: skip
     search = _Search(forced, candidates, y, tuple(names), parents or {})
     refused = {name: why for name in names if (why := search.refusal(name))}
     chosen: list[str] = []

@@ -56,9 +56,7 @@ def fit_whole_angle(
     step = require_regular(t, "the fit of a whole-angle run")
     x = 2 * harmonic * theta
     if np.ptp(x) < LEAST_TURN:
-        raise CompensationError(
-            f"the wave precesses by only {np.degrees(np.ptp(theta)):.3g}°; the fit needs {180 / harmonic:g}° or more: precess it faster or record longer."
-        )
+        raise CompensationError(f"the wave precesses by only {np.degrees(np.ptp(theta)):.3g}°; the fit needs {180 / harmonic:g}° or more: precess it faster or record longer.")  # fmt: skip
     turn_rate = np.diff(theta)
     both_ways = np.ptp(_smooth(turn_rate)) > LEAST_CONTRAST * np.max(np.abs(_smooth(turn_rate)))
     z = float(scipy.special.ndtri(0.5 + confidence / 2))

@@ -101,9 +101,7 @@ def lay_resonator(resonator: Resonator, n: int, level: Level, alongside: tuple[i
         solids.append((corner, ((len(chains) - 1, 1), (len(chains), 0))))
         start, first = after, "tied"
     if not stop > start:
-        raise ShellError(
-            f"the corner or clamp that ends at {mm(start)} of the meridian overlaps the one that begins at {mm(stop)}: lengthen the last segment."
-        )
+        raise ShellError(f"the corner or clamp that ends at {mm(start)} of the meridian overlaps the one that begins at {mm(stop)}: lengthen the last segment.")  # fmt: skip
     chains.append(lay_chain(resonator, start, stop, (first, last), highest, level))
     return Layout(tuple(chains), tuple(solids))
 

@@ -125,9 +125,7 @@ def _meet(resonator: Resonator, joint: int, inner: float) -> tuple[float, float]
         step = np.linalg.solve([[a_1, -a_2], [b_1, -b_2]], [r_2 - r_1, z_2 - z_1])
         s_1, s_2 = s_1 + float(step[0]), s_2 + float(step[1])
     if not gap <= 1e-9 * h or not resonator._starts[joint] < s_1 <= s <= s_2 < resonator._starts[joint + 2]:
-        raise ShellError(
-            f"the corner between segments {joint + 1} and {joint + 2} is too sharp or its segments too short for the thickness."
-        )
+        raise ShellError(f"the corner between segments {joint + 1} and {joint + 2} is too sharp or its segments too short for the thickness.")  # fmt: skip
     return s_1, s_2
 
 

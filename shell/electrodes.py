@@ -71,9 +71,7 @@ class Electrodes:
             raise ShellError(f"the gap must be positive, not {1e6 * self.gap:g} µm.")
         size = self.pair.resonator.size
         if self.gap > 0.2 * size:
-            raise ShellError(
-                f"a gap of {1e3 * self.gap:g} mm is too wide for {1e3 * size:g} mm of radius: is it in µm?"
-            )
+            raise ShellError(f"a gap of {1e3 * self.gap:g} mm is too wide for {1e3 * size:g} mm of radius: is it in µm?")  # fmt: skip
         for one in self.electrodes:
             if not (one.width > 0 and 0 <= one.first < one.last <= 1):
                 raise ShellError("an electrode has a positive width and lies between 0 <= first < last <= 1.")

@@ -68,8 +68,6 @@ def _step(solve: Callable[[float, int], Sequence[Mode]], known: Mode, start: flo
     if together.max() >= SURE:
         return found[int(np.argmax(np.where(together >= SURE, like, -1.0)))]
     if not left:
-        raise ShellError(
-            f"no mode n = {known.harmonic} like the one followed, {known.frequency:.6g} Hz, is among the lowest {len(found)}: it has vanished or changed its shape."
-        )
+        raise ShellError(f"no mode n = {known.harmonic} like the one followed, {known.frequency:.6g} Hz, is among the lowest {len(found)}: it has vanished or changed its shape.")  # fmt: skip
     middle = (start + end) / 2
     return _step(solve, _step(solve, known, start, middle, left - 1), middle, end, left - 1)

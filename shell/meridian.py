@@ -28,9 +28,7 @@ def hemisphere(
     """
     _require_positive(radius=radius)
     if not 0 <= pole_angle < rim_angle <= pi + 1e-12:
-        raise ShellError(
-            f"a dome needs 0 <= pole angle < rim angle <= 180 degrees, not {np.degrees(pole_angle):g} and {np.degrees(rim_angle):g} degrees."
-        )
+        raise ShellError(f"a dome needs 0 <= pole angle < rim angle <= 180 degrees, not {np.degrees(pole_angle):g} and {np.degrees(rim_angle):g} degrees.")  # fmt: skip
     dome = Arc((0.0, 0.0), radius, pole_angle, min(rim_angle, pi))
     return Resonator((dome,), _profile(thickness), _known(support), stem)
 

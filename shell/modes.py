@@ -218,13 +218,9 @@ def _rayleigh(resonator: Resonator, elastic: Elastic | VaryingElastic, n: int, c
     dome = resonator.segments[0]
     thicknesses = {value for _, value in resonator.thickness}
     if len(resonator.segments) != 1 or not isinstance(dome, Arc) or dome.center != (0.0, 0.0) or len(thicknesses) != 1:
-        raise ShellError(
-            "Rayleigh's closed form holds for a hemisphere of constant thickness only: use theory solid or shell."
-        )
+        raise ShellError("Rayleigh's closed form holds for a hemisphere of constant thickness only: use theory solid or shell.")  # fmt: skip
     if resonator.support != "free" or not isinstance(elastic, Elastic):
-        raise ShellError(
-            "Rayleigh's closed form holds for a free shell of one material, without a stem, films or gradients: use --theory solid or shell."
-        )
+        raise ShellError("Rayleigh's closed form holds for a free shell of one material, without a stem, films or gradients: use --theory solid or shell.")  # fmt: skip
     if n < 2 or count != 1:
         raise ShellError("Rayleigh's closed form is one mode for each n >= 2: use --harmonic 2 or more with --count 1.")
     h = thicknesses.pop()

@@ -87,9 +87,7 @@ def rayleigh_integrals(n: int, phi_1: float = 0.0, phi_2: float = pi / 2) -> Ray
     if int(n) != n or n < 2:
         raise ShellError(f"Rayleigh's mode needs a whole harmonic n of at least 2, not {n}; n = 0, 1 move rigidly.")
     if not 0 <= phi_1 < phi_2 < pi:
-        raise ShellError(
-            f"Polar angles must satisfy 0 <= phi_1 < phi_2 < pi, not phi_1 = {phi_1:g}, phi_2 = {phi_2:g} rad; a closed sphere has no inextensional mode."
-        )
+        raise ShellError(f"Polar angles must satisfy 0 <= phi_1 < phi_2 < pi, not phi_1 = {phi_1:g}, phi_2 = {phi_2:g} rad; a closed sphere has no inextensional mode.")  # fmt: skip
     values = []
     for integrand in (_bending, _mass, _coriolis):
         # full_output reports trouble in the result instead of as a warning; the error estimate is judged here.

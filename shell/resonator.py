@@ -217,9 +217,7 @@ def _check_chain(resonator: Resonator) -> None:
     for k, (one, two) in enumerate(zip(resonator.segments, resonator.segments[1:], strict=False), start=1):
         (r1, z1), (r2, z2) = one.end_points[1], two.end_points[0]
         if hypot(r1 - r2, z1 - z2) > max(tolerance, 1e-9):
-            raise ShellError(
-                f"segment {k + 1} of the meridian starts at ({r2:g}, {z2:g}) m, but segment {k} ends at ({r1:g}, {z1:g}) m."
-            )
+            raise ShellError(f"segment {k + 1} of the meridian starts at ({r2:g}, {z2:g}) m, but segment {k} ends at ({r1:g}, {z1:g}) m.")  # fmt: skip
     inside = np.concatenate([segment.jet(np.linspace(0.0, 1.0, 201)[1:-1]).r for segment in resonator.segments])
     joints = [segment.end_points[0][0] for segment in resonator.segments[1:]]
     if min(inside) <= 0 or min(joints, default=1.0) <= tolerance:
@@ -250,9 +248,7 @@ def _check_support(resonator: Resonator) -> None:
     if resonator.support == "clamped-pole" and resonator.starts_on_axis:
         raise ShellError("a closed pole has no edge to clamp: open it (a pole angle above 0) or use a stem.")
     if resonator.support == "clamped-rim" and resonator.ends_on_axis:
-        raise ShellError(
-            "a closed shell has no rim to clamp: end the meridian before the axis, or choose another support."
-        )
+        raise ShellError("a closed shell has no rim to clamp: end the meridian before the axis, or choose another support.")  # fmt: skip
     if (resonator.support == "stem") != (resonator.stem is not None):
         raise ShellError("a stem belongs to the support 'stem', and the support 'stem' needs a stem.")
     for start, on_axis in ((True, resonator.starts_on_axis), (False, resonator.ends_on_axis)):
@@ -271,9 +267,7 @@ def _check_stem(resonator: Resonator, stem: Stem) -> None:
     for face, end in stem.roots:
         r, z = (coordinate[:, 0] for coordinate in points.at_heights([face]))
         if not stem.radius + stem.fillet < 0.9 * r.max():
-            raise ShellError(
-                f"the stem (radius {mm(stem.radius)}, fillet {mm(stem.fillet)}) is larger than the dome it stands on (radius {mm(r.max())}): make it thinner."
-            )
+            raise ShellError(f"the stem (radius {mm(stem.radius)}, fillet {mm(stem.fillet)}) is larger than the dome it stands on (radius {mm(r.max())}): make it thinner.")  # fmt: skip
         at_root = float(np.interp(stem.radius + stem.fillet, r[: r.argmax() + 1], z[: r.argmax() + 1]))
         if abs(end - at_root) > LONGEST_STEM * stem.radius:
             raise ShellError(
@@ -282,6 +276,4 @@ def _check_stem(resonator: Resonator, stem: Stem) -> None:
             )
         base = max(at_root, float(z[0])) if face > 0 else at_root  # the dome bulges into an outer stem
         if not face * (end - base) > stem.fillet + 0.1 * stem.radius:
-            raise ShellError(
-                f"the {'outer' if face > 0 else 'inner'} stem ends at {mm(end)}, not clear of the dome at {mm(base)}: move its end away from the dome."
-            )
+            raise ShellError(f"the {'outer' if face > 0 else 'inner'} stem ends at {mm(end)}, not clear of the dome at {mm(base)}: move its end away from the dome.")  # fmt: skip

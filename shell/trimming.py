@@ -39,9 +39,7 @@ class SplitWave:
     def of(cls, harmonic: int, frequency: float, split: float, slow_axis: float, error: float) -> "SplitWave":
         """From a split and its standard error in Hz and the azimuth of the slower mode's antinode, rad."""
         if not split > 0 or not error > 0:
-            raise ShellError(
-                f"a split of {split:g} Hz with a reading error of {error:g} Hz: both must be positive (--split, --reading-error)."
-            )
+            raise ShellError(f"a split of {split:g} Hz with a reading error of {error:g} Hz: both must be positive (--split, --reading-error).")  # fmt: skip
         if split < 2 * error:
             raise ShellError(
                 f"the split of n = {harmonic}, {1e3 * split:.3g} mHz, cannot be distinguished from its reading error of {1e3 * error:.3g} mHz: measure more accurately before cutting."

@@ -46,9 +46,7 @@ def cut_meridian(length: float, radius: Along, thickness: Along, count: int) -> 
     def section(s: Array) -> Array:
         area: Array = 2 * np.pi * radius(s) * thickness(s)
         if not (np.isfinite(area).all() and (area > 0).all()):
-            raise ThermalError(
-                "radius and thickness must be positive all along; start it at the stem, not at the pole."
-            )
+            raise ThermalError("radius and thickness must be positive all along; start it at the stem, not at the pole.")  # fmt: skip
         return area
 
     return MeridianCells(

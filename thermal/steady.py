@@ -25,9 +25,7 @@ def find_steady_state(network: Network, boundaries: Mapping[str, float], time: f
         T[:n] = np.maximum(T[:n] + step, 0.1 * T[:n])
         if np.abs(step).max() < TOLERANCE * T.max():
             return T
-    raise ThermalError(
-        f"no steady state was found after {NEWTON_STEPS} Newton steps; look for a source whose heat the network cannot carry away."
-    )
+    raise ThermalError(f"no steady state was found after {NEWTON_STEPS} Newton steps; look for a source whose heat the network cannot carry away.")  # fmt: skip
 
 
 def boundary_vector(network: Network, boundaries: Mapping[str, float]) -> Array:

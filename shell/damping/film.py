@@ -66,9 +66,7 @@ def check_film(film: Film, wall: float) -> None:
     if film.thickness >= wall:
         raise ShellError(f"the film ({mm(film.thickness)}) is thicker than the wall ({mm(wall)}): is it in nm?")
     if film.thickness > THICKEST * wall:
-        raise ShellError(
-            f"the film ({mm(film.thickness)}) is more than {100 * THICKEST:.0f} % of the wall ({mm(wall)}): the mode would change; model it as a wall of its own."
-        )
+        raise ShellError(f"the film ({mm(film.thickness)}) is more than {100 * THICKEST:.0f} % of the wall ({mm(wall)}): the mode would change; model it as a wall of its own.")  # fmt: skip
 
 
 def film_energies(film: Film, face: FreeFaces) -> tuple[Array, Array]:

@@ -119,9 +119,7 @@ def radiating_mode(waves: RadiatingBody, frequency: float) -> Radiating:
                 break
             before = now
         shift = before
-    raise ShellError(
-        f"no mode of the resonator on its base converges near {frequency:.6g} Hz: use another stem or base."
-    )
+    raise ShellError(f"no mode of the resonator on its base converges near {frequency:.6g} Hz: use another stem or base.")  # fmt: skip
 
 
 def assemble_waves(system: System, materials: Sequence[Elastic], bases: Sequence[Mask], layer: Layer) -> RadiatingBody:

@@ -115,9 +115,7 @@ def measure_temperature(records: "Sequence[Record]", output: str) -> Found:
         if output in record:
             blocks = average_blocks(record["time_s"], {"output": record[output], "T": record[column]}, BLOCK)
             if len(blocks.time) < 10:
-                raise InputError(
-                    f"{record.path}: a test over temperature needs ten averages of {BLOCK:g} s or more; record longer."
-                )
+                raise InputError(f"{record.path}: a test over temperature needs ten averages of {BLOCK:g} s or more; record longer.")  # fmt: skip
             T = blocks.columns["T"]
             columns["output"].append(blocks.columns["output"])
             columns["temperature"].append(T)

@@ -72,9 +72,7 @@ def measure_storage(record: "Record") -> Found:
         raise InputError(f"{record.path}: angle storage needs at least twenty rows before and after the gap.")
     at = int(np.argmax(np.diff(time))) + 1
     if np.diff(time)[at - 1] < 10 * np.median(np.diff(time)) or min(at, len(time) - at) < LEAST // 5:
-        raise InputError(
-            f"{record.path}: angle storage needs a gap in time while the power was off, with at least twenty rows before and after it."
-        )
+        raise InputError(f"{record.path}: angle storage needs a gap in time while the power was off, with at least twenty rows before and after it.")  # fmt: skip
     sides = []
     for part in (slice(0, at), slice(at, None)):
         t = time[part] - time[at]

@@ -44,9 +44,7 @@ def calibrate(
     instrument = load_card(card)
     if tables := [path for path in data if is_mode_table(path)]:
         if len(data) > 1 or hold_out:
-            raise InputError(
-                f"{tables[0]}: a table of modes is calibrated alone and without --hold-out; save that card, then calibrate it with the records."
-            )
+            raise InputError(f"{tables[0]}: a table of modes is calibrated alone and without --hold-out; save that card, then calibrate it with the records.")  # fmt: skip
         return calibrate_modes(instrument, tables[0], save, exact)
     records = sum(not workbench.is_table(path) for path in data)
     if not 0 <= hold_out <= records:

@@ -77,9 +77,7 @@ def derive(
             "be 0 or more and below the rim angle, the rim angle below 180 degrees."
         )
     if harmonic > MOST_HARMONIC:
-        raise InputError(
-            f"--harmonic {harmonic}: closed forms are derived up to n = {MOST_HARMONIC}; choose a lower n."
-        )
+        raise InputError(f"--harmonic {harmonic}: closed forms are derived up to n = {MOST_HARMONIC}; choose a lower n.")  # fmt: skip
     shape = rayleigh_integrals(harmonic, radians(pole_angle_deg), radians(rim_angle_deg))
     tell(DERIVING, 0.0)
     case = DerivedCase.from_degrees(harmonic, pole_angle_deg, rim_angle_deg)
@@ -87,9 +85,7 @@ def derive(
     # On a cap of a thousandth of a degree a hundred digits do not suffice to evaluate the closed forms.
     for closed, integral in ((case.bending, shape.I), (case.mass, shape.J)):
         if abs(complex(closed.evalf(20)) / integral - 1) > 1e-9:
-            raise InputError(
-                f"from {pole_angle_deg:g} to {rim_angle_deg:g} degrees the closed forms of harmonic {harmonic} cancel to nothing; take a wider cap."
-            )
+            raise InputError(f"from {pole_angle_deg:g} to {rim_angle_deg:g} degrees the closed forms of harmonic {harmonic} cancel to nothing; take a wider cap.")  # fmt: skip
     payload: dict[str, Any] = {
         "harmonic": case.harmonic,
         "pole_angle_deg": pole_angle_deg,

@@ -65,13 +65,9 @@ def fit_cross_damping(
         quality = 1 / loss if loss else float("inf")
     if not (0 < carrier < 1e9 and 1 < quality < 1e12):
         wrong = f"--quality {quality:g}" if 0 < carrier < 1e9 else f"--frequency {carrier:g}"
-        raise InputError(
-            f"{wrong}: {carrier:g} Hz with Q = {quality:g} is not a resonator; correct the option or the columns of the record."
-        )
+        raise InputError(f"{wrong}: {carrier:g} Hz with Q = {quality:g} is not a resonator; correct the option or the columns of the record.")  # fmt: skip
     if not abs(calibration_temperature) <= 1000:
-        raise InputError(
-            f"--calibration-temperature {calibration_temperature:g} °C: no gyro has this temperature; give one within the record, in °C."
-        )
+        raise InputError(f"--calibration-temperature {calibration_temperature:g} °C: no gyro has this temperature; give one within the record, in °C.")  # fmt: skip
     gathered = gather_rest(records, OUTPUTS)
     T = calibration_temperature + zero_Celsius
     with naming(", ".join(data)):

@@ -90,9 +90,7 @@ def fit_ringdown(
     table = read_table(tables[0]) if tables else table_of(decays)
     laws = fit_laws(table)
     if tables and not laws:
-        raise InputError(
-            f"{tables[0]}: no law can be fitted; a table of decays needs four readings or more of frequency_Hz or inverse_q that vary with a column beside them."
-        )
+        raise InputError(f"{tables[0]}: no law can be fitted; a table of decays needs four readings or more of frequency_Hz or inverse_q that vary with a column beside them.")  # fmt: skip
     if save is not None and instrument is not None:
         keep_card(with_decay(instrument, decays[0], harmonic), save)
     if out is not None:

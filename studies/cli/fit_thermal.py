@@ -53,9 +53,7 @@ def fit_thermal(
     for note in found.notes:
         say(f"note: {note}")
     if found.estimates["time_constant_1"].value is None:
-        raise InputError(
-            f"{data[0]}: the records determine no time constant. Record steps or ramps of 10 K or more that last at least five times the resonator's time constant."
-        )
+        raise InputError(f"{data[0]}: the records determine no time constant. Record steps or ramps of 10 K or more that last at least five times the resonator's time constant.")  # fmt: skip
     reference = found.path.card.reference_temperature - zero_Celsius
     estimates = {
         name: row_of(e, "value", "low", "high") | {"determined": e.value is not None}

@@ -101,9 +101,7 @@ def _fit_record(
         say(NO_SCALE)
     if "inverse_q" in record:
         if frequency is None:
-            raise InputError(
-                f"{path}: inverse_q gives the decay rate only with frequency_Hz beside it; add that column."
-            )
+            raise InputError(f"{path}: inverse_q gives the decay rate only with frequency_Hz beside it; add that column.")  # fmt: skip
         decay = np.pi * frequency * record["inverse_q"]
     with naming(path):
         found = fit(

@@ -154,9 +154,7 @@ NONLINEAR = (
 def _check_small(what: str, found: float, most: float, unit: str) -> None:
     """Refuse loads beyond the first order, where the answers are proportional to them."""
     if not found < most:
-        raise InputError(
-            f"these loads would cause a {what} of {found:.3g}{unit}; the theory is linear and does not hold from {most:.3g}{unit} up. Lower them."
-        )
+        raise InputError(f"these loads would cause a {what} of {found:.3g}{unit}; the theory is linear and does not hold from {most:.3g}{unit} up. Lower them.")  # fmt: skip
 
 
 def _waves(mode: Mode, spin: SpinShift, omega: float) -> dict[str, float]:

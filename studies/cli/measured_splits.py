@@ -25,15 +25,11 @@ def pair_splits(
             return [(int(own["harmonic"]), float(own["split_Hz"]), radians(own["slow_axis_deg"]), error)]
     error = READING_ERROR if error is None else error
     if not split:
-        raise InputError(
-            "--split is missing: give the measured splits (Hz), each with its --axis (degrees), or a card with a measured split ('hrg fit ringdown --save')."
-        )
+        raise InputError("--split is missing: give the measured splits (Hz), each with its --axis (degrees), or a card with a measured split ('hrg fit ringdown --save').")  # fmt: skip
     for option, given in (("--axis", axis), ("--harmonic", harmonic)):
         if len(given) != len(split):
             found = "is missing" if not given else f"has {len(given)} values"
-            raise InputError(
-                f"{option} {found}: give one for each --split, of which there {'is 1' if len(split) == 1 else f'are {len(split)}'}."
-            )
+            raise InputError(f"{option} {found}: give one for each --split, of which there {'is 1' if len(split) == 1 else f'are {len(split)}'}.")  # fmt: skip
     if min(harmonic) < 1:
         raise InputError(f"--harmonic {min(harmonic)}: split modes have n = 1 or higher.")
     return [(n, s, radians(a), error) for n, s, a in zip(harmonic, split, axis, strict=True)]

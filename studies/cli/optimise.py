@@ -34,9 +34,7 @@ def optimise(design: str, *, out: str, workers: Workers = None, quiet: Quiet = F
     try:
         found = find_best(design, out, workers=workers, show_progress=not quiet)
     except KeyboardInterrupt:
-        raise KeyboardInterrupt(
-            f"interrupted; {out} keeps the designs; run the same command again to resume."
-        ) from None
+        raise KeyboardInterrupt(f"interrupted; {out} keeps the designs; run the same command again to resume.") from None  # fmt: skip
     payload: dict[str, Any] = {
         **row_of(found, "evaluations", design="task.name", card="task.study.instrument.name"),
         "failed": len(found.failures),

@@ -81,9 +81,7 @@ def run(
             retry_failed=retry_failed, show_progress=not quiet,
         )  # fmt: skip
     except KeyboardInterrupt:
-        raise KeyboardInterrupt(
-            f"interrupted; {out} keeps the finished cases; run the same command again to resume."
-        ) from None
+        raise KeyboardInterrupt(f"interrupted; {out} keeps the finished cases; run the same command again to resume.") from None  # fmt: skip
     found = _status(results, out, running=False)
     failed = found["failed"]
     done = f"{results.total} cases computed, {failed} failed. Next: hrg study report {out}, hrg study export {out}."

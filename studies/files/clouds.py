@@ -64,9 +64,7 @@ def _read_text(path: Path, first: str) -> "Array":
             values = part.to_numpy()
             kept.append(values[np.isfinite(values).all(axis=1)])
     except (ValueError, pd.errors.ParserError):
-        raise InputError(
-            f"{path}: is not a table of x y z: each line needs three numbers with decimal points; comments start with #."
-        ) from None
+        raise InputError(f"{path}: is not a table of x y z: each line needs three numbers with decimal points; comments start with #.") from None  # fmt: skip
     points = np.concatenate(kept)
     if not len(points):
         raise InputError(f"{path}: has no points.")
@@ -84,9 +82,7 @@ def _read_mesh(path: Path) -> "Array":
         loaded = trimesh.load(path, process=False)
         points = np.asarray(loaded.vertices, dtype=float)
     except Exception as error:
-        raise InputError(
-            f"{path}: is not a {path.suffix[1:].upper()} file, or is damaged; export it again, or give x y z text."
-        ) from error
+        raise InputError(f"{path}: is not a {path.suffix[1:].upper()} file, or is damaged; export it again, or give x y z text.") from error  # fmt: skip
     points = points[np.isfinite(points).all(axis=1)] if points.ndim == 2 else points[:0]
     if not len(points):
         raise InputError(f"{path}: has no points.")
@@ -106,9 +102,7 @@ def _read_grid(path: Path, skipped: int) -> FaceGrid:
         table = pd.read_csv(path, skiprows=skipped, comment="#", dtype=float, index_col=0)
         azimuth = np.deg2rad(table.columns.to_numpy(dtype=float))
     except (ValueError, pd.errors.ParserError):
-        raise InputError(
-            f"{path}: is not a table of deviations: after the line {GRID},0,5,10,… every cell must be a number or empty."
-        ) from None
+        raise InputError(f"{path}: is not a table of deviations: after the line {GRID},0,5,10,… every cell must be a number or empty.") from None  # fmt: skip
     position = table.index.to_numpy(dtype=float)
     order = np.argsort(position)
     if len(position) < 1 or np.any(np.diff(position[order]) <= 0) or position.min() < 0 or position.max() > 1:

@@ -255,9 +255,7 @@ def _parse_by_line(path: str | Path, body: str, names: list[str], first_line: in
             if cells[0].startswith("#"):
                 raise InputError(f"{path}, line {number}: comments are allowed only above the header; move it there.")
             if len(cells) != len(names):
-                raise InputError(
-                    f"{path}, line {number}: {len(cells)} values where the header has {len(names)} columns ({', '.join(names)}); decimal commas must become points."
-                )
+                raise InputError(f"{path}, line {number}: {len(cells)} values where the header has {len(names)} columns ({', '.join(names)}); decimal commas must become points.")  # fmt: skip
             rows.append([_number(path, number, name, cell) for name, cell in zip(names, cells, strict=True)])
     except csv.Error as error:
         raise InputError(f"{path}, line {first_line + reader.line_num - 1}: {error}.") from None
@@ -278,9 +276,7 @@ def _number(path: str | Path, line: int, name: str, cell: str) -> float:
     if not text:
         return float("nan")
     if not _is_number(text):
-        raise InputError(
-            f"{path}, line {line}: '{text}' in column '{name}' is not a number; correct it, or leave the cell empty where the value is missing."
-        )
+        raise InputError(f"{path}, line {line}: '{text}' in column '{name}' is not a number; correct it, or leave the cell empty where the value is missing.")  # fmt: skip
     return float(text)
 
 

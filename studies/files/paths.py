@@ -84,9 +84,7 @@ def claim(path: Path) -> None:
 def _spare_read(path: Path, given: str) -> None:
     read = _read.get(_identity(path))
     if read is not None and path.is_file():
-        raise InputError(
-            f"{given}: the same command reads this file ({read}), and writing it would destroy it; choose another name."
-        )
+        raise InputError(f"{given}: the same command reads this file ({read}), and writing it would destroy it; choose another name.")  # fmt: skip
 
 
 def _check_folder(path: Path, given: str) -> None:

@@ -40,9 +40,7 @@ def check_file(path: str | Path, most: int = MOST_BYTES) -> Path:
         if not stat.S_ISREG(about.st_mode):
             raise InputError(f"{path}: is a device or a pipe, not a file; save what it gives and name that file.")
         if about.st_size > most:
-            raise InputError(
-                f"{path}: has {about.st_size / 1e6:,.0f} MB, above the limit of {most / 1e6:,.0f} MB; split it or record at a lower rate."
-            )
+            raise InputError(f"{path}: has {about.st_size / 1e6:,.0f} MB, above the limit of {most / 1e6:,.0f} MB; split it or record at a lower rate.")  # fmt: skip
         return Path(path)
     except InputError:
         raise
@@ -77,7 +75,5 @@ def find_shipped(name: str | Path, shipped: dict[str, Path], kind: str) -> Path:
     if path.suffix == ".toml" or path.exists() or len(path.parts) > 1:
         return path
     if str(name) not in shipped:
-        raise InputError(
-            f"there is no built-in {kind} '{name}' (give the path of your own){nearest(str(name), shipped)}"
-        )
+        raise InputError(f"there is no built-in {kind} '{name}' (give the path of your own){nearest(str(name), shipped)}")  # fmt: skip
     return shipped[str(name)]

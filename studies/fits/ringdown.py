@@ -149,9 +149,7 @@ def _read_trace(path: str | Path) -> tuple[Columns, dict[str, float]]:
     lines = Path(path).read_text(encoding="utf-8", errors="replace").splitlines()
     comments = [line.lstrip("% ").strip() for line in lines if line.startswith("%")]
     if not comments or comments[-1] != "time [s], power [dBm]":
-        raise InputError(
-            f"{path}: comments with % are read of traces whose last comment is 'time [s], power [dBm]' only; give the file a header line."
-        )
+        raise InputError(f"{path}: comments with % are read of traces whose last comment is 'time [s], power [dBm]' only; give the file a header line.")  # fmt: skip
     notes = _read_start(path, comments)
     for comment in comments:
         name, _, text = comment.partition(":")
@@ -206,9 +204,7 @@ def _refuse_other(path: str | Path, found: float, expected: float) -> None:
 def with_decay(instrument: "Instrument", decay: Decay, harmonic: int = 2) -> "Instrument":
     """Return the card with what a decay of two channels says: split and slow axis, 1/Q, damping split and axis."""
     if "frequency_axis_deg" not in decay.estimates:
-        raise InputError(
-            f"{decay.path}: a card takes a split with its axis; this decay shows none: record both pick-offs, with both modes excited, for longer."
-        )
+        raise InputError(f"{decay.path}: a card takes a split with its axis; this decay shows none: record both pick-offs, with both modes excited, for longer.")  # fmt: skip
     e = decay.estimates
     split, axis = e["split_Hz"], e["frequency_axis_deg"]
     imperfection = dict(instrument.content.get("imperfection", {}))

@@ -144,9 +144,7 @@ class Instrument:
 
     def _of_geometry(self, table: str) -> Any:
         if self.polynomial is not None:
-            raise InputError(
-                f"{self.path}: this needs a card with [resonator] and [material]; this one has a polynomial ([law]) instead."
-            )
+            raise InputError(f"{self.path}: this needs a card with [resonator] and [material]; this one has a polynomial ([law]) instead.")  # fmt: skip
         return self.part(table)
 
     def at(self, temperature: float) -> "tuple[Resonator, Elastic]":

@@ -115,9 +115,7 @@ def _priors(instrument: Instrument, exact: Sequence[str]) -> Priors:
     idle = [v.name for v in instrument.uncertain if not v.name.startswith(ACTING) or any(w in v.name for w in IDLE)]
     priors = gather_priors(instrument, (*exact, *idle))
     if not priors.values:
-        raise InputError(
-            f"{instrument.path}: no dimension and no elastic value is uncertain; give one, such as [resonator] thickness_mm = {{ value = …, sd = … }}."
-        )
+        raise InputError(f"{instrument.path}: no dimension and no elastic value is uncertain; give one, such as [resonator] thickness_mm = {{ value = …, sd = … }}.")  # fmt: skip
     return priors
 
 

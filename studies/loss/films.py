@@ -70,9 +70,7 @@ def film_losses(
     missing = [key for key in LOSSY if numbers[key] is None]
     if missing:
         listed = "" if known else f" (films of the table: {', '.join(film_names())})"
-        raise InputError(
-            f"{where}: no source states {' and '.join(missing)} of the film '{keys.material}'{listed}; add it."
-        )
+        raise InputError(f"{where}: no source states {' and '.join(missing)} of the film '{keys.material}'{listed}; add it.")  # fmt: skip
     with naming(where):
         relative = (spread.get(f"{name}.thickness_nm", 0.0), spread.get(f"{name}.loss", 0.0))
         film = _build_film(keys, numbers)

@@ -118,9 +118,7 @@ def check_temperatures(record: "Record") -> str:
             f"{where}: the temperature changes by {np.ptp(T):.3g} K within {lasts:.3g} s, faster than any chamber. time_s must be in seconds: is it in minutes or hours?"
         )
     if name != TEMPERATURES[2] and (change := _fastest_change(time, T)):
-        raise InputError(
-            f"{where}: {name} changes by {change[0]:.3g} K within {change[1]:.3g} s, faster than any housing. time_s must be in seconds: is it in minutes or hours?"
-        )
+        raise InputError(f"{where}: {name} changes by {change[0]:.3g} K within {change[1]:.3g} s, faster than any housing. time_s must be in seconds: is it in minutes or hours?")  # fmt: skip
     if spread < LEAST_SPREAD:
         return ""
     held = _held_rate(time, T, lasts)

@@ -108,9 +108,7 @@ def _check_span(records: Sequence[Record], least: float, purpose: str) -> None:
     known = [record[column][np.isfinite(record[column])] for record in records] if column else []
     span = max((float(np.ptp(T)) for T in known if T.size), default=np.inf)
     if span < least:
-        raise InputError(
-            f"{records[0].path}: {column} changes by {span:.2g} K only; {purpose} needs {least:g} K or more: ramp or step the chamber."
-        )
+        raise InputError(f"{records[0].path}: {column} changes by {span:.2g} K only; {purpose} needs {least:g} K or more: ramp or step the chamber.")  # fmt: skip
 
 
 USES: tuple[tuple[str, str, str, Callable[[Sequence[Record]], object]], ...] = (

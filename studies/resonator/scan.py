@@ -109,9 +109,7 @@ def scan_faces(
     for name, points in clouds.items():
         check_unit(points, resonator, files[name])
         if highest > (most := most_waves(len(points))):
-            raise InputError(
-                f"--highest {highest}: {len(points)} points of {files[name]} allow up to {most}; lower it."
-            )
+            raise InputError(f"--highest {highest}: {len(points)} points of {files[name]} allow up to {most}; lower it.")  # fmt: skip
     if clouds and projector is not None:
         say("aligning the faces")
         together = [list(clouds)] if frames == "common" else [[name] for name in clouds]
@@ -147,9 +145,7 @@ def _check_wall(faces: dict[str, Face], resonator: "Resonator") -> None:
     nominal = resonator.at(x * resonator.length).thickness[:, None]
     wall = nominal + sum(np.array([face.profile(float(at), theta) for at in x]) for face in faces.values())
     if np.any(wall <= 0):
-        raise ShellError(
-            "the measured faces cross each other: they do not share one frame, or belong to different resonators; check the files."
-        )
+        raise ShellError("the measured faces cross each other: they do not share one frame, or belong to different resonators; check the files.")  # fmt: skip
 
 
 def _split(pair: Pair, coupled: CoupledHarmonics, faces: dict[str, Face], imperfection: Imperfection) -> SplitOfScan:

@@ -101,9 +101,7 @@ def rim_sites(
 ) -> Sites:  # fmt: skip
     """Grooves around the shell, a multiple of 4n for every n, one on the antinode at `axis` (rad), at positions of the meridian."""
     if not (tool.width >= NARROWEST and NARROWEST <= tool.length < np.inf and 0 < tool.depth_limit < 1):
-        raise InputError(
-            f"a cut is at least {1e6 * NARROWEST:g} µm wide and long, and takes a share of the wall between 0 and 1."
-        )
+        raise InputError(f"a cut is at least {1e6 * NARROWEST:g} µm wide and long, and takes a share of the wall between 0 and 1.")  # fmt: skip
     step = int(np.lcm.reduce([4 * n for n in pairs]))
     azimuth, position, capacity = [], [], []
     for x in heights:
@@ -215,9 +213,7 @@ def plan_for_card(
             cuts[x] = PlannedCut(
                 groove, {n: solve_groove(pair, groove) for n, pair in pairs.items()}, first, spread, touching
             )
-    raise ShellError(
-        f"no depth of these cuts achieves the plan: the stress that narrow grooves relieve cancels the effect of the mass they remove. {WIDER}"
-    )
+    raise ShellError(f"no depth of these cuts achieves the plan: the stress that narrow grooves relieve cancels the effect of the mass they remove. {WIDER}")  # fmt: skip
 
 
 def error_of_gain(cuts: Mapping[float, PlannedCut], common: float) -> float:

@@ -42,9 +42,7 @@ def read_toml(path: str | FilePath, schema: str | None = None) -> dict[str, Any]
         raise InputError(f"{path}: not valid TOML: nested too deeply.") from None
     for key, said in _texts(content):
         if said != printable(said):
-            raise InputError(
-                f"{path}: {printable(key)} holds a control character ({printable(said)!s:.60}); remove it."
-            )
+            raise InputError(f"{path}: {printable(key)} holds a control character ({printable(said)!s:.60}); remove it.")  # fmt: skip
     if schema is not None:
         found = content.get("schema")
         if not text.strip():
@@ -52,9 +50,7 @@ def read_toml(path: str | FilePath, schema: str | None = None) -> dict[str, Any]
         if found is None:
             raise InputError(f'{path}: the line schema = "{schema}" is missing; add it at the top.')
         if found != schema:
-            raise InputError(
-                f'{path}: schema must be "{schema}", not {found!r}; give such a file, or correct that line.'
-            )
+            raise InputError(f'{path}: schema must be "{schema}", not {found!r}; give such a file, or correct that line.')  # fmt: skip
     return content
 
 

@@ -75,9 +75,7 @@ class Case:
             return None
         found = self.mode(harmonic, 0, theory, temperature)
         if found.index:
-            raise InputError(
-                f"the mode n = {harmonic} of the start is no longer the lowest but number {found.index + 1}."
-            )
+            raise InputError(f"the mode n = {harmonic} of the start is no longer the lowest but number {found.index + 1}.")  # fmt: skip
         return found
 
 

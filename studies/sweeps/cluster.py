@@ -35,9 +35,7 @@ class Cluster(Workers):
             dask: Any = import_module("dask")
             distributed: Any = import_module("distributed")
         except ImportError:
-            raise MissingEnvironment(
-                "--scheduler needs Dask, which is not installed; install it with pip install 'hrg-workbench[cluster]'."
-            ) from None
+            raise MissingEnvironment("--scheduler needs Dask, which is not installed; install it with pip install 'hrg-workbench[cluster]'.") from None  # fmt: skip
         self.address = address
         self.lonely: float | None = None  # since when no worker is left
         # what is lost is said here, in a sentence, not by the libraries' tracebacks of connections that end
@@ -70,12 +68,8 @@ class Cluster(Workers):
                     f"{address}: encryption needs certificates: distributed.comm.tls.ca-file, .client.cert and .client.key in Dask's configuration."
                 ) from error
             if not greeted and is_open(address):
-                raise MissingEnvironment(
-                    f"{address}: this is no Dask scheduler: a server listens there but does not answer as one; correct --scheduler."
-                ) from error
-            raise MissingEnvironment(
-                f"{address}: no scheduler with a worker answers ({str(error) or 'no answer in time'}); start both, or correct --scheduler."
-            ) from error
+                raise MissingEnvironment(f"{address}: this is no Dask scheduler: a server listens there but does not answer as one; correct --scheduler.") from error  # fmt: skip
+            raise MissingEnvironment(f"{address}: no scheduler with a worker answers ({str(error) or 'no answer in time'}); start both, or correct --scheduler.") from error  # fmt: skip
         self._check_versions()
         self.executor = self.client.get_executor(pure=False, retries=0)
         self.count = sum(self.client.nthreads().values())
@@ -102,9 +96,7 @@ class Cluster(Workers):
                 f"{self.address}: the last worker has ended; waiting {PATIENCE:g} s for another.", stacklevel=2
             )
         elif now - self.lonely > PATIENCE:
-            raise MissingEnvironment(
-                f"{self.address}: no worker is left; everything computed before is kept. Start workers, then run the same command again to resume."
-            )
+            raise MissingEnvironment(f"{self.address}: no worker is left; everything computed before is kept. Start workers, then run the same command again to resume.")  # fmt: skip
 
     def close(self) -> None:
         """Take back what is queued and leave the cluster."""

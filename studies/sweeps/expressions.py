@@ -81,9 +81,7 @@ def _look_up(one: Derived, name: str, values: Mapping[str, Any], in_card: LookUp
             except InputError:
                 continue
         else:
-            raise InputError(
-                f"{one.name} = '{one.expression}': '{name}' is neither a parameter nor a key of the card{nearest(name, values)}"
-            )
+            raise InputError(f"{one.name} = '{one.expression}': '{name}' is neither a parameter nor a key of the card{nearest(name, values)}")  # fmt: skip
     if isinstance(found, str) or found is None:
         raise InputError(f"{one.name} = '{one.expression}': '{name}' has no usable number.")
     return float(found)

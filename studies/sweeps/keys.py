@@ -51,9 +51,7 @@ class Sampling(Keys, frozen=True, kw_only=True):
             raise ValueError("the key 'cases' is missing; add it.")
         if self.method in POWERS and self.cases & (self.cases - 1):
             power = 1 << self.cases.bit_length()
-            raise ValueError(
-                f"with method = '{self.method}' cases must be a power of two, such as {power // 2} or {power}, not {self.cases}."
-            )
+            raise ValueError(f"with method = '{self.method}' cases must be a power of two, such as {power // 2} or {power}, not {self.cases}.")  # fmt: skip
 
     @property
     def cases(self) -> int:

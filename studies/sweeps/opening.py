@@ -20,15 +20,11 @@ def open_store(folder: str | Path) -> Store:
     path = Path(folder) / FILE
     _refuse_former(folder)
     if not os.path.isfile(path):
-        raise InputError(
-            f"{folder}: there is no study in it (no {FILE}); give the folder that was named with 'hrg study run --out'."
-        )
+        raise InputError(f"{folder}: there is no study in it (no {FILE}); give the folder that was named with 'hrg study run --out'.")  # fmt: skip
     try:
         store = Store(path.open("rb", buffering=0), path)
     except OSError as error:
-        raise MissingEnvironment(
-            f"{path}: cannot be opened ({error.strerror}); check its rights and the disk."
-        ) from error
+        raise MissingEnvironment(f"{path}: cannot be opened ({error.strerror}); check its rights and the disk.") from error  # fmt: skip
     if store.file.damaged:
         store.close()
         raise say_damaged(path)
@@ -45,9 +41,7 @@ def claim_store(folder: str | Path) -> Store:
         path.parent.mkdir(exist_ok=True)
         lock = (path.parent / LOCK).open("a+")
     except OSError as error:
-        raise MissingEnvironment(
-            f"{folder}: cannot be written ({error.strerror}); choose another place with --out."
-        ) from error
+        raise MissingEnvironment(f"{folder}: cannot be written ({error.strerror}); choose another place with --out.") from error  # fmt: skip
     try:
         _lock(lock, folder)
         path.open("ab").close()

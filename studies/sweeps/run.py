@@ -130,9 +130,7 @@ def check_functions(study: Study, allowed: bool) -> dict[str, str]:
     if not study.functions:
         return {}
     if not allowed:
-        raise InputError(
-            f"the study runs Python code of its own ({', '.join(Path(f).name for f in study.functions)}); read it, and allow it with --allow-python."
-        )
+        raise InputError(f"the study runs Python code of its own ({', '.join(Path(f).name for f in study.functions)}); read it, and allow it with --allow-python.")  # fmt: skip
     return {Path(function).name: check_function(function) for function in study.functions}
 
 

@@ -152,9 +152,7 @@ class Store:
         if changes:
             shown = "; ".join(changes[:SHOWN_CHANGES])
             more = f"; and {len(changes) - SHOWN_CHANGES} more" if len(changes) > SHOWN_CHANGES else ""
-            raise InputError(
-                f"{self.path.parent}: holds results of a study that differs: {shown}{more}. Use another folder with --out, or undo the change."
-            )
+            raise InputError(f"{self.path.parent}: holds results of a study that differs: {shown}{more}. Use another folder with --out, or undo the change.")  # fmt: skip
 
     def _take(self, kind: str, at: int, content: bytes) -> None:
         """Take account of a block, read or written."""

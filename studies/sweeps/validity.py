@@ -70,8 +70,6 @@ def _corners(study: "Study") -> Iterator[Mapping[str, Any]]:
 def check_sample(study: "Study", where: str) -> None:
     """Raise when a study gives a search for tolerances no sample or nothing to keep."""
     if study.sampling.method not in SAMPLES:
-        raise InputError(
-            f"{where}: a search for tolerances needs designs that are drawn: method = 'latin-hypercube' or 'sobol', not '{study.sampling.method}'."
-        )
+        raise InputError(f"{where}: a search for tolerances needs designs that are drawn: method = 'latin-hypercube' or 'sobol', not '{study.sampling.method}'.")  # fmt: skip
     if not study.requirements:
         raise InputError(f"{where}: a search for tolerances needs a [[requirement]] that the designs must meet.")

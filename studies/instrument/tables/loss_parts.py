@@ -44,9 +44,7 @@ class FilmKeys(Keys, frozen=True, kw_only=True):
 
     def __post_init__(self) -> None:
         if not self.from_position < self.to_position:
-            raise ValueError(
-                f"from_position ({self.from_position:g}) is not before to_position ({self.to_position:g})."
-            )
+            raise ValueError(f"from_position ({self.from_position:g}) is not before to_position ({self.to_position:g}).")  # fmt: skip
 
 
 class ActivatedKeys(Keys, frozen=True, kw_only=True):

@@ -100,9 +100,7 @@ class Hemisphere(Stemmed, frozen=True, kw_only=True, tag="hemisphere"):
         super().__post_init__()
         if self.rim_angle_deg <= RADIANS:
             angle = math.degrees(self.rim_angle_deg)
-            raise ValueError(
-                f"rim_angle_deg = {self.rim_angle_deg:g} is too small for a dome; it looks like radians: {self.rim_angle_deg:g} rad are {angle:.4g}°."
-            )
+            raise ValueError(f"rim_angle_deg = {self.rim_angle_deg:g} is too small for a dome; it looks like radians: {self.rim_angle_deg:g} rad are {angle:.4g}°.")  # fmt: skip
 
     def build(self) -> "Resonator":
         """Return the resonator in SI units."""
@@ -203,9 +201,7 @@ def build_resonator(keys: Shape, place: CardPlace) -> "Resonator":
         hint = " Lengths are in mm, not in µm." if resonator.size > LARGEST else " Lengths are in mm, not in m."
         raise InputError(f"{place.where}: a resonator of {resonator.size / MM:g} mm cannot be built.{hint}")
     if (thinnest := min(h for _, h in resonator.thickness)) < THINNEST * resonator.size:
-        raise InputError(
-            f"{place.where}: thickness_mm = {thinnest / MM:g} is too thin for a resonator of {resonator.size / MM:g} mm. Lengths are in mm, not in m."
-        )
+        raise InputError(f"{place.where}: thickness_mm = {thinnest / MM:g} is too thin for a resonator of {resonator.size / MM:g} mm. Lengths are in mm, not in m.")  # fmt: skip
     return resonator
 
 
