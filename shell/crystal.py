@@ -61,9 +61,7 @@ class Crystal:
     @property
     def note(self) -> str:
         """What an isotropic solver makes of it."""
-        mean = (
-            f"a crystal, solved as the mean of all directions (Voigt-Reuss-Hill, E within ±{100 * self.spread:.2g} %)"
-        )
+        mean = f"a crystal, solved as the mean of all directions (Voigt-Reuss-Hill, E within ±{100 * self.spread:.2g} %)"  # fmt: skip
         if self.axis == "[001]":
             return f"{mean}. Along [001] its pair n = 2 splits: only hrg modes computes that, for shells without stem or clamp."
         return f"{mean}. Along its threefold axis the pair n = 2 does not split; the split of n = 3 is not modelled."

@@ -56,9 +56,7 @@ class Material:
     @property
     def caveats(self) -> tuple[str, ...]:
         """What every answer with this material must say: a modulus taken as constant, a crystal, values not checked."""
-        flat = (
-            f"No source states how {spell(self.constant)} of {self.name} changes with temperature: taken as constant."
-        )
+        flat = f"No source states how {spell(self.constant)} of {self.name} changes with temperature: taken as constant."  # fmt: skip
         known = not self.constant or "expansion" in self.constant  # else given in the card, which says so itself
         caveats = (() if known else (flat,)) + ((f"{self.name}: {self.crystal.note}",) if self.crystal else ())
         doubt = f"{self.name}: {spell(self.unchecked)} not checked against a source; the uncertainty is wide."

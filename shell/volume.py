@@ -28,9 +28,7 @@ Index = NDArray[np.intp]
 
 LEVEL = Level((3, 3, 3), 9, 8, 1)  # cells of degree 8 carry the shape of fillets; one ring around a sharp corner
 # places (ξ, η, θ) on the lattice 0, 1, 2 of a turned quadrilateral, in the order that VTK and Abaqus share
-HEXAHEDRON = (
-    "000 200 220 020 002 202 222 022 100 210 120 010 102 212 122 012 001 201 221 021 011 211 101 121 110 112 111"
-)
+HEXAHEDRON = "000 200 220 020 002 202 222 022 100 210 120 010 102 212 122 012 001 201 221 021 011 211 101 121 110 112 111"  # fmt: skip
 WEDGE = "000 202 200 020 222 220 102 201 100 122 221 120 010 212 210 112 211 110"  # its side ξ = 0 lies on the axis
 
 

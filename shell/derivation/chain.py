@@ -114,9 +114,7 @@ def _frequency(case: DerivedCase) -> list[Row]:
     closed = [("", "Integrals and Bryan factor in closed form", names, values)]
     greatest = frequency.maximum_kinetic_energy(), frequency.maximum_potential_energy()
     by_logarithm = "∂lnf/∂lnE ∂lnf/∂ν ∂lnf/∂lnρ ∂lnf/∂lnh ∂lnf/∂lnr ∂lnf/∂φ₂"
-    turning = (
-        "Two patterns on a shell rotating at Ω, per unit of φ and ρh: mass M, Coriolis coupling 2ΩB, Bryan factor K"
-    )
+    turning = "Two patterns on a shell rotating at Ω, per unit of φ and ρh: mass M, Coriolis coupling 2ΩB, Bryan factor K"  # fmt: skip
     return [
         (
             "12",

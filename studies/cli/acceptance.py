@@ -71,9 +71,7 @@ def acceptance(card: Card, *runs: Records, limits: str | None = None, output: st
     missing += [{**one, "words": one["test"], "limited": "no"} for one in elsewhere]
     missing.sort(key=lambda row: float(row["section"].split("–")[0].split(".")[1]))
     used = Column(lambda record: found.used[record.path], "test")
-    note = (
-        "A limit is judged only if the whole interval lies on one side of it. An upper limit applies to the magnitude."
-    )
+    note = "A limit is judged only if the whole interval lies on one side of it. An upper limit applies to the magnitude."  # fmt: skip
     if found.band is not None:
         note += f" Warm-up ends when the output stays within ±{found.band:.3g} °/h of its final value."
     parts: list[Chapter | Part] = [

@@ -159,9 +159,7 @@ WORDS = {
     "time within sessions": ("time within each session", "day", "time_s"),
 }
 TITLES = {"frequency_Hz": "Frequency", "inverse_q": "1/Q"}
-TERM = (
-    "words: depends on | shown ± shown_sd: value | shown_low … shown_high ± shown_sd: 90 % interval | shown_unit: unit"
-)
+TERM = "words: depends on | shown ± shown_sd: value | shown_low … shown_high ± shown_sd: 90 % interval | shown_unit: unit"  # fmt: skip
 
 
 def _law_row(name: str, law: Law) -> dict[str, Any]:

@@ -74,9 +74,7 @@ def fit_whole_angle(
     payload = {"data": run, "confidence": confidence, "saved": save}
     payload |= {"estimates": estimates, "undetermined": found.undetermined}
     rows = [{"quantity": NAMES[key][0], "unit": NAMES[key][1], "key": key} | e for key, e in estimates.items()]
-    columns = (
-        f"Quantity | value ± sd: Value | low … high ± sd: {100 * confidence:g} % interval | Unit | key: Key of the card"
-    )
+    columns = f"Quantity | value ± sd: Value | low … high ± sd: {100 * confidence:g} % interval | Unit | key: Key of the card"  # fmt: skip
     return Result(
         payload,
         "Errors of a whole-angle gyro",

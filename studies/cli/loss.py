@@ -22,9 +22,7 @@ WALL = (
     "The effect of a surface depends on its position: a damaged layer or a film dissipates in proportion to the strain energy, heat"
     " flow in a film to the square of the area strain, gas damping to the square of the normal motion. A film or a scratch does least harm where these curves are low."
 )
-SQUEEZE = (
-    "the share of elastic energy with volume change, relative to a bent beam; twist and pure shear produce no heat."
-)
+SQUEEZE = "the share of elastic energy with volume change, relative to a bent beam; twist and pure shear produce no heat."  # fmt: skip
 
 
 @answers("hrg.loss/1")

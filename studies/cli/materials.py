@@ -41,9 +41,7 @@ def materials(name: str = "", *, compare: bool = False, card: Card = "", harmoni
     laws = [law for key, laws in table.items() if name in ("", key) for law in laws.values()]
     entries = [_describe(law) for law in laws]
     rows = [row | {key: spell(row[key]) or "—" for key in ("lacks", "unchecked")} for row in entries]
-    columns = (
-        "name | law | range_degC.0 … range_degC.1: range (°C) g | lacks: not stated | unchecked: not checked | source"
-    )
+    columns = "name | law | range_degC.0 … range_degC.1: range (°C) g | lacks: not stated | unchecked: not checked | source"  # fmt: skip
     return Result(
         {"materials": entries},
         "Materials",
@@ -191,9 +189,7 @@ def _figures(resonator: "Resonator", material: "Material", T: float, harmonic: i
         alpha, k, c = (float(material.value(name, T)) for name in HEAT)
         sd = dict(zip(material.prior.names, material.prior.sd, strict=True)).get("expansion.value", 0.0)
         if abs(alpha) <= sd:
-            remarks.append(
-                f"{material.name}: its expansion is 0 within {1e9 * sd:.2g}e-9 1/K, so its thermoelastic Q is not known."
-            )
+            remarks.append(f"{material.name}: its expansion is 0 within {1e9 * sd:.2g}e-9 1/K, so its thermoelastic Q is not known.")  # fmt: skip
             return found
         heat = Heat(alpha, float(material.value("density", T)) * c, k)
         cause = thermoelastic_cause(vibration, lambda _: heat, (0.0, 0.0, 0.0), "")

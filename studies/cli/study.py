@@ -164,9 +164,7 @@ def _done(results: Results) -> str:
 def _say_unfinished(results: Results, folder: str) -> None:
     if results.done < results.total:
         if not is_running(folder) and results.store.runs and results.store.runs[-1]["outcome"] is None:
-            say(
-                f"warning: the end of the last run is missing in {results.store.path}: it was killed, or the file was truncated."
-            )
+            say(f"warning: the end of the last run is missing in {results.store.path}: it was killed, or the file was truncated.")  # fmt: skip
         counts = f"{results.done} of {results.total} cases are done"
         say(f"note: the study is not finished: {counts}. Run it again to resume.")
 

@@ -200,9 +200,7 @@ def measure_after(planned: CardPlan) -> list[str]:
             + (" Cuts side by side count as one groove." if planned.cuts[entry["position"]].touching > 1.01 else "")
         )
         if abs(value - 1) > 0.15 or error > 0.15:
-            found.append(
-                "Stress relief beside the groove is large; wider, shallower cuts (--width-mm) or teeth are surer."
-            )
+            found.append("Stress relief beside the groove is large; wider, shallower cuts (--width-mm) or teeth are surer.")  # fmt: skip
     for state in plan.after:
         spread_Hz = state.error * state.frequency
         expected = " ± ".join(to_error(1e3 * state.hertz, 1e3 * spread_Hz))

@@ -76,9 +76,7 @@ def loss_model(
     ripples: list[Ripple] = []
     with naming(f"{instrument.path} [loss]"):
         if heat is None:
-            left_out.append(
-                f"thermoelastic: no source states {lacking} of {material.name}; give it in [thermal] or a material file."
-            )
+            left_out.append(f"thermoelastic: no source states {lacking} of {material.name}; give it in [thermal] or a material file.")  # fmt: skip
         else:
             causes.append(_thermoelastic(instrument, vibration, heat))
         causes += _of_material(instrument, parts, spread, left_out)

@@ -37,9 +37,7 @@ PATH_NOTE = (
 )
 NO_TERMS = "These data support no term: a constant describes the bias just as well. Compensation brings no improvement; the saved model only removes the mean."
 STEP_COLUMNS = "Step | action: Term | F: F .2f | p | bic: BIC .2f | score: Held out .3f | Model"
-COEFFICIENTS = (
-    "number: No. | Term | value ± error: Value | naive: Error if rows were independent .2 | Unit | printed: In eq. (22)"
-)
+COEFFICIENTS = "number: No. | Term | value ± error: Value | naive: Error if rows were independent .2 | Unit | printed: In eq. (22)"  # fmt: skip
 
 
 def facts(study: BiasStudy, method: Method) -> Facts:
@@ -91,9 +89,7 @@ def doubts(study: BiasStudy) -> list[Sentence]:
         )
     if study.opposite is not None:
         which = "One of the two runs" if len(study.runs) == 2 else study.opposite
-        found.append(
-            f"{which} has a bias of the opposite sign: with its sign changed, the terms fit all runs at least twice as well. Check the sign of the output in the files."
-        )
+        found.append(f"{which} has a bias of the opposite sign: with its sign changed, the terms fit all runs at least twice as well. Check the sign of the output in the files.")  # fmt: skip
     return [Sentence(text, "warning") for text in found]
 
 

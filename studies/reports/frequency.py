@@ -62,9 +62,7 @@ def order_table(study: FrequencyStudy) -> Table:
         "0.degrees_of_freedom: Degrees of freedom | 0.sum_of_squares: Sum of squares (Hz²) .3e | 0.chi_squared: χ² .3g"
         " | 0.leave_one_out_rms: Leave-one-out error (Hz) .4f | 1.statistic: F .3g | 1.p_value: p .2g",
     ]
-    note = (
-        "χ² assumes that rounding to the last digit is the only noise. F and p test each order against the one below."
-    )
+    note = "χ² assumes that rounding to the last digit is the only noise. F and p test each order against the one below."  # fmt: skip
     return Table("Polynomials of rising order", rows, columns, note)
 
 

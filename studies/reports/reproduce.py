@@ -56,9 +56,7 @@ SOURCES = (
 )
 
 
-TABLE1 = (
-    "temperature: T (°C) g | frequency: Measured (Hz) .2f | cubic: Cubic (Hz) .3f | residual: Residual (mHz) ×1e3 +.1f"
-)
+TABLE1 = "temperature: T (°C) g | frequency: Measured (Hz) .2f | cubic: Cubic (Hz) .3f | residual: Residual (mHz) ×1e3 +.1f"  # fmt: skip
 TABLE2 = (
     "frequency: f (Hz) .2f | actual: Actual (°C) g | printed: Paper (°C) g | calculated: Here (°C) .4f",
     Column(lambda row: row["calculated"] - row["printed"], "Here − paper", "K", "+.4f"),

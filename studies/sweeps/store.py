@@ -238,9 +238,7 @@ def memory_store() -> Store:
 
 def say_damaged(path: Path) -> InputError:
     """Return the error that names a damaged store and says how to mend it."""
-    return InputError(
-        f"{path}: the store is damaged. Run 'hrg study run' with the same spec and folder again: the damaged cases are computed again, the rest is kept."
-    )
+    return InputError(f"{path}: the store is damaged. Run 'hrg study run' with the same spec and folder again: the damaged cases are computed again, the rest is kept.")  # fmt: skip
 
 
 def _name(identity: Mapping[str, Any]) -> str:

@@ -99,9 +99,7 @@ def cores() -> int:
 
 def say_gone(error: BaseException) -> MissingEnvironment:
     """Return the error that tells that all workers are gone."""
-    return MissingEnvironment(
-        f"the workers are gone ({str(error) or 'connection lost'}); everything computed before is kept. Run the same command again to resume."
-    )
+    return MissingEnvironment(f"the workers are gone ({str(error) or 'connection lost'}); everything computed before is kept. Run the same command again to resume.")  # fmt: skip
 
 
 def become_worker(parent: int) -> None:
