@@ -14,10 +14,8 @@ def steps() -> list[Row]:
     position, velocity = (sp.ImmutableMatrix(sp.symbols(names, real=True)) for names in ("x y", "x' y'"))
     motion = oscillator.small_forces(position, velocity, sp.ImmutableMatrix([sp.Symbol("f_x"), sp.Symbol("f_y")]))
     orbit = "Orbit (X, Y) = R(ψ)(a, −iq) exp(iφ): amplitude, quadrature, precession, phase (Lynch's form)"
-    less, noisy = (
-        demodulated.neglected(),
-        "Optimal filter in series, for white noise of γ² times the signal's power, normalised",
-    )
+    less = demodulated.neglected()
+    noisy = "Optimal filter in series, for white noise of γ² times the signal's power, normalised"
     false = "Rate error from a varying cross-damping ζ_12, equal modes (paper on cross-damping, (9) from (8))"
     white, rising = (filters.derive_wiener_filter(noise).renormalised for noise in ("white", "high-pass"))
     oscillating = "Two patterns of a rotating shell as a planar oscillator, constant rate"

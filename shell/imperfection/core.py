@@ -58,10 +58,8 @@ class Core:
         if key not in self._products:
             (e, d), (f, g), table = self._section(one), self._section(other), self._table(one)
             volume = table.volume[:, :, None]
-            stress, momentum = (
-                self.constants.stress(table, f) * volume,
-                self.constants.rho[..., None, None] * volume * g,
-            )
+            stress = self.constants.stress(table, f) * volume
+            momentum = self.constants.rho[..., None, None] * volume * g
             pairs = [(e, stress, some) for some in (COSINE, SINE)] + [(d, momentum, some) for some in (ALONG, AROUND)]
             self._products[key] = tuple(_flat(a[..., some, :]) @ _flat(b[..., some, :]).T for a, b, some in pairs)
         return self._products[key]

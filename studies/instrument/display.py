@@ -78,8 +78,4 @@ def display_name(key: str) -> str:
 def name_constant(name: str) -> str:
     """Return what people call a constant of the heat path: "conductance housing-base" is "conductance housing to base"."""
     kind, _, where = name.partition(" ")
-    return (
-        f"{NODES.get(kind, kind)} {' to '.join(where.split('-'))}"
-        if "-" in where
-        else f"{NODES.get(kind, kind)} of the {where}"
-    )
+    return f"{NODES.get(kind, kind)} {where.replace('-', ' to ') if '-' in where else f'of the {where}'}"

@@ -110,11 +110,8 @@ def _thermoelastic(instrument: "Instrument", vibration: "Vibration", heat: "Call
     prior = dict(zip(material.prior.names, material.prior.sd, strict=True))
     thermal = {one.name: one.sd / one.value for one in instrument.uncertain if one.name.startswith("thermal.")}
     expansion = float(prior.get("expansion.value", 0.0)) / abs(float(material.value("expansion", T0)) or 1.0)
-    relative = (
-        expansion,
-        thermal.get("thermal.heat_capacity_J_per_kg_K", 0.0),
-        thermal.get("thermal.conductivity_W_per_m_K", 0.0),
-    )
+    capacity = thermal.get("thermal.heat_capacity_J_per_kg_K", 0.0)
+    relative = expansion, capacity, thermal.get("thermal.conductivity_W_per_m_K", 0.0)
     return thermoelastic_cause(
         vibration, heat, relative, f"heat conduction through the wall; {material.name}, law {material.law}"
     )

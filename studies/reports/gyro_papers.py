@@ -18,11 +18,8 @@ MAP_POINTS = 31
 
 def reproduce_gyro_papers(seeds: int = 20) -> tuple[list[Chapter], dict[str, Any]]:
     """Run the virtual gyros of the three papers, so many for cross-damping; return chapters and the numbers for summary.json."""
-    damping, study, chain = (
-        cvg_cross_damping.reproduce_cross_damping(seeds),
-        cvg_filters.study_filters(),
-        bvg.reproduce_bell(),
-    )
+    damping = cvg_cross_damping.reproduce_cross_damping(seeds)
+    study, chain = cvg_filters.study_filters(), bvg.reproduce_bell()
     claims, theory, reading = study_claims(), compare_bell_theory(), read_planted_rate()
     chapters = [
         *cvg_cross_damping.twin_chapters(damping),

@@ -139,10 +139,7 @@ def _make_case(plan: WorkPlan, parameters: Mapping[str, Any]) -> Case:
 
     def on_the_way(place: float) -> Instrument:
         assert start is not None
-        between = {
-            name: value if isinstance(value, str) else start[name] + place * (value - start[name])
-            for name, value in parameters.items()
-        }
+        between = {k: v if isinstance(v, str) else start[k] + place * (v - start[k]) for k, v in parameters.items()}
         return set_parameters(plan.instrument, between, plan.derived)
 
     instrument = set_parameters(plan.instrument, parameters, plan.derived)
