@@ -11,6 +11,8 @@ from compensation.errors import CompensationError
 from compensation.samples import check_time
 from compensation.spikes import NEIGHBOURS, find_spikes
 
+GAP = 3.0  # usual distances of rows, across which the bend of a curve is not known
+
 
 @dataclass(frozen=True)
 class Blocks:
@@ -32,6 +34,16 @@ def average_groups(values: Array, group: NDArray[np.intp], count: int = 0) -> Ar
     members = np.bincount(group, minlength=count)
     total = np.bincount(group, values - middle, len(members))
     return np.asarray(middle + np.divide(total, members, out=np.full(len(members), np.nan), where=members > 0))
+
+
+def curvature(time: Array, column: Array) -> Array:
+    """Return the second derivative of columns (N,) or (N, p) over uneven times, by three points; none across a gap."""
+    step = np.diff(time)
+    usual = (step < GAP * np.median(step)).astype(float)
+    behind = (slice(None), *[None] * (column.ndim - 1))
+    slope = np.diff(column, axis=0) / step[behind]
+    inner = 2.0 * np.diff(slope, axis=0) / (step[1:] + step[:-1])[behind] * (usual[1:] * usual[:-1])[behind]
+    return np.concatenate([inner[:1], inner, inner[-1:]])
 
 
 def average_blocks(time: ArrayLike, columns: Mapping[str, ArrayLike], width: float) -> Blocks:

@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from compensation.decimation import average_groups
+from compensation.decimation import average_groups, curvature
 from compensation.noise import white_rms
 from compensation.spikes import find_spikes
 from shell.constants import zero_Celsius
@@ -38,7 +38,6 @@ PERIOD = 90.0  # ° of azimuth, of what a turning wave of n = 2 meets
 ROWS_PER_PERIOD, BLOCKS_PER_PERIOD = 120, 6  # of that; the mean over a row is then within 1e-4 of its middle
 TURNED_MOST = 10  # times as many rows, and three times as many blocks, for waves that turn often
 LEAST_ROWS = 10
-GAP = 3.0  # usual distances of predicted rows, across which a curve's bend is not known
 MOST_KINKS = 24  # of a run
 LEAST_KINK = 1e-3  # K
 THERMOMETER = 0.3  # K, error of a settled temperature that nothing else tells
@@ -66,7 +65,7 @@ class BlockMeans:
         """Means of a predicted column over the same values, along the first axis: of a curve y behind a row, y + σ² y''/2."""
         if self.width.any():
             behind = (slice(None), *[None] * (column.ndim - 1))
-            column = column + 0.5 * self.width[behind] ** 2 * _curvature(self.predicted, column)
+            column = column + 0.5 * self.width[behind] ** 2 * curvature(self.predicted, column)
         total = np.add.reduceat(column[self.rows], self.edges, axis=0)
         return np.asarray(total / self.counts.reshape(-1, *[1] * (total.ndim - 1)))
 
@@ -237,16 +236,6 @@ def _fine_rows(record: Record, named: Sequence[str], most: int) -> tuple[Array, 
     middle = average_groups(time, group)
     variance = average_groups((time - middle[group]) ** 2, group)
     return middle[present], np.sqrt(variance[present]), columns
-
-
-def _curvature(time: Array, column: Array) -> Array:
-    """Second derivative of columns (N,) or (N, p) over uneven times, by three points; none across a gap."""
-    step = np.diff(time)
-    usual = (step < GAP * np.median(step)).astype(float)
-    behind = (slice(None), *[None] * (column.ndim - 1))
-    slope = np.diff(column, axis=0) / step[behind]
-    inner = 2.0 * np.diff(slope, axis=0) / (step[1:] + step[:-1])[behind] * (usual[1:] * usual[:-1])[behind]
-    return np.concatenate([inner[:1], inner, inner[-1:]])
 
 
 def _block(time: Array, grouped: Array, column: Array, most: int) -> BlockMeans | None:

@@ -7,6 +7,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from compensation.decimation import curvature
 from shell.constants import zero_Celsius
 from studies.errors import InputError
 from studies.record import Record
@@ -169,7 +170,9 @@ def drive_by_record(record: Record, boundary: Boundary | None = None, time: Arra
     t, T = rows[known], values[known] + zero_Celsius
     if boundary == "chamber":
         t, T = _with_jumps(t, T, _settled_at(record))
-    t, T = _thinned(t, T)
+    t, T, width = _thinned(t, T)
+    if boundary == "housing" and width.any():  # of a smooth curve, what it is in their middle
+        T = T - 0.5 * width**2 * curvature(t, T)
     if t[0] > rows[0]:
         t, T = np.insert(t, 0, rows[0]), np.insert(T, 0, T[0])
     if t[-1] < rows[-1]:
@@ -208,21 +211,21 @@ def _with_jumps(t: Array, T: Array, settled: float | None) -> tuple[Array, Array
     return t, T
 
 
-def _thinned(t: Array, T: Array) -> tuple[Array, Array]:
-    """Means of rows that are too many, the first and the last kept; jumps stay where they are."""
+def _thinned(t: Array, T: Array) -> tuple[Array, Array, Array]:
+    """Means of rows that are too many, and how wide these are (s), the first and the last kept; jumps stay where they are."""
     if len(t) <= MOST_BOUNDARY_ROWS:
-        return t, T
+        return t, T, np.zeros(len(t))
     size = int(np.ceil(len(t) / MOST_BOUNDARY_ROWS))
     jumps = np.flatnonzero(np.diff(t) == 0) + 1
     edges = np.unique(np.concatenate([np.arange(0, len(t), size), jumps]))
     counts = np.diff(np.append(edges, len(t)))
     means = np.add.reduceat(np.array([t, T]), edges, axis=1) / counts
+    width = np.sqrt(np.add.reduceat((t - np.repeat(means[0], counts)) ** 2, edges) / counts)
     sides = np.sort(np.concatenate([[0], jumps - 1, jumps, [len(t) - 1]])).astype(np.intp)
-    both = np.array([np.concatenate([means[0], t[sides]]), np.concatenate([means[1], T[sides]])])
-    order = np.lexsort((np.concatenate([edges, sides]), both[0]))
-    found = both[:, order]
-    fresh = np.concatenate([[True], (np.diff(found[0]) > 0) | (np.diff(found[1]) != 0)])
-    return found[0, fresh], found[1, fresh]
+    both = np.hstack([[*means, width], [t[sides], T[sides], np.zeros(len(sides))]])
+    both = both[:, np.lexsort((np.concatenate([edges, sides]), both[0]))]
+    t, T, width = both[:, np.concatenate([[True], np.diff(both[:2], axis=1).any(axis=0)])]
+    return t, T, width
 
 
 WIDE = 3.5  # usual distances of rows, from which a hole is more than a missing row

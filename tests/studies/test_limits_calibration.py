@@ -234,10 +234,11 @@ def test_a_measured_housing_drives_the_frequency_as_its_chamber_did(tau):
     assert error.max() < 0.05 * missed_by_lines * per_area
 
 
-def test_means_of_a_long_record_are_predicted_as_means():
+@pytest.mark.parametrize("rate", [0.1, 2.0])
+def test_means_of_a_long_record_are_predicted_as_means(rate):
     """The mean over a row of width w of a curve is w²/24 of its bend beside its middle: of a ramp that begins, 0.7 mK of a housing here."""
     card = load_card("hrg-30mm").with_values(dict.fromkeys(OF_RECORD, 0.0))
-    record = simulate_run(card, load_profile("cycle 20 -5 40 0.6 4h 1"), 0.1).record
+    record = simulate_run(card, load_profile("cycle 20 -5 40 0.6 4h 1"), rate).record
     (run,) = observe([record])
     assert len(record) > 1.5 * len(run.inner.time)  # it is averaged
     law = law_of(card, 240.0, 340.0)
