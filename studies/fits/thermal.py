@@ -16,7 +16,7 @@ from studies.calibration.fit import fit
 from studies.calibration.priors import from_standard
 from studies.errors import InputError
 from studies.inference.diagnosis import build_problem
-from studies.inference.heat_path import LAGS, OF_LUMPS, SHARE, HeatPath, find_heat_path, slow_share
+from studies.inference.heat_path import LAGS, OF_LUMPS, SENSOR, SHARE, HeatPath, find_heat_path, slow_share
 from studies.inference.polynomial_card import polynomial_card
 from studies.inference.records import driving, make_ready
 from studies.instrument.card import Instrument
@@ -24,7 +24,7 @@ from studies.record import Record
 from studies.resonator.law import law_of
 
 NAMES = {f"law.{key}": f"time_constant_{k}" for k, key in enumerate(LAGS, 1)} | {
-    SHARE: "radiated_share", **{f"law.{key}": key for key in OF_LUMPS}, "law.f0_Hz": "offset", "law.a1_per_K": "slope", "law.a2_per_K2": "curvature"
+    SHARE: "radiated_share", **{f"law.{key}": key for key in OF_LUMPS}, SENSOR: "sensor_time_constant", "law.f0_Hz": "offset", "law.a1_per_K": "slope", "law.a2_per_K2": "curvature"
 }  # fmt: skip
 
 RESTS = 1.0

@@ -13,7 +13,7 @@ from studies.diagnosis.verdict import NINETY, Cause, Interval, same_cause, weigh
 from studies.effects import library
 from studies.effects.effect import UNITS
 from studies.inference.generic_forms import offsets
-from studies.inference.heat_path import DIRECT, LAGS, SHARE
+from studies.inference.heat_path import DIRECT, LAGS, SENSOR, SHARE
 from studies.inference.inferred import Inferred
 from studies.inference.model import Background, Term
 from studies.inference.records import REFERENCE, settle
@@ -171,7 +171,7 @@ def delay_of(found: Inferred) -> tuple[float, float, float]:
 
 
 def _path_causes(found: Inferred) -> list[Cause]:
-    """Return a second lag, and radiation, of a heat path that stands in place of one lag."""
+    """Return a second lag, radiation, and a sensor that is late, of a heat path that stands in place of one lag."""
     if found.path is None:
         return []
     name, path = found.search.linear.responses[0], found.path
@@ -189,6 +189,10 @@ def _path_causes(found: Inferred) -> list[Cause]:
         numbers = {key.removeprefix("law."): Interval.about(*path.value(key)) for key in told}
         radiation = names[SHARE.removeprefix("law.")]
         causes.append(Cause(radiation, name, probability, (), numbers, own, peak=peak, together=True))
+    if path.is_late:
+        late, sd = path.value(SENSOR)
+        numbers, own = {"sensor_time_constant_s": Interval.about(late, sd)}, min((late / sd) ** 2, evidence)
+        causes.append(Cause("thermometer-lag", name, probability, (), numbers, own, peak=peak, together=True))
     return causes
 
 

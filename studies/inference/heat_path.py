@@ -16,15 +16,17 @@ Array = NDArray[np.float64]
 FREQUENCY = "frequency_Hz"
 LAGS = ("lag_s", "second_lag_s", "third_lag_s")
 SHARE, DIRECT = "law.radiated_share", "law.direct_share"
-PLAIN, FULL = False, True
+PLAIN, FULL, LATE = range(3)
 PATHS = (
     ((1.0,), PLAIN),
     ((0.7, 0.3), PLAIN),
     ((0.7, 0.3), FULL),
     ((0.3, 0.7), FULL),
     ((0.65, 0.05, 0.3), FULL),
+    ((0.7, 0.3), LATE),
+    ((0.3, 0.7), LATE),
 )
-"""Lags in series over the one lag that stood for them, where their priors are centred, and whether they have what `OF_LUMPS` says."""
+"""Lags in series over the one lag that stood for them, where their priors are centred, whether they have what `OF_LUMPS` says, and a housing whose sensor is late."""
 LAG_WIDTH = 0.7
 """Standard deviation of the logarithm of each."""
 RADIATED = {"value": 0.3, "sd": 0.3}
@@ -36,12 +38,14 @@ OF_LUMPS = {
     "capacity_slope_per_K": {"value": 1e-3, "sd": 1e-3},
 }
 """The same of what lumps have besides, where plain lags in series leave slow noise."""
+SENSOR, LATENESS = "noise.housing_lag_s", {"value": 5.0, "sd": 20.0}
+"""The sensor of the housing, and what is known of its lag (s) where it may be late."""
 WORTH = 10.0
 """Log evidence that one more lag must bring."""
 FOLLOWED = 3.0
 """Slow noise within a run over that of a row, up to which no more is asked of a path."""
 SURE_SHARE = 3.0
-"""Standard deviations from which on a radiated share is named."""
+"""Standard deviations from which on a radiated share, or a late sensor, is named."""
 
 
 @dataclass(frozen=True)
@@ -71,6 +75,12 @@ class HeatPath:
         share, sd = self.value(SHARE)
         return share > SURE_SHARE * sd
 
+    @property
+    def is_late(self) -> bool:
+        """Whether the sensor of the housing is slow beyond its error."""
+        late, sd = self.value(SENSOR) if SENSOR in self.fit.problem.priors.names else (0.0, 1.0)
+        return late > SURE_SHARE * sd
+
     def value(self, name: str) -> tuple[float, float]:
         """Return a value of the card and its standard deviation."""
         priors, count = self.fit.problem.priors, len(self.fit.problem.priors.values)
@@ -80,14 +90,16 @@ class HeatPath:
         return priors.at(self.fit.point[:count])[name], sd
 
 
-def with_lags(card: Instrument, lags: Sequence[float], full: bool = PLAIN) -> Instrument:
-    """Return a polynomial card with such lags (s) in series, and radiation; a `full` one with all that lumps have, and a cubic law."""
+def with_lags(card: Instrument, lags: Sequence[float], kind: int = PLAIN) -> Instrument:
+    """Return a polynomial card with such lags (s) in series, and radiation; a full one with all that lumps have, and a cubic law."""
     law = dict(card.content["law"])
     law |= {key: {"value": lag, "sd": LAG_WIDTH * lag} for key, lag in zip(LAGS, lags, strict=False)}
-    law |= {"radiated_share": dict(RADIATED)} | (OF_LUMPS if full else {})
+    law |= {"radiated_share": dict(RADIATED)} | (OF_LUMPS if kind >= FULL else {})
     slope, bend = (law.get(key, {}).get("sd", 0.0) for key in ("a1_per_K", "a2_per_K2"))
-    if full and slope and bend:
+    if kind >= FULL and slope and bend:
         law["a3_per_K3"] = {"value": 0.0, "sd": bend**2 / slope}
+    if kind == LATE:
+        card = card.with_table("noise", card.content["noise"] | {"housing_lag_s": dict(LATENESS)})
     return card.with_table("law", law)
 
 
@@ -99,12 +111,14 @@ def find_heat_path(
     lean = replace(whole, runs=tuple(run.explaining((FREQUENCY,)) for run in whole.runs))
     lag = whole.priors.at(baseline.point[: len(whole.priors.values)])["law.lag_s"]
     best: HeatPath | None = None
-    for parts, full in PATHS:
+    for parts, kind in PATHS:
         number = len(parts)
         if lags not in (None, number) or (best is not None and slow_share(best.fit) < FOLLOWED):
             continue
-        progress(f"a heat path with {number} {'lag' if number == 1 else 'lags in series'} and radiation")
-        path = _calibrated(lean, with_lags(whole.instrument, [part * lag for part in parts], full))
+        progress(
+            f"a heat path with {number} {'lag' if number == 1 else 'lags in series'} and radiation{', its sensor late' * (kind == LATE)}"
+        )
+        path = _calibrated(lean, with_lags(whole.instrument, [part * lag for part in parts], kind))
         if best is None or path.evidence > best.evidence + WORTH * (path.lags - best.lags):
             best = path
     assert best is not None

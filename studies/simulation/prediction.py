@@ -115,10 +115,11 @@ def _impose(instrument: "Instrument", drive: Drive) -> tuple[Profile, Profile]:
     read = drive.imposed
     if drive.boundary == "chamber" or read.jumps.size:
         return read, read
-    if instrument.polynomial is not None:  # it follows what was read, linear between its rows
-        return read, drive.kinked(read)
     lag = instrument.noise.housing_lag_s * slope_of_reading(read)
-    return Profile(read.time, read.value + lag), drive.kinked(Profile(read.time, of_equal_area(read).value + lag))
+    lines = (
+        read if instrument.polynomial is not None else of_equal_area(read)
+    )  # a polynomial card follows what was read
+    return Profile(read.time, read.value + lag), drive.kinked(Profile(read.time, lines.value + lag))
 
 
 def of_equal_area(curve: Profile) -> Profile:
