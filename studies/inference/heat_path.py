@@ -22,9 +22,9 @@ PATHS = (
     ((0.7, 0.3), PLAIN),
     ((0.7, 0.3), FULL),
     ((0.3, 0.7), FULL),
-    ((0.65, 0.05, 0.3), FULL),
     ((0.7, 0.3), LATE),
     ((0.3, 0.7), LATE),
+    ((0.65, 0.05, 0.3), FULL),
 )
 """Lags in series over the one lag that stood for them, where their priors are centred, whether they have what `OF_LUMPS` says, and a housing whose sensor is late."""
 LAG_WIDTH = 0.7
