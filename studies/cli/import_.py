@@ -81,7 +81,7 @@ def _import(raw: tuple[str, ...], path: str, out: str) -> Result:
     import_map = load_map(path)
     if import_map.is_table:
         return _import_table(raw, import_map, out)
-    records = import_records(raw, import_map)
+    records = import_records(raw, import_map, str(Path(out).parent))
     files = {axis: str(Path(out).with_stem(f"{Path(out).stem}_{axis}")) if axis else out for axis in records}
     for axis, record in records.items():
         write_record(record, files[axis])
@@ -102,12 +102,13 @@ def _import_table(raw: tuple[str, ...], import_map: LoadedMap, out: str) -> Resu
 
 def _show(records: Mapping[str, Columns], notes: Sequence[str], start: str | None, more: dict[str, Any]) -> Result:
     out, columns = next(iter(records.items()))
-    missing = {name: {"missing": int(np.isnan(v).sum())} for name, v in columns.items()}
     payload: dict[str, Any] = {"start": start, "record": out, "rows": len(next(iter(columns.values())))}
-    payload |= {"columns": missing, "notes": notes, **more}
     chapters = []
     for name, found in records.items():
-        ranges = [find_range(key, values, found.get("time_s")).as_row() for key, values in found.items()]
+        looked = [find_range(key, values, found.get("time_s")) for key, values in found.items()]
+        missing = {"columns": {one.name: {"missing": one.missing} for one in looked}}
+        payload = {**payload, **({} if "columns" in payload else missing)}
+        ranges = [one.as_row() for one in looked]
         rows = rows_of({key: values[:FIRST_ROWS] for key, values in found.items()})
         caption = "All columns." + (" Shaded: no values." if "time_s" in found else "")
         chapters.append(Chapter(name, [
@@ -115,6 +116,7 @@ def _show(records: Mapping[str, Columns], notes: Sequence[str], start: str | Non
             Table(f"{name}: {len(next(iter(found.values()))):,} rows", ranges, COLUMNS),
             Table("First rows", rows, [Column(key, key, form=".10g") for key in found], where="page"),
         ]))  # fmt: skip
+    payload |= {"notes": notes, **more}
     chapters.append(Chapter("Changes", [Sentence("\n".join(notes), "source")]))
     lead = "The data as converted. Compare them with what you know about the run before you use them."
     return Result(payload, "Import", lead, chapters)

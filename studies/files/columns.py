@@ -6,14 +6,14 @@ import hashlib
 import io
 import re
 from collections import Counter
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, TypeAlias
 
 from studies.errors import InputError, nearest
 from studies.files.parquet import is_parquet, read_comments_and_names, read_table
-from studies.files.reading import PORTION, opened, read_bytes
+from studies.files.reading import MOST_BYTES, PORTION, opened, read_bytes
 from studies.progress import tell
 
 if TYPE_CHECKING:
@@ -171,45 +171,58 @@ def _check_names(
     return names
 
 
-def parse_fast(
-    path: str | Path, start: int, names: Sequence[str], separator: str = ",", decimal: str = "."
-) -> "tuple[Table, str] | None":
+def parse_fast(path: str | Path, start: int, names: Sequence[str]) -> "tuple[Table, str] | None":
     """Parse a clean table quickly, never all of its text in memory; None when the careful way must decide."""
     import numpy as np
 
-    with opened(path) as file:
+    table, done, sha256 = np.empty((len(names), 0)), 0, ""
+    try:
+        for rows, sha256, part in parse_portions(path, start, names):  # noqa: B007
+            table = table if done else np.empty((len(names), rows))
+            table[:, done : done + part.shape[1]] = part
+            done += part.shape[1]
+    except ValueError:
+        return None
+    return dict(zip(names, table, strict=True)), sha256
+
+
+def parse_portions(
+    path: str | Path, start: int, names: Sequence[str], separator: str = ",", decimal: str = ".", most: int = MOST_BYTES
+) -> "Iterator[tuple[int, str, NDArray[np.float64]]]":
+    """Yield the number of all rows, the hash and the next rows (columns, rows) of a clean table; ValueError when the careful way must decide."""
+    import numpy as np
+
+    with opened(path, most) as file:
         if (found := _scan(file, start, len(names), separator, decimal)) is None:
-            return None
+            raise ValueError("not plain numbers")
         rows, body, sha256 = found
         file.seek(body)
-        table, done = np.empty((len(names), rows)), 0
-        try:
-            if table.size <= FEW and (separator, decimal) == (",", "."):
-                cells = b",".join(file.read().split()).split(b",")
-                table[:] = np.reshape([float(cell or b"nan") for cell in cells], (rows, -1)).T
-                return dict(zip(names, table, strict=True)), sha256
-            import pandas as pd
+        if rows * len(names) <= FEW and (separator, decimal) == (",", "."):
+            cells = b",".join(file.read().split()).split(b",")
+            yield rows, sha256, np.reshape([float(cell or b"nan") for cell in cells], (rows, -1)).T
+            return
+        import pandas as pd
 
-            with pd.read_csv(
-                file,
-                sep=separator,
-                decimal=decimal,
-                names=list(names),
-                header=None,
-                dtype="float64",
-                keep_default_na=False,
-                na_values=[""],
-                skip_blank_lines=False,
-                index_col=False,
-                chunksize=ROWS_AT_ONCE,
-            ) as parts:
-                for part in parts:
-                    table[:, done : done + len(part)] = part.to_numpy().T
-                    done += len(part)
-                    tell(f"reading {path}", done / rows)
-        except ValueError:
-            return None
-    return (dict(zip(names, table, strict=True)), sha256) if done == rows else None
+        done = 0
+        with pd.read_csv(
+            file,
+            sep=separator,
+            decimal=decimal,
+            names=list(names),
+            header=None,
+            dtype="float64",
+            keep_default_na=False,
+            na_values=[""],
+            skip_blank_lines=False,
+            index_col=False,
+            chunksize=ROWS_AT_ONCE,
+        ) as parts:
+            for part in parts:
+                done += len(part)
+                tell(f"reading {path}", done / rows)
+                yield rows, sha256, part.to_numpy().T
+        if done != rows:
+            raise ValueError("uneven rows")
 
 
 def _scan(file: IO[bytes], start: int, columns: int, separator: str, decimal: str) -> tuple[int, int, str] | None:

@@ -8,6 +8,7 @@ from typing import IO, TYPE_CHECKING, Any
 
 from studies.errors import InputError
 from studies.files.reading import PORTION, load_library, opened
+from studies.progress import tell
 
 if TYPE_CHECKING:
     import numpy as np
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
     Table = Mapping[str, NDArray[np.float64]]
 
 COMMENTS = b"hrg.comments"
+ROWS = 1 << 20  # of a row group
 
 
 def is_parquet(path: str | Path) -> bool:
@@ -58,9 +60,15 @@ def read_table(path: str | Path) -> "tuple[dict[str, NDArray[np.float64]], str]"
 def write_table(file: IO[bytes], columns: "Table", comments: Sequence[str], path: str | Path) -> None:
     """Write columns of numbers and comment lines."""
     arrow, parquet = load_library("pyarrow", path, "Parquet"), load_library("pyarrow.parquet", path, "Parquet")
-    table = arrow.table(dict(columns)).replace_schema_metadata({COMMENTS: json.dumps(list(comments)).encode()})
+    fields = [(name, arrow.float64()) for name in columns]
+    schema = arrow.schema(fields, {COMMENTS: json.dumps(list(comments)).encode()})
     # readings repeat too seldom for a dictionary; other encodings are smaller, but not every program reads them
-    parquet.write_table(table, file, compression="zstd", use_dictionary=False)
+    with parquet.ParquetWriter(file, schema, compression="zstd", use_dictionary=False) as writer:
+        rows = len(next(iter(columns.values())))
+        for begin in range(0, rows, ROWS):
+            part = [arrow.array(values[begin : begin + ROWS]) for values in columns.values()]
+            writer.write_table(arrow.table(part, schema))
+            tell(f"writing {path}", min(begin + ROWS, rows) / rows)
 
 
 def _open(path: str | Path) -> Any:

@@ -12,6 +12,7 @@ from studies.errors import InputError, MissingEnvironment, nearest
 
 MOST_BYTES = 2 * 1024**3  # a record at 200 Hz over a month is smaller; a table of numbers takes about as much in memory
 
+ANY_SIZE = 1 << 62  # bytes of a file that is never held as a whole
 PORTION = 1 << 23  # bytes that are looked through at once
 
 

@@ -7,22 +7,23 @@ The extra `formats` reads them. Nothing in a file is executed: pickled objects a
 import contextlib
 import datetime
 import gc
-import hashlib
 import sys
 import traceback
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Generator, Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from studies.errors import InputError, MissingEnvironment, nearest
-from studies.files.reading import PORTION, opened
+from studies.files.reading import ANY_SIZE, opened
+from studies.files.stored import portions
 from studies.importing.formats import KINDS, READERS, Channel, Clock
 from studies.importing.mapping import FileMap
-from studies.importing.raw import TextTable, name_columns, read_plain, read_raw, shorten
-from studies.importing.tables import ParsedTable, Part, RawTable
+from studies.importing.raw import digest, name_columns, read_text, shorten
+from studies.importing.tables import Part, RawTable
+from studies.progress import tell
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -85,7 +86,7 @@ def open_channels(path: str | Path) -> Iterator[list[Channel]]:
 
 def read_channels(path: str | Path, files: contextlib.ExitStack) -> list[Channel]:
     """Return all channels of a file, which `files` closes."""
-    with opened(path) as file:
+    with opened(path, ANY_SIZE) as file:
         if not file.read(1):
             raise InputError(f"{path}: the file is empty.")
     with plainly(path):
@@ -111,58 +112,36 @@ def sort_groups(channels: Sequence[Channel]) -> list[Group]:
 
 @dataclass(frozen=True)
 class ChannelTable(RawTable):
-    """The channels that one [[file]] of a map reads, of one file or of several that continue one another."""
+    """Consecutive rows of the channels that one [[file]] of a map reads."""
 
-    channels: tuple[dict[str, Channel], ...]
-    files: contextlib.ExitStack = field(repr=False)
-
-    def close(self) -> None:
-        """Close the files."""
-        self.files.close()
-
-    @property
-    def row_name(self) -> str:
-        """What a row is called in messages."""
-        return "row"
+    channels: dict[str, Channel]
 
     def own_clock(self) -> "tuple[Array, datetime.datetime | None]":
-        """Return the seconds of every row by the file's own clock, and when the first file started."""
-        times: list[Array] = []
-        start: datetime.datetime | None = None
-        for part, own in zip(self.parts, self.channels, strict=True):
-            channel = next(iter(own.values()))
-            if channel.clock is None:
-                raise InputError(
-                    f"{part.path}: the channel '{channel.name}' has no clock of its own; name a channel with the time ('time'), or the"
-                    " seconds between rows ('sample_period_s'), in the map."
-                )
-            with plainly(part.path):
-                seconds = channel.clock.seconds(channel.rows)
-            if times and start is not None and channel.clock.start is not None:
-                seconds = seconds + (channel.clock.start - start).total_seconds()
-            start = channel.clock.start if not times else start
-            times.append(seconds)
-        return np.concatenate(times), start
+        """Return the seconds of every row by the file's own clock, and when it started."""
+        channel = next(iter(self.channels.values()))
+        if channel.clock is None:
+            raise InputError(
+                f"{self.path}: the channel '{channel.name}' has no clock of its own; name a channel with the time ('time'), or the"
+                " seconds between rows ('sample_period_s'), in the map."
+            )
+        with plainly(self.path):
+            return channel.clock.seconds(self.first, self.first + self.rows), channel.clock.start
 
     def read(self, column: str) -> "Array":
-        """Return the values of a channel as they stand in the files."""
-        values = []
-        for part, own in zip(self.parts, self.channels, strict=True):
-            with plainly(part.path):
-                values.append(np.array(own[column].read(-1), dtype=float))
-            if len(values[-1]) != part.rows:
-                raise InputError(
-                    f"{part.path}: '{column}' has {len(values[-1])} values, not the {part.rows} declared; export it again."
-                )
-        return np.concatenate(values)
+        """Return the values of a channel as they stand in the file."""
+        with plainly(self.path):
+            values = np.array(self.channels[column].read(self.first, self.first + self.rows), dtype=float)
+        if len(values) != self.rows:
+            rows = self.channels[column].rows
+            raise InputError(f"{self.path}: '{column}' has fewer values than the {rows} declared; export it again.")
+        return values
 
 
-def read_channel_table(paths: Sequence[str | Path], file: FileMap) -> ChannelTable:
-    """Read the channels of one [[file]] of a map."""
+def read_channel_tables(paths: Sequence[str | Path], file: FileMap) -> Generator[RawTable]:
+    """Yield the rows of the channels of one [[file]] of a map, a portion at a time."""
     wanted = [*file.time, *(column.source for column in file.columns)]
-    parts, tables = [], []
-    with contextlib.ExitStack() as files:
-        for path in paths:
+    for path in paths:
+        with contextlib.ExitStack() as files:
             channels = read_channels(path, files)
             names = dict.fromkeys(channel.group for channel in channels)
             if file.group is not None and file.group not in names:
@@ -173,15 +152,16 @@ def read_channel_table(paths: Sequence[str | Path], file: FileMap) -> ChannelTab
                     raise InputError(f"{path}: there is no channel '{name}'{nearest(name, known)}")
                 if known[name].refused:
                     raise InputError(f"{path}: '{name}' {known[name].refused}.")
-            used = [known[name] for name in wanted]
-            if len({(channel.clock.key if channel.clock else "", channel.rows) for channel in used}) > 1:
+            used = {name: known[name] for name in wanted}
+            if len({(channel.clock.key if channel.clock else "", channel.rows) for channel in used.values()}) > 1:
                 raise InputError(
-                    f"{path}: {', '.join(repr(channel.name) for channel in used)} have several clocks or lengths; give each its own"
+                    f"{path}: {', '.join(repr(channel.name) for channel in used.values())} have several clocks or lengths; give each its own"
                     " [[file]] table (same_file = true)."
                 )
-            tables.append(dict(zip(wanted, used, strict=True)))
-            parts.append(Part(str(path), _digest(path), 1, used[0].rows))
-        return ChannelTable(tuple(parts), file.missing, tuple(tables), files.pop_all())
+            part, rows = Part(str(path), digest(path), 1, "row"), used[wanted[0]].rows
+            for k in portions(rows):
+                tell(f"reading {path}", k.start / rows)
+                yield ChannelTable(part, file.missing, k.start, k.stop - k.start, used)
 
 
 def _choose(channels: Sequence[Channel], group: str | None, wanted: Sequence[str]) -> dict[str, Channel]:
@@ -196,30 +176,6 @@ def _choose(channels: Sequence[Channel], group: str | None, wanted: Sequence[str
     return {**refused, **others, **best}
 
 
-def _digest(path: str | Path) -> str:
-    found = hashlib.sha256()
-    with opened(path) as file:
-        while portion := file.read(PORTION):
-            found.update(portion)
-    return found.hexdigest()
-
-
-def read_parts(paths: Sequence[str | Path], file: FileMap) -> RawTable:
-    """Read raw files that continue one another as one table."""
-    if is_container(paths[0]):
-        return read_channel_table(paths, file)
-    import pandas as pd
-
-    plain = [table for table in (read_plain(path, file) for path in paths) if table is not None]
-    if len(plain) == len(paths) == 1:
-        return plain[0]
-    if len(plain) == len(paths) and all(list(table.columns) == list(plain[0].columns) for table in plain):
-        columns = {name: np.concatenate([table.columns[name] for table in plain]) for name in plain[0].columns}
-        return ParsedTable(tuple(part for table in plain for part in table.parts), file.missing, columns)
-    tables = [read_raw(path, file) for path in paths]
-    first = tables[0]
-    for other in tables[1:]:
-        if list(other.cells) != list(first.cells):
-            raise InputError(f"{other.path}: has other columns than {first.path}; give it its own [[file]] table.")
-    cells = pd.concat([table.cells for table in tables], ignore_index=True)
-    return TextTable(tuple(part for table in tables for part in table.parts), first.missing, cells, first.decimal)
+def read_tables(paths: Sequence[str | Path], file: FileMap, plain: bool = True) -> Generator[RawTable]:
+    """Yield the rows of raw files that continue one another, a portion at a time; NotPlain as `read_text`."""
+    return read_channel_tables(paths, file) if is_container(paths[0]) else read_text(paths, file, plain)

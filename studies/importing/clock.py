@@ -1,16 +1,19 @@
 """Clocks of loggers: their stamps become seconds, and seconds of several clocks become those of one."""
 
 import datetime
+import itertools
+import zoneinfo
 from collections.abc import Callable
-from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from studies.errors import InputError
+from studies.files.stored import PORTION, Stored, portions
 from studies.importing.mapping import NUMERIC_TIMES, OWN, SECONDS, UNIX, FileMap
 from studies.importing.raw import shorten
-from studies.importing.tables import RawTable
+from studies.importing.tables import RawTable, Rows
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -21,75 +24,151 @@ if TYPE_CHECKING:
 _EXCEL_EPOCH = datetime.datetime(1899, 12, 30)
 _UNIX_EPOCH = datetime.datetime(1970, 1, 1, tzinfo=datetime.UTC)
 _HALF_DAY = 43200.0
+_ZONE = r"(?:[Zz]|[+-]\d\d:?\d\d)$"
 LONGEST_RUN = 10 * 365.25 * 86400.0  # s
 
 
-@dataclass(frozen=True)
-class Times:
-    """Seconds after an origin (None: the clock's own zero), NaN where a row has no time; what was done, in words."""
+class Clock:
+    """Seconds after an origin (None: the clock's own zero) of rows that are read in order, corrected by the map; what was done, in words.
 
-    seconds: "Array"
-    origin: datetime.datetime | None
-    notes: tuple[str, ...] = ()
+    t = t' / (1 + ε) + d for a clock that is fast by ε and behind by d. A row without a time has NaN.
+    """
 
+    def __init__(self, file: FileMap) -> None:
+        self.file, self.form = file, file.time_format
+        self.origin, self.notes = file.start, list[str]()
+        self._begun: datetime.datetime | None = None  # of the file's own clock
+        self._zero: float | None = None  # of a clock since an epoch
+        self._first: pd.Timestamp | None = None
+        self._zoned = False
+        self._range = np.inf, -np.inf
+        self._count = self._nights = 0
+        self._last = np.nan
 
-def read_times(table: RawTable, file: "FileMap") -> Times:
-    """Return times by the raw file's own clock, corrected by the map: t = t' / (1 + ε) + d for a clock that is fast by ε and behind by d."""
-    form = file.time_format
-    origin, notes = file.start, []
-    if file.sample_period is not None:
-        rows = np.arange(table.rows, dtype=np.float64)
-        return Times(np.asarray(file.sample_period * rows + file.clock_offset), origin)
-    if form in NUMERIC_TIMES and len(file.time) > 1:
-        raise InputError(f"{table.path}: time_format = '{form}' is one column, but 'time' names {len(file.time)}.")
-    if form == OWN:
-        seconds, origin = table.own_clock()
-        origin = file.start or origin
-    elif form in SECONDS:
-        seconds = table.numbers(file.time[0]) * SECONDS[form]
-    elif form in UNIX:
-        seconds, origin = _from_first(table.numbers(file.time[0]) * UNIX[form], _UNIX_EPOCH)
-    elif form == "excel-days":
-        seconds, origin = _from_first(table.numbers(file.time[0]) * 86400.0, _EXCEL_EPOCH)
-    else:
-        seconds, origin = _read_stamps(table, file)
-        if origin.year == 1900:  # a pattern without a date: what strptime then supplies
-            seconds, nights = _unroll_midnights(seconds)
-            origin = _combine(file.start, origin)
-            passed = (
-                "a midnight passed: a day added" if nights == 1 else f"{nights} midnights passed: a day added at each"
-            )
-            notes += [passed] if nights else []
-    _check_span(seconds, table, file)
-    if file.timezone is not None and origin is not None and origin.tzinfo is None:
-        origin, seconds, twice = _place(origin, seconds, table, file)
+    def read(self, table: RawTable) -> "Array":
+        """Return the seconds of the next rows, which `finish` places in their zone and corrects."""
+        file, form = self.file, self.form
+        self._count += table.rows
+        if file.sample_period is not None:
+            return np.asarray(file.sample_period * np.arange(float(self._count - table.rows), float(self._count)))
+        if form in NUMERIC_TIMES and len(file.time) > 1:
+            raise InputError(f"{table.path}: time_format = '{form}' is one column, but 'time' names {len(file.time)}.")
+        if form == OWN:
+            seconds, start = table.own_clock()
+            if self._count == table.rows:
+                self._begun, self.origin = start, file.start or start
+            elif self._begun is not None and start is not None:
+                seconds = seconds + (start - self._begun).total_seconds()
+        elif form in SECONDS:
+            seconds = table.numbers(file.time[0]) * SECONDS[form]
+        elif form in UNIX:
+            seconds = self._since(table.numbers(file.time[0]) * UNIX[form], _UNIX_EPOCH)
+        elif form == "excel-days":
+            seconds = self._since(table.numbers(file.time[0]) * 86400.0, _EXCEL_EPOCH)
+        else:
+            seconds = self._read_stamps(table)
+        known = seconds[np.isfinite(seconds)]
+        if known.size:
+            self._range = min(self._range[0], known.min()), max(self._range[1], known.max())
+            _check_span(self._range[1] - self._range[0], table, file)
+        return seconds
+
+    def finish(self, seconds: Stored, place: Callable[[int], str], folder: str | None = None) -> Stored:
+        """Place the seconds of all rows in their zone, and correct the clock."""
+        file = self.file
+        if file.sample_period is None and self.form not in (*NUMERIC_TIMES, OWN) and self._first is not None:
+            self.origin = self._first.to_pydatetime()
+            if self._first.year == 1900:  # a pattern without a date: what strptime then supplies
+                self.origin = _combine(file.start, self._first.to_pydatetime())
+                if self._nights:
+                    many = f"{self._nights} midnights passed: a day added at each"
+                    self.notes.append("a midnight passed: a day added" if self._nights == 1 else many)
+        zone = file.timezone if self.origin is not None and self.origin.tzinfo is None else None
+        if (
+            zone and self.form in SECONDS and self.origin is not None
+        ):  # a clock that counts seconds has a local start only
+            self.origin = _with_offset(self.origin, self.origin.replace(tzinfo=zoneinfo.ZoneInfo(zone)).utcoffset())
+            zone = None
+        rate = file.clock_rate if file.sample_period is None else 0.0
+        if not (zone or rate or file.clock_offset):
+            return seconds
+        placed, twice, origin, first = Stored(folder), 0, self.origin, None
+        begin = 0
+        while begin < len(seconds):
+            part = seconds[begin : begin + PORTION]
+            if zone and origin is not None:
+                # an hour that comes twice is looked at as a whole
+                while begin + part.size < len(seconds) and _utc_offsets(origin, part[-1:], zone)[1]:
+                    part = seconds[begin : begin + part.size + PORTION]
+                part, first, some = place_in_zone(origin, part, zone, partial(_place, place, begin), first)
+                twice += some
+            begin += part.size
+            part = part / (1 + rate) if rate else part
+            placed.append(part + file.clock_offset)
+        if zone and origin is not None:
+            self.origin = _with_offset(origin, datetime.timedelta(seconds=first or 0.0))
         if twice:
-            notes.append(f"{twice} rows in the hour that {file.timezone} has twice, distinguished by their order")
-    if file.clock_rate:
-        seconds = seconds / (1 + file.clock_rate)
-        notes.append(f"its clock runs {file.clock_rate * 1e6:g} ppm fast: times divided by {1 + file.clock_rate!r}")
-    if file.clock_offset:
-        seconds = seconds + file.clock_offset
-        notes.append(f"{file.clock_offset:g} s added to its times")
-    return Times(seconds, origin, tuple(notes))
+            self.notes.append(f"{twice} rows in the hour that {zone} has twice, distinguished by their order")
+        if rate:
+            self.notes.append(f"its clock runs {rate * 1e6:g} ppm fast: times divided by {1 + rate!r}")
+        if file.clock_offset and file.sample_period is None:
+            self.notes.append(f"{file.clock_offset:g} s added to its times")
+        return placed
+
+    def _since(self, seconds: "Array", epoch: datetime.datetime) -> "Array":
+        """Move the origin to the first whole second, so that small steps keep their digits."""
+        known = seconds[np.isfinite(seconds)]
+        if self._zero is None and known.size:
+            self._zero = float(np.floor(known[0])) if abs(known[0]) < 1e11 else 0.0
+            self.origin = epoch + datetime.timedelta(seconds=self._zero)
+        return seconds - (self._zero or 0.0)
+
+    def _read_stamps(self, table: RawTable) -> "Array":
+        """Parse stamps written as text; several time zones in one file are brought to UTC."""
+        import pandas as pd
+
+        file, name = self.file, " ".join(self.file.time)
+        text = table.joined(file.time)
+        empty = table.is_empty(text)
+        plain = text.str.replace(",", ".", regex=False) if file.decimal == "," else text
+        form = "ISO8601" if self.form == "iso" else self.form
+        plain = plain.mask(empty)
+        zoned = "%z" in form or (form == "ISO8601" and bool(plain.dropna().str.contains(_ZONE).any()))
+        if self._first is not None and zoned > self._zoned:
+            raise InputError(f"{table.place(0)}: states a time zone, which the rows before do not; correct the stamps.")
+        self._zoned |= zoned
+        try:
+            stamps = pd.to_datetime(plain, format=form, errors="coerce", utc=self._zoned)
+        except ValueError as error:
+            raise InputError(
+                f"{table.path}: time_format = '{self.form}' does not fit column '{name}' ({shorten(str(error))})."
+            ) from None
+        bad = np.flatnonzero(np.asarray(stamps.isna()) & ~empty)
+        if len(bad):
+            raise InputError(
+                f"{table.place(bad[0])}: '{shorten(text.iloc[bad[0]])}' in column '{name}' is not a time"
+                f" of the form '{self.form}'; correct time_format in the map."
+            )
+        known = stamps.dropna()
+        if self._first is None and len(known):
+            self._first = known.iloc[0]
+        if self._first is None:
+            return np.full(table.rows, np.nan)
+        seconds = np.array((stamps - self._first) / pd.Timedelta(seconds=1), dtype=float)
+        return self._unroll_midnights(seconds) if self._first.year == 1900 else seconds
+
+    def _unroll_midnights(self, seconds: "Array") -> "Array":
+        """Add a day whenever a clock without a date jumps back by more than half a day."""
+        known = np.flatnonzero(np.isfinite(seconds))
+        if known.size:
+            nights = self._nights + np.cumsum(np.diff(np.append(self._last, seconds[known])) < -_HALF_DAY)
+            self._last, self._nights = float(seconds[known[-1]]), int(nights[-1])
+            seconds[known] += 86400.0 * nights
+        return seconds
 
 
-def _place(
-    origin: datetime.datetime, seconds: "Array", table: RawTable, file: "FileMap"
-) -> "tuple[datetime.datetime, Array, int]":
-    """Place local stamps in their zone; a clock that counts seconds has a local start only."""
-    if file.time_format not in SECONDS:
-        return place_in_zone(origin, seconds, str(file.timezone), table.place)
-    import zoneinfo
-
-    ahead = origin.replace(tzinfo=zoneinfo.ZoneInfo(str(file.timezone))).utcoffset()
-    return origin.replace(tzinfo=datetime.timezone(ahead or datetime.timedelta())), seconds, 0
-
-
-def _check_span(seconds: "Array", table: RawTable, file: "FileMap") -> None:
+def _check_span(span: float, table: RawTable, file: "FileMap") -> None:
     """Refuse times that span longer than any run, and name the units that would make a run of them."""
-    known = seconds[np.isfinite(seconds)]
-    span = float(np.ptp(known)) if known.size else 0.0
     if span <= LONGEST_RUN:
         return
     unit, family = next(
@@ -104,45 +183,128 @@ def _check_span(seconds: "Array", table: RawTable, file: "FileMap") -> None:
     )
 
 
-def drop_repeated(
-    table: RawTable, times: Times, file: "FileMap", repeated: "NDArray[np.bool_]"
-) -> "tuple[Times, NDArray[np.intp]]":
-    """Return strictly increasing times and the rows that they belong to; rows without a time, and those `repeated`, are left out."""
-    rule = file.repeated_times
-
-    rows = np.flatnonzero(np.isfinite(times.seconds) & ~repeated)
-    if not len(rows):
-        raise InputError(f"{table.path}: no row has a time.")
-    t = times.seconds[rows]
-    notes = list(times.notes)
-    lost = int(np.count_nonzero(~np.isfinite(times.seconds)))
-    if lost:
-        first = int(np.flatnonzero(~np.isfinite(times.seconds))[0])
-        notes.append(f"{lost} rows without a time left out (first: {table.place(first)})")
-    steps = np.diff(t)
-    if (steps < 0).any():
-        row = int(rows[int(np.flatnonzero(steps < 0)[0]) + 1])
-        raise InputError(
-            f"{table.place(row)}: the time goes backwards (by up to {-steps.min():g} s). {_mend(table, file, row)}"
-        )
-    same = np.flatnonzero(steps == 0)
-    if len(same) and rule == "error":
-        raise InputError(
-            f"{table.place(int(rows[same[0] + 1]))}: this {table.row_name} repeats the time of the one before ({len(same)}"
-            " such rows); set repeated_times = 'first' or 'spread' in the map."
-        )
-    if len(same) and rule == "first":
-        notes.append(f"{len(same)} rows with a repeated time left out")
-        kept = np.concatenate([[True], steps > 0])
-        rows, t = rows[kept], t[kept]
-    elif len(same):
-        notes.append(f"{len(same)} repeated times spread evenly up to the next stamp")
-        t = _spread(t)
-    return Times(t, times.origin, tuple(notes)), rows
+def rises(time: Stored) -> bool:
+    """Whether every row has a time after the one before it."""
+    last = -np.inf
+    for k in portions(len(time)):
+        t = np.append(last, time[k])
+        if not np.all(t[1:] > t[:-1]):
+            return False
+        last = t[-1]
+    return True
 
 
-def _mend(table: RawTable, file: "FileMap", row: int) -> str:
-    if row in table.starts():
+class Order:
+    """Leave out rows without a time and those that repeat others, of one file or of several that continue one another."""
+
+    def __init__(self, rows: Rows, file: FileMap, folder: str | None) -> None:
+        self.rows, self.file, self.folder = rows, file, folder
+        self.lost = self.same = 0
+        self.first_lost: int | None = None
+        self.repeated: dict[int, int] = {}  # first row of a part that repeats others, and how many do
+        self._held: list[Array] = []  # rows of the last stamp, which are spread when the next is known
+
+    def sort(self, columns: list[Stored]) -> list[Stored]:
+        """Return the columns, the time the first of them, of the rows that are left, whose times increase."""
+        kept = [Stored(self.folder) for _ in columns]
+        edges = [*self.rows.begins, self.rows.count]
+        began = 0  # place among those kept of the file before
+        for begin, end in itertools.pairwise(edges):
+            last, previous, began = (kept[0].at(-1) if len(kept[0]) else -np.inf), began, len(kept[0])
+            for k in portions(end - begin):
+                at = np.arange(begin + k.start, begin + k.stop)
+                part = [column[at[0] : at[-1] + 1] for column in columns]
+                fine = np.isfinite(part[0])
+                self.lost += int(np.count_nonzero(~fine))
+                if self.first_lost is None and not fine.all():
+                    self.first_lost = int(at[~fine][0])
+                fine &= ~self._repeats(kept, part, at, begin, last, previous)
+                self._add(kept, [one[fine] for one in part], at[fine])
+        if not len(kept[0]) and not self._held:
+            raise InputError(f"{self.rows.parts[0].path}: no row has a time.")
+        if self._held:
+            self._spread(kept, self._held, final=True)
+        return kept
+
+    def _repeats(
+        self, kept: list[Stored], part: "list[Array]", at: "NDArray[np.intp]", begin: int, last: float, previous: int
+    ) -> "NDArray[np.bool_]":
+        """Mark rows that repeat rows of the files before theirs; rows of the same times that differ are refused."""
+        t = part[0]
+        again = t <= last
+        if not again.any() or (begin not in self.repeated and t[again][0] < kept[0].at(previous)):
+            return np.zeros(t.size, dtype=bool)
+        begin_, end = kept[0].find(float(t[again].min())), kept[0].find(float(t[again].max()), right=True)
+        earlier = [column[begin_ : max(end, begin_ + 1)] for column in kept]
+        same = np.clip(np.searchsorted(earlier[0], t[again]), 0, earlier[0].size - 1)
+        unlike = np.zeros(same.size, dtype=bool)
+        for old, new in zip(earlier, part, strict=True):
+            unlike |= (old[same] != new[again]) & ~(np.isnan(old[same]) & np.isnan(new[again]))
+        if unlike.any():
+            raise InputError(
+                f"{self.rows.place(begin)}: this file overlaps the one before it by {last - t[again][0]:.6g} s, and they differ there (first at"
+                f" {self.rows.place(int(at[again][np.argmax(unlike)]))}); end one of them with last_line in the map, or import them one by one."
+            )
+        self.repeated[begin] = self.repeated.get(begin, 0) + int(again.sum())
+        return np.asarray(again)
+
+    def _add(self, kept: list[Stored], part: "list[Array]", at: "NDArray[np.intp]") -> None:
+        if not at.size:
+            return
+        before = self._held[0][-1] if self._held else kept[0].at(-1) if len(kept[0]) else -np.inf
+        steps = np.diff(part[0], prepend=before)
+        if (steps < 0).any():
+            row = int(at[np.argmax(steps < 0)])
+            raise InputError(
+                f"{self.rows.place(row)}: the time goes backwards (by up to {-steps.min():g} s). {_mend(self.rows, self.file, row)}"
+            )
+        same = steps == 0
+        self.same += int(same.sum())
+        if same.any() and self.file.repeated_times == "error":
+            row, name = int(at[np.argmax(same)]), self.rows.parts[0].row_name
+            raise InputError(
+                f"{self.rows.place(row)}: this {name} repeats the time of the one before ({self.same}"
+                " such rows); set repeated_times = 'first' or 'spread' in the map."
+            )
+        if self.file.repeated_times == "spread":
+            self._spread(kept, [np.append(*two) for two in zip(self._held, part, strict=True)] if self._held else part)
+            return
+        for column, values in zip(kept, part, strict=True):
+            column.append(values[~same])
+
+    def _spread(self, kept: list[Stored], part: "list[Array]", final: bool = False) -> None:
+        """Spread rows with the same stamp evenly up to the next stamp; the last group takes the usual step."""
+        t = part[0]
+        stamps, first, count = np.unique(t, return_index=True, return_counts=True)
+        steps = np.diff(stamps)
+        usual = float(np.median(steps)) if steps.size else self._usual
+        self._usual = usual
+        within = np.arange(len(t)) - np.repeat(first, count)
+        spread = t + within * np.repeat(np.append(steps, usual) / count, count)
+        ready = len(t) if final else int(first[-1])
+        for column, values in zip(kept, [spread, *part[1:]], strict=True):
+            column.append(values[:ready])
+        self._held = [one[ready:] for one in part]
+
+    _usual = 1.0
+
+    @property
+    def notes(self) -> list[str]:
+        """What was done, in words."""
+        said = []
+        if self.first_lost is not None:
+            said.append(f"{self.lost} rows without a time left out (first: {self.rows.place(self.first_lost)})")
+        if self.same and self.file.repeated_times == "first":
+            said.append(f"{self.same} rows with a repeated time left out")
+        elif self.same:
+            said.append(f"{self.same} repeated times spread evenly up to the next stamp")
+        for begin, count in self.repeated.items():
+            said.append(f"{count} rows from {self.rows.place(begin)} on repeat the file before: left out")
+        return said
+
+
+def _mend(rows: Rows, file: "FileMap", row: int) -> str:
+    if row in rows.begins[1:]:
         return "Give consecutive files in the order of their times; import files whose clocks restart one by one."
     restart = "If its clock restarted, split the file there, or end it with last_line in its [[file]] of the map."
     if file.timezone or file.time_format in SECONDS:
@@ -157,60 +319,6 @@ def seconds_between(one: datetime.datetime, two: datetime.datetime, path: str) -
     return (two - one).total_seconds()
 
 
-def _from_first(seconds: "Array", epoch: datetime.datetime) -> "tuple[Array, datetime.datetime]":
-    """Move the origin to the first whole second, so that small steps keep their digits."""
-    known = seconds[np.isfinite(seconds)]
-    if not len(known) or not abs(known[0]) < 1e11:
-        return seconds, epoch
-    first = float(np.floor(known[0]))
-    return seconds - first, epoch + datetime.timedelta(seconds=first)
-
-
-def _read_stamps(table: RawTable, file: "FileMap") -> "tuple[Array, datetime.datetime]":
-    """Parse stamps written as text; several time zones in one file are brought to UTC."""
-    import pandas as pd
-
-    name = " ".join(file.time)
-    text = table.joined(file.time)
-    empty = table.is_empty(text)
-    plain = text.str.replace(",", ".", regex=False) if file.decimal == "," else text
-    form = "ISO8601" if file.time_format == "iso" else file.time_format
-    stamps = _parse(plain.mask(empty), form, table, file)
-    bad = np.flatnonzero(np.asarray(stamps.isna()) & ~empty)
-    if len(bad):
-        raise InputError(
-            f"{table.place(bad[0])}: '{shorten(text.iloc[bad[0]])}' in column '{name}' is not a time"
-            f" of the form '{file.time_format}'; correct time_format in the map."
-        )
-    known = stamps.dropna()
-    if not len(known):
-        raise InputError(f"{table.path}: no row has a time in column '{name}'.")
-    origin = known.iloc[0]
-    seconds = np.asarray((stamps - origin) / pd.Timedelta(seconds=1), dtype=float)
-    return seconds, origin.to_pydatetime()
-
-
-def _parse(text: "pd.Series[str]", form: str, table: RawTable, file: "FileMap") -> "pd.Series[pd.Timestamp]":
-    import pandas as pd
-
-    zoned = "%z" in form or (form == "ISO8601" and bool(text.dropna().str.contains(r"(?:[Zz]|[+-]\d\d:?\d\d)$").any()))
-    try:
-        return pd.to_datetime(text, format=form, errors="coerce", utc=zoned)
-    except ValueError as error:
-        raise InputError(
-            f"{table.path}: time_format = '{file.time_format}' does not fit column '{' '.join(file.time)}' ({shorten(str(error))})."
-        ) from None
-
-
-def _unroll_midnights(seconds: "Array") -> "tuple[Array, int]":
-    """Add a day whenever a clock without a date jumps back by more than half a day."""
-    known = np.flatnonzero(np.isfinite(seconds))
-    jumps = np.diff(seconds[known]) < -_HALF_DAY
-    unrolled = seconds.copy()
-    unrolled[known[1:]] += 86400.0 * np.cumsum(jumps)
-    return unrolled, int(jumps.sum())
-
-
 def _combine(start: datetime.datetime | None, clock: datetime.datetime) -> datetime.datetime | None:
     """Give the first stamp of a clock without a date the date of `start`."""
     return (
@@ -218,19 +326,10 @@ def _combine(start: datetime.datetime | None, clock: datetime.datetime) -> datet
     )
 
 
-def _spread(t: "Array") -> "Array":
-    """Spread rows with the same stamp evenly up to the next stamp; the last group takes the usual step."""
-    stamps, first, count = np.unique(t, return_index=True, return_counts=True)
-    usual = float(np.median(np.diff(stamps))) if len(stamps) > 1 else 1.0
-    width = np.append(np.diff(stamps), usual)
-    within = np.arange(len(t)) - np.repeat(first, count)
-    return np.asarray(t + within * np.repeat(width / count, count))
-
-
 def place_in_zone(
-    origin: datetime.datetime, seconds: "Array", zone: str, place: Callable[[int], str]
-) -> "tuple[datetime.datetime, Array, int]":
-    """Return the origin with its offset from UTC, true seconds (N,) after it, and how many rows lie in an hour that comes twice."""
+    origin: datetime.datetime, seconds: "Array", zone: str, place: Callable[[int], str], first: float | None = None
+) -> "tuple[Array, float | None, int]":
+    """Return true seconds (N,) after the origin, by how much that is ahead of UTC (`first`, else of the first row), and how many rows lie in an hour that comes twice."""
     rows = np.flatnonzero(np.isfinite(seconds))
     ahead, doubtful = _utc_offsets(origin, seconds[rows], zone)
     skipped = np.flatnonzero(np.isnan(ahead))
@@ -240,8 +339,17 @@ def place_in_zone(
             " stays on winter time needs a fixed zone, such as timezone = 'Etc/GMT-1' for one hour ahead of UTC."
         )
     true = seconds.copy()
-    true[rows] -= ahead - ahead[0]
-    return origin.replace(tzinfo=datetime.timezone(datetime.timedelta(seconds=float(ahead[0])))), true, doubtful
+    first = float(ahead[0]) if first is None and ahead.size else first
+    true[rows] -= ahead - (first or 0.0)
+    return true, first, doubtful
+
+
+def _place(place: Callable[[int], str], begin: int, row: int) -> str:
+    return place(begin + row)
+
+
+def _with_offset(origin: datetime.datetime, ahead: datetime.timedelta | None) -> datetime.datetime:
+    return origin.replace(tzinfo=datetime.timezone(ahead or datetime.timedelta()))
 
 
 def _utc_offsets(origin: datetime.datetime, seconds: "Array", zone: str) -> "tuple[Array, int]":

@@ -8,11 +8,12 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from studies.errors import InputError
+from studies.files.stored import Stored
 from studies.importing.channels import is_container, open_channels, sort_groups
 from studies.importing.look import Look, as_number, find_nominal, find_period, is_stamp, look_at, look_at_group
 from studies.importing.mapping import NUMERIC_TIMES, SCHEMA, TABLE_TARGETS, FileMap, ImportMap
 from studies.importing.meaning import BRACKETED, Meaning, find_meanings, find_unit
-from studies.importing.offset import estimate_offset
+from studies.importing.offset import Offset, estimate_offset
 from studies.importing.raw import shorten
 from studies.importing.timing import TIME_WORDS, find_time
 from studies.importing.units import split_nominal, units_of
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
 JUMPS = 20.0  # times that rows of one time lie farther apart than those of neighbouring times
 MOST_DEVICES = 50  # that one file may hold
 DEVICE_WORDS = r"gyro|device|serial|channel|axis|sensor|unit|\bid\b|gerät|kanal"
+SEEN = 1_000_000  # rows of a file whose clock is compared
 MOST_SETTLED = 500  # rows of a table of settled readings
 
 
@@ -123,7 +125,7 @@ def _find_offsets(paths: Sequence[str], files: list[list[str]]) -> list[str]:
             (offset, one, two)
             for (one, _), y1 in base.columns.items()
             for (two, _), y2 in other.columns.items()
-            if (offset := estimate_offset(base.time, y1, other.time + shift, y2, _one_unit(one, two))) is not None
+            if (offset := _offset(base.time, y1, other.time, y2, shift, _one_unit(one, two))) is not None
         ]
         if not found:
             continue
@@ -143,6 +145,10 @@ def _find_offsets(paths: Sequence[str], files: list[list[str]]) -> list[str]:
         ]
         notes.append(f"{path}: its clock seems to be off: add {said}, by {theirs} against {ours}; see the draft.")
     return notes
+
+
+def _offset(t1: Stored, y1: Stored, t2: Stored, y2: Stored, shift: float, alike: bool) -> Offset | None:
+    return estimate_offset(t1.thin(SEEN), y1.thin(SEEN), t2.thin(SEEN) + shift, y2.thin(SEEN), alike)
 
 
 def _source_of(series: "ClockedFile", target: str) -> str:

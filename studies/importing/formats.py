@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studies.errors import InputError
-from studies.files.reading import load_library, opened
+from studies.files.reading import ANY_SIZE, load_library, opened
+from studies.files.stored import PORTION
 
 Array = NDArray[np.float64]
 KINDS = {
@@ -40,7 +41,11 @@ import sys, h5py
 def read(_, item):
     list(item.attrs.items())
     if isinstance(item, h5py.Dataset) and item.ndim < 3:
-        item[()]
+        shape = item.shape or (0,)
+        along = shape.index(max(shape))
+        for k in range(0, shape[along], 1 << 18):
+            item[(slice(None),) * along + (slice(k, k + (1 << 18)),)]
+        item.shape or item[()]
 with h5py.File(sys.argv[1], "r") as file:
     file.visititems(read)
 """
@@ -49,23 +54,23 @@ PATIENCE, PACE = 20.0, 1e7  # s for which the library may read a file, and bytes
 
 @dataclass(frozen=True)
 class Clock:
-    """The clock of channels: `seconds` of so many rows, and when it started; channels whose clocks have one `key` have the same times."""
+    """The clock of channels: `seconds` of rows from one to before another, and when it started; one `key`, the same times."""
 
     key: str
-    seconds: Callable[[int], Array] = field(repr=False)
+    seconds: Callable[[int, int], Array] = field(repr=False)
     step: float | None = None
     start: datetime.datetime | None = None
 
 
 @dataclass(frozen=True)
 class Channel:
-    """One channel: what reads its first so many values (−1: all), its clock, or why it cannot be read."""
+    """One channel: what reads its values from one row to before another, its clock, or why it cannot be read."""
 
     group: str
     name: str
     unit: str = ""
     rows: int = 0
-    read: Callable[[int], Array] = field(default=lambda _: np.empty(0), repr=False)
+    read: Callable[[int, int], Array] = field(default=lambda *_: np.empty(0), repr=False)
     clock: Clock | None = None
     refused: str = ""
 
@@ -73,7 +78,7 @@ class Channel:
 def read_tdms(path: str, files: ExitStack) -> Iterator[Channel]:
     """Channels of a TDMS file; waveforms have their own clock, and a channel of time stamps is that of its group."""
     nptdms = load_library("nptdms", path, "TDMS")
-    file = nptdms.TdmsFile.open(files.enter_context(opened(path)))
+    file = nptdms.TdmsFile.open(files.enter_context(opened(path, ANY_SIZE)))
     if file.file_status.incomplete_final_segment:
         raise InputError(f"{path}: is cut off within its last block; copy it again after the recording.")
     for group in file.groups():
@@ -86,19 +91,20 @@ def read_tdms(path: str, files: ExitStack) -> Iterator[Channel]:
             yield Channel(group.name, channel.name, find_unit(about), len(channel), read, clock)
 
 
-def _tdms_values(channel: Any, count: int) -> Any:
-    return channel.read_data(0, None if count < 0 else count)
+def _tdms_values(channel: Any, begin: int, end: int) -> Any:
+    return channel.read_data(begin, end - begin)
 
 
-def stamp_clock(key: str, read: Callable[[int], Any], utc: bool) -> Clock | None:
+def stamp_clock(key: str, read: Callable[[int, int], Any], utc: bool) -> Clock | None:
     """Return the clock of a channel of time stamps; None where the first is missing."""
-    first = read(1)[0]
+    first, nanosecond = read(0, 1)[0], np.timedelta64(1, "ns")
     if np.isnat(first):
         return None
-    nanosecond = np.timedelta64(1, "ns")
-    return Clock(
-        key, lambda _: np.asarray((read(-1) - first) / nanosecond * 1e-9, dtype=float), start=_moment(first, utc)
-    )
+
+    def seconds(begin: int, end: int) -> Array:
+        return np.asarray((read(begin, end) - first) / nanosecond * 1e-9, dtype=float)
+
+    return Clock(key, seconds, start=_moment(first, utc))
 
 
 def read_mdf(path: str, files: ExitStack) -> Iterator[Channel]:
@@ -120,13 +126,13 @@ def read_mdf(path: str, files: ExitStack) -> Iterator[Channel]:
                 yield Channel(name, channel.name, str(channel.unit or ""), rows, read, clock)
 
 
-def _mdf_times(file: Any, place: int, _: int) -> Array:
-    return np.asarray(file.get_master(place), dtype=float)
+def _mdf_times(file: Any, place: int, begin: int, end: int) -> Array:
+    return np.asarray(file.get_master(place, record_offset=begin, record_count=end - begin), dtype=float)
 
 
-def _mdf_values(file: Any, place: int, index: int, count: int) -> Array:
-    some = None if count < 0 else count
-    signal = file.get(group=place, index=index, record_count=some, ignore_invalidation_bits=True)
+def _mdf_values(file: Any, place: int, index: int, begin: int, end: int) -> Array:
+    some = {"record_offset": begin, "record_count": end - begin}
+    signal = file.get(group=place, index=index, ignore_invalidation_bits=True, **some)
     values = np.array(signal.samples, dtype=float)
     if (invalid := getattr(signal, "invalidation_bits", None)) is not None:
         values[np.asarray(invalid, dtype=bool)] = np.nan
@@ -220,12 +226,12 @@ def _attributes(item: Any) -> dict[str, Any]:
     return {name: found[name] for name in found if name.lower() in said}
 
 
-def _field(array: Any, part: str, count: int) -> Array:
-    return np.asarray(array[slice(None if count < 0 else count)][part], dtype=float)
+def _field(array: Any, part: str, begin: int, end: int) -> Array:
+    return np.asarray(array[begin:end][part], dtype=float)
 
 
-def _row(array: Any, along: int, place: int, count: int) -> Array:
-    some = slice(None if count < 0 else count)
+def _row(array: Any, along: int, place: int, begin: int, end: int) -> Array:
+    some = slice(begin, end)
     where = some if len(array.shape) == 1 else (some, place) if along == 0 else (place, some)
     return np.asarray(array[where], dtype=float)
 
@@ -237,17 +243,43 @@ def read_parquet(path: str, files: ExitStack) -> Iterator[Channel]:
     clock = None
     for one in schema:
         if str(one.type).startswith("timestamp") and rows and clock is None:
-            clock = stamp_clock(one.name, partial(_parquet_values, file, one.name), utc="tz=" in str(one.type))
+            clock = stamp_clock(one.name, _Stream(file, one.name).read, utc="tz=" in str(one.type))
     for one in schema:
         if str(one.type).startswith(("double", "float", "int", "uint", "bool", "halffloat")):
             about = {key.decode(): value.decode(errors="replace") for key, value in (one.metadata or {}).items()}
-            yield Channel("", one.name, find_unit(about), rows, partial(_parquet_values, file, one.name), clock)
+            yield Channel("", one.name, find_unit(about), rows, _Stream(file, one.name).read, clock)
 
 
-def _parquet_values(file: Any, name: str, count: int) -> Any:
-    if count < 0:
-        return file.read(columns=[name]).column(0).to_numpy()
-    return next(file.iter_batches(batch_size=max(count, 1), columns=[name])).column(0).to_numpy(zero_copy_only=False)
+class _Stream:
+    """A column of a Parquet file, read on from where it was."""
+
+    def __init__(self, file: Any, name: str) -> None:
+        self.file, self.name = file, name
+        self.parts: Iterator[Any] = iter(())
+        self.next, self.left = -1, np.empty(0)
+
+    def read(self, begin: int, end: int) -> Any:
+        """Return the values from one row to before another; only what lies before them is read again."""
+        if begin != self.next:
+            self.parts, self.left, self.next = self._from(begin)
+        found = [self.left]
+        while sum(map(len, found)) < end - begin and (part := next(self.parts, None)) is not None:
+            found.append(part.column(0).to_numpy(zero_copy_only=False))
+        values = np.concatenate(found[len(found) > 1 and not len(found[0]) :])
+        self.next, self.left = end, values[end - begin :]
+        return values[: end - begin]
+
+    def _from(self, begin: int) -> tuple[Iterator[Any], Any, int]:
+        counts = [self.file.metadata.row_group(k).num_rows for k in range(self.file.metadata.num_row_groups)]
+        ends = np.cumsum(counts)
+        first = int(np.searchsorted(ends, begin, side="right"))
+        groups = list(range(first, len(counts)))
+        parts = self.file.iter_batches(batch_size=PORTION, row_groups=groups, columns=[self.name])
+        passed, before = begin - (int(ends[first]) - counts[first] if groups else begin), np.empty(0)
+        while passed > 0:
+            before = next(parts).column(0).to_numpy(zero_copy_only=False)
+            passed -= len(before)
+        return parts, before[len(before) + passed :] if passed else before[:0], begin
 
 
 def even_clock(about: Mapping[str, Any]) -> Clock | None:
@@ -262,7 +294,7 @@ def even_clock(about: Mapping[str, Any]) -> Clock | None:
     offset = _number(known.get("wf_start_offset")) or 0.0
     return Clock(
         f"{step!r} s from {start} + {offset!r}",
-        lambda rows: np.asarray(offset + step * np.arange(float(rows))),
+        lambda begin, end: np.asarray(offset + step * np.arange(float(begin), float(end))),
         step,
         start,
     )

@@ -2,29 +2,31 @@
 
 import datetime
 import itertools
+from collections import Counter
 from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from compensation.decimation import average_groups
 from studies.errors import InputError
-from studies.importing.channels import read_parts
-from studies.importing.clock import drop_repeated, read_times, seconds_between
-from studies.importing.doubtful import drop_doubtful, find_repeats
+from studies.files.stored import Stored, portions
+from studies.importing.channels import read_tables
+from studies.importing.clock import Clock, Order, rises, seconds_between
+from studies.importing.doubtful import LOOKED_AT, drop_doubtful
 from studies.importing.mapping import OWN, TABLE_TARGETS, ColumnMap, FileMap, LoadedMap
-from studies.importing.tables import RawTable
+from studies.importing.raw import NotPlain
+from studies.importing.tables import RawTable, Rows
 from studies.record import Record, check_plausible
 
 if TYPE_CHECKING:
-    import datetime
-
     from numpy.typing import NDArray
 
     Array = NDArray[np.float64]
 
+SHORT = 2_000_000  # rows of a record that is held in memory
 LARGEST = 50_000_000  # rows of a regular grid
 USUAL_GAP = 10.0  # sampling steps that a gap may have before nothing is interpolated across it
 
@@ -35,9 +37,9 @@ class ClockedFile:
 
     file: FileMap
     path: str
-    time: "Array"
+    time: Stored
     origin: "datetime.datetime | None"
-    columns: "dict[tuple[str, str], Array]"
+    columns: "dict[tuple[str, str], Stored]"
     notes: tuple[str, ...]
 
     @property
@@ -45,36 +47,55 @@ class ClockedFile:
         """The longest gap across which values are interpolated, s."""
         if self.file.longest_gap is not None:
             return self.file.longest_gap
-        return USUAL_GAP * float(np.median(np.diff(self.time))) if len(self.time) > 1 else 0.0
+        return USUAL_GAP * self.usual_step if len(self.time) > 1 else 0.0
+
+    @property
+    def usual_step(self) -> float:
+        """The median step of the (first million) rows, s."""
+        return float(np.median(np.diff(self.time[:LOOKED_AT])))
+
+    @property
+    def span(self) -> tuple[float, float]:
+        """The first and the last time, s."""
+        return self.time.at(0), self.time.at(-1)
 
 
-def import_records(paths: Sequence[str], import_map: LoadedMap) -> dict[str, Record]:
-    """Read raw files, convert and join them into one record, or one for each axis; the comments of the header list every change."""
-    series = [read_series(own, file) for own, file in zip(share_out(paths, import_map), import_map.files, strict=True)]
+def import_records(paths: Sequence[str], import_map: LoadedMap, folder: str | None = None) -> dict[str, Record]:
+    """Read raw files, convert and join them into one record, or one for each axis; the comments of the header list every change.
+
+    Columns of more than `SHORT` rows are `Stored` (in the `folder`): they are read by slices.
+    """
+    shared = zip(share_out(paths, import_map), import_map.files, strict=True)
+    series = [read_series(own, file, folder) for own, file in shared]
     base = series[0]
     shifts = [shift_between(base, other) for other in series]
-    grid = _lay_grid(base, import_map)
+    begin = base.span[0]
+    time = _lay_grid(base, import_map, folder)
     notes = [f"imported with {import_map.path}; all changes are listed here"]
-    columns: dict[tuple[str, str], Array] = {}
+    columns: dict[tuple[str, str], Stored] = {}
     for number, (one, shift) in enumerate(zip(series, shifts, strict=True), 1):
         notes += [f"file {number}, {note}" for note in one.notes]
         if number > 1:
-            notes.append(f"file {number}, its time 0 is at {shift - float(base.time[0]):.6g} s of the record")
+            notes.append(f"file {number}, its time 0 is at {shift - begin:.6g} s of the record")
         notes += [f"file {number}, {note}" for note in _report_gaps(one)]
+        moved = one is not base or import_map.step is not None
         for column in one.file.columns:
             values = one.columns[column.target, column.axis]
-            if one is not base or import_map.step is not None:
-                values = resample(one.time + shift, values, grid, column.resample, one.longest_gap)
+            if moved:
+                values = _resample(one, values, shift - begin, time, column.resample, folder)
             columns[column.target, column.axis] = values
-            notes.append(_describe(column, values, moved=one is not base or import_map.step is not None))
-        if one is not base or import_map.step is not None:
+            notes.append(_describe(column, values, moved))
+        if moved:
             notes.append(f"file {number}, nothing is interpolated across gaps longer than {one.longest_gap:.6g} s")
     if import_map.step is not None:
         notes.append(f"regular time grid of {import_map.step:g} s")
-    start = None if base.origin is None else _later(base.origin, float(grid[0]))
+    start = None if base.origin is None else _later(base.origin, begin)
+    held: dict[tuple[str, str], Any] = {("time_s", ""): time, **columns}
+    if len(time) <= SHORT:
+        held = {key: values[:] for key, values in held.items()}
     return {
         axis: Record(
-            {"time_s": grid - grid[0], **{name: v for (name, of), v in columns.items() if of in ("", axis)}},
+            {name: values for (name, of), values in held.items() if of in ("", axis)},
             instrument=" ".join(filter(None, (import_map.instrument, f"axis {axis}" if axis else ""))),
             source=import_map.source,
             start=start,
@@ -87,16 +108,15 @@ def import_records(paths: Sequence[str], import_map: LoadedMap) -> dict[str, Rec
 def import_table(path: str, import_map: LoadedMap) -> "tuple[dict[str, Array], tuple[str, ...]]":
     """Read settled readings, temperature (°C) and frequency (Hz), in the order of the file, and what was changed; incomplete rows go."""
     (file,) = import_map.files
-    with closing(read_parts([path], file)) as table:
-        columns = {column.target: convert(table, column) for column in file.columns}
-        empty = _report_empty(table, file)
+    read = _read_columns([path], file, None)
+    columns = {name: values[:] for (name, _), values in read.columns.items()}
     whole = np.all([np.isfinite(values) for values in columns.values()], axis=0)
     if not whole.any():
         raise InputError(f"{path}: no row has both {' and '.join(columns)}.")
     notes = [
         f"imported with {import_map.path}; all changes are listed here",
-        f"{_name_files(table)}, {int(whole.sum())} of {len(whole)} rows",
-        *empty,
+        f"{_name_files(read.rows)}, {int(whole.sum())} of {len(whole)} rows",
+        *read.empty,
         *(_describe(column, columns[column.target], moved=False) for column in file.columns),
     ]
     notes += [f"source: {import_map.source}"] if import_map.source else []
@@ -120,40 +140,87 @@ def share_out(paths: Sequence[str], import_map: LoadedMap) -> list[Sequence[str]
 
 def _report_gaps(one: ClockedFile) -> list[str]:
     """Say where the sampling of a file has gaps."""
-    steps = np.diff(one.time)
-    if not len(steps):
+    if len(one.time) < 2:
         return []
-    gaps = np.flatnonzero(steps > one.longest_gap)
-    usual = f"{len(one.time)} rows, usually {float(np.median(steps)):.6g} s apart"
-    if not len(gaps):
-        return [f"{usual}; no gap longer than {one.longest_gap:.6g} s"]
-    longest = int(gaps[np.argmax(steps[gaps])])
+    longest, total, count, limit, most, last = 0.0, 0.0, 0, one.longest_gap, 0.0, np.nan
+    for k in portions(len(one.time)):
+        t = np.append(last, one.time[k])
+        steps = np.diff(t)
+        gaps, last = np.flatnonzero(steps > limit), t[-1]
+        count, total = count + gaps.size, total + float(steps[gaps].sum())
+        if gaps.size and (at := gaps[np.argmax(steps[gaps])], steps[at])[1] > most:
+            longest, most = float(t[at]), float(steps[at])
+    usual = f"{len(one.time)} rows, usually {one.usual_step:.6g} s apart"
+    if not count:
+        return [f"{usual}; no gap longer than {limit:.6g} s"]
     return [
-        f"{usual}; {len(gaps)} {'gap' if len(gaps) == 1 else 'gaps'} longer than {one.longest_gap:.6g} s, {float(steps[gaps].sum()):.6g} s together, the"
-        f" longest of {float(steps[longest]):.6g} s after {float(one.time[longest] - one.time[0]):.6g} s"
+        f"{usual}; {count} {'gap' if count == 1 else 'gaps'} longer than {limit:.6g} s, {total:.6g} s together, the"
+        f" longest of {most:.6g} s after {longest - one.span[0]:.6g} s"
     ]
 
 
-def read_series(paths: Sequence[str], file: FileMap) -> ClockedFile:
+@dataclass(frozen=True)
+class _Columns:
+    """The columns of a [[file]] as they stand in its raw files, with the clock that reads their times."""
+
+    rows: Rows
+    clock: Clock
+    time: Stored
+    columns: "dict[tuple[str, str], Stored]"
+    empty: list[str]  # readings that are none, in words
+
+
+def _read_columns(paths: Sequence[str], file: FileMap, folder: str | None, plain: bool = True) -> _Columns:
+    clock, rows, time, counts = Clock(file), Rows(), Stored(folder), Counter[tuple[int, str]]()
+    columns = {(column.target, column.axis): Stored(folder) for column in file.columns}
+    timed = bool(file.time_format or file.sample_period)
+    try:
+        with closing(read_tables(paths, file, plain)) as tables:
+            for table in tables:
+                rows.add(table)
+                if timed:
+                    time.append(clock.read(table))
+                found: Counter[tuple[int, str]] = Counter()
+                for column in file.columns:
+                    values, zeros = convert(table, column)
+                    columns[column.target, column.axis].append(values)
+                    found[0, column.source] = table.overloads[column.source]
+                    found[1, column.source] += zeros
+                counts.update(found)
+    except NotPlain:
+        return _read_columns(paths, file, folder, plain=False)
+    kinds = "an instrument's overload", "0, a dropout"
+    return _Columns(rows, clock, time, columns, [
+        f"{n} {'reading' if n == 1 else 'readings'} of '{name}' {'is' if n == 1 else 'are'} {kinds[kind]}: left empty"
+        for (kind, name), n in sorted(counts.items(), key=lambda one: one[0][0])
+        if n
+    ])  # fmt: skip
+
+
+def read_series(paths: Sequence[str], file: FileMap, folder: str | None = None) -> ClockedFile:
     """Read a raw file, or several that continue one another: clock corrected, columns converted, rows without a time left out."""
-    with closing(read_parts(paths, file)) as table:
-        clock = read_times(table, file)
-        columns = {(column.target, column.axis): convert(table, column) for column in file.columns}
-        empty = _report_empty(table, file)
-    repeated, told = find_repeats(table, clock.seconds, columns)
-    times, rows = drop_repeated(table, clock, file, repeated)
+    read = _read_columns(paths, file, folder)
+    time, columns = read.clock.finish(read.time, read.rows.place, folder), dict(read.columns)
+    order = Order(read.rows, file, folder)
+    if not rises(time):
+        time, *left = order.sort([time, *columns.values()])
+        columns = dict(zip(columns, left, strict=True))
+    told: list[str] = []
     for column in file.columns:
         place = column.target, column.axis
-        kept = columns[place] if len(rows) == table.rows else columns[place][rows]
-        columns[place], found = drop_doubtful(column, kept)
+        columns[place], found = drop_doubtful(column, columns[place], folder)
         told += found
-    _check_lone_values(table, columns, rows)
-    notes = (f"{_name_files(table)}, {len(rows)} rows {_name_clock(file)}", *times.notes, *empty, *told)
-    return ClockedFile(file, table.path, times.seconds, times.origin, columns, notes)
+    path = read.rows.parts[0].path
+    for (name, _), values in columns.items():
+        if all(np.isnan(values[k]).all() for k in portions(len(values))):
+            raise InputError(f"{path}: the column for {name} holds no value in any of the {len(time)} rows.")
+    first = f"{_name_files(read.rows)}, {len(time)} rows {_name_clock(file)}"
+    notes = (first, *read.clock.notes, *order.notes, *read.empty, *told)
+    return ClockedFile(file, path, time, read.clock.origin, columns, notes)
 
 
-def _name_files(table: RawTable) -> str:
-    return " then ".join(f"{' '.join(part.path.split())}, sha256 {part.sha256}" for part in table.parts)
+def _name_files(rows: Rows) -> str:
+    return " then ".join(f"{' '.join(part.path.split())}, sha256 {part.sha256}" for part in rows.parts)
 
 
 def _name_clock(file: FileMap) -> str:
@@ -164,35 +231,43 @@ def _name_clock(file: FileMap) -> str:
     return f"from '{' '.join(file.time)}' ({file.time_format})"
 
 
-def _report_empty(table: RawTable, file: FileMap) -> list[str]:
-    kinds = "an instrument's overload", "0, a dropout"
-    counts = {
-        column.source: (
-            table.count_overloads(column.source),
-            int(np.count_nonzero(_reading(table, column) == 0)) if column.conversion.never_zero else 0,
-        )
-        for column in file.columns
-    }
-    return [
-        f"{count[kind]} {'reading' if count[kind] == 1 else 'readings'} of '{name}' {'is' if count[kind] == 1 else 'are'} {what}: left empty"
-        for kind, what in enumerate(kinds)
-        for name, count in counts.items()
-        if count[kind]
-    ]
-
-
-def _reading(table: RawTable, column: ColumnMap) -> "Array":
-    return np.asarray(table.numbers(column.source) * column.scale + column.offset)
-
-
-def convert(table: RawTable, column: ColumnMap) -> "Array":
-    """Return a raw column in the unit of the record: sign × unit(reading × scale + offset)."""
-    reading = _reading(table, column)
+def convert(table: RawTable, column: ColumnMap) -> "tuple[Array, int]":
+    """Return a raw column in the unit of the record, sign × unit(reading × scale + offset), and how many readings of 0 are none."""
+    reading, zeros = np.asarray(table.numbers(column.source) * column.scale + column.offset), 0
     if column.conversion.never_zero:
-        reading[reading == 0] = np.nan
+        none = reading == 0
+        zeros = int(np.count_nonzero(none))
+        reading[none] = np.nan
     values = column.sign * column.conversion.convert(reading, *column.settings)
     check_plausible({column.target: values}, lambda row: f"{table.place(row)}, '{column.source}'")
-    return np.asarray(values, dtype=float)
+    return np.asarray(values, dtype=float), zeros
+
+
+def _resample(one: ClockedFile, values: Stored, shift: float, time: Stored, how: str, folder: str | None) -> Stored:
+    """Return a column of a file, whose clock is `shift` ahead of the record's, at the times of the record."""
+    found, held, done = Stored(folder), np.full((2, 1), np.nan), 0
+    for k in portions(len(time)):
+        before, after = min(k.start, 1), min(len(time) - k.stop, 1)
+        grid = time[k.start - before : k.stop + after]
+        # what lies farther than a gap tells nothing, but for the value that is held
+        begin = one.time.find(float(grid[0]) - shift - one.longest_gap)
+        end = one.time.find(float(grid[-1]) - shift + one.longest_gap, right=True)
+        if how == "previous" and done < begin:
+            held = _last_known(one, values, slice(done, begin), held)
+            done = begin
+        t, v = (np.append(old, new) for old, new in zip(held, (one.time[begin:end], values[begin:end]), strict=True))
+        part = resample(t + shift, v, grid, how, one.longest_gap)
+        found.append(part[before : part.size - after])
+    return found
+
+
+def _last_known(one: ClockedFile, values: Stored, rows: slice, held: "Array") -> "Array":
+    """Return time and value (2, 1) of the last reading among rows, or what was held before."""
+    for k in portions(rows.stop - rows.start):
+        at = slice(rows.start + k.start, rows.start + k.stop)
+        if (known := np.flatnonzero(np.isfinite(part := values[at]))).size:
+            held = np.array([[one.time.at(at.start + int(known[-1]))], [part[known[-1]]]])
+    return held
 
 
 def resample(time: "Array", values: "Array", grid: "Array", how: str, longest_gap: float) -> "Array":
@@ -226,16 +301,24 @@ def _bin_means(t: "Array", v: "Array", grid: "Array") -> "Array":
     return average_groups(v[inside], which[inside], len(grid))
 
 
-def _lay_grid(base: ClockedFile, import_map: LoadedMap) -> "Array":
-    """Return the times of the record by the first file's clock: its own, or a regular grid over its range."""
-    if import_map.step is None:
+def _lay_grid(base: ClockedFile, import_map: LoadedMap, folder: str | None) -> Stored:
+    """Return the times of the record, from 0 on, by the first file's clock: its own, or a regular grid over its range."""
+    first, last = base.span
+    count = len(base.time)
+    if import_map.step is not None:
+        rows = np.floor((last - first) / import_map.step) + 1
+        if not rows <= LARGEST:
+            raise InputError(
+                f"{import_map.path}: step_s = {import_map.step:g} makes {rows:.3g} rows, more than the limit of {LARGEST:,}; increase step_s."
+            )
+        count = int(rows)
+    elif first == 0:
         return base.time
-    count = np.floor((base.time[-1] - base.time[0]) / import_map.step) + 1
-    if not count <= LARGEST:
-        raise InputError(
-            f"{import_map.path}: step_s = {import_map.step:g} makes {count:.3g} rows, more than the limit of {LARGEST:,}; increase step_s."
-        )
-    return np.asarray(base.time[0] + import_map.step * np.arange(int(count)))
+    grid = Stored(folder)
+    for k in portions(count):
+        even = import_map.step
+        grid.append(base.time[k] - first if even is None else even * np.arange(float(k.start), float(k.stop)))
+    return grid
 
 
 def shift_between(base: ClockedFile, other: ClockedFile) -> float:
@@ -248,23 +331,16 @@ def shift_between(base: ClockedFile, other: ClockedFile) -> float:
             f"{lost.path}: its clock counts from 0 while another file has dates; give the time at which it started ('start' in the map)."
         )
     shift = seconds_between(base.origin, other.origin, other.path)
-    first, last = other.time[0] + shift, other.time[-1] + shift
-    if other is not base and (last < base.time[0] or first > base.time[-1]):
+    (first, last), (begin, end) = (time + shift for time in other.span), base.span
+    if other is not base and (last < begin or first > end):
         raise InputError(
-            f"{other.path}: is entirely {'before' if last < base.time[0] else 'after'} {base.path} (from {first - base.time[0]:g}"
-            f" to {last - base.time[0]:g} s of the record); check the dates, 'start' and clock_offset_s."
+            f"{other.path}: is entirely {'before' if last < begin else 'after'} {base.path} (from {first - begin:g}"
+            f" to {last - begin:g} s of the record); check the dates, 'start' and clock_offset_s."
         )
     return shift
 
 
-def _check_lone_values(table: RawTable, columns: "dict[tuple[str, str], Array]", rows: "NDArray[np.intp]") -> None:
-    """Refuse a file whose mapped columns hold no value at all."""
-    for (name, _), values in columns.items():
-        if not np.isfinite(values).any():
-            raise InputError(f"{table.path}: the column for {name} holds no value in any of the {len(rows)} rows.")
-
-
-def _describe(column: ColumnMap, values: "Array", moved: bool) -> str:
+def _describe(column: ColumnMap, values: "Array | Stored", moved: bool) -> str:
     unit = column.conversion
     steps = [f"x = '{column.source}'" + (f" (axis {column.axis})" if column.axis else "")]
     if column.scale != 1 or column.offset != 0:
@@ -277,7 +353,7 @@ def _describe(column: ColumnMap, values: "Array", moved: bool) -> str:
         steps.append("sign reversed")
     if moved:
         steps.append(f"resampled: {column.resample}")
-    empty = int(np.isnan(values).sum())
+    empty = sum(int(np.isnan(values[k]).sum()) for k in portions(len(values)))
     if empty:
         steps.append(f"{empty} of {len(values)} values missing")
     return f"{column.target} from " + "; ".join(steps)

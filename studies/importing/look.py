@@ -12,6 +12,7 @@ from studies.importing.mapping import SEPARATORS
 from studies.importing.raw import EXCEL, decode, name_columns, read_filled, read_sheet
 
 SEEN = 2000  # lines that are looked at
+HEAD = 1 << 24  # bytes
 
 
 @dataclass(frozen=True)
@@ -50,7 +51,7 @@ def look_at(path: str) -> Look:
     if excel:
         rows, encoding, separator = read_sheet(path, None)[:SEEN], "utf-8", ","
     else:
-        data = read_filled(path)
+        data = read_filled(path, HEAD)
         encoding = _find_encoding(path, data)
         lines = decode(path, data, encoding).split("\n", SEEN)[:SEEN]
         separator = _find_separator(lines)
@@ -75,7 +76,7 @@ def look_at(path: str) -> Look:
 
 def look_at_group(group: Group) -> Look:
     """Look at the first values of the channels of a group as at a table of text."""
-    columns = [channel.read(min(SEEN, channel.rows)).tolist() for channel in group.channels.values()]
+    columns = [channel.read(0, min(SEEN, channel.rows)).tolist() for channel in group.channels.values()]
     rows = [["" if x != x else repr(x) for x in row] for row in zip(*columns, strict=True)]
     units = [f"[{channel.unit}]" if channel.unit else "" for channel in group.channels.values()]
     return Look("", "", [list(group.channels), units, *rows], 0, 2, ".", "channels", group)

@@ -8,7 +8,7 @@ import io
 import itertools
 import re
 import warnings
-from collections.abc import Sequence
+from collections.abc import Generator, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -16,10 +16,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from studies.errors import InputError, MissingEnvironment, nearest
-from studies.files.columns import parse_fast
-from studies.files.reading import opened, read_bytes
+from studies.files.columns import ROWS_AT_ONCE, parse_portions
+from studies.files.reading import ANY_SIZE, PORTION, opened, read_bytes
 from studies.importing.mapping import NUMERIC_TIMES, SEPARATORS, FileMap
-from studies.importing.tables import ParsedTable, Part, RawTable
+from studies.importing.tables import ParsedTable, Part, RawTable, check_column
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -30,9 +30,13 @@ OVERFLOW = "(beyond the header)"
 MOST_CELLS = 20_000_000
 
 
+class NotPlain(Exception):
+    """A text that holds more than plain numbers: its cells must be looked at as text."""
+
+
 @dataclass(frozen=True)
 class TextTable(RawTable):
-    """A table whose cells are all text."""
+    """Rows of a table whose cells are all text."""
 
     cells: "pd.DataFrame"
     decimal: str
@@ -46,9 +50,7 @@ class TextTable(RawTable):
 
     def text(self, column: str) -> "pd.Series[str]":
         """Return the cells of one column without the blanks around them."""
-        if column not in self.cells:
-            known = [str(name) for name in self.cells if name != OVERFLOW]
-            raise InputError(f"{self.path}: there is no column '{column}'{nearest(column, known)}")
+        check_column(self.path, column, [str(name) for name in self.cells if name != OVERFLOW])
         return self.cells[column].str.strip()
 
     def is_empty(self, text: "pd.Series[str]") -> "NDArray[np.bool_]":
@@ -72,61 +74,105 @@ class TextTable(RawTable):
         return values
 
 
-def read_plain(path: str | Path, file: "FileMap") -> ParsedTable | None:
-    """Read a text of plain numbers in blocks, so that a long one costs its numbers and little more; None where cells must be looked at as text."""
+def read_text(paths: Sequence[str | Path], file: "FileMap", plain: bool = True) -> Generator[RawTable]:
+    """Yield the rows of text files that continue one another, a portion at a time; NotPlain where numbers alone do not tell them."""
+    names: list[str] = []
+    for path in paths:
+        for own, table in read_plain(path, file) if plain else read_raw(path, file):
+            if names and own != names:
+                raise InputError(f"{path}: has other columns than {paths[0]}; give it its own [[file]] table.")
+            names = own
+            yield table
+
+
+def read_plain(path: str | Path, file: "FileMap") -> Iterator[tuple[list[str], RawTable]]:
+    """Yield the columns' names and the next rows of a text of plain numbers; NotPlain where cells must be looked at as text."""
     simple = file.encoding == "utf-8" and file.separator != "space" and file.last_line is None
     if not simple or Path(path).suffix.lower() in EXCEL or (file.time and file.time_format not in NUMERIC_TIMES):
-        return None
-    with opened(path) as raw:
+        raise NotPlain
+    with opened(path, ANY_SIZE) as raw:
         head = list(itertools.islice(raw, file.data_line))
     if b"".join(head).startswith(codecs.BOM_UTF8):
-        return None
+        raise NotPlain
     try:
         names = _head(path, _split_lines(path, b"".join(head).decode(), file), file)
-        begin = sum(map(len, head[: file.data_line - 1]))
-        found = parse_fast(path, begin, names, SEPARATORS[file.separator], file.decimal)
-    except (UnicodeDecodeError, InputError):
-        return None
-    if found is None:
-        return None
-    columns, sha256 = found
-    part = Part(str(path), sha256, file.data_line, len(columns[names[0]]))
-    return ParsedTable((part,), file.missing, columns)
+        begin, done, part = sum(map(len, head[: file.data_line - 1])), 0, None
+        for _, sha256, table in parse_portions(path, begin, names, SEPARATORS[file.separator], file.decimal, ANY_SIZE):
+            part = part or Part(str(path), sha256, file.data_line)
+            columns = dict(zip(names, table, strict=True))
+            yield names, ParsedTable(part, file.missing, done, table.shape[1], columns)
+            done += table.shape[1]
+    except (ValueError, InputError):
+        raise NotPlain from None
 
 
-def read_raw(path: str | Path, file: "FileMap") -> TextTable:
-    """Read one raw file as its map describes it."""
+def read_raw(path: str | Path, file: "FileMap") -> Iterator[tuple[list[str], RawTable]]:
+    """Yield the columns' names and the next rows of one raw file, as its map describes it, with cells of text."""
     import pandas as pd
 
-    data = read_filled(path)
-    decimal = file.decimal
+    part = Part(str(path), digest(path), file.data_line)
     if Path(path).suffix.lower() in EXCEL:
         lines = read_sheet(path, file.sheet or None)
         names, rows = _head(path, lines, file), lines[file.data_line - 1 : file.last_line]
+        if not rows:
+            raise _no_rows(path, file)
         width = len(names) + 1
         if any(any(row[width - 1 :]) for row in rows):
             raise InputError(f"{path}: some rows of the sheet are longer than its header (line {file.header_line}).")
         filled = [(row + [""] * width)[:width] for row in rows]
-        cells, decimal = pd.DataFrame(filled, columns=[*names, OVERFLOW], dtype=str), "."
-    else:
-        text = decode(path, data, file.encoding)
-        lines = _split_lines(path, text, file)
-        names = _head(path, lines, file)
-        # a spreadsheet writes separators of empty columns behind the last one
-        padded = bool(file.header_line) and file.separator != "space" and not lines[-1][-1].strip()
-        cells = _read_text(path, text, file, names, padded)
-    if not len(cells):
-        raise InputError(f"{path}: there are no rows from line {file.data_line} on (data_line in the map).")
-    part = Part(str(path), hashlib.sha256(data).hexdigest(), file.data_line, len(cells))
-    return TextTable((part,), file.missing, cells, decimal)
+        cells = pd.DataFrame(filled, columns=[*names, OVERFLOW], dtype=str)
+        yield names, TextTable(part, file.missing, 0, len(cells), cells, ".")
+        return
+    with opened(path, ANY_SIZE) as raw:
+        if not raw.read(PORTION).strip():
+            raise InputError(f"{path}: the file is empty.")
+        raw.seek(0)
+        text = io.TextIOWrapper(raw, "utf-8-sig" if file.encoding == "utf-8" else file.encoding)
+        try:
+            body = _Body(path, text, list(itertools.islice(text, file.data_line)), file)
+            lines = _split_lines(path, body.head, file)
+            names = _head(path, lines, file)
+            # a spreadsheet writes separators of empty columns behind the last one
+            if file.header_line and file.separator != "space" and not lines[-1][-1].strip():
+                body.padding = re.compile(f"{re.escape(SEPARATORS[file.separator])}+$", re.MULTILINE)
+            for cells in _parse_text(path, body, file, names):
+                yield names, TextTable(part, file.missing, int(cells.index[0]), len(cells), cells, file.decimal)
+        except UnicodeError:
+            raise _wrong_encoding(path, file.encoding) from None
 
 
-def read_filled(path: str | Path) -> bytes:
-    """Read a file that must exist and hold something."""
-    data = read_bytes(path)
+def _no_rows(path: str | Path, file: "FileMap") -> InputError:
+    return InputError(f"{path}: there are no rows from line {file.data_line} on (data_line in the map).")
+
+
+def _wrong_encoding(path: str | Path, encoding: str) -> InputError:
+    """Return what is wrong with a text that is not of this encoding, with the line where lines can be told."""
+    if encoding == "utf-8":
+        with opened(path, ANY_SIZE) as raw:
+            for number, line in enumerate(raw, 1):
+                try:
+                    line.decode()
+                except UnicodeDecodeError:
+                    path = f"{path}, line {number}"
+                    break
+    return InputError(f"{path}: not {encoding} text; set 'encoding' in the map (cp1252 is common).")
+
+
+def digest(path: str | Path) -> str:
+    """Return the hash of a file."""
+    found = hashlib.sha256()
+    with opened(path, ANY_SIZE) as file:
+        while portion := file.read(PORTION):
+            found.update(portion)
+    return found.hexdigest()
+
+
+def read_filled(path: str | Path, most: int) -> bytes:
+    """Read a file that must exist and hold something, or its first lines."""
+    data = read_bytes(path, ANY_SIZE, most)
     if not data.strip():
         raise InputError(f"{path}: the file is empty.")
-    return data
+    return data if len(data) < most else data[: data.rfind(b"\n") + 1]
 
 
 def decode(path: str | Path, data: bytes, encoding: str) -> str:
@@ -202,7 +248,7 @@ def _head(path: str | Path, lines: Sequence[Sequence[str]], file: "FileMap") -> 
     if file.header_line == 0:
         width = len(lines[file.data_line - 1]) if len(lines) >= file.data_line else 0
         if not width:
-            raise InputError(f"{path}: there are no rows from line {file.data_line} on (data_line in the map).")
+            raise _no_rows(path, file)
         return [f"column {place}" for place in range(1, width + 1)]
     cells = list(lines[file.header_line - 1])
     while cells and not cells[-1].strip():
@@ -221,20 +267,40 @@ def name_columns(cells: Sequence[str]) -> list[str]:
     return names
 
 
-def _read_text(path: str | Path, text: str, file: "FileMap", names: list[str], padded: bool) -> "pd.DataFrame":
+class _Body:
+    """The rows of a text as a file that gives some whole lines at a time."""
+
+    padding: "re.Pattern[str] | None" = None
+
+    def __init__(self, path: str | Path, text: io.TextIOWrapper, head: list[str], file: "FileMap") -> None:
+        self.path, self.text = path, text
+        self.head, self.first = self._checked("".join(head)), "".join(head[file.data_line - 1 :])
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.read, "")
+
+    def read(self, _: int = -1) -> str:
+        """The next lines, as many as there are at hand."""
+        part, self.first = self.first or self.text.read(PORTION), ""
+        part += self.text.readline() if part and not part.endswith("\n") else ""
+        return self.padding.sub("", self._checked(part)) if self.padding else self._checked(part)
+
+    def _checked(self, part: str) -> str:
+        if "\0" in part:
+            raise InputError(f"{self.path}: not a text table (it holds zero bytes); is it UTF-16 or a binary file?")
+        return part
+
+
+def _parse_text(path: str | Path, body: _Body, file: "FileMap", names: list[str]) -> "Iterator[pd.DataFrame]":
+    """Yield the cells of the next rows."""
     import pandas as pd
 
     rows = None if file.last_line is None else file.last_line - file.data_line + 1
-    body = text.split("\n", file.data_line - 1)[-1] if text.count("\n") >= file.data_line - 1 else ""
-    if not body.strip():
-        raise InputError(f"{path}: there are no rows from line {file.data_line} on (data_line in the map).")
-    if padded:
-        body = re.sub(f"{re.escape(SEPARATORS[file.separator])}+$", "", body, flags=re.MULTILINE)
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error", pd.errors.ParserWarning)
-            cells = pd.read_csv(
-                io.StringIO(body),
+            with pd.read_csv(
+                body,  # type: ignore[call-overload]
                 sep=SEPARATORS[file.separator],
                 header=None,
                 names=[*names, OVERFLOW],
@@ -243,17 +309,23 @@ def _read_text(path: str | Path, text: str, file: "FileMap", names: list[str], p
                 skip_blank_lines=False,
                 index_col=False,
                 nrows=rows,
-            )
-    except (pd.errors.ParserError, pd.errors.ParserWarning, pd.errors.EmptyDataError) as error:
+                chunksize=ROWS_AT_ONCE,
+            ) as parts:
+                for cells in parts:
+                    cells = cells.fillna("")
+                    if not len(cells) or (cells.index[-1] < ROWS_AT_ONCE - 1 and not cells.to_numpy().any()):
+                        raise _no_rows(path, file)
+                    longer = cells.index[cells[OVERFLOW].str.strip() != ""]
+                    if len(longer):
+                        line = file.data_line + int(longer[0])
+                        raise InputError(
+                            f"{path}, line {line}: more values than the {len(names)} columns of the header; check separator and decimal in the map."
+                        )
+                    yield cells
+    except pd.errors.EmptyDataError:
+        raise _no_rows(path, file) from None
+    except (pd.errors.ParserError, pd.errors.ParserWarning) as error:
         raise InputError(
             f"{path}: the rows from line {file.data_line} on do not fit the {len(names)} columns of the header"
             f" ({shorten(str(error))}); check separator and decimal in the map."
         ) from None
-    cells = cells.fillna("")
-    longer = cells.index[cells[OVERFLOW].str.strip() != ""]
-    if len(longer):
-        line = file.data_line + int(longer[0])
-        raise InputError(
-            f"{path}, line {line}: more values than the {len(names)} columns of the header; check separator and decimal in the map."
-        )
-    return cells

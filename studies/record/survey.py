@@ -15,6 +15,7 @@ from compensation.lines import Line, find_line
 from compensation.noise import white_rms
 from compensation.samples import is_regular
 from compensation.spikes import find_dropouts, find_spikes, find_step, find_stuck
+from studies.files.stored import portions
 from studies.progress import told
 from studies.record import COMMANDED, Record
 from studies.record.rest import LEAST_SPIKE
@@ -132,14 +133,19 @@ def survey_record(record: Record) -> Survey:
 
 def find_range(name: str, values: Array, time: Array | None = None) -> ColumnRange:
     """Look at what is in a column, and over time at its gaps."""
-    y = values[np.isfinite(values)]
-    low, high = (float(y.min()), float(y.max())) if y.size else (np.nan, np.nan)
+    low, high, missing, some = np.inf, -np.inf, 0, np.empty(0)
+    for k in portions(len(values)):
+        part = values[k]
+        y = part[np.isfinite(part)]
+        missing += part.size - y.size
+        low, high = float(np.min(y, initial=low)), float(np.max(y, initial=high))
+        some = np.append(some, y[: MOST - some.size])
     gaps = find_gaps(time, values) if time is not None else np.empty((0, 2))
-    some = y[:MOST]
     step = find_step(some)
     places = (some - some[0]) / step if step else some
     rounded = step > 0 and bool(np.max(np.abs(places - np.round(places))) < 0.01)
-    return ColumnRange(name, low, high, step if rounded else 0.0, values.size - y.size, gaps)
+    low, high = (low, high) if low <= high else (np.nan, np.nan)
+    return ColumnRange(name, low, high, step if rounded else 0.0, missing, gaps)
 
 
 def survey_column(name: str, time: Array, values: Array) -> ColumnSurvey:

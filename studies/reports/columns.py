@@ -5,6 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from compensation.arrays import Array
+from studies.files.stored import portions
 from studies.instrument.display import display_name
 from studies.instrument.units import unit_of
 from studies.reports import style
@@ -26,13 +27,13 @@ def draw_columns(columns: Columns) -> Drawing:
     """Return a figure with every column over time, or over the first column of a table of settled readings."""
     names = list(columns)
     timed = names[0] == "time_s"
-    x, label = (columns["time_s"] / 3600, "Time (h)") if timed else (columns[names[0]], column_title(names[0]))
+    unit, label = (3600, "Time (h)") if timed else (1, column_title(names[0]))
     shown = names[1:]
-    mark = "-" if timed and len(x) >= FEW else "."
+    mark = "-" if timed and len(columns[names[0]]) >= FEW else "."
     with style.figure(len(shown), height=1.9 * len(shown) + 0.6, squeeze=False, sharex=True) as (figure, axes):
         for axis, name in zip(axes[:, 0], shown, strict=True):
-            rows = style.outline_rows(columns[name])
-            drawn = x[rows], columns[name][rows]
+            drawn = _outline(columns[names[0]], columns[name])
+            drawn = drawn[0] / unit, drawn[1]
             if timed:
                 gaps = find_gaps(columns["time_s"], columns[name]) / 3600
                 at = np.searchsorted(drawn[0], gaps[:, 0], side="right")  # the line is interrupted in gaps
@@ -47,17 +48,32 @@ def draw_columns(columns: Columns) -> Drawing:
     return made
 
 
+def _outline(x: Array, y: Array) -> tuple[Array, Array]:
+    """Return the rows of a column that are drawn; of a long one those of every portion, and of them again."""
+    parts = [(x[k], y[k], style.outline_rows(y[k])) for k in portions(len(x))]
+    a, b = (np.concatenate([part[i][part[2]] for part in parts]) for i in (0, 1))
+    rows = style.outline_rows(b) if len(parts) > 1 else np.arange(len(b))
+    return a[rows], b[rows]
+
+
 def find_gaps(time: Array, values: Array) -> Array:
     """Return begin and end of every gap of a column, (k, 2): the times of the values beside it, or the ends of the record."""
-    rows = np.flatnonzero(np.isfinite(values))
-    if rows.size < 2:
-        return np.array([[time[0], time[-1]]]) if time.size > 1 else np.empty((0, 2))
-    steps = np.diff(time[rows] if rows.size < time.size else time)
-    usual = float(np.median(steps))
-    at = np.flatnonzero(steps > min(LONG, SKIPPED) * usual)
-    at = at[(steps[at] > LONG * usual) | ((rows[at + 1] - rows[at] > 1) & (steps[at] > SKIPPED * usual))]
-    inner = np.column_stack([time[rows[at]], time[rows[at + 1]]])
-    ends = [(time[0], time[rows[0]]), (time[rows[-1]], time[-1])]
-    outer = [end for end in ends if end[1] - end[0] > usual / 2]
-    found = np.concatenate([inner, np.array(outer).reshape(-1, 2)])
-    return np.asarray(found[np.argsort(found[:, 0])])
+    count = len(time)
+    if count < 2:
+        return np.empty((0, 2))
+    found, usual, last, row = [], np.nan, float(time[:1][0]), -1
+    first, end = last, float(time[count - 1 : count][0])
+    for k in portions(count):
+        known = np.flatnonzero(np.isfinite(values[k]))
+        t, rows = np.append(last, time[k][known]), np.append(row, k.start + known)
+        if row < 0 and known.size:
+            usual = float(np.median(np.diff(t[1:]))) if known.size > 1 else usual
+            found += [(first, t[1])] if t[1] - first > usual / 2 else []
+            t, rows = t[1:], rows[1:]
+        steps = np.diff(t)
+        far = (steps > LONG * usual) | ((np.diff(rows) > 1) & (steps > SKIPPED * usual))
+        found += zip(t[:-1][far].tolist(), t[1:][far].tolist(), strict=True)
+        last, row = (float(t[-1]), int(rows[-1])) if rows.size else (last, row)
+    if np.isnan(usual):
+        return np.array([[first, end]])
+    return np.array(found + ([(last, end)] if end - last > usual / 2 else [])).reshape(-1, 2)
