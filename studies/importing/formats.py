@@ -49,6 +49,7 @@ def read(_, item):
 with h5py.File(sys.argv[1], "r") as file:
     file.visititems(read)
 """
+FRAGMENT = 1 << 24  # bytes of an MDF file at once
 PATIENCE, PACE = 20.0, 1e7  # s for which the library may read a file, and bytes for which it gets a second more
 
 
@@ -73,6 +74,28 @@ class Channel:
     read: Callable[[int, int], Array] = field(default=lambda *_: np.empty(0), repr=False)
     clock: Clock | None = None
     refused: str = ""
+
+
+class _Stream:
+    """The values of a channel that a library gives in portions, read on from where they were."""
+
+    def __init__(self, begin: Callable[[], Iterator[Any]]) -> None:
+        self.begin, self.parts = begin, begin()
+        self.at, self.left = 0, np.empty(0)  # place of what is left of a portion
+
+    def read(self, begin: int, end: int) -> Any:
+        """Return the values from one row to before another."""
+        if begin < self.at:
+            self.parts, self.at, self.left = self.begin(), 0, np.empty(0)
+        found = [self.left]
+        while self.at + sum(map(len, found)) < end and (part := next(self.parts, None)) is not None:
+            found.append(part)
+            while len(found) > 1 and self.at + len(found[0]) <= begin:
+                self.at += len(found.pop(0))
+        values = np.concatenate(found) if len(found) > 1 else found[0]
+        self.left, first = values[end - self.at :], begin - self.at
+        values, self.at = values[first : end - self.at], end
+        return values
 
 
 def read_tdms(path: str, files: ExitStack) -> Iterator[Channel]:
@@ -109,7 +132,8 @@ def stamp_clock(key: str, read: Callable[[int, int], Any], utc: bool) -> Clock |
 
 def read_mdf(path: str, files: ExitStack) -> Iterator[Channel]:
     """Channels of an MDF file, with the master channel of their group as clock; readings marked invalid are missing."""
-    file = files.enter_context(load_library("asammdf", path, "MDF").MDF(path))
+    file = files.enter_context(load_library("asammdf", path, "MDF").MDF(files.enter_context(opened(path, ANY_SIZE))))
+    file.configure(read_fragment_size=FRAGMENT)
     names: dict[str, int] = {}
     for place, group in enumerate(file.groups):
         master, rows = file.masters_db.get(place), int(group.channel_group.cycles_nr)
@@ -121,7 +145,7 @@ def read_mdf(path: str, files: ExitStack) -> Iterator[Channel]:
         for index, channel in enumerate(group.channels):
             if index == master or not rows:
                 continue
-            read = partial(_mdf_values, file, place, index)
+            read = _Stream(partial(_mdf_values, file, place, index)).read
             if file.get(group=place, index=index, record_count=1).samples.dtype.kind in NUMBERS:
                 yield Channel(name, channel.name, str(channel.unit or ""), rows, read, clock)
 
@@ -130,13 +154,12 @@ def _mdf_times(file: Any, place: int, begin: int, end: int) -> Array:
     return np.asarray(file.get_master(place, record_offset=begin, record_count=end - begin), dtype=float)
 
 
-def _mdf_values(file: Any, place: int, index: int, begin: int, end: int) -> Array:
-    some = {"record_offset": begin, "record_count": end - begin}
-    signal = file.get(group=place, index=index, ignore_invalidation_bits=True, **some)
-    values = np.array(signal.samples, dtype=float)
-    if (invalid := getattr(signal, "invalidation_bits", None)) is not None:
-        values[np.asarray(invalid, dtype=bool)] = np.nan
-    return values
+def _mdf_values(file: Any, place: int, index: int) -> Iterator[Array]:
+    for samples, invalid in file.iter_get(group=place, index=index, samples_only=True):
+        values = np.array(samples, dtype=float)
+        if invalid is not None:
+            values[np.asarray(invalid, dtype=bool)] = np.nan
+        yield values
 
 
 def read_hdf5(path: str, files: ExitStack) -> Iterator[Channel]:
@@ -243,43 +266,16 @@ def read_parquet(path: str, files: ExitStack) -> Iterator[Channel]:
     clock = None
     for one in schema:
         if str(one.type).startswith("timestamp") and rows and clock is None:
-            clock = stamp_clock(one.name, _Stream(file, one.name).read, utc="tz=" in str(one.type))
+            clock = stamp_clock(one.name, _Stream(partial(_parquet_values, file, one.name)).read, utc="tz=" in str(one.type))
     for one in schema:
         if str(one.type).startswith(("double", "float", "int", "uint", "bool", "halffloat")):
             about = {key.decode(): value.decode(errors="replace") for key, value in (one.metadata or {}).items()}
-            yield Channel("", one.name, find_unit(about), rows, _Stream(file, one.name).read, clock)
+            yield Channel("", one.name, find_unit(about), rows, _Stream(partial(_parquet_values, file, one.name)).read, clock)
 
 
-class _Stream:
-    """A column of a Parquet file, read on from where it was."""
-
-    def __init__(self, file: Any, name: str) -> None:
-        self.file, self.name = file, name
-        self.parts: Iterator[Any] = iter(())
-        self.next, self.left = -1, np.empty(0)
-
-    def read(self, begin: int, end: int) -> Any:
-        """Return the values from one row to before another; only what lies before them is read again."""
-        if begin != self.next:
-            self.parts, self.left, self.next = self._from(begin)
-        found = [self.left]
-        while sum(map(len, found)) < end - begin and (part := next(self.parts, None)) is not None:
-            found.append(part.column(0).to_numpy(zero_copy_only=False))
-        values = np.concatenate(found[len(found) > 1 and not len(found[0]) :])
-        self.next, self.left = end, values[end - begin :]
-        return values[: end - begin]
-
-    def _from(self, begin: int) -> tuple[Iterator[Any], Any, int]:
-        counts = [self.file.metadata.row_group(k).num_rows for k in range(self.file.metadata.num_row_groups)]
-        ends = np.cumsum(counts)
-        first = int(np.searchsorted(ends, begin, side="right"))
-        groups = list(range(first, len(counts)))
-        parts = self.file.iter_batches(batch_size=PORTION, row_groups=groups, columns=[self.name])
-        passed, before = begin - (int(ends[first]) - counts[first] if groups else begin), np.empty(0)
-        while passed > 0:
-            before = next(parts).column(0).to_numpy(zero_copy_only=False)
-            passed -= len(before)
-        return parts, before[len(before) + passed :] if passed else before[:0], begin
+def _parquet_values(file: Any, name: str) -> Iterator[Any]:
+    for part in file.iter_batches(batch_size=PORTION, columns=[name]):
+        yield part.column(0).to_numpy(zero_copy_only=False)
 
 
 def even_clock(about: Mapping[str, Any]) -> Clock | None:
