@@ -1,9 +1,9 @@
 """Decay of an amplitude or a power that was recorded without its phase, such as a spectrum analyser's trace in dB.
 
-    P(t) = a² = S e^{−2t/τ} + F + e(t),   var e = v m² + (2 m F − F²)/M,   m = S e^{−2t/τ} + F
+    P(t) = a² = S e^{−2t/τ} + F + e(t),   var e = v m² + w (m − F/2),   m = S e^{−2t/τ} + F
 
-F is the power of the noise floor, v the scatter of the reading, M the number of looks that a row averages (1: |signal + noise|²). The
-sum of squares over this variance is made least, which asks no more of the noise than that: a logarithm of noise is biased, its power
+F is the power of the noise floor, v the scatter of the reading, w the noise that adds to the amplitude: of |signal + noise|² it is
+2F, of a mean of M such looks 2F/M. The sum of squares over this variance is made least, which asks no more of the noise than that: a logarithm of noise is biased, its power
 is not. A floor is fitted where it pays, from all rows after the release.
 """
 
@@ -60,7 +60,7 @@ def analyse_trace(time: ArrayLike, amplitude: ArrayLike, frequency: float | None
         said.append(
             f"After {t[first + rows - 1]:.4g} s the decay is not exponential (interference, a second mode, or amplitude dependence): only the part before is used."
         )
-    if fit.floor:
+    if above < rows:
         under = 10 * np.log10(fit.signal(x[:1])[0] / fit.floor)
         said.append(
             f"The noise floor is {under:.3g} dB below the start, above the decay from {end:.4g} s on; it is fitted with it."
@@ -107,13 +107,13 @@ def _find_release(t: Array, L: Array) -> int:
 
 @dataclass(frozen=True)
 class _Power:
-    """A fitted power, as in the head of the module, with 1/M for M; the `bound` of 1/τ in white noise, and the factor to its interval."""
+    """A fitted power, as in the head of the module; the `bound` of 1/τ in white noise, and the factor to its interval."""
 
     level: float  # ln S
     rate: float  # 1/τ
     floor: float  # F
     scatter: float = 1.0
-    looks: float = 0.0
+    noise: float = 0.0
     bound: float = 0.0
     widening: float = 1.0
 
@@ -125,7 +125,7 @@ class _Power:
 
     def variance(self, x: Array) -> Array:
         m = self.mean(x)
-        return np.asarray(self.scatter * m**2 + self.looks * (2 * m * self.floor - self.floor**2))
+        return np.asarray(self.scatter * m**2 + self.noise * (m - self.floor / 2))
 
     def slopes(self, x: Array) -> Array:
         """Derivatives of the mean by ln S, 1/τ and F."""
@@ -170,7 +170,8 @@ def _iterate(fit: _Power, x: Array, y: Array, free: int) -> _Power:
         begin = np.array([fit.level, fit.rate, max(fit.floor, 1e-12)][:free])
         least = np.array([-np.inf, -np.inf, 0.0][:free])
         found = scipy.optimize.least_squares(misfit, begin, slopes, (least, np.inf), x_scale="jac", max_nfev=50)
-        fit = _fit_scatter(put(found.x), x[some], y[some])
+        fit = put(found.x)
+        fit = _fit_scatter(replace(fit, floor=max(fit.floor, 1e-12) if free == 3 else fit.floor), x[some], y[some])
         if abs(fit.rate - old.rate) < 1e-6 * abs(old.rate):
             break
     r, V = y - fit.mean(x), fit.variance(x)
@@ -196,21 +197,21 @@ def _cost(fit: _Power, x: Array, y: Array) -> float:
 
 
 def _fit_scatter(fit: _Power, x: Array, y: Array) -> _Power:
-    """Return the fit with its most probable v and 1/M."""
-    usual = float(np.median(((y - fit.mean(x)) / fit.mean(x)) ** 2)) + 1e-12
-    if not fit.floor:
-        return replace(fit, scatter=float(np.mean(((y - fit.mean(x)) / fit.mean(x)) ** 2)) + 1e-12, looks=0.0)
+    """Return the fit with its most probable v and w."""
+    away = (y / fit.mean(x) - 1) ** 2
+    usual = float(np.median(away)) + 1e-12
+    if not fit.floor:  # without a floor there is no noise that adds to the amplitude
+        return replace(fit, scatter=float(np.mean(away)) + 1e-12)
 
     def put(point: Array) -> _Power:
-        return replace(fit, scatter=float(np.exp(point[0])), looks=float(np.exp(point[1])))
+        return replace(fit, scatter=float(np.exp(point[0])), noise=float(np.exp(point[1])))
 
     def cost(point: Array) -> float:
         return _cost(put(point), x, y)
 
-    limits = [(-40.0, 5.0), (-15.0, 0.0)]
-    start = np.log([fit.scatter if fit.looks else usual, fit.looks or 0.5])
-    solved = scipy.optimize.minimize(cost, start, method="Nelder-Mead", bounds=limits)
-    return put(solved.x)
+    start = np.log([fit.scatter if fit.noise else usual, fit.noise or fit.floor])
+    limits = [(-40.0, 5.0), (-60.0, 5.0)]
+    return put(scipy.optimize.minimize(cost, start, method="Nelder-Mead", bounds=limits).x)
 
 
 def _find_end(fit: _Power, x: Array, y: Array) -> int:
