@@ -16,7 +16,7 @@ PAYS = 20.0  # least fall of −2 ln L, over the widening², for a second mode o
 NAMED = (1, 2)
 """Numbers that a rate depending on the amplitude and a drift have: the fall that noise passes once in a thousand records is χ² of so many."""
 WHITE = 1.3
-TONES, DEGREES = 3, 8
+TONES, DEGREES, WANDERS = 3, 8, (16, 32, 64)
 SMALL = 1e-4  # radians of the trial step of a curved rate
 TAIL = 0.3  # last part of a window, in which a weak tone stands out of a decay
 
@@ -140,6 +140,20 @@ def _rivals(envelope: Envelope, fit: DecayFit) -> Iterator[tuple[float, Terms, G
         shapes = drift_shapes(envelope, terms.drift + 2)[-2:]
         gain, step = promise(*(1j * shape * z for shape in shapes))
         yield gain, replace(terms, drift=terms.drift + 2), replace(found, drift=(*found.drift, *step.tolist()))
+    # a course of any kind: the phase that the data are ahead of the model, in both channels alike
+    shared = np.sum((r + z) * z.conj(), axis=0)
+    ahead, size = np.unwrap(np.angle(shared)), np.sqrt(np.abs(shared))
+    for degrees in (one for one in WANDERS if terms.drift < one < time.size / 4):
+        columns = np.vstack([np.ones_like(time), time, drift_shapes(envelope, degrees)])
+        level, slope, *more = np.linalg.lstsq((columns * size).T, ahead * size, rcond=None)[0].tolist()
+        left = r + z - z * np.exp(1j * (np.array([level, slope, *more]) @ columns))
+        gain = (
+            2 * time.size * float(np.sum(np.log(np.mean(np.abs(r) ** 2, axis=1) / np.mean(np.abs(left) ** 2, axis=1))))
+        )
+        decay = replace(found.decay, detuning=found.decay.detuning + slope)
+        drift = (np.resize([*found.drift, *np.zeros(degrees)], degrees) + more).tolist()
+        start = fit.start * np.exp(1j * level)
+        yield gain, replace(terms, drift=degrees), replace(found, decay=decay, start=start, drift=tuple(drift))
     if terms.tones < TONES:
         late = time > (1 - TAIL) * time[-1]
         lines = {find_line(envelope.time, fit.residual), find_line(envelope.time[late], envelope.values[:, late])}

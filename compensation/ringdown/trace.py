@@ -102,7 +102,12 @@ def _find_release(t: Array, L: Array) -> int:
         left = float(np.sum((flat - flat.mean()) ** 2) + np.sum(falls**2))
         if left < best:
             best, knee = left, k
-    return knee * size if knee > 2 else 0
+    if knee <= 2:
+        return 0
+    falls = -np.diff(L[knee * size : (knee + 3) * size])  # the knee lies within a mean: a fall beside it is the drive's
+    at = int(np.argmax(falls))
+    sudden_row = falls[at] > max(DROP, 6 * float(np.median(np.abs(falls))))
+    return knee * size + (at + 1 if sudden_row else 0)
 
 
 @dataclass(frozen=True)
