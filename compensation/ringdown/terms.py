@@ -10,12 +10,12 @@ from compensation.arrays import Array, Complex
 from compensation.ringdown.envelope import Envelope
 from compensation.ringdown.fit import CURVED, DecayFit, Guess, Terms, drift_shapes, fit_decay
 from compensation.ringdown.model import swing
-from compensation.ringdown.whiteness import RARE, Leftover, examine, find_line
+from compensation.ringdown.whiteness import Leftover, examine, find_line
 
 PAYS = 20.0  # least fall of −2 ln L, over the widening², for a second mode or a tone, beside 2 ln N
-NAMED = (1, 2)
-"""Numbers that a rate depending on the amplitude and a drift have: the fall that noise passes once in a thousand records is χ² of so many."""
-WHITE = 1.3
+NAMED, RARER = (1, 2), 1e-4
+"""Numbers that a rate depending on the amplitude and a drift have: the fall that noise passes with the probability `RARER` is χ² of so many. A term that is not there costs six times the bound."""
+WHITE, WANDERED = 1.3, 3.0
 TONES, DEGREES, WANDERS = 3, 8, (16, 32, 64)
 SMALL = 1e-4  # radians of the trial step of a curved rate
 TAIL = 0.3  # last part of a window, in which a weak tone stands out of a decay
@@ -32,6 +32,12 @@ class Found:
 def is_plain(left: Leftover) -> bool:
     """Whether a residual is white, from its first row on."""
     return not left.early and left.widening < WHITE
+
+
+def describes(found: Found) -> bool:
+    """Whether one decay describes a window: a plain residual, or what is left of a frequency that wanders."""
+    wanders = found.fit.terms.drift > DEGREES and not found.left.early
+    return is_plain(found.left) or (wanders and found.left.widening < WANDERED)
 
 
 def fit_terms(envelope: Envelope, known: tuple[Terms, Guess] | None = None, most: int = 12) -> Found:
@@ -59,7 +65,7 @@ def _price(fit: DecayFit, terms: Terms) -> float:
     """Return what terms must save beyond those of a fit."""
     tones = terms.tones - fit.terms.tones
     more = np.array([len(terms.curved) - len(fit.terms.curved), (terms.drift - fit.terms.drift + 1) // 2])
-    return float(scipy.special.chdtri(NAMED, RARE) @ more) + tones * (PAYS + 2 * float(np.log(fit.envelope.time.size)))
+    return float(scipy.special.chdtri(NAMED, RARER) @ more) + tones * (PAYS + 2 * float(np.log(fit.envelope.time.size)))
 
 
 def _extend(envelope: Envelope, fit: DecayFit, most: int) -> DecayFit:
@@ -95,7 +101,7 @@ def _drop(envelope: Envelope, fit: DecayFit) -> DecayFit:
     poorer = [
         (replace(terms, curved=tuple(one for one in terms.curved if one != name)), found) for name in terms.curved
     ]
-    poorer += [(replace(terms, drift=0), replace(found, drift=()))] if terms.drift else []
+    poorer += [(replace(terms, drift=0), replace(found, drift=()))] if 0 < terms.drift <= DEGREES else []
     for k in range(terms.tones):
         tones, sizes = ((*each[:k], *each[k + 1 :]) for each in (found.tones, found.sizes))
         poorer.append((replace(terms, tones=terms.tones - 1), replace(found, tones=tones, sizes=sizes)))
@@ -143,7 +149,7 @@ def _rivals(envelope: Envelope, fit: DecayFit) -> Iterator[tuple[float, Terms, G
     # a course of any kind: the phase that the data are ahead of the model, in both channels alike
     shared = np.sum((r + z) * z.conj(), axis=0)
     ahead, size = np.unwrap(np.angle(shared)), np.sqrt(np.abs(shared))
-    for degrees in (one for one in WANDERS if terms.drift < one < time.size / 4):
+    for degrees in (one for one in WANDERS if terms.drift < one < time.size / 4 and not terms.tones):
         columns = np.vstack([np.ones_like(time), time, drift_shapes(envelope, degrees)])
         level, slope, *more = np.linalg.lstsq((columns * size).T, ahead * size, rcond=None)[0].tolist()
         left = r + z - z * np.exp(1j * (np.array([level, slope, *more]) @ columns))
@@ -154,7 +160,7 @@ def _rivals(envelope: Envelope, fit: DecayFit) -> Iterator[tuple[float, Terms, G
         drift = (np.resize([*found.drift, *np.zeros(degrees)], degrees) + more).tolist()
         start = fit.start * np.exp(1j * level)
         yield gain, replace(terms, drift=degrees), replace(found, decay=decay, start=start, drift=tuple(drift))
-    if terms.tones < TONES:
+    if terms.tones < TONES and terms.drift <= DEGREES:  # no line can be told from a frequency that wanders
         late = time > (1 - TAIL) * time[-1]
         lines = {find_line(envelope.time, fit.residual), find_line(envelope.time[late], envelope.values[:, late])}
         for line in lines - {None}:

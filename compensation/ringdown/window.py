@@ -4,7 +4,7 @@ import numpy as np
 
 from compensation.ringdown.envelope import Envelope, estimate_noise, thin
 from compensation.ringdown.fit import carry_over
-from compensation.ringdown.terms import Found, fit_terms, is_plain
+from compensation.ringdown.terms import Found, describes, fit_terms
 from compensation.samples import block_means
 
 LATER = (0.6, 0.35, 0.15)  # parts of the record after which a free decay is looked for, where the whole is none
@@ -65,7 +65,7 @@ def find_free(whole: Envelope) -> Found:
             tried, None if known is None else (known.fit.terms, carry_over(known.fit, tried)), NEXT if known else most
         )
         judged.append((found.left.widening + (10.0 if found.left.early else 0.0), start, found))
-        return found if is_plain(found.left) else None
+        return found if describes(found) else None
 
     best, good, bad = describe(first, most=EASY), first, first
     if best is None:
