@@ -266,11 +266,15 @@ def read_parquet(path: str, files: ExitStack) -> Iterator[Channel]:
     clock = None
     for one in schema:
         if str(one.type).startswith("timestamp") and rows and clock is None:
-            clock = stamp_clock(one.name, _Stream(partial(_parquet_values, file, one.name)).read, utc="tz=" in str(one.type))
+            clock = stamp_clock(
+                one.name, _Stream(partial(_parquet_values, file, one.name)).read, utc="tz=" in str(one.type)
+            )
     for one in schema:
         if str(one.type).startswith(("double", "float", "int", "uint", "bool", "halffloat")):
             about = {key.decode(): value.decode(errors="replace") for key, value in (one.metadata or {}).items()}
-            yield Channel("", one.name, find_unit(about), rows, _Stream(partial(_parquet_values, file, one.name)).read, clock)
+            yield Channel(
+                "", one.name, find_unit(about), rows, _Stream(partial(_parquet_values, file, one.name)).read, clock
+            )
 
 
 def _parquet_values(file: Any, name: str) -> Iterator[Any]:

@@ -5,12 +5,15 @@ import json
 import re
 import sys
 import tomllib
+from zoneinfo import ZoneInfo
 
 import numpy as np
 import pytest
 
 from studies.cli import main
 from studies.errors import InputError, MissingEnvironment
+from studies.files import columns, stored
+from studies.importing import clock, raw
 from studies.importing.draft import draft_map
 from studies.importing.join import import_records, resample
 from studies.importing.mapping import load_map
@@ -750,10 +753,44 @@ def test_plain_numbers_are_read_as_numbers_and_equal_to_the_last_digit_what_is_r
     )
     (file,) = load_map(written).files
     plain, text = (next(one)[1] for one in (read_plain(raw, file), read_raw(raw, file)))
-    assert plain.part == text.part and plain.rows == text.rows
+    assert (plain.part, plain.rows) == (text.part, text.rows)
     for name in ("t", "T", "f"):
         np.testing.assert_array_equal(plain.numbers(name), text.numbers(name))
         assert plain.overloads[name] == text.overloads[name] == (name == "f")
     raw.write_text(raw.read_text() + between.join(["500", "see note", "1"]) + "\n")
     with pytest.raises(NotPlain):
         list(read_plain(raw, file))
+
+
+def test_portions_change_nothing(tmp_path, monkeypatch):
+    """Stamps of summer and winter time, repeated times, and a counter brought onto them: whole, and 7 rows at a time."""
+    begin = datetime.datetime(2026, 10, 25, 0, 30, tzinfo=datetime.UTC)
+    zone = ZoneInfo("Europe/Berlin")
+    stamps = [(begin + datetime.timedelta(seconds=20.0 * (k // 2))).astimezone(zone) for k in range(600)]
+    rows = [f"{stamp:%Y-%m-%d %H:%M:%S},{20 + k / 100}" for k, stamp in enumerate(stamps)]
+    (tmp_path / "one.csv").write_text("t,T\n" + "\n".join(rows) + "\n")
+    rows = [f"{7.0 * k},{4430 + k / 1e3 if k % 50 > 9 else ''}" for k in range(900)]
+    (tmp_path / "two.csv").write_text("t,f\n" + "\n".join(rows) + "\n")
+    column = "[[file.column]]\nfrom = '{}'\nto = '{}'\nunit = '{}'\n"
+    found = []
+    for how in ("linear", "mean", "nearest", "previous"):
+        (tmp_path / "map.toml").write_text(
+            'schema = "hrg.map/1"\n[[file]]\ntime = "t"\ntime_format = "iso"\ntimezone = "Europe/Berlin"\nrepeated_times = "spread"\n'
+            + column.format("T", "housing_temperature_degC", "degC")
+            + '[[file]]\ntime = "t"\ntime_format = "s"\nstart = 2026-10-25T00:20:00Z\n'
+            + column.format("f", "frequency_Hz", "Hz")
+            + f'resample = "{how}"\n'
+        )
+        paths, loaded = [str(tmp_path / "one.csv"), str(tmp_path / "two.csv")], load_map(tmp_path / "map.toml")
+        whole = import_records(paths, loaded)[""]
+        with monkeypatch.context() as patch:
+            for module in (clock, stored, columns):
+                patch.setattr(module, "ROWS_AT_ONCE" if module is columns else "PORTION", 7)
+            patch.setattr(raw, "ROWS_AT_ONCE", 7)
+            patch.setattr(columns, "FEW", 4)
+            found.append((whole, import_records(paths, loaded)[""]))
+    for whole, parts in found:
+        assert np.ptp(np.diff(whole["time_s"])) < 1e-6
+        assert whole.comments == parts.comments
+        for name in whole.columns:
+            np.testing.assert_allclose(parts[name], whole[name], rtol=1e-14, atol=0)
