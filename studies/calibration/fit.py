@@ -90,7 +90,7 @@ def fit(problem: CardProblem, start: Array | None = None, progress: Progress = l
         linear = _Linear.of(problem, state, noise, rows)
         size = linear.fall(linear.step(np.inf)[0])
         progress(f"step {step}: −2 ln L decreases by about {size:.2g}")
-        if size < CLOSE and straight and step > 3:
+        if size < CLOSE and straight and step > 2:
             converged = True
             break
         reached, radius, whole = _advance(problem, state, linear, radius, noise, rows)
