@@ -37,6 +37,13 @@ class PolynomialCurve:
         shift = np.asarray(x, dtype=float) - self.reference
         return np.asarray(np.polynomial.polynomial.polyval(shift, self.coefficients), dtype=float)
 
+    def inverse(self, y: ArrayLike) -> Array:
+        """Return x at y, on the rising branch of a parabola."""
+        c0, c1, c2 = np.pad(self.coefficients, (0, 3))[:3]
+        shift = c0 - np.asarray(y, dtype=float)
+        with np.errstate(invalid="ignore"):
+            return np.asarray(self.reference - 2 * shift / (c1 + np.sqrt(c1**2 - 4 * c2 * shift)))
+
     def refuse_outside(self, x: Array, name: str, show: Callable[[float], str]) -> None:
         """Raise when x leaves the fitted range by more than `MARGIN` of it; `show` writes an x for people."""
         beyond = MARGIN * (self.highest - self.lowest)
@@ -46,6 +53,29 @@ class PolynomialCurve:
                 f"the {name} runs from {show(low)} to {show(high)}, but the chain was fitted between "
                 f"{show(self.lowest)} and {show(self.highest)}; allow extrapolation or calibrate over that range."
             )
+
+
+@dataclass(frozen=True)
+class Warming:
+    """An output y that is another while the temperature rises (w = 1) than while it falls (w = −1): y + w (b + g (y − a))."""
+
+    null: float  # a, in the unit of the output
+    offset: float  # b
+    gain: float  # g
+    turn: float  # K by which the temperature goes back before it counts as turned
+
+    def undo(self, output: Array, temperature: Array) -> Array:
+        """Return the output without it; until the temperature has moved by `turn`, w = 0."""
+        way, low, high, found = 0, np.inf, -np.inf, []
+        for T in temperature.tolist():
+            low, high = min(low, T), max(high, T)
+            if way < 1 and T - low > self.turn:
+                way, high = 1, T
+            elif way > -1 and high - T > self.turn:
+                way, low = -1, T
+            found.append(way)
+        w = np.array(found)
+        return np.asarray((output - w * (self.offset - self.gain * self.null)) / (1 + w * self.gain))
 
 
 @dataclass(frozen=True)
@@ -60,6 +90,7 @@ class BellChain:
     scale_over_temperature: PolynomialCurve  # factor (1) over kelvin: eq. (36)
     taps: Array  # array, FIR coefficients, empty for none
     sampling: float  # step (s) that the taps were designed for
+    warming: Warming | None = None  # taken out of the output before all steps
 
     @property
     def delay(self) -> float:
@@ -83,7 +114,7 @@ def apply_chain(
 ) -> ChainOutput:
     """Return the rate after each step of eq. (32), and after the filter."""
     t, A, T = read_columns(time=time, output=output, temperature=temperature)
-    rough = chain.scale * (A - chain.null)
+    rough = chain.scale * ((chain.warming.undo(A, T) if chain.warming else A) - chain.null)
     straight = rough - chain.bias.value(T)
     if not extrapolate:
         chain.bias.refuse_outside(T, "temperature", _show_celsius)
@@ -99,14 +130,10 @@ def apply_chain(
 
 
 def invert_chain(chain: BellChain, rate: ArrayLike, temperature: ArrayLike) -> Array:
-    """Return the raw output (counts) that the chain, without its filter, turns into this rate (rad/s), on the rising branch of (35)'s parabola."""
+    """Return the raw output (counts) that the chain, without its filter and warming, turns into this rate (rad/s)."""
     T = np.asarray(temperature, dtype=float)
     target = np.asarray(rate, dtype=float) / chain.scale_over_temperature.value(T)
-    c0, c1, c2 = np.pad(chain.scale_over_rate.coefficients, (0, 3))[:3]
-    shift = c0 - target
-    root = np.sqrt(c1**2 - 4 * c2 * shift)
-    straight = chain.scale_over_rate.reference - 2 * shift / (c1 + root)
-    counts: Array = (straight + chain.bias.value(T)) / chain.scale + chain.null
+    counts: Array = (chain.scale_over_rate.inverse(target) + chain.bias.value(T)) / chain.scale + chain.null
     if not np.all(np.isfinite(counts)):
         raise CompensationError("the scale over rate has a turning point in this range and cannot be inverted.")
     return counts
@@ -128,8 +155,16 @@ def design_smoother(sampling: float, cutoff: float, order: int = 50) -> Array:
 
 
 def smooth(values: ArrayLike, taps: Array) -> Array:
-    """Return the causal FIR output, settled on the first value at the start, as firmware computes it."""
+    """Return the causal FIR output, settled on the first value at the start, as firmware computes it.
+
+    Unknown values (NaN) stay so and leave the mean of the others; a value after which less than half of the weight is known stays as it is.
+    """
     x = np.asarray(values, dtype=float)
     if not len(taps):
         return x
-    return np.convolve(np.r_[np.full(len(taps) - 1, x[0]), x], taps, mode="valid")
+    past = np.r_[np.full(len(taps) - 1, x[0]), x]
+    known = np.isfinite(past)
+    if known.all():
+        return np.convolve(past, taps, mode="valid")
+    total, share = (np.convolve(one, taps, mode="valid") for one in (np.where(known, past, 0.0), known.astype(float)))
+    return np.where(np.isfinite(x) & (share > 0.5), total / np.maximum(share, 0.5), x)

@@ -97,6 +97,12 @@ class RateCurve(PolynomialCurve):
         u = (np.asarray(x, dtype=float) - a) / k
         return np.where(np.abs(u) < self.blind, np.nan, FORMS[self.form].rate(u, k, s))
 
+    def inverse(self, y: ArrayLike) -> Array:
+        """Return the output at a rate."""
+        a, *sizes = self.coefficients
+        columns = FORMS[self.form].columns(np.asarray(y, dtype=float), sizes[-1])
+        return np.asarray(a + sum(size * column for size, column in zip(sizes, columns, strict=False)))
+
 
 def fit_rate_curve(form: str, averaged: float, measured: Array, rate: Array) -> RateCurve:
     """Fit a form to the measured over the applied rate, means of so many rows; errors as of the linear form nearby."""

@@ -2,6 +2,7 @@
 
 import math
 import re
+from dataclasses import replace
 from typing import Any
 
 from compensation.bell import PolynomialCurve
@@ -57,7 +58,13 @@ def fit_scale(
     records = [read_record(path) for path in data]
     study = study_scale(records, None if no_filter else cutoff, order)
     sources = tuple(source_of(record) for record in records)
-    model = save_scale(study.chain, study.output, study.temperature_column, sources, "hrg-workbench, hrg fit scale")
+    model = save_scale(
+        replace(study.chain, warming=study.warming),
+        study.output,
+        study.temperature_column,
+        sources,
+        "hrg-workbench, hrg fit scale",
+    )
     keep_model(model, save)
     parts: dict[str, dict[str, dict[str, Any]]] = {
         part.name: {
@@ -132,7 +139,7 @@ def _law_words(law: RateLaw, curve: PolynomialCurve) -> str:
         d = math.degrees(curve.coefficients[2] + curve.blind)  # the band, and what noise hides beside it
         words += f" Within ±{d:.2g} °/s the output does not tell the rate: such rows stay empty, and errors here are without them."
     if "warming" in law.chosen.over:
-        words += " The model takes warming and cooling as one."
+        words += " The model first takes the difference between warming and cooling out of the output."
     return f"{words} {left if law.structure else 'What it leaves is within the errors of the means.'}"
 
 

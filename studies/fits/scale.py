@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from compensation.arrays import Array
-from compensation.bell import BellChain, apply_chain
+from compensation.bell import BellChain, Warming, apply_chain
 from compensation.bell_calibration import BellRun, fit_chain
 from compensation.decimation import average_blocks
 from compensation.linearity import measure_nonlinearity, same_rate
@@ -27,6 +27,7 @@ SWEPT = 5.0  # span of temperature (K) from which a run counts as one over tempe
 STEADY = 0.01  # part of the rate by which a rate table may waver and still turn at one rate
 SHORT, LONG = 1.0, 100.0  # s, at which the random walk is read: a filter of 5 s changes the first, not the second
 BLOCKS = 5
+TURN = 0.05  # K by which a temperature at least goes back before it turns
 
 
 Runs: TypeAlias = tuple[BellRun, BellRun | None, BellRun | None]
@@ -61,6 +62,9 @@ class ScaleStudy:
     averaged: bool  # a run was long: the fit and this error are of its block averages
     rough_run: bool = False  # the rough null and scale have a run of their own
     law: RateLaw | None = None
+    warming: Warming | None = (
+        None  # what the output differs by warming and cooling; the runs and figures are without it
+    )
     from_table: tuple[str, ...] = ()  # the kinds of runs that were taken out of a rate table over temperature
 
 
@@ -116,13 +120,18 @@ def study_scale(records: "Sequence[Record]", cutoff: float | None, order: int) -
         if kind in sorted_runs:
             raise InputError(f"{record.path} and {sorted_runs[kind][1]} are both runs {kind}; give only one of them.")
         sorted_runs[kind] = (run, record.path)
+    several = next(iter(KINDS))
+    law = read_law([*([sorted_runs[several][0]] if several in sorted_runs else []), *tables])
+    warming = _warming_of(law, [run for run, _ in sorted_runs.values()] + tables)
+    if warming:
+        sorted_runs = {kind: (_undo(warming, run), path) for kind, (run, path) in sorted_runs.items()}
+        tables = [_undo(warming, run) for run in tables]
     from_table = []
     for table in (run for run in tables if np.ptp(run.temperature) > SWEPT):
         for kind, run in _parts_of(table).items():
             if kind not in sorted_runs:
                 sorted_runs[kind] = (run, "the rate table over temperature")
                 from_table.append(kind)
-    several = next(iter(KINDS))
     if several not in sorted_runs:
         raise InputError(f"no record is a run {several}, which {KINDS[several]} needs, nor a rate table; add one.")
     rates, rest, turning = (sorted_runs[kind][0] if kind in sorted_runs else None for kind in KINDS)
@@ -137,7 +146,6 @@ def study_scale(records: "Sequence[Record]", cutoff: float | None, order: int) -
     if cutoff is not None and order >= shortest:
         raise InputError(f"a FIR filter of order {order} is longer than a run of {shortest} rows; lower --order.")
     thin = (_thin(rates), rest and _thin(rest), turning and _thin(turning))
-    law = read_law([*([] if several in from_table else [rates]), *tables])
     found = law.chosen.name if law and len(np.unique(same_rate(rates.rate))) >= LEAST else ""
     form = found if found in CARRIED else None
     with naming(", ".join(path for _, path in sorted_runs.values())):
@@ -145,7 +153,7 @@ def study_scale(records: "Sequence[Record]", cutoff: float | None, order: int) -
         before, after = _hold_out(thin, rough, form)
         figures = judge_steps(chain, rates, rest, turning)
     averaged = sum(len(run.time) for run in thin if run is not None) < sum(len(run.time) for run in there)
-    judged = (figures, before, after, averaged, rough is not None, law, tuple(from_table))
+    judged = (figures, before, after, averaged, rough is not None, law, warming, tuple(from_table))
     return ScaleStudy(chain, runs, output, column, left_out, *judged)
 
 
@@ -160,6 +168,21 @@ KINDS = {
     "at rest over temperature": "equation (34)",
     "at one rate over temperature": "equation (36)",
 }
+
+
+def _warming_of(law: RateLaw | None, runs: Sequence[BellRun]) -> Warming | None:
+    """Return what the law says of warming and cooling; noise of the thermometers does not turn it."""
+    if law is None or "warming" not in law.chosen.over:
+        return None
+    v = law.chosen.values
+    noise = max(float(np.std(np.diff(run.temperature, 2))) / 6**0.5 for run in runs)
+    return Warming(v["a"], v["a_warming"], v["k_warming"] / v["k"], max(TURN, 8 * noise))
+
+
+def _undo(warming: Warming, run: BellRun) -> BellRun:
+    """A run that sweeps the temperature without it; at one temperature there is no course."""
+    swept = float(np.ptp(run.temperature)) > SWEPT
+    return replace(run, output=warming.undo(run.output, run.temperature)) if swept else run
 
 
 def _parts_of(table: BellRun) -> dict[str, BellRun]:

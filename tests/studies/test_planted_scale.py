@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from compensation.bell import apply_chain, invert_chain
+from compensation.bell import apply_chain, design_smoother, invert_chain, smooth
 from compensation.bell_calibration import BellRun, fit_chain
-from compensation.rate_law import fit_rate_law
+from compensation.rate_law import RateCurve, fit_rate_law
 from studies.cli import main
 from studies.errors import InputError
 from studies.fits.scale import read_law, settled_rows
@@ -400,3 +400,46 @@ def test_rate_is_read_from_the_bells_own_elements():
     assert reading.from_charges == pytest.approx(2.0, rel=1e-6)
     assert reading.second_form == pytest.approx(2.0, rel=1e-4)
     assert 0.1 < reading.printed_share < 0.25
+
+
+def test_the_saved_model_tells_warming_from_cooling(tmp_path, ask):
+    """An output 8 counts (0.2 °/s) off either way, in a rate table: another table comes back to its noise."""
+
+    def table(name, seed, turns):
+        rng, time = np.random.default_rng(seed), 0.1 * np.arange(26 * 13 * 20)
+        rate = np.repeat(np.tile(np.linspace(-300.0, 300.0, 13), 20), 26)
+        x = 2 * np.pi * turns * time / time[-1]
+        away, warming = 15 * np.sin(x), np.sign(np.cos(x))
+        output = (
+            -690
+            + 40 * rate
+            + 2 * away
+            + 0.01 * away * rate
+            + warming * (8 + 0.02 * rate)
+            + rng.standard_normal(time.size)
+        )
+        return write(tmp_path / name, BellRun(time, output, 293.15 + away, rate * DEG), stride=1), rate, away
+
+    seen, unseen = table("seen.csv", 1, 1), table("unseen.csv", 2, 2)
+    model, out = tmp_path / "m.toml", tmp_path / "out.csv"
+    found = ask(["fit", "scale", seen[0], "--save", str(model)])
+    assert {one["form"]: one["over"] for one in found["rate_law"]["forms"]}["line"] == "temperature, warming"
+    ask(["compensate", str(model), unseen[0], "--out", str(out), "--extrapolate"])
+    away = read_record(out)["compensated_measured_rate_deg_per_s"] - unseen[1]
+    settled = np.arange(away.size) > 400  # until the temperature has moved by the turn
+    assert np.sqrt(np.mean(away[settled] ** 2)) < 0.08
+
+
+def test_a_filter_leaves_out_what_a_dead_band_hides():
+    x = np.ones(300)
+    x[100:103] = np.nan
+    smoothed = smooth(x, design_smoother(0.1, 1.0))
+    assert np.flatnonzero(np.isnan(smoothed)).tolist() == [100, 101, 102]
+    np.testing.assert_allclose(smoothed[~np.isnan(smoothed)], 1.0)
+
+
+@pytest.mark.parametrize(("form", "s"), [("cubic", -1e-7), ("sine", 400.0), ("dead band", 1.5), ("directions", 4e-3)])
+def test_limits_the_inverse_of_a_law_gives_its_rate_back(form, s):
+    curve = RateCurve(np.array([0.3, 1.02, s]), np.zeros((3, 3)), 0.0, -300.0, 300.0, form)
+    rate = np.array([-250.0, -20.0, 10.0, 299.0])
+    np.testing.assert_allclose(curve.value(curve.inverse(rate)), rate, rtol=1e-12)

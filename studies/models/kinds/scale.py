@@ -3,12 +3,14 @@
 The file has the parts "rough" (null, scale), "bias", "scale_over_rate" and "scale_over_temperature" (c0, c1, c2 in °C
 and °/s), and the settings `fir_taps` and `sampling_s` (empty and 0 without a filter) and `temperature_column`. With the setting
 `rate_form`, "scale_over_rate" is that law of `compensation.rate_law`: a, k, and c, A, d or k_positive_more, in °/s; a dead band has
-`blind_deg_per_s`, within which of its null the output tells no rate (NaN). Ranges are those of the fit, widened by 5 % of their
+`blind_deg_per_s`, within which of its null the output tells no rate (NaN). With the setting `warming` (a, b in the unit of the output, g, turn in K) the
+output is first rid of what differs while the temperature rises and falls. Ranges are those of the fit, widened by 5 % of their
 length, because readings scatter; outliers, which the fit leaves out, are not judged.
 """
 
 import math
 from collections.abc import Sequence
+from dataclasses import astuple
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -28,7 +30,7 @@ DEG = math.radians(1.0)
 RAW = ("output_counts", "measured_rate_deg_per_s")
 """Columns that can be the raw output; the first needs the rough scale, the second is a rate already."""
 RATE = "measured_rate_deg_per_s"
-FORM, BLIND = "rate_form", "blind_deg_per_s"
+FORM, BLIND, WARMING = "rate_form", "blind_deg_per_s", "warming"
 C_FORMS = {  # a rate law's own coefficient: its unit, the power of an angle in it; and Ω over u = (y − a)/k in C
     "directions": ("1", 0.0, "u / (u < 0.0 ? 1.0 : 1.0 + {s} / {k})"),
     "cubic": ("s^2/deg^2", -2.0, "2.0 * {t} * ({s} > 0.0 ? sinh(asinh({w}) / 3.0) : sin(asin(fmax(-1.0, fmin(1.0, {w}))) / 3.0))"),
@@ -51,6 +53,7 @@ def save_scale(
     over_temperature = ("1/degC", "1/degC^2")
     curve = chain.scale_over_rate
     law: dict[str, Setting] = {FORM: curve.form, BLIND: curve.blind / DEG} if isinstance(curve, RateCurve) else {}
+    law |= {WARMING: astuple(chain.warming)} if chain.warming else {}
     return Model(
         kind="scale",
         compensates=output,
@@ -82,7 +85,7 @@ def save_scale(
 
 def load_scale(model: Model) -> "BellChain":
     """Return the chain that a model file holds."""
-    from compensation.bell import BellChain
+    from compensation.bell import BellChain, Warming
 
     rough, column = model.part("rough"), model.temperature_column
     for name in ("null", "scale"):
@@ -95,6 +98,11 @@ def load_scale(model: Model) -> "BellChain":
     taps = model.settings.get("fir_taps", ())
     if isinstance(taps, str | float):
         raise InputError(f"{model.where} [settings]: fir_taps must be a list of numbers, [] for no filter.")
+    warming = model.settings.get(WARMING, ())
+    if not isinstance(warming, tuple) or (
+        warming and not (len(warming) == 4 and abs(warming[2]) < 1 and warming[3] > 0)
+    ):
+        raise InputError(f"{model.where} [settings]: {WARMING} must be a, b, g and turn, |g| below 1 and turn above 0.")
     errors = np.array(rough.covariance) if rough.covariance else np.zeros((2, 2))
     return BellChain(
         null=rough["null"],
@@ -105,6 +113,7 @@ def load_scale(model: Model) -> "BellChain":
         scale_over_temperature=_load_curve(model, "scale_over_temperature", 0.0, 0.0, zero_Celsius, (low, high)),
         taps=np.array(taps, dtype=float),
         sampling=model.number("sampling_s", least=0),
+        warming=Warming(*warming) if warming else None,
     )
 
 
@@ -147,6 +156,9 @@ def emit_c(model: Model) -> str:
         values = ",\n    ".join(repr(float(tap)) for tap in taps)
         sampling = f"{model.number('sampling_s', least=0):g}"
         smoother = "\n" + write_c("smoother", count=len(taps), taps=values, sampling=sampling)
+    if warming := load_scale(model).warming:
+        shift = repr(warming.offset - warming.gain * warming.null)
+        smoother += "\n" + write_c("warming", turn=repr(warming.turn), gain=repr(warming.gain), shift=shift)
     T = "temperature_degC"
     variables = {"bias": T, "scale_over_rate": "rate", "scale_over_temperature": T}
     curves = {name: polynomial(f"hrg_{name}", x, model.part(name).values) for name, x in variables.items()}
