@@ -1,6 +1,6 @@
-"""Pages in the tests: figures without layout, file and curves, stills of one pixel, sliders of one dimension.
+"""Pages in the tests: figures without layout, file and curves, stills of one pixel, sliders of one dimension; diagnoses of coarse means.
 
-What draws them whole has tests of its own, which ask for the fixture `drawn`.
+What draws them whole has tests of its own, which ask for the fixture `drawn`; golden answers and `tests/benchmarks/judge.py` take all means.
 """
 
 import base64
@@ -35,3 +35,9 @@ def sketch_pages(patch: Any) -> dict[str, Any]:
         whole[name] = getattr(import_module(module), attribute)
         patch.setattr(name, made)
     return whole
+
+
+def coarsen(patch: Any) -> None:
+    """Let a diagnosis take half as many means of a campaign as it does of itself: half the time."""
+    patch.setattr("studies.inference.diagnosis.BLOCKS", 400)
+    patch.setattr("studies.inference.diagnosis.BLOCKS_OF_RUN", (50, 200))

@@ -8,11 +8,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 
 from studies import workbench
 from studies.calibration.observed import RESPONSES
 from studies.diagnosis.verdict import Verdict
 from studies.record import read_record
+from tests.sketches import coarsen
 from tests.stranger.aliens import ALIENS
 from tests.stranger.baseline import COLUMN
 from tests.stranger.campaign import make_campaign
@@ -79,7 +81,9 @@ def diagnose(files: list[str], asked: set[str]) -> Verdict:
     """Ask for the frequency and the responses in which something is hidden."""
     records = [read_record(file) for file in files]
     kept = [{n: own for n, own in r.columns.items() if n in asked or n not in RESPONSES} for r in records]
-    return workbench.diagnose_records([replace(r, columns=own) for r, own in zip(records, kept, strict=True)]).verdict
+    with pytest.MonkeyPatch.context() as patch:
+        coarsen(patch)
+        return workbench.diagnose_records([replace(r, columns=o) for r, o in zip(records, kept, strict=True)]).verdict
 
 
 def answer(place: int, folder: Path) -> Line:

@@ -39,6 +39,14 @@ def test_shipped_card_is_complete(name):
         ('name = "fused-silica"', 'name = "mystery"\nyoungs_modulus_GPa = 70', ["mystery", "poisson_ratio, density"]),
         ('name = "fused-silica"', 'name = "fused-silica"\nyoungs_modulus_GPa = -1', ["youngs_modulus_GPa", "above 0"]),
         ('name = "fused-silica"', 'name = "fused-silica"\nfile = "none.toml"', ["none.toml", "cannot be read"]),
+        (
+            'name = "fused-silica"',
+            'name = "fused-silica"\nyoungs_modulus_GPa = 72.7e9',
+            ["looks like pascal: write 72.7"],
+        ),
+        ('name = "fused-silica"', 'name = "fused-silica"\nyoungs_modulus_GPa = 5000.0', ["no solid is stiffer"]),
+        ('name = "fused-silica"', 'name = "fused-silica"\ndensity_kg_m3 = 2.203', ["looks like g/cm³: write 2203"]),
+        ('name = "fused-silica"', 'name = "fused-silica"\ndensity_kg_m3 = 2e6', ["30 to 30000"]),
         ("[material]", "[[effect]]\nsize = 1\n[material]", ["[[effect]] number 1", "name"]),
     ],
 )
@@ -73,11 +81,6 @@ def test_thickness_may_vary_along_the_meridian(tmp_path):
     assert thickness == pytest.approx([0.95e-3, 0.925e-3, 0.85e-3])
 
 
-def test_unknown_bare_name_suggests_a_shipped_card():
-    with pytest.raises(InputError, match="hrg-30mm"):
-        load_card("hrg-30m")
-
-
 def test_given_values_rescale_the_law_at_the_reference_temperature(tmp_path):
     path = tmp_path / "card.toml"
     given = 'name = "fused-silica"\nyoungs_modulus_GPa = 73.0\npoisson_ratio = 0.18\ndensity_kg_m3 = 2201'
@@ -88,14 +91,6 @@ def test_given_values_rescale_the_law_at_the_reference_temperature(tmp_path):
     for name in ("shear_modulus", "poisson_ratio"):
         law = plain.value(name, 323.15) / plain.value(name, 293.15)
         assert own.value(name, 323.15) / own.value(name, 293.15) == pytest.approx(law, rel=1e-12)
-
-
-def test_a_name_outside_the_table_with_given_values_is_constant(tmp_path):
-    path = tmp_path / "card.toml"
-    given = 'name = "mystery"\nyoungs_modulus_GPa = 70\npoisson_ratio = 0.3\ndensity_kg_m3 = 2700'
-    path.write_text(HRG.replace('name = "fused-silica"', given), encoding="utf-8")
-    material = load_card(path).material
-    assert material.elastic(200.0) == material.elastic(400.0)
 
 
 def test_saved_card_loads_equal_even_from_another_folder(tmp_path):
@@ -118,25 +113,6 @@ def test_saved_card_loads_equal_even_from_another_folder(tmp_path):
     (effect,) = again.effects
     assert (effect.name, effect.parameters) == ("second-lag", {"weight": 0.1, "second_time_constant_s": 2000.0})
     assert tomllib.loads(moved.read_text())["schema"] == "hrg.card/1"
-
-
-@pytest.mark.parametrize(
-    ("line", "part"),
-    [
-        ("youngs_modulus_GPa = 72.7e9", "looks like pascal: write 72.7"),
-        ("youngs_modulus_GPa = 5000.0", "no solid is stiffer"),
-        ("density_kg_m3 = 2.203", "looks like g/cm³: write 2203"),
-        ("density_kg_m3 = 2e6", "30 to 30000"),
-    ],
-)
-def test_units_mixed_up_are_named(tmp_path, line, part):
-    card = tmp_path / "card.toml"
-    card.write_text(
-        'schema = "hrg.card/1"\nname = "x"\n[resonator]\nshape = "hemisphere"\nradius_mm = 15.0\nthickness_mm = 0.9\n'
-        f'[material]\nname = "fused-silica"\n{line}\n'
-    )
-    with pytest.raises(InputError, match=part):
-        load_card(card)
 
 
 @pytest.mark.parametrize("stem", ["", 'support = "stem"\n[resonator.stem]\nradius_mm = 2.5\nend_mm = 2.0\n'])

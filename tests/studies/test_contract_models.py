@@ -11,7 +11,7 @@ from msgspec.structs import replace
 from compensation.frequency import fit_frequency
 from studies.cli import main
 from studies.errors import InputError
-from studies.models import ModelSource, compensate, emit_c, format_model, model_kinds, read_model, write_model
+from studies.models import ModelSource, compensate, emit_c, format_model, read_model, write_model
 from studies.models.kinds.frequency import evaluate, find_temperature, save_frequency
 from studies.record import Record, read_record, write_record
 from tests.compiled import compile_c
@@ -32,15 +32,6 @@ def test_a_saved_model_is_read_back_to_the_last_bit(model, tmp_path):
     assert again.settings == model.settings
     assert again.part("frequency")["a1"] == model.parts[0].values[1]
     assert len((tmp_path / "m.toml").read_text().splitlines()) < 45
-
-
-def test_every_kind_can_be_applied_and_emitted():
-    from importlib import import_module
-
-    for kind in model_kinds():
-        module = import_module(f"studies.models.kinds.{kind.replace('-', '_')}")
-        assert callable(module.compensate)
-        assert callable(module.emit_c)
 
 
 def test_frequency_c_code_agrees_with_the_fit(model, tmp_path):

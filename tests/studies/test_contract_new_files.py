@@ -58,18 +58,6 @@ def test_every_commented_line_is_toml(tmp_path, words):
         assert tomllib.loads(block)
 
 
-@pytest.mark.parametrize("like", sorted(shipped_cards()))
-def test_the_form_without_its_comment_signs_is_toml(tmp_path, like, refuse):
-    """Together its examples contradict each other: the first that does is named with its line."""
-    path = tmp_path / "mine.toml"
-    assert main(["card", "new", str(path), "--like", like]) == 0
-    lines = path.read_text(encoding="utf-8").splitlines()
-    first = next(k for k, line in enumerate(lines) if line.startswith("# Optional entries")) + 1
-    path.write_text("\n".join(lines[:first] + [line.removeprefix("#") for line in lines[first:]]), encoding="utf-8")
-    assert tomllib.loads(path.read_text(encoding="utf-8"))
-    assert f"({path}:" in refuse(["cards", str(path)])
-
-
 @pytest.mark.parametrize("like", sorted(shipped_specs()))
 def test_a_new_study_is_valid_with_another_card(tmp_path, like):
     assert main(["study", "new", str(tmp_path / "s.toml"), "--like", like, "--card", "free-dome"]) == 0

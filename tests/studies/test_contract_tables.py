@@ -2,7 +2,6 @@
 
 import datetime
 import tracemalloc
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -31,6 +30,8 @@ BAD = [
     (read_record, b"time_s,frequency_Hz\n0,1\n1,nan\n", ["line 3", "'nan'"]),
     (read_record, b"time_s,frequency_Hz\n0,1\n1,inf\n", ["line 3", "'inf'"]),
     (read_record, b"time_s,frequency_Hz\n0,1_0\n", ["line 2"]),
+    (read_record, b"time_s,bias_deg_per_h\n0,1\n1,-1e21\n", ["line 3", "is not a possible reading"]),
+    (read_record, b"time_s,bias_deg_per_h\n0,1\n1,1e400\n", ["line 3", "is not a possible reading"]),
     (read_record, b"time_s,frequency_Hz\n0,1,5\n", ["line 2", "3 values", "2 columns"]),
     (read_record, b"time_s,frequency_Hz\n0,4432,07\n", ["decimal commas"]),
     (read_record, b"time_s,frequency_Hz\n0,1\n0,2\n", ["line 3", "does not increase"]),
@@ -113,14 +114,6 @@ def test_record_survives_writing_and_reading_to_the_last_bit(tmp_path_factory, v
     assert back.source == " ".join(note.split())
 
 
-@pytest.mark.parametrize("number", ["1e21", "-1e300", "1e400"])
-def test_numbers_that_no_instrument_reads_are_refused(tmp_path, number):
-    path = tmp_path / "run.csv"
-    path.write_text(f"time_s,bias_deg_per_h\n0,1\n1,{number}\n")
-    with pytest.raises(InputError, match=r"run\.csv, line 3: bias_deg_per_h = .* is not a possible reading"):
-        read_record(path)
-
-
 def test_quick_and_careful_parsers_agree(tmp_path):
     rng = np.random.default_rng(7)
     rows = [f"{k},{4432 + x!r}" for k, x in enumerate(rng.normal(size=200).tolist())]
@@ -148,18 +141,6 @@ def test_a_file_that_fails_halfway_leaves_nothing(tmp_path):
         fail()
     assert target.read_text() == "old"
     assert [p.name for p in tmp_path.iterdir()] == ["out.csv"]
-
-
-def test_unwritable_place_is_refused(tmp_path):
-    occupied = Path(tmp_path) / "file"
-    occupied.write_text("")
-
-    def write() -> None:
-        with written_whole(occupied / "sub" / "out.csv") as file:
-            file.write(b"x")
-
-    with pytest.raises(InputError, match="cannot be written"):
-        write()
 
 
 def test_a_large_table_costs_its_numbers_not_its_text(tmp_path, monkeypatch):

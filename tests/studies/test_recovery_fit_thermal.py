@@ -63,19 +63,18 @@ def test_one_lag_without_radiation_is_found_with_its_interval(tmp_path, ask):
 @pytest.mark.slow
 @pytest.mark.parametrize("walk", [0.0, 2e-4], ids=["white", "random walk"])
 def test_ninety_percent_intervals_cover_about_nine_in_ten(walk):
-    """Of 12 seeds, 7 or fewer hits have a probability of 0.4 % if the coverage is 90 %.
+    """Of 6 seeds, 3 or fewer hits have a probability of 1.6 % if the coverage is 90 %.
 
     Not of the radiated share in a random walk beside the noise of the housing's sensor: 18 of 24 there, by the noise that is estimated.
     """
-    runs = [one_lag("step 20 -10 2h then step -10 40 2h", seed=seed, walk=walk) for seed in range(12)]
+    runs = [one_lag("step 20 -10 2h then step -10 40 2h", seed=seed, walk=walk) for seed in range(6)]
     fits = [fit_thermal_constants([run], lags=1).estimates for run in runs]
     share = () if walk else (("radiated_share", 0.0),)
     for name, truth in (("time_constant_1", 1800.0), ("curvature", CURVATURE), *share):
-        assert sum(one[name].low <= truth <= one[name].high for one in fits) > 7
+        assert sum(one[name].low <= truth <= one[name].high for one in fits) > 3
 
 
-@pytest.mark.parametrize("row", [0, 200])
-@pytest.mark.parametrize("column", ["frequency_Hz", "housing_temperature_degC"])
+@pytest.mark.parametrize(("row", "column"), [(0, "frequency_Hz"), (200, "housing_temperature_degC")])
 def test_one_accidental_reading_does_not_move_the_lag(row, column):
     """A start-up accident of a real voltmeter's record made a lag of 1.4e6 s out of 6 649 s."""
     clean = one_lag()
@@ -99,13 +98,8 @@ def test_two_lags_in_series_are_found_and_a_second_is_not_made_up():
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("taus", "past", "late"),
-    [
-        ((1500.0,), False, 0.0),
-        ((1500.0, 400.0), False, 0.0),
-        ((1500.0, 400.0), True, 0.0),
-        ((1500.0, 400.0), True, 60.0),
-    ],
-    ids=["one lump", "two in series", "past the lump between", "behind a late sensor"],
+    [((1500.0,), False, 0.0), ((1500.0, 400.0), True, 0.0), ((1500.0, 400.0), True, 60.0)],
+    ids=["one lump", "past the lump between", "behind a late sensor"],
 )
 def test_the_radiated_share_of_lumps_is_found(taus, past, late):
     """Lumps in a row with 40 % of their conductance by radiation at 20 °C over 100 K, by the implicit integrator.
@@ -159,7 +153,7 @@ def test_a_heat_path_of_several_lumps_is_followed_to_its_noise():
     """The virtual gyro's own heat path, several lumps with radiation: residual near the noise, curvature that of the card's law."""
     card = load_card("hrg-30mm")
     runs = [
-        simulate_run(card, parse_profile(words), 0.1, seed).record
+        simulate_run(card, parse_profile(words), 1 / 30, seed).record
         for seed, words in enumerate(("step 40 -20 5h", "step -20 40 5h"))
     ]
     found = fit_thermal_constants(runs)

@@ -40,7 +40,7 @@ def amplitude(cause):
 @pytest.mark.slow
 def test_without_a_line_the_blocks_are_the_usual_ones_and_what_is_left_decides():
     campaign = a_campaign(60.0, size=0.0)
-    assert blocks_of(campaign) == blocks_of(a_campaign(17.0)) == 400
+    assert blocks_of(campaign) == blocks_of(a_campaign(17.0)) == 200
     found = diagnose_records(campaign)
     assert found.verdict.verdict == "adequate"
     left = found.left["frequency_Hz"]

@@ -111,8 +111,8 @@ def test_a_wrong_value_is_named_as_one(shipped):
     assert frequency["shipped_rms"] > 20.0 * frequency["baseline"]["residual_rms"]
 
 
-TRIED = (PACKS[2], PACKS[5], PACKS[10])
-"""Effects of memory and of a moment, of commanded drives and of days, of the heat path; `bench_recovery` hides every effect in every response."""
+TRIED = (PACKS[2], PACKS[5])
+"""Effects of memory and of a moment, of commanded drives and of days; `bench_recovery` hides every effect in every response."""
 
 
 @pytest.mark.slow
