@@ -33,7 +33,7 @@ def test_a_thin_ring_softens_as_an_inextensible_one(n: int) -> None:
 
 
 def test_a_free_dome_as_another_code_has_it() -> None:
-    """NGSolve, polynomials of order 6, energies summed over azimuths: -323.4011 per m² (tests/benchmarks/finite_ngsolve.py)."""
+    """NGSolve, polynomials of order 6, energies summed over azimuths: -323.4011 per m² (tests/benchmarks/finite_ngsolve.py of 722ba988)."""
     (mode,) = solve_modes(hemisphere(15e-3, 0.9e-3), SILICA)
     assert amplitude_shift(mode).total == pytest.approx(-323.4011, rel=1e-4)
 

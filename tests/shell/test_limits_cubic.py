@@ -48,7 +48,7 @@ def test_a_ring_of_silicon() -> None:
 
 @pytest.mark.slow
 def test_a_dome_of_silicon_splits_by_seven_per_cent() -> None:
-    """By NGSolve, a quarter of the dome in curved tetrahedra of order 5, from above (tests/benchmarks/cubic_ngsolve.py)."""
+    """By NGSolve, a quarter of the dome in curved tetrahedra of order 5, from above (tests/benchmarks/cubic_ngsolve.py of 722ba988)."""
     pair = solve_cubic(DOME, SILICON)
     assert pair.relative_error_estimate < 1e-5
     assert [pair.along_100, pair.along_110] == pytest.approx([6407.882, 6876.657], rel=1e-5)

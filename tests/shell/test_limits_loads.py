@@ -77,7 +77,7 @@ def test_pressure_all_around_changes_the_elastic_constants() -> None:
     ],
 )
 def test_an_acceleration_along_the_axis_as_another_code_has_it(body: Resonator, other: float) -> None:
-    """NGSolve: modes on equilibria of Green's strain at ± 1e4 m/s², differenced (tests/benchmarks/finite_ngsolve.py)."""
+    """NGSolve: modes on equilibria of Green's strain at ± 1e4 m/s², differenced (tests/benchmarks/finite_ngsolve.py of 722ba988)."""
     assert loads_on(body, 1e-6).shift("axial") == pytest.approx(other, rel=1e-3)
 
 

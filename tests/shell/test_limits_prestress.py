@@ -71,7 +71,7 @@ def test_a_clamped_disc_that_its_frame_stretches(n):
     ],
 )
 def test_the_stress_of_a_base_as_another_code_has_it(shape, by_base):
-    """NGSolve: modes on equilibria of Green's strain at ± 1e-6 of the base, differenced (tests/benchmarks/finite_ngsolve.py)."""
+    """NGSolve: modes on equilibria of Green's strain at ± 1e-6 of the base, differenced (tests/benchmarks/finite_ngsolve.py of 722ba988)."""
     (mode,) = solve_modes(shape, SILICA, tolerance=1e-7)
     assert Prestress(mode).by_base == pytest.approx(by_base, abs=2e-4)
 

@@ -37,7 +37,7 @@ def modes(tmp_path, capsys):
 
 @pytest.mark.slow
 def test_the_pair_of_a_silicon_dome(modes):
-    """By NGSolve (tests/benchmarks/cubic_ngsolve.py); n = 4 is not solved."""
+    """By NGSolve (tests/benchmarks/cubic_ngsolve.py of 722ba988); n = 4 is not solved."""
     two, four = modes(CARD, "--harmonic", "2", "4")
     pair = two["crystal"]
     assert [pair["antinode_along_100_Hz"], pair["other_Hz"]] == pytest.approx([6407.882, 6876.657], rel=1e-5)
