@@ -78,16 +78,6 @@ def test_flicker_is_flat_and_has_a_spectrum_of_one_over_f():
     assert spectrum * 2 * np.pi * f == pytest.approx(np.ones(200), rel=0.012)
 
 
-def test_whitened_draws_are_white():
-    rows = NoiseRows.of([30.0 * np.arange(200.0)] * 3)
-    noise, generator = Noise(2.0, 0.5, 0.05, 0.7), np.random.default_rng(7)
-    drawn = np.array([np.concatenate([noise.draw(200, 1 / 30, generator) for _ in range(3)]) for _ in range(200)])
-    white = rows.whiten(drawn.T, noise)
-    assert np.mean(white**2) == pytest.approx(1.0, abs=5 * np.sqrt(2 / white.size))
-    neighbours = np.mean([np.mean(white[s][1:] * white[s][:-1]) for s in rows.slices])
-    assert neighbours == pytest.approx(0.0, abs=5 / np.sqrt(white.size))
-
-
 def test_whitened_rows_have_the_identity_as_covariance_where_rows_are_uneven():
     gapped = np.cumsum(np.concatenate([np.full(60, 80.0), [4000.0], np.full(50, 130.0)]))
     spans = np.concatenate([np.full(60, 80.0), [130.0], np.full(50, 120.0)])

@@ -10,13 +10,6 @@ from compensation.transfer import TransferFunction
 TURNING = TransferFunction((2.0, 1 - 3j), (1.0, 4 + 5j, 6 - 1j))
 
 
-def test_frequency_response_equals_state_space():
-    A, B, C, D = TURNING.realise()
-    for frequency in (-30.0, 0.0, 0.7, 400.0):
-        expected = C @ np.linalg.solve(1j * frequency * np.eye(2) - A, B) + D
-        assert TURNING.respond(frequency) == pytest.approx(expected, rel=1e-13)
-
-
 def test_frequency_response_equals_scipy():
     frequency = np.array([-30.0, 0.7, 400.0])
     expected = signal.freqs(TURNING.numerator, TURNING.denominator, frequency)[1]

@@ -142,17 +142,6 @@ def test_broken_material_file_is_refused(tmp_path, broken, words):
         assert word in str(caught.value)
 
 
-def test_own_table_passes_through_its_points(tmp_path):
-    path = tmp_path / "mine.toml"
-    path.write_text(
-        'schema = "hrg.materials/1"\n[glass.laws.data]\nsource = "mine"\nrange_degC = [0, 50]\n'
-        'youngs_modulus = {form = "table", temperature_degC = [0, 20, 50], values = [70e9, 70.2e9, 70.5e9]}\n'
-        'poisson_ratio = {form = "constant", value = 0.2}\ndensity = {form = "constant", value = 2300, at_degC = 20}\n'
-    )
-    law = find_material("glass", path=path)
-    np.testing.assert_allclose(law.value("youngs_modulus", np.array([273.15, 293.15, 323.15])), [70e9, 70.2e9, 70.5e9])
-
-
 def test_constant_material_does_not_change():
     law = constant_material("m", 70e9, 0.3, 2700.0)
     assert law.elastic(250.0) == law.elastic(350.0)

@@ -82,11 +82,6 @@ def test_scaling_scales_every_length() -> None:
     assert twice.thickness == ((0, 2e-3), (1, 1e-3))
 
 
-def test_resonators_are_values() -> None:
-    assert hemisphere(15e-3, 0.9e-3) == hemisphere(15e-3, 0.9e-3)
-    assert hash(bell(12e-3, 0.8e-3, 8e-3, 5e-3, 14e-3)) == hash(bell(12e-3, 0.8e-3, 8e-3, 5e-3, 14e-3))
-
-
 def test_arc_through_points_takes_the_shorter_way() -> None:
     arc = Arc.through((0.0, 1.0), (1.0, 0.0), (0.0, 0.0))
     assert arc.length == pytest.approx(pi / 2)

@@ -96,7 +96,7 @@ def test_random_roots_are_conforming_and_never_folded() -> None:
 
 
 def test_a_stem_on_both_sides_with_a_fillet_is_one_body() -> None:
-    """Both values by NGSolve, finite elements of order 6 in the section (tests/benchmarks/fourier_ngsolve.py), from above."""
+    """Both values by NGSolve, finite elements of order 6 in the section (tests/benchmarks/fourier_ngsolve.py of 722ba988), from above."""
     both = stemmed(0.5e-3, Stem(3e-3, (-5e-3, 25e-3), 0.6e-3, "both"))
     for n, reference in ((2, 2745.679), (1, 3414.68)):
         (mode,) = solve_modes(both, SILICA, n)

@@ -62,9 +62,10 @@ def faults_of(truth: Truth, snr: float | None, folder: Path) -> list[str]:
 
 
 def truth_of(place: int, folder: Path) -> tuple[Line, list[str], set[str]]:
-    """Draw a campaign of two runs; return its truth in the form that marks read, its files and the responses that matter."""
+    """Draw a campaign of two runs, of one in every other that hides no effect; return its truth in the form that marks read, its files and the responses that matter."""
     kind, name, snr = CASES[place]
-    truth = make_campaign(FIRST_SEED + place, kind, name, snr, runs=2, folder=folder)
+    alone = kind in ("null", "alien") and place % 2
+    truth = make_campaign(FIRST_SEED + place, kind, name, snr, runs=1 if alone else 2, folder=folder)
     line = {
         "kind": kind,
         "hidden": [sorted(h.right_names) for h in truth.hidden] if kind != "alien" else [],
@@ -73,8 +74,8 @@ def truth_of(place: int, folder: Path) -> tuple[Line, list[str], set[str]]:
         "tolerated": truth.tolerated,
         "faults": faults_of(truth, snr, folder),
     }
-    asked = {"frequency_Hz", *(COLUMN[h.response] for h in truth.hidden)} if truth.hidden else set(COLUMN.values())
-    return line, [str(folder / file) for file in truth.files], asked
+    own = [COLUMN[h.response] for h in truth.hidden] or [("bias_deg_per_h", "inverse_q")[place // 2 % 2]]
+    return line, [str(folder / file) for file in truth.files], {"frequency_Hz", *own}
 
 
 def diagnose(files: list[str], asked: set[str]) -> Verdict:

@@ -5,6 +5,7 @@ import re
 import shlex
 import shutil
 from base64 import b64decode
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,7 @@ import pytest
 from compensation.noise import Noise
 from compensation.spikes import STUCK, find_dropouts, find_stuck
 from studies.cli import main
-from studies.record import Record, write_record
+from studies.record import Record, read_record, write_record
 from studies.record.survey import find_density, find_steps, survey_column, survey_record
 from studies.reports import style
 from studies.results.page import draw
@@ -133,9 +134,10 @@ def test_contract_what_is_named_possible_runs_and_what_is_missing_is_said(tmp_pa
 
 @pytest.mark.slow
 def test_contract_every_line_that_is_named_possible_runs(tmp_path, capsys, monkeypatch):
-    """But for those that have a golden answer with the same words."""
+    """But for those that have a golden answer with the same words; of every fourth row."""
     monkeypatch.chdir(tmp_path)
-    shutil.copy(INPUTS / "run1.csv", tmp_path)
+    run = read_record(INPUTS / "run1.csv")
+    write_record(replace(run, columns={name: own[::4] for name, own in run.columns.items()}), "run1.csv")
     assert main(["show", "run1.csv", "--json"]) == 0
     for use in json.loads(capsys.readouterr().out)["uses"]:
         words = shlex.split(use["line"].replace("CARD.toml", "hrg-30mm"))[1:]

@@ -29,7 +29,7 @@ def draw(card, seed):
 
 
 def measure(card, words, seed, **options):
-    return simulate_run(card, load_profile(words), 1 / 60, seed, **options).record
+    return simulate_run(card, load_profile(words), 1 / 120, seed, **options).record
 
 
 @pytest.fixture(scope="module")
@@ -126,7 +126,7 @@ def test_the_saved_card_predicts_the_runs_and_an_unseen_one_from_their_chambers(
     saved = load_card(tmp_path / "calibrated.toml")
     for words, run in zip((*PROFILES, UNSEEN), (*records, measure(device, UNSEEN, 9)), strict=True):
         profile = load_profile(words)
-        stated = spread_of_prediction(saved, drive_by_profile(profile, rows_of(profile, 1 / 60)))
+        stated = spread_of_prediction(saved, drive_by_profile(profile, rows_of(profile, 1 / 120)))
         true, again = measure(device, words, 0, noise=False), measure(saved, words, 0, noise=False)
         usual = [measure(device, words, seed) for seed in range(20, 28)]  # one run's wander says little of the next's
         for name in ("frequency_Hz", "bias_deg_per_h", "inverse_q"):
