@@ -63,6 +63,7 @@ def test_physics_knows_only_itself(package):
             assert not {i for i in imports(path) if i.split(".")[0] in others}, name
 
 
+@pytest.mark.slow
 def test_no_imports_run_in_a_circle():
     """Also those that only the type checker follows; `TopologicalSorter` raises CycleError with the circle."""
     graph = {name: {i for i in imports(path) if i in MODULES and i != name} for name, path in MODULES.items()}

@@ -148,6 +148,7 @@ def test_stiffness_against_the_carrier():
         assert averaged.decay[row] == pytest.approx(true.decay[row], rel=2e-3)
 
 
+@pytest.mark.slow
 def test_a_free_wave_with_stiffness_against_the_carrier():
     wave = from_quality(
         FREQUENCY, 1e3, damping_anisotropy=0.02, damping_axis=0.1, frequency_split=0.3, frequency_axis=0.4

@@ -25,6 +25,7 @@ def hrg(*words: str, cwd: Path = ROOT) -> subprocess.CompletedProcess[str]:
     return subprocess.run(command, capture_output=True, text=True, cwd=cwd, env=environment, timeout=300)
 
 
+@pytest.mark.slow
 def test_help_every_command_and_short_answers_start_without_the_heavy_packages():
     """One process: each line is what was loaded too much after the help, all modules of commands, `cards` and `modes`."""
     code = f"""

@@ -227,6 +227,7 @@ def test_both_languages_agree(tmp_path, capsys):
         assert list(rates) == pytest.approx(list(space["averaged_rates"](*values)), rel=1e-12)
 
 
+@pytest.mark.slow
 def test_latex_is_plain_ascii(capsys):
     """Letters that pdflatex does not know end the run of the document that reads the fragment."""
     assert speak(capsys, "--dynamics", "--latex")[1].out.isascii()

@@ -48,6 +48,7 @@ addEventListener("load", () => {
 """
 
 
+@pytest.mark.slow
 @WHOLE
 def test_the_data_are_small_and_bounded():
     data, missing = describe_live(load_card("free-dome"), 2, "shell")

@@ -111,6 +111,7 @@ def test_what_the_actuators_cannot_hold_is_refused_with_their_range(card, tmp_pa
         assert said in refuse(["simulate", path, "soak 20 10min", "--out", str(tmp_path / "run.csv")])
 
 
+@pytest.mark.slow
 def test_the_rate_of_a_profile_is_applied_and_one_beyond_the_range_is_named_by_its_line(card, tmp_path, refuse, ask):
     path, profile, out = card(""), tmp_path / "rates.csv", str(tmp_path / "run.csv")
 

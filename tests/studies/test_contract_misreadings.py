@@ -76,6 +76,7 @@ def test_a_bias_in_degrees_per_second_is_refused_before_the_fit(card, record):
         calibrate(card, [spoilt(record, bias_deg_per_h=lambda b: b / 3600.0)])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("work", [lambda own, run: calibrate(own, [run]), lambda own, run: diagnose(run, card=own)])
 def test_a_bias_of_the_opposite_sign_is_refused_before_the_fit(card, work):
     """Only a warning once: the card was saved with a bias of no gyro, and a diagnosis called the sign an ageing."""

@@ -103,8 +103,10 @@ def test_wide_tables_are_stacked_on_a_phone_and_long_ones_end_on_paper():
             marks=pytest.mark.slow,
         ),
         ("trim free-dome --split 0.12 --axis 31", "thermal equilibrium"),
-        ("loop hrg-30mm-loops", "phase and rate loops"),
-        ("modes free-dome --harmonic 0 2 --theory shell", "bent into 4 lobes"),  # the mode that the sliders move
+        pytest.param("loop hrg-30mm-loops", "phase and rate loops", marks=pytest.mark.slow),
+        pytest.param(  # the mode that the sliders move
+            "modes free-dome --harmonic 0 2 --theory shell", "bent into 4 lobes", marks=pytest.mark.slow
+        ),
         pytest.param("loss hrg-30mm", "1.46 times this loss", marks=pytest.mark.slow),
     ],
 )

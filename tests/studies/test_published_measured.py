@@ -71,6 +71,7 @@ def test_a_crystal_in_liquid_without_a_header_line(tmp_path):
     assert record["housing_temperature_degC"][0] == pytest.approx(24.1)
 
 
+@pytest.mark.slow
 def test_the_accident_of_a_start_up_does_not_make_a_lag(ask):
     """The first of 2 104 readings is 4.67 times the others; it once made a lag of 1.4e6 s with tight intervals."""
     found = ask(["fit", "thermal", str(DATA / "voltmeter_sweep.csv"), "--lags", "1"])

@@ -168,6 +168,7 @@ def test_several_runs_share_the_constants_and_not_the_initial_state():
     assert [lump for (lump,) in fit.departures] == pytest.approx([1.5, 4.0], abs=0.1)
 
 
+@pytest.mark.slow
 def test_unusable_records_are_refused(tmp_path, capsys):
     path = tmp_path / "still.csv"
     write_record(one_lag("soak 20 5h", departure=0.0), path)
@@ -183,6 +184,7 @@ def test_unusable_records_are_refused(tmp_path, capsys):
         fit_thermal_constants([one_lag("soak 20 5h")], lags=9)
 
 
+@pytest.mark.slow
 def test_a_chamber_stands_for_the_housing_that_nobody_measured():
     run = one_lag()
     columns = {name.replace("housing", "chamber"): own for name, own in run.columns.items()}
