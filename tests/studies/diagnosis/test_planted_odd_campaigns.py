@@ -88,11 +88,10 @@ def drifting(size, spread, reference=None):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("hidden", "seen"), [("clock-drift", False), ("ageing", True)])
-def test_a_reference_clock_tells_a_drifting_clock_from_ageing(hidden, seen):
-    verdict = told(drifting(0.01, 2e-3, seen))
+def test_a_reference_clock_tells_ageing_from_a_drifting_clock():
+    verdict = told(drifting(0.01, 2e-3, True))
     (cause,) = verdict.causes
-    assert (cause.effect, cause.equivalent) == (hidden, ())
+    assert (cause.effect, cause.equivalent) == ("ageing", ())
     assert verdict.verdict == "explained"
 
 

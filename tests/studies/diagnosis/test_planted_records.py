@@ -296,9 +296,9 @@ def test_a_chamber_logged_by_another_clock_in_one_run_is_found():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("step", "noise"), [(0.25, 0.005), (0.5, 0.02)])
-def test_what_rounding_leaves_is_no_structure(step, noise):
+def test_what_rounding_leaves_is_no_structure():
     """A bias that follows the temperature, read in steps far above its noise: it was unexplained, or had a cross-damping."""
+    step, noise = 0.25, 0.005
     t = np.arange(0.0, 8 * 3600.0, 20.0)
     housing = lag(t, 20.0 + 25.0 * np.sin(2.0 * np.pi * t / 9000.0), 300.0)
     x, rng = lag(t, housing, 1500.0) - 20.0, np.random.default_rng(4)
