@@ -219,51 +219,21 @@ def read_all_of_a_model(path):
     compensate(model, read_record(record), extrapolate=True)
 
 
-EVERY_TABLE = """
-film_emissivity = { value = 0.03, low = 0.01, high = 0.2 }
-[material.deviation.poisson_ratio]
-value = { value = 1e-4, sd = 1e-5 }
-slope_per_K = 1e-7
-[loss]
-inverse_q = { value = 1e-7, relative_sd = 0.3 }
-[[loss.activated]]
-height = 1e-9
-energy_eV = 0.5
-peak_degC = 100.0
-[bias]
-offset_deg_per_h = 1.0
-[noise]
-housing_lag_s = 3.0
-[[effect]]
-name = "second-lag"
-weight = { value = 0.1, sd = 0.02 }
-second_time_constant_s = 2000.0
-"""
+INPUTS = Path(__file__).parents[1] / "golden" / "inputs"
 
 
 def documents(tmp_path):
-    """Valid TOML documents of every format, by name, with their reader."""
-    found = [(f"card {name}", path.read_text(), load_card) for name, path in shipped_cards().items()]
-    found.append(("card with every table", shipped_cards()["hrg-30mm"].read_text() + EVERY_TABLE, load_card))
+    """Valid TOML documents of every format, by name, with their reader; `busy.toml` is a card with most tables."""
+    cards = [*shipped_cards().values(), INPUTS / "busy.toml", INPUTS / "wave.toml"]
+    found = [(f"card {path.stem}", path.read_text(), load_card) for path in cards]
     model = tmp_path / "model.toml"
     write_model(save_frequency(fit_frequency(T, F), (ModelSource("a.csv", "ab12", 7),), "test"), model)
     found.append(("model", model.read_text(), read_all_of_a_model))
     raw = tmp_path / "raw.csv"
     raw.write_text(raw_text(), encoding="utf-8")
     found.append(("map", draft_map([str(raw)]).text, lambda path: import_records([str(raw)], load_map(path))[""]))
-    found.append(("limits", LIMITS, lambda path: read_file(path, Limits, LIMITS_SCHEMA)))
-    found += [(f"study {name}", path.read_text(), read_study) for name, path in shipped_specs().items()]
-    return found
-
-
-LIMITS = """
-schema = "hrg.limits/1"
-[limits]
-bias_deg_per_h = 5.0
-angle_random_walk_deg_per_rt_h = 0.01
-[warm_up]
-band_deg_per_h = 1.0
-"""
+    found.append(("limits", (INPUTS / "limits.toml").read_text(), lambda path: read_file(path, Limits, LIMITS_SCHEMA)))
+    return found + [(f"study {name}", path.read_text(), read_study) for name, path in shipped_specs().items()]
 
 
 def grid_text():
