@@ -22,20 +22,6 @@ def test_figures_are_those_of_the_other_commands(tmp_path, ask):
         assert figures["slope"]["values"][place] == pytest.approx(point["slope_ppm_per_degC"], rel=1e-4)
 
 
-def test_hertz_per_micrometre_is_a_difference_of_two_solves(tmp_path, ask):
-    """A wall 1 µm thicker, solved anew."""
-    text = (
-        'schema = "hrg.card/1"\nname = "x"\n[resonator]\nshape = "hemisphere"\nradius_mm = 15.0\nthickness_mm = {}\n'
-        '[material]\nname = "fused-silica"\n'
-    )
-    frequencies = []
-    for thickness in (0.9, 0.901):
-        (tmp_path / "x.toml").write_text(text.format(thickness))
-        (mode,) = ask(["modes", str(tmp_path / "x.toml"), "--tolerance", "1e-8"])["modes"]
-        frequencies.append(mode["frequency_Hz"])
-    assert mode["frequency_per_thickness_Hz_per_um"] == pytest.approx(frequencies[1] - frequencies[0], rel=1e-3)
-
-
 def test_nearest_mode_lies_behind_many_lower_ones():
     """Planted: five modes of n = 1 below the drive mode, the fifth nearest."""
     from types import SimpleNamespace

@@ -1,6 +1,5 @@
 """`hrg render`: every kind of file, side by side, colours with units, and the exits that a user can mend."""
 
-import json
 import subprocess
 import sys
 
@@ -36,31 +35,6 @@ def test_without_opengl_the_page_has_its_view_and_a_still_picture(tmp_path, no_o
     text = page.read_text()
     assert "webgl2" in text
     assert len(text.partition("data:image/png;base64,")[2].partition('"')[0]) > 50_000
-
-
-def test_a_mesh_for_slicers_is_the_undeformed_solid_in_mm(tmp_path, capsys):
-    import trimesh
-
-    out = tmp_path / "dome.stl"
-    assert hrg_render("free-dome", "--theory", "shell", "--out", out, "--json") == 0
-    told = json.loads(capsys.readouterr().out)
-    assert (told["schema"], told["bytes"]) == ("hrg.render/1", out.stat().st_size)
-    assert told["modes"][0]["harmonic"] == 2
-    mesh = trimesh.load(out)
-    outer, inner = 15.45, 14.55
-    assert mesh.is_watertight
-    assert mesh.volume == pytest.approx(2 * np.pi / 3 * (outer**3 - inner**3), rel=3e-3)
-    assert mesh.extents == pytest.approx([2 * outer, 2 * outer, outer], rel=1e-3)
-
-
-def test_the_deformed_mesh_reaches_out_by_the_swing(tmp_path):
-    import trimesh
-
-    still, moved = tmp_path / "still.ply", tmp_path / "moved.ply"
-    assert hrg_render("free-dome", "--theory", "shell", "--out", still) == 0
-    assert hrg_render("free-dome", "--theory", "shell", "--swing-mm", "0.8", "--out", moved) == 0
-    far = np.linalg.norm(trimesh.load(moved).vertices - trimesh.load(still).vertices, axis=1)
-    assert far.max() == pytest.approx(0.8, rel=1e-3)
 
 
 def test_a_temperature_field_colours_the_meridian(tmp_path):
@@ -106,11 +80,3 @@ def test_the_drawing_process_ends_with_the_one_that_wants_it(tmp_path):
     done = subprocess.run(child, stdin=subprocess.DEVNULL, capture_output=True, timeout=600, check=False)
     assert done.returncode == 1
     assert not folder.exists()
-
-
-def test_a_mesh_for_another_program_says_what_it_holds(tmp_path, ask):
-    found = ask(["mesh", "hrg-30mm", "--out", str(tmp_path / "solid.msh"), "--around", "16"])
-    assert found["schema"] == "hrg.mesh/1"
-    text = (tmp_path / "solid.msh").read_text()
-    assert text.split("$Nodes\n")[1].splitlines()[0] == str(found["nodes"])
-    assert found["held_nodes"] > 0

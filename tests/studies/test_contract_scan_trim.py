@@ -25,10 +25,10 @@ def faces(tmp_path_factory):
 
 
 @pytest.mark.slow
-def test_a_scan_says_its_noise_and_saves_the_card_that_it_saw(faces, tmp_path, capsys, ask):
+def test_a_scan_says_its_noise_saves_the_card_that_it_saw_and_can_be_trimmed(faces, tmp_path, capsys, ask):
     words = ["scan", "free-dome", faces["inner"], faces["outer"], "--harmonic", 2, "--theory", "shell", "--json"]
     assert main([str(word) for word in (*words, "--map", tmp_path / "map.csv", "--save", tmp_path / "s.toml")]) == 0
-    found = json.loads(capsys.readouterr().out)
+    found = json.loads(text := capsys.readouterr().out)
     (split,) = found["splits"]
     assert split["split_Hz"]["low"] < split["split_Hz"]["value"] < split["split_Hz"]["high"]
     assert abs(found["faces"]["outer"]["noise_um"] - 0.1) < 0.01
@@ -38,6 +38,9 @@ def test_a_scan_says_its_noise_and_saves_the_card_that_it_saw(faces, tmp_path, c
     assert set(rows[0]) == {"position", "azimuth_deg", "inner_um", "outer_um", "wall_um", "offset_um"}
     (mode,) = ask(["modes", str(tmp_path / "s.toml"), "--theory", "shell"])["modes"]
     assert mode["split"]["split_Hz"] == pytest.approx(split["split_Hz"]["value"], rel=2e-3)
+    (tmp_path / "scan.json").write_text(text, encoding="utf-8")
+    plan = ask(["trim", "free-dome", "--scan", str(tmp_path / "scan.json"), "--goal", "0.02"])
+    assert plan["before"][0]["split_Hz"] == pytest.approx(split["split_Hz"]["value"])
 
 
 def test_a_plan_is_one_object_a_table_for_the_machine_and_a_page(tmp_path, capsys):
@@ -52,15 +55,6 @@ def test_a_plan_is_one_object_a_table_for_the_machine_and_a_page(tmp_path, capsy
     rows = list(csv.DictReader((tmp_path / "cuts.csv").read_text().splitlines()))
     assert sum(float(r["mass_ug"]) for r in rows) == pytest.approx(found["mass_ug"], rel=1e-4)
     assert "Cuts of this round" in (tmp_path / "trim.html").read_text(encoding="utf-8")
-
-
-def test_a_scan_can_be_trimmed(faces, tmp_path, capsys, ask):
-    words = ["scan", "free-dome", faces["inner"], faces["outer"], "--harmonic", 2, "--theory", "shell", "--json"]
-    assert main([str(word) for word in words]) == 0
-    text = capsys.readouterr().out
-    (tmp_path / "scan.json").write_text(text, encoding="utf-8")
-    plan = ask(["trim", "free-dome", "--scan", str(tmp_path / "scan.json"), "--goal", "0.02"])
-    assert plan["before"][0]["split_Hz"] == pytest.approx(json.loads(text)["splits"][0]["split_Hz"]["value"])
 
 
 @pytest.mark.slow
