@@ -1,4 +1,4 @@
-"""What holds for every test: one thread for linear algebra, a heap that is swept once, figures that are only sketched; how commands are asked."""
+"""What holds for every test: one thread for linear algebra, a heap that is swept once, figures only sketched, diagnoses coarse; how commands are asked."""
 
 import gc
 import json
@@ -6,7 +6,7 @@ import os
 
 import pytest
 
-from tests.sketches import sketch_pages
+from tests.sketches import coarsen, sketch_pages
 
 for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
     os.environ.setdefault(name, "1")  # the solver's matrices are small
@@ -23,6 +23,15 @@ def whole_pages():
     """Pages are sketched (`tests/sketches.py`); what draws them whole, for those that look at it."""
     with pytest.MonkeyPatch.context() as patch:
         yield sketch_pages(patch)
+
+
+@pytest.fixture(autouse=True, scope="module")
+def coarse(request):
+    """Diagnoses take coarse means, but for golden answers."""
+    with pytest.MonkeyPatch.context() as patch:
+        if "tests/golden" not in request.node.nodeid:
+            coarsen(patch)
+        yield
 
 
 @pytest.fixture
