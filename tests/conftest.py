@@ -29,9 +29,14 @@ def whole_pages():
 def coarse(request):
     """Diagnoses take coarse means, but for golden answers."""
     with pytest.MonkeyPatch.context() as patch:
-        if "tests/golden" not in request.node.nodeid:
-            coarsen(patch)
-        yield
+        yield coarsen(patch) if "tests/golden" not in request.node.nodeid else {}
+
+
+@pytest.fixture
+def fine(monkeypatch, coarse):
+    """A diagnosis takes the means that it takes of itself, where coarse ones resolve too little."""
+    for name, whole in coarse.items():
+        monkeypatch.setattr(name, whole)
 
 
 @pytest.fixture

@@ -37,7 +37,10 @@ def sketch_pages(patch: Any) -> dict[str, Any]:
     return whole
 
 
-def coarsen(patch: Any) -> None:
-    """Let a diagnosis take half as many means of a campaign as it does of itself: half the time."""
-    patch.setattr("studies.inference.diagnosis.BLOCKS", 400)
-    patch.setattr("studies.inference.diagnosis.BLOCKS_OF_RUN", (50, 200))
+def coarsen(patch: Any) -> dict[str, Any]:
+    """Let a diagnosis take half as many means of a campaign as it does of itself, for half the time; return what it takes, by name."""
+    module, coarse = import_module("studies.inference.diagnosis"), {"BLOCKS": 400, "BLOCKS_OF_RUN": (50, 200)}
+    whole = {f"{module.__name__}.{name}": getattr(module, name) for name in coarse}
+    for name, value in coarse.items():
+        patch.setattr(module, name, value)
+    return whole

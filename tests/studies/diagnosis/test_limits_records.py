@@ -74,6 +74,7 @@ def test_a_bump_is_told_from_a_curve(added, bump, structure):
     [(4.2, 500.0, 0.0, 20.0), (10.0, 2000.0, 800.0, -10.0)],
     ids=["over before the second block", "30 K from equilibrium, 10⁴ times the noise"],
 )
+@pytest.mark.usefixtures("fine")
 def test_an_initial_state_that_one_block_alone_sees_spoils_nothing(hours, period, tau, start):
     t = np.arange(0.0, 3600.0 * hours, 20.0)
     housing = 20 + 10 * np.sin(t / period)
