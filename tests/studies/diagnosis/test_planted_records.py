@@ -224,6 +224,7 @@ def lumps_of_silica(words, seed):
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("fine")
 def test_a_healthy_gyro_of_several_lumps_is_followed_to_its_noise_and_its_card_predicts_an_unseen_run():
     """Lags in series, whose lumps take no heat, left 60 times the noise; two runs left the level of the bias open by 10 °/h."""
     runs = [lumps_of_silica("step 20 45 3h then step 45 -15 4h", 1), lumps_of_silica("cycle 20 -10 40 1 30min 2", 2)]
