@@ -29,6 +29,7 @@ def chamber(tmp_path_factory):
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("fine")
 @pytest.mark.parametrize(("axis", "when"), [("x", 1021.0), ("z", 1448.0)])
 def test_the_step_of_an_axis_is_named_with_its_moment(chamber, axis, when):
     """Known: x by +454 ± 26 °/h at 1021 s, z by -199 ± 17 at 1448; a step was once named with probability 0.10."""
