@@ -86,6 +86,7 @@ def test_a_resistor_that_relaxes_from_run_to_run_ages():
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("fine")
 def test_a_voltmeter_in_an_air_bath_gets_no_false_name():
     """Known: one lag leaves 0.33 ppm, two 0.19, of averages over many rows."""
     verdict = diagnose(DATA / "voltmeter_sweep.csv")
@@ -95,6 +96,7 @@ def test_a_voltmeter_in_an_air_bath_gets_no_false_name():
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("fine")
 def test_the_thermometer_of_a_crystal_is_slower_than_the_crystal(tmp_path):
     """Known: by 100 to 130 s, of a crystal at 25 MHz. To the frequency it is as if a gradient shifted it: one set."""
     column = '# unknown column: "column 3"'
