@@ -8,7 +8,6 @@ import pytest
 
 from studies.cli import main
 from studies.effects import find_effect
-from studies.inference import signatures
 from studies.instrument.card import load_card
 from studies.record import write_record
 from studies.simulation.chamber import load_profile
@@ -30,14 +29,6 @@ def simulated(card, *profiles, seed=0):
 @pytest.fixture(scope="module")
 def shipped():
     return load_card("hrg-30mm")
-
-
-@pytest.fixture
-def only(monkeypatch):
-    """Let a diagnosis know a few effects alone: those that contend."""
-    return lambda *names: monkeypatch.setattr(
-        signatures, "library", lambda: {name: find_effect(name) for name in names}
-    )
 
 
 @pytest.mark.slow
@@ -66,6 +57,7 @@ def test_what_a_loss_peak_does_to_the_bias_is_no_second_cause(only):
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("fine")
 def test_an_effect_is_not_taken_for_values_far_from_the_card(only):
     """A gradient's dT/dt was once fitted as eleven standard deviations of the housing's lag, with other causes to mend it."""
     card = load_card("bvg-bell")

@@ -1,0 +1,14 @@
+"""What diagnoses of the tests' own records share."""
+
+import pytest
+
+from studies.effects import find_effect
+from studies.inference import signatures
+
+
+@pytest.fixture
+def only(monkeypatch):
+    """Let a diagnosis know a few effects alone: those that contend."""
+    return lambda *names: monkeypatch.setattr(
+        signatures, "library", lambda: {name: find_effect(name) for name in names}
+    )
