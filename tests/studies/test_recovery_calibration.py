@@ -28,8 +28,8 @@ def draw(card, seed):
     return card.with_values(priors.at(u))
 
 
-def measure(card, words, seed, **options):
-    return simulate_run(card, load_profile(words), 1 / 120, seed, **options).record
+def measure(card, words, seed, rate=1 / 120, **options):
+    return simulate_run(card, load_profile(words), rate, seed, **options).record
 
 
 @pytest.fixture(scope="module")
@@ -176,7 +176,7 @@ def test_a_run_that_began_in_the_midst_of_a_change_is_explained_and_what_its_cha
 @pytest.mark.slow
 def test_where_nothing_is_wrong_the_card_stays_and_an_unseen_bias_is_as_it_was(card):
     """Terms of the bias that followed the noise of one run once made that of another ten times worse."""
-    found = calibrate(card, [measure(card, UNSEEN, 3)], profile=False)
+    found = calibrate(card, [measure(card, UNSEEN, 3, 1 / 60)], profile=False)
     true, again = (measure(one, PROFILES[0], 0, noise=False) for one in (card, found.instrument))
     assert np.sqrt(np.mean((again["bias_deg_per_h"] - true["bias_deg_per_h"]) ** 2)) < 3e-3
     assert {one.parameter for one in found.estimates if abs(one.shift_sd) > 0.5} == set()

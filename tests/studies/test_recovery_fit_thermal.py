@@ -153,7 +153,7 @@ def test_a_heat_path_of_several_lumps_is_followed_to_its_noise():
     """The virtual gyro's own heat path, several lumps with radiation: residual near the noise, curvature that of the card's law."""
     card = load_card("hrg-30mm")
     runs = [
-        simulate_run(card, parse_profile(words), 1 / 30, seed).record
+        simulate_run(card, parse_profile(words), 0.1, seed).record
         for seed, words in enumerate(("step 40 -20 5h", "step -20 40 5h"))
     ]
     found = fit_thermal_constants(runs)
