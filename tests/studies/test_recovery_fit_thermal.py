@@ -96,6 +96,7 @@ def test_two_lags_in_series_are_found_and_a_second_is_not_made_up():
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("fine")
 @pytest.mark.parametrize(
     ("taus", "past", "late"),
     [((1500.0,), False, 0.0), ((1500.0, 400.0), True, 0.0), ((1500.0, 400.0), True, 60.0)],
