@@ -31,8 +31,8 @@ CASES: tuple[tuple[str, str, float | None], ...] = (
     *(("pair", name, 6.0) for name in PAIRS),
 )
 """Kind, what is hidden, SNR; every effect of the library, every noise, every cause outside the library."""
-BETWEEN_RUNS = {"ageing", "leak", "clock-drift", "clock-offset"}
-"""Seen between two runs; of the others three in four are hidden in one."""
+IN_TWO_RUNS = {"ageing", "leak", "clock-drift", "clock-offset", "radiation"}
+"""Seen between two runs, or not of every SNR in one; of the others three in four are hidden in one."""
 FIRST_SEED = 5000
 Line = dict[str, Any]
 
@@ -66,7 +66,7 @@ def faults_of(truth: Truth, snr: float | None, folder: Path) -> list[str]:
 def truth_of(place: int, folder: Path) -> tuple[Line, list[str], set[str]]:
     """Draw a campaign of two runs or one; return its truth in the form that marks read, its files and the responses that matter."""
     kind, name, snr = CASES[place]
-    runs = 2 if kind == "pair" or name in BETWEEN_RUNS or place % 4 == 0 else 1
+    runs = 2 if kind == "pair" or name in IN_TWO_RUNS or place % 4 == 0 else 1
     truth = make_campaign(FIRST_SEED + place, kind, name, snr, runs=runs, folder=folder)
     line = {
         "kind": kind,
