@@ -30,6 +30,8 @@ LONGEST_ROW = 60.0  # s, between which what radiation adds is a parabola
 MEAN_LINE = np.array([[2.0, 2.0, -1.0], [-1.0, 2.0, 2.0]])[:, :, None, None] / 3
 """Both ends of the straight line of a parabola's mean, from its values at start, middle and end."""
 INTERVALS = 32  # solved together: their matrices stay in the cache
+FEW_CORNERS = 20  # of a profile after whose corners knots are closer, where they are closer than usual everywhere
+SOON, CLOSER = 96, 4  # usual distances over which they are, and how much: a parabola is far from what begins there
 MOST_CORNERS = 200  # of profiles whose every corner is a knot; a measured column of more rows is averaged for δ
 
 
@@ -247,11 +249,15 @@ def _mean_around(profile: Profile, time: Array, reach: Array) -> Array:
 
 
 def _choose_knots(corners: Array, boundaries: Mapping[str, Profile], longest: float) -> Array:
-    """Corners, or of very many only the jumps, divided until no interval is longer than `longest` (s)."""
+    """Corners, or of very many only the jumps, divided until no interval is longer than `longest` (s), shorter after each of few corners."""
     if len(corners) > MOST_CORNERS:
         jumps = [profile.jumps for profile in boundaries.values()]
         corners = np.unique(np.concatenate([corners[[0, -1]], *jumps]))
-    parts = np.ceil(np.diff(corners) / longest)
+    soon = SOON * longest if longest < LONGEST_ROW and len(corners) <= FEW_CORNERS else 0.0
+    old, ends = corners, corners + soon
+    corners = np.unique(np.concatenate([old, ends[ends < old[-1]]]))
+    since = corners[:-1] - old[np.searchsorted(old, corners[:-1], side="right") - 1]
+    parts = np.ceil(np.diff(corners) / np.where(since < soon, longest / CLOSER, longest))
     if parts.sum() > MOST_ROWS:
         raise ThermalError(f"the profile is too long to be swept ({np.ptp(corners):.3g} s); shorten it.")
     counts = parts.astype(np.intp)

@@ -71,11 +71,12 @@ static double azimuth_of(const Twin *w, const TwinInput *in) {
 }
 #endif
 
-/* The resonator's temperature as much earlier as [law] says, by cubics through what has been; where it is ahead of its lags, as much later, the boundary going straight on. */
+/* The resonator's temperature as much earlier as [law] says, by cubics through what has been; where it is ahead of its lags, as much later. */
 static const char *displace(Twin *w, double *T, double rate) {
 #if TWIN_AHEAD
     Twin later = *w;
-    const char *fault = twin_heat(&later, -TWIN_DELAY, w->boundary, w->boundary - w->trend * TWIN_DELAY);
+    const char *fault = w->onward ? w->onward(&later, w->way, -TWIN_DELAY)
+                                  : twin_heat(&later, -TWIN_DELAY, w->boundary, w->boundary - w->trend * TWIN_DELAY);
     for (int i = 0; i < TWIN_NODES; ++i) *T += twin_rows[0][i] * (later.T[i] - w->T[i]);
     return (void)rate, fault;
 #else

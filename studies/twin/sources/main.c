@@ -89,6 +89,12 @@ static const char *heat_to(Twin *twin, Profile *profile, double start, double ti
     return fault;
 }
 
+static const char *onward(Twin *twin, const void *way, double seconds) {
+    Profile ahead = *(const Profile *)way;
+    const double now = ahead.rows[0][TIME] + twin->time;
+    return heat_to(twin, &ahead, now, now + seconds);
+}
+
 /* Commands whose columns stand among those of the loops. */
 static int said_by_loops(int command) { return TWIN_LOOPS && (command == IN_QUADRATURE || command == IN_ANGLE); }
 
@@ -123,6 +129,8 @@ static int write_rows(Twin *twin, Profile *profile, FILE *out, double row, int f
     Row here = {0};
     double now = start;
     twin->step = row;
+    twin->onward = onward;
+    twin->way = profile;
     fprintf(out, "# instrument: %s\n# source: simulated\ntime_s%s", TWIN_NAME, TWIN_SENSOR >= 0 ? "," TWIN_BOUNDARY : "");
     for (int k = 0; k < TWIN_OUTPUTS - 1; ++k)
         fprintf(out, ",%s", twin_columns[k]);

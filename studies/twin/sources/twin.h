@@ -32,7 +32,7 @@ typedef struct { double markov[FLICKER_TIMES], walk, offset; int begun; } TwinNo
 typedef struct { double re, im; } TwinComplex;
 typedef struct { double rate; TwinComplex drift[TWIN_TERMS]; } TwinTurning; /* at a row: rad/s, and the rate that azimuths feign */
 
-typedef struct {
+typedef struct Twin {
     double p[TWIN_PARAMETERS];
     double time, step, row_time; /* since the start; between rows; of the last row, below 0 before the first */
     double boundary, trend, T[TWIN_NODES]; /* of the boundary, K/s */
@@ -56,6 +56,9 @@ typedef struct {
     TwinTurning turning;
     TwinComplex shown[TWIN_TERMS], arriving[TWIN_TERMS];
     int held;
+    /* heats by seconds along what the boundary will do, where that is known; else it goes straight on */
+    const char *(*onward)(struct Twin *, const void *way, double seconds);
+    const void *way;
 } Twin;
 
 extern const double twin_start[TWIN_PARAMETERS];

@@ -223,24 +223,22 @@ k4_deg_per_h_s_per_Hz = 30.0
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("delay", "direct", "most"), [(31.0, 0.0, 1e-9), (-31.0, 0.3, 1e-7)])
-def test_limits_card_without_a_geometry(delay, direct, most, folder):
-    """A polynomial law behind three lumps that radiate, bias that follows part of its bend, a resonator that is late or early.
+@pytest.mark.parametrize(("delay", "direct"), [(31.0, 0.3), (-31.0, 0.3)])
+def test_limits_card_without_a_geometry(delay, direct, folder):
+    """A polynomial law behind three lumps that radiate, past one another too, bias that follows part of its bend, a resonator late or early.
 
-    What is radiated past the lumps between makes the rate, of which k₄ is a part of the bias, 2e-9 K/s less sure. The twin does not know a corner of the chamber before it comes.
+    The program knows a corner of its profile before it comes, but neither it nor the simulation what comes after the end.
     """
     card = folder / "law.toml"
     card.write_text(LAW.format(direct=direct, delay=delay))
     instrument = load_card(card)
     profile = write_profile(folder / "ten.csv", TEN_HOURS)
-    found = run_twin(compile_twin(instrument, folder / "law", SANITIZED), profile, 6.0)
+    found = run_twin(compile_twin(instrument, folder / "law", SANITIZED), profile, 3.0)
     chamber = Profile(np.array(TEN_HOURS["time_s"]), 273.15 + np.array(TEN_HOURS["chamber_temperature_degC"]))
-    expected = simulated(instrument, chamber, 6.0)
-    known = np.all(
-        [(found["time_s"] < t + min(delay, 0.0)) | (found["time_s"] > t) for t in TEN_HOURS["time_s"]], axis=0
-    )
+    expected = simulated(instrument, chamber, 3.0)
+    known = found["time_s"] <= TEN_HOURS["time_s"][-1] + min(delay, 0.0)
     errors = worst({k: v[known] for k, v in found.items()}, {k: v[known] for k, v in expected.items()})
-    assert {name: error for name, error in errors.items() if error > most} == {}
+    assert {name: error for name, error in errors.items() if error > 1e-9} == {}
     assert not [key for key in instrument_keys(instrument) if key.startswith(("thermal.", "law."))]
 
 
