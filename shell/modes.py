@@ -5,7 +5,7 @@
 
 import warnings
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import log, pi, sqrt
 from typing import TYPE_CHECKING
@@ -14,7 +14,7 @@ import numpy as np
 
 from shell.assembly import build_system
 from shell.curves import Arc
-from shell.elastic import Elastic, VaryingElastic
+from shell.elastic import Constants, Elastic, VaryingElastic, find_constants
 from shell.errors import ShellError
 from shell.fitted import fit_profile
 from shell.layout import Theory
@@ -87,6 +87,14 @@ class Mode:
         solution = self._solved()
         assert self.resonator is not None
         return sample_shape(self.resonator, solution, points)
+
+    def kept_on(self, resonator: Resonator, elastic: Elastic | VaryingElastic) -> "Mode":
+        """The mode with its shape kept on a design a little aside: f is stationary in the shape, so exact to first order."""
+        fitted = fit_profile(resonator)[0]
+        moved = _keep_shape(fitted, elastic, self._solved())
+        if moved is None:
+            raise ShellError("the elements of the design aside are others.")
+        return replace(self, frequency=sqrt(moved.eigenvalue) / (2 * pi), solution=moved, resonator=fitted)
 
     def plot(self) -> "Figure":
         """Draw the cross-section through an antinode, undeformed and at full swing to both sides (matplotlib)."""
@@ -178,14 +186,26 @@ def _by_thickness(resonator: Resonator, solution: Solution) -> float:
         step = min(step, *(SMALL * (resonator.stem.radius / (end - top)) ** 2 for _, end in resonator.stem.roots))
     found: dict[float, float] = {0.0: solution.eigenvalue}
     for change in (-step, step):
-        system = build_system(resonator.thickened(1 + change), solution.system.n, solution.system.level)
-        same = [
-            a.unknowns.shape == b.unknowns.shape for a, b in zip(system.groups, solution.system.groups, strict=True)
-        ]
-        if all(same) and system.constraint.shape == solution.system.constraint.shape:
-            found[change] = Solution(system, solution.constants, solution.vector).eigenvalue
+        if moved := _keep_shape(resonator.thickened(1 + change), solution.constants, solution):
+            found[change] = moved.eigenvalue
     low, high = min(found), max(found)  # one-sided where one more cell fits on one side
     return log(found[high] / found[low]) / (2 * log((1 + high) / (1 + low)))
+
+
+def _keep_shape(
+    resonator: Resonator, material: Elastic | VaryingElastic | tuple[Constants, ...], solution: Solution
+) -> Solution | None:
+    """Return the same eigenvector on another resonator; None where its elements are others."""
+    old = solution.system
+    system = build_system(resonator, old.n, old.level)
+    if [group.unknowns.shape for group in system.groups] != [group.unknowns.shape for group in old.groups]:
+        return None
+    if system.constraint.shape != old.constraint.shape:
+        return None
+    if not isinstance(material, tuple):
+        tables = [group.table for group in system.groups]
+        material = tuple(find_constants(table.position, material, table.plane_stress) for table in tables)
+    return Solution(system, material, solution.vector)
 
 
 def _label(solution: Solution) -> str:

@@ -8,7 +8,7 @@ import scipy
 from numpy.typing import NDArray
 
 from studies.design.goals import EXACT, Scalar
-from studies.design.search import BOXES, Search
+from studies.design.search import FINE, WIDE, Search
 from studies.design.task import Task, is_magnitude, shown
 from studies.errors import InputError
 from studies.sweeps.evaluate import WorkPlan, evaluate_case
@@ -89,7 +89,7 @@ def answer(task: Task, explorer: Explorer, plan: WorkPlan) -> Answer:
     best = ends[0]
     if count > 1:
         scalar = _walk_front(search, ends)
-        best = search.descend(scalar, search.rank(scalar)[0], BOXES[1:])
+        best = search.descend(scalar, search.rank(scalar)[0])
     smooth = best
     best = search.settle(scalar, best)
     _refuse_infeasible(search, best)
@@ -142,7 +142,7 @@ def _walk_front(search: Search, ends: list[int]) -> Scalar:
     span = np.maximum(corners.max(axis=0) - ideal, ALIKE * spread)  # where one design is best in all, there is no front
     for weights in _lattice(len(ends), keys.search.front):
         between = Scalar(1 / weights, ideal, span)
-        search.descend(between, search.rank(between)[0], BOXES[1:])
+        search.descend(between, search.rank(between)[0])
     own = np.array([one.weight for one in keys.objective])
     return Scalar(own / own.sum(), ideal, span)
 
@@ -187,7 +187,7 @@ def _refuse_infeasible(search: Search, best: int) -> None:
     ends = [
         f"{p.name} is at its {'low' if x < 0.5 else 'high'} end"
         for p, x in zip(search.task.study.parameters, search.x[best], strict=True)
-        if min(x, 1 - x) < BOXES[-1] / 10
+        if min(x, 1 - x) < FINE / 10
     ]
     bound = f" There, {' and '.join(ends)}: wider bounds may help." if ends else ""
     raise InputError(
@@ -198,13 +198,8 @@ def _refuse_infeasible(search: Search, best: int) -> None:
 
 def _foretell(search: Search, best: int) -> Array:
     """Return what the interpolant through all the other designs about the best one says of it, in units of the columns."""
-    x, values = search.x, search.values
-    others = np.arange(len(x)) != best
-    search.x, search.values = x[others], values[others]
-    try:
-        z = search.local(x[best], BOXES[0])(x[best, : search.task.free])[0]
-    finally:
-        search.x, search.values = x, values
+    x = search.x[best]
+    z = search.local(x, WIDE, without=best)(x[: search.task.free])[0]
     log = search.goals.logarithmic
     return np.where(log, np.exp(np.where(log, z, 0.0)), z)
 
@@ -213,7 +208,7 @@ def _prices(search: Search, scalar: Scalar, best: int) -> list[float | None]:
     """Return the multiplier of every limit: ∇t + Σ λ ∇g + Σ μ ∇bound = 0 with λ, μ ≥ 0, by least squares."""
     goals, task = search.goals, search.task
     free = slice(0, task.free)
-    z, slopes = search.local(search.x[best], BOXES[-1])(search.x[best][free])
+    z, slopes = search.local(search.x[best], FINE)(search.x[best][free])
     pieces = goals.pieces(scalar, z, search.margins)
     value = np.array([one.slope * z[one.column] + one.offset for one in pieces])
     slope = np.array([one.slope * slopes[one.column] for one in pieces])
@@ -267,7 +262,7 @@ def spread_about(search: Search, best: int) -> tuple[Spread, ...]:
     x, values = search.x[best], search.values[best]
     most = np.array([t.most if (t := task.tolerance(n)) else 0.0 for n in task.study.names]) / search.width
     sd = np.array([t.sd if (t := task.tolerance(n)) else 0.0 for n in task.study.names]) / search.width
-    slopes = search.slopes(best, BOXES[-1])
+    slopes = search.slopes(best, FINE, both=True)
     moves = {c: goals.moves(values, slopes, c) for name in task.wanted for c in goals.smooth(name)}
     nearest = {name: moves[min(goals.smooth(name), key=lambda c: abs(values[c]))] for name in task.wanted}
     corners = [x + side * np.sign(move) * most for move in nearest.values() for side in (1.0, -1.0)]

@@ -92,9 +92,15 @@ class Goals:
 
     def violation(self, values: Array, margins: Array) -> float:
         """Return the largest excess over limits with their margins, in spreads of its column; 0 where all is kept."""
-        slack = np.array([EXACT * abs(limit) for _, _, limit, _ in self.limits])
-        spread = np.array([self.raw_spread[self._place(column)] for column, *_ in self.limits])
-        return max(0.0, float(((self.excess(values, margins) - slack) / spread).max(initial=0.0)))
+        found = [0.0]
+        for (column, sign, limit, _), over in zip(self.limits, self.excess(values, margins), strict=True):
+            c = self._place(column)
+            if self.logarithmic[c]:  # sign (v − limit) + margin = over
+                value = values[c]
+                found.append((sign * np.log(value / max(value - sign * over, 1e-300)) - EXACT) / self.spread[c])
+            else:
+                found.append((over - EXACT * abs(limit)) / self.raw_spread[c])
+        return float(max(found))
 
     @cached_property
     def limits(self) -> list[tuple[str, float, float, int]]:
@@ -186,10 +192,15 @@ def step(
     columns = np.array([one.column for one in pieces])
     slope, offset = (np.array([getattr(one, name) for one in pieces]) for name in ("slope", "offset"))
     aims = np.array([one.of >= 0 for one in pieces])
+    used_ones, places = np.unique(columns, return_inverse=True)
+    wanted = surface.of(used_ones)
+    last: list[Any] = [None, None]
 
     def at(x: Array) -> tuple[Array, Array]:
-        values, slopes = surface(x)
-        return slope * values[columns] + offset, slope[:, None] * slopes[columns]
+        if last[0] is None or not np.array_equal(last[0], x):
+            values, slopes = wanted(x)
+            last[:] = x.copy(), (slope * values[places] + offset, slope[:, None] * slopes[places])
+        return last[1]  # type: ignore[no-any-return]
 
     def solve(begin: Array, lifted: NDArray[np.bool_], used: NDArray[np.bool_]) -> Array:
         """Minimise t with the pieces that `lifted` marks at most t, the others that are used at most 0."""

@@ -76,7 +76,7 @@ class SearchKeys(Keys, frozen=True, kw_only=True):
     """How long and from where the search goes."""
 
     seed: Annotated[int, number("of the designs drawn first", least=0, most=2**63 - 1)] = 0
-    starts: Annotated[int, number("regions in which it searches locally", least=1, most=100)] = 5
+    starts: Annotated[int, number("regions in which it searches locally", least=1, most=100)] = 3
     evaluations: Annotated[int, number("full solves, at most, about", least=10, most=10**6)] = 600
     front: Annotated[int, number("designs on the front between those best in one objective", least=1, most=200)] = 5
 

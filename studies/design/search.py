@@ -10,7 +10,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from studies.design.goals import Goals, Scalar, lay_goals, step
+from studies.design.goals import HELD, Goals, Scalar, lay_goals, step
 from studies.design.interpolant import Interpolant, interpolate
 from studies.design.task import Task
 from studies.errors import InputError
@@ -19,15 +19,20 @@ from studies.sweeps.search import Explorer
 Array = NDArray[np.float64]
 TOGETHER = 4  # designs that are computed together
 ROUNDS = 6  # over the whole box, at most
-BOXES = (0.15, 0.04, 0.01)  # half widths of the trust region, in parts of the ranges
-WIDER = 2.0  # half widths of a second step, computed beside the first; as many times more after each time that it is the better
-PATIENCE = 3  # times without a gain end the steps within a box; before the last, a new star
-REFINED = 8  # steps within boxes of one size, at most
+WIDE, FINE = (
+    0.15,
+    0.01,
+)  # half widths of the box about a design: the first and largest, and where steps end, in parts of the ranges
+WIDER = 2.0  # half widths of a second step, computed beside the first; the box grows as much where it is the better
+SHRINK = 1 / 3  # of a box without a gain
+FEW, MOST = 5, 30  # steps from one design: rough ones, those to the end
+SETTLING = 8  # steps from whole steps of the parameters to others
 DRAWN = 100  # of which one is looked at because it is far off
 ENOUGH = 3  # regions that lead to one place
 STARTS = 24  # of every step on the interpolant over the whole box
 NEAR = 6.0  # half widths within which designs make the interpolant of a trust region
 PENALTY = 100.0  # of the excess over limits, in spreads, against the objective's
+SLOPED, MANY = 20, 60  # designs whose slopes the interpolant takes: about a centre, over the whole box
 GAIN = 1e-5  # of an objective's spread: less is none
 ASIDE = 0.05  # step of a parameter that is not free, in parts of its range
 MOST_CORNERS = 256  # of the grid of steps about a design
@@ -45,6 +50,9 @@ class Search:
         self.rng = np.random.default_rng(task.keys.search.seed)
         self.x = np.empty((0, len(self.low)))  # designs that have values, in parts of the ranges
         self.values = np.empty((0, len(task.columns)))
+        self.exact = np.empty(
+            (0, len(task.columns), len(self.low))
+        )  # slopes by the widths of the ranges; NaN where none
         self.seen: dict[bytes, Array | None] = {}  # every design looked at, in order, with its values
         self.failures: list[tuple[Array, str]] = []
         self._draw_first()
@@ -65,10 +73,14 @@ class Search:
             return
         cases = self.explorer.cases(np.array([design for design, _ in new.values()]))
         for (key, (_, x)), case in zip(new.items(), cases, strict=True):
+            values, slopes = np.split(case.values, [self.values.shape[1]])
             good = bool(np.isfinite(case.values).all())
-            self.seen[key] = case.values if good else None
+            self.seen[key] = values if good else None
             if good:
-                self.x, self.values = np.vstack([self.x, x]), np.vstack([self.values, case.values])
+                exact = np.full((1, *self.exact.shape[1:]), np.nan)
+                exact[0, list(self.task.exact)] = slopes.reshape(-1, len(self.low)) * self.width
+                self.x, self.values = np.vstack([self.x, x]), np.vstack([self.values, values])
+                self.exact = np.vstack([self.exact, exact])
             else:
                 self.failures.append((x, case.remark))
 
@@ -98,8 +110,8 @@ class Search:
             found = [self._step(surface, scalar, x, low, high) for x in starts]
             chosen: list[Array] = []
             for _, x in sorted(found, key=lambda one: one[0]):
-                other = all(np.abs(x - one).max() > BOXES[0] for one in chosen)
-                if other and np.abs(x - self.x).max(axis=1).min() > BOXES[-1]:
+                other = all(np.abs(x - one).max() > WIDE for one in chosen)
+                if other and np.abs(x - self.x).max(axis=1).min() > FINE:
                     chosen.append(x)
             self.look([*chosen[: TOGETHER - 1], self._far_off(surface, scalar)])
             idle = 0 if self._is_better(self._merit(self.rank(scalar)[0], scalar), before) else idle + 1
@@ -107,7 +119,7 @@ class Search:
                 break
         regions: list[int] = []
         for k in self.rank(scalar):
-            if all(np.abs(self.x[k] - self.x[j]).max() > 2 * BOXES[0] for j in regions):
+            if all(np.abs(self.x[k] - self.x[j]).max() > 2 * WIDE for j in regions):
                 regions.append(k)
         return regions[: task.keys.search.starts]
 
@@ -118,49 +130,49 @@ class Search:
         hopeful = sorted(drawn, key=lambda x: self._judge(surface, scalar, x))[: DRAWN // 4]
         return max(hopeful, key=lambda x: float(np.linalg.norm(self.x - x, axis=1).min()))
 
-    def descend(self, scalar: Scalar, best: int, boxes: Sequence[float] = BOXES, known: Sequence[int] = ()) -> int:
-        """Improve a design within boxes that move with it and shrink, until it meets one `known` before; return the place of the best one.
+    def descend(self, scalar: Scalar, best: int, rough: bool = False, known: Sequence[int] = ()) -> int:
+        """Improve a design by steps within a box that grows with what they gain and shrinks without; return the place of the best one.
 
-        Boxes of the first size have no star.
+        Where nothing more is foretold, what the interpolant knows no slopes of gets them from a star of designs. The last steps keep
+        all limits. Rough ones take no star, and end where they meet a design `known` before.
         """
-        first = best
-        for half in boxes:
-            strict, rough = half == BOXES[-1], half == BOXES[0]
-            centre, idle, reach = np.full_like(self.start, np.inf), 0, WIDER * half
-            for _ in range(REFINED):
-                aside = np.abs(self.x[best] - centre).max() > half
-                if aside and not rough and (idle == PATIENCE - 1 or not np.isfinite(centre).all()):
-                    centre = self.x[best]  # steps that keep what the interpolant said need no new star
-                    self.margins = self.goals.margins(self.values[best], self.slopes(best, half))
+        first, centre = best, np.full_like(self.start, np.inf)
+        for strict in (False,) if rough else (False, True):
+            half = FINE if strict else WIDE
+            for _ in range(FEW if rough else MOST):
                 surface = self.local(self.x[best], half)
                 best = self._best_near(best, half, scalar, strict)
                 before, here = self._worth(best, scalar, strict), self.x[best]
-                self.look([self._step(surface, scalar, here, *self._box(here, far))[1] for far in (half, reach)])
-                best = self._best_near(best, reach, scalar, strict)
-                idle = 0 if self._is_better(self._worth(best, scalar, strict), before) else idle + 1
-                far_off = np.abs(self.x[best] - here).max() > half
-                reach = min(WIDER * reach, BOXES[0]) if far_off and not idle else WIDER * half
-                if (
-                    self.spent
-                    or idle == PATIENCE - rough
-                    or any(np.abs(self.x[best] - self.x[k]).max() < half for k in known)
-                ):
+                steps = [self._step(surface, scalar, here, *self._box(here, far)) for far in (half, WIDER * half)]
+                foretold = min(self._mix(over, t, strict) for (over, t), _ in steps)
+                if not rough and (half < FINE or not self._is_better(foretold, before)):
+                    if np.abs(here - centre).max() <= WIDER * FINE:
+                        break
+                    centre, half = here, max(half, FINE)
+                    self.margins = self.goals.margins(self.values[best], self.slopes(best, half))
+                    continue
+                self.look([x for _, x in steps])
+                best = self._best_near(best, WIDER * half, scalar, strict)
+                gained = self._is_better(self._worth(best, scalar, strict), before)
+                if np.abs(self.x[best] - here).max() > half or not gained:
+                    half = min(WIDER * half, WIDE) if gained else SHRINK * half
+                if self.spent or (rough and half < FINE):
                     break
-        return best if self._merit(best, scalar) <= self._merit(first, scalar) or not strict else first
+                if any(np.abs(self.x[best] - self.x[k]).max() < half for k in known):
+                    break
+        return best if rough or self._merit(best, scalar) <= self._merit(first, scalar) else first
 
     def best(self, scalar: Scalar) -> int:
         """Return the best design of several regions, each descended into at first, the best to the end; three that meet are enough."""
         found: list[int] = []
         for k in self.explore(scalar):
-            found.append(self.descend(scalar, k, BOXES[:1], found))
+            found.append(self.descend(scalar, k, True, found))
             apart = np.abs(self.x[found] - self.x[found[-1]]).max(axis=1)
-            if (apart < BOXES[0]).sum() == ENOUGH or self.spent:
+            if (apart < WIDE).sum() == ENOUGH or self.spent:
                 break
-        best = self.descend(scalar, min(found, key=lambda k: self._worth(k, scalar, False)), BOXES[1:])
+        best = self.descend(scalar, min(found, key=lambda k: self._worth(k, scalar, False)))
         first = self.rank(scalar)[0]
-        return (
-            best if self._merit(best, scalar) <= self._merit(first, scalar) else self.descend(scalar, first, BOXES[-1:])
-        )
+        return best if self._merit(best, scalar) <= self._merit(first, scalar) else self.descend(scalar, first)
 
     def _best_near(self, best: int, half: float, scalar: Scalar, strict: bool) -> int:
         near = np.flatnonzero(self._is_plain() & (np.abs(self.x - self.x[best]).max(axis=1) <= half + 1e-9))
@@ -168,8 +180,11 @@ class Search:
 
     def _worth(self, k: int, scalar: Scalar, strict: bool) -> tuple[float, float]:
         """Return what designs are compared by on the way: limits first where `strict`, else a little beyond a limit for a gain."""
-        over, t = self._merit(k, scalar)
-        return (over, t) if strict else (0.0, t + PENALTY * over)
+        return self._mix(*self._merit(k, scalar), strict)
+
+    @staticmethod
+    def _mix(over: float, t: float, strict: bool) -> tuple[float, float]:
+        return (over if over > HELD else 0.0, t) if strict else (0.0, t + PENALTY * over)
 
     @staticmethod
     def _is_better(now: tuple[float, float], before: tuple[float, float]) -> bool:
@@ -179,11 +194,11 @@ class Search:
         """Return the best design whose parameters are whole steps, where the task asks for steps."""
         if not self.steps.any():
             return best
-        for _ in range(REFINED):
-            surface = self.local(self.x[best], BOXES[-1])
+        for _ in range(SETTLING):
+            surface = self.local(self.x[best], FINE)
             x = self.x[best]
             if not self._is_settled(x):
-                _, x = self._step(surface, scalar, x, *self._box(x, BOXES[-1]))
+                _, x = self._step(surface, scalar, x, *self._box(x, FINE))
             judged = [(self._judge(surface, scalar, one), one) for one in self._corners(x)]
             self.look([one for _, one in sorted(judged, key=lambda pair: pair[0])[:TOGETHER]])
             found = next((k for k in self.rank(scalar) if self._is_settled(self.x[k])), best)
@@ -192,18 +207,24 @@ class Search:
             best = found
         return best
 
-    def local(self, centre: Array, half: float) -> Interpolant:
+    def local(self, centre: Array, half: float, without: int = -1) -> Interpolant:
         """Return the interpolant through the designs about a centre; those that are next to it where these are too few."""
-        plain = np.flatnonzero(self._is_plain())
+        plain = np.flatnonzero(self._is_plain() & (np.arange(len(self.x)) != without))
         apart = np.abs(self.x[plain] - centre).max(axis=1)
         count = max(int((apart <= NEAR * half).sum()), 2 * self.task.free + 2)
-        return self._surface(plain[np.argsort(apart, kind="stable")[:count]])
+        return self._surface(plain[np.argsort(apart, kind="stable")[:count]], SLOPED)
 
-    def slopes(self, best: int, half: float) -> Array:
-        """Return slopes of all columns as they count, (columns, parameters), from a star of solves, in the last stage to both sides."""
-        x, count, last = self.x[best], len(self.low), half <= BOXES[-1]
+    def slopes(self, best: int, half: float, both: bool = False) -> Array:
+        """Return slopes of all columns as they count, (columns, parameters): exact ones, and where any that is wanted has none, from
+        a star of solves, to both sides where `both`.
+        """
+        exact = self._count_slopes(np.array([best]))[0]
+        lacking = [c for name in self.task.wanted for c in self.goals.smooth(name) if not np.isfinite(exact[c]).all()]
+        if not lacking:
+            return exact
+        x, count = self.x[best], len(self.low)
         by = np.where(np.arange(count) < self.task.free, half, ASIDE) * np.where(x <= 0.5, 1.0, -1.0)
-        sides = [x + side * move for move in np.diag(by) for side in ((1.0, -1.0) if last else (1.0,))]
+        sides = [x + side * move for move in np.diag(by) for side in ((1.0, -1.0) if both else (1.0,))]
         self.look([one for one in sides if (one >= 0).all() and (one <= 1).all()])
         found = np.zeros((len(self.task.columns), count))
         here = (0.0, self.goals.count(self.values[best]))
@@ -215,7 +236,7 @@ class Search:
             if ends:
                 (one, f), (other, g) = (*ends, here)[:2]
                 found[:, k] = (f - g) / (one - other)
-        return found
+        return np.where(np.isfinite(exact), exact, found)
 
     def _draw_first(self) -> None:
         """Compute the first design and some drawn over the box; InputError where the first one, or most of them, cannot be."""
@@ -223,7 +244,9 @@ class Search:
         if self.failures:
             raise InputError(f"the first design cannot be computed: {self.failures[0][1]}")
         free = self.task.free
-        drawn = scipy.stats.qmc.LatinHypercube(free, rng=self.rng).random(max(2 * free + 4, 8))
+        drawn = scipy.stats.qmc.LatinHypercube(free, rng=self.rng).random(
+            max((1 if self.task.exact else 2) * free + 6, 8)
+        )
         self.look([np.append(x, self.start[free:]) for x in drawn])
         if len(self.failures) > len(drawn) / 2:
             raise InputError(
@@ -238,8 +261,16 @@ class Search:
                     f"the objective '{one.column}' is {column[0]:g} whatever the free parameters are; leave it out. {why}".strip()
                 )
 
-    def _surface(self, places: NDArray[np.intp]) -> Interpolant:
-        return interpolate(self.x[places, : self.task.free], self.goals.count(self.values[places]))
+    def _surface(self, places: NDArray[np.intp], sloped: int = MANY) -> Interpolant:
+        """Return the interpolant through designs, with the slopes of the first `sloped` of them."""
+        slopes = self._count_slopes(places)[:, :, : self.task.free]
+        slopes[sloped:] = np.nan
+        return interpolate(self.x[places, : self.task.free], self.goals.count(self.values[places]), slopes)
+
+    def _count_slopes(self, places: NDArray[np.intp]) -> Array:
+        """Return the exact slopes of columns as they count, (designs, columns, parameters)."""
+        over = np.where(self.goals.logarithmic, self.values[places], 1.0)
+        return np.asarray(self.exact[places] / over[:, :, None])
 
     def _step(
         self, surface: Interpolant, scalar: Scalar, x: Array, low: Array, high: Array

@@ -1,7 +1,7 @@
 """A design task, read and checked: a study of its designs, and what their columns are wanted to be."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studies.design.keys import SCHEMA, DesignKeys, Objective, Tolerance
+from studies.design.slopes import STEP, Slopes
 from studies.errors import InputError, nearest
 from studies.files.reading import find_shipped, list_shipped
 from studies.instrument.card import load_card
@@ -37,11 +38,13 @@ class Task:
     study: Study
     free: int  # how many of the parameters are free
     start: Array  # the first design, array (parameters,)
+    exact: tuple[int, ...] = ()  # places of the columns whose slopes follow all columns, each by all parameters
 
     @property
     def columns(self) -> list[str]:
-        """The names of all columns."""
-        return [column.name for column in self.study.columns]
+        """The names of all columns, their slopes apart."""
+        names = [column.name for column in self.study.columns]
+        return names[: len(names) - len(self.exact) * len(self.study.parameters)]
 
     @property
     def wanted(self) -> list[str]:
@@ -101,7 +104,14 @@ def read_task(source: str | Path) -> Task:
     study = check_study(spec, instrument, where, str(path.parent.resolve()), path.read_text(encoding="utf-8-sig"))
     if study.functions:
         raise InputError(f"{where}: a design asks for no Python function; use hrg study for that.")
-    task = Task(keys, keys.name or path.stem, study, len(free), np.array(start))
+    of = tuple(one for one in study.asked if one.is_stationary and one.options.get("theory") != "rayleigh")
+    exact = tuple(k for k, column in enumerate(study.columns) if any(column in one.columns for one in of))
+    by = tuple(
+        (p.name, STEP * (p.high - p.low) * (1 if q < (p.low + p.high) / 2 else -1))
+        for p, q in zip(study.parameters, start, strict=True)
+    )
+    study = replace(study, asked=(*study.asked, Slopes(of=of, by=by)))
+    task = Task(keys, keys.name or path.stem, study, len(free), np.array(start), exact)
     for goal in _goals(keys):
         _check_magnitude(goal, where)
     _check_bounds(task, where)

@@ -25,12 +25,14 @@ class Case:
 
     instrument: Instrument  # the card with this design's parameters
     parameters: Mapping[str, Any]  # every parameter of the study by name, in the unit of its name
-    # the instrument at a place 0 ... 1 of the way from the start of a search to this design, where modes keep their
-    # names by their shapes; None where they have them by their order
-    on_the_way: "Callable[[float], Instrument] | None" = None
+    # the instrument of other parameters, and the design from which a search follows modes by their shapes: None where
+    # they have their names by their order
+    build: "Callable[[Mapping[str, Any]], Instrument] | None" = None
+    start: Mapping[str, Any] | None = None
     # of a harmonic and theory the number of modes and the tolerance that suffice for all quantities
     wanted: "Mapping[tuple[int, str], tuple[int, float]]" = field(default_factory=dict)
     _solved: dict[tuple[int, str, float], tuple[float, "tuple[Mode, ...]"]] = field(default_factory=dict, repr=False)
+    _named: "dict[tuple[int, int, str, float], Mode]" = field(default_factory=dict, repr=False)
 
     def temperature(self, given: float | None) -> float:
         """Return the temperature in K that a quantity gives (°C), else the study's, or the card's reference."""
@@ -56,22 +58,52 @@ class Case:
 
     def mode(self, harmonic: int, index: int, theory: "Theory", temperature: float) -> "Mode":
         """Return one mode of a harmonic: by its order, or the one that the start's becomes on the way to this design."""
-        if self.on_the_way is None:
+        key = harmonic, index, theory, temperature
+        if key in self._named:
+            return self._named[key]
+        if self.start is None:
             return self.modes(harmonic, index + 1, theory, temperature)[index]
         from shell.following import follow
-
-        along = self.on_the_way
 
         def solve(place: float, count: int) -> "tuple[Mode, ...]":
             if place == 1.0:
                 return self.modes(harmonic, count, theory, temperature)
-            return _solve_once(*along(place).at(temperature), harmonic, count, theory)
+            return _solve_once(*self._on_the_way(place).at(temperature), harmonic, count, theory)
 
-        return follow(solve, solve(0.0, index + 1)[index])
+        self._named[key] = follow(solve, solve(0.0, index + 1)[index])
+        return self._named[key]
+
+    def moved(self, name: str, value: float) -> "Case":
+        """Return the design with another value, whose modes keep their shapes: f is exact to first order, for it is stationary."""
+        assert self.build is not None
+        parameters = {**self.parameters, name: value}
+        case = Case(self.build(parameters), parameters)
+        at = {T: case.temperature(None) if T == self.temperature(None) else T for _, _, T in self._solved}
+        case._solved |= {
+            (n, theory, at[T]): (within, tuple(mode.kept_on(*case.instrument.at(at[T])) for mode in found))
+            for (n, theory, T), (within, found) in self._solved.items()
+        }
+        case._named |= {
+            (n, k, theory, at[T]): case._solved[n, theory, at[T]][1][mode.index]
+            for (n, k, theory, T), mode in self._named.items()
+        }
+        return case
+
+    def _on_the_way(self, place: float) -> Instrument:
+        """Return the instrument at a place 0 ... 1 between the start and this design."""
+        assert self.build is not None
+        assert self.start is not None
+        start = self.start
+        return self.build(
+            {
+                name: value if isinstance(value, str) else start[name] + place * (value - start[name])
+                for name, value in self.parameters.items()
+            }
+        )
 
     def require_lowest(self, harmonic: int, theory: "Theory", temperature: float) -> "Mode | None":
         """Return the followed mode; refuse a design in which another has come below it: what is asked is of the lowest."""
-        if self.on_the_way is None:
+        if self.start is None:
             return None
         found = self.mode(harmonic, 0, theory, temperature)
         if found.index:

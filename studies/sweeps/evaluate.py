@@ -135,15 +135,10 @@ def evaluate_case(plan: WorkPlan, parameters: Mapping[str, Any]) -> Row:
 
 
 def _make_case(plan: WorkPlan, parameters: Mapping[str, Any]) -> Case:
-    start = plan.start
+    def build(given: Mapping[str, Any]) -> Instrument:
+        return set_parameters(plan.instrument, given, plan.derived)
 
-    def on_the_way(place: float) -> Instrument:
-        assert start is not None
-        between = {k: v if isinstance(v, str) else start[k] + place * (v - start[k]) for k, v in parameters.items()}
-        return set_parameters(plan.instrument, between, plan.derived)
-
-    instrument = set_parameters(plan.instrument, parameters, plan.derived)
-    return Case(instrument, parameters, None if start is None else on_the_way, plan.wanted)
+    return Case(build(parameters), parameters, build, plan.start, plan.wanted)
 
 
 def failed_row(plan: WorkPlan, status: str, reason: str) -> Row:
