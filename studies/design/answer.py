@@ -94,7 +94,7 @@ def answer(task: Task, explorer: Explorer, plan: WorkPlan) -> Answer:
     best = search.settle(scalar, best)
     _refuse_infeasible(search, best)
     centre = search.x[best]
-    front = _unbeaten(search, scalar) if count > 1 else [best]
+    front = _unbeaten(search, scalar, [*ends, best]) if count > 1 else [best]
     foretold = _foretell(search, best)
     prices = _prices(search, scalar, smooth)
     values = search.values[best]
@@ -140,17 +140,19 @@ def _walk_front(search: Search, ends: list[int]) -> Scalar:
     ideal = corners.min(axis=0)
     spread = np.array([goals.objectives(v) for v in search.values]).std(axis=0)
     span = np.maximum(corners.max(axis=0) - ideal, ALIKE * spread)  # where one design is best in all, there is no front
+    found: list[int] = []
     for weights in _lattice(len(ends), keys.search.front):
         between = Scalar(1 / weights, ideal, span)
-        search.descend(between, search.rank(between)[0])
+        found.append(search.descend(between, search.rank(between)[0]))
     own = np.array([one.weight for one in keys.objective])
+    ends += found
     return Scalar(own / own.sum(), ideal, span)
 
 
-def _unbeaten(search: Search, scalar: Scalar) -> list[int]:
-    """Return the designs that keep all limits and that no other beats in every objective, each sort once."""
+def _unbeaten(search: Search, scalar: Scalar, ends: list[int]) -> list[int]:
+    """Return, of where the search ended, the designs that keep all limits and that no other beats in every objective, each sort once."""
     goals = search.goals
-    held = [k for k in search.rank(scalar) if goals.violation(search.values[k], search.margins) == 0]
+    held = [k for k in dict.fromkeys(ends) if goals.violation(search.values[k], search.margins) == 0]
     found = {k: (goals.objectives(search.values[k]) - scalar.ideal) / scalar.span for k in held}
     front: list[int] = []
     for k in sorted(held, key=lambda k: tuple(found[k])):

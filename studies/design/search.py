@@ -23,6 +23,7 @@ WIDE, FINE = (
     0.15,
     0.01,
 )  # half widths of the box about a design: the first and largest, and where steps end, in parts of the ranges
+STAR = 0.04  # half width of a star, at most
 WIDER = 2.0  # half widths of a second step, computed beside the first; the box grows as much where it is the better
 SHRINK = 1 / 3  # of a box without a gain
 FEW, MOST = 5, 30  # steps from one design: rough ones, those to the end
@@ -146,10 +147,12 @@ class Search:
                 steps = [self._step(surface, scalar, here, *self._box(here, far)) for far in (half, WIDER * half)]
                 foretold = min(self._mix(over, t, strict) for (over, t), _ in steps)
                 if not rough and (half < FINE or not self._is_better(foretold, before)):
-                    if np.abs(here - centre).max() <= WIDER * FINE:
+                    if np.abs(here - centre).max() <= (FINE / 10 if self.task.keys.margin else WIDER * FINE):
                         break
                     centre, half = here, max(half, FINE)
-                    self.margins = self.goals.margins(self.values[best], self.slopes(best, half))
+                    robust = self.task.keys.margin is not None
+                    slopes = self.slopes(best, FINE if robust else min(half, STAR), both=robust)
+                    self.margins = self.goals.margins(self.values[best], slopes)
                     continue
                 self.look([x for _, x in steps])
                 best = self._best_near(best, WIDER * half, scalar, strict)
@@ -160,7 +163,7 @@ class Search:
                     break
                 if any(np.abs(self.x[best] - self.x[k]).max() < half for k in known):
                     break
-        return best if rough or self._merit(best, scalar) <= self._merit(first, scalar) else first
+        return best if rough or self._is_as_good(best, first, scalar) else first
 
     def best(self, scalar: Scalar) -> int:
         """Return the best design of several regions, each descended into at first, the best to the end; three that meet are enough."""
@@ -172,7 +175,11 @@ class Search:
                 break
         best = self.descend(scalar, min(found, key=lambda k: self._worth(k, scalar, False)))
         first = self.rank(scalar)[0]
-        return best if self._merit(best, scalar) <= self._merit(first, scalar) else self.descend(scalar, first)
+        return best if self._is_as_good(best, first, scalar) else self.descend(scalar, first)
+
+    def _is_as_good(self, best: int, other: int, scalar: Scalar) -> bool:
+        """Whether a design is as good as another; margins are those of the first one, and the other's are not known."""
+        return self.task.keys.margin is not None or self._merit(best, scalar) <= self._merit(other, scalar)
 
     def _best_near(self, best: int, half: float, scalar: Scalar, strict: bool) -> int:
         near = np.flatnonzero(self._is_plain() & (np.abs(self.x - self.x[best]).max(axis=1) <= half + 1e-9))

@@ -29,6 +29,7 @@ from studies.sweeps.results import Results
 from studies.sweeps.tolerance import resolve_limits
 
 MOST_ROWS = 300
+TOGETHER = 65_536  # designs looked at together for those
 ENDS = 20  # designs shown from each end when there are more than MOST_ROWS
 METHODS = {
     "grid": "all combinations of the values",
@@ -146,13 +147,21 @@ def _designs(results: Results) -> Table:
     places: Sequence[int] = range(len(results))
     note = "Click a heading to sort."
     if len(places) > MOST_ROWS:
-        order = np.argsort(results.column(columns[0].name), kind="stable")
-        order = order[np.isfinite(results.column(columns[0].name)[order])]
-        places = [*order[:ENDS].tolist(), *order[-ENDS:].tolist()]
+        places = _find_ends(results.column(columns[0].name))
         note += f" Of {len(results)} designs, the {ENDS} with the lowest and the {ENDS} with the highest {columns[0].label} are shown; hrg study export writes all."
     shown = [Column(_at(results.column(c.name), places), figures.column_label(c), form=".8g") for c in columns]
     case = Column(lambda place: place, "Case")
     return Table("Designs", places, (case, *_design_columns(results, places), *shown), note, sortable=True)
+
+
+def _find_ends(y: NDArray[np.float64]) -> list[int]:
+    """Return the places of the lowest and the highest values, in their order; no index of all is made."""
+    kept = np.empty(0, dtype=np.intp)
+    for first in range(0, len(y), TOGETHER):
+        places = np.append(kept, first + np.flatnonzero(np.isfinite(y[first : first + TOGETHER])))
+        order = places[np.argsort(y[places], kind="stable")]
+        kept = order if len(order) <= 2 * ENDS else np.append(order[:ENDS], order[-ENDS:])
+    return [int(place) for place in kept]
 
 
 def _pictures(results: Results) -> list[Part]:
@@ -164,8 +173,8 @@ def _pictures(results: Results) -> list[Part]:
         limits = []
     parts: list[Part] = []
     for column in main_columns(results):
-        y = results.column(column.name)
-        if np.isfinite(y).sum() >= 20 and np.nanmax(y) > np.nanmin(y):
+        n = results.numbers[column.name]
+        if np.isfinite(results.column(column.name)).sum() >= 20 and n["greatest"] > n["least"]:
             parts.append(figures.spread_figure(results, column, limits))
         parts += figures.response_figures(results, column)
     return parts

@@ -79,17 +79,18 @@ def _is_map(results: Results) -> bool:
 
 
 def _draw_spread(results: Results, column: Column, limits: list[RequirementLimits]) -> Drawing:
-    y = results.column(column.name)
-    y = y[np.isfinite(y)]
+    y, n = results.column(column.name), results.numbers[column.name]
+    count = int(np.isfinite(y).sum())
+    bars, edges = np.histogram(y, min(60, max(5, int(np.sqrt(count)))), (n["least"], n["greatest"]))
     with style.figure(height=2.6, x=column_label(column), y="designs") as (made, axes):
-        axes.hist(y, bins=min(60, max(5, int(np.sqrt(len(y))))), color=style.SKY, edgecolor="white", linewidth=0.4)
+        axes.hist(edges[:-1], list(edges), weights=bars, color=style.SKY, edgecolor="white", linewidth=0.4)
         if results.nominal is not None:
             place = [c.name for c in results.study.columns].index(column.name)
             axes.axvline(results.nominal.values[place], color=style.BLACK, linewidth=1.2, label="nominal design")
         ends = {end for limit in limits if limit.column == column.name for end in (limit.low, limit.high)}
-        near = float(y.max() - y.min())  # what lies farther away than the spread is said, so that the bars stay wide
+        near = n["greatest"] - n["least"]  # what lies farther away than the spread is said, so that the bars stay wide
         for end in sorted(end for end in ends if np.isfinite(end)):
-            if y.min() - near <= end <= y.max() + near:
+            if n["least"] - near <= end <= n["greatest"] + near:
                 axes.axvline(end, color=style.VERMILION, linestyle="--", label=f"required: {end:.8g}")
             else:
                 axes.plot([], [], color=style.VERMILION, linestyle="--", label=f"required: {end:.8g}, outside the plot")
@@ -105,15 +106,15 @@ def _draw_response(results: Results, column: Column) -> Drawing:
         return _draw_map(results, column)
     numeric = _numeric(results)
     shown = numeric[:6]
-    y = results.column(column.name)
-    few = style.few_rows(len(y))
+    few = style.few_rows(len(results))
+    y = results.column(column.name)[few]
     mark = (
         {"marker": "o", "markersize": 4} if len(numeric) == 1 else {"marker": ".", "markersize": 2.5, "linestyle": ""}
     )
     with style.panels(len(shown), 3, 2.6, sharey=True) as (made, axes):
         for panel, parameter in zip(axes, shown, strict=True):
-            x = results.parameter(parameter.name).astype(float)
-            order = few[np.argsort(x[few])]
+            x = results.parameter(parameter.name)[few].astype(float)
+            order = np.argsort(x)
             panel.plot(x[order], y[order], color=style.BLUE, rasterized=len(few) > 500, **mark)
             panel.set_xlabel(label(parameter.name, parameter.unit), fontsize=9)
             panel.locator_params(axis="x", nbins=4)

@@ -1,6 +1,6 @@
 """The results of a study: a table with units, columns as arrays, failures, outcomes of searches."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -102,17 +102,40 @@ class Results(Shown):
     @cached_property
     def numbers(self) -> Mapping[str, Mapping[str, float]]:
         """Every column at the nominal design and over all designs, with its largest numerical error; NaN where there is none."""
-        found = {}
-        for place, column in enumerate(self.study.columns):
-            y, errors = self.column(column.name), self.error(column.name)
-            y, errors = y[np.isfinite(y)], errors[np.isfinite(errors)]
-            nominal = float(self.nominal.values[place]) if self.nominal is not None else np.nan
-            over_all: dict[str, Any] = {"mean": np.mean, "deviation": np.std, "least": np.min, "greatest": np.max}
-            found[column.name] = {"nominal": nominal} | {
-                name: float(of(y)) if y.size else np.nan for name, of in over_all.items()
-            }
-            found[column.name]["error"] = float(errors.max()) if errors.size else np.nan
-        return found
+        columns = self.study.columns
+        w, first = len(columns), 1 + len(self.study.names)
+        count, mean, square = (np.zeros(w) for _ in range(3))
+        least, greatest, error = np.full(w, np.inf), np.full(w, -np.inf), np.full(w, -np.inf)
+        for found in self.blocks(range(first, first + 2 * w)):
+            y, judged = found[:w], found[w:]
+            there, known = np.isfinite(y), np.isfinite(judged)
+            here = there.sum(axis=1)
+            aside = y - mean[:, None]  # moments about the mean so far, moved to the new one
+            moved = aside.sum(axis=1, where=there) / np.maximum(count + here, 1)
+            square += (aside**2).sum(axis=1, where=there) - (count + here) * moved**2
+            count, mean = count + here, mean + moved
+            least = np.minimum(least, y.min(axis=1, where=there, initial=np.inf))
+            greatest = np.maximum(greatest, y.max(axis=1, where=there, initial=-np.inf))
+            error = np.maximum(error, judged.max(axis=1, where=known, initial=-np.inf))
+        deviation = np.sqrt(np.maximum(square, 0) / np.maximum(count, 1))
+        of = {"mean": mean, "deviation": deviation, "least": least, "greatest": greatest}
+        some = {"nominal": np.full(w, np.nan) if self.nominal is None else self.nominal.values}
+        some |= {name: np.where(count > 0, values, np.nan) for name, values in of.items()}
+        some["error"] = np.where(error > -np.inf, error, np.nan)
+        return {c.name: {name: float(values[k]) for name, values in some.items()} for k, c in enumerate(columns)}
+
+    def blocks(self, places: Sequence[int]) -> Iterator[Array]:
+        """Give columns of the store (columns, m), some thousand cases at a time; all at once where the spec repeats some."""
+        if self._repeats is not None:
+            yield np.array([self._column(k) for k in places])
+            return
+        for _, found in self.store.read(places):
+            yield found
+
+    def pieces(self, parameters: Sequence[str], columns: Sequence[str]) -> Iterator[Array]:
+        """Give numeric parameters and columns by name (names, m), some thousand cases at a time."""
+        d, names = len(self.study.names), self.study.names
+        return self.blocks([*(1 + names.index(p) for p in parameters), *(1 + d + self._place(c) for c in columns)])
 
     def frames(self) -> "Iterator[pd.DataFrame]":
         """Give one row a case, some thousand at a time: parameters, results, numerical errors, status, remark."""
@@ -181,7 +204,10 @@ class Results(Shown):
         """One column of the store; those that were read last are kept, as many as memory is meant for."""
         found = self._read.pop(k, None)
         if found is None:
-            whole = np.concatenate([np.empty(0), *(columns[0] for _, columns in self.store.read([k]))])
+            whole, filled = np.empty(self.done), 0
+            for places, columns in self.store.read([k]):
+                whole[filled : filled + len(places)] = columns[0]
+                filled += len(places)
             found = whole if self._repeats is None else whole[self._repeats]
         self._read[k] = found
         while len(self._read) > 1 and len(self._read) * found.nbytes > KEPT_BYTES:

@@ -9,6 +9,8 @@ from compensation.arrays import Array
 from studies.errors import InputError
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
     from studies.sweeps.results import Results
 
 RESAMPLES = 1000
@@ -117,29 +119,43 @@ def linear_shares(results: "Results", column: str) -> LinearShares | None:
 
     study = results.study
     numeric = [p.name for p in study.parameters if not isinstance(p.nominal, str)]
-    y = results.column(column)
-    there = np.isfinite(y)
-    y = y[there]
-    free = len(y) - len(numeric) - 1
-    if not numeric or free < 2 or np.ptp(y) == 0:
+    if not numeric:
         return None
-    X = np.empty((len(numeric), len(y)))
-    for row, name in zip(X, numeric, strict=True):
-        row[:] = results.parameter(name)[there]
-    if not (np.ptp(X, axis=1) > 0).all():
+    # normal equations of what lies about the first block's means, over its spreads
+    d = len(numeric)
+    about = over = np.zeros(0)
+    count, sums, products, ends = 0, np.zeros(d + 1), np.zeros((d + 1, d + 1)), np.tile([[np.inf], [-np.inf]], d + 1)
+    for z in _numbers(results, numeric, column):
+        if not about.size:
+            about = z.mean(axis=1)
+            over = np.maximum(z.std(axis=1), 1e-9 * np.abs(about) + 1e-300)
+        ends = np.array([np.minimum(ends[0], z.min(axis=1)), np.maximum(ends[1], z.max(axis=1))])
+        z = (z - about[:, None]) / over[:, None]
+        count, sums, products = count + z.shape[1], sums + z.sum(axis=1), products + z @ z.T
+    if count - d - 1 < 2 or not (ends[1] > ends[0]).all():
         return None
-    spread = np.array([row.std() for row in X])
-    X -= X.mean(axis=1, keepdims=True)
-    X /= spread[:, None]
-    inverse, residual, slopes = np.linalg.pinv(X @ X.T), y - y.mean(), np.zeros(len(X))
-    for _ in range(2):  # the second takes what rounding has left
-        step = inverse @ (X @ residual)
-        residual -= step @ X
-        slopes += step
-    deviation = np.sqrt(residual @ residual / free * np.diag(inverse))
-    half = stdtrit(free, 0.95) * deviation
-    share = slopes**2 / y.var()
-    return LinearShares(tuple(numeric), slopes / spread, half / spread, share, float(1 - residual.var() / y.var()))
+    mean = sums / count
+    scatter = products - count * np.outer(mean, mean)
+    inverse = np.linalg.pinv(scatter[:d, :d])
+    slopes = inverse @ scatter[:d, d]
+    shift, squares = mean[d] - slopes @ mean[:d], 0.0
+    for z in _numbers(results, numeric, column):
+        z = (z - about[:, None]) / over[:, None]
+        residual = z[d] - slopes @ z[:d] - shift
+        squares += float(residual @ residual)
+    deviation = np.sqrt(squares / (count - d - 1) * np.diag(inverse))
+    half = stdtrit(count - d - 1, 0.95) * deviation
+    scale, spread = over[d] / over[:d], np.sqrt(np.diag(scatter)[:d] / count)
+    share = (slopes * spread) ** 2 / (scatter[d, d] / count)
+    return LinearShares(tuple(numeric), slopes * scale, half * scale, share, 1 - squares / float(scatter[d, d]))
+
+
+def _numbers(results: "Results", numeric: "Sequence[str]", column: str) -> "Iterator[Array]":
+    """Give the numeric parameters and a column of the designs that have it, some thousand at a time."""
+    for z in results.pieces(numeric, [column]):
+        kept = z[:, np.isfinite(z[-1])]
+        if kept.size:
+            yield kept
 
 
 def _complete(results: "Results", column: str) -> Array:

@@ -63,11 +63,12 @@ def find_yield(results: "Results", requirements: tuple[Requirement, ...]) -> Yie
     from scipy.special import ndtri
 
     limits = tuple(resolve_limits(results, requirement) for requirement in requirements)
-    good, unknown = _judge(results, limits)
     # rows that are independent draws: of Saltelli's design the first two blocks
-    last = 2 * results.study.sampling.cases if results.study.sampling.method == "sensitivity" else None
-    good, unknown = good[:last], unknown[:last]
-    n, passed, open_ = len(good), int(good.sum()), int(unknown.sum())
+    last = 2 * results.study.sampling.cases if results.study.sampling.method == "sensitivity" else len(results)
+    n = passed = open_ = 0
+    for values in results.pieces([], [limit.column for limit in limits]):
+        good, unknown = (one[: last - n] for one in _judge(values, limits))
+        n, passed, open_ = n + len(good), passed + int(good.sum()), open_ + int(unknown.sum())
     if results.study.sampling.method not in DRAWN or n == 0:
         return Yield(limits, n, passed, open_, None, None)
     ends = []
@@ -76,21 +77,25 @@ def find_yield(results: "Results", requirements: tuple[Requirement, ...]) -> Yie
     return Yield(limits, n, passed, open_, float(ends[0]), float(ends[1]))
 
 
-def find_reach(results: "Results", requirements: tuple[Requirement, ...]) -> Reach:
+def find_reach(results: "Results", requirements: "tuple[Requirement, ...]") -> Reach:
     """Return the largest box about the nominal design, in parts of the asked ranges, without a failing design; no value is a failure."""
     limits = tuple(resolve_limits(results, requirement) for requirement in requirements)
-    good, _ = _judge(results, limits)
-    distance = np.zeros(len(good))
-    for p in results.study.parameters:
-        if isinstance(p.nominal, str):
-            continue
-        x = results.parameter(p.name).astype(float)
-        above, below = max(p.high - p.nominal, 1e-300), max(p.nominal - p.low, 1e-300)
-        distance = np.maximum(distance, np.where(x > p.nominal, (x - p.nominal) / above, (p.nominal - x) / below))
-    if good.all():
-        return Reach(None, len(good))
-    part = float(distance[~good].min())
-    return Reach(part, int((distance < part).sum()))
+    numeric = [p for p in results.study.parameters if not isinstance(p.nominal, str)]
+    nominal = np.array([[p.nominal] for p in numeric], dtype=float)
+    above, below = (
+        np.maximum([[sign * (getattr(p, end) - p.nominal)] for p in numeric], 1e-300)
+        for sign, end in ((1, "high"), (-1, "low"))
+    )
+    part, sound = np.inf, []
+    for found in results.pieces([p.name for p in numeric], [limit.column for limit in limits]):
+        x, values = np.split(found, [len(numeric)])
+        distance = np.max(np.maximum((x - nominal) / above, (nominal - x) / below), axis=0, initial=0.0)
+        good, _ = _judge(values, limits)
+        part = min(part, float(distance[~good].min(initial=np.inf)))
+        sound.append(distance[distance < part])
+    if np.isinf(part):
+        return Reach(None, len(results))
+    return Reach(part, sum(int((one < part).sum()) for one in sound))
 
 
 def place_limits(values: NDArray[np.float64], nominal: float, low: float, high: float) -> NDArray[np.float64]:
@@ -101,12 +106,12 @@ def place_limits(values: NDArray[np.float64], nominal: float, low: float, high: 
     return np.asarray(np.maximum(up, down))
 
 
-def _judge(results: "Results", limits: tuple[RequirementLimits, ...]) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Return which cases meet all limits, and of which that is unknown: no known value fails, but one lacks."""
-    good, fails = np.ones(len(results), dtype=bool), np.zeros(len(results), dtype=bool)
-    for limit in limits:
-        values = results.column(limit.column)
-        inside = (values >= limit.low) & (values <= limit.high)
-        good &= inside
-        fails |= np.isfinite(values) & ~inside
+def _judge(
+    values: NDArray[np.float64], limits: tuple[RequirementLimits, ...]
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Return which cases (limits, m) meet all limits, and of which that is unknown: no known value fails, but one lacks."""
+    low, high = (np.array([[getattr(limit, end)] for limit in limits]) for end in ("low", "high"))
+    inside = (values >= low) & (values <= high)
+    fails = (np.isfinite(values) & ~inside).any(axis=0)
+    good = inside.all(axis=0)
     return good, ~good & ~fails
