@@ -12,7 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from compensation.arrays import Array
+
 APART = 1e-9  # designs nearer than this are one
 
 
@@ -47,7 +48,8 @@ def interpolate(x: Array, values: Array, slopes: Array) -> Interpolant:
     (m, p), count = x.shape, values.shape[1]
     known = np.isfinite(slopes).all(axis=2)
     weights, turns, tail = np.zeros((m, count)), np.zeros((m, count, p)), np.zeros((1 + p, count))
-    for columns, sure in ((known.any(axis=0), known.any(axis=1)), (~known.any(axis=0), np.zeros(m, dtype=bool))):
+    has, tells = (np.asarray(known.any(axis=axis)) for axis in (0, 1))
+    for columns, sure in ((has, tells), (~has, np.zeros(m, dtype=bool))):
         given = values[:, columns], slopes[sure][:, columns]
         weights[:, columns], turns[np.ix_(sure, columns)], tail[:, columns] = _solve(x, sure, *given)
     return Interpolant(x, weights, turns, tail)

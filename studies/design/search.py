@@ -228,7 +228,7 @@ class Search:
         exact = self._count_slopes(np.array([best]))[0]
         lacking = [c for name in self.task.wanted for c in self.goals.smooth(name) if not np.isfinite(exact[c]).all()]
         if not lacking:
-            return exact
+            return np.asarray(exact)
         x, count = self.x[best], len(self.low)
         by = np.where(np.arange(count) < self.task.free, half, ASIDE) * np.where(x <= 0.5, 1.0, -1.0)
         sides = [x + side * move for move in np.diag(by) for side in ((1.0, -1.0) if both else (1.0,))]

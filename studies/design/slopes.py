@@ -8,8 +8,8 @@ Komkov 1986). Bryan factors, losses and temperature coefficients hang on the sha
 
 import numpy as np
 
+from compensation.arrays import Array
 from studies.errors import UNUSABLE_INPUT, InputError
-from studies.sweeps.block import Array
 from studies.sweeps.case import Case
 from studies.sweeps.quantity import Column, Number, Quantity
 

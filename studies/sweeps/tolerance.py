@@ -114,4 +114,4 @@ def _judge(
     inside = (values >= low) & (values <= high)
     fails = (np.isfinite(values) & ~inside).any(axis=0)
     good = inside.all(axis=0)
-    return good, ~good & ~fails
+    return np.asarray(good), np.asarray(~good & ~fails)
