@@ -32,7 +32,7 @@ DRAWN = 100  # of which one is looked at because it is far off
 ENOUGH = 3  # regions that lead to one place
 STARTS = 24  # of every step on the interpolant over the whole box
 NEAR = 6.0  # half widths within which designs make the interpolant of a trust region
-PENALTY = 100.0  # of the excess over limits, in spreads, against the objective's
+PENALTY = 30.0  # of the excess over limits, in spreads, against the objective's
 SLOPED, MANY = 20, 60  # designs whose slopes the interpolant takes: about a centre, over the whole box
 GAIN = 1e-5  # of an objective's spread: less is none
 ASIDE = 0.05  # step of a parameter that is not free, in parts of its range
@@ -85,10 +85,9 @@ class Search:
             else:
                 self.failures.append((x, case.remark))
 
-    def rank(self, scalar: Scalar) -> list[int]:
-        """Return the designs from the best on: those that keep all limits by what is wanted, then the others by their excess."""
-        keys = [(self.goals.violation(v, self.margins), scalar(self.goals.objectives(v))) for v in self.values]
-        return sorted(np.flatnonzero(self._is_plain()).tolist(), key=lambda k: keys[k])
+    def rank(self, scalar: Scalar, strict: bool = True) -> list[int]:
+        """Return the designs from the best on: those that keep all limits first, or (not `strict`) by gain and excess together."""
+        return sorted(np.flatnonzero(self._is_plain()).tolist(), key=lambda k: self._worth(k, scalar, strict))
 
     def single(self, i: int) -> Scalar:
         """Return objective i alone, over its spread."""
@@ -102,8 +101,8 @@ class Search:
         task, idle = self.task, 0
         low, high = self._box(self.start, 2.0)
         for _ in range(ROUNDS):
-            order = self.rank(scalar)
-            before = self._merit(order[0], scalar)
+            order = self.rank(scalar, False)
+            before = self._worth(order[0], scalar, False)
             surface = self._surface(np.flatnonzero(self._is_plain()))
             starts = [self.x[k] for k in order[: STARTS // 3]]
             while len(starts) < STARTS:
@@ -115,11 +114,11 @@ class Search:
                 if other and np.abs(x - self.x).max(axis=1).min() > FINE:
                     chosen.append(x)
             self.look([*chosen[: TOGETHER - 1], self._far_off(surface, scalar)])
-            idle = 0 if self._is_better(self._merit(self.rank(scalar)[0], scalar), before) else idle + 1
+            idle = 0 if self._is_better(self._worth(self.rank(scalar, False)[0], scalar, False), before) else idle + 1
             if idle == 2 or self.spent or not chosen:
                 break
         regions: list[int] = []
-        for k in self.rank(scalar):
+        for k in self.rank(scalar, False):
             if all(np.abs(self.x[k] - self.x[j]).max() > 2 * WIDE for j in regions):
                 regions.append(k)
         return regions[: task.keys.search.starts]
