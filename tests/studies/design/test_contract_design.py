@@ -162,11 +162,12 @@ def test_recovery_dome_at_8_khz(tmp_path):
 
 @pytest.mark.slow
 def test_recovery_light_cylinder(tmp_path):
-    """In whole steps: none of some 8000 designs around was lighter and kept the limits, by an interpolant of full solves."""
+    """In whole steps, with the thinnest bottom: 15 % lighter than the best of some 8000 designs about [0.775, 19.3, 1.2], the next valley."""
     few = '\n[[quantity]]\nname = "mode-separation"\nhighest = 1\neach = 1\n[search]\nstarts = 1\n'
     task = write(tmp_path, shipped_tasks()["light-cylinder"].read_text(encoding="utf-8") + few)
     found = optimise(task, workers=1)
-    assert found.best == pytest.approx([0.775, 19.3, 1.2])
+    assert found.best == pytest.approx([0.83, 18.2, 0.6])
+    assert found.after[found.place("mass_g")] == pytest.approx(11.694, abs=1e-3)
     assert all(limit.room >= 0 for limit in found.limits)
 
 
