@@ -48,7 +48,7 @@ def interpolate(x: Array, values: Array, slopes: Array) -> Interpolant:
     (m, p), count = x.shape, values.shape[1]
     known = np.isfinite(slopes).all(axis=2)
     weights, turns, tail = np.zeros((m, count)), np.zeros((m, count, p)), np.zeros((1 + p, count))
-    has, tells = (np.asarray(known.any(axis=axis)) for axis in (0, 1))
+    has, tells = np.any(known, axis=0), np.any(known, axis=1)
     for columns, sure in ((has, tells), (~has, np.zeros(m, dtype=bool))):
         given = values[:, columns], slopes[sure][:, columns]
         weights[:, columns], turns[np.ix_(sure, columns)], tail[:, columns] = _solve(x, sure, *given)
