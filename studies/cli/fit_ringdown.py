@@ -109,6 +109,7 @@ def fit_ringdown(
             *(Table(f"Ring-down {row['file']}", row["estimates"], ESTIMATE) for row in rows if len(rows) <= 3),
             Table("Decays", rows, DECAY),
             *(Sentence(f"{row['file']}: {' '.join(row['remarks'])}", "warning") for row in rows if row["remarks"]),
+            save and f"Next: 'hrg trim {save}' plans the cuts against this split; 'hrg acceptance {save} {data[0]}' judges the run-down.",
             _law_chapter(laws, table),
             Chapter("Records and fits", [
                 Figure(partial(_draw, one), f"{Path(one.path).name}: record, fitted decay (orange), residual.") for one in decays

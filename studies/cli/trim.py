@@ -136,6 +136,7 @@ def _parts(planned: CardPlan, payload: dict[str, Any]) -> list[Chapter]:
     ]
     axes = ", ".join(f"n = {one['harmonic']} at {one['slow_axis_deg']:.1f}°" for one in payload["before"])
     limit = f"below {plain(1e3 * max(one['most_Hz'] for one in first['after']))} mHz"
+    met = max(one["most_Hz"] for one in payload["before"]) <= plan.goal
     goal = f"goal {plain(1e3 * plan.goal)} mHz" + ("" if plan.is_enough else ": another round is needed")
     kinds = ", ".join(f"{KINDS[kind]} {value:+.2f}" for kind, value in payload["other_cuts"].items()).replace("-", "−")
     return [
@@ -145,6 +146,7 @@ def _parts(planned: CardPlan, payload: dict[str, Any]) -> list[Chapter]:
                 ("Mass to remove", f"{first['mass_ug']:.3g} µg", f"{len(cuts)} cuts, {100 * first['share']:.0f} % of the split" + (", to avoid overshoot" if first["share"] < 1 else "")),
                 ("Expected split", limit, f"95 % limit; {goal}"),
             ]),
+            "The measured split is within the goal: no cut is needed; these would lower it further." if met else None,
             Table("Cuts of this round", cuts, CUTS, f"Total {first['mass_ug']:.4g} µg."),
             *payload["measure"],
             Sentence(f"Type of cut in this plan: {KINDS[payload['cut']]}. Effect of the same mass at the rim by type of cut, relative to this one: {kinds}."
