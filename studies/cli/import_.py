@@ -42,7 +42,7 @@ def import_(
 
     The draft of a TDMS, MDF, HDF5, MATLAB or Parquet file lists its groups and channels with their units; channels of another rate
     are brought onto the times of the first group (mean, nearest, linear or previous). Spikes, stuck readings and dropouts to 0 are
-    counted and left as they are, unless the map says drop. An --out that ends in .parquet is a Parquet file.
+    counted and left as they are, unless the map says drop. Raw decays become files for hrg fit ringdown (pickoff_cos_V, power_dBm …). An --out that ends in .parquet is a Parquet file.
 
     Args:
         raw: Text with any separator, Excel workbooks, TDMS, MDF, HDF5, MATLAB or Parquet, in the map's order.

@@ -25,13 +25,9 @@ from studies.errors import InputError, naming
 from studies.files.columns import Columns, read_columns, read_header
 from studies.files.reading import read_bytes
 from studies.instrument.card import Instrument
+from studies.record import CARTESIAN, DECAYS, PARTS, POLAR, POWERS, RAW
 
-PARTS = ("cos", "sin")
-RAW = tuple(f"pickoff_{part}_V" for part in PARTS)
-POLAR = tuple((f"amplitude_{part}_V", f"phase_{part}_deg") for part in PARTS)
-CARTESIAN = tuple((f"in_phase_{part}_V", f"out_of_phase_{part}_V") for part in PARTS)
-POWERS = ("power_dBm", "power_dB", "power_W")
-KNOWN = ("time_s", "frequency_Hz", *RAW, *(name for pair in (*POLAR, *CARTESIAN) for name in pair), *POWERS)
+KNOWN = ("time_s", "frequency_Hz", *DECAYS)
 NOTES = ("reference_frequency_Hz", "pressure_Pa", "temperature_degC")
 NOTE = re.compile(r"^\W*(\w+):\s*([-+.\deE]+)\s*$")
 START = re.compile(r"^\W*(?:start|Date and time):\s*(\d{4}-\d\d-\d\d\S*(?: \d\d:\S+)?)\s*$")

@@ -26,6 +26,8 @@ BIDS: tuple[tuple[str, str, int], ...] = (
     (r"electrode|polari[sz]|trim", "electrode_bias_V", 5),
     (r"pattern|azimuth|theta", "pattern_angle_deg", 5),
     (r"counts?\b|\badc\b|\braw\b", "output_counts", 2),
+    (r"(?=.*pick ?-?off)(?=.*(\bx\b|cos|\b1\b|\ba\b))", "pickoff_cos_V", 6),
+    (r"(?=.*pick ?-?off)(?=.*(\by\b|sin|\b2\b|\bb\b))", "pickoff_sin_V", 6),
 )  # fmt: skip
 FITTING_UNIT = 2
 OWN_NAME = 100

@@ -7,7 +7,7 @@ from math import pi
 from typing import TYPE_CHECKING
 
 from shell.constants import zero_Celsius
-from studies.record import COLUMNS
+from studies.record import COLUMNS, DECAYS
 
 if TYPE_CHECKING:
     import numpy as np
@@ -88,6 +88,9 @@ _BY_ENDING: Mapping[str, Mapping[str, Unit]] = {
     "_V": _VOLTAGE,
     "_deg": _ANGLE,
     "_counts": {"counts": _SAME},
+    "_dBm": {"dBm": _SAME},
+    "_dB": {"dB": _SAME},
+    "_W": {"W": _SAME, "mW": _times(1e-3, "x / 1000"), "uW": _times(1e-6, "x / 1e6")},
     "inverse_q": {"1/Q": _SAME, "Q": _over(1.0, "1 / x"), "ppm": _times(1e-6, "x / 1e6")},
 }
 
@@ -139,4 +142,4 @@ def split_nominal(text: str) -> tuple[str, float | None]:
         return found[1].lower(), None
 
 
-TARGETS = tuple(name for name in COLUMNS if name != "time_s")
+TARGETS = (*(name for name in COLUMNS if name != "time_s"), *DECAYS)

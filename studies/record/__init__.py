@@ -38,6 +38,16 @@ COLUMNS = {
     "quadrature_V": "quadrature-control effort",
     "pattern_angle_deg": "azimuth of the standing wave",
 }
+PARTS = ("cos", "sin")  # pick-offs of a free decay
+RAW = tuple(f"pickoff_{part}_V" for part in PARTS)
+POLAR = tuple((f"amplitude_{part}_V", f"phase_{part}_deg") for part in PARTS)
+CARTESIAN = tuple((f"in_phase_{part}_V", f"out_of_phase_{part}_V") for part in PARTS)
+POWERS = ("power_dBm", "power_dB", "power_W")
+DECAYS = (
+    *RAW,
+    *(name for pair in (*POLAR, *CARTESIAN) for name in pair),
+    *POWERS,
+)  # of `hrg fit ringdown`, beside the time
 REPEATED = 0.5  # part of the rows of a record that stand in another of the same run
 PICKED = 500  # rows that are compared
 OUTPUTS = ("frequency_Hz", "bias_deg_per_h", "measured_rate_deg_per_s", "output_counts", "inverse_q")

@@ -18,8 +18,8 @@ from compensation.ringdown.laws import Law, Rows, fit_law
 from studies.errors import InputError, naming
 from studies.files.columns import read_columns, read_header
 from studies.files.reading import read_bytes
-from studies.fits.ringdown import POWERS, Decay
-from studies.record import Record, check_plausible, write_record
+from studies.fits.ringdown import Decay
+from studies.record import POWERS, Record, check_plausible, write_record
 
 TEMPERATURE, AMPLITUDE = "housing_temperature_degC", "vibration_amplitude_V"
 RESPONSES = ("frequency_Hz", "inverse_q")

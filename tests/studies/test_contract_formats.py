@@ -289,3 +289,22 @@ def test_contract_a_long_csv_is_written_in_portions_and_reads_back_to_the_last_d
     monkeypatch.setattr("studies.files.writing.MANY", 3)
     write_record(record, tmp_path / "long.csv")
     assert same(record, read_record(tmp_path / "long.csv"))
+
+
+def test_a_raw_decay_of_a_laboratory_is_fitted(tmp_path, ask):
+    """Two pick-offs in TDMS: drafted, imported, fitted as from a text."""
+    nptdms = pytest.importorskip("nptdms")
+    t = np.arange(40_000) / 5e3
+    x, y = (np.exp(-t / 1.5) * np.cos(2 * np.pi * f * t) for f in (900.0, 902.0))
+    noise = 1e-3 * np.random.default_rng(2).standard_normal((2, t.size))
+    clock = {"wf_increment": 2e-4, "wf_start_offset": 0.0, "unit_string": "V"}
+    raw, draft, run = tmp_path / "decay.tdms", tmp_path / "map.toml", tmp_path / "run.parquet"
+    with nptdms.TdmsWriter(raw) as writer:
+        channels = zip(("X pickoff", "Y pickoff"), np.add((x, y), noise), strict=True)
+        writer.write_segment([nptdms.ChannelObject("scope", name, values, clock) for name, values in channels])
+    assert ask(["import", str(raw), "--draft", str(draft)])["mapped"] == ["pickoff_cos_V", "pickoff_sin_V"]
+    ask(["import", str(raw), "--map", str(draft), "--out", str(run)])
+    (decay,) = ask(["fit", "ringdown", str(run)])["decays"]
+    found = {one["name"]: one for one in decay["estimates"]}
+    assert found["frequency_1_Hz"]["value"] == pytest.approx(902.0, abs=1e-3)
+    assert found["decay_time_s"]["low"] <= 1.5 <= found["decay_time_s"]["high"]

@@ -253,7 +253,7 @@ def test_every_unit_of_every_column_is_right(target):
         "deg/h": 15.0, "arcsec/s": 15.0, "deg/s": 15.0 / 3600, "mdeg/s": 15.0 / 3.6, "rad/s of rate": np.deg2rad(15.0) / 3600,
         "mdeg/h": 15e3, "mrad/s": np.deg2rad(15.0) / 3.6, "urad/s": np.deg2rad(15.0) / 3.6e-3, "mK": 298150.0, "mHz": 4430e3,
         "rpm": 15.0 / 3600 / 6, "V": 0.25, "mV": 250.0, "uV": 250e3, "kV": 0.25e-3,
-        "deg": 45.0, "rad": np.pi / 4, "turns": 0.125, "counts": 17.0, "1/Q": 1e-7, "Q": 1e7,
+        "deg": 45.0, "rad": np.pi / 4, "turns": 0.125, "counts": 17.0, "1/Q": 1e-7, "Q": 1e7, "dBm": -7.0, "dB": -7.0, "W": 2e-4, "mW": 0.2, "uW": 200.0,
         "ppm": 0.1 if target == "inverse_q" else 1e6 * (4430.0 / 4400.0 - 1), "ppb": 1e9 * (4430.0 / 4400.0 - 1),
     }  # fmt: skip
     settings = {"clock_Hz": 10e6, "periods": 1000.0, "gate_s": 10.0, "nominal_Hz": 4400.0}
