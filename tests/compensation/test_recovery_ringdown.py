@@ -279,3 +279,17 @@ def test_recovery_of_a_decay_into_the_noise_floor(looks):
     assert abs(np.mean(scores)) < 0.9
     assert np.max(np.abs(scores)) < 3.5
     assert held >= 8
+
+
+def test_recovery_of_a_decay_whose_frequency_wanders():
+    """A random walk of both frequencies, some fifteen radians from a line: τ, split and axis come back, and the drift is said."""
+    random = np.random.default_rng(2)
+    gyro = draw_gyro(random)
+    course = np.interp(TIME, np.linspace(0.0, TIME[-1], 150), 2e-3 * np.cumsum(random.normal(size=150)))
+    phase = 2 * np.pi * np.cumsum(course) * (TIME[1] - TIME[0])
+    found = analyse_decay(from_lock_in(TIME, ring(gyro, random, 1e-3) * np.exp(1j * phase), CARRIER))
+    truth = truth_of(gyro)
+    z, _ = misses(found, {name: truth[name] for name in ("split_Hz", "frequency_axis_deg", "inverse_q")})
+    assert max(map(abs, z.values())) < 4
+    assert found.estimates["inverse_q"].sd < 0.02 * truth["inverse_q"]
+    assert any("drifts" in one for one in found.remarks)
