@@ -1,6 +1,6 @@
 """Parts of a lot: what devices of one design have in common, which differ, and control charts of their values."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -79,6 +79,13 @@ def _sizes(one: Share) -> str:
     return f"{name} {plain(min(values), 2)} … {plain(max(values), 2)}"
 
 
+def _unseen(verdict: Mapping[str, Any]) -> str:
+    """Return the residual of rows that were kept aside over that of those used, for each response; nothing where none was kept."""
+    ends = {name: one["extended"] or one["baseline"] for name, one in verdict["responses"].items()}
+    ratios = {name: (of["held_out_rms"] or 0.0) / (of["residual_rms"] or 1.0) for name, of in ends.items() if of}
+    return ", ".join(f"{NAMES[name]} {ratio:.2f}" for name, ratio in ratios.items() if ratio > 0)
+
+
 def device_table(lot: Lot, page: Callable[[str], str] | None = None) -> Table:
     """Return one row a device: its verdict, its causes, and how it differs."""
     rows: list[dict[str, Any]] = [
@@ -88,13 +95,26 @@ def device_table(lot: Lot, page: Callable[[str], str] | None = None) -> Table:
             "batch": lot.batches.get(serial, ""),
             "verdict": one.verdict["verdict"],
             "causes": ", ".join(" or ".join([c["effect"], *c["equivalent"]]) for c in one.verdict["causes"]),
+            "unseen_over_used_rows": _unseen(one.verdict),
             "differs_from_the_others": "; ".join(lot.reasons[serial]),
             "page": page(serial) if page else "",
         }
         for serial, one in lot.answers.items()
     ]
-    columns = ("device", "date", "batch", "verdict", "causes", "differs from the others", "page")
-    return Table("Devices", rows, columns, sortable=True)
+    columns = (
+        "device",
+        "date",
+        "batch",
+        "verdict",
+        "causes",
+        "unseen over used rows",
+        "differs from the others",
+        "page",
+    )
+    note = "Unseen over used rows: rms of what is left in rows that were kept aside over that in the others; 1 where the model holds."
+    if silent := [row["device"] for row in rows if not row["unseen_over_used_rows"]]:
+        note += f" Of {len(silent)} devices no rows could be kept aside, so nothing judges their models: {', '.join(silent[:6])}."
+    return Table("Devices", rows, columns, note, sortable=True)
 
 
 def fleet_parts(lot: Lot, page: Callable[[str], str] | None = None) -> list[Chapter]:
