@@ -106,7 +106,7 @@ class Effect:
     # beforehand. One, without parameters, unless given.
     grid: Callable[[Span, str], Sequence[tuple[float, ...]]] = lambda span, response: [()]
     acts_on: str = "response"  # "temperature" or "response"
-    law_key: str = ""  # key of [law] that takes its place in a heat path of several lags
+    card_key: str = ""  # value of a card that takes its place in a heat path of several lags
     needs: tuple[str, ...] = ()  # drives (fields of `States`) that must be measured and must vary
     # mapping from response to names: Effects that no record of that response alone can tell from this one, whatever
     # their evidence.

@@ -178,21 +178,22 @@ def _path_causes(found: Inferred) -> list[Cause]:
     probability, evidence = 1.0 / (1.0 + float(np.exp(-path.lead))), 2.0 * path.evidence
     pairs = zip(found.plain[name].residual, found.rows[name].residual, strict=True)
     peak = float(np.ptp(np.concatenate([before - after for before, after in pairs])))
-    causes, names = [], {effect.law_key: effect.name for effect in library().values()}
+    causes, names = [], {effect.card_key: effect.name for effect in library().values()}
     if path.lags > 1:
         numbers = {key: Interval.about(*path.value(f"law.{key}")) for key in LAGS[: path.lags]}
-        causes.append(Cause(names[LAGS[1]], name, probability, (), numbers, evidence, peak=peak, together=True))
+        causes.append(
+            Cause(names[f"law.{LAGS[1]}"], name, probability, (), numbers, evidence, peak=peak, together=True)
+        )
     if path.radiates:
         share, sd = path.value(SHARE)
         own = min((share / sd) ** 2, evidence) if causes else evidence
         told = [key for key in (SHARE, DIRECT) if key in path.fit.problem.priors.names]  # plain lags have one share
         numbers = {key.removeprefix("law."): Interval.about(*path.value(key)) for key in told}
-        radiation = names[SHARE.removeprefix("law.")]
-        causes.append(Cause(radiation, name, probability, (), numbers, own, peak=peak, together=True))
+        causes.append(Cause(names[SHARE], name, probability, (), numbers, own, peak=peak, together=True))
     if path.is_late:
         late, sd = path.value(SENSOR)
         numbers, own = {"sensor_time_constant_s": Interval.about(late, sd)}, min((late / sd) ** 2, evidence)
-        causes.append(Cause("thermometer-lag", name, probability, (), numbers, own, peak=peak, together=True))
+        causes.append(Cause(names[SENSOR], name, probability, (), numbers, own, peak=peak, together=True))
     return causes
 
 

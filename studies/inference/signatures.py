@@ -219,9 +219,10 @@ class Signatures:
 
     @property
     def _taken(self) -> tuple[str, ...]:
-        """Effects for which the law has values: of lags in series."""
-        own = (effect.name for effect in library().values() if effect.law_key)
-        return tuple(own) if SHARE in self.problem.priors.names else ()
+        """Effects for which a heat path of several lags has values: of lags in series, and of a sensor that may be late."""
+        names = self.problem.priors.names
+        own = (one.name for one in library().values() if one.card_key.startswith("law.") or one.card_key in names)
+        return tuple(own) if SHARE in names else ()
 
     def _varies(self, drive: str) -> bool:
         parts = [getattr(path.states, drive) for path in self.paths]

@@ -51,7 +51,7 @@ EFFECT = Effect(
         Parameter("exchange", 0.0, 1.0, "1: exchange with the housing, 0: by the resonator alone", False, True),
     ),
     acts_on="temperature",
-    law_key="radiated_share",
+    card_key="law.radiated_share",
     positive=True,
     sees_heat=True,
     steady=steady,

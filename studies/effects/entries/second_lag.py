@@ -32,6 +32,6 @@ EFFECT = Effect(
     sizes={"frequency_Hz": 0.5},
     shape=(Parameter("second_time_constant_s", 20.0, 3e5, "the other time constant"),),
     acts_on="temperature",
-    law_key="second_lag_s",
+    card_key="law.second_lag_s",
     memory="second_time_constant_s",
 )

@@ -21,6 +21,7 @@ EFFECT = Effect(
     coefficients=(Coefficient("sensor_time_constant_s"),),
     columns=columns,
     delay=-1,
+    card_key="noise.housing_lag_s",
     sizes={"frequency_Hz": 300.0},
     acts_on="temperature",
     equivalents={"frequency_Hz": ("rate-frequency",)},
