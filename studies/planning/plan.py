@@ -54,7 +54,7 @@ class Prospect:
     def at(self, curves: Array, snr: float) -> float | None:
         """Return a chance at one SNR, the mean over shapes; None where that is larger than any source shows."""
         sizes = snr / self.snr
-        within = np.flatnonzero(sizes <= SIZES[-1])
+        within = np.flatnonzero(sizes <= SIZES[-1] * (1.0 + 1e-9))  # the largest is asked for by its SNR, which rounds
         if 2 * within.size < sizes.size:
             return None
         own = [np.interp(np.log(sizes[b]), np.log(self.chances.size), curves[:, b]) for b in within]
