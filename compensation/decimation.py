@@ -39,11 +39,16 @@ def average_groups(values: Array, group: NDArray[np.intp], count: int = 0) -> Ar
 def curvature(time: Array, column: Array) -> Array:
     """Return the second derivative of columns (N,) or (N, p) over uneven times, by three points; none across a gap."""
     step = np.diff(time)
-    usual = (step < GAP * np.median(step)).astype(float)
+    usual = (step <= GAP * np.median(step)).astype(float)
     behind = (slice(None), *[None] * (column.ndim - 1))
     slope = np.diff(column, axis=0) / step[behind]
     inner = 2.0 * np.diff(slope, axis=0) / (step[1:] + step[:-1])[behind] * (usual[1:] * usual[:-1])[behind]
     return np.concatenate([inner[:1], inner, inner[-1:]])
+
+
+def bend_of_means(time: Array, column: Array, width: Array) -> Array:
+    """Return what means of rows of a curve y, their times scattered by σ = `width` (s), have beyond its middle: σ² y''/2."""
+    return np.asarray(0.5 * width.reshape(-1, *[1] * (column.ndim - 1)) ** 2 * curvature(time, column))
 
 
 def average_blocks(time: ArrayLike, columns: Mapping[str, ArrayLike], width: float) -> Blocks:

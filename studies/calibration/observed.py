@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from compensation.decimation import average_groups, curvature
+from compensation.decimation import average_groups, bend_of_means
 from compensation.noise import white_rms
 from compensation.spikes import find_spikes
 from shell.constants import zero_Celsius
@@ -62,10 +62,9 @@ class BlockMeans:
     width: Array  # array, standard deviation of the times of the record's rows that each of these is the mean of, s
 
     def average(self, column: Array) -> Array:
-        """Means of a predicted column over the same values, along the first axis: of a curve y behind a row, y + σ² y''/2."""
+        """Means of a predicted column over the same values, along the first axis; of a row that is a mean itself, of the curve behind it."""
         if self.width.any():
-            behind = (slice(None), *[None] * (column.ndim - 1))
-            column = column + 0.5 * self.width[behind] ** 2 * curvature(self.predicted, column)
+            column = column + bend_of_means(self.predicted, column, self.width)
         total = np.add.reduceat(column[self.rows], self.edges, axis=0)
         return np.asarray(total / self.counts.reshape(-1, *[1] * (total.ndim - 1)))
 

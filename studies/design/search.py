@@ -19,10 +19,8 @@ from studies.sweeps.search import Explorer
 Array = NDArray[np.float64]
 TOGETHER = 4  # designs that are computed together
 ROUNDS = 6  # over the whole box, at most
-WIDE, FINE = (
-    0.15,
-    0.01,
-)  # half widths of the box about a design: the first and largest, and where steps end, in parts of the ranges
+WIDE, FINE = 0.15, 0.01
+"""Half widths of the box about a design: the first and largest, and where steps end, in parts of the ranges."""
 STAR = 0.04  # half width of a star, at most
 WIDER = 2.0  # half widths of a second step, computed beside the first; the box grows as much where it is the better
 SHRINK = 1 / 3  # of a box without a gain

@@ -264,11 +264,11 @@ def _from(start: CardFit, told: Array | None, progress: Report, least: float | N
     def holds(final: Hypothesis) -> bool:
         """Whether the straight lines are those of the simulation where they end."""
         model = Model(search.linear, search.signatures, final.terms, final.noise)
+        linear, mean = model.linear, model.mean()
         try:
-            left = model.left()
+            left = model.left(model.kept(mean))
         except IMPOSSIBLE:
             return False
-        linear, mean = model.linear, model.mean()
         apart = {n: linear.target[n] - linear.columns(final.terms, n) @ mean - left[n] for n in linear.responses}
         return STRAYED > sum(np.sum(linear.rows[n].whiten(own, final.noise[n]) ** 2) for n, own in apart.items())
 
@@ -349,8 +349,9 @@ def _confirmed(
 
 def _left_by(model: Model) -> Left | None:
     """What a model leaves of the records' rows and of their blocks; None where its straight lines end and there is no prediction."""
+    numbers = model.kept(model.mean())
     try:
-        return model.residuals(model.kept(model.mean())), model.left()
+        return model.residuals(numbers), model.left(numbers)
     except IMPOSSIBLE:
         return None
 

@@ -116,9 +116,8 @@ class Model:
                 found[name][1].append(rest)
         return {name: Rows(tuple(t), tuple(r)) for name, (t, r) in found.items() if r}
 
-    def left(self) -> dict[str, Array]:
-        """Return what the simulation leaves of the blocks of every response at the most probable coordinates, not what its straight lines do."""
-        numbers = self.kept(self.mean())
+    def left(self, numbers: Kept) -> dict[str, Array]:
+        """Return what the simulation leaves of the blocks of every response, not what its straight lines do."""
         left = dict(self.problem.evaluate(numbers.point, slopes=False).residual)
         there = Signatures.at(self.problem, numbers.point) if self.terms else self.signatures
         for term, size in zip(self.terms, numbers.coefficients, strict=True):

@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from compensation.decimation import curvature
+from compensation.decimation import bend_of_means
 from shell.constants import zero_Celsius
 from studies.errors import InputError
 from studies.record import Record
@@ -172,7 +172,7 @@ def drive_by_record(record: Record, boundary: Boundary | None = None, time: Arra
         t, T = _with_jumps(t, T, _settled_at(record))
     t, T, width = _thinned(t, T)
     if boundary == "housing" and width.any():  # of a smooth curve, what it is in their middle
-        T = T - 0.5 * width**2 * curvature(t, T)
+        T = T - bend_of_means(t, T, width)
     if t[0] > rows[0]:
         t, T = np.insert(t, 0, rows[0]), np.insert(T, 0, T[0])
     if t[-1] < rows[-1]:

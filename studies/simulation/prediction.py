@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from compensation.decimation import curvature
 from shell.constants import zero_Celsius
 from studies.effects import find_effect
 from studies.loss.damping_law import DampingLaw
@@ -27,7 +28,6 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 MARGIN = 10.0  # K beyond the boundary in which the frequency stays known: the drive's own heat
 SHIFT_STEP = 0.02  # s
-GAP = 3.0  # usual distances of rows, across which nothing is known of a curve
 
 
 @dataclass(frozen=True)
@@ -116,9 +116,8 @@ def _impose(instrument: "Instrument", drive: Drive) -> tuple[Profile, Profile]:
     if drive.boundary == "chamber" or read.jumps.size:
         return read, read
     lag = instrument.noise.housing_lag_s * slope_of_reading(read)
-    lines = (
-        read if instrument.polynomial is not None else of_equal_area(read)
-    )  # a polynomial card follows what was read
+    # a polynomial card follows what was read, linear between its rows
+    lines = read if instrument.polynomial is not None else of_equal_area(read)
     return Profile(read.time, read.value + lag), drive.kinked(Profile(read.time, lines.value + lag))
 
 
@@ -126,8 +125,7 @@ def of_equal_area(curve: Profile) -> Profile:
     """Straight lines between the rows of a smooth curve T(t), with the area under it: rows moved by h² T''/12, not beside a gap."""
     h = np.diff(curve.time)
     before, after = h[:-1], h[1:]
-    bend = np.diff(np.diff(curve.value) / h) * (before**3 + after**3) / (6 * (before + after) ** 2)
-    bend[np.maximum(before, after) > GAP * np.median(h)] = 0.0
+    bend = curvature(curve.time, curve.value)[1:-1] * (before**3 + after**3) / (12 * (before + after))
     return Profile(curve.time, curve.value - np.concatenate([[0.0], bend, [0.0]]))
 
 
