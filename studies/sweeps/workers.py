@@ -76,10 +76,10 @@ class Pool(Workers):
         return True
 
     def close(self) -> None:
-        """Kill the processes."""
-        self._executor.shutdown(wait=False, cancel_futures=True)
+        """Kill the processes and wait for the executor's thread: left alive it races with the end of the interpreter."""
         for process in self._processes:
             process.kill()
+        self._executor.shutdown(cancel_futures=True)
         for process in self._processes:
             process.join()
 

@@ -7,6 +7,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections import Counter
 from pathlib import Path
@@ -23,6 +24,7 @@ from studies.sweeps.export import export_results
 from studies.sweeps.opening import claim_store
 from studies.sweeps.results import open_results
 from studies.sweeps.run import run_study
+from studies.sweeps.workers import Pool
 from tests.studies.sweeps.processes import environment, rows_of, spec_of, words_of
 
 X = 'name = "user.x"\nlow = 0.0\nhigh = 1.0'
@@ -112,6 +114,15 @@ def test_many_kills_lose_nothing_kept_and_leave_no_process(tmp_path, functions, 
         with contextlib.closing(open_results(tmp_path / folder)) as results:
             export_results(results, tmp_path / folder / "results.csv")
     assert (tmp_path / "out" / "results.csv").read_bytes() == (tmp_path / "whole" / "results.csv").read_bytes()
+
+
+def test_a_closed_pool_leaves_no_thread():
+    """One that is left reads pipes that the end of the interpreter closes, and an interrupt ends in a traceback."""
+    pool, before = Pool(2), set(threading.enumerate())
+    started = [pool.submit(time.sleep, 0.1) for _ in range(9)]
+    started[0].result()
+    pool.close()
+    assert set(threading.enumerate()) <= before
 
 
 @pytest.mark.slow
