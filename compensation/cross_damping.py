@@ -14,36 +14,11 @@ from numpy.typing import ArrayLike
 
 from compensation.arrays import Array
 from compensation.constants import zero_Celsius
-from compensation.demodulated import expand_secondary, relate_rate_to_secondary
 from compensation.errors import CompensationError
 from compensation.noise_regression import correlated_covariance
 from compensation.regression import fit_linear, refuse_constant_columns
 from compensation.samples import check_time, own_columns, read_columns
-from compensation.sensitive_element import SensitiveElement
 from compensation.transfer import TransferFunction
-
-
-def relate_cross_damping_to_secondary(element: SensitiveElement) -> TransferFunction:
-    """W₂ᶻ(s) = 2 A₁ j ω k₂ / ((s + jω)² + 2 ζ₂ k₂ (s + jω) + k₂²), in m per unit ζ₁₂: second of eqs. (6)."""
-    return TransferFunction((_drive_by_damping(element),), expand_secondary(element))
-
-
-def relate_cross_damping_to_slow_secondary(element: SensitiveElement) -> TransferFunction:
-    """The same with the second derivative of the amplitude neglected, m per unit ζ₁₂: the ζ₁₂ part of eq. (4)."""
-    return TransferFunction((_drive_by_damping(element),), expand_secondary(element)[1:])
-
-
-def relate_cross_damping_to_rate(element: SensitiveElement) -> TransferFunction:
-    """Cross-damping to erroneous rate, rad/s per unit ζ₁₂: eq. (8).
-
-    W(s) = W₂ᶻ(s) / W₂(0) = 2 k₂ (k₂² − ω² + 2 j k₂ ω ζ₂) / (g₂ (k₂² − ω² + 2 k₂ ζ₂ s + 2 j ω (s + k₂ ζ₂))),
-    which takes W₂ᶻ in its slow form (4), not in the form (6).
-    """
-    return relate_cross_damping_to_slow_secondary(element) * (1 / relate_rate_to_secondary(element).steady_gain)
-
-
-def _drive_by_damping(element: SensitiveElement) -> complex:
-    return 2j * element.primary_amplitude * element.omega * element.k2
 
 
 def relate_cross_damping_to_rate_when_tuned(k: float, zeta: float, g2: float = 2.0) -> TransferFunction:

@@ -8,7 +8,7 @@ second derivative, of order ζ + λ/ω, and the mismatch of the two modes.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from compensation.arrays import Array
 from compensation.errors import CompensationError
@@ -31,81 +31,10 @@ def expand_secondary(element: SensitiveElement) -> tuple[complex, ...]:
     return 1.0, 2 * (e.zeta2 * e.k2 + 1j * e.omega), detuning + 2j * e.omega * e.zeta2 * e.k2
 
 
-def relate_drive_to_primary(element: SensitiveElement) -> TransferFunction:
-    """A₁(s) / q₁₀(s) = 1 / ((s + jω)² + 2 ζ₁ k₁ (s + jω) + k₁²), in s²: first of eqs. (7); at s = 0 it is (8)."""
-    e = element
-    detuning = (e.k1 - e.omega) * (e.k1 + e.omega)
-    damping = e.zeta1 * e.k1
-    return TransferFunction((1.0,), (1.0, 2 * (damping + 1j * e.omega), detuning + 2j * e.omega * damping))
-
-
-def relate_primary_to_secondary(element: SensitiveElement, rate: float) -> TransferFunction:
-    """A₂(s) / A₁(s) = g₂ Ω (s + jω) / ((s + jω)² + 2 ζ₂ k₂ (s + jω) + k₂²) for a constant rate: second of eqs. (7).
-
-    It holds while the primary still builds up, where (9) and all that follows from it take A₁ as settled.
-    """
-    gain = element.g2 * rate
-    return TransferFunction((gain, 1j * gain * element.omega), expand_secondary(element))
-
-
-def relate_rate_to_slow_secondary(element: SensitiveElement) -> TransferFunction:
-    """W₂(s) with the second derivative of the amplitude neglected: eq. (16), single pole (17)."""
-    e, A1 = element, element.primary_amplitude
-    return TransferFunction((A1, 1j * A1 * e.g2 * e.omega), expand_secondary(e)[1:])
-
-
-def find_poles(element: SensitiveElement) -> NDArray[np.complex128]:
-    """s₁,₂ = −k₂ ζ₂ ± j k₂ √(1 − ζ₂²) − jω (1/s): eq. (15); the first is the slow one, the second is near −2jω."""
-    e = element
-    ring = e.k2 * np.sqrt(1 - e.zeta2**2)
-    return np.array([-e.k2 * e.zeta2 + 1j * (ring - e.omega), -e.k2 * e.zeta2 - 1j * (ring + e.omega)])
-
-
-def find_slow_pole(element: SensitiveElement) -> complex:
-    """s₁ = −(k₂² − ω² + 2jωζ₂k₂) / (2 (ζ₂ k₂ + jω)) (1/s): eq. (17)."""
-    slope, constant = expand_secondary(element)[1:]
-    return complex(-constant / slope)
-
-
 def respond_to_oscillating_rate(element: SensitiveElement, frequency: ArrayLike) -> tuple[Array, Array]:
     """Return amplitude A(λ) (m per rad/s) and phase φ(λ) (rad, all four quadrants) of the secondary for the rate e^{jλt}: eq. (14)."""
-    e, frequency = element, np.asarray(frequency, dtype=float)
-    shifted = frequency + e.omega
-    first, second = e.k1**2 - e.omega**2, e.k2**2 - shifted**2
-    gain = e.q10 * (frequency + e.g2 * e.omega)
-    amplitude = gain / np.sqrt(
-        (second**2 + 4 * e.zeta2**2 * e.k2**2 * shifted**2) * (first**2 + 4 * e.zeta1**2 * e.k1**2 * e.omega**2)
-    )
-    delta = 2 * (e.k2 * e.zeta2 * shifted * first + e.k1 * e.zeta1 * e.omega * second)
-    phase = np.arctan2(second * first - 4 * e.k1 * e.k2 * e.zeta1 * e.zeta2 * e.omega * shifted, delta)
-    return amplitude, phase
-
-
-def split_primary(element: SensitiveElement) -> tuple[float, float]:
-    """Real and imaginary part of A₁ (m): eq. (19), without the j that the paper prints in A₁ᵢ, which is a slip."""
-    e = element
-    detuning, damping = e.k1**2 - e.omega**2, 2 * e.omega * e.k1 * e.zeta1
-    size = detuning**2 + damping**2
-    return e.q10 * detuning / size, -e.q10 * damping / size
-
-
-def split_secondary(element: SensitiveElement) -> tuple[TransferFunction, TransferFunction]:
-    """Real-coefficient transfer functions from rate to Re A₂ and Im A₂ (m per rad/s): eqs. (21), (22).
-
-    A₂ᵣ = (A₁ᵣ Mᵣᵣ + A₁ᵢ Mᵣᵢ) / P · Ω and A₂ᵢ = (A₁ᵣ Mᵢᵣ + A₁ᵢ Mᵢᵢ) / P · Ω, with M and P as in (22); there
-    Mᵣᵣ = Mᵢᵢ and Mᵢᵣ = −Mᵣᵢ.
-    """
-    e = element
-    A1R, A1I = split_primary(e)
-    inner = np.array([1.0, 2 * e.k2 * e.zeta2, e.k2**2 - e.omega**2])
-    outer = np.array([1.0, e.k2 * e.zeta2])
-    along = np.polyadd(np.polymul([1, 0], inner), 2 * e.g2 * e.omega**2 * outer)
-    across = e.omega * np.polysub(2 * np.polymul([1, 0], outer), e.g2 * inner)
-    P = tuple(np.polyadd(4 * e.omega**2 * np.polymul(outer, outer), np.polymul(inner, inner)))
-    return (
-        TransferFunction(tuple(np.polyadd(A1R * along, A1I * across)), P),
-        TransferFunction(tuple(np.polysub(A1I * along, A1R * across)), P),
-    )
+    response = relate_rate_to_secondary(element).respond(frequency)
+    return np.abs(response), np.angle(response)
 
 
 def relate_rate_to_tuned_amplitude(element: SensitiveElement) -> TransferFunction:
