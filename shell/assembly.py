@@ -1,6 +1,6 @@
 """From a resonator to its system of elements: layout, unknowns, poles, clamps, ties between shell and solid parts."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -10,14 +10,12 @@ from shell.cells import at_gauss_points, tabulate_cells
 from shell.corner import find_kinks, lay_clamped_edge, lay_clamped_face, lay_corner
 from shell.errors import ShellError, mm
 from shell.kernel import Section, shell_table
-from shell.layout import Chain, End, Level, lay_chain
+from shell.layout import OTHERS, Chain, End, Level, lay_chain
 from shell.quadrature import Array, at_gauss, gauss, nodal
 from shell.resonator import Resonator
 from shell.root import lay_root
 from shell.sparse import Index, Rows
 from shell.system import Group, ShellGroup, SolidGroup, System
-
-SMALL = 0.5  # length over radius of a small element
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,17 +62,22 @@ def assemble(resonator: Resonator, layout: Layout, n: int, level: Level, rigid_m
     return System(tuple(groups), rows.matrix(size), rigid_motions, n, level)
 
 
+@lru_cache(maxsize=12)
 def lay_resonator(resonator: Resonator, n: int, level: Level, alongside: tuple[int, ...] = ()) -> Layout:
     """Divide the section: a solid root or clamped face first, then chains of shell with a solid corner at every kink."""
+    model = lay_resonator(level.like, n, replace(level, like=None), alongside) if level.like else None
     lowest, highest = min(n, *alongside, n), max(n, *alongside, n)
     start, stop = 0.0, resonator.length
     first: End = "pole" if resonator.starts_on_axis else "free"
     last: End = "pole" if resonator.ends_on_axis else "free"
     solids: list[tuple[Solid, tuple[tuple[int, int], ...]]] = []
     kinks = find_kinks(resonator)
+    if model and len(model.chains) != 1 + len(kinks):
+        raise ShellError(f"{OTHERS}: its meridian has other kinks.")
+    models = iter(model.chains if model else [None] * (1 + len(kinks)))
     whole_section = max(level.through) > 1  # a Naghdi shell is clamped as a line and has no singular corners there
     if resonator.support == "stem":
-        root, start = lay_root(resonator, level.rings, lowest)
+        root, start = lay_root(resonator, level, lowest)
     elif resonator.support == "clamped-face":
         root, start = lay_clamped_face(resonator, level.rings)
     elif resonator.support == "clamped-pole" and whole_section:
@@ -97,12 +100,12 @@ def lay_resonator(resonator: Resonator, n: int, level: Level, alongside: tuple[i
             raise ShellError(
                 f"the corner or clamp that ends at {mm(start)} of the meridian overlaps the next, which begins at {mm(before)}: lengthen the segment between them or make the clamp shorter."
             )
-        chains.append(lay_chain(resonator, start, before, (first, "tied"), highest, level))
+        chains.append(lay_chain(resonator, start, before, (first, "tied"), highest, level, next(models)))
         solids.append((corner, ((len(chains) - 1, 1), (len(chains), 0))))
         start, first = after, "tied"
     if not stop > start:
         raise ShellError(f"the corner or clamp that ends at {mm(start)} of the meridian overlaps the one that begins at {mm(stop)}: lengthen the last segment.")  # fmt: skip
-    chains.append(lay_chain(resonator, start, stop, (first, last), highest, level))
+    chains.append(lay_chain(resonator, start, stop, (first, last), highest, level, next(models)))
     return Layout(tuple(chains), tuple(solids))
 
 
@@ -128,17 +131,14 @@ def _shell_group(resonator: Resonator, chain: Chain, n: int, level: Level, start
     elements, m = len(chain.segments), sum(orders) + 3
     nodes = p * np.arange(elements)[:, None] + np.arange(p + 1)
     unknowns = start + (nodes[:, :, None] * m + np.arange(m)).reshape(elements, -1)
-    anchors, rows, fresh = _anchor(resonator, chain, unknowns, m, start + (elements * p + 1) * m)
+    anchors, rows, fresh = _anchor(chain, unknowns, m, start + (elements * p + 1) * m)
     group = ShellGroup(table, unknowns, chain, section, anchors)
     return group, rows, fresh
 
 
-def _anchor(
-    resonator: Resonator, chain: Chain, unknowns: Index, m: int, fresh: int
-) -> tuple[tuple[tuple[int, int], ...], Rows, int]:
+def _anchor(chain: Chain, unknowns: Index, m: int, fresh: int) -> tuple[tuple[tuple[int, int], ...], Rows, int]:
     """Choose the small elements at free edges solved in differences from their inner node; return them, their rows and the next number."""
     elements = len(chain.segments)
-    small = np.diff(chain.breaks) < SMALL * resonator.size
     anchors: list[tuple[int, int]] = []
     rows = Rows()
     for end, outwards in zip(chain.ends, (-1, 1), strict=True):
@@ -147,7 +147,7 @@ def _anchor(
         edge = 0 if outwards < 0 else elements - 1
         most = elements // 2 if chain.ends == ("free", "free") else elements - 1
         run = [edge - outwards * k for k in range(most)]
-        run = run[: next((k for k, element in enumerate(run) if not small[element]), most)]
+        run = run[: next((k for k, element in enumerate(run) if not chain.small[element]), most)]
         inner, outer = (slice(-m, None), slice(0, m)) if outwards < 0 else (slice(0, m), slice(-m, None))
         above: list[Index] = []  # what the outer end of the element before is the sum of
         for element in reversed(run):

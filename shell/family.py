@@ -6,13 +6,13 @@
 
 E, ρ and growth need no solve: f = √(E/ρ)/g F(dimensions, ν), g the growth of all lengths. ln F, the Bryan factor and the
 slopes of ln f are interpolated (`shell.interpolation`) between full solves; how well is judged by full solves that the
-interpolant has not seen. Where the solver lays out other elements for some designs than for others, its own error jumps
-between them; that error is then part of the stated one.
+interpolant has not seen. All designs have the elements of the one in the middle of the ranges, so that the solver's own error
+is smooth as well.
 """
 
 import warnings
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import product
 from math import isfinite
 
@@ -29,12 +29,12 @@ from shell.resonator import Resonator
 
 Range = tuple[float, float]
 Builder = Callable[[Array], Resonator]
-SOLVER_TOLERANCES = (1e-5, 1e-6, 1e-7, 1e-8)  # a finer one where the elements differ between designs
+SOLVER_TOLERANCES = (1e-5, 1e-6, 1e-7)  # of the middle; a finer one where its elements are too coarse for other designs
+COARSE = 2e-5  # error of a full solve from which they are
 FINER = 3.0  # by which the threshold of the grid falls from round to round
 WORTH = 1.5  # more solves in a round than this, without halving the error, mean that the grid has come to its end
-SAFETY = 3.0  # stated errors over the largest seen on designs that the interpolant does not know, and over the solver's
+SAFETY = 3.0  # stated errors over the largest seen on designs that the interpolant does not know
 NOISE = 5e-10  # of a full solve, relative: its iteration and rounding
-AMPLIFIED = 10.0  # what jumps may grow to in an interpolant
 CORNERS = 16  # of the box that judge the interpolant, at most: it is worst there
 MOST_SOLVES = 1000
 
@@ -82,7 +82,7 @@ class Family:
     polynomial: SparsePolynomial
     error: Errors
     theory_error: float  # relative error of f of the full solves themselves against the exact solution of the theory
-    solver_tolerance: float  # what the full solves were asked for
+    solver_tolerance: float  # what the full solve of the middle was asked for
     solves: int  # how many of them it took, those that judge it included
 
     def evaluate(
@@ -135,61 +135,59 @@ def build_family(
 ) -> Family:  # fmt: skip
     """Interpolate one mode over ranges of dimensions and of Poisson's ratio.
 
-    `build`: (axes,) -> Resonator; `slopes`: ∂ ln f/∂ν and ∂ ln f/∂ ln h too; `tolerance` relative to the full solve;
-    `most` full solves, finer ones counting by the square of their unknowns.
+    `build`: (axes,) -> Resonator; `slopes`: ∂ ln f/∂ν and ∂ ln f/∂ ln h too; `tolerance` relative to the full solve; `most` full solves.
     """
     _check(axes, nu, tolerance, most)
     if theory == "rayleigh":
         raise ShellError("the theory of a family is solid or shell; Rayleigh's closed form needs none.")
-    count, reached, left = 0, np.inf, None
+    count = 0
     for solver_tolerance in SOLVER_TOLERANCES:
-        solve = _Solve(build, tuple(axes), nu, harmonic, index, theory, slopes, solver_tolerance)
-        polynomial, errors = _interpolate(solve, tolerance, most, left)
-        if errors[0] <= tolerance:
-            bounds = np.full(4, np.nan)
-            bounds[: len(errors)] = errors
-            return Family(
-                tuple(axes), nu, harmonic, index, theory,
-                polynomial, Errors(*bounds), solve.theory_error, solver_tolerance, solve.count,
-            )  # fmt: skip
-        count, reached = count + solve.count, min(reached, errors[0])
-        left = (most * solve.work / solve.count if left is None else left) - solve.work
-        if errors[0] > AMPLIFIED * solve.jumps or left <= 0:
-            break  # where it is not for the jumps, finer solves would be no smoother
-    raise ShellError(
-        f"the interpolation error of the frequency within these ranges is {reached:.2g} after {count} full solves; {tolerance:.2g} is asked."
-        " Narrow the ranges, allow a larger error, or solve each design in full."
+        solve = _Solve(build, tuple(axes), nu, slopes, most - count)
+        solve.middle = _solve_middle(solve, harmonic, index, theory, solver_tolerance)
+        polynomial, errors = _interpolate(solve, tolerance)
+        count += solve.count
+        if solve.theory_error <= COARSE:
+            break
+    if errors[0] > tolerance:
+        raise ShellError(
+            f"the interpolation error of the frequency within these ranges is {errors[0]:.2g} after {count} full solves; {tolerance:.2g} is asked."
+            " Narrow the ranges, allow a larger error, or solve each design in full."
+        )
+    bounds = np.full(4, np.nan)
+    bounds[: len(errors)] = errors
+    return Family(
+        tuple(axes),
+        nu,
+        harmonic,
+        index,
+        theory,
+        polynomial,
+        Errors(*bounds),
+        solve.theory_error,
+        solver_tolerance,
+        count,
     )
 
 
 @dataclass
 class _Solve:
-    """Full solves of the designs at points of the cube."""
+    """Full solves of the designs at points of the cube, at `most`, with the elements of the one in its middle."""
 
     build: Builder
     axes: tuple[Axis, ...]
     nu: Range
-    harmonic: int
-    index: int
-    theory: Theory
     slopes: bool
-    tolerance: float
+    most: int
+    middle: Mode | None = None
     theory_error: float = 0.0
     count: int = 0
-    work: float = 0.0
-    layouts: set[tuple[tuple[int, ...], ...]] = field(default_factory=set)
-
-    @property
-    def jumps(self) -> float:
-        """What f may jump by between designs, relative: the solver's error where their elements differ, else 0."""
-        return SAFETY * self.theory_error if len(self.layouts) > 1 else 0.0
 
     @property
     def dimensions(self) -> int:
         return len(_varied(self.axes, self.nu))
 
-    def __call__(self, unit: Array) -> Array:
-        """Return ln F, Bryan factor and slopes."""
+    def at(self, unit: Array) -> tuple[Resonator, Elastic]:
+        """Return a design."""
         rest = iter(unit)
         *values, nu = (
             (axis.low + axis.high) / 2 + (axis.high - axis.low) / 2 * float(next(rest))
@@ -197,46 +195,43 @@ class _Solve:
             else axis.low
             for axis in (*self.axes, Axis("", *self.nu))
         )
-        mode = self._mode(self.build(np.array(values)), nu)
+        return self.build(np.array(values)), Elastic(1.0, nu, 1.0)
+
+    def __call__(self, unit: Array) -> Array:
+        """Return ln F, Bryan factor and slopes."""
+        assert self.middle is not None
+        mode = self.middle.solved_on(*self.at(unit))
         self.theory_error = max(self.theory_error, mode.relative_error_estimate)
         self.count += 1
-        assert mode.solution is not None
-        self.work += float(mode.solution.vector.size) ** 2
-        self.layouts.add(tuple(group.unknowns.shape for group in mode.solution.system.groups))
         found = [np.log(mode.frequency), mode.bryan_factor]
         if self.slopes:
             found += [mode.sensitivities.nu, mode.sensitivities.thickness]
         return np.array(found)
 
-    def _mode(self, resonator: Resonator, nu: float) -> Mode:
-        with warnings.catch_warnings():
-            # at the usual tolerance a warning means that these designs lie outside the theory; a finer one is for smoothness
-            usual = self.tolerance == SOLVER_TOLERANCES[0]
-            warnings.simplefilter("error" if usual else "ignore", TheoryRangeWarning)
-            try:
-                return solve_modes(
-                    resonator, Elastic(1.0, nu, 1.0), self.harmonic, self.index + 1, self.theory, self.tolerance
-                )[self.index]
-            except TheoryRangeWarning as warning:
-                raise ShellError(str(warning)) from None
+
+def _solve_middle(solve: _Solve, harmonic: int, index: int, theory: Theory, tolerance: float) -> Mode:
+    with warnings.catch_warnings():
+        # at the usual tolerance a warning means that the design lies outside the theory
+        warnings.simplefilter("error" if tolerance == SOLVER_TOLERANCES[0] else "ignore", TheoryRangeWarning)
+        try:
+            return solve_modes(*solve.at(np.zeros(solve.dimensions)), harmonic, index + 1, theory, tolerance)[index]
+        except TheoryRangeWarning as warning:
+            raise ShellError(str(warning)) from None
 
 
-def _interpolate(solve: _Solve, tolerance: float, most: int, left: float | None) -> tuple[SparsePolynomial, Array]:
-    """Refine until the stated errors hold the tolerance, or until more solves do not help or no work is left for them."""
+def _interpolate(solve: _Solve, tolerance: float) -> tuple[SparsePolynomial, Array]:
+    """Refine until the stated errors hold the tolerance, or until more solves do not help or none are left."""
     grid = Exploration(solve, solve.dimensions)
     unseen = unseen_points(solve.dimensions)
     truth = np.array([solve(point) for point in unseen])
     threshold, before = tolerance, (np.inf, 1)
-    if left is not None:
-        most = int(left * solve.count / solve.work)
+    if solve.theory_error > COARSE:
+        return grid.polynomial(), np.array([np.inf])
     while True:
-        if solve.jumps > tolerance:
-            return grid.polynomial(), np.array([solve.jumps])
-        within = grid.refine(threshold, most - len(unseen))
+        within = grid.refine(threshold, solve.most - len(unseen))
         polynomial = grid.polynomial()
         errors = SAFETY * abs(polynomial(unseen) - truth).max(axis=0) + NOISE
-        errors[0] += solve.jumps
-        if errors[0] <= tolerance or not within or solve.jumps > tolerance / 2:  # finer solves leave more to the grid
+        if errors[0] <= tolerance or not within:
             return polynomial, errors
         if len(polynomial.indices) > WORTH * before[1]:
             if errors[0] > before[0] / 2:

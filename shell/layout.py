@@ -1,11 +1,12 @@
 """Elements of a meridian: their levels of refinement, and their breaks at joints, knots of thickness and layers of edges and joints."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import Literal
 
 import numpy as np
 
+from shell.errors import ShellError
 from shell.kernel import Orders
 from shell.resonator import Resonator
 
@@ -14,11 +15,16 @@ Theory = Literal["solid", "shell", "rayleigh"]
 Kind = Literal["along", "through", "solids"]
 KINDS: tuple[Kind, ...] = ("along", "through", "solids")  # what an error may come from
 LONGEST = 1.6  # element length over the radius
+SMALL = 0.5  # length over radius of a small element
+OTHERS = "the design has other elements than the one that they are laid like"
 
 
 @dataclass(frozen=True)
 class Level:
-    """Orders (u, v, w) through the thickness, along the meridian, in blocks; rings at corners; `longest` times the radius, each `split`."""
+    """Orders (u, v, w) through the thickness, along the meridian, in blocks; rings at corners; `longest` times the radius, each `split`.
+
+    Elements are laid `like` those of another design, in the same number and order: what is solved is then smooth in the dimensions.
+    """
 
     through: Orders
     along: int
@@ -26,6 +32,7 @@ class Level:
     rings: int
     split: int = 1
     longest: float = LONGEST
+    like: Resonator | None = field(default=None, repr=False)
 
     def raised(self, theory: Theory, kinds: set[Kind]) -> "Level":
         """The next level in what the error comes from; the same level where that is at its end."""
@@ -67,30 +74,60 @@ SMOOTH_JOINT = 1e-6  # rad; a larger change of the tangent is a kink and gets a 
 
 @dataclass(frozen=True)
 class Chain:
-    """A run of shell elements without a kink: arc lengths of their ends (m), the curve each lies on, what holds the ends."""
+    """A run of shell elements without a kink: arc lengths of their ends (m), the curve each lies on, what holds the ends, which are small."""
 
     breaks: tuple[float, ...]
     segments: tuple[int, ...]
     ends: tuple[End, End]
+    small: tuple[bool, ...]
 
     def element(self, k: int) -> "Chain":
         """One of its elements alone."""
-        return Chain(self.breaks[k : k + 2], (self.segments[k],), self.ends)
+        return Chain(self.breaks[k : k + 2], (self.segments[k],), self.ends, (self.small[k],))
 
 
-def lay_chain(resonator: Resonator, start: float, stop: float, ends: tuple[End, End], n: int, level: Level) -> Chain:
-    """Break the meridian between two arc lengths into elements, also for the layers of edges (2 h, 5 √(h R)) and of jumps of curvature."""
-    length = stop - start
-    joints = [s for s in resonator.joints if start + 1e-9 * length < s < stop - 1e-9 * length]
-    knots = [position * resonator.length for position, _ in resonator.thickness[1:-1]]
-    firm = sorted({start, stop, *joints, *(s for s in knots if start + 1e-9 * length < s < stop - 1e-9 * length)})
+def lay_chain(
+    resonator: Resonator, start: float, stop: float, ends: tuple[End, End], n: int, level: Level,
+    model: Chain | None = None,
+) -> Chain:  # fmt: skip
+    """Break the meridian between two arc lengths into elements, also for the layers of edges (2 h, 5 √(h R)) and of jumps of curvature.
+
+    Like those of a `model`, between joints and knots at the same parts of the arc.
+    """
+    firm = _firm_ends(resonator, start, stop)
+    if model and level.like:
+        known = _firm_ends(level.like, model.breaks[0], model.breaks[-1])
+        if len(known) != len(firm):
+            raise ShellError(f"{OTHERS}: a joint or knot of its thickness lies elsewhere.")
+        breaks = [float(s) for s in np.interp(model.breaks, known, firm)]
+        small = model.small
+    else:
+        breaks = _break(resonator, firm, ends, n, level)
+        small = tuple(bool(one) for one in np.diff(breaks) < SMALL * resonator.size)
+    bounds = np.array(resonator._starts)
+    middles = (np.array(breaks[1:]) + np.array(breaks[:-1])) / 2
+    segments = np.clip(np.searchsorted(bounds, middles, side="right") - 1, 0, len(resonator.segments) - 1)
+    return Chain(tuple(breaks), tuple(int(k) for k in segments), ends, small)
+
+
+def _firm_ends(resonator: Resonator, start: float, stop: float) -> list[float]:
+    """Arc lengths at which an element ends in any case: joints, and knots of the thickness."""
+    margin = 1e-9 * (stop - start)
+    knots = (position * resonator.length for position, _ in resonator.thickness[1:-1])
+    return sorted({start, stop, *(s for s in (*resonator.joints, *knots) if start + margin < s < stop - margin)})
+
+
+def _break(resonator: Resonator, firm: list[float], ends: tuple[End, End], n: int, level: Level) -> list[float]:
+    start, stop = firm[0], firm[-1]
     wanted: list[tuple[float, float]] = []  # (distance from its edge, arc length)
     for edge, inward, end in ((start, 1, ends[0]), (stop, -1, ends[1])):
         if end != "pole":
             wanted += _layers(resonator, edge, inward, end)
-    for joint in joints:
+    for joint in (s for s in resonator.joints if s in firm[1:-1]):
         wanted += [(w, joint + side * w) for side in (-1, 1) for w, _ in _layers(resonator, joint, side, "tied")]
-    for width, s in sorted(wanted):
+    for width, s in sorted(
+        wanted, key=lambda one: (float(f"{one[0]:.6g}"), -one[1])
+    ):  # of equal ones the outer first, whatever rounding says
         if min(abs(s - other) for other in firm) > 0.4 * width and start < s < stop:
             firm = sorted([*firm, s])
     longest = level.longest * resonator.size * crowding(n)
@@ -98,10 +135,7 @@ def lay_chain(resonator: Resonator, start: float, stop: float, ends: tuple[End, 
     for one, two in pairwise(firm):
         pieces = level.split * int(np.ceil((two - one) / longest - 1e-9))
         breaks += np.linspace(one, two, pieces + 1)[1:].tolist()
-    bounds = np.array(resonator._starts)
-    middles = (np.array(breaks[1:]) + np.array(breaks[:-1])) / 2
-    segments = np.clip(np.searchsorted(bounds, middles, side="right") - 1, 0, len(resonator.segments) - 1)
-    return Chain(tuple(breaks), tuple(int(k) for k in segments), ends)
+    return breaks
 
 
 def crowding(n: int) -> float:

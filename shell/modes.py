@@ -18,10 +18,11 @@ from shell.elastic import Constants, Elastic, VaryingElastic, find_constants
 from shell.errors import ShellError
 from shell.fitted import fit_profile
 from shell.layout import Theory
-from shell.refinement import refine
+from shell.refinement import FLOOR, refine, solve_level
 from shell.resonator import Resonator
 from shell.section import ShapePatch, draw_section, sample_shape
 from shell.solution import AlongMeridian, EnergyFractions, Solution, total
+from shell.surplus import estimate_errors
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
 THEORIES = ("solid", "shell", "rayleigh")
 MOST_HARMONIC = 100  # waves shorter than any wall is thin; beyond, the meshes outgrow memory
 SMALL = 5e-4  # relative change of the thickness over h/R (and a²/L² of a stem), of the difference that gives the slope of ln f
+EXACT = 1e-11  # of ω², at which the iteration for another design stops
 THICKEST_SHELL = 0.1  # h/R up to which shell theory has been held against the solid
 
 
@@ -90,11 +92,21 @@ class Mode:
 
     def kept_on(self, resonator: Resonator, elastic: Elastic | VaryingElastic) -> "Mode":
         """The mode with its shape kept on a design a little aside: f is stationary in the shape, so exact to first order."""
+        assert self.resonator is not None
         fitted = fit_profile(resonator)[0]
-        moved = _keep_shape(fitted, elastic, self._solved())
-        if moved is None:
-            raise ShellError("the elements of the design aside are others.")
+        moved = _keep_shape(fitted, elastic, self._solved(), self.resonator)
         return replace(self, frequency=sqrt(moved.eigenvalue) / (2 * pi), solution=moved, resonator=fitted)
+
+    def solved_on(self, resonator: Resonator, elastic: Elastic) -> "Mode":
+        """The mode of another design with the same elements, so that frequencies are smooth in its dimensions."""
+        _check_theory(resonator, self.theory)
+        old, (fitted, rest) = self._solved().system, fit_profile(resonator)
+        system = build_system(fitted, old.n, replace(old.level, like=old.level.like or self.resonator))
+        found = solve_level(system, fitted.size, elastic, self.index + 1, EXACT)
+        error = FLOOR + float(estimate_errors(fitted, elastic, found)[:, self.index].sum())
+        if rest:
+            error += rest.error(found[-1].along)
+        return _name(found[-1], self.index, self.theory, error, fitted)
 
     def plot(self) -> "Figure":
         """Draw the cross-section through an antinode, undeformed and at full swing to both sides (matplotlib)."""
@@ -134,13 +146,7 @@ def solve_modes(
         TheoryRangeWarning: Where the theory is outside its range, or the tolerance is out of reach.
     """
     _check_arguments(harmonic, count, theory, tolerance)
-    ratio = max(value for _, value in resonator.thickness) / resonator.size
-    if theory != "solid" and ratio > THICKEST_SHELL:
-        warnings.warn(
-            f"h/R = {ratio:.3g} is {ratio / THICKEST_SHELL:.2g} times the limit ({THICKEST_SHELL:g}) of the {theory} theory: use the solid theory.",
-            TheoryRangeWarning,
-            stacklevel=2,
-        )
+    _check_theory(resonator, theory)
     if theory == "rayleigh":
         return _rayleigh(resonator, elastic, harmonic, count)
     resonator, rest = fit_profile(resonator)
@@ -154,12 +160,23 @@ def solve_modes(
             stacklevel=2,
         )
     return tuple(
-        Mode(
-            harmonic, k, sqrt(solution.eigenvalue) / (2 * pi), theory, error, solution.bryan_factor,
-            _label(solution), solution, resonator,
+        _name(one, k, theory, error, resonator) for k, (one, error) in enumerate(zip(solutions, errors, strict=True))
+    )
+
+
+def _name(solution: Solution, index: int, theory: Theory, error: float, resonator: Resonator) -> Mode:
+    f, n = sqrt(solution.eigenvalue) / (2 * pi), solution.system.n
+    return Mode(n, index, f, theory, error, solution.bryan_factor, _label(solution), solution, resonator)
+
+
+def _check_theory(resonator: Resonator, theory: Theory) -> None:
+    ratio = max(value for _, value in resonator.thickness) / resonator.size
+    if theory != "solid" and ratio > THICKEST_SHELL:
+        warnings.warn(
+            f"h/R = {ratio:.3g} is {ratio / THICKEST_SHELL:.2g} times the limit ({THICKEST_SHELL:g}) of the {theory} theory: use the solid theory.",
+            TheoryRangeWarning,
+            stacklevel=3,
         )
-        for k, (solution, error) in enumerate(zip(solutions, errors, strict=True))
-    )  # fmt: skip
 
 
 def nearest_mode(
@@ -184,24 +201,19 @@ def _by_thickness(resonator: Resonator, solution: Solution) -> float:
     if resonator.stem:
         top = float(resonator.at([0.0]).z[0])
         step = min(step, *(SMALL * (resonator.stem.radius / (end - top)) ** 2 for _, end in resonator.stem.roots))
-    found: dict[float, float] = {0.0: solution.eigenvalue}
-    for change in (-step, step):
-        if moved := _keep_shape(resonator.thickened(1 + change), solution.constants, solution):
-            found[change] = moved.eigenvalue
-    low, high = min(found), max(found)  # one-sided where one more cell fits on one side
-    return log(found[high] / found[low]) / (2 * log((1 + high) / (1 + low)))
+    low, high = (
+        _keep_shape(resonator.thickened(1 + change), solution.constants, solution, resonator).eigenvalue
+        for change in (-step, step)
+    )
+    return log(high / low) / (2 * log((1 + step) / (1 - step)))
 
 
 def _keep_shape(
-    resonator: Resonator, material: Elastic | VaryingElastic | tuple[Constants, ...], solution: Solution
-) -> Solution | None:
-    """Return the same eigenvector on another resonator; None where its elements are others."""
-    old = solution.system
-    system = build_system(resonator, old.n, old.level)
-    if [group.unknowns.shape for group in system.groups] != [group.unknowns.shape for group in old.groups]:
-        return None
-    if system.constraint.shape != old.constraint.shape:
-        return None
+    resonator: Resonator, material: Elastic | VaryingElastic | tuple[Constants, ...], solution: Solution, own: Resonator
+) -> Solution:
+    """Return the eigenvector of a design, its `own`, on the same elements of another one."""
+    level = solution.system.level
+    system = build_system(resonator, solution.system.n, replace(level, like=level.like or own))
     if not isinstance(material, tuple):
         tables = [group.table for group in system.groups]
         material = tuple(find_constants(table.position, material, table.plane_stress) for table in tables)

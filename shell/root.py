@@ -22,6 +22,7 @@ import numpy as np
 
 from shell.blocks import Solid
 from shell.errors import ShellError, mm
+from shell.layout import OTHERS, Level
 from shell.patches import Cell, Patch, Path, Planar, along, circular, layers, rings, shrinking, straight, whole
 from shell.quadrature import Array
 from shell.resonator import Resonator, Stem
@@ -60,21 +61,29 @@ class Frame:
     widest: float
     collar: float  # arc length where the shell begins; `widest` : that of the outermost contact
     corners: tuple[float, ...]  # for each contact, the arc length of O
+    bases: tuple["Base", ...]  # for each contact, where the core ends
     radii: tuple[float, ...]  # bounds of the columns of the stem, from its side to the axis
     # for each contact, η of the face opposite (0: the middle surface) and its arc lengths at the inner radii.
     above: tuple[tuple[float, tuple[float, ...]], ...]
     # arc lengths between O and X on the opposite face at which the cells of a fillet end; two stems share them.
     cuts: tuple[float, ...]
+    rings: tuple[int, ...]  # for each contact, how often the rings around its fillet shrink
 
 
-def lay_root(resonator: Resonator, ring_count: int, n: int) -> tuple[Solid, float]:
+def lay_root(resonator: Resonator, level: Level, n: int) -> tuple[Solid, float]:
     """Patches of cap, root and stem for harmonic n, and the arc length where the shell begins."""
-    frame = _find_frame(resonator)
+    like = level.like or resonator
+    model = _find_frame(like)
+    frame = model if like == resonator else _find_frame(resonator, like)
     stem = resonator.stem
     assert stem is not None
     patches: list[Patch] = []
-    for which in range(len(frame.contacts)):
-        patches += _half_root(resonator, stem, frame, which, ring_count, n)
+    for which, (contact, base) in enumerate(zip(frame.contacts, frame.bases, strict=True)):
+        # rings shrink to nothing at a sharp corner
+        steps = shrinking(model.rings[which], FILLET_SHRINK) if stem.fillet else shrinking(level.rings)
+        patches += _half_root(resonator, stem, frame, which, steps)
+        rows, is_felt = _rows(model.radii, model.bases[which], model.contacts[which].end, n)
+        patches += _stem(base, contact.end, rows, steps, rings(shrinking(level.rings)) if is_felt else ())
     ends = [contact.end for contact in frame.contacts]
 
     def held(r: float, z: float) -> bool:
@@ -84,10 +93,14 @@ def lay_root(resonator: Resonator, ring_count: int, n: int) -> tuple[Solid, floa
 
 
 @lru_cache(maxsize=16)
-def _find_frame(resonator: Resonator) -> Frame:
+def _find_frame(resonator: Resonator, like: Resonator | None = None) -> Frame:
+    """The frame of a root, its counts and choices those of another design if given."""
     stem = resonator.stem
     assert stem is not None
+    model = _find_frame(like) if like else None
     contacts = tuple(_touch(resonator, stem, face, end) for face, end in stem.roots)
+    if model and (len(model.contacts) != len(contacts) or any(model.rings) != bool(stem.fillet)):
+        raise ShellError(f"{OTHERS}: its stem has another fillet or other sides.")
     h = float(resonator.at([contacts[0].s]).thickness[0])
     widest = max(contact.s for contact in contacts)
     collar = widest + COLLAR * h + min(stem.fillet, h)
@@ -96,13 +109,7 @@ def _find_frame(resonator: Resonator) -> Frame:
             f"the stem (radius {mm(stem.radius)}, fillet {mm(stem.fillet)}) with {mm(collar - widest)} of solid around its root "
             f"leaves no room for the shell, whose meridian is {mm(resonator.length)} long: make the stem or its fillet smaller, or the shell thinner."
         )
-    # columns of the stem, from its side to the axis, wider the further in
-    inset = min(0.5 * stem.radius, 2 * h + stem.fillet)
-    radii, step = [stem.radius, stem.radius - inset], 3 * inset
-    while radii[-1] > 1.5 * step:
-        radii.append(radii[-1] - step)
-        step *= 3
-    radii.append(0.0)
+    radii = [radius * stem.radius / model.radii[0] for radius in model.radii] if model else _columns(stem, h)
     above = []
     for contact in contacts:
         far = 0.0 if len(contacts) == 2 else -float(contact.face)
@@ -110,23 +117,32 @@ def _find_frame(resonator: Resonator) -> Frame:
         above.append((far, tuple(_at_radius(surface, r, widest) for r in radii[1:])))
     # two fillets end at different places of a thin shell; where they nearly do not, one slanting cut serves both
     slant = SLANT * h if stem.fillet else np.inf
-    corners = tuple(widest if widest - contact.s < slant else contact.s for contact in contacts)
-    cuts = _cuts(resonator, stem, contacts, corners, above[0][0], above[0][1][0])
-    return Frame(contacts, widest, collar, corners, tuple(radii), tuple(above), cuts)
+    shared = [corner == model.widest for corner in model.corners] if model else [widest - c.s < slant for c in contacts]
+    corners = tuple(widest if one else contact.s for one, contact in zip(shared, contacts, strict=True))
+    far_face, near, over = resonator.surface(above[0][0], 0), min(corners), above[0][1][0]
+    heights = [_distance(c.on_dome, _point(far_face, s)) for c, s in zip(contacts, corners, strict=True)]
+    count, rings = 0, [0] * len(contacts)
+    if model:
+        count, rings = len(model.cuts), list(model.rings)
+    elif stem.fillet:
+        # beside a thin shell the wedge under the fillet is long: its cells grow away from the shell
+        wedges = [abs(c.turn[1]) / 4 * stem.fillet / height for c, height in zip(contacts, heights, strict=True)]
+        count = 1 + max(0, *(ceil(log(wedge) / log(3)) for wedge in wedges))
+        reaches = [min(radii[0] - radii[1], height) / (2 * stem.fillet) for height in heights]
+        rings = [1 + max(0, ceil(log(reach) / -log(FILLET_SHRINK))) for reach in reaches]
+    cuts = [near, *(near + (over - near) * step for step in shrinking(count - 1, 1 / 3)[:0:-1])] if count else []
+    bases = tuple(_base(resonator, contact, tuple(radii)) for contact in contacts)
+    return Frame(contacts, widest, collar, corners, bases, tuple(radii), tuple(above), tuple(cuts), tuple(rings))
 
 
-def _cuts(
-    resonator: Resonator, stem: Stem, contacts: tuple[Contact, ...], corners: tuple[float, ...], far: float, over: float
-) -> tuple[float, ...]:
-    """Beside a thin shell the wedge under the fillet is long: its cells grow away from the shell."""
-    if not stem.fillet:
-        return ()
-    far_face, near = resonator.surface(far, 0), min(corners)
-    count = 0
-    for contact, corner in zip(contacts, corners, strict=True):
-        height = _distance(contact.on_dome, _point(far_face, corner))
-        count = max(count, ceil(log(abs(contact.turn[1]) / 2 * stem.fillet / (2 * height)) / log(3)))
-    return (near, *(near + (over - near) * step for step in shrinking(count, 1 / 3)[:0:-1]))
+def _columns(stem: Stem, h: float) -> list[float]:
+    """Bounds of the columns of the stem, from its side to the axis, wider the further in."""
+    inset = min(0.5 * stem.radius, 2 * h + stem.fillet)
+    radii, step = [stem.radius, stem.radius - inset], 3 * inset
+    while radii[-1] > 1.5 * step:
+        radii.append(radii[-1] - step)
+        step *= 3
+    return [*radii, 0.0]
 
 
 def _touch(resonator: Resonator, stem: Stem, face: int, end: float) -> Contact:
@@ -149,16 +165,14 @@ def _touch(resonator: Resonator, stem: Stem, face: int, end: float) -> Contact:
     return Contact(face, end, s, middle, on_dome, (stem.radius, middle[1]))
 
 
-def _half_root(resonator: Resonator, stem: Stem, frame: Frame, which: int, ring_count: int, n: int) -> list[Patch]:
+def _half_root(resonator: Resonator, stem: Stem, frame: Frame, which: int, steps: tuple[float, ...]) -> list[Patch]:
     """The patches between one face of the dome and `far` (η of the opposite face, or 0: the middle surface)."""
     contact, (far, arcs), own = frame.contacts[which], frame.above[which], frame.corners[which]
     near_face, far_face = resonator.surface(contact.face, 0), resonator.surface(far, 0)
-    radii, collar = frame.radii, frame.collar
+    collar, base = frame.collar, frame.bases[which]
     over = _point(far_face, arcs[0])  # X; `arcs` are those of X and of the points further in
     corner = _point(far_face, own)  # O
-    base = _base(resonator, contact, radii)
-    foot, under = _point(base.path, base.arcs[0]), _point(base.path, base.arcs[1])  # T1, X1
-    steps = _steps(stem.fillet, min(hypot(foot[0] - under[0], 0.0), _distance(contact.on_dome, corner)), ring_count)
+    under = _point(base.path, base.arcs[1])  # X1
     cross, roof = straight(contact.on_dome, corner), along(far_face, own, arcs[0])
     ends = [collar] if own == frame.widest else [frame.widest, collar]
     patches: list[Patch] = []
@@ -178,7 +192,7 @@ def _half_root(resonator: Resonator, stem: Stem, frame: Frame, which: int, ring_
         patches += _fillet(contact, stem.fillet, cross, roof, floor, wall, over, steps, (1.0, *cuts[::-1]))
     else:
         patches.append(Patch(cross, wall, floor, roof, rings(steps), "root"))
-    return patches + _stem(list(radii), base, contact.end, steps, ring_count, n)
+    return patches
 
 
 @dataclass(frozen=True)
@@ -219,30 +233,32 @@ def _fillet(
     ]
 
 
-def _stem(radii: list[float], base: Base, end: float, steps: tuple[float, ...], ring_count: int, n: int) -> list[Patch]:
-    """The stem from its root to the clamped end, in columns between the radii; n > 1 dies out as exp(-1.8 z/a) within `QUIET` radii."""
+def _rows(radii: tuple[float, ...], base: Base, end: float, n: int) -> tuple[list[float], bool]:
+    """Bounds of the rows of cells, 0 at the root and 1 at the clamp, and whether that is felt: n > 1 dies out as exp(-1.8 z/a) within `QUIET` radii."""
     length = min(abs(end - _point(base.path, arc)[1]) for arc in (base.arcs[0], base.arcs[-1]))
-    quiet = n > 1 and length > QUIET * radii[0]
     # cells grow from both ends; the first is as tall as the outer column is wide
     step = min(radii[0] - radii[1], 0.4 * length)
     low, high = [0.0], [length]
-    if quiet:
+    is_felt = n < 2 or length <= QUIET * radii[0]
+    if not is_felt:
         while low[-1] + 3.5 * step < length:
             low.append(low[-1] + step)
             step *= 2.5
-        heights = [*low, length]
     else:
         while high[-1] - low[-1] > 2.4 * step:
             low.append(low[-1] + step)
             high.append(high[-1] - step)
             step = min(2.5 * step, 1.5 * radii[0])
         middle = np.linspace(low[-1], high[-1], 1 + ceil((high[-1] - low[-1]) / (1.5 * step)))
-        heights = [*low, *middle[1:-1].tolist(), *high[::-1]]
-    levels = [height / length for height in heights]
-    sharp = rings(shrinking(ring_count))
+        low += middle[1:-1].tolist()
+    return [height / length for height in (*low, *high[::-1])], is_felt
+
+
+def _stem(base: Base, end: float, rows: list[float], steps: tuple[float, ...], sharp: tuple[Cell, ...]) -> list[Patch]:
+    """The stem from its root to the clamped end, in columns between the radii; `sharp` cells at the edge of a clamp that is felt."""
     patches = []
-    for k, (one, two) in enumerate(pairwise(levels)):
-        if k == len(levels) - 2 and not quiet:  # the edge of the clamp is as singular as a sharp corner
+    for k, (one, two) in enumerate(pairwise(rows)):
+        if k == len(rows) - 2 and sharp:  # as singular as a sharp corner
             side = _block(base, base.arcs[:2], (two, one), end, sharp)
         else:
             side = _block(base, base.arcs[:2], (one, two), end, rings(steps) if k == 0 else whole())
@@ -265,13 +281,6 @@ def _block(
     bottom, top = row(rows[0]), row(rows[1])
     left, right = (straight(_point(bottom, y), _point(top, y)) for y in (0.0, 1.0))
     return Patch(bottom, top, left, right, cells, "stem")
-
-
-def _steps(fillet: float, reach: float, ring_count: int) -> tuple[float, ...]:
-    """Rings shrink to nothing at a sharp corner, and to the size of the fillet at a rounded one."""
-    if not fillet:
-        return shrinking(ring_count)
-    return shrinking(max(0, ceil(log(reach / (2 * fillet)) / -log(FILLET_SHRINK))) + 1, FILLET_SHRINK)
 
 
 def _at_radius(surface: Callable[[Array], Planar], r: float, s_most: float) -> float:

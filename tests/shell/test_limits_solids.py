@@ -9,6 +9,7 @@ from shell.blocks import Solid, mesh_solid
 from shell.cells import at_gauss_points, tabulate_cells
 from shell.elastic import Elastic
 from shell.errors import ShellError
+from shell.layout import LEVELS
 from shell.meridian import hemisphere
 from shell.modes import solve_modes
 from shell.patches import Patch, rings, straight, whole
@@ -73,7 +74,7 @@ def stemmed(h: float, stem: Stem) -> Resonator:
 @pytest.mark.parametrize(("side", "ends"), [("inner", -5e-3), ("outer", 25e-3), ("both", (-5e-3, 25e-3))])
 def test_root_fills_its_outline(side: str, ends: float, h: float, fillet: float) -> None:
     stem = Stem(3.5e-3, ends, fillet, side)  # type: ignore[arg-type]
-    root, collar = lay_root(stemmed(h, stem), 3, 1)
+    root, collar = lay_root(stemmed(h, stem), LEVELS["solid"][0], 1)
     mesh = mesh_solid(root, 14)  # refuses cells that do not join edge to edge
     table = tabulate_cells(mesh.grid, at_gauss_points(2, 14, 18), 1, root.position)  # refuses folded cells
     assert 2 * pi * table.volume.sum() == pytest.approx(pappus(h, stem, collar), rel=1e-12)
@@ -89,7 +90,7 @@ def test_random_roots_are_conforming_and_never_folded() -> None:
         ends = {"inner": inner, "outer": outer, "both": (inner, outer)}[side]
         fillet = rng.integers(2) * a * rng.uniform(0.02, 0.5)
         dome = stemmed(h, Stem(a, ends, fillet, side))  # type: ignore[arg-type]
-        root, collar = lay_root(dome, 3, 2)
+        root, collar = lay_root(dome, LEVELS["solid"][0], 2)
         mesh = mesh_solid(root, 12)
         table = tabulate_cells(mesh.grid, at_gauss_points(2, 12, 14), 2, root.position)
         assert 2 * pi * table.volume.sum() == pytest.approx(pappus(h, dome.stem, collar), rel=1e-9)  # type: ignore[arg-type]
