@@ -9,7 +9,6 @@ from typing import Protocol
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from shell.errors import ShellError
 from shell.quadrature import Array
@@ -33,7 +32,6 @@ class Pattern:
     shared: Index  # global numbers of the shared unknowns, in that order
     size: int
     band: int
-    is_whole: bool  # whether there is one element, with all unknowns in their order
 
 
 def find_pattern(unknowns: list[Index], size: int, in_order: bool = False) -> Pattern:
@@ -51,13 +49,12 @@ def find_pattern(unknowns: list[Index], size: int, in_order: bool = False) -> Pa
     own = tuple(int(np.count_nonzero(place[members] < 0)) for members in unknowns)
     where = [place[members[k:]] for members, k in zip(unknowns, own, strict=True)]
     band = max((int(w.max() - w.min()) for w in where if len(w)), default=0)
-    is_whole = len(unknowns) == 1 and np.array_equal(unknowns[0], np.arange(size))
     entries = []
     for w in where:
-        rows, columns, source = _lower_triangle(len(w))
+        rows, columns = np.tril_indices(len(w))
         one, two = w[rows], w[columns]
-        entries.append((np.maximum(one, two) + band * np.minimum(one, two), source))
-    return Pattern(tuple(unknowns), order, own, tuple(where), tuple(entries), shared, size, band, is_whole)
+        entries.append((np.maximum(one, two) + band * np.minimum(one, two), rows * len(w) + columns))
+    return Pattern(tuple(unknowns), order, own, tuple(where), tuple(entries), shared, size, band)
 
 
 @lru_cache(maxsize=16)
@@ -66,30 +63,15 @@ def whole_pattern(size: int) -> Pattern:
     return find_pattern([np.arange(size)], size)
 
 
-@lru_cache(maxsize=64)
-def _lower_triangle(size: int) -> tuple[Index, Index, Index]:
-    """Rows, columns and flat places of the lower triangle of a matrix."""
-    rows, columns = np.tril_indices(size)
-    return rows, columns, rows * size + columns
-
-
 def _in_a_narrow_band(elements: list[Index], size: int) -> Index:
-    """Places of unknowns in an order (reverse Cuthill-McKee) in which those of one element lie near one another."""
-    # unknowns that the same elements share stay together
-    marks = np.zeros(size, dtype=np.uint64)
-    for members, mark in zip(elements, _marks(len(elements)), strict=True):
-        marks[members] += mark
-    _, bundle = np.unique(marks, return_inverse=True)
-    known = [np.unique(bundle[members]) for members in elements]
-    owner = np.repeat(np.arange(len(known)), [len(k) for k in known])
-    shares = scipy.sparse.csr_matrix((np.ones(len(owner)), (owner, np.concatenate(known))))
-    rank = np.empty(shares.shape[1], dtype=np.intp)
-    rank[scipy.sparse.csgraph.reverse_cuthill_mckee((shares.T @ shares).tocsr(), symmetric_mode=True)] = np.arange(
-        shares.shape[1]
-    )
-    place = np.empty(size, dtype=np.intp)
-    place[np.argsort(rank[bundle], kind="stable")] = np.arange(size)
-    return place
+    """Places of unknowns in which those of one element lie near one another: elements by reverse Cuthill-McKee, unknowns by their first and last."""
+    owner, members = np.repeat(np.arange(len(elements)), [len(one) for one in elements]), np.concatenate(elements)
+    shares = scipy.sparse.csr_matrix((np.ones(len(owner)), (owner, members)), shape=(len(elements), size))
+    rank = np.argsort(scipy.sparse.csgraph.reverse_cuthill_mckee((shares @ shares.T).tocsr(), symmetric_mode=True))
+    first, last = np.full(size, len(elements)), np.zeros(size, dtype=np.intp)
+    np.minimum.at(first, members, rank[owner])
+    np.maximum.at(last, members, rank[owner])
+    return np.argsort(np.lexsort((first, last)))
 
 
 class Factor:
@@ -97,41 +79,33 @@ class Factor:
 
     def __init__(self, pattern: Pattern, stiffness: list[Array]) -> None:
         self.pattern = pattern
-        self.own: list[Array] = []
-        self.coupling: list[Array] = []
+        self.parts: list[tuple[Array, Array, Index, Index]] = []  # L, L⁻¹ K_own,shared, own unknowns, place in the band
         band = np.zeros((pattern.band + 1, len(pattern.shared)), order="F")
         flat = band.reshape(-1, order="F")
-        for K, own, (target, source) in zip(stiffness, pattern.own, pattern.entries, strict=True):
-            L = _cholesky(K[:own, :own])
-            W = np.zeros((own, len(K) - own))
+        shapes = zip(pattern.unknowns, pattern.own, pattern.skeleton, pattern.entries, strict=True)
+        for K, (members, own, where, (target, source)) in zip(stiffness, shapes, strict=True):
+            L, W = K[:own, :own], np.zeros((own, len(K) - own))
+            if own:
+                L = _definite(*scipy.linalg.lapack.dpotrf(L.T, lower=1, clean=0))
             if W.size:
                 W = scipy.linalg.blas.dtrsm(1.0, L, K[own:, :own].T, lower=1)
             if len(source):
                 flat[target] += (K[own:, own:] - W.T @ W).ravel()[source]
-            self.own.append(L)
-            self.coupling.append(W)
-        self.band = _cholesky_band(band)
+            self.parts.append((L, W, members[:own], where))
+        self.band = _definite(*scipy.linalg.lapack.dpbtrf(band, lower=1, overwrite_ab=1)) if band.size else band
 
     def solve(self, load: Array) -> Array:
         """K⁻¹ load for several columns."""
-        p = self.pattern
-        if p.is_whole:
-            return np.asarray(scipy.linalg.lapack.dpotrs(self.own[0], load, lower=1)[0])
-        x = np.empty_like(load)
-        right = load[p.shared]
-        half = []
-        for L, W, members, own, where in zip(self.own, self.coupling, p.unknowns, p.own, p.skeleton, strict=True):
-            y = scipy.linalg.blas.dtrsm(1.0, L, load[members[:own]], lower=1) if own else load[:0]
-            right[where] -= W.T @ y
-            half.append(y)
-        if len(p.shared):
+        x, right, half = np.empty_like(load), load[self.pattern.shared], []
+        for L, W, own, where in self.parts:
+            half.append(scipy.linalg.blas.dtrsm(1.0, L, load[own], lower=1) if len(own) else load[:0])
+            right[where] -= W.T @ half[-1]
+        if len(right):
             right = scipy.linalg.lapack.dpbtrs(self.band, right, lower=1)[0]
-            x[p.shared] = right
-        for y, L, W, members, own, where in zip(
-            half, self.own, self.coupling, p.unknowns, p.own, p.skeleton, strict=True
-        ):
-            if own:
-                x[members[:own]] = scipy.linalg.blas.dtrsm(1.0, L, y - W @ right[where], lower=1, trans_a=1)
+            x[self.pattern.shared] = right
+        for y, (L, W, own, where) in zip(half, self.parts, strict=True):
+            if len(own):
+                x[own] = scipy.linalg.blas.dtrsm(1.0, L, y - W @ right[where], lower=1, trans_a=1)
         return x
 
 
@@ -197,7 +171,7 @@ def _orthonormal(mass: Mass, x: Array) -> tuple[tuple[Array, Array], Array]:
     """An M-orthonormal basis of the columns, and M times it; and the factors, x = basis @ factors."""
     # one solve leaves little but the inextensional modes of a thin shell (two at most) in every column
     reflectors, tau, _, _ = scipy.linalg.lapack.dgeqrf(x)
-    right = reflectors[: x.shape[1]] * _upper(x.shape[1])
+    right = np.triu(reflectors[: x.shape[1]])
     columns = np.asarray(scipy.linalg.lapack.dorgqr(reflectors, tau)[0])
     loaded = mass @ columns
     squares, axes = _eigenpairs(columns.T @ loaded)
@@ -227,37 +201,12 @@ def _eigenpairs(matrix: Array) -> tuple[Array, Array]:
 
 
 @lru_cache(maxsize=16)
-def _upper(size: int) -> Array:
-    return np.triu(np.ones((size, size)))
-
-
-@lru_cache(maxsize=16)
-def _marks(count: int) -> NDArray[np.uint64]:
-    """Numbers whose sums tell every set of elements from every other one."""
-    return np.random.default_rng(3).integers(2**63, size=count, dtype=np.uint64)
-
-
-@lru_cache(maxsize=16)
 def _random(size: int, width: int) -> Array:
     """A start with a share of every mode, always the same."""
     return np.random.default_rng(5).standard_normal((size, width))
 
 
-def _cholesky(matrix: Array) -> Array:
-    if not matrix.size:
-        return matrix
-    factor, fault = scipy.linalg.lapack.dpotrf(matrix.T, lower=1, clean=0)
-    return np.asarray(_definite(factor, fault))
-
-
-def _cholesky_band(band: Array) -> Array:
-    if not band.size:
-        return band
-    factor, fault = scipy.linalg.lapack.dpbtrf(band, lower=1, overwrite_ab=1)
-    return np.asarray(_definite(factor, fault))
-
-
 def _definite(factor: Array, fault: int) -> Array:
     if fault:
         raise ShellError(TOO_THIN)
-    return factor
+    return np.asarray(factor)

@@ -131,20 +131,15 @@ class System:
     n: int
     level: Level
 
-    @property
+    @cached_property
     def pattern(self) -> Pattern:
         """The elements' free unknowns."""
-        return self._elements[0]
-
-    @property
-    def maps(self) -> list["ToFree"]:
-        """From the unknowns of every element to its free ones, in the order of `pattern`."""
-        return self._elements[1]
+        return find_pattern([at.free for at in self.to_free], self.constraint.shape[1])
 
     @cached_property
-    def _elements(self) -> tuple[Pattern, list["ToFree"]]:
-        pattern = find_pattern([at.free for at in self.to_free], self.constraint.shape[1])
-        return pattern, [at.reordered(order) for at, order in zip(self.to_free, pattern.order, strict=True)]
+    def maps(self) -> list["ToFree"]:
+        """From the unknowns of every element to its free ones, in the order of `pattern`."""
+        return [at.reordered(order) for at, order in zip(self.to_free, self.pattern.order, strict=True)]
 
     @cached_property
     def to_free(self) -> list["ToFree"]:
@@ -160,12 +155,12 @@ class System:
                 columns, factors = P.indices[start:stop], P.data[start:stop]
                 kept = np.flatnonzero(terms)
                 if len(set(columns.tolist())) == len(kept) == len(columns) and np.all(factors == 1):
-                    maps.append(ToFree(columns.astype(np.intp), kept, None))
+                    maps.append(ToFree(columns.astype(np.intp), kept))
                 else:
                     free, place = np.unique(columns, return_inverse=True)
                     matrix = np.zeros((size, len(free)))
                     matrix[np.repeat(np.arange(size), terms), place] = factors
-                    maps.append(ToFree(free.astype(np.intp), None, matrix))
+                    maps.append(ToFree(free.astype(np.intp), kept, matrix))
                 first += size
         return maps
 
@@ -249,23 +244,21 @@ class System:
 
 @dataclass(frozen=True, eq=False)
 class ToFree:
-    """From an element's unknowns to free ones: a choice, or (kept None) a full matrix of factors."""
+    """From an element's unknowns to free ones: a choice of those that are kept, or a full matrix of factors."""
 
     free: Index
-    kept: Index | None
-    factors: Array | None
+    kept: Index
+    factors: Array | None = None
 
     def reordered(self, order: Index) -> "ToFree":
         """The same with the free unknowns in another order."""
-        if self.kept is None:
-            assert self.factors is not None
-            return ToFree(self.free[order], None, self.factors[:, order])
-        return ToFree(self.free[order], self.kept[order], None)
+        if self.factors is not None:
+            return ToFree(self.free[order], self.kept, self.factors[:, order])
+        return ToFree(self.free[order], self.kept[order])
 
     def restrict(self, matrix: Array) -> Array:
         """The element's matrix on the free unknowns."""
-        if self.kept is None:
-            assert self.factors is not None
+        if self.factors is not None:
             return np.asarray(self.factors.T @ matrix @ self.factors)
         if len(self.kept) == len(matrix) and np.all(self.kept[1:] > self.kept[:-1]):
             return matrix

@@ -66,7 +66,7 @@ def live_blocks(
     errors = [f"f to {1e6 * f:.2g} ppm", f"the other modes to {100 * max(others, default=0.0):.2g} %"]
     errors += [words[name].format(100 * error) for name, error in data["fields"]["errors"].items()]
     caption = (
-        f"Interpolated between full solves ({theory} theory) and checked against others within the sliders' ranges: {', '.join(errors)}."
+        f"Interpolated between full solves ({theory} theory, one layout of elements) and checked against others within the sliders' ranges: {', '.join(errors)}."
         " f: without imperfection and electrodes. The picture shows the reference temperature. Other modes: of n = 0 …"
         f" {HIGHEST}, those nearest to f at the card's values or at an end of a slider. {' '.join(missing)}"
     )
