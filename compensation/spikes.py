@@ -1,7 +1,6 @@
 """Spikes: readings that disagree with their neighbours."""
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 
 from compensation.arrays import Array
@@ -25,8 +24,9 @@ def find_spikes(values: Array, least: float = 0.0, step: float = 0.0) -> NDArray
         return marked
     known = values[rows]
     marked[rows] = _stand_out(known, 0.5 * step)
-    if least:
-        smooth = scipy.ndimage.median_filter(known, NEIGHBOURS, mode="mirror")
+    if least and marked.any():
+        around = np.lib.stride_tricks.sliding_window_view(np.pad(known, REACH, "reflect"), NEIGHBOURS)
+        smooth = np.partition(around, REACH, axis=1)[:, REACH]  # `scipy.ndimage` has it too, and takes 0.1 s to load
         marked[rows] &= np.abs(known - smooth) > least * np.ptp(smooth)
     return marked
 

@@ -66,12 +66,26 @@ def whole_pattern(size: int) -> Pattern:
 def _in_a_narrow_band(elements: list[Index], size: int) -> Index:
     """Places of unknowns in which those of one element lie near one another: elements by reverse Cuthill-McKee, unknowns by their first and last."""
     owner, members = np.repeat(np.arange(len(elements)), [len(one) for one in elements]), np.concatenate(elements)
-    shares = scipy.sparse.csr_matrix((np.ones(len(owner)), (owner, members)), shape=(len(elements), size))
-    rank = np.argsort(scipy.sparse.csgraph.reverse_cuthill_mckee((shares @ shares.T).tocsr(), symmetric_mode=True))
+    users: list[set[int]] = [set() for _ in range(size)]
+    for unknown, element in zip(members.tolist(), owner.tolist(), strict=True):
+        users[unknown].add(element)
+    rank = np.argsort(_cuthill_mckee([set().union(*(users[unknown] for unknown in one.tolist())) for one in elements]))
     first, last = np.full(size, len(elements)), np.zeros(size, dtype=np.intp)
     np.minimum.at(first, members, rank[owner])
     np.maximum.at(last, members, rank[owner])
     return np.argsort(np.lexsort((first, last)))
+
+
+def _cuthill_mckee(beside: list[set[int]]) -> list[int]:
+    """An order of nodes in which neighbours lie near one another, as `scipy.sparse.csgraph` has it, which takes 20 ms to load."""
+    found: dict[int, None] = {}
+    for start in sorted(range(len(beside)), key=lambda one: len(beside[one])):
+        queue = [start]
+        for one in queue:
+            if one not in found:
+                found[one] = None
+                queue += sorted(beside[one] - found.keys(), key=lambda other: len(beside[other]))
+    return [*found][::-1]
 
 
 class Factor:

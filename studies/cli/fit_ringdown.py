@@ -57,18 +57,12 @@ def fit_ringdown(
     time (ageing, or steps between sessions). A table of earlier results does the same: frequency_Hz or inverse_q beside
     time_s, housing_temperature_degC, pressure_Pa or vibration_amplitude_V; with a column decay, rows are readings within one decay.
 
-    Parameters
-    ----------
-    data : str
-        The files.
-    card : str
-        The resonator's card: an aliased frequency is recognised by it, and --save writes it with the values found.
-    frequency : float
-        Carrier or reference frequency in Hz, in place of the file's comment '# reference_frequency_Hz: …'.
-    save : str
-        Write the card with the split, its axis, 1/Q and the damping axis of the first decay.
-    out : str
-        Write a record with a row for each decay (temperature, frequency, 1/Q), for hrg calibrate and hrg diagnose.
+    Args:
+        data: The files.
+        card: The resonator's card: an aliased frequency is recognised by it, and --save writes it with the values found.
+        frequency: Carrier or reference frequency in Hz, in place of the file's comment '# reference_frequency_Hz: …'.
+        save: Write the card with the split, its axis, 1/Q and the damping axis of the first decay.
+        out: Write a record with a row for each decay (temperature, frequency, 1/Q), for hrg calibrate and hrg diagnose.
     """
     if not data:
         raise InputError("name at least one file (CSV) with a free decay.")

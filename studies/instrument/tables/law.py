@@ -19,8 +19,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from compensation.arrays import Array
+from shell.constants import zero_Celsius
 from shell.errors import ShellError
-from studies.effects.effect import AROUND
 from studies.instrument.registry import CardPlace, CardTable
 from studies.schema.keys import Keys, Note, number
 
@@ -111,7 +111,7 @@ class PolynomialLaw:
         """Return the heat capacity of the resonator, a number or over temperature (K)."""
         if self.capacity_slope == 0.0:
             return at_20_degC
-        return lambda T: at_20_degC * np.exp(self.capacity_slope * (T - AROUND))
+        return lambda T: at_20_degC * np.exp(self.capacity_slope * (T - zero_Celsius - 20.0))
 
     @property
     def absent(self) -> tuple[str, ...]:
