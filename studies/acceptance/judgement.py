@@ -22,7 +22,7 @@ from studies.acceptance.service import measure_life, measure_storage, measure_tr
 from studies.fits.ringdown import Decay
 from studies.record import Record
 
-FIRST: "dict[Test, Callable[[Record], Found]]" = {
+FIRST: dict[Test, Callable[[Record], Found]] = {
     # tests that take the first record that serves them
     "scale-factor": measure_scale,
     "run-down": measure_run_down,
@@ -71,8 +71,8 @@ class Acceptance:
     elsewhere: tuple[tuple[str, str, str], ...]
     used: dict[str, str]
     band: float | None
-    allan: "AllanDeviation | None"
-    noise: "NoiseCoefficients | None"
+    allan: AllanDeviation | None
+    noise: NoiseCoefficients | None
 
     @property
     def verdict(self) -> Literal["pass", "fail", "incomplete"]:
@@ -84,10 +84,10 @@ class Acceptance:
 
 
 def judge(
-    records: "Sequence[Record]",
+    records: Sequence[Record],
     limits: Limits | None = None,
     output: str = "bias_deg_per_h",
-    decays: "Sequence[Decay]" = (),
+    decays: Sequence[Decay] = (),
 ) -> Acceptance:
     """Measure what the records and the free decays give and set it against the limits."""
     sorted_runs, left = sort_records(records, output)

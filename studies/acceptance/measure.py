@@ -57,7 +57,7 @@ def of_fit(fit: LinearFit, place: int, sources: Sequence[str], scale: float = 1.
     return within(value, sd, sources, fit.degrees_of_freedom, scale=scale)
 
 
-def measure_drift(records: "Sequence[Record]", output: str) -> tuple[Found, AllanDeviation, NoiseCoefficients]:
+def measure_drift(records: Sequence[Record], output: str) -> tuple[Found, AllanDeviation, NoiseCoefficients]:
     """Bias, its repeatability, and the noise coefficients of the longest record (12.11)."""
     means: list[tuple[float, float]] = []
     for record in records:
@@ -86,7 +86,7 @@ def measure_drift(records: "Sequence[Record]", output: str) -> tuple[Found, Alla
     return found, allan, noise
 
 
-def _stability(record: "Record", output: str) -> tuple[AllanDeviation, NoiseCoefficients]:
+def _stability(record: Record, output: str) -> tuple[AllanDeviation, NoiseCoefficients]:
     time, y = record["time_s"], record[output]
     step = float(np.median(np.diff(time)))
     width = step * math.ceil(len(y) / MOST_POINTS)
@@ -103,7 +103,7 @@ def _deviation(deviation: float, free: int, sources: Sequence[str]) -> Measured:
     return Measured(deviation, deviation * math.sqrt(free / low), deviation * math.sqrt(free / high), tuple(sources))
 
 
-def measure_temperature(records: "Sequence[Record]", output: str) -> Found:
+def measure_temperature(records: Sequence[Record], output: str) -> Found:
     """Bias over temperature and its rate, fitted together, what they leave, and the frequency's slope (12.8)."""
     columns: dict[str, list[Array]] = {"output": [], "temperature": [], "slope": []}
     frequencies: list[tuple[Array, Array]] = []
@@ -151,7 +151,7 @@ def measure_temperature(records: "Sequence[Record]", output: str) -> Found:
     return found
 
 
-def measure_scale(record: "Record") -> Found:
+def measure_scale(record: Record) -> Found:
     """Scale factor, its nonlinearity and asymmetry, from the means of constant rates (12.9)."""
     applied, measured = record["rate_deg_per_s"], record["measured_rate_deg_per_s"]
     keep = np.isfinite(applied) & np.isfinite(measured)
@@ -185,7 +185,7 @@ def measure_scale(record: "Record") -> Found:
     return found
 
 
-def measure_warm_up(record: "Record", output: str, band: float | None) -> tuple[Found, float]:
+def measure_warm_up(record: Record, output: str, band: float | None) -> tuple[Found, float]:
     """Time from power-on until the means over 50 s stay within the band of the final output, the last quarter's mean (12.5, 12.6)."""
     step = float(np.median(np.diff(record["time_s"])))
     width = max(WARM_BLOCK, 7 * step)
@@ -213,7 +213,7 @@ def measure_warm_up(record: "Record", output: str, band: float | None) -> tuple[
     return {"warm_up_time_s": Measured(value, max(low - width / 2, 0.0), high + width / 2, (record.path,))}, band
 
 
-def measure_run_down(record: "Record") -> Found:
+def measure_run_down(record: Record) -> Found:
     """Decay time of the amplitude with the drive off, and Q = π f τ (12.14)."""
     if "vibration_amplitude_V" not in record:
         raise InputError(f"{record.path}: a run-down needs the column vibration_amplitude_V.")
@@ -223,7 +223,7 @@ def measure_run_down(record: "Record") -> Found:
     return _run_down(found.estimates, record.path)
 
 
-def measure_decays(decays: "Sequence[Decay]") -> Found:
+def measure_decays(decays: Sequence[Decay]) -> Found:
     """The same of free decays as they were recorded (12.14), of the one that runs down fastest."""
     for decay in decays:
         if "decay_time_s" not in decay.estimates:
@@ -238,7 +238,7 @@ def _run_down(estimates: Mapping[str, Estimate], path: str) -> Found:
     return found | ({"quality_factor": within(1 / loss.value, loss.sd / loss.value**2, [path])} if loss else {})
 
 
-def measure_seal(records: "Sequence[Record]") -> Found:
+def measure_seal(records: Sequence[Record]) -> Found:
     """Growth of 1/Q per year, the change with temperature fitted beside it (an indication for 12.3; the tracer gas is not replaced)."""
     rows, sources = [], []
     dated = [record for record in records if record.start is not None and "inverse_q" in record]

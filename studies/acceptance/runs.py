@@ -15,7 +15,7 @@ HOUR = 3600.0
 MOVING = 0.5  # part of the rows from which on an applied rate that changes is swept or shaken, not held at levels
 
 
-def test_of(record: "Record", output: str) -> Test | None:
+def test_of(record: Record, output: str) -> Test | None:
     """Return the test that a record serves; None when it serves none."""
     for comment in record.comments:
         key, colon, name = (part.strip() for part in comment.partition(":"))
@@ -39,12 +39,12 @@ def test_of(record: "Record", output: str) -> Test | None:
     return None
 
 
-def temperature_column(record: "Record") -> str | None:
+def temperature_column(record: Record) -> str | None:
     """Return the temperature that a record is judged by: the housing's, the resonator's or the chamber's."""
     return next((name for name in TEMPERATURES if name in record and np.isfinite(record[name]).any()), None)
 
 
-def sort_records(records: "Sequence[Record]", output: str) -> "tuple[dict[Test, list[Record]], list[Record]]":
+def sort_records(records: Sequence[Record], output: str) -> tuple[dict[Test, list[Record]], list[Record]]:
     """Return the records by test, and those that serve none."""
     found: dict[Test, list[Record]] = {}
     left: list[Record] = []

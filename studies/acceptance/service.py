@@ -18,7 +18,7 @@ HALF = math.sqrt(0.5)
 LEAST = 100  # rows
 
 
-def measure_transfer(record: "Record") -> Found:
+def measure_transfer(record: Record) -> Found:
     """Bandwidth and delay of the measured rate behind the applied one (12.15), from the cross-spectrum of a swept or shaken run.
 
     H(f) = S_xy/S_xx where the applied rate has power and coherence; |H| has the relative error √((1 - γ²)/(2 γ² n)) of n segments.
@@ -62,7 +62,7 @@ def measure_transfer(record: "Record") -> Found:
     return found
 
 
-def measure_storage(record: "Record") -> Found:
+def measure_storage(record: Record) -> Found:
     """How far the pattern's azimuth is, after the longest gap of the record, from where it was going before (12.13)."""
     if "pattern_angle_deg" not in record:
         raise InputError(f"{record.path}: angle storage needs the column pattern_angle_deg.")
@@ -85,7 +85,7 @@ def measure_storage(record: "Record") -> Found:
     return {"angle_storage_error_deg": within(error, math.hypot(one, two), [record.path])}
 
 
-def measure_life(records: "Sequence[Record]", output: str) -> Found:
+def measure_life(records: Sequence[Record], output: str) -> Found:
     """Change of the bias per year over dated runs at rest, three or more and a day or more apart (12.18, as far as they reach)."""
     dated = [record for record in records if record.start is not None]
     if len(dated) < 3:

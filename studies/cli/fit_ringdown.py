@@ -168,7 +168,7 @@ def _law_row(name: str, law: Law) -> dict[str, Any]:
     }
 
 
-def _law_chapter(laws: dict[str, Law], decays: "Decays") -> Chapter:
+def _law_chapter(laws: dict[str, Law], decays: Decays) -> Chapter:
     parts: list[Part] = []
     for name, law in laws.items():
         if name == "frequency_Hz":
@@ -209,7 +209,7 @@ def _remarks(law: Law) -> list[str]:
     return said
 
 
-def _draw_law(name: str, law: Law, decays: "Decays") -> Drawing:
+def _draw_law(name: str, law: Law, decays: Decays) -> Drawing:
     over = list(dict.fromkeys(WORDS[t][2] for t in law.terms if t in WORDS and WORDS[t][2]))
     over = over or ["time_s"]
     labels = {"housing_temperature_degC": "temperature (°C)", "pressure_Pa": "pressure (Pa)", "vibration_amplitude_V": "amplitude", "time_s": "time (d)"}  # fmt: skip

@@ -5,10 +5,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
-import numpy as np
 from cyclopts import Parameter
-from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from studies.cli.output import answers
 from studies.errors import InputError
 from studies.files.writing import write_text
@@ -21,7 +20,7 @@ from studies.reports.columns import draw_columns
 from studies.reports.survey import COLUMNS
 from studies.results import Chapter, Column, Figure, Result, Sentence, Table, row_of, rows_of
 
-Columns = Mapping[str, NDArray[np.float64]]
+Columns = Mapping[str, Array]
 
 FIRST_ROWS = 5
 

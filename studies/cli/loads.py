@@ -176,7 +176,7 @@ def _under(found: Loads, amounts: dict[Kind, float], shift: float) -> dict[str, 
     }
 
 
-def _amplitudes(instrument: Instrument, harmonic: int, temperatures: "np.ndarray[Any, Any]") -> list[dict[str, float]]:
+def _amplitudes(instrument: Instrument, harmonic: int, temperatures: np.ndarray[Any, Any]) -> list[dict[str, float]]:
     rows: list[dict[str, float]] = []
     for T in instrument.material.check(temperatures):
         (mode,) = solve_modes(*instrument.at(float(T)), harmonic)

@@ -81,7 +81,7 @@ def _compare(card: str, harmonic: int) -> Result:
     )  # fmt: skip
 
 
-def _law_tables(law: "Material") -> list[Table]:
+def _law_tables(law: Material) -> list[Table]:
     properties = [
         {
             "property": key,
@@ -115,12 +115,12 @@ def _with_error(name: str, value: Any, error: float, unit: str) -> str:
     return f"{name} = " + (f"{number} ± {spread}" if error > 0 else plain(value * scale, 6)) + words
 
 
-def _correlated(prior: "Prior", k: int) -> str:
+def _correlated(prior: Prior, k: int) -> str:
     others = [j for j in range(len(prior.names)) if j != k and abs(prior.correlation[k, j]) >= 0.005]
     return ", ".join(f"{prior.correlation[k, j]:+.2f} with {prior.names[j]}" for j in others)
 
 
-def _describe(law: "Material") -> "dict[str, Any]":
+def _describe(law: Material) -> dict[str, Any]:
     return row_of(law, "name", "law", "source", "note", "caveats", "lacks", "unchecked") | {
         "range_degC": [law.lowest - zero_Celsius, law.highest - zero_Celsius],
         "prior": row_of(law.prior, "sd", "correlation", coefficients="names"),
@@ -154,7 +154,7 @@ def compare_materials(resonator: "Resonator", temperature: float, harmonic: int 
     return sorted(rows, key=lambda row: (-np.nan_to_num(row["thermoelastic_q"]), isnan(row["frequency_Hz"])))
 
 
-def _figures(resonator: "Resonator", material: "Material", T: float, harmonic: int) -> dict[str, Any]:
+def _figures(resonator: "Resonator", material: Material, T: float, harmonic: int) -> dict[str, Any]:
     from shell.damping.budget import surface_cause, thermoelastic_cause
     from shell.damping.faces import Vibration
     from shell.damping.heat import Heat

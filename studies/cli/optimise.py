@@ -162,7 +162,7 @@ def _number(count: int, what: str) -> str:
     return f"{count} {what}{'s' * (count != 1)}"
 
 
-def _draw_history(found: "Answer") -> Drawing:
+def _draw_history(found: Answer) -> Drawing:
     over, t = found.history.T
     count = np.arange(1, len(over) + 1)
     held = over == 0
@@ -178,7 +178,7 @@ def _draw_history(found: "Answer") -> Drawing:
         return made
 
 
-def _draw_front(found: "Answer") -> Drawing:
+def _draw_front(found: Answer) -> Drawing:
     columns = {column.name: column for column in found.task.study.columns}
     names = [one.column for one in found.task.keys.objective[:2]]
     titles = [f"{columns[n].label}{f' ({columns[n].unit})' if columns[n].unit != '1' else ''}" for n in names]

@@ -3,8 +3,8 @@
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from shell.constants import zero_Celsius
 from shell.law import FrequencyLaw
 from studies.cli.arguments import AnyTheory, Card, FromDegC, Harmonic, Step, ToDegC, lay_temperatures
@@ -101,7 +101,7 @@ def _curves(points: list[dict[str, Any]], parts: list[str], local: list[dict[str
         return made
 
 
-def _points(law: FrequencyLaw, T: NDArray[np.float64]) -> list[dict[str, Any]]:
+def _points(law: FrequencyLaw, T: Array) -> list[dict[str, Any]]:
     parts = law.parts(T)
     rows = rows_of({
         "temperature_degC": T - zero_Celsius,
@@ -113,7 +113,7 @@ def _points(law: FrequencyLaw, T: NDArray[np.float64]) -> list[dict[str, Any]]:
     return [row | {"parts_ppm_per_degC": share} for row, share in zip(rows, shares, strict=True)]
 
 
-def _moves(law: FrequencyLaw, T: NDArray[np.float64]) -> list[dict[str, Any]]:
+def _moves(law: FrequencyLaw, T: Array) -> list[dict[str, Any]]:
     """Return what one standard deviation of each open coefficient of the law moves the slope by."""
     slopes, prior = law.slope_derivatives(T), law.material.prior
     return [

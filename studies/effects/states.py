@@ -5,11 +5,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from compensation.transfer import recur
 
-FloatArray = NDArray[np.float64]
+FloatArray = Array
 
 
 @dataclass(frozen=True)

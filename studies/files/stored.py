@@ -6,11 +6,10 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from studies.errors import InputError
 
-Array = NDArray[np.float64]
 PORTION = 1 << 19
 """Rows that are looked at together."""
 IN_MEMORY = 1 << 23  # bytes of a column that need no file

@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from compensation.cross_damping import CrossDampingModel, RestRun, fit_cross_damping
 from compensation.errors import CompensationError
 from compensation.improvement import Improvement, compare_outputs, hold_out
@@ -42,7 +42,7 @@ def study_cross_damping(
     def fit(chosen: Sequence[RestRun]) -> CrossDampingModel:
         return fit_cross_damping(chosen, k=k, zeta=zeta, calibration_temperature=calibration_temperature, order=order)
 
-    def compensate(chosen: Sequence[RestRun], run: RestRun) -> NDArray[np.float64]:
+    def compensate(chosen: Sequence[RestRun], run: RestRun) -> Array:
         return fit(chosen).compensate(run.time, run.rate, run.temperature, extrapolate=True)
 
     model = fit(runs)

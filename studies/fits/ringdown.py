@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from compensation.ringdown.analysis import analyse_decay
 from compensation.ringdown.answer import Estimate, RingDown
 from compensation.ringdown.envelope import even_rows, from_lock_in, mix_down
@@ -55,7 +56,7 @@ class Decay(RingDown):
         return sum(found) / len(found) if found else self.notes["reference_frequency_Hz"]
 
     @property
-    def inverse_q(self) -> "Estimate | None":
+    def inverse_q(self) -> Estimate | None:
         """1/Q; None where the frequency is not known."""
         return self.estimates.get("inverse_q")
 
@@ -165,7 +166,7 @@ def _read_trace(path: str | Path) -> tuple[Columns, dict[str, float]]:
     return Columns(str(path), {"time_s": rows[:, 0], "power_dBm": rows[:, 1]}, tuple(comments)), notes
 
 
-def _pairs(path: str | Path, columns: Mapping[str, NDArray[np.float64]]) -> list[NDArray[np.complex128]]:
+def _pairs(path: str | Path, columns: Mapping[str, Array]) -> list[NDArray[np.complex128]]:
     found: list[NDArray[np.complex128]] = []
     for first, second in (*POLAR, *CARTESIAN):
         if (first in columns) != (second in columns):
@@ -197,7 +198,7 @@ def _refuse_other(path: str | Path, found: float, expected: float) -> None:
         )
 
 
-def with_decay(instrument: "Instrument", decay: Decay, harmonic: int = 2) -> "Instrument":
+def with_decay(instrument: Instrument, decay: Decay, harmonic: int = 2) -> Instrument:
     """Return the card with what a decay of two channels says: split and slow axis, 1/Q, damping split and axis."""
     if "frequency_axis_deg" not in decay.estimates:
         raise InputError(f"{decay.path}: a card takes a split with its axis; this decay shows none: record both pick-offs, with both modes excited, for longer.")  # fmt: skip

@@ -103,7 +103,7 @@ def settled_rows(rate: Array, rows: int) -> NDArray[np.bool_]:
     return np.asarray((index - begin >= rows) | (begin == 0), dtype=bool)
 
 
-def study_scale(records: "Sequence[Record]", cutoff: float | None, order: int) -> ScaleStudy:
+def study_scale(records: Sequence[Record], cutoff: float | None, order: int) -> ScaleStudy:
     """Sort the records, fit the chain, and judge it."""
     output = choose_column(records, RAW, "a fit of the scale")
     column = choose_column(records, TEMPERATURES, "a fit of the scale over temperature")
@@ -271,7 +271,7 @@ def _classify(run: BellRun, path: str) -> str:
     return at_rest if abs(np.mean(run.rate)) <= LARGEST_REST * DEG else turning
 
 
-def _read_run(record: "Record", output: str, column: str) -> tuple[BellRun, int]:
+def _read_run(record: Record, output: str, column: str) -> tuple[BellRun, int]:
     if "rate_deg_per_s" not in record:
         raise InputError(f"{record.path}: the column 'rate_deg_per_s' is missing; add the applied rate, 0 at rest.")
     columns = [record["time_s"], record[output], record[column], record["rate_deg_per_s"]]

@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from studies.calibration.estimates import TOLD, find_groups
 from studies.calibration.fit import fit
 from studies.calibration.priors import from_standard
@@ -62,7 +62,7 @@ class ThermalFit:
         return slow_share(self.path.fit)
 
     @property
-    def left(self) -> list[tuple[NDArray[np.float64], NDArray[np.float64]]]:
+    def left(self) -> list[tuple[Array, Array]]:
         """Times (s) and residuals (Hz) of each run."""
         found = self.path.fit
         rows, rest = found.rows["frequency_Hz"], found.state.residual["frequency_Hz"]

@@ -12,10 +12,10 @@ import traceback
 from collections.abc import Generator, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from compensation.arrays import Array
 from studies.errors import InputError, MissingEnvironment, nearest
 from studies.files.reading import ANY_SIZE, opened
 from studies.files.stored import portions
@@ -24,11 +24,6 @@ from studies.importing.mapping import FileMap
 from studies.importing.raw import digest, name_columns, read_text, shorten
 from studies.importing.tables import Part, RawTable
 from studies.progress import tell
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -116,7 +111,7 @@ class ChannelTable(RawTable):
 
     channels: dict[str, Channel]
 
-    def own_clock(self) -> "tuple[Array, datetime.datetime | None]":
+    def own_clock(self) -> tuple[Array, datetime.datetime | None]:
         """Return the seconds of every row by the file's own clock, and when it started."""
         channel = next(iter(self.channels.values()))
         if channel.clock is None:
@@ -127,7 +122,7 @@ class ChannelTable(RawTable):
         with plainly(self.path):
             return channel.clock.seconds(self.first, self.first + self.rows), channel.clock.start
 
-    def read(self, column: str) -> "Array":
+    def read(self, column: str) -> Array:
         """Return the values of a channel as they stand in the file."""
         with plainly(self.path):
             values = np.array(self.channels[column].read(self.first, self.first + self.rows), dtype=float)

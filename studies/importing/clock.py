@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from compensation.arrays import Array
 from studies.errors import InputError
 from studies.files.stored import PORTION, Stored, portions
 from studies.importing.mapping import NUMERIC_TIMES, OWN, SECONDS, UNIX, FileMap
@@ -18,8 +19,6 @@ from studies.importing.tables import RawTable, Rows
 if TYPE_CHECKING:
     import pandas as pd
     from numpy.typing import NDArray
-
-    Array = NDArray[np.float64]
 
 _EXCEL_EPOCH = datetime.datetime(1899, 12, 30)
 _UNIX_EPOCH = datetime.datetime(1970, 1, 1, tzinfo=datetime.UTC)
@@ -45,7 +44,7 @@ class Clock:
         self._count = self._nights = 0
         self._last = np.nan
 
-    def read(self, table: RawTable) -> "Array":
+    def read(self, table: RawTable) -> Array:
         """Return the seconds of the next rows, which `finish` places in their zone and corrects."""
         file, form = self.file, self.form
         self._count += table.rows
@@ -115,7 +114,7 @@ class Clock:
             self.notes.append(f"{file.clock_offset:g} s added to its times")
         return placed
 
-    def _since(self, seconds: "Array", epoch: datetime.datetime) -> "Array":
+    def _since(self, seconds: Array, epoch: datetime.datetime) -> Array:
         """Move the origin to the first whole second, so that small steps keep their digits."""
         known = seconds[np.isfinite(seconds)]
         if self._zero is None and known.size:
@@ -123,7 +122,7 @@ class Clock:
             self.origin = epoch + datetime.timedelta(seconds=self._zero)
         return seconds - (self._zero or 0.0)
 
-    def _read_stamps(self, table: RawTable) -> "Array":
+    def _read_stamps(self, table: RawTable) -> Array:
         """Parse stamps written as text; several time zones in one file are brought to UTC."""
         import pandas as pd
 
@@ -157,7 +156,7 @@ class Clock:
         seconds = np.array((stamps - self._first) / pd.Timedelta(seconds=1), dtype=float)
         return self._unroll_midnights(seconds) if self._first.year == 1900 else seconds
 
-    def _unroll_midnights(self, seconds: "Array") -> "Array":
+    def _unroll_midnights(self, seconds: Array) -> Array:
         """Add a day whenever a clock without a date jumps back by more than half a day."""
         known = np.flatnonzero(np.isfinite(seconds))
         if known.size:
@@ -167,7 +166,7 @@ class Clock:
         return seconds
 
 
-def _check_span(span: float, table: RawTable, file: "FileMap") -> None:
+def _check_span(span: float, table: RawTable, file: FileMap) -> None:
     """Refuse times that span longer than any run, and name the units that would make a run of them."""
     if span <= LONGEST_RUN:
         return
@@ -227,7 +226,7 @@ class Order:
         return kept
 
     def _repeats(
-        self, kept: list[Stored], part: "list[Array]", at: "NDArray[np.intp]", begin: int, last: float, previous: int
+        self, kept: list[Stored], part: list[Array], at: "NDArray[np.intp]", begin: int, last: float, previous: int
     ) -> "NDArray[np.bool_]":
         """Mark rows that repeat rows of the files before theirs; rows of the same times that differ are refused."""
         t = part[0]
@@ -248,7 +247,7 @@ class Order:
         self.repeated[begin] = self.repeated.get(begin, 0) + int(again.sum())
         return np.asarray(again)
 
-    def _add(self, kept: list[Stored], part: "list[Array]", at: "NDArray[np.intp]") -> None:
+    def _add(self, kept: list[Stored], part: list[Array], at: "NDArray[np.intp]") -> None:
         if not at.size:
             return
         before = self._held[0][-1] if self._held else kept[0].at(-1) if len(kept[0]) else -np.inf
@@ -272,7 +271,7 @@ class Order:
         for column, values in zip(kept, part, strict=True):
             column.append(values[~same])
 
-    def _spread(self, kept: list[Stored], part: "list[Array]", final: bool = False) -> None:
+    def _spread(self, kept: list[Stored], part: list[Array], final: bool = False) -> None:
         """Spread rows with the same stamp evenly up to the next stamp; the last group takes the usual step."""
         t = part[0]
         stamps, first, count = np.unique(t, return_index=True, return_counts=True)
@@ -303,7 +302,7 @@ class Order:
         return said
 
 
-def _mend(rows: Rows, file: "FileMap", row: int) -> str:
+def _mend(rows: Rows, file: FileMap, row: int) -> str:
     if row in rows.begins[1:]:
         return "Give consecutive files in the order of their times; import files whose clocks restart one by one."
     restart = "If its clock restarted, split the file there, or end it with last_line in its [[file]] of the map."
@@ -327,8 +326,8 @@ def _combine(start: datetime.datetime | None, clock: datetime.datetime) -> datet
 
 
 def place_in_zone(
-    origin: datetime.datetime, seconds: "Array", zone: str, place: Callable[[int], str], first: float | None = None
-) -> "tuple[Array, float | None, int]":
+    origin: datetime.datetime, seconds: Array, zone: str, place: Callable[[int], str], first: float | None = None
+) -> tuple[Array, float | None, int]:
     """Return true seconds (N,) after the origin, by how much that is ahead of UTC (`first`, else of the first row), and how many rows lie in an hour that comes twice."""
     rows = np.flatnonzero(np.isfinite(seconds))
     ahead, doubtful = _utc_offsets(origin, seconds[rows], zone)
@@ -352,13 +351,13 @@ def _with_offset(origin: datetime.datetime, ahead: datetime.timedelta | None) ->
     return origin.replace(tzinfo=datetime.timezone(ahead or datetime.timedelta()))
 
 
-def _utc_offsets(origin: datetime.datetime, seconds: "Array", zone: str) -> "tuple[Array, int]":
+def _utc_offsets(origin: datetime.datetime, seconds: Array, zone: str) -> tuple[Array, int]:
     """Return by how many seconds the zone's clocks are ahead of UTC at each local time; NaN where the time does not exist."""
     import pandas as pd
 
     wall = pd.DatetimeIndex(np.datetime64(origin, "us") + np.round(1e6 * seconds).astype("timedelta64[us]"))
 
-    def ahead(summer: bool) -> "Array":
+    def ahead(summer: bool) -> Array:
         placed = wall.tz_localize(zone, ambiguous=np.full(len(wall), summer), nonexistent="NaT")
         return np.asarray((wall - placed.tz_convert(None)) / pd.Timedelta(seconds=1), dtype=float)
 
@@ -370,7 +369,7 @@ def _utc_offsets(origin: datetime.datetime, seconds: "Array", zone: str) -> "tup
     return first, len(twice)
 
 
-def _second_pass(seconds: "Array", begin: int, end: int) -> int:
+def _second_pass(seconds: Array, begin: int, end: int) -> int:
     """Return the row of a block in the repeated hour that begins the second pass: where stamps step back, else by the
     smaller step beside it.
     """

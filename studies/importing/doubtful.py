@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from compensation.arrays import Array
 from compensation.spikes import find_dropouts, find_spikes, find_stuck
 from studies.files.stored import Stored
 from studies.importing.mapping import ColumnMap
@@ -13,8 +14,6 @@ from studies.record.rest import LEAST_SPIKE
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
-
-    Array = NDArray[np.float64]
 
 FINDERS: "Mapping[str, tuple[str, Callable[[Array], NDArray[np.bool_]]]]" = {
     "spikes": ("spikes", lambda values: find_spikes(values, LEAST_SPIKE)),

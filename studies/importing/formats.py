@@ -11,13 +11,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from studies.errors import InputError
 from studies.files.reading import ANY_SIZE, load_library, opened
 from studies.files.stored import PORTION
 
-Array = NDArray[np.float64]
 KINDS = {
     ".tdms": "TDMS",
     ".mf4": "MDF",

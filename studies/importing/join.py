@@ -6,10 +6,11 @@ from collections import Counter
 from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from compensation.arrays import Array
 from compensation.decimation import average_groups
 from studies.errors import InputError
 from studies.files.stored import Stored, portions
@@ -20,11 +21,6 @@ from studies.importing.mapping import OWN, TABLE_TARGETS, ColumnMap, FileMap, Lo
 from studies.importing.raw import NotPlain
 from studies.importing.tables import RawTable, Rows
 from studies.record import Record, check_plausible
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Array = NDArray[np.float64]
 
 SHORT = 2_000_000  # rows of a record that is held in memory
 LARGEST = 50_000_000  # rows of a regular grid
@@ -38,8 +34,8 @@ class ClockedFile:
     file: FileMap
     path: str
     time: Stored
-    origin: "datetime.datetime | None"
-    columns: "dict[tuple[str, str], Stored]"
+    origin: datetime.datetime | None
+    columns: dict[tuple[str, str], Stored]
     notes: tuple[str, ...]
 
     @property
@@ -105,7 +101,7 @@ def import_records(paths: Sequence[str], import_map: LoadedMap, folder: str | No
     }
 
 
-def import_table(path: str, import_map: LoadedMap) -> "tuple[dict[str, Array], tuple[str, ...]]":
+def import_table(path: str, import_map: LoadedMap) -> tuple[dict[str, Array], tuple[str, ...]]:
     """Read settled readings, temperature (°C) and frequency (Hz), in the order of the file, and what was changed; incomplete rows go."""
     (file,) = import_map.files
     read = _read_columns([path], file, None)
@@ -166,7 +162,7 @@ class _Columns:
     rows: Rows
     clock: Clock
     time: Stored
-    columns: "dict[tuple[str, str], Stored]"
+    columns: dict[tuple[str, str], Stored]
     empty: list[str]  # readings that are none, in words
 
 
@@ -231,7 +227,7 @@ def _name_clock(file: FileMap) -> str:
     return f"from '{' '.join(file.time)}' ({file.time_format})"
 
 
-def convert(table: RawTable, column: ColumnMap) -> "tuple[Array, int]":
+def convert(table: RawTable, column: ColumnMap) -> tuple[Array, int]:
     """Return a raw column in the unit of the record, sign × unit(reading × scale + offset), and how many readings of 0 are none."""
     reading, zeros = np.asarray(table.numbers(column.source) * column.scale + column.offset), 0
     if column.conversion.never_zero:
@@ -261,7 +257,7 @@ def _resample(one: ClockedFile, values: Stored, shift: float, time: Stored, how:
     return found
 
 
-def _last_known(one: ClockedFile, values: Stored, rows: slice, held: "Array") -> "Array":
+def _last_known(one: ClockedFile, values: Stored, rows: slice, held: Array) -> Array:
     """Return time and value (2, 1) of the last reading among rows, or what was held before."""
     for k in portions(rows.stop - rows.start):
         at = slice(rows.start + k.start, rows.start + k.stop)
@@ -270,7 +266,7 @@ def _last_known(one: ClockedFile, values: Stored, rows: slice, held: "Array") ->
     return held
 
 
-def resample(time: "Array", values: "Array", grid: "Array", how: str, longest_gap: float) -> "Array":
+def resample(time: Array, values: Array, grid: Array, how: str, longest_gap: float) -> Array:
     """Return values at the times of the grid, NaN outside and within gaps: linear, the mean of nearer samples, the nearest, the previous."""
     known = np.isfinite(values)
     t, v = time[known], values[known]
@@ -291,7 +287,7 @@ def resample(time: "Array", values: "Array", grid: "Array", how: str, longest_ga
     return np.where(reachable, np.interp(grid, t, v), np.nan)
 
 
-def _bin_means(t: "Array", v: "Array", grid: "Array") -> "Array":
+def _bin_means(t: Array, v: Array, grid: Array) -> Array:
     if len(grid) < 2:
         return np.full(len(grid), float(np.mean(v)))
     middles = (grid[1:] + grid[:-1]) / 2
@@ -340,7 +336,7 @@ def shift_between(base: ClockedFile, other: ClockedFile) -> float:
     return shift
 
 
-def _describe(column: ColumnMap, values: "Array | Stored", moved: bool) -> str:
+def _describe(column: ColumnMap, values: Array | Stored, moved: bool) -> str:
     unit = column.conversion
     steps = [f"x = '{column.source}'" + (f" (axis {column.axis})" if column.axis else "")]
     if column.scale != 1 or column.offset != 0:
@@ -359,7 +355,7 @@ def _describe(column: ColumnMap, values: "Array | Stored", moved: bool) -> str:
     return f"{column.target} from " + "; ".join(steps)
 
 
-def _later(origin: "datetime.datetime", seconds: float) -> "datetime.datetime":
+def _later(origin: datetime.datetime, seconds: float) -> datetime.datetime:
     try:
         return origin + datetime.timedelta(seconds=seconds)
     except OverflowError:

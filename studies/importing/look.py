@@ -167,7 +167,7 @@ def find_period(lines: Sequence[str]) -> float | None:
     return None
 
 
-def _first(pattern: "re.Pattern[str]", lines: Sequence[str]) -> tuple[float, str] | None:
+def _first(pattern: re.Pattern[str], lines: Sequence[str]) -> tuple[float, str] | None:
     for line in lines:
         if found := pattern.search(line.lower()):
             return float(found[1].replace(",", ".")), found[2]

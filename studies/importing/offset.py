@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from compensation.arrays import Array
+
 MOST_ROWS = 4000
 SMOOTHED = 2.0  # rows, standard deviation of the kernel
 FARTHEST = 3600.0  # s

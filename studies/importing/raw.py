@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from compensation.arrays import Array
 from studies.errors import InputError, MissingEnvironment, nearest
 from studies.files.columns import ROWS_AT_ONCE, parse_portions
 from studies.files.reading import ANY_SIZE, PORTION, opened, read_bytes
@@ -57,7 +58,7 @@ class TextTable(RawTable):
         """Tell which cells hold no value."""
         return np.asarray(text.isin(["", *self.missing]))
 
-    def read(self, column: str) -> "NDArray[np.float64]":
+    def read(self, column: str) -> Array:
         """Return a column as numbers, NaN where a cell is empty; anything else is an error that names the line."""
         import pandas as pd
 
@@ -74,7 +75,7 @@ class TextTable(RawTable):
         return values
 
 
-def read_text(paths: Sequence[str | Path], file: "FileMap", plain: bool = True) -> Generator[RawTable]:
+def read_text(paths: Sequence[str | Path], file: FileMap, plain: bool = True) -> Generator[RawTable]:
     """Yield the rows of text files that continue one another, a portion at a time; NotPlain where numbers alone do not tell them."""
     names: list[str] = []
     for path in paths:
@@ -85,7 +86,7 @@ def read_text(paths: Sequence[str | Path], file: "FileMap", plain: bool = True) 
             yield table
 
 
-def read_plain(path: str | Path, file: "FileMap") -> Iterator[tuple[list[str], RawTable]]:
+def read_plain(path: str | Path, file: FileMap) -> Iterator[tuple[list[str], RawTable]]:
     """Yield the columns' names and the next rows of a text of plain numbers; NotPlain where cells must be looked at as text."""
     simple = file.encoding == "utf-8" and file.separator != "space" and file.last_line is None
     if not simple or Path(path).suffix.lower() in EXCEL or (file.time and file.time_format not in NUMERIC_TIMES):
@@ -106,7 +107,7 @@ def read_plain(path: str | Path, file: "FileMap") -> Iterator[tuple[list[str], R
         raise NotPlain from None
 
 
-def read_raw(path: str | Path, file: "FileMap") -> Iterator[tuple[list[str], RawTable]]:
+def read_raw(path: str | Path, file: FileMap) -> Iterator[tuple[list[str], RawTable]]:
     """Yield the columns' names and the next rows of one raw file, as its map describes it, with cells of text."""
     import pandas as pd
 
@@ -141,7 +142,7 @@ def read_raw(path: str | Path, file: "FileMap") -> Iterator[tuple[list[str], Raw
             raise _wrong_encoding(path, file.encoding) from None
 
 
-def _no_rows(path: str | Path, file: "FileMap") -> InputError:
+def _no_rows(path: str | Path, file: FileMap) -> InputError:
     return InputError(f"{path}: there are no rows from line {file.data_line} on (data_line in the map).")
 
 
@@ -229,7 +230,7 @@ def _cell_text(value: object) -> str:
     return value.isoformat(sep=" ") if hasattr(value, "isoformat") else str(value)
 
 
-def _split_lines(path: str | Path, text: str, file: "FileMap") -> list[list[str]]:
+def _split_lines(path: str | Path, text: str, file: FileMap) -> list[list[str]]:
     """Return the cells of the lines down to the header; of the first line of data where there is none."""
     count = file.header_line or file.data_line
     lines = text.split("\n", count)[:count]
@@ -242,7 +243,7 @@ def _split_lines(path: str | Path, text: str, file: "FileMap") -> list[list[str]
         raise InputError(f"{path}, line {file.header_line}: the header cannot be read ({error}).") from None
 
 
-def _head(path: str | Path, lines: Sequence[Sequence[str]], file: "FileMap") -> list[str]:
+def _head(path: str | Path, lines: Sequence[Sequence[str]], file: FileMap) -> list[str]:
     if len(lines) < file.header_line:
         raise InputError(f"{path}: has {len(lines)} lines, but header_line is {file.header_line} in the map.")
     if file.header_line == 0:
@@ -270,9 +271,9 @@ def name_columns(cells: Sequence[str]) -> list[str]:
 class _Body:
     """The rows of a text as a file that gives some whole lines at a time."""
 
-    padding: "re.Pattern[str] | None" = None
+    padding: re.Pattern[str] | None = None
 
-    def __init__(self, path: str | Path, text: io.TextIOWrapper, head: list[str], file: "FileMap") -> None:
+    def __init__(self, path: str | Path, text: io.TextIOWrapper, head: list[str], file: FileMap) -> None:
         self.path, self.text = path, text
         self.head, self.first = self._checked("".join(head)), "".join(head[file.data_line - 1 :])
 
@@ -291,7 +292,7 @@ class _Body:
         return part
 
 
-def _parse_text(path: str | Path, body: _Body, file: "FileMap", names: list[str]) -> "Iterator[pd.DataFrame]":
+def _parse_text(path: str | Path, body: _Body, file: FileMap, names: list[str]) -> "Iterator[pd.DataFrame]":
     """Yield the cells of the next rows."""
     import pandas as pd
 

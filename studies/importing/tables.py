@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from compensation.arrays import Array
 from studies.errors import InputError, nearest
 
 if TYPE_CHECKING:
@@ -15,7 +16,6 @@ if TYPE_CHECKING:
     import pandas as pd
     from numpy.typing import NDArray
 
-    Array = NDArray[np.float64]
 
 OVERLOAD = 1e36
 """Instruments write 9.9e37 or 1e38 where a reading overloads them."""
@@ -54,11 +54,11 @@ class RawTable:
         """Return the file and the line on which a row (from 0) stands."""
         return self.part.place(self.first + int(row))
 
-    def read(self, column: str) -> "Array":
+    def read(self, column: str) -> Array:
         """Return the values of a column as they stand in the file, in an array of its own."""
         raise NotImplementedError
 
-    def numbers(self, column: str) -> "Array":
+    def numbers(self, column: str) -> Array:
         """Return a column as numbers, NaN where a value is missing."""
         values = self.read(column)
         for word in self.missing:
@@ -89,9 +89,9 @@ class RawTable:
 class ParsedTable(RawTable):
     """Rows of a text of plain numbers."""
 
-    columns: "Mapping[str, Array]"
+    columns: Mapping[str, Array]
 
-    def read(self, column: str) -> "Array":
+    def read(self, column: str) -> Array:
         """Return the values of a column."""
         check_column(self.path, column, self.columns)
         return self.columns[column].copy()

@@ -109,7 +109,7 @@ def _find_stamp(columns: Sequence[str], cells: Mapping[str, list[str]], decimal:
     return fitting[0], unsure
 
 
-def _fits(text: "object", form: str) -> bool:
+def _fits(text: object, form: str) -> bool:
     import pandas as pd
 
     try:

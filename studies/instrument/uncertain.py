@@ -95,7 +95,7 @@ def is_spread(raw: Any) -> bool:
     return isinstance(raw, Mapping) and "value" in raw and 1 < len(raw) and set(raw) <= set(SPREAD_KEYS)
 
 
-def read_uncertain(raw: Any, keys: Any, where: str, name: str) -> "tuple[Any, list[UncertainValue], set[str]]":
+def read_uncertain(raw: Any, keys: Any, where: str, name: str) -> tuple[Any, list[UncertainValue], set[str]]:
     """Read a table of a card into its class; return it, its numbers that are not exact, and the names whose uncertainty it states."""
     stated: dict[Path, UncertainValue] = {}
 

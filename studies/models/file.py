@@ -7,8 +7,8 @@ from typing import Annotated, Any
 
 import msgspec
 import numpy as np
-from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from studies.errors import InputError
 from studies.files.writing import write_text
 from studies.instrument.units import unit_of
@@ -158,7 +158,7 @@ class Model(ModelKeys, frozen=True, kw_only=True):
             raise InputError(f"{self.where} [validity]: the range of '{variable}' is missing; add it.")
         return self.validity[variable]
 
-    def check_range(self, variable: str, values: NDArray[np.float64], extrapolate: bool) -> None:
+    def check_range(self, variable: str, values: Array, extrapolate: bool) -> None:
         """Refuse values of a variable outside the fitted range, unless told to extrapolate; NaN pass and stay missing."""
         low, high = self.range_of(variable)
         outside = (values < low) | (values > high)
@@ -177,8 +177,8 @@ def widen(low: float, high: float) -> tuple[float, float]:
 
 
 def make_part(
-    name: str, names: Sequence[str], values: Sequence[float] | NDArray[np.float64], units: Sequence[str],
-    covariance: NDArray[np.float64] | None = None,
+    name: str, names: Sequence[str], values: Sequence[float] | Array, units: Sequence[str],
+    covariance: Array | None = None,
 ) -> ModelPart:  # fmt: skip
     """Build a part from arrays."""
     columns = zip(names, map(float, values), units, strict=True)

@@ -11,8 +11,8 @@ from functools import cache
 from typing import Any, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from compensation.bias import SELECTED_BY_THE_PAPER, TERMS, BiasRun, prepare_run
 from compensation.bias_selection import HeldOutRows, Method, bias_stability, fit_bias, score_runs
 from shell.law import FrequencyLaw
@@ -27,7 +27,7 @@ CARD = "hrg-30mm"
 COOLING, WARMING = "step 25 -20 5h", "step -20 25 5h"
 ROWS_PER_SECOND = 0.1
 PAPER_BEFORE, PAPER_AFTER = 3.0143, 0.5848
-Trace: TypeAlias = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
+Trace: TypeAlias = tuple[Array, Array, Array]
 METHODS: tuple[Method, ...] = ("paper", "guarded")
 
 
@@ -115,7 +115,7 @@ def study_twin(seed: int) -> tuple[TwinFit, ...]:
 
 
 @cache
-def _law() -> "FrequencyLaw":
+def _law() -> FrequencyLaw:
     return simulate_run(load_card(CARD), load_profile(COOLING), 0.01, noise=False).law
 
 

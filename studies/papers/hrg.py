@@ -51,9 +51,9 @@ class FrequencyStudy:
 class PhysicsComparison:
     """What the material's published laws predict for a card, beside the measured table."""
 
-    instrument: "Instrument"
+    instrument: Instrument
     temperature: Array
-    parts: "SlopeParts"  # 1/K, of the slope by the card's law, at the local temperatures and, last, at 20 °C
+    parts: SlopeParts  # 1/K, of the slope by the card's law, at the local temperatures and, last, at 20 °C
     uncertainty: Array  # 1/K, of the slope
     laws: Sequence[tuple[str, float, float]]  # name, slope at 20 °C and its uncertainty (ppm/°C) of every published law
     curvature_measured: float  # ppm/°C², twice the quadratic coefficient of ln f
@@ -119,7 +119,7 @@ def local_slopes(temperature_degC: Array, frequency: Array) -> tuple[Array, Arra
     return (T[1:] + T[:-1]) / 2, 2e6 * np.diff(f) / np.diff(T) / (f[1:] + f[:-1])
 
 
-def compare_physics(study: FrequencyStudy, instrument: "Instrument") -> PhysicsComparison:
+def compare_physics(study: FrequencyStudy, instrument: Instrument) -> PhysicsComparison:
     """Set first-principles physics, the solid solver over the card's material law, beside a measured table."""
     T = study.temperature_degC + zero_Celsius
     law = law_of(instrument, float(T.min()), float(T.max()))

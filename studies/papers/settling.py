@@ -77,7 +77,7 @@ class SettlingStudy:
     law_curvature: float
 
 
-def study_settling(instrument: "Instrument", hours: tuple[float, ...] = (4.0, 4.5, 5.0)) -> SettlingStudy:
+def study_settling(instrument: Instrument, hours: tuple[float, ...] = (4.0, 4.5, 5.0)) -> SettlingStudy:
     """Compute Figure 3 and the soak errors of Table 1 in the radiative and the linear network."""
     law = _law(instrument)
     weights = cell_weights(instrument, law)
@@ -133,7 +133,7 @@ def _slope_and_curvature(T: Array, f: Array) -> tuple[float, float]:
     return float(1e6 * c[1]), float(2e6 * c[2])
 
 
-def _law(instrument: "Instrument") -> FrequencyLaw:
+def _law(instrument: Instrument) -> FrequencyLaw:
     low, high = POINTS_degC[[0, -1]] + zero_Celsius
     return law_of(instrument, low - 5, high + 5)
 

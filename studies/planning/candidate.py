@@ -6,8 +6,8 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from compensation.noise_rows import Whitener
 from studies.calibration.observed import RESPONSES, ObservedRun, observe
 from studies.calibration.problem import CardProblem
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from shell.law import FrequencyLaw
     from studies.instrument.card import Instrument
 
-Array = NDArray[np.float64]
 NEXT_DAY = 16 * 3600.0
 """From the end of the last run to the start of the next one, s."""
 COARSE, MARGIN = 480, 30.0

@@ -17,8 +17,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from studies.diagnosis.constants import CONSTANTS
 from studies.diagnosis.verdict import temper_of
 from studies.effects import Effect
@@ -26,7 +26,6 @@ from studies.inference.model import PRICE, SCALES, Background
 from studies.inference.search import MARGIN, Search, Shapes
 from studies.inference.shapes import MOST_SHAPES
 
-Array = NDArray[np.float64]
 Key = tuple[str, str]
 """Effect and response."""
 CASES = 12

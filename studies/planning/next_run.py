@@ -12,7 +12,6 @@ energy of every effect of the library beyond what the card absorbs.
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from shell.material import spell
 from studies.diagnosis.constants import CONSTANTS
@@ -25,7 +24,6 @@ from studies.planning.candidate import Candidate, Known, simulate_candidates, un
 from studies.planning.chamber import Chamber
 from studies.planning.programme import BY_INPUT, NextRun, Programme, candidates
 
-Array = NDArray[np.float64]
 MOST_RIVALS, CLOSE = 3, 10.0
 """Rivals that are held against each other; log evidence so near the winner's that it deserves a run."""
 SMALLEST, ENOUGH = 6.0, 20.0

@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from compensation.noise import Noise
 from shell.constants import zero_Celsius
 from studies.effects import find_effect, library
@@ -24,7 +24,6 @@ from studies.simulation.drive import drive_by_schedule
 from studies.simulation.noise import bias_noise, frequency_noise
 from studies.simulation.prediction import MARGIN
 
-Array = NDArray[np.float64]
 SNRS, SURE, OFTEN, SMALLER = (1.0, 0.3, 0.1), 0.9, 0.05, 0.5
 """Where chances are shown; chance from which on an effect is identified; share from which on another answer is listed, and the part of
 the least size at which what would be named instead is asked."""

@@ -5,15 +5,14 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from shell.constants import zero_Celsius
 from studies.calibration.observed import ObservedRun
 from studies.planning.chamber import Chamber, limited
 from studies.simulation.drive import COMMANDS
 from thermal.profile import Profile, parse_profile
 
-Array = NDArray[np.float64]
 NARROW, WIDENED = 5.0, 15.0
 """A campaign that covers less than this, K, is widened by so much on both sides."""
 SHORTEST, LONGEST = 3600.0, 16 * 3600.0

@@ -196,7 +196,7 @@ def reading_resolution(values: Array) -> float:
     return float(10.0**-decimals)
 
 
-def drop_repeats(records: "Sequence[Record]") -> tuple[list[Record], list[str]]:
+def drop_repeats(records: Sequence[Record]) -> tuple[list[Record], list[str]]:
     """Return the records without those that repeat most of a longer one, and a sentence for each that was left out."""
     kept: list[Record] = []
     said = []

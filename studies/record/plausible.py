@@ -25,7 +25,7 @@ SAME_GYRO = 0.01  # relative: one gyro over temperature, beyond the range of its
 
 
 def check_card_frequency(
-    instrument: "Instrument", frequency: Array, path: str, law: "FrequencyLaw | None" = None
+    instrument: Instrument, frequency: Array, path: str, law: "FrequencyLaw | None" = None
 ) -> None:
     """Ask whether a record is of the card's gyro where its frequency lies far from the card's."""
     known = frequency[np.isfinite(frequency)]
@@ -48,7 +48,7 @@ def check_card_frequency(
     )
 
 
-def check_one_gyro(readings: "Sequence[tuple[str, Array | None, Array]]") -> None:
+def check_one_gyro(readings: Sequence[tuple[str, Array | None, Array]]) -> None:
     """Refuse records of different gyros: path, temperature (°C; None where it is not known) and frequency (Hz) of each."""
     levels = []
     for path, T, f in readings:
@@ -67,10 +67,10 @@ def check_one_gyro(readings: "Sequence[tuple[str, Array | None, Array]]") -> Non
                 )
 
 
-def records_of_one_gyro(records: "Sequence[Record]", say: Callable[[str], None]) -> "list[Record]":
+def records_of_one_gyro(records: Sequence[Record], say: Callable[[str], None]) -> list[Record]:
     """Return the records that a fit may take: one given twice counts once, which is said, and all are of one gyro."""
 
-    def thermometer(record: "Record") -> Array | None:
+    def thermometer(record: Record) -> Array | None:
         return next((record[name] for name in TEMPERATURES if name in record), None)
 
     kept, repeated = drop_repeats(records)
@@ -91,12 +91,12 @@ def check_model_frequency(frequency: Array, lowest: float, highest: float, path:
     )
 
 
-def _frequency(instrument: "Instrument", law: "FrequencyLaw | None" = None) -> float:
+def _frequency(instrument: Instrument, law: "FrequencyLaw | None" = None) -> float:
     T = instrument.reference_temperature
     return float((law or law_of(instrument, T, T)).frequency(T))
 
 
-def _spread(instrument: "Instrument", own: float) -> float:
+def _spread(instrument: Instrument, own: float) -> float:
     """Relative standard deviation of the card's frequency, by its material's law and by the numbers that it states."""
     T = instrument.reference_temperature
     squares = float(law_of(instrument, T, T).uncertainty(np.array([T]))[0]) ** 2

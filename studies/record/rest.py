@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from compensation.cross_damping import RestRun
 from compensation.decimation import average_blocks
 from compensation.memory import follow_lag
@@ -45,7 +46,7 @@ class RestData:
     block_s: float
 
 
-def drop_spikes(keep: NDArray[np.bool_], *columns: NDArray[np.float64]) -> NDArray[np.bool_]:
+def drop_spikes(keep: NDArray[np.bool_], *columns: Array) -> NDArray[np.bool_]:
     """Return the rows to keep without those in which a column is contradicted by its neighbours."""
     cleaned = keep.copy()
     for column in columns:
@@ -63,7 +64,7 @@ def celsius_range(lowest: float, highest: float) -> tuple[float, float]:
     return ends[0], ends[1]
 
 
-def choose_column(records: "Sequence[Record]", candidates: Sequence[str], purpose: str) -> str:
+def choose_column(records: Sequence[Record], candidates: Sequence[str], purpose: str) -> str:
     """Return the first candidate that every record has."""
     for name in candidates:
         if all(name in record for record in records):
@@ -75,13 +76,13 @@ def choose_column(records: "Sequence[Record]", candidates: Sequence[str], purpos
     raise InputError(f"{records[0].path}: {purpose} needs the same column in every record: {names}.")
 
 
-def require_rest(record: "Record", why: str) -> None:
+def require_rest(record: Record, why: str) -> None:
     """Refuse a record of a gyro that turned."""
     if "rate_deg_per_s" in record and np.any(np.abs(record["rate_deg_per_s"]) > LARGEST_REST):
         raise InputError(f"{record.path or 'record'}: rate_deg_per_s is not zero; {why}")
 
 
-def gather_rest(records: "Sequence[Record]", outputs: "dict[str, float]") -> RestData:
+def gather_rest(records: Sequence[Record], outputs: dict[str, float]) -> RestData:
     """Return the runs of these records in SI units; `outputs` gives the output columns and their unit in rad/s."""
     output = choose_column(records, tuple(outputs), "a fit at zero rate")
     column = choose_column(records, TEMPERATURES, "a fit over temperature")
@@ -103,7 +104,7 @@ def gather_rest(records: "Sequence[Record]", outputs: "dict[str, float]") -> Res
     return RestData(tuple(runs), output, column, left_out, widest)
 
 
-def check_temperatures(record: "Record") -> str:
+def check_temperatures(record: Record) -> str:
     """Refuse temperatures that contradict each other or lag as in no chamber and no resonator; else return a doubt, if any."""
     name = next((one for one in DRIVING if one in record and np.isfinite(record[one]).sum() > 1), None)
     if name is None:
@@ -139,7 +140,7 @@ def check_temperatures(record: "Record") -> str:
     return f"{said}: if time_s is in {unit}, convert it to seconds ('hrg import')."
 
 
-def _check_signs(record: "Record", where: str) -> None:
+def _check_signs(record: Record, where: str) -> None:
     """Refuse a housing that is far from its chamber and near it with the opposite sign."""
     if DRIVING[0] not in record or DRIVING[1] not in record:
         return
@@ -152,7 +153,7 @@ def _check_signs(record: "Record", where: str) -> None:
         )
 
 
-def _fastest_change(time: NDArray[np.float64], T: NDArray[np.float64]) -> tuple[float, float] | None:
+def _fastest_change(time: Array, T: Array) -> tuple[float, float] | None:
     """Largest change (K) over `AT_ONCE` rows in one direction, and how long it took, if no mass behind a wall can change so fast."""
     if len(T) <= AT_ONCE:
         return None
@@ -164,7 +165,7 @@ def _fastest_change(time: NDArray[np.float64], T: NDArray[np.float64]) -> tuple[
     return (float(fast[k]), float(lasts[k])) if fast.any() else None
 
 
-def _held_rate(time: NDArray[np.float64], T: NDArray[np.float64], lasts: float) -> float:
+def _held_rate(time: Array, T: Array, lasts: float) -> float:
     """Rate (K/s) that a temperature exceeds during a tenth of the record: the few jumps of a set point do not count."""
     block = np.minimum(BLOCKS * time / lasts, BLOCKS - 1).astype(int)
     count = np.bincount(block, minlength=BLOCKS)
@@ -172,7 +173,7 @@ def _held_rate(time: NDArray[np.float64], T: NDArray[np.float64], lasts: float) 
     return float(np.percentile(np.abs(np.diff(mean) / np.diff(at)), 90))
 
 
-def _lag_of(time: NDArray[np.float64], T: NDArray[np.float64], f: NDArray[np.float64]) -> float | None:
+def _lag_of(time: Array, T: Array, f: Array) -> float | None:
     """Lag τ (s) with which f = c₀ + c₁ x + c₂ x² + c₃ e^(−t/τ), τ ẋ + x = T, leaves least; None where no lag is clear."""
     known = np.flatnonzero(np.isfinite(f))
     known = known[:: max(1, known.size // LAG_ROWS)]

@@ -1,8 +1,8 @@
 """Parts of any page about a steady-state table: fit, inverse, order, and extrapolation."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from compensation.errors import CompensationError
 from compensation.frequency import FrequencyFit, misreading_degC
 from studies.models.file import widen
@@ -144,7 +144,7 @@ def _extrapolation(study: FrequencyStudy, other: FrequencyFit) -> Figure:
     return Figure(draw, caption, "Difference of two fits: small inside the measured range, large outside.")
 
 
-def _most(ends: NDArray[np.float64]) -> str:
+def _most(ends: Array) -> str:
     """Write the difference of two readings; a curve that turns has none beyond its turning point."""
     if not np.isfinite(ends).all():
         return "more than the range" if not np.isfinite(ends).any() else f"{np.nanmin(ends):.1f} K or more"

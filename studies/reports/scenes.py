@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from shell.constants import zero_Celsius
 from shell.layout import Theory
 from shell.resonator import Resonator
@@ -66,7 +67,7 @@ class ModeScene:
         departures = f", departures x {self.exaggeration:.0f}" if self.exaggeration > 1 else ""
         return f"{line}\nslower mode, split {1e3 * self.split.hertz:.4g} mHz{departures}"
 
-    def values(self, colour: Colour, field: "ShellTemperature | None" = None) -> NDArray[np.float64]:
+    def values(self, colour: Colour, field: "ShellTemperature | None" = None) -> Array:
         """Return the coloured quantity on every vertex, in the unit of its legend."""
         if colour == "displacement":
             return np.asarray(np.linalg.norm(self.surface.displacement, axis=1))
@@ -100,8 +101,8 @@ class ModeScene:
 class ShellTemperature:
     """A temperature (°C) along the meridian, position 0 ... 1, linear between the points."""
 
-    position: NDArray[np.float64]
-    temperature: NDArray[np.float64]
+    position: Array
+    temperature: Array
 
 
 def show_mode(

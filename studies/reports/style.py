@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from studies.results import Drawing
 
 if TYPE_CHECKING:
@@ -38,7 +39,7 @@ def few_rows(count: int) -> NDArray[np.intp]:
     return np.unique(np.linspace(0, count - 1, MOST_POINTS).astype(np.intp))
 
 
-def outline_rows(values: NDArray[np.float64]) -> NDArray[np.intp]:
+def outline_rows(values: Array) -> NDArray[np.intp]:
     """Return the rows of a column that are drawn: all, or the least and the largest of as many parts as can be told apart."""
     if len(values) <= MOST_POINTS:
         return np.arange(len(values))

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from studies.errors import UNUSABLE_INPUT, InputError
 from studies.papers.hrg import study_table
 from studies.reports import frequency, scenes
@@ -154,7 +155,7 @@ def _designs(results: Results) -> Table:
     return Table("Designs", places, (case, *_design_columns(results, places), *shown), note, sortable=True)
 
 
-def _find_ends(y: NDArray[np.float64]) -> list[int]:
+def _find_ends(y: Array) -> list[int]:
     """Return the places of the lowest and the highest values, in their order; no index of all is made."""
     kept = np.empty(0, dtype=np.intp)
     for first in range(0, len(y), TOGETHER):

@@ -29,14 +29,14 @@ KINK = np.radians(35.0)  # where the outline turns by more than this, the shadin
 class Drawn:
     """How a split pair is drawn: its slower mode on its axis, both axes, the departures of the shape times a factor."""
 
-    split: "Split"
-    imperfection: "Imperfection | None"
+    split: Split
+    imperfection: Imperfection | None
     exaggeration: float
 
 
 def view_modes(
-    resonator: "Resonator", modes: "Sequence[Mode]", title: str, png: bytes, alt: str, caption: str = "",
-    splits: "Sequence[Drawn | None]" = (),
+    resonator: Resonator, modes: Sequence[Mode], title: str, png: bytes, alt: str, caption: str = "",
+    splits: Sequence[Drawn | None] = (),
 ) -> Embedded:  # fmt: skip
     """Return an interactive view of modes (solid or shell) of one resonator; `png` stands in where WebGL2 is missing, and on paper."""
     import matplotlib as mpl
@@ -65,7 +65,7 @@ def view_modes(
     return Embedded(html, caption)
 
 
-def _describe(resonator: "Resonator", mode: "Mode", size: float, drawn: Drawn | None) -> dict[str, Any]:
+def _describe(resonator: Resonator, mode: Mode, size: float, drawn: Drawn | None) -> dict[str, Any]:
     outlines = trace_outlines(resonator, size / SPACING, mode)
     runs = [run for line in outlines for run in _split_at_kinks(line)]
     points = np.concatenate([_columns(line, members, size) for line, members in runs])
@@ -82,14 +82,14 @@ def _describe(resonator: "Resonator", mode: "Mode", size: float, drawn: Drawn | 
     }
 
 
-def outline_rows(resonator: "Resonator", mode: "Mode", size: float) -> list[Array]:
+def outline_rows(resonator: Resonator, mode: Mode, size: float) -> list[Array]:
     """Return the runs of a mode's outline as the view draws them, each (points, 12), lengths over `size`."""
     lines = trace_outlines(resonator, resonator.size / SPACING, mode)
     return [_columns(line, members, size) for one in lines for line, members in _split_at_kinks(one)]
 
 
 def _imperfect(
-    resonator: "Resonator", runs: "list[tuple[Outline, Members]]", size: float, drawn: Drawn
+    resonator: Resonator, runs: "list[tuple[Outline, Members]]", size: float, drawn: Drawn
 ) -> dict[str, Any]:
     """The slow axis (rad), where the axes lie on the rim, and the departures: for each wave and point its parts along r and z."""
     rim = resonator.at([resonator.length])
@@ -113,7 +113,7 @@ def _imperfect(
     return found
 
 
-def _columns(line: "Outline", members: "Members", size: float) -> Array:
+def _columns(line: Outline, members: "Members", size: float) -> Array:
     """One row for each point: r, z and their slopes, the displacement and its slope, the two parts of the energy."""
     r, z = line.r[members] / size, line.z[members] / size
     shift = line.displacement[:, members]
@@ -122,7 +122,7 @@ def _columns(line: "Outline", members: "Members", size: float) -> Array:
     return np.column_stack([r, z, *slopes[:2], *shift, *slopes[2:], *line.energy[:, members]])
 
 
-def _split_at_kinks(line: "Outline") -> "list[tuple[Outline, Members]]":
+def _split_at_kinks(line: Outline) -> "list[tuple[Outline, Members]]":
     """Runs of points without a kink; neighbouring runs share their end point."""
     closing = np.arange(len(line.r)) if line.on_axis else np.append(np.arange(len(line.r)), 0)
     heading = np.unwrap(np.arctan2(np.diff(line.z[closing]), np.diff(line.r[closing])))
@@ -131,7 +131,7 @@ def _split_at_kinks(line: "Outline") -> "list[tuple[Outline, Members]]":
     return [(line, closing[a : b + 1]) for a, b in pairwise(bounds)]
 
 
-def _bounds(resonator: "Resonator") -> tuple[float, float]:
+def _bounds(resonator: Resonator) -> tuple[float, float]:
     """Height of the middle of the resonator and the radius of the sphere around it, m."""
     line = trace_outlines(resonator, resonator.size / SPACING)[0]
     middle = float(line.z.max() + line.z.min()) / 2

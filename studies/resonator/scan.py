@@ -84,7 +84,7 @@ class Scan:
         return x, theta, combine(parts, quantity)
 
 
-def combine(parts: "dict[str, Array]", quantity: str) -> Array:
+def combine(parts: dict[str, Array], quantity: str) -> Array:
     """Wall = inner + outer, offset of the middle surface = (outer - inner)/2, of departures out of the material."""
     if quantity in parts:
         return parts[quantity]
@@ -94,7 +94,7 @@ def combine(parts: "dict[str, Array]", quantity: str) -> Array:
 
 
 def scan_faces(
-    resonator: "Resonator", elastic: "Elastic", files: dict[str, str], *, unit: Unit = "mm",
+    resonator: Resonator, elastic: Elastic, files: dict[str, str], *, unit: Unit = "mm",
     frames: Literal["own", "common"] = "own", harmonics: tuple[int, ...] = (1, 2, 3, 4), highest: int = 12,
     theory: Literal["solid", "shell"] = "solid", say: Callable[[str], None] = lambda _: None,
 ) -> Scan:  # fmt: skip
@@ -137,7 +137,7 @@ def scan_faces(
     return Scan(faces, imperfection, tuple(splits), _waves(faces), _roundness(faces))
 
 
-def _check_wall(faces: dict[str, Face], resonator: "Resonator") -> None:
+def _check_wall(faces: dict[str, Face], resonator: Resonator) -> None:
     if len(faces) < 2:
         return
     x = np.linspace(max(f.low for f in faces.values()), min(f.high for f in faces.values()), 40)

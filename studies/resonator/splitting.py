@@ -23,8 +23,8 @@ PLACES = 65  # along the meridian, where waves are held against the wall
 class SplitPair:
     """A pair of an instrument at a temperature, split by all that its card says, in parts that add."""
 
-    instrument: "Instrument"
-    mode: "Mode"
+    instrument: Instrument
+    mode: Mode
     temperature: float
     known: Pair | None = None  # the pair, if it has been made before
 
@@ -73,7 +73,7 @@ class SplitPair:
         return self._sum(own, self.measured, self.electrodes)
 
     @property
-    def _fields(self) -> "Imperfection | None":
+    def _fields(self) -> Imperfection | None:
         card: CardImperfection = self.instrument.part("imperfection")
         if card.fields is not None:
             _check_wall(self.instrument, card.fields)
@@ -84,7 +84,7 @@ class SplitPair:
         return Split(self.mode.harmonic, self.mode.frequency, float(shift), complex(wave))
 
 
-def _check_wall(instrument: "Instrument", fields: "Imperfection") -> None:
+def _check_wall(instrument: Instrument, fields: Imperfection) -> None:
     """Refuse waves of the wall that would go through it."""
     position, wall = zip(*instrument.resonator.thickness, strict=True)
     at = np.linspace(0.0, 1.0, PLACES)
@@ -101,7 +101,7 @@ def _check_wall(instrument: "Instrument", fields: "Imperfection") -> None:
 
 
 @lru_cache(maxsize=8)
-def solved_pair(resonator: "Resonator", elastic: "Elastic", harmonic: int) -> Pair:
+def solved_pair(resonator: Resonator, elastic: Elastic, harmonic: int) -> Pair:
     """The perfect pair of a harmonic, solved once."""
     return Pair(solve_modes(resonator, elastic, harmonic)[0])
 
@@ -110,7 +110,7 @@ _PREPARED: dict[tuple[object, ...], CoupledHarmonics] = {}
 MOST_PREPARED = 4
 
 
-def _coupled(mode: "Mode", elastic: "Elastic") -> CoupledHarmonics:
+def _coupled(mode: Mode, elastic: Elastic) -> CoupledHarmonics:
     """The coupled harmonics of a pair, prepared once for all imperfections of one perfect resonator."""
     assert mode.solution is not None
     key = (mode.resonator, elastic, mode.harmonic, mode.index, mode.theory, mode.solution.system.level)
@@ -122,20 +122,20 @@ def _coupled(mode: "Mode", elastic: "Elastic") -> CoupledHarmonics:
 
 
 @lru_cache(maxsize=64)
-def _softening(pair: Pair, electrodes: "CardElectrodes") -> tuple[float, float]:
+def _softening(pair: Pair, electrodes: CardElectrodes) -> tuple[float, float]:
     """Mean shift by the card's own voltages, and per V² on all of the electrodes together, at the reference temperature."""
     charged = electrodes.on(pair, electrodes.reference_temperature)
     return charged.soften().shift, float(charged.per_square_volt[0].sum())
 
 
-def reference_split(instrument: "Instrument", harmonic: int = 2) -> SplitPair:
+def reference_split(instrument: Instrument, harmonic: int = 2) -> SplitPair:
     """The pair of a harmonic at the card's reference temperature."""
     resonator, elastic = instrument.at(instrument.reference_temperature)
     pair = solved_pair(resonator, elastic, harmonic)
     return SplitPair(instrument, pair.mode, instrument.reference_temperature, pair)
 
 
-def mean_shift(instrument: "Instrument", temperature: Array, voltage_squared: Array | None = None) -> Array | float:
+def mean_shift(instrument: Instrument, temperature: Array, voltage_squared: Array | None = None) -> Array | float:
     """What imperfection and electrodes, as V²/g³ with a common V² or the card's voltages, add to the mean frequency of the n = 2 pair, relative."""
     electrodes: CardElectrodes = instrument.part("electrodes")
     card: CardImperfection = instrument.part("imperfection")

@@ -96,7 +96,7 @@ NARROWEST = 1e-6  # m: no tool cuts a groove that is narrower
 
 
 def rim_sites(
-    resonator: "Resonator", pairs: Mapping[int, Pair], density: float, axis: float, *,
+    resonator: Resonator, pairs: Mapping[int, Pair], density: float, axis: float, *,
     heights: Sequence[float] = (1.0,), tool: Tool = TOOL, kind: CutKind = "mass",
 ) -> Sites:  # fmt: skip
     """Grooves around the shell, a multiple of 4n for every n, one on the antinode at `axis` (rad), at positions of the meridian."""
@@ -152,7 +152,7 @@ def _gains(pairs: Mapping[int, Pair], position: Array, kind: CutKind = "mass") -
 
 
 def plan_for_card(
-    resonator: "Resonator", elastic: "Elastic", measured: Sequence[tuple[int, float, float, float]], *, goal: float,
+    resonator: Resonator, elastic: Elastic, measured: Sequence[tuple[int, float, float, float]], *, goal: float,
     heights: Sequence[float] = (1.0,), tool: Tool = TOOL, kind: CutKind = "mass", teeth: Teeth | None = None,
     removal_error: float = 0.02, gain_error: float = 0.03, gain: float = 1.0,
     unbalance: Mapping[int, complex] | None = None,
@@ -232,7 +232,7 @@ def _typical(plan: TrimPlan, sites: Sites, position: float) -> tuple[float, floa
     return mean, scatter, max(float(masses.sum()) / mean / max(int(apart.sum()), 1), 1.0)
 
 
-def other_cuts(resonator: "Resonator", elastic: "Elastic", harmonic: int, kind: CutKind) -> dict[str, float]:
+def other_cuts(resonator: Resonator, elastic: Elastic, harmonic: int, kind: CutKind) -> dict[str, float]:
     """What a kilogram at the rim does to the split as each kind of cut, over what it does as `kind`."""
     pair = Pair(solve_modes(resonator, elastic, harmonic)[0])
     kinds: tuple[CutKind, ...] = ("mass", "edge", "inner", "outer")

@@ -5,8 +5,8 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from compensation.decimation import bend_of_means
 from shell.constants import zero_Celsius
 from studies.errors import InputError
@@ -15,7 +15,6 @@ from studies.record.rest import check_temperatures
 from studies.simulation.heat_path import SENSOR
 from thermal.profile import Profile
 
-Array = NDArray[np.float64]
 Boundary = Literal["chamber", "housing"]
 COLUMN: dict[Boundary, str] = {"chamber": "chamber_temperature_degC", "housing": "housing_temperature_degC"}
 COMMANDS = {

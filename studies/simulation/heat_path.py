@@ -5,8 +5,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from studies.effects.effect import AROUND
 from studies.errors import naming
 from studies.instrument.tables.law import BETWEEN, NO_LOAD
@@ -90,7 +90,7 @@ def slowest_lag(network: Network, temperature: float) -> float:
     return float(find_relaxation(chain, temperature).time_constants[0])
 
 
-def departures(network: Network, lumps: Sequence[str], temperature: float) -> dict[str, NDArray[np.float64]]:
+def departures(network: Network, lumps: Sequence[str], temperature: float) -> dict[str, Array]:
     """Temperatures of the nodes (K) for 1 K of each lump, as far as it persists: Σ v vᵀC e over as many of the slowest modes v."""
     names = [node.name for node in network.nodes]
     relaxation = find_relaxation(network, temperature)

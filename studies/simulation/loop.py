@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from compensation.actuators import Actuators, RangeUse
+from compensation.arrays import Array
 from compensation.controllers import Loops, Margin, require_stable
 from compensation.electronics import Channels, Electronics, LoopNoise, thermal_noise
 from compensation.rebalance import LoopRun, settle_rebalance, simulate_rebalance
@@ -23,7 +24,6 @@ if TYPE_CHECKING:
     from studies.instrument.card import Instrument
     from studies.instrument.tables.loop import Loop
 
-Array = NDArray[np.float64]
 DEG_PER_H = float(np.degrees(1.0)) * 3600.0
 
 

@@ -4,9 +4,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from compensation.actuators import RangeUse
+from compensation.arrays import Array
 from compensation.closed_loop import ClosedLoop
 from compensation.controllers import Loops, Margin
 from compensation.electronics import Electronics, LoopNoise
@@ -28,7 +28,6 @@ from studies.simulation.loop import (
     wave_of,
 )
 
-Array = NDArray[np.float64]
 ERRORS = {
     # source of bias: keys of the card that are 0 without it
     "damping anisotropy": ("bias.damping_anisotropy",),

@@ -3,14 +3,12 @@
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from compensation.noise import Noise
 
 if TYPE_CHECKING:
     from studies.instrument.tables.noise import NoiseKeys
-
-Array = NDArray[np.float64]
 
 
 def frequency_noise(noise: "NoiseKeys") -> Noise:

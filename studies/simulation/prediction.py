@@ -6,8 +6,8 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from compensation.decimation import curvature
 from shell.constants import zero_Celsius
 from studies.effects import find_effect
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from shell.layout import Theory
     from studies.instrument.card import Instrument
 
-Array = NDArray[np.float64]
 MARGIN = 10.0  # K beyond the boundary in which the frequency stays known: the drive's own heat
 SHIFT_STEP = 0.02  # s
 
@@ -50,7 +49,7 @@ class Prediction:
 def predict(
     instrument: "Instrument",
     drive: Drive,
-    derivatives: "Sequence[str] | Variations" = (),
+    derivatives: Sequence[str] | Variations = (),
     law: "FrequencyLaw | None" = None,
     longest: float | None = None,
 ) -> Prediction:
@@ -146,7 +145,7 @@ def _slope_of_timing(network: Network, drive: Drive, name: str, rows: Array, dep
     return (above.temperature - below.temperature) / distance, (above.rate - below.rate) / distance
 
 
-def _slope_of_lag(sides: "Sequence[Side]", boundary: Mapping[str, Profile], time: Array, departure: Array) -> Array:
+def _slope_of_lag(sides: Sequence[Side], boundary: Mapping[str, Profile], time: Array, departure: Array) -> Array:
     """Derivative of the reading of a predicted housing by its sensor's time constant (K/s): it may be shorter than a sweep's steps."""
     reading = np.zeros((1, len(departure)))
     reading[0, -1] = 1.0

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from shell.constants import zero_Celsius
 from studies.effects import apply_effects
 from studies.effects.states import States
@@ -29,8 +29,6 @@ if TYPE_CHECKING:
     from shell.law import FrequencyLaw
     from studies.instrument.card import Instrument
     from studies.loss.damping_law import DampingLaw
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

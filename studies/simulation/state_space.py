@@ -15,8 +15,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from compensation.closed_loop import CHANNELS, ClosedLoop, real_form
 from compensation.controllers import Loops, held
 from studies.errors import InputError
@@ -25,7 +25,6 @@ from studies.files.writing import write_text, written_whole
 if TYPE_CHECKING:
     from studies.simulation.loop_study import LoopStudy
 
-Array = NDArray[np.float64]
 PICKOFFS = ("antinode_real", "antinode_imaginary", "node_real", "node_imaginary")
 RATE = "rate_rad_per_s"
 

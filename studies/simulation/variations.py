@@ -6,8 +6,8 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from studies.errors import InputError
 from studies.instrument.dotted import look_up
 from studies.loss.damping_law import DampingLaw, damping_law
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from shell.law import FrequencyLaw
     from studies.instrument.card import Instrument
 
-Array = NDArray[np.float64]
 STEP = 1e-3  # of a value, or of its standard deviation: the differences that give derivatives
 INITIAL = "initial."
 SHIFT, JUMP, KINK = "shift", "jump.", "kink."

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from compensation.noise import Noise
 from shell.constants import zero_Celsius
 from studies.effects import find_effect
@@ -27,7 +27,6 @@ if TYPE_CHECKING:
     from studies.instrument.card import Instrument
     from studies.instrument.tables.noise import NoiseKeys
 
-Array = NDArray[np.float64]
 DIGITS = {
     # decimals that are recorded, far below any noise
     "time_s": 9,
@@ -59,7 +58,7 @@ class VirtualRun:
 
 def simulate_run(
     instrument: "Instrument",
-    driven: "Profile | Drive",
+    driven: Profile | Drive,
     rate: float = 1.0,
     seed: int = 0,
     noise: bool = True,

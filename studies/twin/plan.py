@@ -7,8 +7,8 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from shell.constants import zero_Celsius
 from studies.effects import find_effect
 from studies.effects.effect import check_effect
@@ -30,7 +30,6 @@ if TYPE_CHECKING:
     from studies.simulation.drive import Boundary
     from thermal.network import Network
 
-Array = NDArray[np.float64]
 TABLES = ("thermal", "loss", "bias", "noise", "loop")
 FIXED = ("thermal.cells", "thermal.stem_radius_mm", "thermal.stem_length_mm")
 """Numbers of those tables that have become part of the network."""

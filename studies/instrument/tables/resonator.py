@@ -84,7 +84,7 @@ class Stemmed(Shape, frozen=True, kw_only=True):
             raise ValueError("support = 'stem' and a table [resonator.stem] go together; give both or none.")
 
     @property
-    def held(self) -> "dict[str, Any]":
+    def held(self) -> dict[str, Any]:
         """Support and stem in SI units."""
         return {"support": self.support, "stem": None if self.stem is None else self.stem.build()}
 

@@ -7,8 +7,8 @@ The file has one part "cross-damping" (zeta_0, zeta_1 …, per power of °C of s
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from compensation.cross_damping import CrossDampingModel
 from shell.constants import zero_Celsius
 from studies.errors import InputError
@@ -62,7 +62,7 @@ def load_cross_damping(model: Model) -> CrossDampingModel:
     )
 
 
-def compensate(model: Model, record: Record, *, extrapolate: bool) -> dict[str, NDArray[np.float64]]:
+def compensate(model: Model, record: Record, *, extrapolate: bool) -> dict[str, Array]:
     """Subtract the predicted cross-damping error; rows without temperature or output stay empty."""
     output, column = model.compensates, model.temperature_column
     model.check_inputs(record, column, outputs=OUTPUTS)

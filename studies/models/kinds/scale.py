@@ -14,8 +14,8 @@ from dataclasses import astuple
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from shell.constants import zero_Celsius
 from studies.errors import InputError
 from studies.models.c_source import head, polynomial, write_c
@@ -117,7 +117,7 @@ def load_scale(model: Model) -> "BellChain":
     )
 
 
-def compensate(model: Model, record: Record, *, extrapolate: bool) -> dict[str, NDArray[np.float64]]:
+def compensate(model: Model, record: Record, *, extrapolate: bool) -> dict[str, Array]:
     """Return the compensated rate; without a filter, rows that lack an input stay empty."""
     from compensation.bell import apply_chain
 
