@@ -10,7 +10,7 @@ from cyclopts import Parameter
 from compensation.arrays import Array
 from studies.cli.output import answers
 from studies.errors import InputError
-from studies.files.writing import write_text
+from studies.files.writing import write_numbers, write_text
 from studies.importing.draft import draft_map
 from studies.importing.join import import_records, import_table
 from studies.importing.mapping import LoadedMap, load_map
@@ -93,9 +93,7 @@ def _import_table(raw: tuple[str, ...], import_map: LoadedMap, out: str) -> Resu
     if len(raw) != 1:
         raise InputError(f"{import_map.path}: describes one table, but {len(raw)} raw files are given.")
     columns, notes = import_table(raw[0], import_map)
-    rows = zip(*(values.tolist() for values in columns.values()), strict=True)
-    text = "".join(f"# {note}\n" for note in notes) + ",".join(columns) + "\n"
-    write_text(out, text + "".join(",".join(f"{value:.12g}" for value in row) + "\n" for row in rows))
+    write_numbers(out, columns, ".12g", notes)
     return _show({out: columns}, notes, None, {})
 
 

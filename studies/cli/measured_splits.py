@@ -3,7 +3,6 @@
 import cmath
 import re
 from math import radians
-from typing import Literal
 
 import msgspec
 
@@ -35,40 +34,23 @@ def pair_splits(
     return [(n, s, radians(a), error) for n, s, a in zip(harmonic, split, axis, strict=True)]
 
 
-class _Value(msgspec.Struct):
-    value: float
-
-
-class _Interval(_Value):
-    low: float
-    high: float
-
-
-class _Split(msgspec.Struct):
-    harmonic: int
-    split_Hz: _Interval
-    slow_axis_deg: _Value | None
-
-
-class _Scan(msgspec.Struct):
-    schema: Literal["hrg.scan/1"]
-    splits: list[_Split]
-
-
 def read_scan(path: str, harmonic: tuple[int, ...]) -> list[tuple[int, float, float, float]]:
     """Return the same of the splits of a scan."""
+    entries, found = {}, []
     try:
-        scan = msgspec.json.decode(read_bytes(path), type=_Scan)
-    except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError):
+        scan = msgspec.json.decode(read_bytes(path))
+        for one in scan["splits"] if scan["schema"] == "hrg.scan/1" else scan["splits of a scan"]:
+            size, axis = (float(one["split_Hz"][key]) for key in ("value", "low", "high")), one["slow_axis_deg"]
+            entries[int(one["harmonic"])] = (*size, None if axis is None else radians(axis["value"]))
+    except (msgspec.MsgspecError, KeyError, TypeError, ValueError, RecursionError):
         raise InputError(f'{path}: is not output of hrg scan --json (schema "hrg.scan/1").') from None
-    entries, found = {entry.harmonic: entry for entry in scan.splits}, []
     for n in harmonic:
         if n not in entries:
             raise InputError(f"{path}: no split of n = {n}; it contains n = {', '.join(map(str, entries))}.")
-        size, axis = entries[n].split_Hz, entries[n].slow_axis_deg
-        if axis is None:
+        value, low, high, azimuth = entries[n]
+        if azimuth is None:
             raise InputError(f"{path}: the split of n = {n} may be 0; measure more accurately before cutting.")
-        found.append((n, size.value, radians(axis.value), (size.high - size.low) / 3.29))
+        found.append((n, value, azimuth, (high - low) / 3.29))
     return found
 
 

@@ -1,16 +1,14 @@
 """`hrg reproduce`: the papers' tables and figures from their data."""
 
-from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from studies.cli.output import answers, dump_json
-from studies.files.writing import check_folder, write_text
+from studies.files.writing import check_folder, write_numbers, write_text
 from studies.progress import Told
 from studies.results import Result
 
 if TYPE_CHECKING:
-    from compensation.arrays import Array
     from studies.reports.reproduce import Reproduction
 
 GYROS = 12
@@ -32,10 +30,10 @@ def reproduce(*, out: str = "report") -> Result:
     parts = _reproduce()
     study, result = parts.study, reproduce_result(parts)
     T, f = study.temperature_degC, study.frequency
-    columns = {"temperature_degC": T, "frequency_Hz": f, "cubic_Hz": study.fit.frequency(T)}
-    write_text(folder / "table1.csv", _csv(columns))
+    fitted = {"temperature_degC": T, "frequency_Hz": f, "cubic_Hz": study.fit.frequency(T)}
+    write_numbers(folder / "table1.csv", fitted, ".10g")
     found = {"calculated_temperature_degC": study.calculated_degC, "error_degC": study.error_degC}
-    write_text(folder / "table2.csv", _csv({"frequency_Hz": f, "actual_temperature_degC": T, **found}))
+    write_numbers(folder / "table2.csv", {"frequency_Hz": f, "actual_temperature_degC": T, **found}, ".10g")
     write_text(folder / "summary.json", dump_json(result.payload))
     write_text(folder / "report.html", render_result(result))
     sensitivity = result.payload["sensitivity_ppm_per_degC"]
@@ -68,8 +66,3 @@ def _reproduce() -> "Reproduction":
     chapters, summary = reproduce_gyro_papers(GYROS)
     told("writing the page", 0.9)
     return Reproduction(study, physics, diagnosis, settling, twins, chapters, summary)
-
-
-def _csv(columns: "Mapping[str, Array]") -> str:
-    rows = "\n".join(",".join(f"{float(x):.10g}" for x in row) for row in zip(*columns.values(), strict=True))
-    return f"{','.join(columns)}\n{rows}\n"

@@ -92,6 +92,17 @@ def write_csv(path: str | Path, head: Iterable[str], rows: Iterable[Iterable[str
     write_text(path, "".join(f"{','.join(row)}\n" for row in (head, *rows)))
 
 
+def write_numbers(path: str | Path, columns: "Table", form: str, notes: Iterable[str] = ()) -> None:
+    """Write a short table of numbers in one format below lines of comments, whole or not at all."""
+    rows = zip(*(values.tolist() for values in columns.values()), strict=True)
+    lines = [
+        *(f"# {note}" for note in notes),
+        ",".join(columns),
+        *(",".join(format(x, form) for x in row) for row in rows),
+    ]
+    write_text(path, "\n".join([*lines, ""]))
+
+
 def write_rows(file: IO[bytes], columns: "Table") -> Iterator[float]:
     """Write numbers as lines of cells that read back to the last digit, missing ones empty; yield the part that is done.
 

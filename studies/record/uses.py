@@ -69,29 +69,24 @@ def _bias(records: Sequence[Record]) -> None:
 
 
 def _thermal(records: Sequence[Record]) -> None:
-    choose_column(records, ("frequency_Hz",), "a fit of time constants")
-    choose_column(records, TEMPERATURES[::2], "a fit of time constants")
+    _require(records, "a fit of time constants", ("frequency_Hz",), TEMPERATURES[::2])
     _check_span(records, STEP_SPAN, "a fit of time constants")
 
 
 def _cross_damping(records: Sequence[Record]) -> None:
     gather_rest(records, dict.fromkeys(OUTPUTS, 1.0))
-    for column in ("frequency_Hz", "inverse_q"):
-        choose_column(records, (column,), "the cross-damping")
+    _require(records, "the cross-damping", ("frequency_Hz",), ("inverse_q",))
     _check_span(records, LEAST_SPAN, "a cross-damping over temperature")
 
 
 def _scale(records: Sequence[Record]) -> None:
-    choose_column(records, RAW, "a fit of the scale")
-    choose_column(records, TEMPERATURES, "a fit of the scale")
-    choose_column(records, ("rate_deg_per_s",), "a fit of the scale")
+    _require(records, "a fit of the scale", RAW, TEMPERATURES, ("rate_deg_per_s",))
     if "scale-factor" not in sort_records(records, OUTPUT)[0]:
         raise InputError(f"{records[0].path}: no record has several constant rates; run a rate table.")
 
 
 def _whole_angle(records: Sequence[Record]) -> None:
-    choose_column(records, ("pattern_angle_deg",), "a fit of a whole-angle gyro")
-    choose_column(records, tuple(OUTPUTS), "a fit of a whole-angle gyro")
+    _require(records, "a fit of a whole-angle gyro", ("pattern_angle_deg",), tuple(OUTPUTS))
     if len(records) > 1:
         raise InputError("one run at a time; show a single record for its line.")
 
@@ -101,6 +96,11 @@ def _acceptance(records: Sequence[Record]) -> None:
     if not served:
         needs = "; ".join(dict.fromkeys(quantity.needs for quantity in QUANTITIES))
         raise InputError(f"{left[0].path}: fits none of the tests, which need {needs}.")
+
+
+def _require(records: Sequence[Record], purpose: str, *columns: Sequence[str]) -> None:
+    for candidates in columns:
+        choose_column(records, candidates, purpose)
 
 
 def _check_span(records: Sequence[Record], least: float, purpose: str) -> None:

@@ -54,15 +54,13 @@ def response_figures(results: Results, column: Column) -> list[Figure]:
 
 def sobol_figure(indices: SobolIndices, column: Column) -> Figure:
     """Return first-order and total indices with their intervals."""
-    alt = "Bars of first-order and total indices for each parameter."
-    return Figure(lambda: _draw_sobol(indices, column), "Sobol indices with 90 % intervals.", alt)
+    return Figure(lambda: _draw_sobol(indices, column), "Sobol indices with 90 % intervals.")
 
 
 def tornado_figure(slopes: list[LocalSlope], column: Column) -> Figure:
     """Return what each parameter alone does to a column between the ends of its range."""
     caption = "Change from the nominal design at the ends of each parameter's range."
-    alt = "Tornado diagram: bars to both sides of the nominal design."
-    return Figure(lambda: _draw_tornado(slopes, column), caption, alt)
+    return Figure(lambda: _draw_tornado(slopes, column), caption)
 
 
 def _numeric(results: Results) -> list[StudyParameter]:
