@@ -34,6 +34,8 @@ def find_jump(envelope: Envelope) -> float | None:
     size = np.sqrt(np.sum(np.abs(z) ** 2, axis=0))
     usual = max(float(np.sqrt(estimate_noise(z))), 1e-12 * float(size.max()))
     turn = np.angle(np.sum(z[:, 2:] * z[:, :-2].conj(), axis=0))
+    if turn.size < NEAR:
+        return None
     near = np.lib.stride_tricks.sliding_window_view(np.exp(1j * turn), NEAR)
     around = np.median(near.real, axis=1) + 1j * np.median(near.imag, axis=1)
     half = NEAR // 2
