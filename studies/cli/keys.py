@@ -24,6 +24,8 @@ def keys(kind: str = "card", *, table: str = "") -> Result:
     if kind not in KINDS:
         raise InputError(f"there are no keys of '{kind}'{nearest(kind, KINDS)}")
     rows = [row for row in _keys_of(kind) if not table or f"{row['table'].strip('[]')}.".startswith(f"{table}.")]
+    if not rows and kind == "card" and table == "effect":
+        raise InputError("the keys of an [[effect]] depend on its name: hrg effects NAME lists them.")
     if not rows:
         names = {row["table"].strip("[]") for row in _keys_of(kind)} - {""}
         raise InputError(f"a {kind} has no table '{table}'{nearest(table, names)}")
