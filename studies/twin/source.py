@@ -75,7 +75,7 @@ def card_header(plan: Plan) -> str:
     lines += [f"#define TWIN_{name} {value}" for name, value in switches.items()]
     lines += [f"#define TWIN_{name} {_number(value)}" for name, value in numbers.items()]
     lines += [f"enum {{ {', '.join(f'TWIN_{name} = {value}' for name, value in sizes.items())} }};"]
-    named = [f"P_{_identifier(key)}" for key in plan.parameters]
+    named = [f"P_{''.join(c if c.isascii() and c.isalnum() else '_' for c in key)}" for key in plan.parameters]
     lines += ["enum {", *(f"    {name}," for name in named), "    TWIN_PARAMETERS", "};"]
     lines += [f"enum {{ {', '.join(f'OUT_{name}' for name in outputs)}, TWIN_OUTPUTS }};"]
     lines += [f"enum {{ E_none, {', '.join(f'E_{name}' for name in EFFECTS)} }};", "", "#endif", ""]
@@ -176,10 +176,6 @@ def _number(value: float) -> str:
     if not math.isfinite(value):
         return "0.0"
     return repr(float(np.float64(value)))
-
-
-def _identifier(key: str) -> str:
-    return "".join(c if c.isascii() and c.isalnum() else "_" for c in key)
 
 
 def _text(words: str) -> str:

@@ -184,7 +184,7 @@ def memory_of(model: Model) -> Memory:
 
 def read_terms(model: Model) -> tuple[tuple[str, ...], Array]:
     """Return the terms in the names of `compensation.bias`, and all coefficients, the constant first."""
-    part, variable = model.part("bias"), _variable(variable_column(model))
+    part, variable = model.part("bias"), (FREQUENCY if variable_column(model) == "frequency_Hz" else TEMPERATURE)
     where = model.where
     model.check_output(OUTPUTS)
     if part.names[0] != "constant":
@@ -235,7 +235,3 @@ def _made_causal(model: Model) -> Model:
 
 def _reference_key(column: str) -> str:
     return "reference_frequency_Hz" if column == "frequency_Hz" else "reference_temperature_degC"
-
-
-def _variable(column: str) -> Variable:
-    return FREQUENCY if column == "frequency_Hz" else TEMPERATURE
