@@ -7,7 +7,7 @@ import numpy as np
 
 from compensation.errors import CompensationError
 from compensation.ringdown.answer import Curve, Estimate, RingDown
-from compensation.ringdown.envelope import Envelope
+from compensation.ringdown.envelope import LEAST, Envelope
 from compensation.ringdown.fit import DecayFit, drift_shapes
 from compensation.ringdown.model import Decay
 from compensation.ringdown.whiteness import Leftover
@@ -29,6 +29,10 @@ def analyse_decay(envelope: Envelope, *, harmonic: int = 2) -> RingDown:
         x, y = envelope.values
         if np.linalg.norm(y - np.vdot(x, y) / np.vdot(x, x) * x) < ALIKE * np.linalg.norm(y):
             raise CompensationError("the two channels carry the same signal; give each pick-off its own column.")
+    if (rows := envelope.time.size) < LEAST:
+        raise CompensationError(
+            f"the samples make {rows} amplitudes of whole periods; a decay needs {LEAST} or more: record longer or sample faster."
+        )
     jump = find_jump(envelope)
     given = envelope
     if jump is not None:

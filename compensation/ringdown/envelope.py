@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from compensation.arrays import Array, Complex
 from compensation.errors import CompensationError
 
+LEAST = 16  # amplitudes of a decay
 MOST_BLOCKS = 4096
 CHUNK = 1 << 18
 PASSES = 3  # each takes the image out with the amplitudes of the one before, straight between the blocks
@@ -136,8 +137,8 @@ def from_lock_in(time: ArrayLike, amplitudes: ArrayLike, carrier: float = 0.0) -
     keep = np.isfinite(t) & np.all(np.isfinite(z), axis=0) & ~_stuck(z, 1.0)
     lost = 1 - float(np.mean(keep))
     t, z = t[keep], z[:, keep]
-    if t.size < 16:
-        raise CompensationError(f"a decay needs 16 rows or more with a value in every channel, not {t.size}.")
+    if t.size < LEAST:
+        raise CompensationError(f"a decay needs {LEAST} rows or more with a value in every channel, not {t.size}.")
     step = float(np.median(np.diff(t)))
     between = np.diff(t) / step
     if np.median(np.abs(between - 1)) < 0.01:  # an even clock: rows may be absent

@@ -219,6 +219,7 @@ def _fit_scatter(fit: _Power, x: Array, y: Array) -> _Power:
     return put(scipy.optimize.minimize(cost, start, method="Nelder-Mead", bounds=limits).x)
 
 
+@np.errstate(over="ignore")
 def _find_end(fit: _Power, x: Array, y: Array) -> int:
     """Return the rows from the start that one decay foretells: each next fortieth within four standard deviations of it."""
     size = max(4, x.size // 40)
@@ -231,13 +232,15 @@ def _find_end(fit: _Power, x: Array, y: Array) -> int:
             J = one.slopes(x[:rows])[:, :2] * w[:, None]
             step = np.linalg.lstsq(J, (y[:rows] - one.mean(x[:rows])) * w, rcond=None)[0]
             one = replace(one, level=one.level + step[0], rate=one.rate + step[1])
+            if not np.isfinite(one.mean(x[:rows])).all():  # noise alone: it foretells nothing
+                return rows
         blocks = block_means((y[:rows] - one.mean(x[:rows])) * w, size)
         spread = max(float(np.sum(blocks**2)) / max(len(blocks) - 2, 1), 1.0 / size)  # variance of a block's mean
         following = slice(rows, rows + size)
         ahead = one.slopes(x[following])[:, :2].mean(axis=0)
         known = spread * size * float(ahead @ np.linalg.pinv(J.T @ J, hermitian=True) @ ahead)
         miss = float(np.mean(y[following] - one.mean(x[following])))
-        if miss**2 > 16 * (known + spread * float(np.mean(root[following] ** 2))):
+        if abs(miss) > 4 * np.sqrt(known + spread * float(np.mean(root[following] ** 2))):
             return rows
         rows += size
     return x.size

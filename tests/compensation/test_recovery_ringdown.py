@@ -157,6 +157,20 @@ def test_refused():
         analyse_decay(from_lock_in(TIME, driven, CARRIER))
     with pytest.raises(CompensationError, match="half the sampling rate"):
         mix_down(np.arange(1000) / 1000, np.ones((1, 1000)), 7000.0)
+    t, quiet = np.arange(500) / 500, 3e-6 * np.random.default_rng(0).standard_normal(500)
+    with pytest.raises(CompensationError, match="nothing decays"):  # what one decay foretells of it overflows
+        analyse_trace(t, np.abs(np.exp(-28 * t) + quiet), None)
+    t = np.arange(800) / 200
+    with pytest.raises(CompensationError, match="amplitudes of whole periods"):
+        analyse_decay(mix_down(t, np.exp(-t) * np.cos(2 * np.pi * 14.03 * t)[None], None))
+
+
+def test_recovery_of_a_decay_of_few_blocks():
+    t = np.arange(0.0, 40.0, 0.01)
+    x = np.exp(-t / 10) * np.cos(2 * np.pi * 7.03 * t) + 1e-2 * np.random.default_rng(1).standard_normal(t.size)
+    found = analyse_decay(mix_down(t, x[None], None)).estimates
+    assert abs(found["frequency_Hz"].value - 7.03) < 5 * found["frequency_Hz"].sd < 2e-4
+    assert abs(found["decay_time_s"].value - 10) < 5 * found["decay_time_s"].sd < 0.1
 
 
 @pytest.mark.parametrize("plateau", [0.0, 5.0])
