@@ -36,21 +36,23 @@ def pair_splits(
 
 def read_scan(path: str, harmonic: tuple[int, ...]) -> list[tuple[int, float, float, float]]:
     """Return the same of the splits of a scan."""
-    entries, found = {}, []
+    entries: dict[int, tuple[float, float | None, float]] = {}
+    found = []
     try:
         scan = msgspec.json.decode(read_bytes(path))
         for one in scan["splits"] if scan["schema"] == "hrg.scan/1" else scan["splits of a scan"]:
-            size, axis = (float(one["split_Hz"][key]) for key in ("value", "low", "high")), one["slow_axis_deg"]
-            entries[int(one["harmonic"])] = (*size, None if axis is None else radians(axis["value"]))
+            value, low, high = (float(one["split_Hz"][key]) for key in ("value", "low", "high"))
+            axis = None if one["slow_axis_deg"] is None else radians(one["slow_axis_deg"]["value"])
+            entries[int(one["harmonic"])] = value, axis, (high - low) / 3.29
     except (msgspec.MsgspecError, KeyError, TypeError, ValueError, RecursionError):
         raise InputError(f'{path}: is not output of hrg scan --json (schema "hrg.scan/1").') from None
     for n in harmonic:
         if n not in entries:
             raise InputError(f"{path}: no split of n = {n}; it contains n = {', '.join(map(str, entries))}.")
-        value, low, high, azimuth = entries[n]
-        if azimuth is None:
+        value, axis, sd = entries[n]
+        if axis is None:
             raise InputError(f"{path}: the split of n = {n} may be 0; measure more accurately before cutting.")
-        found.append((n, value, azimuth, (high - low) / 3.29))
+        found.append((n, value, axis, sd))
     return found
 
 
