@@ -129,21 +129,6 @@ class Mass(Protocol):
     def __matmul__(self, x: Array) -> Array: ...
 
 
-@dataclass(frozen=True, eq=False)
-class ElementMass:
-    """The mass element by element."""
-
-    pattern: Pattern
-    matrices: list[Array]
-
-    def __matmul__(self, x: Array) -> Array:
-        """M x for several columns."""
-        y = np.zeros_like(x)
-        for M, members in zip(self.matrices, self.pattern.unknowns, strict=True):
-            y[members] += M @ x[members]
-        return y
-
-
 def lowest_pairs(factor: Factor, mass: Mass, count: int, accuracy: float) -> tuple[Array, Array]:
     """The `count` lowest eigenvectors as columns, M-orthonormal, lowest first, and what is left undone of each eigenvalue, relative.
 

@@ -6,7 +6,7 @@ from math import ceil, e, exp, hypot, log, pi
 import numpy as np
 
 from shell.assembly import build_system
-from shell.eigen import ElementMass, Factor, Mass, lowest_pairs
+from shell.eigen import Factor, Mass, lowest_pairs, whole_pattern
 from shell.elastic import Constants, Elastic, VaryingElastic, find_constants
 from shell.errors import ShellError
 from shell.layout import FIRST, KINDS, LONGEST, ROUGH, Kind, Level, Theory, crowding
@@ -172,10 +172,8 @@ def _begin(
     """Factor K + shift M, and M; both over ρ where it is the same everywhere."""
     uniform, rho = isinstance(elastic, Elastic), _density(elastic)
     if uniform and system.plain:
-        pattern, units = system.plain
-        one, two = (float(field[0, 0]) / rho for field in constants[0].lame)
-        stiffness = [one * trace + two * shear + shift * mass for trace, shear, mass in units]
-        return Factor(pattern, stiffness), ElementMass(pattern, [mass for _, _, mass in units])
+        (trace, shear, mass), (lam, G) = system.plain, (float(field[0, 0]) / rho for field in constants[0].lame)
+        return Factor(whole_pattern(len(mass)), [lam * trace + G * shear + shift * mass]), mass
     K, M = system.operators(constants, shift, over=rho)
     return Factor(system.pattern, K), M
 

@@ -53,9 +53,7 @@ class Rows:
 
     def __init__(self) -> None:
         self._held: list[Index] = []
-        self._followers: list[Index] = []
-        self._masters: list[Index] = []
-        self._factors: list[Array] = []
+        self._terms: list[tuple[Index, Index, Array]] = []  # followers, masters, factors
 
     def hold(self, unknowns: Index) -> None:
         """Take unknowns out."""
@@ -64,24 +62,18 @@ class Rows:
     def follow(self, unknowns: Index, masters: Index, factors: Array) -> None:
         """Let unknowns follow masters; the terms of one that appears several times add up."""
         self.hold(unknowns)
-        self._followers.append(unknowns.ravel())
-        self._masters.append(masters.ravel())
-        self._factors.append(factors.ravel())
+        self._terms.append((unknowns.ravel(), masters.ravel(), factors.ravel()))
 
     def extend(self, more: "Rows") -> None:
         """Take over the rows of others."""
         self._held += more._held
-        self._followers += more._followers
-        self._masters += more._masters
-        self._factors += more._factors
+        self._terms += more._terms
 
     def matrix(self, size: int) -> "scipy.sparse.csr_matrix":
         """The sparse matrix from free to raw unknowns; an unknown without a row is free."""
         is_free = np.ones(size, dtype=bool)
         is_free[np.concatenate([np.zeros(0, dtype=np.intp), *self._held])] = False
-        column = np.cumsum(is_free) - 1
         free = np.flatnonzero(is_free)
-        rows = np.concatenate([free, *self._followers])
-        columns = column[np.concatenate([free, *self._masters])]
-        values = np.concatenate([np.ones(len(free)), *self._factors])
-        return scipy.sparse.csr_matrix((values, (rows, columns)), shape=(size, len(free)))
+        terms = zip((free, free, np.ones(len(free))), *self._terms, strict=True)
+        rows, masters, values = (np.concatenate(column) for column in terms)
+        return scipy.sparse.csr_matrix((values, (rows, np.searchsorted(free, masters))), shape=(size, len(free)))

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import islice
 from typing import TypeAlias
 
 import numpy as np
@@ -10,7 +11,7 @@ import scipy
 
 from shell.blocks import Mesh, Support
 from shell.cells import CellTable, cell_mass, cell_stiffness
-from shell.eigen import Pattern, find_pattern, whole_pattern
+from shell.eigen import Pattern, find_pattern
 from shell.elastic import Constants, are_uniform
 from shell.kernel import Section, StrainTable, integrate_mass, integrate_stiffness, station_mass, station_stiffness
 from shell.layout import Chain, Level
@@ -20,7 +21,6 @@ from shell.sparse import Index
 Pair: TypeAlias = tuple[Array, Array]
 PORTION = 16  # elements integrated at a time
 TINY = 160  # unknowns of a dense matrix
-FEW = 12  # elements that are handled one by one
 KEPT = 8_000_000  # numbers that a system may keep for the next material (64 MB)
 
 
@@ -137,14 +137,25 @@ class System:
         return find_pattern([at.free for at in self.to_free], self.constraint.shape[1])
 
     @cached_property
-    def maps(self) -> list["ToFree"]:
-        """From the unknowns of every element to its free ones, in the order of `pattern`."""
-        return [at.reordered(order) for at, order in zip(self.to_free, self.pattern.order, strict=True)]
+    def maps(self) -> list[list["ToFree"]]:
+        """From the unknowns of every element of every group to its free ones, in the order of `pattern`."""
+        found = (at.reordered(order) for at, order in zip(self.to_free, self.pattern.order, strict=True))
+        return [list(islice(found, len(group.unknowns))) for group in self.groups]
+
+    @cached_property
+    def _units(self) -> list[list[Array]]:
+        """Of every element of every chain: its matrices per unit λ, G and ρ on the free unknowns."""
+        return [
+            [np.stack([at.restrict(unit[k]) for unit in group.units]) for k, at in enumerate(own)]
+            if isinstance(group, ShellGroup)
+            else []
+            for group, own in zip(self.groups, self.maps, strict=True)
+        ]
 
     @cached_property
     def to_free(self) -> list["ToFree"]:
         """From the unknowns of every element to its free ones, in their own order."""
-        P = self._choice
+        P = self._choice[0]
         uses = np.diff(P.indptr)
         maps: list[ToFree] = []
         first = 0
@@ -185,8 +196,7 @@ class System:
         uniform = not once and self.is_small and are_uniform(constants)
         K: list[Array] = []
         M: list[Array] = []
-        maps = iter(self.maps)
-        for group, c in zip(self.groups, constants, strict=True):
+        for number, (group, maps, c) in enumerate(zip(self.groups, self.maps, constants, strict=True)):
             dilation, shear, density = c.lame[0] / over, c.lame[1] / over, c.rho / over
             if isinstance(group, SolidGroup):
                 blocks = np.empty((len(density), *(group.table.gradients.shape[3],) * 2))
@@ -195,39 +205,34 @@ class System:
                     if shift:
                         stiffness += shift * density[here, :, None] * cell_mass(products)
                     blocks[here] = density[here, :, None] * products[:, 9].reshape(-1, *blocks.shape[1:])
-                    K += [next(maps).restrict(one) for one in stiffness]
+                    K += [at.restrict(one) for at, one in zip(maps[here], stiffness, strict=True)]
                 M.append(blocks)
-                continue
-            if uniform:
-                trace, sheared, mass = group.units
-                stiffness, mass = dilation[0, 0] * trace + shear[0, 0] * sheared, density[0, 0] * mass
+            elif uniform:
+                weights = np.array([dilation[0, 0], shear[0, 0], shift * density[0, 0]])
+                K += [np.tensordot(weights, units, 1) for units in self._units[number]]
+                M.append(density[0, 0] * group.units[2])
             else:
                 stiffness, mass = group.vary(dilation, shear, density)
-            K += [next(maps).restrict(one) for one in (stiffness + shift * mass if shift else stiffness)]
-            M.append(mass)
+                K += [at.restrict(one) for at, one in zip(maps, stiffness + shift * mass, strict=True)]
+                M.append(mass)
         starts = np.cumsum([group.unknowns.size for group in self.groups[:-1]], dtype=np.intp)
-        return K, Inertia(self._choice, starts, tuple(M))
+        return K, Inertia(*self._choice, starts, tuple(M))
 
     @cached_property
-    def _choice(self) -> "scipy.sparse.csr_matrix":
-        """From the free unknowns to those of all elements."""
-        return self.constraint[np.concatenate([group.unknowns.ravel() for group in self.groups])]
+    def _choice(self) -> "tuple[scipy.sparse.csr_matrix, scipy.sparse.csr_matrix]":
+        """From the free unknowns to those of all elements, and its transpose."""
+        choice = self.constraint[np.concatenate([group.unknowns.ravel() for group in self.groups])]
+        return choice, scipy.sparse.csr_matrix(choice.T)
 
     @cached_property
-    def plain(self) -> tuple[Pattern, list[tuple[Array, Array, Array]]] | None:
-        """Of one short chain: pattern, and element matrices per unit λ, G and ρ on free unknowns; a tiny one is one element."""
-        if len(self.groups) > 1 or not isinstance(self.groups[0], ShellGroup) or not self.is_small:
-            return None
+    def plain(self) -> tuple[Array, Array, Array] | None:
+        """Of a tiny chain: matrices per unit λ, G and ρ of all free unknowns at once, which cost less than elements one by one."""
         group, size = self.groups[0], self.constraint.shape[1]
-        if size <= TINY:  # one dense matrix costs less than the elements one by one
-            P = np.asarray(self._choice.toarray()).reshape(*group.unknowns.shape, -1)
-            trace, shear, mass = (np.sum(np.swapaxes(P, 1, 2) @ unit @ P, axis=0) for unit in group.units)
-            return whole_pattern(size), [(trace, shear, mass)]
-        if len(self.maps) > FEW:
+        if len(self.groups) > 1 or not isinstance(group, ShellGroup) or size > TINY:
             return None
-        trace, shear, mass = group.units
-        units = [(at.restrict(trace[k]), at.restrict(shear[k]), at.restrict(mass[k])) for k, at in enumerate(self.maps)]
-        return self.pattern, units
+        P = np.asarray(self._choice[0].toarray()).reshape(*group.unknowns.shape, -1)
+        trace, shear, mass = (np.sum(np.swapaxes(P, 1, 2) @ unit @ P, axis=0) for unit in group.units)
+        return trace, shear, mass
 
     def spread(self, free: Array) -> list[Array]:
         """Element unknowns (elements, size) of every group from the free unknowns of one vector."""
@@ -269,9 +274,9 @@ class ToFree:
 class Inertia:
     """The mass of all elements: M x = Pᵀ m P x."""
 
-    # P, from the free unknowns to those of the elements; `starts` : its first rows of the second group and on.
-    choice: "scipy.sparse.csr_matrix"
-    starts: Index
+    choice: "scipy.sparse.csr_matrix"  # P, from the free unknowns to those of the elements
+    back: "scipy.sparse.csr_matrix"  # Pᵀ
+    starts: Index  # the first rows of P of the second group and on
     # m of the elements of every group, (elements, functions, functions), the same for each component of a solid.
     blocks: tuple[Array, ...]
 
@@ -280,4 +285,4 @@ class Inertia:
         local = self.choice @ x
         for block, rows in zip(self.blocks, np.split(local, self.starts), strict=True):
             rows[:] = (block @ rows.reshape(*block.shape[:2], -1)).reshape(rows.shape)
-        return np.asarray(self.choice.T @ local)
+        return np.asarray(self.back @ local)
