@@ -15,6 +15,7 @@ from studies.instrument.card import load_card
 from studies.progress import Told
 from studies.record.decays import Decays, fit_laws, is_table, read_table, table_of, write_decays
 from studies.reports import style
+from studies.reports.digits import to_error
 from studies.resonator.law import law_of
 from studies.results import Chapter, Drawing, Figure, Part, Result, Sentence, Table, row_of
 
@@ -174,7 +175,7 @@ def _law_chapter(laws: dict[str, Law], decays: Decays) -> Chapter:
         if name == "frequency_Hz":
             note = f"Level: {_law_row(name, law)['level']:.10g} Hz. Scatter: {1e6 * law.scatter:.3g} ppm."
         else:
-            level = f"{law.level.value:.4g} ± {law.level.sd:.2g}"
+            level = " ± ".join(to_error(law.level.value, law.level.sd))
             note = f"1/Q without these: {level}. Scatter: {100 * law.scatter:.2g} %."
         rows, over = [_shown(name, term, law) for term in law.terms], f"{TITLES[name]} over many decays"
         if not rows:
@@ -222,6 +223,7 @@ def _draw_law(name: str, law: Law, decays: Decays) -> Drawing:
             axis.plot(x[rows], y[rows], "o", color=style.BLUE, markersize=4)
             axis.plot(x[rows], fitted[rows], "x", color=style.ORANGE, markersize=4)
             axis.set_xlabel(labels[column])
+            axis.ticklabel_format(axis="y", useOffset=False)
             if column == "pressure_Pa":
                 axis.set_xscale("log")
     return made

@@ -45,6 +45,7 @@ def answers(
 
     def give(command: Callable[..., Result]) -> Callable[..., int]:
         own = inspect.signature(command)
+        name = "hrg " + command.__name__.strip("_").replace("fit_", "fit ").replace("_", "-")
 
         @functools.wraps(command)
         def run(*arguments: Any, json: bool = False, **options: Any) -> int:
@@ -52,7 +53,7 @@ def answers(
             if report is not None:
                 check_ending("--report", report, "a report is an HTML page", ".html", ".htm")
             with guarded({"report": report, **own.bind(*arguments, **options).arguments}, endings) as read:
-                with Stages(f"hrg {command.__name__.strip('_')}"):
+                with Stages(name):
                     result = command(*arguments, **options)
                 result = replace(result, payload=usual | result.payload)
                 if caveats := _caveats_of(read):

@@ -22,14 +22,13 @@ from compensation.bias_selection import (
 )
 from compensation.errors import CompensationError
 from compensation.memory import NO_MEMORY, Memory, follow_lag
-from compensation.stability import allan_deviation, fit_noise
 from studies.errors import InputError, naming
 from studies.models import Model, compensate, source_of
 from studies.models.kinds.bias import OUTPUTS, save_bias
 from studies.record import COMPENSATED, Record
 from studies.record.plausible import records_of_one_gyro
 from studies.record.rest import TEMPERATURES, choose_column, require_rest
-from studies.record.stability import Stability, unbroken
+from studies.record.stability import Stability, read_stability, unbroken
 
 Over = Literal["auto", "frequency", "temperature"]
 METHODS: tuple[Method, ...] = ("guarded", "paper")
@@ -128,17 +127,11 @@ def study_bias(
     longest = max(records, key=len)
     after = compensate(model, longest, extrapolate=True)[f"{COMPENSATED}{output}"]
     step, series = unbroken(longest["time_s"], {"before": longest[output], "after": after})
-    spectra = [_spectrum(values, step) for values in series.values()]
+    long = min(map(len, series.values())) >= FEWEST_FOR_ALLAN
+    spectra = [read_stability(values, step, 0.9) if long else None for values in series.values()]
     odd = find_opposite(runs, fit.reference)
     opposite = None if odd is None else records[odd].path or f"run {odd + 1}"
     return BiasStudy(output, column, tuple(runs), tuple(judged), model, spectra[0], spectra[1], step, why, opposite)
-
-
-def _spectrum(values: Array, step: float) -> Stability | None:
-    if values.size < FEWEST_FOR_ALLAN:
-        return None
-    allan = allan_deviation(values, step, confidence=0.9)
-    return Stability(allan, fit_noise(allan))
 
 
 def check_lengths(records: Sequence[Record]) -> None:
