@@ -58,20 +58,17 @@ class ErrorMap:
     error: Array  # array (M, N), J of eq. (26) over the integral of the realistic amplitude squared (1)
 
 
-def map_integral_error(
-    frequency_ratio: ArrayLike, damping_ratio: ArrayLike, *, k: float, zeta: float, rate: float = 1.0,
-    settling_times: float = 5.0,
-) -> ErrorMap:  # fmt: skip
+def map_integral_error(frequency_ratio: ArrayLike, damping_ratio: ArrayLike, *, k: float, zeta: float) -> ErrorMap:
     """Judge the simplified transfer function (24) on mistuned gyros by its integral error: eq. (26), figure 3.
 
     J(δk, δζ) = ∫₀ᵀ [A₂₀ − A₂₀*]² dt / ∫ A₂₀*² dt after a step of the rate, A₂₀* from (1) for k₂ = δk k, ζ₂ = δζ ζ, the
-    latter of the tuned gyro; here T = `settling_times` / (k ζ).
+    latter of the tuned gyro; here T = 5 / (k ζ).
     """
     ratios, dampings = np.array(frequency_ratio, float, ndmin=1), np.array(damping_ratio, float, ndmin=1)
     if np.any(ratios <= 0) or np.any(dampings <= 0):
         raise CompensationError("the ratios of frequency and of damping must be positive.")
-    time = np.linspace(0.0, settling_times / (k * zeta), 400)
-    step = np.where(time > 0, rate, 0.0)
+    time = np.linspace(0.0, 5 / (k * zeta), 400)
+    step = np.where(time > 0, 1.0, 0.0)
     tuned = tune(k, zeta)
     simple = relate_rate_to_tuned_amplitude(tuned).simulate(time, step)
     size = float(np.trapezoid(np.abs(propagate_envelope(tuned, time, step).secondary) ** 2, time))

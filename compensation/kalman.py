@@ -7,6 +7,7 @@ from numpy.typing import ArrayLike
 
 from compensation.arrays import Array
 from compensation.errors import CompensationError
+from compensation.transfer import run_states
 
 SETTLED = 1e-13  # relative change of the covariance in one step below which it has settled
 _NOT_STEADY = "this model has no steady filter: a persistent state is not observed, or no process noise drives it."
@@ -110,26 +111,11 @@ def run_filter(model: LinearModel, measurements: ArrayLike, start: ArrayLike, co
         states[i], covariances[i], innovations[i], spreads[i] = x, P, row - C @ before, S
         if settled:  # the covariance does not depend on the data; once it repeats itself x⁺ = (1 − K C) F x + K z
             rest = slice(i + 1, None)
-            states[rest] = _follow((np.eye(n) - K @ C) @ F, z[rest] @ K.T, x)
+            states[rest] = run_states((np.eye(n) - K @ C) @ F, K @ z[rest].T, x)[:, 1:].real.T
             covariances[rest], spreads[rest] = P, S
             innovations[rest] = z[rest] - states[i:-1] @ (C @ F).T
             break
     return KalmanRun(states, covariances, innovations, spreads)
-
-
-def _follow(A: Array, u: Array, start: Array) -> Array:
-    """Return x_{k+1} = A x_k + u_k, (N, n): triangular by Schur's form A = U T Uᴴ, so that each row is a filter of first order."""
-    from scipy.linalg import rsf2csf, schur
-    from scipy.signal import lfilter
-
-    real = schur(A)
-    T, U = rsf2csf(*real) if np.diag(real[0], -1).any() else real  # a pair of complex poles is a block
-    begun, driven = start @ U.conj(), u @ U.conj()
-    y = np.empty_like(driven)
-    for k in reversed(range(len(T))):
-        drive = driven[:, k] + np.vstack([begun, y[:-1]])[:, k + 1 :] @ T[k, k + 1 :] if len(u) else driven[:, k]
-        y[:, k] = lfilter([1.0], [1.0, -T[k, k]], drive, zi=[T[k, k] * begun[k]])[0]
-    return np.asarray((y @ U.T).real)
 
 
 def settle(model: LinearModel) -> tuple[Array, Array, Array]:

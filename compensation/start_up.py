@@ -12,6 +12,8 @@ from compensation.errors import CompensationError
 
 LOCKED = math.radians(5.0)
 SETTLED = 0.01
+NOTHING = 1e-4  # amplitude at the start, over the command
+MOST_STEPS = 200_000
 
 
 @dataclass(frozen=True)
@@ -26,10 +28,7 @@ class StartUp:
     ready: float
 
 
-def start_up(
-    tau: float, loops: Loops, *, headroom: float = 20.0, offset: float = 0.0, amplitude: float = 1e-4,
-    seconds: float | None = None, most_steps: int = 200_000,
-) -> StartUp:  # fmt: skip
+def start_up(tau: float, loops: Loops, *, headroom: float = 20.0, offset: float = 0.0) -> StartUp:
     """Start the vibration from almost nothing, a quarter cycle off: nothing is linearised here.
 
     Ż = −Z/τ − i (ν − ω + ω_n) Z + u, the drive u at most `headroom` times what holds the amplitude.
@@ -38,8 +37,8 @@ def start_up(
         raise CompensationError(f"the drive reaches {headroom:g} of the commanded amplitude; it must exceed 1.")
     require_stable(loops, 1 / tau, ("amplitude", "phase"))
     least = tau * math.log(headroom / (headroom - 1))
-    seconds = seconds if seconds is not None else 3 * least + 20 / loops.phase + 10 / loops.amplitude
-    T = max(loops.step, seconds / most_steps)
+    seconds = 3 * least + 20 / loops.phase + 10 / loops.amplitude
+    T = max(loops.step, seconds / MOST_STEPS)
     slow = Loops(
         loops.amplitude, loops.phase, loops.rate, loops.quadrature, 1 / T, loops.delay, min(loops.demodulator, 1 / T)
     )
@@ -48,7 +47,7 @@ def start_up(
     most, smoothing, (late, rest) = headroom / tau, slow.smoothing, slow.late
     steps = math.ceil(seconds / T)
     course = np.empty((steps, 3))
-    Z, seen = complex(0.0, amplitude), complex(0.0, amplitude)
+    Z = seen = 1j * NOTHING
     drive_integral = phase_integral = 0.0
     waiting = [(0.0, 0.0)] * (late + (rest > 0) + 1)
     for n in range(steps):

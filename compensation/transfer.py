@@ -148,22 +148,23 @@ def _step(A: Complex, B: Complex, steps: NDArray[np.float64]) -> tuple[Complex, 
 
 
 def _march_evenly(A: Complex, B: Complex, t: NDArray[np.float64], u: NDArray[Any], x0: Complex) -> Complex:
-    """States on an even grid; the Schur form turns the recursion into a chain of first-order ones."""
-    from scipy.linalg import schur
+    """States on an even grid."""
+    (transition,), (held,), (ramp,) = _step(A, B, np.array([(t[-1] - t[0]) / (len(t) - 1)]))
+    return np.asarray(run_states(transition, np.outer(held, u[:-1]) + np.outer(ramp, np.diff(u)), x0), dtype=complex)
 
-    step = np.array([(t[-1] - t[0]) / (len(t) - 1)])
-    (transition,), (held,), (ramp,) = _step(A, B, step)
-    if not len(B):
-        return np.zeros((0, len(t)), dtype=complex)
-    T, Z = schur(transition, output="complex")
-    forcing = Z.conj().T @ (np.outer(held, u[:-1]) + np.outer(ramp, np.diff(u)))
-    z = np.empty((len(B), len(t)), dtype=complex)
-    z[:, 0] = Z.conj().T @ x0
-    for i in reversed(range(len(B))):
-        driven = forcing[i] + T[i, i + 1 :] @ z[i + 1 :, :-1]
-        z[i] = recur(T[i, i], np.r_[z[i, 0], driven])
-    states: Complex = Z @ z
-    return states
+
+def run_states(transition: NDArray[Any], forcing: NDArray[Any], start: NDArray[Any]) -> NDArray[Any]:
+    """States x_{k+1} = A x_k + f_k, (n, rows + 1): by Schur's form of A a chain of first-order recursions."""
+    from scipy.linalg import rsf2csf, schur
+
+    T, Z = schur(transition) if len(transition) else (transition, transition)
+    if np.isrealobj(T) and np.diag(T, -1).any():  # a pair of complex poles is a block
+        T, Z = rsf2csf(T, Z)
+    forced, z = Z.conj().T @ forcing, np.empty((len(T), forcing.shape[1] + 1), dtype=np.result_type(T, forcing, start))
+    z[:, 0] = Z.conj().T @ start
+    for i in reversed(range(len(T))):
+        z[i] = recur(T[i, i], np.r_[z[i, 0], forced[i] + T[i, i + 1 :] @ z[i + 1 :, :-1]])
+    return np.asarray(Z @ z)
 
 
 def _march(A: Complex, B: Complex, t: NDArray[np.float64], u: NDArray[Any], x0: Complex) -> Complex:

@@ -24,7 +24,7 @@ from shell.inertia import MassProperties, weigh
 from shell.kernel import StrainTable
 from shell.modes import Mode
 from shell.prestress import expansion_shares, mean_answer, neighbour, settle
-from shell.quadrature import Array, gauss
+from shell.quadrature import Array
 from shell.solution import Solution, face_table, total
 from shell.system import Group, ShellGroup, System
 
@@ -106,11 +106,11 @@ class Loads:
             elif kind == "cooling":
                 stress[:, :, :3] = 3 * bulk * self.away(group.table.position)[..., None, None]
             elif kind == "spin":
-                force = along_r(group, rho * radii(group, system))
+                force = directed(group, rho * group.radius)
             elif kind == "axial":
-                force = _directed(group, np.full(shape, -rho), 2)
+                force = directed(group, np.full(shape, -rho), 1)
             else:
-                force = along_r(group, np.full(shape, -rho))
+                force = directed(group, np.full(shape, -rho))
                 force[:, :, 1] = rho
             found.append(-group.table.loads(stress, force))
         return system.gather(found)
@@ -233,29 +233,10 @@ class Loads:
         return float(t_r * u - t_z * w), float(t_z * u + t_r * w), float(section.r[e, s])
 
 
-def radii(group: Group, system: System) -> Array:
-    """Distance of the points from the axis, (elements, stations, points)."""
-    if not isinstance(group, ShellGroup):
-        return group.table.radius[:, None]
-    section = group.section
-    eta = gauss(max(system.level.through) + 2)[0]
-    return np.asarray(section.r[..., None] - section.tangent_z[..., None] * section.thickness[..., None] * eta / 2)
-
-
-def along_r(group: Group, amount: Array) -> Array:
-    """A vector field along r, in the axes of a group: (elements, stations, 3, points)."""
-    return _directed(group, amount, 0)
-
-
-def _directed(group: Group, amount: Array, axis: int) -> Array:
-    """A vector field along r (axis 0) or z (axis 2), in the axes of a group."""
+def directed(group: Group, amount: Array, axis: int = 0) -> Array:
+    """A vector field along r (axis 0) or z (1), in the axes of a group: (elements, stations, 3, points)."""
     field = np.zeros((*amount.shape[:2], 3, amount.shape[2]))
-    if not isinstance(group, ShellGroup):
-        field[:, :, axis] = amount
-        return field
-    t_r, t_z = group.section.tangent_r[..., None], group.section.tangent_z[..., None]
-    tangent, normal = (t_r, -t_z) if axis == 0 else (t_z, t_r)
-    field[:, :, 0], field[:, :, 2] = tangent * amount, normal * amount
+    field[:, :, 0], field[:, :, 2] = group.axes[axis] * amount
     return field
 
 

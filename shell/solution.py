@@ -202,12 +202,7 @@ def _integrate(at_points: Array, group: Group) -> Array:
 
 def radial(group: Group, displacement: Array) -> Array:
     """Displacement away from the axis, (elements, stations, points)."""
-    if not isinstance(group, ShellGroup):
-        return displacement[:, :, 0]
-    section = group.section
-    return np.asarray(
-        section.tangent_r[..., None] * displacement[:, :, 0] - section.tangent_z[..., None] * displacement[:, :, 2]
-    )
+    return np.asarray(sum(group.axes[0, k] * displacement[:, :, 2 * k] for k in (0, 1)))
 
 
 def plane_energies(E: Array, nu: Array, s: Array, theta: Array, twist: Array) -> tuple[Array, Array]:

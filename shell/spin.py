@@ -20,7 +20,7 @@ from shell.eigen import Factor
 from shell.elastic import Elastic
 from shell.errors import ShellError
 from shell.finite import solved_as_solid
-from shell.loads import along_r, radii
+from shell.loads import directed
 from shell.modes import Mode
 from shell.prestress import answer_without, mean_answer, neighbour
 from shell.quadrature import Array
@@ -49,7 +49,7 @@ def spin_shift(mode: Mode, elastic: Elastic) -> SpinShift:
         raise ShellError("the second-order effect of spin is computed for the lowest mode of a harmonic from 2 up.")
     system, mass, eigenvalue = solution.system, total(solution.kinetic), solution.eigenvalue
     rest = neighbour(mode, 0)
-    pull = [_pull(group, elastic.rho * along_r(group, radii(group, system))) for group in rest.groups]
+    pull = [_pull(group, elastic.rho * directed(group, group.radius)) for group in rest.groups]
     stiffening = 4 * float(mean_answer(mode)[0].vector @ rest.gather(pull)) / mass
     around = [(radial(group, d), d[:, :, 1]) for group, d in zip(system.groups, solution.displacement, strict=True)]
     softening = sum(
@@ -58,7 +58,7 @@ def spin_shift(mode: Mode, elastic: Elastic) -> SpinShift:
     )
     forces = []
     for group, (r, t) in zip(system.groups, around, strict=True):
-        force = along_r(group, elastic.rho * t)
+        force = directed(group, elastic.rho * t)
         force[:, :, 1] = elastic.rho * r
         forces.append(_pull(group, force))
     load = system.gather(forces)

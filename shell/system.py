@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import islice
-from typing import TypeAlias
+from typing import ClassVar, TypeAlias
 
 import numpy as np
 import scipy
@@ -15,7 +15,7 @@ from shell.eigen import Pattern, find_pattern
 from shell.elastic import Constants, are_uniform
 from shell.kernel import Section, StrainTable, integrate_mass, integrate_stiffness, station_mass, station_stiffness
 from shell.layout import Chain, Level
-from shell.quadrature import Array
+from shell.quadrature import Array, gauss
 from shell.sparse import Index
 
 Pair: TypeAlias = tuple[Array, Array]
@@ -56,6 +56,18 @@ class ShellGroup:
             amplitudes += inner
             amplitudes[node] = inner
         return np.asarray(unknowns)
+
+    @property
+    def axes(self) -> Array:
+        """Parts of the radial and of the axial direction along tangent and normal, (r or z, tangent or normal, elements, stations, 1)."""
+        t_r, t_z = self.section.tangent_r[..., None], self.section.tangent_z[..., None]
+        return np.array([[t_r, -t_z], [t_z, t_r]])
+
+    @property
+    def radius(self) -> Array:
+        """Distance of the points from the axis, (elements, stations, points)."""
+        eta, section = gauss(self.table.volume.shape[2])[0], self.section
+        return np.asarray(section.r[..., None] - section.tangent_z[..., None] * section.thickness[..., None] * eta / 2)
 
     def gather(self, loads: Array) -> Array:
         """Loads (elements, functions, amplitudes) on the unknowns (elements, size) that are solved for."""
@@ -101,6 +113,13 @@ class SolidGroup:
     def spread(self, raw: Array) -> Array:
         """Unknowns (cells, size) of functions as they are in each cell."""
         return np.asarray(raw[self.unknowns] * np.repeat(self.signs, 3, axis=1))
+
+    axes: ClassVar[Array] = np.eye(2)[:, :, None, None, None]  # see `ShellGroup.axes`; a cell's own are r and z
+
+    @property
+    def radius(self) -> Array:
+        """Distance of the points from the axis, (cells, 1, points)."""
+        return self.table.radius[:, None]
 
     def gather(self, loads: Array) -> Array:
         """Loads (cells, functions, 3) of functions as they are in each cell, on the unknowns (cells, size)."""

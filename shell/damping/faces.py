@@ -47,6 +47,14 @@ class FreeFaces:
         """∫ density dA / π."""
         return float(np.sum(density * self.area))
 
+    def mean_stress(self, first: float, last: float) -> tuple[float, float]:
+        """σ_φφ and σ_θθ of a face, Pa, E/(1 − ν²) (ε_φ + ν ε_θ) and its like, means by area between two positions."""
+        area = np.where((self.position >= first) & (self.position <= last), self.area, 0.0)
+        if not area.any():
+            raise ShellError(f"no part of the shell lies between the positions {first:g} and {last:g}.")
+        stiff, (along, around) = area / area.sum() * self.E / (1 - self.nu**2), self.strain[:2]
+        return float(stiff @ (along + self.nu * around)), float(stiff @ (around + self.nu * along))
+
 
 @dataclass(frozen=True, eq=False)
 class Vibration:
