@@ -5,18 +5,9 @@ from dataclasses import dataclass
 from typing import Literal
 
 from compensation.stability import AllanDeviation, NoiseCoefficients
+from studies.acceptance import measure
 from studies.acceptance.limits import ELSEWHERE, QUANTITIES, Limits, TestedQuantity
-from studies.acceptance.measure import (
-    Found,
-    Measured,
-    measure_decays,
-    measure_drift,
-    measure_run_down,
-    measure_scale,
-    measure_seal,
-    measure_temperature,
-    measure_warm_up,
-)
+from studies.acceptance.measure import Found, Measured
 from studies.acceptance.runs import Test, sort_records
 from studies.acceptance.service import measure_life, measure_storage, measure_transfer
 from studies.fits.ringdown import Decay
@@ -24,8 +15,8 @@ from studies.record import Record
 
 FIRST: dict[Test, Callable[[Record], Found]] = {
     # tests that take the first record that serves them
-    "scale-factor": measure_scale,
-    "run-down": measure_run_down,
+    "scale-factor": measure.measure_scale,
+    "run-down": measure.measure_run_down,
     "transfer": measure_transfer,
     "angle-storage": measure_storage,
 }
@@ -91,21 +82,21 @@ def judge(
 ) -> Acceptance:
     """Measure what the records and the free decays give and set it against the limits."""
     sorted_runs, left = sort_records(records, output)
-    found: Found = measure_seal(records)
+    found: Found = measure.measure_seal(records)
     allan = noise = band = None
     if "warm-up" in sorted_runs:
         asked = None if limits is None else limits.warm_up.band_deg_per_h
-        more, band = measure_warm_up(sorted_runs["warm-up"][0], output, asked)
+        more, band = measure.measure_warm_up(sorted_runs["warm-up"][0], output, asked)
         found |= more
     if "temperature" in sorted_runs:
-        found |= measure_temperature(sorted_runs["temperature"], output)
+        found |= measure.measure_temperature(sorted_runs["temperature"], output)
     if "drift" in sorted_runs:
-        more, allan, noise = measure_drift(sorted_runs["drift"], output)
+        more, allan, noise = measure.measure_drift(sorted_runs["drift"], output)
         found |= more
-    for test, measure in FIRST.items():
+    for test, read in FIRST.items():
         for record in sorted_runs.get(test, [])[:1]:
-            found |= measure(record)
-    found |= measure_decays(decays)
+            found |= read(record)
+    found |= measure.measure_decays(decays)
     found |= measure_life(sorted_runs.get("drift", []), output)
     lines = tuple(JudgedQuantity(q, found.get(q.key), None if limits is None else limits.of(q.key)) for q in QUANTITIES)
     used: dict[str, str] = {record.path: test for test, group in sorted_runs.items() for record in group}

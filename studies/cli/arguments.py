@@ -37,6 +37,13 @@ FRACTION = numbers(lambda one: 0 < one < 1, "between 0 and 1")
 
 CARD = "Path of a card, or the name of a built-in one (hrg cards)."
 REFERENCE = "Temperature in °C; the card's reference temperature unless given."
+PROFILE = (
+    "A CSV file (time_s,chamber_temperature_degC, linear between its rows), or words in quotes with temperatures in °C, durations as"
+    ' 5h, 30min or 90s, and rates in K/min: "soak T DURATION", "step FROM TO DURATION", "ramp FROM TO RATE", "staircase FROM TO STEP'
+    ' HOLD", "cycle START FIRST SECOND RATE HOLD COUNT", joined by "then"; for example "step 20 -10 5h then ramp -10 40 1". The gyro'
+    " starts settled at the first temperature."
+)
+Course = Annotated[str, Parameter(help=PROFILE)]
 Card = Annotated[str, Parameter(help=CARD)]
 Records = Annotated[str, Parameter(help="The records (CSV).")]
 Run = Annotated[str, Parameter(help="The record (CSV).")]

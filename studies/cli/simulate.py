@@ -3,20 +3,26 @@
 from typing import Annotated, Literal
 
 import numpy as np
+from cyclopts import Parameter
 
 from studies.calibration.ahead import spread_of_prediction
-from studies.cli.arguments import POSITIVE, Card, Out, Seed, Theory
+from studies.cli.arguments import POSITIVE, PROFILE, Card, Out, Seed, Theory
 from studies.cli.output import answers, keep_record, say
 from studies.instrument.card import load_card
 from studies.results import Figure, Result, Sentence, Table, row_of
 from studies.simulation.chamber import load_drive
 from studies.simulation.virtual_gyro import simulate_run
 
+DRIVES = (
+    "Further columns of the file command the drives (drive_amplitude_V, electrode_bias_V, quadrature_V, pattern_angle_deg) or"
+    " are applied (rate_deg_per_s). Or a record: its housing temperature, or else its chamber temperature, is imposed at its rows."
+)
+
 
 @answers("hrg.simulate/1")
 def simulate(
     card: Card,
-    profile: str,
+    profile: Annotated[str, Parameter(help=f"{PROFILE} {DRIVES}")],
     *,
     out: Out,
     row: Annotated[float, POSITIVE] = 1.0,
@@ -35,13 +41,6 @@ def simulate(
     defaults (hrg keys card).
 
     Args:
-        profile: A CSV file (time_s,chamber_temperature_degC, linear between its rows; drive_amplitude_V,
-            electrode_bias_V, quadrature_V or pattern_angle_deg beside them command the drives, rate_deg_per_s is
-            applied), or words in quotes with temperatures in °C, durations as 5h, 30min or 90s, and rates in K/min:
-            "soak T DURATION", "step FROM TO DURATION", "ramp FROM TO RATE", "staircase FROM TO STEP HOLD", "cycle START
-            FIRST SECOND RATE HOLD COUNT", joined by "then"; for example "step 20 -10 5h then ramp -10 40 1". Or a
-            record: its housing temperature, or else its chamber temperature, is imposed at its rows. The gyro starts
-            settled at the first temperature.
         row: Time between rows in s; a record keeps its rows.
         noiseless: Leave out noise, sensor lag and rounding.
         boundary: Column of a record that is imposed: chamber or housing.

@@ -7,7 +7,7 @@ import numpy as np
 
 from compensation.arrays import Array
 from shell.constants import zero_Celsius
-from studies.cli.arguments import Card, numbers
+from studies.cli.arguments import Card, Course, numbers
 from studies.cli.output import answers
 from studies.instrument.card import load_card
 from studies.instrument.display import name_constant
@@ -25,18 +25,13 @@ from thermal.transient import Transient, check_energy
 
 @answers("hrg.thermal/1")
 def thermal(
-    card: Card, profile: str, *, rows: Annotated[int, numbers(lambda one: one > 1, "at least 2")] = 13
+    card: Card, profile: Course, *, rows: Annotated[int, numbers(lambda one: one > 1, "at least 2")] = 13
 ) -> Result:
     """Show time constants, their sensitivities, and the temperatures of housing, base, stem and shell in time.
 
     The heat path is the card's table [thermal] with its defaults (hrg keys card).
 
     Args:
-        profile: A CSV file (time_s,chamber_temperature_degC, linear between its rows), or words in quotes with
-            temperatures in °C, durations as 5h, 30min or 90s, and rates in K/min: "soak T DURATION", "step FROM TO
-            DURATION", "ramp FROM TO RATE", "staircase FROM TO STEP HOLD", "cycle START FIRST SECOND RATE HOLD COUNT",
-            joined by "then"; for example "step 20 -10 5h then ramp -10 40 1". The gyro starts settled at its first
-            temperature.
         rows: Rows of the table, evenly spaced in time.
     """
     instrument = load_card(card)
