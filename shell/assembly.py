@@ -6,11 +6,11 @@ from functools import lru_cache
 import numpy as np
 
 from shell.blocks import Mesh, Solid, Tie, constrain, find_boundary, mesh_solid, number_functions
-from shell.cells import at_gauss_points, tabulate_cells
+from shell.cells import CellTable, at_gauss_points, tabulate_cells
 from shell.corner import find_kinks, lay_clamped_edge, lay_clamped_face, lay_corner
 from shell.errors import ShellError, mm
-from shell.kernel import Section, shell_table
-from shell.layout import OTHERS, Chain, End, Level, lay_chain
+from shell.kernel import Section, StrainTable, shell_table
+from shell.layout import OTHERS, Chain, End, Level, crowding, lay_chain
 from shell.quadrature import Array, at_gauss, gauss, nodal
 from shell.resonator import Resonator
 from shell.root import lay_root
@@ -34,8 +34,21 @@ def lay_system(resonator: Resonator, n: int, level: Level, alongside: tuple[int,
 
 @lru_cache(maxsize=12)
 def build_system(resonator: Resonator, n: int, level: Level) -> System:
-    """The system of a resonator, kept for the next material or temperature, since only the material changes with them."""
-    return lay_system(resonator, n, level)
+    """The system of a resonator, kept for the next material or temperature, since only the material changes with them.
+
+    Harmonics above 1 have the same elements, unknowns and constraints; their strains alone differ.
+    """
+    if n <= 2 or crowding(n) < 1:
+        return lay_system(resonator, n, level)
+    alike = build_system(resonator, 2, level)
+    return replace(alike, n=n, groups=tuple(_with_waves(group, n, level) for group in alike.groups))
+
+
+def _with_waves(group: Group, n: int, level: Level) -> Group:
+    """The same elements for another harmonic."""
+    if isinstance(group, SolidGroup):
+        return replace(group, table=replace(group.table, n=n))
+    return replace(group, table=_strains(group.section, n, level))
 
 
 def assemble(resonator: Resonator, layout: Layout, n: int, level: Level, rigid_motions: int = 0) -> System:
@@ -77,7 +90,7 @@ def lay_resonator(resonator: Resonator, n: int, level: Level, alongside: tuple[i
     models = iter(model.chains if model else [None] * (1 + len(kinks)))
     whole_section = max(level.through) > 1  # a Naghdi shell is clamped as a line and has no singular corners there
     if resonator.support == "stem":
-        root, start = lay_root(resonator, level, lowest)
+        root, start = lay_root(resonator, level, 2 if lowest > 1 else 1)
     elif resonator.support == "clamped-face":
         root, start = lay_clamped_face(resonator, level.rings)
     elif resonator.support == "clamped-pole" and whole_section:
@@ -117,23 +130,36 @@ def solid_group(
     rows = constrain(mesh, boundary, ties, degree, n, start)
     numbers, signs, count = number_functions(mesh, degree)
     unknowns = start + (3 * numbers[:, :, None] + np.arange(3)).reshape(len(numbers), -1)
-    table = tabulate_cells(mesh.grid, at_gauss_points(degree, degree, degree + 2), n, solid.position)
+    table = replace(_tabulate(mesh, degree, solid.position), n=n)
     return SolidGroup(table, unknowns, mesh, boundary, signs), rows, start + 3 * count
+
+
+@lru_cache(maxsize=12)  # the same for every harmonic
+def _tabulate(mesh: Mesh, degree: int, position: float) -> CellTable:
+    return tabulate_cells(mesh.grid, at_gauss_points(degree, degree, degree + 2), 0, position)
+
+
+@lru_cache(maxsize=12)  # the same for every harmonic
+def _stations(resonator: Resonator, chain: Chain, degree: int) -> Section:
+    return sections(resonator, chain, *gauss(degree + 2))
 
 
 def _shell_group(resonator: Resonator, chain: Chain, n: int, level: Level, start: int) -> tuple[ShellGroup, Rows, int]:
     """Tabulate one chain and number its unknowns, (node, amplitude) from `start`; see `_anchor` for the rows."""
-    p, orders = level.along, level.through
-    xi, weights = gauss(p + 2)
-    eta = gauss(max(orders) + 2)
-    section = sections(resonator, chain, xi, weights)
-    table = shell_table(section, n, orders, eta, at_gauss(nodal, p, p + 2))
-    elements, m = len(chain.segments), sum(orders) + 3
+    p, section = level.along, _stations(resonator, chain, level.along)
+    table = _strains(section, n, level)
+    elements, m = len(chain.segments), sum(level.through) + 3
     nodes = p * np.arange(elements)[:, None] + np.arange(p + 1)
     unknowns = start + (nodes[:, :, None] * m + np.arange(m)).reshape(elements, -1)
     anchors, rows, fresh = _anchor(chain, unknowns, m, start + (elements * p + 1) * m)
     group = ShellGroup(table, unknowns, chain, section, anchors)
     return group, rows, fresh
+
+
+def _strains(section: Section, n: int, level: Level) -> StrainTable:
+    """The strains of a chain at its stations."""
+    orders, p = level.through, level.along
+    return shell_table(section, n, orders, gauss(max(orders) + 2), at_gauss(nodal, p, p + 2))
 
 
 def _anchor(chain: Chain, unknowns: Index, m: int, fresh: int) -> tuple[tuple[tuple[int, int], ...], Rows, int]:

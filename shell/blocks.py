@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,6 +55,7 @@ class Mesh:
 SIDES = ((0, 1), (2, 3), (0, 2), (1, 3))
 
 
+@lru_cache(maxsize=12)  # the same for every harmonic
 def mesh_solid(solid: Solid, degree: int) -> Mesh:
     """Place the cells, identify the corners that coincide and the edges between them."""
     nodes = lobatto(degree)

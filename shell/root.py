@@ -70,8 +70,9 @@ class Frame:
     rings: tuple[int, ...]  # for each contact, how often the rings around its fillet shrink
 
 
+@lru_cache(maxsize=12)
 def lay_root(resonator: Resonator, level: Level, n: int) -> tuple[Solid, float]:
-    """Patches of cap, root and stem for harmonic n, and the arc length where the shell begins."""
+    """Patches of cap, root and stem for harmonic n (all above 1 have the same), and the arc length where the shell begins."""
     like = level.like or resonator
     model = _find_frame(like)
     frame = model if like == resonator else _find_frame(resonator, like)

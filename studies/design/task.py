@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -40,7 +41,7 @@ class Task:
     start: Array  # the first design, array (parameters,)
     exact: tuple[int, ...] = ()  # places of the columns whose slopes follow all columns, each by all parameters
 
-    @property
+    @cached_property
     def columns(self) -> list[str]:
         """The names of all columns, their slopes apart."""
         names = [column.name for column in self.study.columns]

@@ -79,8 +79,9 @@ class Case:
         parameters = {**self.parameters, name: value}
         case = Case(self.build(parameters), parameters)
         at = {T: case.temperature(None) if T == self.temperature(None) else T for _, _, T in self._solved}
+        grown = {T: case.instrument.at(at[T]) for T in at}
         case._solved |= {
-            (n, theory, at[T]): (within, tuple(mode.kept_on(*case.instrument.at(at[T])) for mode in found))
+            (n, theory, at[T]): (within, tuple(mode.kept_on(*grown[T]) for mode in found))
             for (n, theory, T), (within, found) in self._solved.items()
         }
         case._named |= {
