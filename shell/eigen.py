@@ -36,6 +36,12 @@ class Pattern:
 
 def find_pattern(unknowns: list[Index], size: int, in_order: bool = False) -> Pattern:
     """Split the unknowns of every element and order the shared ones (reverse Cuthill-McKee) unless they are in order."""
+    return _find_pattern(tuple(np.asarray(members, dtype=np.intp).tobytes() for members in unknowns), size, in_order)
+
+
+@lru_cache(maxsize=32)  # the same for all designs whose elements join alike
+def _find_pattern(numbers: tuple[bytes, ...], size: int, in_order: bool) -> Pattern:
+    unknowns = [np.frombuffer(members, dtype=np.intp) for members in numbers]
     uses = np.bincount(np.concatenate(unknowns), minlength=size)
     shared = np.flatnonzero(uses > 1)
     place = np.full(size, -1, dtype=np.intp)  # in the band; -1 for an element's own
@@ -57,7 +63,6 @@ def find_pattern(unknowns: list[Index], size: int, in_order: bool = False) -> Pa
     return Pattern(tuple(unknowns), order, own, tuple(where), tuple(entries), shared, size, band)
 
 
-@lru_cache(maxsize=16)
 def whole_pattern(size: int) -> Pattern:
     """The pattern of one element with all unknowns."""
     return find_pattern([np.arange(size)], size)
