@@ -1,6 +1,6 @@
 """`hrg materials`: the published laws of the materials, and how they compare in one geometry."""
 
-from math import isnan, nan
+from math import inf, isnan, nan, pi
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -27,7 +27,7 @@ def materials(name: str = "", *, compare: bool = False, card: Card = "", harmoni
 
     Args:
         name: Show one material's laws with their properties, sources and ranges.
-        compare: Compare all laws in the geometry of --card: frequency, TCF, thermoelastic Q, worthwhile surface loss.
+        compare: Compare all laws in the geometry of --card: frequency, TCF, thermoelastic Q, worthwhile surface loss, decay time.
     """
     if card and not compare:
         raise InputError(f"--card {card}: it belongs to --compare; add that.")
@@ -43,23 +43,39 @@ def materials(name: str = "", *, compare: bool = False, card: Card = "", harmoni
     rows = [row | {key: spell(row[key]) or "—" for key in ("lacks", "unchecked")} for row in entries]
     columns = "name | law | range_degC.0 … range_degC.1: range (°C) g | lacks: not stated | unchecked: not checked | source"  # fmt: skip
     return Result(
-        {"materials": entries},
+        {"materials": entries, "surfaces": _surfaces(name)},
         "Materials",
         "Materials and their published laws over temperature.",
         [
             Table("Materials", rows, columns, "The first law of a material is its default."),
             *(part for law in laws if name for part in _law_tables(law)),
+            Table("Surface loss", _surfaces(name), SURFACES, "Depth times loss of the damaged layer; a card chooses with [loss] surface_treatment."),
         ],
     )
 
 
+SURFACES = "treatment | depth_pm ± sd_pm: surface layer (pm) | source"
+
+
+def _surfaces(name: str) -> list[dict[str, Any]]:
+    from shell.damping.sources import known_losses
+
+    known = known_losses(name)
+    stated = {"best": known["surface"], **known.get("treatment", {})} if "surface" in known else {}
+    return [
+        {"treatment": key, "depth_pm": 1e12 * one["depth_m"], "sd_pm": 1e12 * one["depth_m"] * one["relative_sd"], "source": one["source"]}
+        for key, one in stated.items()
+    ]  # fmt: skip
+
+
 COMPARED = (
     "material | law | frequency_Hz ± frequency_sd_Hz: f (Hz) | slope_ppm_per_degC ± slope_sd_ppm_per_degC: TCF (ppm/°C) | thermoelastic_q: thermoelastic Q .3"
-    " | surface_q: surface Q .3 | surface_layer_pm: break-even surface (pm) .3g"
+    " | surface_q: surface Q .3 | surface_layer_pm: break-even surface (pm) .3g | decay_s: decay time (s) .3"
 )
 WORTH = (
     "Thermoelastic Q: from heat conduction alone. Surface Q: where a source gives the depth times loss of a surface layer. Break-even surface:"
-    " the depth times loss at which the surface loses as much as heat conduction; a better surface gains little. Empty: no source (see below)."
+    " the depth times loss at which the surface loses as much as heat conduction; a better surface gains little."
+    " Decay time, the figure of merit of a gyro's drift: Q/(π f) of both, without the bulk: what is possible at most. Empty: no source (see below)."
 )
 
 
@@ -134,7 +150,7 @@ def _describe(law: Material) -> dict[str, Any]:
 HEAT = ("expansion", "conductivity", "heat_capacity")
 FIGURES = (
     *("frequency_Hz", "frequency_sd_Hz", "slope_ppm_per_degC", "slope_sd_ppm_per_degC"),
-    *("thermoelastic_q", "surface_q", "surface_layer_pm"),
+    *("thermoelastic_q", "surface_q", "surface_layer_pm", "decay_s"),
 )
 
 
@@ -194,5 +210,6 @@ def _figures(resonator: "Resonator", material: Material, T: float, harmonic: int
         heat = Heat(alpha, float(material.value("density", T)) * c, k)
         cause = thermoelastic_cause(vibration, lambda _: heat, (0.0, 0.0, 0.0), "")
         inverse = float(cause.inverse_q(vibration, at)[0])
-        found |= {"thermoelastic_q": 1 / inverse, "surface_layer_pm": 1e12 * inverse / per_layer}
+        decay = 1 / (pi * mode.frequency * (inverse + 1 / found.get("surface_q", inf)))
+        found |= {"thermoelastic_q": 1 / inverse, "surface_layer_pm": 1e12 * inverse / per_layer, "decay_s": decay}
     return found

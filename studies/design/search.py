@@ -260,9 +260,14 @@ class Search:
         for one in self.task.keys.objective:
             column = self.values[:, self.task.columns.index(one.column)]
             if np.ptp(column) <= 1e-12 * np.abs(column).max():
-                why = "The card states no such part of the loss." if column[0] == 0 else ""
+                why = "The card states nothing that makes one, such as a part of the loss or an imperfection." if column[0] == 0 else ""  # fmt: skip
                 raise InputError(
                     f"the objective '{one.column}' is {column[0]:g} whatever the free parameters are; leave it out. {why}".strip()
+                )
+            if len(steps := np.unique(column)) <= len(column) / 2:
+                raise InputError(
+                    f"the objective '{one.column}' changes in steps ({', '.join(f'{step:g}' for step in steps)}), so that no gradient"
+                    " leads to a better design; ask for a quantity that changes continuously."
                 )
 
     def _surface(self, places: NDArray[np.intp], sloped: int = MANY) -> Interpolant:

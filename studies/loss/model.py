@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
-from studies.errors import InputError, naming
+from studies.errors import InputError, naming, nearest
 from studies.loss.films import film_losses
 
 if TYPE_CHECKING:
@@ -155,7 +155,16 @@ def _of_material(
         causes.append(bulk_cause(bulk["coefficient"], bulk["exponent"], bulk["relative_sd"], bulk["source"]))
     else:
         left_out.append(f"bulk: no source states that of {instrument.material.name}; give bulk_coefficient.")
+    treatment = parts.surface_treatment
     surface: Mapping[str, Any] = known.get("surface", {})
+    if treatment is not None:
+        of_treatment: Mapping[str, Any] = known.get("treatment", {})
+        if parts.surface_layer_pm is not None or treatment not in of_treatment:
+            raise InputError(
+                f"{instrument.path} [loss]: surface_treatment = '{treatment}' stands alone and is of those that hrg materials"
+                f" {instrument.material.name} lists; else give surface_layer_pm{nearest(treatment, of_treatment)}"
+            )
+        surface = of_treatment[treatment]
     if parts.surface_layer_pm is not None:
         depth = 1e-12 * parts.surface_layer_pm
         causes.append(surface_cause(depth, spread.get("loss.surface_layer_pm", 0.0), "given in the card"))

@@ -86,6 +86,14 @@ def test_uncertain_parts_are_values_of_the_card():
     assert twice["surface"] == part["surface"]
 
 
+def test_a_published_surface_is_chosen_by_its_treatment():
+    part = [
+        {p.name: p.inverse_q[0] for p in loss_model(build_instrument(DOME | {"loss": loss})).budget(293.15).parts}
+        for loss in ({}, {"surface_treatment": "mechanically-polished"})
+    ]
+    assert part[1]["surface"] == pytest.approx(3 * part[0]["surface"], rel=1e-9)  # three times as lossy, says the source
+
+
 def test_what_no_source_states_is_left_out_and_said():
     found = loss_model(load_card("bvg-bell"))
     assert any(sentence.startswith("bulk: no source states that of 3j53") for sentence in found.left_out)
@@ -106,6 +114,7 @@ def test_what_no_source_states_is_left_out_and_said():
         ({"film": [GOLD | {"from_position": 1.0}]}, "from_position (1) is not before to_position (1)."),
         ({"activated": [PEAK | {"energy_eV": 0.0}]}, "energy_eV must be"),
         ({"unbalance_mg": 1.0}, "on a stem"),
+        ({"surface_treatment": "drown"}, "did you mean 'drawn'?"),
         ({"inverse_q": 1e7}, "inverse_q = 1e+07 must lie between 0 and 0.1: it is 1/Q, not Q."),
     ],
 )

@@ -75,6 +75,7 @@ class LossParts(Keys, frozen=True, kw_only=True):
     ) = None
     bulk_exponent: Annotated[float, number("b; of the loss table unless given", example=0.77)] | None = None
     surface_layer_pm: Annotated[float, number("depth times loss of the damaged surface; of the loss table unless given", least=0.0, relative_sd=0.2, example=5.2)] | None = None  # fmt: skip
+    surface_treatment: Annotated[str, says("of the surface, as hrg materials NAME lists them; the best unless given", example="drawn")] | None = None  # fmt: skip
     surface_anisotropy: Annotated[float, number("wave 2n of the surface loss", least=0.0, most=1.0, relative_sd=1.0, example=0.01)] | None = None  # fmt: skip
     surface_anisotropy_angle_deg: Annotated[float, number("azimuth of its crest", sd=13.0)] = 0.0
     anchor_inverse_q: Annotated[float, number("loss through the mount", least=0.0, relative_sd=1.0, example=1e-09)] | None = None  # fmt: skip

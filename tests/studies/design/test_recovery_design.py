@@ -127,6 +127,11 @@ def test_the_nearest_mode_is_kept_off_on_the_side_where_it_is(pose):
     assert abs(found.after[0]) >= 0.3 - 1e-6
 
 
+def test_an_objective_that_changes_in_steps_has_no_gradient(pose):
+    with pytest.raises(InputError, match=r"'n' changes in steps \(0, 1\), so that no gradient"):
+        ask(pose(XY, ["n"], lambda d: [float(d[0] > 1)], objective=[{"column": "n"}]))
+
+
 @pytest.mark.slow
 def test_limits_that_contradict_are_named_with_what_lacks(pose):
     posed = pose(
