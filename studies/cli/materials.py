@@ -49,7 +49,12 @@ def materials(name: str = "", *, compare: bool = False, card: Card = "", harmoni
         [
             Table("Materials", rows, columns, "The first law of a material is its default."),
             *(part for law in laws if name for part in _law_tables(law)),
-            Table("Surface loss", _surfaces(name), SURFACES, "Depth times loss of the damaged layer; a card chooses with [loss] surface_treatment."),
+            Table(
+                "Surface loss",
+                _surfaces(name),
+                SURFACES,
+                "Depth times loss of the damaged layer; a card chooses with [loss] surface_treatment.",
+            ),
         ],
     )
 

@@ -91,7 +91,9 @@ def test_a_published_surface_is_chosen_by_its_treatment():
         {p.name: p.inverse_q[0] for p in loss_model(build_instrument(DOME | {"loss": loss})).budget(293.15).parts}
         for loss in ({}, {"surface_treatment": "mechanically-polished"})
     ]
-    assert part[1]["surface"] == pytest.approx(3 * part[0]["surface"], rel=1e-9)  # three times as lossy, says the source
+    assert part[1]["surface"] == pytest.approx(
+        3 * part[0]["surface"], rel=1e-9
+    )  # three times as lossy, says the source
 
 
 def test_what_no_source_states_is_left_out_and_said():
