@@ -93,7 +93,7 @@ def fit(problem: CardProblem, start: Array | None = None, progress: Progress = l
         if size < CLOSE and straight and step > 2:
             converged = True
             break
-        reached, radius, whole = _advance(problem, state, linear, radius, noise, rows)
+        reached, radius, whole = _advance(problem, state, linear, radius, noise, rows, size < NEAR)
         if reached is None:
             converged = size < NEAR and straight
             break
@@ -285,8 +285,12 @@ def _advance(
     radius: float,
     noise: Mapping[str, Noise],
     rows: Mapping[str, NoiseRows],
+    near: bool = False,
 ) -> tuple[State | None, float, bool]:
-    """Go the longest step that keeps what it promises, or None; with the next radius, and whether a whole step kept half its promise."""
+    """Go the longest step that keeps what it promises, or None; with the next radius, and whether a whole step kept half its promise.
+
+    Where a step is `near` the end and keeps its promise, its straight lines hold there too, and none are drawn anew.
+    """
     before = objective(problem, state, noise, rows)
     for _ in range(TRIALS):
         move, damping = linear.step(radius)
@@ -307,7 +311,8 @@ def _advance(
         if reached is not None and kept > LEAST_FALL:
             whole = length < 0.999 * radius and kept > 0.5
             wider = min(LONGEST_STEP, max(radius, 2 * length)) if kept > KEPT else radius
-            return problem.evaluate(reached.point), wider if kept > 0.5 else length / 2, whole
+            drawn = replace(reached, slope=state.slope) if near and kept > KEPT else problem.evaluate(reached.point)
+            return drawn, wider if kept > 0.5 else length / 2, whole
         radius = length / 4
     return None, radius, False
 

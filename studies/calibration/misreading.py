@@ -9,6 +9,7 @@ from compensation.noise import white_rms
 from shell.constants import zero_Celsius
 from shell.errors import ShellError
 from studies.calibration.ahead import BIAS
+from studies.calibration.problem import FARTHEST
 from studies.calibration.settled import READ_AS
 from studies.errors import InputError
 from studies.resonator.law import law_of
@@ -18,11 +19,13 @@ from studies.simulation.prediction import predict
 from thermal.errors import ThermalError
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from shell.law import FrequencyLaw
     from studies.instrument.card import Instrument
     from studies.record import Record
+
+    Left = Mapping[str, tuple[float, float]]
 
 FREQUENCY = "frequency_Hz"
 ROWS = 400
@@ -42,11 +45,12 @@ def check_readings(instrument: "Instrument", records: "Sequence[Record]", law: "
     law = law or law_of(instrument)
     for record in records:
         _check_unit(instrument, record)
-        _check_temperatures(instrument, record, law)
-        _check_sign(instrument, record, law)
+        left = _left(instrument, record, law)
+        _check_temperatures(instrument, record, left)
+        _check_sign(record, left)
 
 
-def _check_temperatures(instrument: "Instrument", record: "Record", law: "FrequencyLaw") -> None:
+def _check_temperatures(instrument: "Instrument", record: "Record", as_read: "Left") -> None:
     """Refuse temperatures that the frequency follows only if they are read otherwise."""
     names = [name for name in COLUMN.values() if name in record]
     if FREQUENCY not in record or not names:
@@ -55,13 +59,13 @@ def _check_temperatures(instrument: "Instrument", record: "Record", law: "Freque
     changes = float(np.std(known)) if known.size > 2 else 0.0
     if changes <= CLEAR * white_rms(known):
         return
-    (left,) = _left(instrument, record, law)
+    left = as_read[FREQUENCY][0]
     if left < REFUSED * changes:
         return
     whole = law_of(instrument)
     for words, read in READ_AS.items():
         columns = {name: read(record[name] + zero_Celsius) - zero_Celsius for name in names}
-        (other,) = _left(instrument, record.with_columns(columns), whole)
+        other = _left(instrument, record.with_columns(columns), whole)[FREQUENCY][0]
         if other < min((AGAINST if left > changes else FOLLOWED) * changes, left / 3):
             right = columns[COLUMN["housing"] if COLUMN["housing"] in names else names[0]]
             wrong = [one for one in names if _apart(columns[one], right) <= _apart(record[one], right)]
@@ -75,14 +79,13 @@ def _apart(one: Array, two: Array) -> float:
     return float(np.nanmedian(np.abs(one - two)))
 
 
-def _check_sign(instrument: "Instrument", record: "Record", law: "FrequencyLaw") -> None:
+def _check_sign(record: "Record", as_read: "Left") -> None:
     """Refuse a bias that follows what the card predicts with the opposite sign."""
     if BIAS not in record:
         return
     white = white_rms(record[BIAS][np.isfinite(record[BIAS])])
     changes, left, rest = (
-        float(np.sqrt(max(rms**2 - white**2, 0.0)))
-        for rms in (float(np.nanstd(record[BIAS])), *_left(instrument, record, law, BIAS, (1.0, -1.0)))
+        float(np.sqrt(max(rms**2 - white**2, 0.0))) for rms in (float(np.nanstd(record[BIAS])), *as_read[BIAS])
     )
     if white < changes and rest < min(FOLLOWED * changes, left / 3):
         raise InputError(
@@ -105,18 +108,15 @@ def _check_unit(instrument: "Instrument", record: "Record") -> None:
         )
 
 
-def _left(
-    instrument: "Instrument",
-    record: "Record",
-    law: "FrequencyLaw",
-    response: str = FREQUENCY,
-    signs: "Sequence[float]" = (1.0,),
-) -> list[float]:
-    """Rms of measured, with each sign, minus predicted about its mean, with the card as given; infinite where it cannot be predicted."""
-    time = record["time_s"]
+def _left(instrument: "Instrument", record: "Record", law: "FrequencyLaw") -> "Left":
+    """Rms of frequency and bias, and of these with the sign changed, minus predicted about its mean, with the card as given; infinite where it cannot be predicted."""
+    time, names = record["time_s"], [name for name in (FREQUENCY, BIAS) if name in record]
     places = np.unique(np.linspace(0, len(time) - 1, min(ROWS, len(time))).astype(int))
     try:
-        found = predict(instrument, drive_by_record(record, time=time[places]), (), law)
+        found = predict(instrument, drive_by_record(record, time=time[places]), (), law, FARTHEST).columns
     except (ShellError, ThermalError):
-        return [np.inf] * len(signs)
-    return [float(np.nanstd(sign * record[response][places] - found.columns[response])) for sign in signs]
+        return dict.fromkeys(names, (np.inf, np.inf))
+    pairs = {name: (record[name][places], found[name]) for name in names}
+    return {
+        name: (float(np.nanstd(own - other)), float(np.nanstd(own + other))) for name, (own, other) in pairs.items()
+    }

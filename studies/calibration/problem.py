@@ -177,7 +177,8 @@ class CardProblem:
         varied = Variations(instrument, law, self.priors.names)
         for k, part in enumerate(self.parts):
             names = [*self.priors.names, *(name for one, name, _ in self.starts if one == k)] if slopes else []
-            prediction = predict(instrument, self.drive_at(point, k), varied.with_names(names), law, self.knots(part))
+            drive, wanted = self.drive_at(point, k), varied.with_names(names)
+            prediction = predict(instrument, drive, wanted, law, self.knots(part), part.responses == (HOUSING,))
             for name in part.responses:
                 blocks = self.runs[part.run].responses[name]
                 residual[name].append(blocks.value - blocks.average(prediction.columns[name]))

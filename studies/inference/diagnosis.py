@@ -192,7 +192,8 @@ def infer(card: "Instrument", campaign: Campaign, progress: Report = lambda _: N
         search, outcome = max((there, (search, outcome)), key=lambda found: _on_all_rows(found[0], found[1].final))
     # one lag in its own noise: in that of a longer path its straight lines lead out of the world
     alone = outcome.plain.noise if path is None else found.noise
-    plain = Model(Linear.of(found, told), Signatures.at(problem, found.point), (), alone)
+    paths = search.signatures.there(found.point) if path is None else Signatures.at(problem, found.point)
+    plain = Model(Linear.of(found, told), paths, (), alone)
     shipped = {name: rows.rms for name, rows in plain.residuals(Kept(np.zeros(problem.count), ())).items()}
     calibrated, blocks = plain.residuals(Kept(found.point, ())), found.state.residual
     if path is not None:
@@ -351,7 +352,8 @@ def _left_by(model: Model) -> Left | None:
     """What a model leaves of the records' rows and of their blocks; None where its straight lines end and there is no prediction."""
     numbers = model.kept(model.mean())
     try:
-        return model.residuals(numbers), model.left(numbers)
+        there = model.signatures.there(numbers.point)
+        return model.residuals(numbers, there), model.left(numbers, there)
     except IMPOSSIBLE:
         return None
 

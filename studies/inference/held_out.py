@@ -11,7 +11,6 @@ from compensation.noise import Noise
 from studies.calibration.fit import LASTING
 from studies.inference.model import Linear, Term, solve_posterior
 from studies.inference.signatures import Path, Signatures
-from studies.simulation.prediction import predict
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -93,17 +92,13 @@ class Model:
         values = len(self.problem.priors.values)
         return Kept(np.concatenate([self.problem.priors.inside(point[:values]), point[values:]]), tuple(coefficients))
 
-    def residuals(self, numbers: Kept, runs: Sequence[int] | None = None) -> dict[str, Rows]:
-        """Return what is left of every response on the rows of some runs."""
-        instrument = self.problem.instrument_at(numbers.point)
-        law = self.problem.law_at(instrument)
-        paths = Signatures.at(self.problem, numbers.point).paths if self.terms else self.signatures.paths
+    def residuals(self, numbers: Kept, there: Signatures | None = None) -> dict[str, Rows]:
+        """Return what is left of every response on the rows of all runs; `there`: the paths at these numbers, where they are known."""
+        paths = (there or self.signatures.there(numbers.point)).paths
         found: dict[str, tuple[list[Array], list[Array]]] = {name: ([], []) for name in self.problem.responses}
         for k, part in enumerate(self.problem.parts):
-            if runs is not None and part.run not in runs:
-                continue
-            run, drive = self.problem.runs[part.run], self.problem.drive_at(numbers.point, k)
-            columns = dict(predict(instrument, drive, (), law).columns)
+            run, drive = self.problem.runs[part.run], paths[k].prediction.drive
+            columns = dict(paths[k].prediction.columns)
             for term, values in zip(self.terms, numbers.coefficients, strict=True):
                 for name, change in self.change(term, values, k, paths[k]).items():
                     columns[name] = columns[name] + change
@@ -116,10 +111,10 @@ class Model:
                 found[name][1].append(rest)
         return {name: Rows(tuple(t), tuple(r)) for name, (t, r) in found.items() if r}
 
-    def left(self, numbers: Kept) -> dict[str, Array]:
+    def left(self, numbers: Kept, there: Signatures | None = None) -> dict[str, Array]:
         """Return what the simulation leaves of the blocks of every response, not what its straight lines do."""
-        left = dict(self.problem.evaluate(numbers.point, slopes=False).residual)
-        there = Signatures.at(self.problem, numbers.point) if self.terms else self.signatures
+        there = there or self.signatures.there(numbers.point)
+        left = there.left()
         for term, size in zip(self.terms, numbers.coefficients, strict=True):
             for name, columns in there.columns_of(term).items():
                 left[name] = left[name] - columns @ size

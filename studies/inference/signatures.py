@@ -56,12 +56,44 @@ def _gradient(count: int, step: float) -> "csr_array":
 class Path:
     """One run as the card predicts it: its states on an even grid, and by response the slopes per K, per K/s and by 1/Q."""
 
-    time: Array
+    instrument: "Instrument"
     states: States
     prediction: Prediction
-    by_temperature: Mapping[str, Array]
-    by_rate: Mapping[str, Array]
-    by_loss: Array
+
+    @property
+    def time(self) -> Array:
+        """Predicted rows, s since the first."""
+        return np.asarray(self.prediction.drive.time - self.prediction.drive.time[0])
+
+    @cached_property
+    def by_temperature(self) -> dict[str, Array]:
+        """Slopes per K."""
+        return self._slopes(WARMER, np.array([WARMER, 0.0, 0.0]))
+
+    @cached_property
+    def by_rate(self) -> dict[str, Array]:
+        """Slopes per K/s."""
+        return self._slopes(FASTER, np.array([0.0, FASTER, 0.0]))
+
+    @cached_property
+    def by_loss(self) -> Array:
+        """Slope of the bias by 1/Q."""
+        more = LOSSIER * float(np.median(self.prediction.columns["inverse_q"]))
+        return self._slopes(more, np.array([0.0, 0.0, more]))["bias_deg_per_h"]
+
+    def _slopes(self, step: float, change: Array) -> dict[str, Array]:
+        """Central differences of the read-out, for a change of temperature, rate and 1/Q."""
+        found = self.prediction
+
+        def read(warmer: float, faster: float, lossier: float) -> dict[str, Array]:
+            value, rate = found.temperatures.value.copy(), found.temperatures.rate.copy()
+            value[:, 1] += warmer
+            rate[:, 1] += faster
+            at = Temperatures(value, rate)
+            return read_out(self.instrument, found.law, found.drive, at, self.states.tau, found.damping, lossier)
+
+        below, above = read(*-change), read(*change)
+        return {name: (above[name] - below[name]) / (2 * step) for name in above}
 
     def onto_rows(self, values: Array) -> Array:
         """Return columns of the even grid at the predicted rows."""
@@ -95,45 +127,24 @@ class Path:
         return {response: here}
 
 
-def trace(instrument: "Instrument", law: "FrequencyLaw", drive: Drive, run: int) -> Path:
+def trace(instrument: "Instrument", law: "FrequencyLaw", drive: Drive, run: int, longest: float | None = None) -> Path:
     """Return the path of one run through the states of a card."""
-    found = predict(instrument, drive, (), law)
+    found = predict(instrument, drive, (), law, longest)
     time = drive.time - drive.time[0]
     even = np.linspace(0.0, time[-1], int(np.ceil(time[-1] / np.median(np.diff(time)))) + 1)
     standing = {"pattern_angle": np.full(len(time), np.radians(instrument.bias.pattern_angle_deg))}
     commands = {name: np.interp(even, time, values) for name, values in (standing | dict(drive.commands)).items()}
-    at, tau = found.temperatures, slowest_lag(found.network, instrument.reference_temperature)
-
-    def read(warmer: float, faster: float) -> dict[str, Array]:
-        value, rate = at.value.copy(), at.rate.copy()
-        value[:, 1] += warmer
-        rate[:, 1] += faster
-        return read_out(instrument, law, drive, Temperatures(value, rate), tau, found.damping)
-
-    (below, above), (slower, faster) = (
-        [read(sign * step * (kind == 0), sign * step * (kind == 1)) for sign in (-1, 1)]
-        for kind, step in enumerate((WARMER, FASTER))
-    )
     states = States(
         run=run,
         time=even,
         campaign_time=even + drive.start,
         housing=np.interp(even, time, found.housing),
         resonator=np.interp(even, time, found.columns["resonator_temperature_degC"]) + zero_Celsius,
-        tau=tau,
+        tau=slowest_lag(found.network, instrument.reference_temperature),
         reference=instrument.reference_temperature,
         **commands,
     )
-    more = LOSSIER * float(np.median(found.columns["inverse_q"]))
-    less, lossier = (read_out(instrument, law, drive, at, tau, found.damping, sign * more) for sign in (-1, 1))
-    return Path(
-        time,
-        states,
-        found,
-        {name: (above[name] - below[name]) / (2 * WARMER) for name in above},
-        {name: (faster[name] - slower[name]) / (2 * FASTER) for name in faster},
-        (lossier["bias_deg_per_h"] - less["bias_deg_per_h"]) / (2 * more),
-    )
+    return Path(instrument, states, found)
 
 
 def memory_of(effect: Effect, shape: Sequence[float]) -> float:
@@ -153,6 +164,7 @@ class Signatures:
     """Paths of all runs of a calibration at one point."""
 
     problem: CardProblem
+    point: Array
     paths: tuple[Path, ...]
 
     @classmethod
@@ -160,16 +172,32 @@ class Signatures:
         """Trace all runs with the values of a point."""
         instrument = problem.instrument_at(point)
         law = problem.law_at(instrument)
-        drives = [problem.drive_at(point, k) for k in range(len(problem.parts))]
-        paths = [trace(instrument, law, drive, part.run) for drive, part in zip(drives, problem.parts, strict=True)]
+        paths = [
+            trace(instrument, law, problem.drive_at(point, k), part.run, problem.knots(part))
+            for k, part in enumerate(problem.parts)
+        ]
         past = remembered([path.states for path in paths])
         return cls(
             problem,
+            point,
             tuple(
                 replace(path, states=replace(path.states, before=turns))
                 for path, turns in zip(paths, past, strict=True)
             ),
         )
+
+    def there(self, point: Array) -> "Signatures":
+        """Paths at another point, these where it is the same."""
+        return self if np.array_equal(point, self.point) else Signatures.at(self.problem, point)
+
+    def left(self) -> dict[str, Array]:
+        """What the card alone leaves of the blocks of every response."""
+        found: dict[str, list[Array]] = {name: [] for name in self.problem.responses}
+        for part, path in zip(self.problem.parts, self.paths, strict=True):
+            for name in part.responses:
+                blocks = self.problem.runs[part.run].responses[name]
+                found[name].append(blocks.value - blocks.average(path.prediction.columns[name]))
+        return {name: np.concatenate(own) for name, own in found.items()}
 
     @cached_property
     def span(self) -> Span:

@@ -105,7 +105,7 @@ def simulate_candidates(found: Inferred, programmes: Sequence[Programme]) -> lis
     out = []
     for k, part in enumerate(here.parts):
         alone = replace(here, runs=(runs[part.run],))
-        path = trace(card, law, here.drive_at(point, k), len(old.runs))
+        path = trace(card, law, here.drive_at(point, k), len(old.runs), here.knots(part))
         path = replace(path, states=replace(path.states, before=remembered([*past, path.states])[-1]))
         own = [*range(values), *(values + j for j, (of, _, _) in enumerate(here.starts) if of == k)]
         whiteners = {
@@ -113,7 +113,7 @@ def simulate_candidates(found: Inferred, programmes: Sequence[Programme]) -> lis
         }
         places = {name: here.rows[name].slices[here.members(name).index(part)] for name in whiteners}
         slopes = np.vstack([whiteners[name](state.slope[name][place][:, own]) for name, place in places.items()])
-        out.append(Candidate(programmes[part.run], Signatures(alone, (path,)), slopes, whiteners, values))
+        out.append(Candidate(programmes[part.run], Signatures(alone, point, (path,)), slopes, whiteners, values))
     return out
 
 

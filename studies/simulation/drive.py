@@ -29,7 +29,7 @@ COMMAND_COLUMNS = (*(column for column, _, _ in COMMANDS.values()), RATE)
 """Columns beside the chamber's that a profile may have."""
 LUMPS = ("housing", "base", "stem", "resonator")
 """Parts of the heat path whose temperature at the start may depart from the settled one."""
-MOST_BOUNDARY_ROWS = 20_000
+MOST_BOUNDARY_ROWS, IN_ROW = 20_000, 8  # of a run, and of a housing in each row that is predicted: it has no corners
 MOST_ROWS = 40_000_000
 LEAST_JUMP = 0.5  # K from one row to the next, and
 STEEP = 20.0  # times the usual change near it: a set point that jumps, rather than a ramp
@@ -169,7 +169,8 @@ def drive_by_record(record: Record, boundary: Boundary | None = None, time: Arra
     t, T = rows[known], values[known] + zero_Celsius
     if boundary == "chamber":
         t, T = _with_jumps(t, T, _settled_at(record))
-    t, T, width = _thinned(t, T)
+    few = MOST_BOUNDARY_ROWS if time is None or boundary == "chamber" else IN_ROW * len(time)
+    t, T, width = _thinned(t, T, min(few, MOST_BOUNDARY_ROWS))
     if boundary == "housing" and width.any():  # of a smooth curve, what it is in their middle
         T = T - bend_of_means(t, T, width)
     if t[0] > rows[0]:
@@ -210,11 +211,11 @@ def _with_jumps(t: Array, T: Array, settled: float | None) -> tuple[Array, Array
     return t, T
 
 
-def _thinned(t: Array, T: Array) -> tuple[Array, Array, Array]:
+def _thinned(t: Array, T: Array, most: int) -> tuple[Array, Array, Array]:
     """Means of rows that are too many, and how wide these are (s), the first and the last kept; jumps stay where they are."""
-    if len(t) <= MOST_BOUNDARY_ROWS:
+    if len(t) <= most:
         return t, T, np.zeros(len(t))
-    size = int(np.ceil(len(t) / MOST_BOUNDARY_ROWS))
+    size = int(np.ceil(len(t) / most))
     jumps = np.flatnonzero(np.diff(t) == 0) + 1
     edges = np.unique(np.concatenate([np.arange(0, len(t), size), jumps]))
     counts = np.diff(np.append(edges, len(t)))

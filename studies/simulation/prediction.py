@@ -52,8 +52,9 @@ def predict(
     derivatives: Sequence[str] | Variations = (),
     law: "FrequencyLaw | None" = None,
     longest: float | None = None,
+    housing_only: bool = False,
 ) -> Prediction:
-    """Predict the record of a run, and its derivatives by names or by `Variations` that runs share.
+    """Predict the record of a run, and its derivatives by names or by `Variations` that runs share, of the `housing_only` where no other counts.
 
     Names are keys of the card, departures "initial.base" (K), "shift" (s), "jump.0" (s), "kink.7" (K, before row 7);
     `longest` is between the knots of what radiation adds.
@@ -79,7 +80,7 @@ def predict(
     for name in varied.names:
         along, read = partial(_still, found), np.zeros(len(drive.time))
         if name == SHIFT or name.startswith(JUMP):
-            slope, rate = _slope_of_timing(network, drive, name, rows, departure)
+            slope, rate = _slope_of_timing(network, drive, name, rows, departure, longest)
             along, read = partial(found.moved, slope[:, :6], rate[:, :6]), slope[:, 6]
         elif name in changes:
             k = list(changes).index(name)
@@ -88,13 +89,18 @@ def predict(
                 slope[:, 0] = changes[name].boundaries["housing"].at(drive.time)
             along, read = partial(found.moved, slope[:, :6], rate[:, :6]), slope[:, 6]
         elif name == LAG:
-            read = _slope_of_lag(varied.sides(name), boundary, drive.time, departure)
+            read = _slope_of_lag(
+                varied.sides(name), boundary, drive.time, departure, longest, thermal.temperature[:, 6]
+            )
+        slopes[name] = {COLUMN["housing"]: read}
+        if housing_only:
+            continue
         below, above = (
             read_out(side.instrument, side.law, drive, along(side.distance), side.lag(drive.boundary), side.damping)
             for side in varied.sides(name)
         )
         step = np.ptp([side.distance for side in varied.sides(name)])
-        slopes[name] = {COLUMN["housing"]: read} | {column: (above[column] - below[column]) / step for column in above}
+        slopes[name] |= {column: (above[column] - below[column]) / step for column in above}
     network = varied.here.network(drive.boundary)
     return Prediction(drive, columns, slopes, found.value[:, 0], law, network, found, varied.here.damping)
 
@@ -128,7 +134,9 @@ def of_equal_area(curve: Profile) -> Profile:
     return Profile(curve.time, curve.value - np.concatenate([[0.0], bend, [0.0]]))
 
 
-def _slope_of_timing(network: Network, drive: Drive, name: str, rows: Array, departure: Array) -> tuple[Array, Array]:
+def _slope_of_timing(
+    network: Network, drive: Drive, name: str, rows: Array, departure: Array, longest: float | None
+) -> tuple[Array, Array]:
     """Derivatives of `Temperatures` by the time of the boundary or of a jump (K/s, K/s²): differences, of a jump to earlier times only."""
 
     def moved(step: float) -> Drive:
@@ -139,21 +147,23 @@ def _slope_of_timing(network: Network, drive: Drive, name: str, rows: Array, dep
 
     steps = (-SHIFT_STEP, SHIFT_STEP if name == SHIFT else 0.0)
     below, above = (
-        respond(network, {drive.boundary: moved(step).imposed}, drive.time, rows, departure=departure) for step in steps
+        respond(network, {drive.boundary: moved(step).imposed}, drive.time, rows, (), departure, longest)
+        for step in steps
     )
     distance = steps[1] - steps[0]
     return (above.temperature - below.temperature) / distance, (above.rate - below.rate) / distance
 
 
-def _slope_of_lag(sides: Sequence[Side], boundary: Mapping[str, Profile], time: Array, departure: Array) -> Array:
-    """Derivative of the reading of a predicted housing by its sensor's time constant (K/s): it may be shorter than a sweep's steps."""
+def _slope_of_lag(
+    sides: Sequence[Side], boundary: Mapping[str, Profile], time: Array, departure: Array, longest: float | None,
+    here: Array,
+) -> Array:  # fmt: skip
+    """Derivative of the reading of a predicted housing, `here`, by its sensor's time constant (K/s): it may be shorter than a sweep's steps."""
     reading = np.zeros((1, len(departure)))
     reading[0, -1] = 1.0
-    below, above = (
-        respond(side.driven("chamber"), boundary, time, reading, departure=departure).temperature[:, 0]
-        for side in sides
-    )
-    return np.asarray((above - below) / (sides[1].distance - sides[0].distance))
+    side = max(sides, key=lambda one: abs(one.distance))
+    moved = respond(side.driven("chamber"), boundary, time, reading, (), departure, longest).temperature[:, 0]
+    return np.asarray((moved - here) / side.distance)
 
 
 def _still(found: Temperatures, _: float) -> Temperatures:

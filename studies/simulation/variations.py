@@ -88,6 +88,7 @@ class Variations:
         self.here = Side(0.0, instrument, law, damping_law(instrument, law.lowest, law.highest))
         self._known = {value.name: value for value in instrument.uncertain}
         self._sides: dict[str, tuple[Side, Side]] = {}
+        self._changes: dict[tuple[str, str], NetworkChange | None] = {}
 
     def with_names(self, names: Sequence[str]) -> "Variations":
         """Return the same with other names; what has been built is shared."""
@@ -112,10 +113,11 @@ class Variations:
             return no_change(network, {"housing": Profile(drive.imposed.time, slope_of_reading(drive.imposed))})
         if name.partition(".")[0] not in HEATED:
             return None
-        below, above = self.sides(name)
-        step = above.distance - below.distance
-        change = difference(above.driven(drive.boundary), below.driven(drive.boundary), step)
-        return change if change.moves else None
+        if (name, drive.boundary) not in self._changes:
+            below, above = (side.driven(drive.boundary) for side in self.sides(name))
+            change = difference(above, below, float(np.ptp([side.distance for side in self.sides(name)])))
+            self._changes[name, drive.boundary] = change if change.moves else None
+        return self._changes[name, drive.boundary]
 
     def _build(self, name: str) -> tuple[Side, Side]:
         here = self.here
