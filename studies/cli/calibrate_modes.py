@@ -15,7 +15,7 @@ from studies.instrument.display import display_name
 from studies.inversion.invert import EXCLUDED, ModeCalibration, decided, invert
 from studies.inversion.readings import read_modes
 from studies.progress import Told
-from studies.reports.calibration import KEY, TOLD, VALUE, VALUES
+from studies.reports.calibration import KEY, VALUE, VALUES, WIDTHS, best_known_first
 from studies.results import Column, Result, Sentence, Table, row_of
 
 STAGES = {"assignment 1": 0.2, "the mode to measure next": 0.9}
@@ -28,7 +28,6 @@ NEXT = (
     "harmonic: n | index | frequency_Hz: near (Hz) .6 | sd: now ± .2g | sd_then: then ± .2g",
 )
 UNTOUCHED = 0.9995
-WIDTHS = "Shift: change in prior standard deviations. Width: posterior over prior standard deviation; the modes determine a value up to 0.5."
 READ = (
     "Noise: of the reading and of the solver. Probability: that the reading is of this mode. The modes are those of the bare"
     " resonator (of a pair, the mean), without electrodes, films or mount."
@@ -43,11 +42,7 @@ def calibrate_modes(instrument: Instrument, path: str, save: str | None, exact: 
         found = invert(instrument, read_modes(path), exact, told)
     saved = keep_card(found.instrument, save, unsaved(found))
     payload = _payload(found, saved)
-    values = [
-        {**one, "unit": one["unit"] if one["unit"] != "1" else "", "told": TOLD[one["told_by"]]}
-        for one in sorted(payload["values"], key=lambda one: float(one["width"]))
-        if one["width"] < UNTOUCHED
-    ]
+    values = [one for one in best_known_first(payload) if one["width"] < UNTOUCHED]
     modes = [
         {**one, "others": ", ".join(f"{r['harmonic']}, {r['index']} ({100 * r['chance']:.0f})" for r in one["rivals"])}
         for one in payload["modes"]
@@ -58,8 +53,7 @@ def calibrate_modes(instrument: Instrument, path: str, save: str | None, exact: 
         f"Elastic values and dimensions of {instrument.name} from {len(modes)} frequencies in {path}.",
         [
             *(Sentence(one, "warning") for one in payload["warnings"]),
-            Table("Values, best known first", values, (*VALUES, KEY), WIDTHS, "page"),
-            Table("Values, best known first", values, VALUES, WIDTHS, "terminal"),
+            Table("Values, best known first", values, (*VALUES, KEY), WIDTHS),
             *(TIED.format(", ".join(map(display_name, group))) for group in found.groups),
             Table("Modes", modes, MODES, READ),
             Table("Measure next", payload["next_modes"], NEXT, MEASURE),

@@ -28,7 +28,7 @@ VALUES = (
     "unit | card: card .5",
     "value in low … high: calibrated | low … high: 90 % interval .0 | shift_sd: shift (sd) +.2f | width: width .3f | told: determined by",
 )
-KEY = "parameter: key of the card"
+KEY = Column("parameter", "key of the card", where="page")
 RESIDUALS = "response | unit | as_shipped: as given .3 | calibrated: calibrated .3 | noise: noise .3 | run_offset: run offset .2 | outliers"
 PREDICTED = "response | unit | source: predicted from | as_shipped: as given .3 | calibrated: calibrated .3 | stated: expected error .3 | noise: noise .3"
 LEVELS = "response | unit | white: white .3 | flicker: flicker .3 | walk: walk .3 | offset: offset .3"
@@ -51,6 +51,14 @@ def lead(found: Calibration, data: Sequence[str]) -> str:
     )
 
 
+def best_known_first(payload: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Return the values as rows of `VALUES`."""
+    return [
+        {**one, "unit": one["unit"] if one["unit"] != "1" else "", "told": TOLD[one["told_by"]] + (f", at its {one['bound']} bound" if one["bound"] else "")}
+        for one in sorted(payload["values"], key=lambda one: float(one["width"]))
+    ]  # fmt: skip
+
+
 def calibration_parts(found: Calibration, payload: Mapping[str, Any]) -> list[Chapter]:
     """Return what people read of a calibration, with the tables over rows of its payload."""
     responses = [_scaled(name, row) for name, row in payload["responses"].items()]
@@ -62,10 +70,7 @@ def calibration_parts(found: Calibration, payload: Mapping[str, Any]) -> list[Ch
         )
         for row in responses
     ]
-    rows = [
-        {**one, "unit": one["unit"] if one["unit"] != "1" else "", "told": TOLD[one["told_by"]] + (f", at its {one['bound']} bound" if one["bound"] else "")}
-        for one in sorted(payload["values"], key=lambda one: float(one["width"]))
-    ]  # fmt: skip
+    rows = best_known_first(payload)
     touched = [one for one in rows if one["width"] <= 0.9995 or abs(one["shift_sd"]) >= 0.005]
     rest = [one for one in rows if one not in touched]
     unchanged = f" The data do not depend on {len(rest)} more value{'s' * (len(rest) > 1)}." if rest else ""
@@ -76,7 +81,6 @@ def calibration_parts(found: Calibration, payload: Mapping[str, Any]) -> list[Ch
         for name, n in found.fit.noise.items()
         if name in runs
     ]
-    title = "Values, best known first"
     groups = "; ".join(spell([display_name(name) for name in group]) for group in found.groups)
     return [
         Chapter("Fit of the card to the data", [
@@ -88,8 +92,7 @@ def calibration_parts(found: Calibration, payload: Mapping[str, Any]) -> list[Ch
             Table("Held-out run", _predicted(payload), PREDICTED, _held_out_note(payload)),
         ]),
         Chapter("Values", [
-            Table(title, touched, (*VALUES, KEY), WIDTHS, "page", sortable=True),
-            Table(title, touched, VALUES, WIDTHS + unchanged, "terminal"),
+            Table("Values, best known first", touched, (*VALUES, KEY), WIDTHS + unchanged, sortable=True),
             f"Correlated by more than 0.9, so that the data determine a combination better than each value: {groups}." if groups else "",
             Figure(lambda: _draw_shifts(found), "Shifts of the values that the data determine at least in part, with 90 % intervals; shaded: 90 % of the prior."),
             Table("Values that the data do not depend on", rest, (*VALUES[:2], KEY), "", "page", sortable=True),
