@@ -10,7 +10,7 @@ for each orientation of the mode (shell.imperfection.pair). For a full ring of e
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 from math import pi
@@ -64,7 +64,6 @@ class Electrodes:
     # relative departure of the gap over the shell, g = gap (1 + departure); its waves 1, 2, ... are the gap harmonics
     departure: Field | None = None
     face: Literal["inner", "outer"] = "inner"  # "inner" or "outer", the face that they look at
-    _bands: dict[tuple[float, float], tuple[Array, Array, Array]] = field(default_factory=dict, repr=False)
 
     def __post_init__(self) -> None:
         if not self.gap > 0:
@@ -75,12 +74,6 @@ class Electrodes:
         for one in self.electrodes:
             if not (one.width > 0 and 0 <= one.first < one.last <= 1):
                 raise ShellError("an electrode has a positive width and lies between 0 <= first < last <= 1.")
-
-    def charged(self, voltage: float | Sequence[float]) -> "Electrodes":
-        """The same electrodes at other voltages, one for all or one for each."""
-        volts = np.broadcast_to(np.asarray(voltage, dtype=float), (len(self.electrodes),))
-        patches = tuple(replace(one, voltage=float(v)) for one, v in zip(self.electrodes, volts, strict=True))
-        return Electrodes(self.pair, patches, self.gap, self.departure, self.face, self._bands)
 
     @property
     def voltages(self) -> Array:
@@ -170,7 +163,7 @@ class Electrodes:
 
     def _patch(self, one: Electrode) -> tuple[Array, Array, Array, Array, Array]:
         """Area per radian and w at places along the meridian; azimuths with weights; the gap (places, azimuths)."""
-        position, area, w = self._band(one.first, one.last)
+        position, area, w = self._bands[one.first, one.last]
         pieces = max(1, int(np.ceil(one.width / PIECE)))
         x, weights = gauss(8)
         starts = one.azimuth - one.width / 2 + one.width / pieces * np.arange(pieces)[:, None]
@@ -183,11 +176,10 @@ class Electrodes:
             raise ShellError("the gap closes somewhere: its relative departure falls below -1.")
         return area, w, theta, weight, gap
 
-    def _band(self, first: float, last: float) -> tuple[Array, Array, Array]:
-        """Places of a band of the face: position, area per radian that each stands for (m²), displacement out of the material."""
-        if (first, last) not in self._bands:
-            self._bands[first, last] = self._lay_band(first, last)
-        return self._bands[first, last]
+    @cached_property
+    def _bands(self) -> dict[tuple[float, float], tuple[Array, Array, Array]]:
+        """Places of every band of the face: position, area per radian that each stands for (m²), displacement out of the material."""
+        return {band: self._lay_band(*band) for band in {(one.first, one.last) for one in self.electrodes}}
 
     def _lay_band(self, first: float, last: float) -> tuple[Array, Array, Array]:
         solution, resonator = self.pair.solution, self.pair.resonator

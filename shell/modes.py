@@ -102,7 +102,7 @@ class Mode:
         _check_theory(resonator, self.theory)
         old, (fitted, rest) = self._solved().system, fit_profile(resonator)
         system = build_system(fitted, old.n, replace(old.level, like=old.level.like or self.resonator))
-        found = solve_level(system, fitted.size, elastic, self.index + 1, EXACT)
+        found, *_ = solve_level(system, fitted.size, elastic, self.index + 1, EXACT)
         error = FLOOR + float(estimate_errors(fitted, elastic, found)[:, self.index].sum())
         if rest:
             error += rest.error(found[-1].along)

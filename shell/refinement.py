@@ -53,7 +53,7 @@ def refine(
                 f"harmonic {n} of this resonator needs {system.memory / 1e9:.1f} GB: its wavelength is too short for elements of the "
                 "whole section. Ask for a lower harmonic or a shorter or thicker shell."
             )
-        solutions, undone, factor = _solve(system, resonator.size, elastic, count, max(UNDONE * tolerance, 1e-13))
+        solutions, undone, factor = solve_level(system, resonator.size, elastic, count, max(UNDONE * tolerance, 1e-13))
         if not before and (shorter := _cut(solutions[1:], level, tolerance)) < level.longest / 1.2:
             level = replace(level, longest=shorter)
             continue
@@ -146,15 +146,11 @@ def _is_resolved(solution: Solution) -> bool:
 
 def solve_level(
     system: System, size: float, elastic: Elastic | VaryingElastic, count: int, accuracy: float
-) -> list[Solution]:
-    """The `count` lowest elastic modes of one system, for a resonator of radius `size`, m; `accuracy` is that of ω²."""
-    return _solve(system, size, elastic, count, accuracy)[0]
-
-
-def _solve(
-    system: System, size: float, elastic: Elastic | VaryingElastic, count: int, accuracy: float
 ) -> tuple[list[Solution], list[float], Factor]:
-    """The modes of one system, what the iteration left undone of each, and the factor of its stiffness over `_density`."""
+    """The `count` lowest elastic modes of one system, for a resonator of radius `size`, m; `accuracy` is that of ω².
+
+    Returns them, what the iteration left undone of each, and the factor of the stiffness over `_density`.
+    """
     constants = tuple(find_constants(one.table.position, elastic, one.table.plane_stress) for one in system.groups)
     # a small shift factors the rigid motions and leaves the elastic modes in order
     shift = 1e-2 * constants[0].wave_speed_squared / size**2 if system.rigid_motions else 0.0

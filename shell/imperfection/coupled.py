@@ -75,7 +75,7 @@ class CoupledHarmonics:
     @cached_property
     def pair(self) -> tuple[float, Array]:
         """ω² and the vector of the pair on these elements."""
-        solved = solve_level(self.system(self.n), self.resonator.size, self.elastic, self.mode.index + 1, 1e-13)
+        solved, *_ = solve_level(self.system(self.n), self.resonator.size, self.elastic, self.mode.index + 1, 1e-13)
         found = solved[self.mode.index]
         return found.eigenvalue, found.vector / sqrt(found.mass)
 
