@@ -68,20 +68,18 @@ def average_blocks(time: ArrayLike, columns: Mapping[str, ArrayLike], width: flo
     for column in arrays.values():
         keep[present] &= ~find_spikes(column[present])
     used = t[keep]
-    edges = np.searchsorted(used, used[0] + width * np.arange(np.floor((used[-1] - used[0]) / width) + 2))
-    counts = np.diff(edges)
+    starts = used[0] + width * np.arange(np.floor((used[-1] - used[0]) / width) + 1)
+    block = np.searchsorted(starts, used, side="right") - 1
+    counts = np.bincount(block, minlength=len(starts))
     full = counts >= max(1.0, 0.5 * float(np.median(counts[counts > 0])))
-    starts, counts = edges[:-1][full], counts[full]
 
     def mean(column: Array) -> Array:
-        # Sums of differences from one value keep the digits that running sums of large values lose.
-        total = np.concatenate([[0.0], np.cumsum(column[keep] - column[keep][0])])
-        return np.asarray((total[starts + counts] - total[starts]) / counts + column[keep][0])
+        return average_groups(column[keep], block, len(starts))[full]
 
     return Blocks(
         time=mean(t),
         columns={name: mean(column) for name, column in arrays.items()},
-        counts=counts,
+        counts=counts[full],
         width=float(width),
         missing=int(np.count_nonzero(~present)),
         spikes=int(np.count_nonzero(present & ~keep)),

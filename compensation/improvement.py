@@ -7,6 +7,7 @@ from typing import TypeVar
 import numpy as np
 
 from compensation.arrays import Array
+from compensation.decimation import average_groups
 from compensation.errors import CompensationError
 
 Run = TypeVar("Run")
@@ -38,9 +39,9 @@ def compare_outputs(times: Sequence[Array], before: Sequence[Array], after: Sequ
     """Return the improvement of an output that should be zero; its mean before counts as removed by calibration."""
     means: tuple[list[Array], list[Array]] = ([], [])
     for t, *outputs in zip(times, before, after, strict=True):
-        starts = np.flatnonzero(np.diff(np.floor((t - t[0]) / AVERAGING), prepend=-1))
+        _, block = np.unique(np.floor((t - t[0]) / AVERAGING), return_inverse=True)
         for found, y in zip(means, outputs, strict=True):
-            found.append(np.add.reduceat(y, starts) / np.diff(np.append(starts, y.size)))
+            found.append(average_groups(y, block))
     return Improvement(_compare(np.concatenate(before), np.concatenate(after)), _compare(*map(np.concatenate, means)))
 
 

@@ -49,11 +49,13 @@ class Outline:
         r, z = np.append(self.r, self.r[0]), np.append(self.z, self.z[0])
         return float(np.sum(r[:-1] * z[1:] - r[1:] * z[:-1]) / 2)
 
+    def take(self, points: slice | list[int]) -> "Outline":
+        """Some of the points, in the order given."""
+        return Outline(*(getattr(self, field.name)[..., points] for field in fields(Outline)))
+
     def reversed(self) -> "Outline":
         """The same line run through the other way."""
-        return Outline(
-            self.r[::-1], self.z[::-1], self.position[::-1], self.displacement[:, ::-1], self.energy[:, ::-1]
-        )
+        return self.take(slice(None, None, -1))
 
 
 def trace_outlines(resonator: Resonator, spacing: float, mode: "Mode | None" = None) -> tuple[Outline, ...]:
@@ -196,4 +198,4 @@ def _thin(line: Outline, least: float, size: float) -> Outline:
         kept.pop()
     if r[0] == 0 and r[last] == 0:
         kept.append(last)
-    return Outline(r[kept], line.z[kept], line.position[kept], line.displacement[:, kept], line.energy[:, kept])
+    return replace(line, r=r).take(kept)

@@ -50,32 +50,30 @@ def find_departures(
 def depart_points(points: Array, resonator: Resonator, imperfection: Imperfection) -> Array:
     """Move points (count, 3) of the perfect solid to their places in the imperfect one."""
     at = Projector(resonator).place(points)
-    r = np.hypot(points[:, 0], points[:, 1])
     x = np.clip(at.position, 0.0, 1.0)
     on_shell = (abs(at.height) < at.thickness * (0.5 + SLACK)) & (abs(at.position - x) < SLACK)
-    out, up = np.zeros((2, len(points)))
-    for m, wave in find_departures(resonator, imperfection, x, r, points[:, 2]).items():
-        out, up = (np.array([out, up]) + (wave * np.exp(-1j * m * at.azimuth)).real) * on_shell
-    return np.asarray(points + np.stack([out * np.cos(at.azimuth), out * np.sin(at.azimuth), up], axis=1))
+    return np.asarray(points + _departures(resonator, imperfection, x, points) * on_shell[:, None])
 
 
 def depart_surface(
     surface: Surface, resonator: Resonator, imperfection: Imperfection, exaggerated: bool = True
 ) -> tuple[Surface, float]:
     """The surface with the departures of its faces and rim, exaggerated to a visible size or as they are, and the factor."""
-    theta = np.arctan2(surface.points[:, 1], surface.points[:, 0])
-    r, z = np.hypot(surface.points[:, 0], surface.points[:, 1]), surface.points[:, 2]
-    moved = np.zeros((2, len(r)))
-    for m, wave in find_departures(resonator, imperfection, surface.position, r, z).items():
-        moved += (wave * np.exp(-1j * m * theta)).real
-    largest = float(np.max(np.hypot(*moved)))
+    moved = _departures(resonator, imperfection, surface.position, surface.points)
+    largest = float(np.linalg.norm(moved, axis=1).max())
     if largest == 0:
         return surface, 0.0
     thinnest = float(resonator.at(np.clip(surface.position, 0.0, 1.0) * resonator.length).thickness.min())
     factor = DEPARTURE * thinnest / largest if exaggerated else 1.0
-    out, up = factor * moved
-    shift = np.stack([out * np.cos(theta), out * np.sin(theta), up], axis=1)
-    return replace(surface, points=surface.points + shift), factor
+    return replace(surface, points=surface.points + factor * moved), factor
+
+
+def _departures(resonator: Resonator, imperfection: Imperfection, position: Array, points: Array) -> Array:
+    """How far points (count, 3) at positions of the meridian depart, (count, 3)."""
+    theta, r = np.arctan2(points[:, 1], points[:, 0]), np.hypot(points[:, 0], points[:, 1])
+    waves = find_departures(resonator, imperfection, position, r, points[:, 2])
+    out, up = sum(((wave * np.exp(-1j * m * theta)).real for m, wave in waves.items()), np.zeros((2, len(r))))
+    return np.stack([out * np.cos(theta), out * np.sin(theta), up], axis=1)
 
 
 def draw_axes(surface: Surface, slow_axis: float) -> Array:
