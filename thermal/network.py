@@ -14,7 +14,6 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-import scipy
 from numpy.typing import ArrayLike, NDArray
 
 from thermal.constants import Stefan_Boltzmann
@@ -246,9 +245,10 @@ def _check_paths(network: Network) -> None:
             raise ThermalError(f"node '{node.name}' is isolated; join it by a conductor or a radiator.")
     if not network.boundaries:
         raise ThermalError("the network has no boundary; give at least one Boundary, such as the chamber.")
-    _, group = scipy.sparse.csgraph.connected_components(scipy.sparse.csr_array(links), directed=False)
-    reached = set(group[network.count :])
-    lost = [node.name for node, part in zip(network.nodes, group, strict=False) if part not in reached]
+    joined = (links != 0).astype(float)
+    for _ in range(len(links).bit_length()):  # by paths of twice as many links
+        joined = np.minimum(joined @ joined, 1.0)
+    lost = [node.name for node, ends in zip(network.nodes, joined[:, network.count :], strict=False) if not ends.any()]
     if lost:
         raise ThermalError(f"no path leads from {', '.join(map(repr, lost))} to a boundary; add the missing link.")
 
