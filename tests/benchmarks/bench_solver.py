@@ -19,7 +19,6 @@ import time
 from pathlib import Path
 
 import numpy as np
-from history import record
 
 import shell.corner
 import shell.root
@@ -265,7 +264,7 @@ def importable(name):
 
 
 def main():
-    """Print the table and keep the figures in history.jsonl."""
+    """Print the table."""
     argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter).parse_args()
     print(f"threads of BLAS: {os.environ.get('OPENBLAS_NUM_THREADS', 'not limited')}; load {os.getloadavg()[0]:.1f}")
     rows = list(ours())
@@ -288,7 +287,6 @@ def main():
         print(
             f"{name:42} {1e3 * seconds:8.2f} ms {seconds / unit:8.2f} {unknowns:9d} {mean:12.4f} {mean / EXACT - 1:9.1e} {split:>9}"
         )
-    record("solvers side by side", milliseconds={name: round(1e3 * seconds, 3) for name, seconds, _, _ in rows})
     return 0
 
 

@@ -47,13 +47,12 @@ from studies.instrument.card import load_card
 from studies.record import write_record
 from studies.simulation.chamber import load_profile
 from studies.simulation.virtual_gyro import simulate_run
-from tests.benchmarks.bench_calibration import PROFILES
 from tests.benchmarks.diagnosis.card_cases import CARDS, SEEN, ceiling, make_case, run
 from tests.benchmarks.diagnosis.marks import compare, read_lines
-from tests.benchmarks.history import commit
 from tests.measured import DATA, bring_in
 from tests.stranger.__main__ import make_one
 
+PROFILES = ("staircase 20 -10 15 75min", "ramp -10 35 0.5 then soak 35 90min")
 ASK = "import sys; from studies.cli import main; sys.exit(main(sys.argv[1:]))"
 DCXO = (
     '# unknown column: "column 3"',
@@ -67,6 +66,16 @@ MEASURED: dict[str, tuple[str, tuple[tuple[str, str], ...], str]] = {
     "liquid": ("qcm_steps.txt", (), "run.csv"),
 }
 Line = dict[str, Any]
+
+
+def commit() -> str:
+    """Return the commit, with a plus where files have been changed since."""
+    asked = (["rev-parse", "--short", "HEAD"], ["status", "--porcelain", "--untracked-files=no"])
+    here, changed = (
+        subprocess.run(["git", *words], cwd=Path(__file__).parent, capture_output=True, text=True, check=False).stdout
+        for words in asked
+    )
+    return (here.strip() or "unknown") + ("+" if changed.strip() else "")
 
 
 def make_stranger(folder: Path, seed: int, first: int) -> Line:

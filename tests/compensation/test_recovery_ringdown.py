@@ -66,7 +66,7 @@ def misses(found, truth):
 
 @pytest.mark.slow
 def test_two_channels_reach_the_bound_and_their_intervals_hold():
-    """7 kHz, Q = 1e7, split 15 to 25 mHz: within 1.3 of the Cramér–Rao bound; tests/benchmarks/ringdowns.py counts 200."""
+    """7 kHz, Q = 1e7, split 15 to 25 mHz: within 1.3 of the Cramér–Rao bound."""
     random = np.random.default_rng(20)
     scores, held, split, q, axis = [], [], [], [], []
     for _ in range(12):

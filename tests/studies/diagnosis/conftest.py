@@ -4,6 +4,13 @@ import pytest
 
 from studies.effects import find_effect
 from studies.inference import signatures
+from tests.sketches import coarsen
+
+
+@pytest.fixture
+def coarser(monkeypatch):
+    """A diagnosis takes so few means of a run as show what is asserted."""
+    coarsen(monkeypatch, 120)
 
 
 @pytest.fixture

@@ -16,7 +16,7 @@ from studies.inference.signatures import Signatures
 from studies.instrument.card import load_card
 from studies.simulation.prediction import predict
 from studies.simulation.virtual_gyro import simulate_run
-from tests.benchmarks.diagnosis.unseen import COMMANDED, run_drive
+from tests.studies.diagnosis.unseen import COMMANDED, run_drive
 
 CARD = "hrg-30mm"
 
