@@ -3,6 +3,7 @@
 import gc
 import json
 import os
+from functools import cache, lru_cache
 
 import pytest
 
@@ -30,6 +31,20 @@ def coarse(request):
     """Diagnoses take coarse means, but for golden answers."""
     with pytest.MonkeyPatch.context() as patch:
         yield coarsen(patch) if "tests/golden" not in request.node.nodeid else {}
+
+
+keep = cache(lru_cache(200))
+
+
+@pytest.fixture(autouse=True, scope="module")
+def solved_once(request):
+    """The modes of a card's law are solved once in a process, but for the tests of the solver itself."""
+    from shell import law
+
+    with pytest.MonkeyPatch.context() as patch:
+        if "tests/shell" not in request.node.nodeid:
+            patch.setattr(law, "solve_modes", keep(law.solve_modes))
+        yield
 
 
 @pytest.fixture

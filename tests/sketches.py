@@ -37,9 +37,9 @@ def sketch_pages(patch: Any) -> dict[str, Any]:
     return whole
 
 
-def coarsen(patch: Any) -> dict[str, Any]:
-    """Let a diagnosis take half as many means of a campaign as it does of itself, for half the time; return what it takes, by name."""
-    module, coarse = import_module("studies.inference.diagnosis"), {"BLOCKS": 400, "BLOCKS_OF_RUN": (50, 200)}
+def coarsen(patch: Any, means: int = 200) -> dict[str, Any]:
+    """Let a diagnosis take so many means of a run, where it takes 400 of itself, and of a campaign twice as many; return what it takes, by name."""
+    module, coarse = import_module("studies.inference.diagnosis"), {"BLOCKS": 2 * means, "BLOCKS_OF_RUN": (50, means)}
     whole = {f"{module.__name__}.{name}": getattr(module, name) for name in coarse}
     for name, value in coarse.items():
         patch.setattr(module, name, value)

@@ -51,6 +51,14 @@ async function visit() {
   seen.modes = [...find(".mode").options].map(option => option.text);
   find(".mode").value = 1; find(".mode").dispatchEvent(new Event("change")); seen.other = look();
   find(".colour").value = 1; find(".colour").dispatchEvent(new Event("change")); seen.energy = look(); seen.legend = find(".top").textContent;
+  const curves = document.querySelector("figure.curves canvas"), told = () => document.querySelector(".reading").textContent;
+  const go = (kind, x) => { const at = curves.getBoundingClientRect();
+    curves.dispatchEvent(new PointerEvent(kind, {clientX: at.left + x * at.width, clientY: at.top + at.height / 2})); };
+  go("pointermove", 0.5); seen.whole = told();
+  go("pointerdown", 0.4); go("pointermove", 0.6); go("pointerup", 0.6); go("pointermove", 0.5); seen.part = told();
+  seen.button = !document.querySelector(".curves button").hidden;
+  document.querySelector(".curves button").click(); go("pointermove", 0.5); seen.again = told();
+  const table = document.querySelector("table"); seen.table = table.scrollWidth; seen.room = table.parentElement.clientWidth;
   document.title = JSON.stringify(seen);
 }
 addEventListener("load", () => visit().catch(error => { document.title = JSON.stringify({error: String(error)}); }));
@@ -63,7 +71,7 @@ def browse(page, *flags):
     command = [
         BROWSER, "--headless", "--no-sandbox", "--disable-gpu", "--no-first-run", "--disable-background-networking",
         "--disable-component-update", "--disable-sync", "--disable-quic", f"--user-data-dir={page.parent / 'profile'}",
-        "--window-size=900,900", "--virtual-time-budget=10000", *flags, "--dump-dom", f"file://{page}",
+        "--window-size=1280,900", "--virtual-time-budget=10000", *flags, "--dump-dom", f"file://{page}",
     ]  # fmt: skip
     cut = shutil.which("unshare") and subprocess.run(["unshare", "-n", "true"], capture_output=True).returncode == 0
     done = subprocess.run(["unshare", "-n", *command] if cut else command, capture_output=True, text=True, timeout=600)
@@ -80,87 +88,47 @@ def difference(one, two):
     return float(abs(picture(one) - picture(two)).mean())
 
 
+HEAD = [
+    "quantity",
+    "unit",
+    "card",
+    "calibrated",
+    "90 % interval",
+    "shift (sd)",
+    "width",
+    "determined by",
+    "key of the card",
+]
+NUMBERS = ["1.0000e-7", "1.00000e-7", "9.9966e-8 … 1.00052e-7", "+0.00", "0.000", "data and prior"]
+ROWS = [
+    ["1/Q at the reference temperature", "J/(kg K)", *NUMBERS, "loss.inverse_q_at_reference"],
+    [
+        "temperature curvature of the shear modulus",
+        "1/K²",
+        *NUMBERS,
+        "material.deviation.shear_modulus.log_curvature_per_K2",
+    ],
+]
+
+
 @pytest.fixture(scope="module")
 def page(tmp_path_factory):
+    """A mode view, a figure and a table on one page."""
     instrument = load_card("free-dome")
     elastic = instrument.material.elastic(instrument.reference_temperature)
     modes = [solve_modes(instrument.resonator, elastic, n, theory="shell", tolerance=1e-3)[0] for n in (2, 3)]
     buffer = io.BytesIO()
     Image.new("RGB", (8, 8), "gray").save(buffer, "PNG")
     view = view_modes(instrument.resonator, modes, "free-dome", buffer.getvalue(), "a dome with four lobes", "caption")
-    text = render_page("Modes", "lead", [Chapter("Mode shapes", [Sentence("before"), view])])
+    x = np.linspace(-1.0, 1.0, 2001)
+    with style.figure(x="time (h)", y="bias (°/h)") as (made, axes):
+        axes.plot(x, 3.0 + x**3, label="<b>")
+    parts = [Sentence("before"), view, draw(made, "caption", "alt"), Cells("Values", HEAD, ROWS, sortable=True)]
+    text = render_page("Modes", "lead", [Chapter("Mode shapes", parts)])
     path = tmp_path_factory.mktemp("browser") / "page.html"
     path.write_text(text.replace("</body>", VISIT + "</body>"))
     assert not re.findall(r"""(?:src|href)\s*=\s*["']?(?!data:)(?:https?:)?//""", text)
     return path
-
-
-READ = """
-<script>
-addEventListener("load", () => setTimeout(() => {
-  const canvas = document.querySelector("figure.curves canvas"), at = canvas.getBoundingClientRect(), seen = {};
-  const told = () => document.querySelector(".reading").textContent;
-  const go = (kind, x) => canvas.dispatchEvent(new PointerEvent(kind, {clientX: at.left + x * at.width, clientY: at.top + at.height / 2}));
-  go("pointermove", 0.5); seen.whole = told();
-  go("pointerdown", 0.4); go("pointermove", 0.6); go("pointerup", 0.6); go("pointermove", 0.5); seen.large = told();
-  seen.button = !document.querySelector(".curves button").hidden;
-  document.querySelector(".curves button").click(); go("pointermove", 0.5); seen.again = told();
-  document.title = JSON.stringify(seen);
-}, 200));
-</script>
-"""
-
-
-def test_a_figure_shows_values_under_the_pointer_and_a_part_of_it_enlarged(tmp_path):
-    x = np.linspace(-1.0, 1.0, 2001)
-    with style.figure(x="time (h)", y="bias (°/h)") as (made, axes):
-        axes.plot(x, 3.0 + x**3, label="<b>")
-    text = render_page("T", "lead", [Chapter("C", [draw(made, "caption", "alt")])])
-    path = tmp_path / "page.html"
-    path.write_text(text.replace("</body>", READ + "</body>"))
-    seen = browse(path)
-    assert seen["button"]
-    for said in (seen["whole"], seen["large"], seen["again"]):
-        found = re.fullmatch(r"time \(h\) (−?[\d.]+) · <b> ([\d.]+) °/h", said)
-        at, value = (float(number.replace("−", "-")) for number in found.groups())
-        assert value == pytest.approx(3.0 + at**3, abs=2e-3)
-    assert seen["whole"] == seen["again"]
-
-
-MEASURE = """
-<script>
-addEventListener("load", () => {
-  const table = document.querySelector("table");
-  document.title = JSON.stringify({table: table.scrollWidth, room: table.parentElement.clientWidth});
-});
-</script>
-"""
-
-
-def test_nine_columns_with_a_key_of_the_card_fit_a_screen_of_1280_px(tmp_path):
-    """The last column of a calibration, the key of the card, was cut off."""
-    head = [
-        "quantity",
-        "unit",
-        "card",
-        "calibrated",
-        "90 % interval",
-        "shift (sd)",
-        "width",
-        "determined by",
-        "key of the card",
-    ]
-    key = "material.deviation.shear_modulus.log_curvature_per_K2"
-    numbers = ["1.0000e-7", "1.00000e-7", "9.9966e-8 … 1.00052e-7", "+0.00", "0.000", "data and prior"]
-    rows = [
-        ["1/Q at the reference temperature", "J/(kg K)", *numbers, "loss.inverse_q_at_reference"],
-        ["temperature curvature of the shear modulus", "1/K²", *numbers, key],
-    ]
-    text = render_page("T", "lead", [Chapter("C", [Cells("Values", head, rows, sortable=True)])])
-    path = tmp_path / "page.html"
-    path.write_text(text.replace("</body>", MEASURE + "</body>"))
-    seen = browse(path, "--window-size=1280,900")
-    assert seen["table"] <= seen["room"] <= 1280
 
 
 @pytest.fixture(scope="module")
@@ -171,6 +139,20 @@ def seen(page):
 def test_the_page_is_live_and_asks_the_network_for_nothing(seen):
     assert "error" not in seen, seen
     assert (seen["live"], seen["still"], seen["requests"]) == (True, False, [])
+
+
+def test_a_figure_shows_values_under_the_pointer_and_a_part_of_it_enlarged(seen):
+    assert seen["button"]
+    for said in (seen["whole"], seen["part"], seen["again"]):
+        found = re.fullmatch(r"time \(h\) (−?[\d.]+) · <b> ([\d.]+) °/h", said)
+        at, value = (float(number.replace("−", "-")) for number in found.groups())
+        assert value == pytest.approx(3.0 + at**3, abs=2e-3)
+    assert seen["whole"] == seen["again"]
+
+
+def test_nine_columns_with_a_key_of_the_card_fit_a_screen_of_1280_px(seen):
+    """The last column of a calibration, the key of the card, was cut off."""
+    assert seen["table"] <= seen["room"] <= 1280
 
 
 def test_the_mode_swings_pauses_and_turns(seen):

@@ -187,8 +187,11 @@ def test_the_split_of_an_imperfect_shell_moves_as_full_solves_say():
 @pytest.mark.slow
 def test_the_pages_of_modes_and_tcf_have_the_sliders(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    assert main(["tcf", "free-dome", "--theory", "shell", "--report", "tcf.html"]) == 0
+    assert main(["tcf", "hrg-30mm", "--theory", "shell", "--report", "tcf.html"]) == 0
     text = (tmp_path / "tcf.html").read_text(encoding="utf-8")
     assert text.count('class="live-numbers"') == 1
+    assert (
+        text.count("Measured on the gyro of the HRG paper (Sensors 2012, 12, 6434, Table 1).") == 1
+    )  # of what its numbers are
     assert main(["tcf", "free-dome", "--theory", "rayleigh", "--report", "rayleigh.html"]) == 0
     assert "live-numbers" not in (tmp_path / "rayleigh.html").read_text(encoding="utf-8")

@@ -40,13 +40,3 @@ def test_error_map_is_darkest_in_the_middle():
     i, j = np.unravel_index(np.argmin(error_map.error), error_map.error.shape)
     assert error_map.frequency_ratio[j] == pytest.approx(1)
     assert error_map.damping_ratio[i] == pytest.approx(1)
-
-
-@pytest.mark.slow
-def test_chapters_can_be_drawn(study):
-    from studies.papers.cvg_filters import filter_chapters
-    from studies.results.page import make_blocks
-
-    chapters = filter_chapters(study, study_error_map(5))
-    assert [len(make_blocks(*chapter.parts)) for chapter in chapters] == [2, 2, 2, 3]
-    assert cvg_filters.KALMAN_STEP == study.by_step[-1][0]

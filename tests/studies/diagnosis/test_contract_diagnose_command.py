@@ -142,18 +142,6 @@ def test_constant_temperature_is_adequate_and_says_what_cannot_show(capsys, tmp_
     assert "K only" in found["responses"]["frequency_Hz"]["remark"]
 
 
-@pytest.mark.slow
-def test_a_plan_of_one_step_names_what_cannot_show(capsys):
-    """One step alone ended in an internal fault."""
-    status, out, _ = run(capsys, "--plan", "step 20 -10 5h", "--json")
-    assert status == 0
-    plan = json.loads(out)
-    assert plan["schema"] == "hrg.plan/2"
-    assert "electrostatic-softening" in plan["not_testable"]
-    (bias,) = [one for one in plan["effects"] if (one["effect"], one["response"]) == ("rate-bias", "bias_deg_per_h")]
-    assert all(0.0 <= chance <= 1.0 for chance in bias["identified"].values())
-
-
 @pytest.mark.parametrize("kind", ["run", "table"])
 def test_temperatures_beyond_the_material_law_are_named(campaign, capsys, tmp_path, kind):
     """The law of the card ends at -60 degrees: nothing is extrapolated in silence."""

@@ -90,8 +90,8 @@ def test_rows_of_two_gyros_one_after_the_other_are_no_noise_and_no_dip(rows, abo
 
 
 def test_few_rows_of_pure_noise_name_no_row_and_no_step():
-    tables = [study(np.linspace(-40.0, 60.0, 9 + k % 9), 0.0, seed=k, white=1e-2) for k in range(36)]
-    assert sum(found.verdict.verdict != "adequate" for found in tables) <= 2
+    tables = [study(np.linspace(-40.0, 60.0, 9 + k % 9), 0.0, seed=k, white=1e-2) for k in range(18)]
+    assert sum(found.verdict.verdict != "adequate" for found in tables) <= 1
     assert not any("alone makes it" in sentence for found in tables for sentence in found.sentences)
 
 

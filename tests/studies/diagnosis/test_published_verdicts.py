@@ -112,9 +112,10 @@ def test_the_thermometer_of_a_crystal_is_slower_than_the_crystal(tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("coarser")
 def test_steps_of_liquid_on_a_crystal_are_not_adequate(only, tmp_path):
-    """Of every third row, and of the effects those that are slow."""
+    """Of every sixth row, and of the effects those that are slow."""
     only(*SLOW)
     record = read_record(str(bring_in("qcm_steps.txt", tmp_path)))
-    thin = {name: own[::3] for name, own in record.columns.items()}
+    thin = {name: own[::6] for name, own in record.columns.items()}
     assert diagnose(replace(record, columns=thin)).verdict != "adequate"

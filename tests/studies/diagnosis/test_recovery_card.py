@@ -41,7 +41,6 @@ def test_a_virtual_record_of_the_card_is_adequate(shipped):
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("coarser")
 def test_what_a_loss_peak_does_to_the_bias_is_no_second_cause(only):
     """Anisotropy of damping makes bias of 1/Q (Lynch 1995): a peak of the one was once named cross-damping in the other too."""
     card = load_card("cvg-25mm")
@@ -71,7 +70,6 @@ def test_an_effect_is_not_taken_for_values_far_from_the_card(only):
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("coarser")
 def test_a_strong_effect_leaves_the_values_alone(only):
     """Beside an amplitude-frequency effect of a hundred times the noise, priors of the first fit's scale let three values go far."""
     card, runs = load_card("bvg-bell"), []
