@@ -8,7 +8,7 @@ variance that they show.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import astuple, dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 import scipy
@@ -43,6 +43,33 @@ LEAST_FALL = 0.1  # of the objective, over what the step promises
 UNSEEN = 0.1  # of the noise of one row: a column whose whole length is less tells nothing
 LASTING = ("frequency_Hz", "inverse_q")  # responses without an offset of turn-on
 LONGEST_STEP = 3.0  # prior standard deviations, of any coordinate in one step
+IMPOSSIBLE = (InputError, ShellError, ThermalError, CompensationError)  # what a point says that has no prediction
+
+
+class Problem(Protocol):
+    """What steps need of a least-squares problem whose coordinates are of unit prior variance."""
+
+    @property
+    def responses(self) -> tuple[str, ...]:
+        """Names of what is compared."""
+
+    @property
+    def count(self) -> int:
+        """Number of coordinates."""
+
+    @property
+    def bending(self) -> int:
+        """How many coordinates come first in which it bends, and a step may not be long."""
+
+    @property
+    def ends(self) -> tuple[Array, Array]:
+        """Least and largest coordinates."""
+
+    def inside(self, point: Array) -> Array:
+        """Nearest coordinates within the bounds of the values."""
+
+    def evaluate(self, point: Array, slopes: bool = True) -> State:
+        """Predict and compare."""
 
 
 @dataclass(frozen=True)
@@ -104,6 +131,22 @@ def fit(problem: CardProblem, start: Array | None = None, progress: Progress = l
     return CardFit(problem, state, noise, rows, covariance, outliers, step, converged)
 
 
+def descend(problem: Problem, state: State, noise: Mapping[str, Noise], rows: Mapping[str, NoiseRows]) -> State:
+    """Step in given noise as long as the objective falls by `CLOSE`."""
+    radius, left = LONGEST_STEP, objective(problem, state, noise, rows)
+    for _ in range(MOST_STEPS):
+        linear = _Linear.of(problem, state, noise, rows)
+        if linear.fall(linear.step(np.inf)[0]) < CLOSE:
+            break
+        reached, radius, _ = _advance(problem, state, linear, radius, noise, rows)
+        if reached is None:
+            break
+        before, left, state = left, objective(problem, reached, noise, rows), reached
+        if before - left < CLOSE:
+            break
+    return state
+
+
 def step_within(both: Array, target: Array, low: Array, high: Array) -> Array:
     """Least squares of both · x = target; where x leaves its bounds it is held at them and the others are solved anew."""
     free = np.ones(both.shape[1], dtype=bool)
@@ -117,7 +160,7 @@ def step_within(both: Array, target: Array, low: Array, high: Array) -> Array:
         free &= ~beyond
 
 
-def objective(problem: CardProblem, state: State, noise: Mapping[str, Noise], rows: Mapping[str, NoiseRows]) -> float:
+def objective(problem: Problem, state: State, noise: Mapping[str, Noise], rows: Mapping[str, NoiseRows]) -> float:
     """−2 ln of likelihood and prior, up to a constant."""
     total = float(state.point @ state.point)
     return total + sum(float(np.sum(rows[n].whiten(state.residual[n], noise[n]) ** 2)) for n in problem.responses)
@@ -215,7 +258,7 @@ def _spare_outliers(rows: NoiseRows, state: State, name: str, noise: Noise) -> t
 
 
 def whitened(
-    problem: CardProblem, state: State, noise: Mapping[str, Noise], rows: Mapping[str, NoiseRows]
+    problem: Problem, state: State, noise: Mapping[str, Noise], rows: Mapping[str, NoiseRows]
 ) -> tuple[Array, Array]:
     """Slopes and residuals of all responses in rows whose noise is white of variance 1."""
     white = [
@@ -236,30 +279,33 @@ class _Linear:
     target: Array
     low: Array
     high: Array
+    bending: int
 
     @classmethod
-    def of(
-        cls, problem: CardProblem, state: State, noise: Mapping[str, Noise], rows: Mapping[str, NoiseRows]
-    ) -> "_Linear":
+    def of(cls, problem: Problem, state: State, noise: Mapping[str, Noise], rows: Mapping[str, NoiseRows]) -> "_Linear":
         J, r = whitened(problem, state, noise, rows)
         both = np.column_stack([np.vstack([J, np.eye(problem.count)]), np.append(r, -state.point)])
         triangle = np.linalg.qr(both).R
         low, high = (end - state.point for end in problem.ends)
-        return cls(J, r, triangle[:, :-1], triangle[:, -1], low, high)
+        return cls(J, r, triangle[:, :-1], triangle[:, -1], low, high, problem.bending)
+
+    def length(self, move: Array) -> float:
+        """How far a move goes in any coordinate in which the problem bends."""
+        return float(np.abs(move[: self.bending]).max(initial=0.0))
 
     def fall(self, move: Array) -> float:
         """What a move promises of the objective."""
         return float(self.target @ self.target - np.sum((self.target - self.triangle @ move) ** 2))
 
     def step(self, radius: float) -> tuple[Array, float]:
-        """The move of the largest fall of those that are no longer than the radius in any coordinate, and its damping (Levenberg, Marquardt)."""
+        """The move of the largest fall of those that are no longer than the radius, and its damping (Levenberg, Marquardt)."""
         move = self._damped(0.0)
-        if np.abs(move).max(initial=0.0) <= radius:
+        if self.length(move) <= radius:
             return move, 0.0
         low, high = LEAST_DAMPING, MOST_DAMPING
         for _ in range(HALVINGS):
             middle = (low + high) / 2
-            low, high = (low, middle) if np.abs(self._damped(np.exp(middle))).max() <= radius else (middle, high)
+            low, high = (low, middle) if self.length(self._damped(np.exp(middle))) <= radius else (middle, high)
         return self._damped(np.exp(high)), float(np.exp(high))
 
     def bend(self, move: Array, damping: float, bent: Array, reached: Array) -> Array:
@@ -279,7 +325,7 @@ class _Linear:
 
 
 def _advance(
-    problem: CardProblem,
+    problem: Problem,
     state: State,
     linear: _Linear,
     radius: float,
@@ -294,7 +340,7 @@ def _advance(
     before = objective(problem, state, noise, rows)
     for _ in range(TRIALS):
         move, damping = linear.step(radius)
-        length, promised = float(np.abs(move).max(initial=0.0)), max(linear.fall(move), 1e-300)
+        length, promised = linear.length(move), max(linear.fall(move), 1e-300)
         reached = _reach(problem, state.point + move)
         kept = -np.inf if reached is None else (before - objective(problem, reached, noise, rows)) / promised
         bent = np.zeros_like(move)
@@ -303,7 +349,7 @@ def _advance(
                 break
             there = np.concatenate([rows[n].whiten(reached.residual[n], noise[n]) for n in problem.responses])
             bent = linear.bend(move, damping, bent, there)
-            other = _reach(problem, state.point + move + bent) if np.abs(bent).max() < length else None
+            other = _reach(problem, state.point + move + bent) if linear.length(bent) < length else None
             gained = -np.inf if other is None else (before - objective(problem, other, noise, rows)) / promised
             if gained <= kept:
                 break
@@ -317,10 +363,9 @@ def _advance(
     return None, radius, False
 
 
-def _reach(problem: CardProblem, point: Array) -> State | None:
+def _reach(problem: Problem, point: Array) -> State | None:
     """The model at a point, its values within their bounds; None where it is impossible there."""
-    count = len(problem.priors.values)
     try:
-        return problem.evaluate(np.concatenate([problem.priors.inside(point[:count]), point[count:]]), slopes=False)
-    except (InputError, ShellError, ThermalError, CompensationError):
+        return problem.evaluate(problem.inside(point), slopes=False)
+    except IMPOSSIBLE:
         return None

@@ -4,7 +4,7 @@ Coordinates, all of unit prior variance: the card's uncertain values, then each 
 start. Frequency, bias and 1/Q are driven by the measured housing where there is one; the chamber then explains the housing.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -105,6 +105,11 @@ class CardProblem:
         """Number of coordinates."""
         return len(self.priors.values) + len(self.starts)
 
+    @property
+    def bending(self) -> int:
+        """Number of coordinates in which it bends: all."""
+        return self.count
+
     @cached_property
     def ends(self) -> tuple[Array, Array]:
         """Least and largest coordinates: those of values, and of a jump that was after the row before it and not after its own, where the model has a kink."""
@@ -114,6 +119,11 @@ class CardProblem:
             np.append(low, np.where(jumps, -np.sqrt(3.0), -np.inf)),
             np.append(high, np.where(jumps, 0.0, np.inf)),
         )
+
+    def inside(self, point: Array) -> Array:
+        """Nearest coordinates whose values respect their bounds."""
+        count = len(self.priors.values)
+        return np.concatenate([self.priors.inside(point[:count]), point[count:]])
 
     @cached_property
     def responses(self) -> tuple[str, ...]:
@@ -168,24 +178,31 @@ class CardProblem:
 
     def evaluate(self, point: Array, slopes: bool = True) -> State:
         """Predict all runs and compare."""
-        values = self.priors.values
-        instrument = self.instrument_at(point)
-        law = self.law_at(instrument)
-        scale = self.priors.slopes(point[: len(values)])
-        residual: dict[str, list[Array]] = {name: [] for name in self.responses}
-        slope: dict[str, list[Array]] = {name: [] for name in self.responses}
-        varied = Variations(instrument, law, self.priors.names)
+        return self.compare(point, self.predictions(point, slopes), slopes)
+
+    def predictions(self, point: Array, slopes: bool = True) -> Iterator[Prediction]:
+        """Yield what is predicted of every part."""
+        varied = self._varied(point)
         for k, part in enumerate(self.parts):
             names = [*self.priors.names, *(name for one, name, _ in self.starts if one == k)] if slopes else []
-            drive, wanted = self.drive_at(point, k), varied.with_names(names)
-            prediction = predict(instrument, drive, wanted, law, self.knots(part), part.responses == (HOUSING,))
+            drive, wanted, here = self.drive_at(point, k), varied.with_names(names), varied.here
+            yield predict(here.instrument, drive, wanted, here.law, self.knots(part), part.responses == (HOUSING,))
+
+    def compare(self, point: Array, predictions: Iterable[Prediction], slopes: bool = True) -> State:
+        """Set the predictions of every part beside what was measured."""
+        scale = self.priors.slopes(point[: len(self.priors.values)])
+        residual: dict[str, list[Array]] = {name: [] for name in self.responses}
+        slope: dict[str, list[Array]] = {name: [] for name in self.responses}
+        for k, (part, prediction) in enumerate(zip(self.parts, predictions, strict=True)):
             for name in part.responses:
                 blocks = self.runs[part.run].responses[name]
                 residual[name].append(blocks.value - blocks.average(prediction.columns[name]))
                 if slopes:
                     slope[name].append(self._slopes(k, name, prediction, scale))
+        varied = self._varied(point) if self.tables else None
         for table in self.tables:
-            residual[SETTLED].append(table.frequency - law.frequency(table.temperature, extrapolate=True))
+            assert varied is not None
+            residual[SETTLED].append(table.frequency - varied.here.law.frequency(table.temperature, extrapolate=True))
             if slopes:
                 slope[SETTLED].append(self._settled_slopes(table, varied, scale))
         return State(
@@ -194,17 +211,24 @@ class CardProblem:
             {name: np.concatenate(found) for name, found in slope.items()} if slopes else {},
         )
 
+    def _varied(self, point: Array) -> Variations:
+        instrument = self.instrument_at(point)
+        return Variations(instrument, self.law_at(instrument), self.priors.names)
+
     def _slopes(self, k: int, response: str, prediction: Prediction, scale: Array) -> Array:
-        part, count = self.parts[k], len(self.priors.values)
-        blocks = self.runs[part.run].responses[response]
+        blocks = self.runs[self.parts[k].run].responses[response]
         J = np.zeros((len(blocks.value), self.count))
-        if count:
-            columns = np.column_stack([prediction.derivatives[name][response] for name in self.priors.names])
-            J[:, :count] = blocks.average(columns) @ scale
-        for place, (one, name, sd) in enumerate(self.starts):
-            if one == k:
-                J[:, count + place] = sd * blocks.average(prediction.derivatives[name][response])
+        slopes, places = self.along(k, response, prediction, scale)
+        J[:, places] = blocks.average(slopes)
         return J
+
+    def along(self, k: int, column: str, prediction: Prediction, scale: Array) -> tuple[Array, list[int]]:
+        """Return how a column of a part's prediction goes with the coordinates that reach it, and their places."""
+        by, count, nothing = prediction.derivatives, len(self.priors.values), np.zeros((len(prediction.housing), 0))
+        values = np.column_stack([nothing, *(by[name][column] for name in self.priors.names)]) @ scale
+        own = [(count + i, name, sd) for i, (one, name, sd) in enumerate(self.starts) if one == k]
+        starts = [sd * by[name][column] for _, name, sd in own]
+        return np.column_stack([values, *starts]), [*range(count), *(place for place, _, _ in own)]
 
     def _settled_slopes(self, table: SettledTable, varied: Variations, scale: Array) -> Array:
         columns = np.zeros((len(table.frequency), len(self.priors.values)))

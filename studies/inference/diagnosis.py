@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from compensation.noise import Noise, white_rms
 from shell.constants import zero_Celsius
-from studies.calibration.fit import CardFit, fit, residual_noise
+from studies.calibration.fit import IMPOSSIBLE, CardFit, fit, residual_noise
 from studies.calibration.observed import HOUSING, RESPONSES, observe
 from studies.calibration.priors import gather_priors
 from studies.calibration.problem import CardProblem, wide_law
@@ -28,7 +28,7 @@ from studies.inference.inferred import Inferred
 from studies.inference.lack_of_fit import generic_bank, is_rounding, look
 from studies.inference.model import Background, Linear, Term
 from studies.inference.records import Campaign
-from studies.inference.relinearise import IMPOSSIBLE, relinearise
+from studies.inference.relinearise import relinearise
 from studies.inference.search import MARGIN, SUSPICIOUS, Hypothesis, Outcome, Search, Shapes
 from studies.inference.sharp import RESOLVED, fast_line, longest_resolved
 from studies.inference.signatures import Signatures
@@ -53,6 +53,8 @@ AGAIN, SETTLING = 7, 4
 """Most linearisations after the first, and how many of these look for no further effects."""
 STRAYED = 1.0
 """Error of −2 ln L up to which a linearisation is taken as it is."""
+STILL = 0.2
+"""Prior standard deviations by which it must have moved to be made anew once more."""
 FAR = 2.0
 """The same, beyond which the search begins from the card's own values too."""
 STRAIGHT = 1.0
@@ -276,10 +278,10 @@ def _from(start: CardFit, told: Array | None, progress: Report, least: float | N
     def linearise(
         terms: Sequence[Term], noise: Mapping[str, Noise], bank: Sequence[Shapes] | None = None
     ) -> tuple[Search, Array, tuple[Term, ...]]:
-        linear, signatures, there, own = relinearise(start, search.linear, search.signatures, point, terms, noise)
-        if bank is None and signatures.away(search.signatures) < SAME_PATH:
+        there = relinearise(start, search.linear, point, terms, noise)
+        if bank is None and there.signatures.away(search.signatures) < SAME_PATH:
             bank = search.bank
-        return Search(linear, signatures, noise, bank, progress), there, own
+        return Search(there.linear, there.signatures, noise, bank, progress), there.values, there.terms
 
     def straightened(plain: Hypothesis, final: Hypothesis) -> tuple[Hypothesis, Hypothesis]:
         nonlocal search, point
@@ -287,11 +289,14 @@ def _from(start: CardFit, told: Array | None, progress: Report, least: float | N
             if holds(final) or not (final.terms or left == AGAIN) or beaten(final):
                 break
             progress("linearising the model again with the effects found")
+            before = point
             search, point, terms = linearise(final.terms, final.noise)
             if left > SETTLING:
                 plain, final = search.grow(terms, near if left > SETTLING + 1 else lambda _: True)
             else:
                 plain, final = search.grow(terms, most=0)
+            if np.abs(point - before).max(initial=0.0) < STILL:
+                break
         return plain, final
 
     def beaten(final: Hypothesis) -> bool:

@@ -88,9 +88,7 @@ class Model:
         for term in self.terms:
             coefficients.append(mean[at : at + len(term.unit)] * term.spread)
             at += len(term.unit)
-        point = np.clip(mean[:count], *self.problem.ends)
-        values = len(self.problem.priors.values)
-        return Kept(np.concatenate([self.problem.priors.inside(point[:values]), point[values:]]), tuple(coefficients))
+        return Kept(self.problem.inside(np.clip(mean[:count], *self.problem.ends)), tuple(coefficients))
 
     def residuals(self, numbers: Kept, there: Signatures | None = None) -> dict[str, Rows]:
         """Return what is left of every response on the rows of all runs; `there`: the paths at these numbers, where they are known."""

@@ -1,122 +1,196 @@
-"""The point beside effects where a linear model of values, starts and effects holds: Gauss–Newton steps that really leave less.
+"""The point beside effects where a linear model of values, starts and effects holds: the steps of a calibration, with the effects in it.
 
-At values u the effects' coefficients c are linear; what is left at their best,
+Coordinates are the card's u, then the effects' coefficients c in units of their priors; in given noise every step lets
 
-    Q(u) = min_c |L⁻¹ (r(u) − Σ X_k(u) c_k)|² + |c|² + |u|²,
-
-has to fall with every step of u; a step that does not is shortened.
+    Q(u, c) = |L⁻¹ (r(u) − Σ X_k(u) c_k)|² + |u|² + |c|²   fall.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from compensation.errors import CompensationError
 from compensation.noise import Noise
-from shell.errors import ShellError
-from studies.calibration.fit import CardFit
-from studies.errors import InputError
-from studies.inference.held_out import Model
-from studies.inference.model import Linear, Term, solve_posterior
+from compensation.noise_rows import NoiseRows
+from studies.calibration.fit import CardFit, descend
+from studies.calibration.problem import State
+from studies.effects.states import States
+from studies.inference.model import TOLD, Linear, Term, solve_posterior
 from studies.inference.signatures import Signatures
-from thermal.errors import ThermalError
+from studies.simulation.drive import COLUMN, Boundary
+from studies.simulation.heat_path import build_network, slowest_lag
+from studies.simulation.prediction import Prediction
+from studies.simulation.variations import HEATED
 
 Array = NDArray[np.float64]
-STEPS, PARTS = 6, (1.0, 0.4, 0.15)
-"""Most steps, and the parts of one that are tried."""
-STEP = 0.02
+STEP = 1e-3
 """Prior standard deviations, for differences."""
-IMPOSSIBLE = (InputError, ShellError, ThermalError, CompensationError)
-"""What a point says that has no prediction."""
-CLOSE = 0.5
-"""Fall of Q that a step must promise to be taken."""
+OF_SLOPE = ("law.a", "material.")
+"""Values that the slope of the frequency over temperature depends on."""
 
 
 def relinearise(
-    start: CardFit,
-    linear: Linear,
-    signatures: Signatures,
-    point: Array,
-    terms: Sequence[Term],
-    noise: Mapping[str, Noise],
-) -> tuple[Linear, Signatures, Array, tuple[Term, ...]]:
-    """Return the model linearised where its values are most probable beside some effects, these values, and the effects there."""
-    problem = start.problem
-    terms = tuple(replace(one, bend={}) for one in terms)
-    best, sizes = _left(linear, point, terms, noise)
-    terms = _bent(start, point, terms, sizes)
-    for _ in range(STEPS):
-        model = Model(linear, signatures, terms, noise)
-        X, r = model.linear.stacked(terms, noise)
-        mean = solve_posterior(X, r)[0]
-        if best - float(mean @ mean + np.sum((r - X @ mean) ** 2)) < CLOSE:
-            break
-        moved = model.kept(mean).point
-        for part in PARTS:
-            trial = point + part * (moved - point)
-            try:
-                state, there = problem.evaluate(trial), Signatures.at(problem, trial)
-            except IMPOSSIBLE:
-                continue
-            here = Linear.of(replace(start, state=state), linear.told)
-            fresh = tuple(replace(one, columns=there.columns_of(one), bend={}) for one in terms)
-            left, sizes = _left(here, trial, fresh, noise)
-            if left < best:
-                break
-        else:
-            break
-        linear, signatures, point, best = here, there, trial, left
-        terms = _bent(start, trial, fresh, sizes)
-    return linear, signatures, point, terms
+    start: CardFit, linear: Linear, point: Array, terms: Sequence[Term], noise: Mapping[str, Noise]
+) -> "Linearised":
+    """Return the model where its values are most probable beside some effects, from a point about which it is linear."""
+    X, r = linear.stacked(terms, noise)
+    own = X[:, linear.count :]
+    sizes = solve_posterior(own, r - X[:, : linear.count] @ point)[0] if terms else np.zeros(0)
+    beside = Beside(start, tuple(terms), linear.told)
+    rows, noise = dict(start.rows), dict(noise)
+    if linear.told is not None:
+        rows[TOLD] = NoiseRows.of([np.arange(len(linear.told), dtype=np.float64)], [np.ones(len(linear.told))])
+        noise[TOLD] = Noise(1.0)
+    found = descend(beside, beside.evaluate(np.append(point, sizes)), noise, rows)
+    assert isinstance(found, Linearised)
+    return found
 
 
-def _bent(start: CardFit, point: Array, terms: Sequence[Term], sizes: Sequence[Array]) -> tuple[Term, ...]:
-    """Return terms that know how what they do goes with the starts of runs and with the lag, and slope, of a polynomial card."""
-    problem, names = start.problem, start.problem.priors.names
-    thermal = any(term.effect.thermal for term in terms)
-    law = [k for k, name in enumerate(names) if name == "law.lag_s" or (thermal and name.startswith("law.a"))]
-    kinds: dict[str, list[int]] = {}
-    for i, (_, name, _) in enumerate(problem.starts):
-        if name.startswith("initial."):
-            kinds.setdefault(name, []).append(len(names) + i)
-    # runs know nothing of each other: their starts move at once
-    directions = [*([k] for k in law), *kinds.values()] if terms else []
-    moved = [Signatures.at(problem, point + STEP * np.isin(np.arange(problem.count), places)) for places in directions]
-    found = []
-    for term, size in zip(terms, sizes, strict=True):
-        own = {name: columns @ size for name, columns in term.columns.items()}
-        bend = {name: np.zeros((len(change), problem.count + 1)) for name, change in own.items()}
-        for places, paths in zip(directions, moved, strict=True):
-            if places[0] < len(names) and names[places[0]].startswith("law.a") and not term.effect.thermal:
-                continue
-            for response, columns in paths.columns_of(term).items():
-                change = (columns @ size - own[response]) / STEP
-                for k in places:
-                    bend[response][_rows_of(start, response, k), k] = change[_rows_of(start, response, k)]
-        for columns in bend.values():
-            columns[:, -1] = columns[:, :-1] @ point
-        found.append(replace(term, bend=bend) if any(columns.any() for columns in bend.values()) else term)
-    return tuple(found)
+@dataclass(frozen=True)
+class Linearised(State):
+    """A state with the model that is linear about it, the paths there and the effects along them."""
+
+    linear: Linear = field(kw_only=True)
+    signatures: Signatures = field(kw_only=True)
+    terms: tuple[Term, ...] = field(kw_only=True)
+
+    @property
+    def values(self) -> Array:
+        """Coordinates of the card."""
+        return self.point[: self.linear.count]
 
 
-def _rows_of(start: CardFit, response: str, k: int) -> slice:
-    """Rows of a response that a coordinate reaches: those of its run, or all."""
-    problem = start.problem
-    if k < len(problem.priors.names):
-        return slice(None)
-    own = problem.parts[problem.starts[k - len(problem.priors.names)][0]]
-    members = problem.members(response)
-    return start.rows[response].slices[members.index(own)] if own in members else slice(0, 0)
+@dataclass(frozen=True)
+class Beside:
+    """The least-squares problem of a calibration with effects in it."""
 
+    start: CardFit
+    terms: tuple[Term, ...]
+    told: Array | None
 
-def _left(linear: Linear, point: Array, terms: Sequence[Term], noise: Mapping[str, Noise]) -> tuple[float, list[Array]]:
-    """Q at a point where the model is linearised, and the coefficients of the terms there."""
-    whole, r = linear.stacked(terms, noise)
-    count = linear.count
-    rest, own = r - whole[:, :count] @ point, whole[:, count:]
-    c = solve_posterior(own, rest)[0] if own.shape[1] else np.zeros(0)
-    ends = np.cumsum([0, *(len(term.unit) for term in terms)])
-    sizes = [c[a:b] * term.spread for a, b, term in zip(ends[:-1], ends[1:], terms, strict=True)]
-    return float(np.sum((rest - own @ c) ** 2) + c @ c + point @ point), sizes
+    @property
+    def responses(self) -> tuple[str, ...]:
+        """Those of the calibration, and what else is told."""
+        return self.start.problem.responses + (() if self.told is None else (TOLD,))
+
+    @property
+    def count(self) -> int:
+        """Number of coordinates."""
+        return self.start.problem.count + sum(len(term.unit) for term in self.terms)
+
+    @property
+    def bending(self) -> int:
+        """Number of the card's coordinates: in the effects' sizes it is straight."""
+        return self.start.problem.count
+
+    @property
+    def ends(self) -> tuple[Array, Array]:
+        """Least and largest coordinates."""
+        low, high = self.start.problem.ends
+        free = np.full(self.count - len(low), np.inf)
+        return np.append(low, -free), np.append(high, free)
+
+    def inside(self, point: Array) -> Array:
+        """Nearest coordinates within the bounds of the values."""
+        count = self.start.problem.count
+        return np.append(self.start.problem.inside(point[:count]), point[count:])
+
+    def evaluate(self, point: Array, slopes: bool = True) -> State:
+        """Predict all runs with the effects and compare."""
+        problem = self.start.problem
+        predicted = list(problem.predictions(point[: problem.count], slopes))
+        card = problem.compare(point[: problem.count], predicted, slopes)
+        residual, terms = dict(card.residual), self.terms
+        if self.told is not None:
+            residual[TOLD] = self.told[:, -1] - self.told[:, :-1] @ card.point
+        if not terms and not slopes:
+            return State(point, residual)
+        paths = Signatures.at(problem, card.point, (replace(one, derivatives={}) for one in predicted))
+        terms = tuple(replace(one, columns=paths.columns_of(one), bend={}) for one in terms)
+        ends = problem.count + np.cumsum([0, *(len(term.unit) for term in terms)])
+        sizes = [point[a:b] * term.spread for a, b, term in zip(ends[:-1], ends[1:], terms, strict=True)]
+        for term, size in zip(terms, sizes, strict=True):
+            residual |= {name: residual[name] - columns @ size for name, columns in term.columns.items()}
+        if not slopes:
+            return State(point, residual)
+        terms = self._bent(paths, predicted, card.point, terms, sizes)
+        linear = Linear.of(replace(self.start, state=card), self.told)
+        slope = {name: linear.bent(terms).columns(terms, name) for name in problem.responses}
+        if (told := linear.told_beside(terms)) is not None:
+            slope[TOLD] = told[:, :-1]
+        return Linearised(point, residual, slope, linear=linear, signatures=paths, terms=terms)
+
+    def _bent(
+        self,
+        paths: Signatures,
+        predicted: Sequence[Prediction],
+        point: Array,
+        terms: Sequence[Term],
+        sizes: Sequence[Array],
+    ) -> tuple[Term, ...]:
+        """Return terms that know how what they do goes with the card's values and with the starts of runs."""
+        problem = self.start.problem
+        names, count = problem.priors.names, problem.count
+        own = [
+            {name: columns @ size for name, columns in term.columns.items()}
+            for term, size in zip(terms, sizes, strict=True)
+        ]
+        bends = [{name: np.zeros((len(change), count + 1)) for name, change in changes.items()} for changes in own]
+        for places in self._directions() if terms else []:
+            there, moved = paths, self._moved(paths, predicted, point, places)
+            if (
+                places[0] < len(names)
+                and names[places[0]].startswith(OF_SLOPE)
+                and any(t.effect.thermal for t in terms)
+            ):
+                there, moved = Signatures.at(problem, point + STEP * np.isin(np.arange(count), places)), []
+            for term, size, plain, bend in zip(terms, sizes, own, bends, strict=True):
+                for response, columns in there.columns_of(term, moved).items():
+                    change = (columns @ size - plain[response]) / STEP
+                    for k in places:
+                        reached = self._rows_of(response, k)
+                        bend[response][reached, k] = change[reached]
+        for bend in bends:
+            for columns in bend.values():
+                columns[:, -1] = columns[:, :-1] @ point
+        return tuple(replace(term, bend=bend) for term, bend in zip(terms, bends, strict=True))
+
+    def _directions(self) -> list[list[int]]:
+        """Places of the coordinates that move at once: each value, and one start of each run, for runs know nothing of each other."""
+        problem = self.start.problem
+        values = len(problem.priors.names)
+        parts = [part for part, _, _ in problem.starts]
+        turns: dict[int, list[int]] = {}
+        for i, part in enumerate(parts):
+            turns.setdefault(parts[:i].count(part), []).append(values + i)
+        return [*([k] for k in range(values)), *turns.values()]
+
+    def _moved(
+        self, paths: Signatures, predicted: Sequence[Prediction], point: Array, places: Sequence[int]
+    ) -> list[States]:
+        """Return the states of all runs a step of some coordinates away."""
+        problem, found = self.start.problem, []
+        names = problem.priors.names
+        scale, lags = problem.priors.slopes(point[: len(names)]), dict[Boundary, float]()
+        if any(k < len(names) and names[k].partition(".")[0] in HEATED for k in places):
+            card = problem.instrument_at(point + STEP * np.isin(np.arange(problem.count), places))
+            for boundary in {part.drive.boundary for part in problem.parts}:
+                lags[boundary] = slowest_lag(build_network(card, boundary=boundary), card.reference_temperature)
+        for k, (path, prediction) in enumerate(zip(paths.paths, predicted, strict=True)):
+            states, moved = path.states, {}
+            for state, column in (("housing", COLUMN["housing"]), ("resonator", "resonator_temperature_degC")):
+                slopes, own = problem.along(k, column, prediction, scale)
+                way = STEP * slopes[:, np.isin(own, places)].sum(axis=1)
+                moved[state] = getattr(states, state) + np.interp(states.time, path.time, way)
+            found.append(replace(states, tau=lags.get(prediction.drive.boundary, states.tau), **moved))
+        return found
+
+    def _rows_of(self, response: str, k: int) -> slice:
+        """Rows of a response that a coordinate reaches: those of its run, or all."""
+        problem = self.start.problem
+        if k < len(problem.priors.names):
+            return slice(None)
+        own = problem.parts[problem.starts[k - len(problem.priors.names)][0]]
+        members = problem.members(response)
+        return problem.rows[response].slices[members.index(own)] if own in members else slice(0, 0)

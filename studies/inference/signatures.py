@@ -4,8 +4,8 @@ An effect on a response adds its columns there. One on the resonator's temperatu
 ∂y/∂T dT + ∂y/∂Ṫ dṪ, the slopes by differences of the read-out at the temperatures that the card predicts.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -13,19 +13,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shell.constants import zero_Celsius
-from studies.calibration.problem import CardProblem
+from studies.calibration.problem import CardProblem, Part
 from studies.effects import Effect, Span, library
 from studies.effects.states import States, remembered
 from studies.inference.heat_path import SHARE
-from studies.simulation.drive import Drive
 from studies.simulation.heat_path import slowest_lag
-from studies.simulation.prediction import Prediction, predict
+from studies.simulation.prediction import Prediction
 from studies.simulation.response import Temperatures, read_out
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
-    from shell.law import FrequencyLaw
     from studies.inference.model import Term
     from studies.instrument.card import Instrument
 
@@ -127,10 +125,9 @@ class Path:
         return {response: here}
 
 
-def trace(instrument: "Instrument", law: "FrequencyLaw", drive: Drive, run: int, longest: float | None = None) -> Path:
-    """Return the path of one run through the states of a card."""
-    found = predict(instrument, drive, (), law, longest)
-    time = drive.time - drive.time[0]
+def trace(instrument: "Instrument", found: Prediction, run: int) -> Path:
+    """Return the path of one run, as it is predicted, through the states of a card."""
+    drive, time = found.drive, found.drive.time - found.drive.time[0]
     even = np.linspace(0.0, time[-1], int(np.ceil(time[-1] / np.median(np.diff(time)))) + 1)
     standing = {"pattern_angle": np.full(len(time), np.radians(instrument.bias.pattern_angle_deg))}
     commands = {name: np.interp(even, time, values) for name, values in (standing | dict(drive.commands)).items()}
@@ -166,16 +163,14 @@ class Signatures:
     problem: CardProblem
     point: Array
     paths: tuple[Path, ...]
+    _made: "dict[tuple[str, str], csr_array]" = field(default_factory=dict, init=False, repr=False, compare=False)
 
     @classmethod
-    def at(cls, problem: CardProblem, point: Array) -> "Signatures":
-        """Trace all runs with the values of a point."""
+    def at(cls, problem: CardProblem, point: Array, predicted: Iterable[Prediction] | None = None) -> "Signatures":
+        """Trace all runs with the values of a point, as they are predicted there."""
         instrument = problem.instrument_at(point)
-        law = problem.law_at(instrument)
-        paths = [
-            trace(instrument, law, problem.drive_at(point, k), part.run, problem.knots(part))
-            for k, part in enumerate(problem.parts)
-        ]
+        predicted = problem.predictions(point, slopes=False) if predicted is None else predicted
+        paths = [trace(instrument, one, part.run) for one, part in zip(predicted, problem.parts, strict=True)]
         past = remembered([path.states for path in paths])
         return cls(
             problem,
@@ -192,17 +187,18 @@ class Signatures:
 
     def left(self) -> dict[str, Array]:
         """What the card alone leaves of the blocks of every response."""
-        found: dict[str, list[Array]] = {name: [] for name in self.problem.responses}
-        for part, path in zip(self.problem.parts, self.paths, strict=True):
-            for name in part.responses:
-                blocks = self.problem.runs[part.run].responses[name]
-                found[name].append(blocks.value - blocks.average(path.prediction.columns[name]))
-        return {name: np.concatenate(own) for name, own in found.items()}
+        predicted = (path.prediction for path in self.paths)
+        return dict(self.problem.compare(self.point, predicted, slopes=False).residual)
+
+    @property
+    def states(self) -> list[States]:
+        """States of all runs."""
+        return [path.states for path in self.paths]
 
     @cached_property
     def span(self) -> Span:
         """What the campaign covers."""
-        states = [path.states for path in self.paths]
+        states = self.states
         housing = np.concatenate([s.housing for s in states])
         low, high = np.percentile(housing, (0.5, 99.5))
         first = [self.problem.runs[part.run].responses[part.responses[0]].time for part in self.problem.parts]
@@ -259,8 +255,10 @@ class Signatures:
         values = np.concatenate(parts)
         return bool(np.ptp(values) > VARIES * max(float(np.abs(values).max()), 1e-12))
 
-    def columns(self, effect: Effect, shape: tuple[float, ...], response: str) -> dict[str, Array]:
-        """Return what the members of an effect make of each response, stacked over its rows."""
+    def columns(
+        self, effect: Effect, shape: tuple[float, ...], response: str, states: Sequence[States] = ()
+    ) -> dict[str, Array]:
+        """Return what the members of an effect make of each response, stacked over its rows, in `states` beside the paths if given."""
         kinds = dict.fromkeys(self.problem.responses, WARMED) if effect.thermal else {response: DIRECT}
         if (
             response == "inverse_q"
@@ -269,8 +267,8 @@ class Signatures:
             and "bias_deg_per_h" in self.problem.responses
         ):
             kinds["bias_deg_per_h"] = DAMPED
-        own = np.concatenate([effect.columns(path.states, shape, response) for path in self.paths])
-        return {name: self._operators[name, kind] @ own for name, kind in kinds.items()}
+        own = np.concatenate([effect.columns(one, shape, response) for one in states or self.states])
+        return {name: self._operator(name, kind) @ own for name, kind in kinds.items()}
 
     def of_term(
         self, effect: Effect, shape: tuple[float, ...], response: str, members: Sequence[int], starts: bool
@@ -278,9 +276,10 @@ class Signatures:
         """Return what some members make of each response, beside them what every run began with where the effect remembers it."""
         return self.columns(replace(effect, columns=self.on_grid(effect, members, starts)), shape, response)
 
-    def columns_of(self, term: "Term") -> dict[str, Array]:
-        """Return the columns of a term along these paths."""
-        return self.of_term(term.effect, term.shape, term.response, term.members, term.starts)
+    def columns_of(self, term: "Term", states: Sequence[States] = ()) -> dict[str, Array]:
+        """Return the columns of a term along these paths, or in `states` beside them."""
+        effect = replace(term.effect, columns=self.on_grid(term.effect, term.members, term.starts))
+        return self.columns(effect, term.shape, term.response, states)
 
     def on_grid(
         self, effect: Effect, members: Sequence[int], starts: bool
@@ -300,32 +299,33 @@ class Signatures:
         """Whether an effect keeps what came before a run for longer than the resonator does."""
         return bool(effect.memory) and memory_of(effect, shape) > self.span.tau
 
-    @cached_property
-    def _operators(self) -> "dict[tuple[str, str], csr_array]":
-        """By response and way: what takes a column on the even grids of all parts to the means of the blocks."""
-        from scipy.sparse import block_diag, csr_array, diags_array
+    def _operator(self, name: str, way: str) -> "csr_array":
+        """What takes a column on the even grids of all parts to the means of the blocks of a response; made once."""
+        if (name, way) not in self._made:
+            from scipy.sparse import block_diag
 
-        found: dict[tuple[str, str], list[csr_array]] = {}
-        for part, path in zip(self.problem.parts, self.paths, strict=True):
-            onto, slope = path.interpolation, _gradient(len(path.states.time), path.states.step)
-            for name in self.problem.responses:
-                own = [found.setdefault((name, way), []) for way in (DIRECT, WARMED, DAMPED)]
-                if name not in part.responses:
-                    for column in own:
-                        column.append(csr_array((0, onto.shape[1])))
-                    continue
-                blocks = self.problem.runs[part.run].responses[name]
-                sizes = np.diff(np.append(blocks.edges, len(blocks.rows)))
-                place = np.repeat(np.arange(len(sizes)), sizes)
-                entries = 1.0 / blocks.counts[place]
-                mean = csr_array((entries, (place, blocks.rows)), (len(sizes), len(path.time)))
-                warmed = mean @ diags_array(path.by_temperature[name]) @ onto
-                if np.any(path.by_rate[name]):
-                    warmed = warmed + mean @ diags_array(path.by_rate[name]) @ onto @ slope
-                each = (mean @ onto, warmed, mean @ diags_array(path.by_loss) @ onto)
-                for column, block in zip(own, each, strict=True):
-                    column.append(block)
-        return {key: block_diag(blocks, "csr") for key, blocks in found.items()}
+            each = zip(self.problem.parts, self.paths, strict=True)
+            self._made[name, way] = block_diag([self._block(part, path, name, way) for part, path in each], "csr")
+        return self._made[name, way]
+
+    def _block(self, part: Part, path: Path, name: str, way: str) -> "csr_array":
+        from scipy.sparse import csr_array, diags_array
+
+        onto = path.interpolation
+        if name not in part.responses:
+            return csr_array((0, onto.shape[1]))
+        blocks = self.problem.runs[part.run].responses[name]
+        sizes = np.diff(np.append(blocks.edges, len(blocks.rows)))
+        place = np.repeat(np.arange(len(sizes)), sizes)
+        mean = csr_array((1.0 / blocks.counts[place], (place, blocks.rows)), (len(sizes), len(path.time)))
+        if way != DIRECT:
+            along = path.by_loss if way == DAMPED else path.by_temperature[name]
+            found = mean @ diags_array(along) @ onto
+            if way == WARMED and np.any(path.by_rate[name]):
+                slope = _gradient(len(path.states.time), path.states.step)
+                found = found + mean @ diags_array(path.by_rate[name]) @ onto @ slope
+            return csr_array(found)
+        return csr_array(mean @ onto)
 
     @cached_property
     def _leaks(self) -> bool:

@@ -101,11 +101,11 @@ def simulate_candidates(found: Inferred, programmes: Sequence[Programme]) -> lis
     runs = [replace(run, inner=replace(run.inner, start=start)) for run in runs]
     here = CardProblem(old.instrument, old.priors, tuple(runs), law)
     point = np.concatenate([found.numbers.point[:values], np.zeros(here.count - values)])
-    state, law = here.evaluate(point), here.law_at(card)
+    state = here.evaluate(point)
     out = []
-    for k, part in enumerate(here.parts):
+    for k, (part, predicted) in enumerate(zip(here.parts, here.predictions(point, slopes=False), strict=True)):
         alone = replace(here, runs=(runs[part.run],))
-        path = trace(card, law, here.drive_at(point, k), len(old.runs), here.knots(part))
+        path = trace(card, predicted, len(old.runs))
         path = replace(path, states=replace(path.states, before=remembered([*past, path.states])[-1]))
         own = [*range(values), *(values + j for j, (of, _, _) in enumerate(here.starts) if of == k)]
         whiteners = {

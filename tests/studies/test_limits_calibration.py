@@ -11,7 +11,7 @@ from studies.calibration.ahead import spread_of_prediction
 from studies.calibration.calibrate import calibrate
 from studies.calibration.estimates import NINETY, estimate
 from studies.calibration.fit import CardFit, stated_noise, whitened
-from studies.calibration.observed import observe
+from studies.calibration.observed import HOUSING, observe
 from studies.calibration.priors import Priors
 from studies.calibration.problem import MOST_SPREAD, CardProblem, State, start_spread
 from studies.instrument.card import load_card
@@ -24,6 +24,7 @@ from studies.simulation.drive import Drive, drive_by_profile, rows_of
 from studies.simulation.heat_path import build_network, slowest_lag
 from studies.simulation.noise import bias_noise, frequency_noise
 from studies.simulation.prediction import law_for, predict
+from studies.simulation.variations import LAG
 from studies.simulation.virtual_gyro import simulate_run
 from thermal.lag import lag
 from thermal.profile import Profile
@@ -216,6 +217,18 @@ def test_a_sensor_follows_its_housing_between_rows_too():
     read = predict(card, drive_by_profile(profile, fine.time[::60]), law=law).columns["housing_temperature_degC"]
     assert np.ptp(read) > 10
     assert read == pytest.approx(expected, rel=0, abs=1e-5)
+
+
+def test_a_slower_sensor_reads_its_housing_later():
+    """The slope of a reading by the sensor's time constant, of one that begins 1 K warmer than its housing, against differences."""
+    profile = load_profile("soak 20 20min then ramp -10 35 1.0 then soak 35 30min")
+    drive = replace(drive_by_profile(profile, rows_of(profile, 1 / 30)), initial={"sensor": 1.0})
+
+    def read(tau: float):
+        return predict(load_card("hrg-30mm").with_values({LAG: tau}), drive, (LAG,))
+
+    slope = (read(20.05).columns[HOUSING] - read(19.95).columns[HOUSING]) / 0.1
+    assert read(20.0).derivatives[LAG][HOUSING] == pytest.approx(slope, rel=0, abs=3e-3 * np.abs(slope).max())
 
 
 @pytest.mark.parametrize("tau", [0.0, 20.0])
