@@ -329,6 +329,7 @@ def _confirmed(
     by_record = len(search.linear.problem.runs) > 1 and not events
     alone = calibrated if longer else _left_by(plain) or calibrated
     before = plain.held_out(by_record, alone[0])
+    given_up: set[tuple[str, str]] = set()
     while True:
         final = outcome.final
         beside = Background(search.linear, final.terms, final.noise)
@@ -350,7 +351,8 @@ def _confirmed(
         if not weak:
             return outcome, {name: before[name].beside(after[name]) for name in before}, rows
         gone = min(weak, key=lambda k: final.score - outcome.without[k].score)
-        outcome = _left_out(search, outcome, gone)
+        given_up.add(final.terms[gone].key)
+        outcome = _in_place(search, outcome, gone, given_up) or _left_out(search, outcome, gone)
 
 
 def _left_by(model: Model) -> Left | None:
@@ -361,6 +363,22 @@ def _left_by(model: Model) -> Left | None:
         return model.residuals(numbers, there), model.left(numbers, there)
     except IMPOSSIBLE:
         return None
+
+
+def _in_place(search: Search, outcome: Outcome, gone: int, given_up: set[tuple[str, str]]) -> Outcome | None:
+    """Put the likeliest effect of a definite size in the place of a faint one without; what was given up is no rival of it."""
+    base = outcome.without[gone]
+    if outcome.final.score - base.score >= FAINT:
+        return None
+    for one in outcome.rivals[gone]:
+        own = one.terms[-1]
+        if own.key in given_up or one.score - base.score < search.needed(own, base.terms):
+            continue
+        if Background(search.linear, one.terms, one.noise).sized(len(one.terms) - 1):
+            found = search.compare(outcome.plain, search.grow(one.terms, noise=one.noise, most=0)[1])
+            rivals = (tuple(h for h in own if h.terms[-1].key not in given_up) for own in found.rivals)
+            return replace(found, rivals=tuple(rivals))
+    return None
 
 
 def _left_out(search: Search, outcome: Outcome, gone: int) -> Outcome:
