@@ -102,7 +102,7 @@ def device_table(lot: Lot, page: Callable[[str], str] | None = None) -> Table:
         for serial, one in lot.answers.items()
     ]
     columns = "device | date | batch | verdict | causes | unseen over used rows | differs from the others | page"
-    note = "Unseen over used rows: rms of what is left in rows that were kept aside over that in the others; 1 where the model holds."
+    note = "Unseen over used rows: rms of what is left in rows that were kept aside over that in the others: about 1 where the model holds, less where slow noise has carried off the level of the kept rows, which is fitted."
     if silent := [row["device"] for row in rows if not row["unseen_over_used_rows"]]:
         note += f" Of {len(silent)} devices no rows could be kept aside, so nothing judges their models: {', '.join(silent[:6])}."
     return Table("Devices", rows, columns, note, sortable=True)
