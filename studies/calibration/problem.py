@@ -199,12 +199,13 @@ class CardProblem:
                 residual[name].append(blocks.value - blocks.average(prediction.columns[name]))
                 if slopes:
                     slope[name].append(self._slopes(k, name, prediction, scale))
-        varied = self._varied(point) if self.tables else None
-        for table in self.tables:
-            assert varied is not None
-            residual[SETTLED].append(table.frequency - varied.here.law.frequency(table.temperature, extrapolate=True))
-            if slopes:
-                slope[SETTLED].append(self._settled_slopes(table, varied, scale))
+        if self.tables:
+            varied = self._varied(point)
+            law = varied.here.law
+            for table in self.tables:
+                residual[SETTLED].append(table.frequency - law.frequency(table.temperature, extrapolate=True))
+                if slopes:
+                    slope[SETTLED].append(self._settled_slopes(table, varied, scale))
         return State(
             point,
             {name: np.concatenate(found) for name, found in residual.items()},

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from compensation.noise import Noise
 from studies.calibration.fit import LASTING
-from studies.inference.model import Linear, Term, solve_posterior
+from studies.inference.model import Linear, Term, solve_posterior, split
 from studies.inference.signatures import Path, Signatures
 
 Array = NDArray[np.float64]
@@ -84,11 +84,9 @@ class Model:
 
     def kept(self, mean: Array) -> Kept:
         """Split coordinates into the card's and the coefficients of the terms."""
-        count, coefficients, at = self.linear.count, [], self.linear.count
-        for term in self.terms:
-            coefficients.append(mean[at : at + len(term.unit)] * term.spread)
-            at += len(term.unit)
-        return Kept(self.problem.inside(np.clip(mean[:count], *self.problem.ends)), tuple(coefficients))
+        count = self.linear.count
+        point = self.problem.inside(np.clip(mean[:count], *self.problem.ends))
+        return Kept(point, tuple(split(self.terms, mean[count:])))
 
     def residuals(self, numbers: Kept, there: Signatures | None = None) -> dict[str, Rows]:
         """Return what is left of every response on the rows of all runs; `there`: the paths at these numbers, where they are known."""

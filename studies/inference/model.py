@@ -304,6 +304,12 @@ class Background:
         return np.asarray(self._bent.target[name] - self._bent.columns(self.terms, name) @ self.posterior[0])
 
 
+def split(terms: Sequence[Term], coordinates: Array) -> list[Array]:
+    """Return the coefficients of every term in its own units, from the coordinates of all."""
+    ends = np.cumsum([0, *(len(term.unit) for term in terms)])
+    return [coordinates[a:b] * term.spread for a, b, term in zip(ends[:-1], ends[1:], terms, strict=True)]
+
+
 def solve_posterior(X: Array, r: Array) -> tuple[Array, Array]:
     """Return mean and covariance of unknowns of unit prior from whitened rows."""
     p = X.shape[1]

@@ -16,7 +16,7 @@ from compensation.noise_rows import NoiseRows
 from studies.calibration.fit import CardFit, descend
 from studies.calibration.problem import State
 from studies.effects.states import States
-from studies.inference.model import TOLD, Linear, Term, solve_posterior
+from studies.inference.model import TOLD, Linear, Term, solve_posterior, split
 from studies.inference.signatures import Signatures
 from studies.simulation.drive import COLUMN, Boundary
 from studies.simulation.heat_path import build_network, slowest_lag
@@ -24,8 +24,12 @@ from studies.simulation.prediction import Prediction
 from studies.simulation.variations import HEATED
 
 Array = NDArray[np.float64]
+Along = Mapping[str, tuple[Array, list[int]]]
+"""By state: how it goes with the coordinates that reach a run, and their places."""
 STEP = 1e-3
 """Prior standard deviations, for differences."""
+STATES = {"housing": COLUMN["housing"], "resonator": "resonator_temperature_degC"}
+"""What of the states goes with the coordinates, and the column of a prediction that tells how."""
 OF_SLOPE = ("law.a", "material.")
 """Values that the slope of the frequency over temperature depends on."""
 
@@ -108,15 +112,15 @@ class Beside:
             return State(point, residual)
         paths = Signatures.at(problem, card.point, (replace(one, derivatives={}) for one in predicted))
         terms = tuple(replace(one, columns=paths.columns_of(one), bend={}) for one in terms)
-        ends = problem.count + np.cumsum([0, *(len(term.unit) for term in terms)])
-        sizes = [point[a:b] * term.spread for a, b, term in zip(ends[:-1], ends[1:], terms, strict=True)]
+        sizes = split(terms, point[problem.count :])
         for term, size in zip(terms, sizes, strict=True):
             residual |= {name: residual[name] - columns @ size for name, columns in term.columns.items()}
         if not slopes:
             return State(point, residual)
-        terms = self._bent(paths, predicted, card.point, terms, sizes)
+        terms = self._bent(paths, predicted, card.point, terms, sizes) if terms else ()
         linear = Linear.of(replace(self.start, state=card), self.told)
-        slope = {name: linear.bent(terms).columns(terms, name) for name in problem.responses}
+        bent = linear.bent(terms)
+        slope = {name: bent.columns(terms, name) for name in problem.responses}
         if (told := linear.told_beside(terms)) is not None:
             slope[TOLD] = told[:, :-1]
         return Linearised(point, residual, slope, linear=linear, signatures=paths, terms=terms)
@@ -132,19 +136,23 @@ class Beside:
         """Return terms that know how what they do goes with the card's values and with the starts of runs."""
         problem = self.start.problem
         names, count = problem.priors.names, problem.count
+        thermal = any(term.effect.thermal for term in terms)
+        scale = problem.priors.slopes(point[: len(names)])
+        along = [
+            {state: problem.along(k, column, one, scale) for state, column in STATES.items()}
+            for k, one in enumerate(predicted)
+        ]
         own = [
             {name: columns @ size for name, columns in term.columns.items()}
             for term, size in zip(terms, sizes, strict=True)
         ]
         bends = [{name: np.zeros((len(change), count + 1)) for name, change in changes.items()} for changes in own]
-        for places in self._directions() if terms else []:
-            there, moved = paths, self._moved(paths, predicted, point, places)
-            if (
-                places[0] < len(names)
-                and names[places[0]].startswith(OF_SLOPE)
-                and any(t.effect.thermal for t in terms)
-            ):
-                there, moved = Signatures.at(problem, point + STEP * np.isin(np.arange(count), places)), []
+        for places in self._directions():
+            aside = point + STEP * np.isin(np.arange(count), places)
+            value = names[places[0]] if places[0] < len(names) else ""
+            anew = thermal and value.startswith(OF_SLOPE)
+            there = Signatures.at(problem, aside) if anew else paths
+            moved = [] if anew else self._moved(paths, along, aside, places, value.partition(".")[0] in HEATED)
             for term, size, plain, bend in zip(terms, sizes, own, bends, strict=True):
                 for response, columns in there.columns_of(term, moved).items():
                     change = (columns @ size - plain[response]) / STEP
@@ -167,23 +175,20 @@ class Beside:
         return [*([k] for k in range(values)), *turns.values()]
 
     def _moved(
-        self, paths: Signatures, predicted: Sequence[Prediction], point: Array, places: Sequence[int]
+        self, paths: Signatures, along: Sequence[Along], aside: Array, places: Sequence[int], heated: bool
     ) -> list[States]:
-        """Return the states of all runs a step of some coordinates away."""
-        problem, found = self.start.problem, []
-        names = problem.priors.names
-        scale, lags = problem.priors.slopes(point[: len(names)]), dict[Boundary, float]()
-        if any(k < len(names) and names[k].partition(".")[0] in HEATED for k in places):
-            card = problem.instrument_at(point + STEP * np.isin(np.arange(problem.count), places))
+        """Return the states of all runs a step of some coordinates `aside`, with the lag where the heat path may be another."""
+        problem, found, lags = self.start.problem, [], dict[Boundary, float]()
+        if heated:
+            card = problem.instrument_at(aside)
             for boundary in {part.drive.boundary for part in problem.parts}:
                 lags[boundary] = slowest_lag(build_network(card, boundary=boundary), card.reference_temperature)
-        for k, (path, prediction) in enumerate(zip(paths.paths, predicted, strict=True)):
+        for path, ways in zip(paths.paths, along, strict=True):
             states, moved = path.states, {}
-            for state, column in (("housing", COLUMN["housing"]), ("resonator", "resonator_temperature_degC")):
-                slopes, own = problem.along(k, column, prediction, scale)
-                way = STEP * slopes[:, np.isin(own, places)].sum(axis=1)
-                moved[state] = getattr(states, state) + np.interp(states.time, path.time, way)
-            found.append(replace(states, tau=lags.get(prediction.drive.boundary, states.tau), **moved))
+            for state, (slopes, own) in ways.items():
+                step = STEP * slopes[:, np.isin(own, places)].sum(axis=1)
+                moved[state] = getattr(states, state) + np.interp(states.time, path.time, step)
+            found.append(replace(states, tau=lags.get(path.prediction.drive.boundary, states.tau), **moved))
         return found
 
     def _rows_of(self, response: str, k: int) -> slice:

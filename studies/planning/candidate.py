@@ -101,11 +101,11 @@ def simulate_candidates(found: Inferred, programmes: Sequence[Programme]) -> lis
     runs = [replace(run, inner=replace(run.inner, start=start)) for run in runs]
     here = CardProblem(old.instrument, old.priors, tuple(runs), law)
     point = np.concatenate([found.numbers.point[:values], np.zeros(here.count - values)])
-    state = here.evaluate(point)
-    out = []
-    for k, (part, predicted) in enumerate(zip(here.parts, here.predictions(point, slopes=False), strict=True)):
+    predicted = list(here.predictions(point))
+    state, out = here.compare(point, predicted), []
+    for k, (part, one) in enumerate(zip(here.parts, predicted, strict=True)):
         alone = replace(here, runs=(runs[part.run],))
-        path = trace(card, predicted, len(old.runs))
+        path = trace(card, replace(one, derivatives={}), len(old.runs))
         path = replace(path, states=replace(path.states, before=remembered([*past, path.states])[-1]))
         own = [*range(values), *(values + j for j, (of, _, _) in enumerate(here.starts) if of == k)]
         whiteners = {
