@@ -21,6 +21,9 @@ SMALL = 1e-4  # radians of the trial step of a curved rate
 TAIL = 0.3  # last part of a window, in which a weak tone stands out of a decay
 
 
+Rival = tuple[float, Terms, Guess]  # the fall of −2 ln L that the linearised fit promises, and where to start
+
+
 @dataclass(frozen=True)
 class Found:
     """A fit with the terms that pay, and what it leaves."""
@@ -45,6 +48,11 @@ def fit_terms(envelope: Envelope, known: tuple[Terms, Guess] | None = None, most
     if known is None:
         one, two = fit_decay(envelope, Terms(1)), fit_decay(envelope, Terms(2))
         fit = _extend(envelope, two if one.cost - two.cost > _second(envelope) else one, most)
+        if not fit.one_mode:  # a frequency or damping that goes with the amplitude looks like a second mode
+            bent = _add(envelope, one, False, len(CURVED))
+            dearer = bent.cost + _price(one, bent.terms) - fit.cost - _price(two, fit.terms)
+            if dearer < _second(envelope) and is_plain(examine(bent.residual)):
+                fit = _extend(envelope, bent, most)
     else:
         fit = _drop(envelope, _add(envelope, fit_decay(envelope, known[0], [known[1]]), False, most))
     left = examine(fit.residual)
@@ -83,16 +91,23 @@ def _add(envelope: Envelope, fit: DecayFit, tones_first: bool, most: int) -> Dec
     for _ in range(most):
         rivals = [one for one in _rivals(envelope, fit) if one[0] > 0.5 * _price(fit, one[1])]
         rivals.sort(key=lambda one: ((one[1].tones > fit.terms.tones) != tones_first, _price(fit, one[1]) - one[0]))
-        for _, terms, guess in rivals[:2]:
+        paid = [(fit, fit.cost)]
+        for _, terms, guess in _tried(fit, rivals):
             tried = fit_decay(envelope, terms, [guess])
-            if fit.cost - tried.cost > _price(fit, terms):
-                widening = examine(tried.residual).widening
-                sure = tried if sure.cost - tried.cost > _price(sure, terms) * widening**2 else sure
-                fit = tried
-                break
-        else:
+            paid.append((tried, tried.cost + _price(fit, terms)))
+        best = min(paid, key=lambda one: one[1])[0]
+        if best is fit:
             break
+        widening = examine(best.residual).widening
+        sure = best if sure.cost - best.cost > _price(sure, best.terms) * widening**2 else sure
+        fit = best
     return sure
+
+
+def _tried(fit: DecayFit, rivals: list[Rival]) -> list[Rival]:
+    """Return the two rivals that promise most and the best curved one, whose promise is of first order only."""
+    curved = (k for k, one in enumerate(rivals) if len(one[1].curved) > len(fit.terms.curved))
+    return [rivals[k] for k in sorted({0, 1, next(curved, 0)}) if k < len(rivals)]
 
 
 def _drop(envelope: Envelope, fit: DecayFit) -> DecayFit:
@@ -112,8 +127,8 @@ def _drop(envelope: Envelope, fit: DecayFit) -> DecayFit:
     return fit
 
 
-def _rivals(envelope: Envelope, fit: DecayFit) -> Iterator[tuple[float, Terms, Guess]]:
-    """Yield (fall of −2 ln L that the linearised fit promises, terms, where to start) of every term that may be added."""
+def _rivals(envelope: Envelope, fit: DecayFit) -> Iterator[Rival]:
+    """Yield every term that may be added."""
     time = envelope.time - envelope.time[0]
     noise = fit.noise[:, None]
     r = fit.residual / noise
@@ -149,7 +164,8 @@ def _rivals(envelope: Envelope, fit: DecayFit) -> Iterator[tuple[float, Terms, G
     # a course of any kind: the phase that the data are ahead of the model, in both channels alike
     shared = np.sum((r + z) * z.conj(), axis=0)
     ahead, size = np.unwrap(np.angle(shared)), np.sqrt(np.abs(shared))
-    for degrees in (one for one in WANDERS if terms.drift < one < time.size / 4 and not terms.tones):
+    wide = WANDERS if np.all(np.isfinite(shared)) and not terms.tones else ()  # a mode that grows may leave the numbers
+    for degrees in (one for one in wide if terms.drift < one < time.size / 4):
         columns = np.vstack([np.ones_like(time), time, drift_shapes(envelope, degrees)])
         level, slope, *more = np.linalg.lstsq((columns * size).T, ahead * size, rcond=None)[0].tolist()
         left = r + z - z * np.exp(1j * (np.array([level, slope, *more]) @ columns))

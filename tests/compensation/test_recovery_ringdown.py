@@ -307,3 +307,19 @@ def test_recovery_of_a_decay_whose_frequency_wanders():
     assert max(map(abs, z.values())) < 4
     assert found.estimates["inverse_q"].sd < 0.02 * truth["inverse_q"]
     assert any("drifts" in one for one in found.remarks)
+
+
+@pytest.mark.parametrize(
+    ("hardening", "sd", "ratios"), [(5e-4, 4e-4, [1.0]), (0.01, 0.02, [1.0]), (0.01, 0.02, [1.0, 0.6])]
+)
+def test_recovery_of_a_frequency_that_goes_with_the_amplitude(hardening, sd, ratios):
+    """The closed form of one mode with cubic stiffness (Hz at the start): no second mode, no drift."""
+    q = 1e6
+    time, tau = np.arange(0, 60, 1e-2), q / (np.pi * CARRIER)
+    phase = np.pi * hardening * tau * (1 - np.exp(-2 * time / tau))
+    z = np.array(ratios)[:, None] * np.exp(-time / tau + 1j * phase + 0.3j)
+    found = analyse_decay(from_lock_in(time, noisy(z, sd, np.random.default_rng(11)), CARRIER))
+    z, _ = misses(found, {"inverse_q": 1 / q, "hardening_Hz": hardening})
+    assert max(map(abs, z.values())) < 4
+    assert "split_Hz" not in found.estimates
+    assert not any("drifts" in one for one in found.remarks)
