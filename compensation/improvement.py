@@ -11,7 +11,7 @@ from compensation.decimation import average_groups
 from compensation.errors import CompensationError
 
 Run = TypeVar("Run")
-AVERAGING = 100.0  # seconds of the averages
+AVERAGING, FEWEST = 100.0, 3  # seconds of the averages; how many have a standard deviation
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,10 @@ def compare_outputs(times: Sequence[Array], before: Sequence[Array], after: Sequ
         _, block = np.unique(np.floor((t - t[0]) / AVERAGING), return_inverse=True)
         for found, y in zip(means, outputs, strict=True):
             found.append(average_groups(y, block))
-    return Improvement(_compare(np.concatenate(before), np.concatenate(after)), _compare(*map(np.concatenate, means)))
+    averages = [np.concatenate(found) for found in means]
+    if averages[0].size < FEWEST:
+        raise CompensationError(f"an improvement is judged on averages over {AVERAGING:g} s, of which it needs {FEWEST} or more, not {averages[0].size}; record longer.")  # fmt: skip
+    return Improvement(_compare(np.concatenate(before), np.concatenate(after)), _compare(*averages))
 
 
 def hold_out(runs: Sequence[Run], compensate: Callable[[Sequence[Run], Run], Array]) -> list[Array]:

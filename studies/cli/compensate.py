@@ -16,12 +16,12 @@ from studies.record import COMPENSATED, RESONATOR, Record, read_record
 from studies.reports import style
 from studies.results import Drawing, Figure, Part, Result, Sentence, Table
 
-AVERAGE = 100.0  # s
+AVERAGE, FEWEST = 100.0, 10  # s; how many averages a stability is the standard deviation of, at least
 NOISE = 0.02  # relative: what the noise of a model's inputs may add to a record that has nothing to compensate
-WORSE = "{} is worse than the record: the standard deviation of {:g} s averages increases from {:.4g} to {:.4g}. Use it only if the model is of this gyro."
+WORSE = "{} is worse than the record: the standard deviation of {:.3g} s averages increases from {:.4g} to {:.4g}. Use it only if the model is of this gyro."
 OPPOSITE = 0.5  # of the record's deviation: what a correction of the opposite sign leaves where the output's is changed
 SIGN = (
-    "{}: the correction of {} has the wrong sign for this record: it would increase the standard deviation of {:g} s averages from {:.4g}"
+    "{}: the correction of {} has the wrong sign for this record: it would increase the standard deviation of {:.3g} s averages from {:.4g}"
     " to {:.4g}, and with the opposite sign leave {:.4g}. Correct the sign of the column, or of the temperature if the model takes one."
 )
 OWN_THERMOMETER = (
@@ -85,8 +85,9 @@ def _judge(record: Record, result: Record, name: str) -> dict[str, Any]:
     after, before = result[name], record.columns.get(name.removeprefix(COMPENSATED))
     missing = np.isnan(after) if before is None else np.isnan(after) & ~np.isnan(before)
     return {
-        "stability_before": None if before is None else _stability(record["time_s"], before),
-        "stability_after": _stability(record["time_s"], after),
+        "averaging_s": _width(record),
+        "stability_before": None if before is None else _stability(record, before),
+        "stability_after": _stability(record, after),
         "rows_not_compensated": int(np.count_nonzero(missing)),
     }
 
@@ -99,17 +100,17 @@ def _find_worse(record: Record, result: Record, columns: dict[str, dict[str, Any
         if was is None or now is None or now <= was * (1 + NOISE):
             continue
         output = name.removeprefix(COMPENSATED)
-        turned = _stability(record["time_s"], 2 * record[output] - result[name])
+        turned = _stability(record, 2 * record[output] - result[name])
         if turned is not None and turned < OPPOSITE * was:
-            raise InputError(SIGN.format(record.path, output, AVERAGE, was, now, turned))
-        found.append(WORSE.format(name, AVERAGE, was, now))
+            raise InputError(SIGN.format(record.path, output, _width(record), was, now, turned))
+        found.append(WORSE.format(name, _width(record), was, now))
     return found
 
 
 def _show(record: Record, result: Record, columns: dict[str, dict[str, Any]], worse: list[str]) -> list[Part]:
     rows = [{"name": name, "unit": unit_of(name).removeprefix("1") or ""} | one for name, one in columns.items()]
     which = "Before, after" if any(one["stability_before"] is not None for one in rows) else "After"
-    note = f"{which}: standard deviation of {AVERAGE:g} s averages."
+    note = f"{which}: standard deviation of {_width(record):.3g} s averages."
     if any(one["rows_not_compensated"] for one in rows):
         note += " Empty rows: an input is missing, too few samples come before, or the output is within a dead band."
     for words in worse:
@@ -118,7 +119,7 @@ def _show(record: Record, result: Record, columns: dict[str, dict[str, Any]], wo
     parts.append(Table("Compensated columns", rows, COLUMNS, note))
     for name, one in columns.items():
         if one["stability_after"] is None:
-            parts.append(f"{name}: too few rows for {AVERAGE:g} s averages.")
+            parts.append(f"{name}: too few rows for averages.")
         parts.append(Figure(lambda name=name: _draw(record, result, name), f"{name} over time."))  # type: ignore[misc]
     return parts
 
@@ -133,8 +134,14 @@ def _draw(record: Record, result: Record, name: str) -> Drawing:
         return made
 
 
-def _stability(time: Array, values: Array) -> float | None:
+def _width(record: Record) -> float:
+    """Return AVERAGE, or what makes FEWEST averages of a shorter record (s)."""
+    return min(AVERAGE, float(np.ptp(record["time_s"])) / FEWEST)
+
+
+def _stability(record: Record, values: Array) -> float | None:
     try:
-        return float(average_blocks(time, {"output": values}, AVERAGE).columns["output"].std())
+        means = average_blocks(record["time_s"], {"output": values}, _width(record)).columns["output"]
     except CompensationError:
         return None
+    return float(means.std()) if means.size > 2 else None

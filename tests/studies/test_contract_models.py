@@ -99,6 +99,21 @@ def test_a_record_too_short_for_its_stability_is_compensated_all_the_same(model,
     assert read_record(tmp_path / "out.csv")["compensated_frequency_Hz"] == pytest.approx(model.part("frequency")["f0"])
 
 
+def test_a_short_record_is_judged_by_averages_of_a_tenth_of_it(model, tmp_path, ask):
+    """100 s of a ramp: what 100 s averages gave was one number, whose standard deviation is 0, before and after."""
+    time = np.arange(101.0)
+    housing = 10.0 + 0.1 * time
+    columns = {"time_s": time, "housing_temperature_degC": housing, "frequency_Hz": evaluate(model, housing)}
+    write_model(model, tmp_path / "m.toml")
+    write_record(Record(columns), tmp_path / "run.csv")
+    words = ["compensate", str(tmp_path / "m.toml"), str(tmp_path / "run.csv"), "--out", str(tmp_path / "out.csv")]
+    column = ask(words)["columns"]["compensated_frequency_Hz"]
+    means = columns["frequency_Hz"][:100].reshape(10, 10).mean(1)
+    assert column["averaging_s"] == 10.0
+    assert column["stability_before"] == pytest.approx(means.std())
+    assert column["stability_after"] < 1e-6 * column["stability_before"]
+
+
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from compensation.cross_damping import RestRun
+from compensation.errors import CompensationError
 from studies.cli import main
 from studies.errors import InputError
 from studies.fits.cross_damping import study_cross_damping
@@ -100,6 +101,14 @@ def test_a_gain_that_fast_rows_hide_shows_in_their_means():
     assert study.held_out.rows.ratio == pytest.approx(1.0, abs=0.01)
     # means over 100 s: drift 1.5 °/h rms, noise 30/√1000
     assert study.held_out.averages.ratio > 1.5
+
+
+def test_no_improvement_is_stated_of_a_single_average():
+    """90 s at 1 s: the one average of it has no deviation, and "0.00 times" was said of a compensation that removes all."""
+    swing = np.linspace(0.0, 1.0, 91)
+    rate = DEG_PER_H * (3.0 * swing + 0.1 * np.random.default_rng(3).standard_normal(swing.size))
+    with pytest.raises(CompensationError, match="needs 3 or more, not 1"):
+        study_cross_damping([RestRun(90.0 * swing, rate, 293.15 + 40 * swing)], k=3e4, zeta=5e-5)
 
 
 @pytest.mark.slow
