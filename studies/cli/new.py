@@ -2,27 +2,27 @@
 
 import os
 import tomllib
-from collections.abc import Collection, Iterator
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import replace
 from pathlib import Path
 from shlex import quote
 from typing import Annotated, Any
 
-import tomli_w
 from cyclopts import Parameter
 
 from studies.cli.output import say
 from studies.design.keys import DesignKeys
-from studies.design.task import shipped_tasks
+from studies.design.task import read_task, shipped_tasks
 from studies.errors import InputError
 from studies.files.reading import find_shipped, read_bytes
 from studies.files.writing import write_text
 from studies.instrument.card import build_instrument, load_card, spell_card
 from studies.instrument.registry import card_tables
-from studies.schema.keys import Keys
+from studies.schema.keys import Keys, spell_value
 from studies.schema.reference import write_form
 from studies.sweeps.keys import StudyKeys
-from studies.sweeps.spec import shipped_specs
+from studies.sweeps.parameters import find_nominal
+from studies.sweeps.spec import read_study, shipped_specs
 
 
 def card(path: str, *, like: str = "hrg-30mm", name: str | None = None) -> int:
@@ -57,32 +57,66 @@ def study(path: NewFile, *, like: str = "dimension-tolerance", card_: OtherCard 
     Args:
         like: A built-in study: frequency-over-temperature, dimension-tolerance, dimension-influence, split-tolerance.
     """
-    return _copy(path, like, shipped_specs(), card_, StudyKeys, "study", f"hrg study run {quote(path)} --dry-run")
+    text = _copy(like, shipped_specs(), card_, "study")
+    return _write(path, text, StudyKeys, read_study, "study", f"hrg study run {quote(path)} --dry-run")
 
 
-def design(path: NewFile, *, like: str = "dome-8khz", card_: OtherCard = None) -> int:
+def design(path: NewFile, *, like: str | None = None, card_: OtherCard = None) -> int:
     """Write a template of a task for hrg optimise.
 
     Args:
-        like: A worked design: dome-8khz, light-cylinder, robust-dome.
+        like: A worked design: dome-8khz (default), light-cylinder, robust-dome; with --card by default a task for the wall
+            and the radius of that card.
     """
-    return _copy(path, like, shipped_tasks(), card_, DesignKeys, "design", f"hrg optimise {quote(path)} --out FOLDER")
+    own = card_ is not None and like is None
+    text = _own_task(path, card_) if own else _copy(like or "dome-8khz", shipped_tasks(), card_, "design")
+    return _write(path, text, DesignKeys, read_task, "design", f"hrg optimise {quote(path)} --out FOLDER")
 
 
-def _copy(
-    path: str, like: str, shipped: dict[str, Path], card_: str | None, keys: type[Keys], kind: str, then: str
-) -> int:
-    """Write a copy of a shipped file, for another card if one is given, with all entries that it may have as comments."""
-    source = find_shipped(like, shipped, kind)
+def _own_task(path: str, card_: str) -> str:
+    """Return a task that any card can have: other modes far away, at the frequency that it has."""
+    instrument = load_card(Path(path).parent / card_ if card_.endswith(".toml") else card_)
+    text = OWN_TASK.format(spell_value(card_))
+    for name in ("resonator.thickness_mm", "resonator.radius_mm"):
+        if name.split(".")[1] in instrument.content["resonator"]:
+            value = float(find_nominal(instrument, name, card_) or 0.0)
+            text += f'\n[[parameter]]\nname = "{name}"\nlow = {0.9 * value:.4g}\nhigh = {1.1 * value:.4g}\n'
+    return text
+
+
+OWN_TASK = """# Other modes as far from n = 2 as can be, within 50 Hz of the frequency that the card has
+schema = "hrg.design/1"
+card = {}
+
+[[objective]]
+column = "separation_n2_Hz"
+goal = "greatest"
+
+[[constraint]]
+column = "frequency_n2_Hz"
+within = 50.0
+"""
+
+
+def _copy(like: str, shipped: dict[str, Path], card_: str | None, kind: str) -> str:
+    """Return the text of a shipped file, for another card if one is given."""
+    text = read_bytes(find_shipped(like, shipped, kind)).decode("utf-8-sig")
+    if card_ is None:
+        return text
+    return text.replace(*(f"card = {spell_value(one)}" for one in (tomllib.loads(text)["card"], card_)))
+
+
+def _write(path: str, text: str, keys: type[Keys], read: Callable[[str], Any], kind: str, then: str) -> int:
+    """Write a file that fits its card, with all entries that it may have as comments."""
     _refuse_existing(path)
-    text = read_bytes(source).decode("utf-8-sig")
-    if card_ is not None:
-        stated = tomllib.loads(text)["card"]
-        old, new = (tomli_w.dumps({"card": one}).rstrip("\n") for one in (stated, card_))
-        text = text.replace(old, new)
     form = [f"All entries of a {kind}, by example:", *write_form([(keys, "")])]
     write_text(path, "\n".join([text.rstrip("\n"), "", *(f"# {line}".rstrip() for line in form)]) + "\n")
-    say(f"{path}: written as a copy of {like}. Edit it, then run: {then}")
+    try:
+        read(path)
+    except InputError as error:
+        Path(path).unlink()
+        raise InputError(f"not written, since it does not fit the card: {error}") from None
+    say(f"{path}: written. Edit it, then run: {then}")
     return 0
 
 

@@ -7,6 +7,7 @@ import pytest
 
 import shell
 from studies.cli import main
+from studies.design.task import read_task
 from studies.instrument.card import load_card, shipped_cards
 from studies.instrument.registry import card_tables
 from studies.sweeps.parameters import set_parameters
@@ -65,6 +66,23 @@ def test_a_new_study_is_valid_with_another_card(tmp_path, like):
     text = (tmp_path / "s.toml").read_text(encoding="utf-8")
     for heading in ("# [[derived]]", "# [[requirement]]", "# [[search]]", "# [sampling]"):
         assert heading in text
+
+
+@pytest.mark.parametrize("card", sorted(shipped_cards()))
+def test_a_new_task_is_of_the_card_that_it_names(tmp_path, card):
+    """Every card, whether it has a stem and a radius or not: the first design is the card itself."""
+    path = tmp_path / "t.toml"
+    assert main(["design", "new", str(path), "--card", card]) == 0
+    task, model = read_task(path), load_card(card)
+    assert set_parameters(model, task.named(task.start)).resonator == model.resonator
+
+
+@pytest.mark.parametrize("words", ["design new FILE --like dome-8khz", "study new FILE --like dimension-tolerance"])
+def test_what_does_not_fit_a_card_is_not_written(tmp_path, refuse, words):
+    path = tmp_path / "x.toml"
+    said = refuse([str(path) if word == "FILE" else word for word in [*words.split(), "--card", "birdbath-5mm"]])
+    assert "has no parameter 'resonator.radius_mm'" in said
+    assert not path.exists()
 
 
 def test_nothing_is_overwritten(tmp_path, capsys):
