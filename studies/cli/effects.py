@@ -5,7 +5,9 @@ from typing import Any
 from studies.cli.output import answers
 from studies.diagnosis.response import RESPONSES
 from studies.effects import Effect, find_effect, library
+from studies.instrument.tables.effect import keys_of
 from studies.results import Result, Sentence, Table, row_of
+from studies.schema.reference import list_keys
 
 
 @answers("hrg.effects/1")
@@ -25,6 +27,7 @@ def effects(name: str = "") -> Result:
         lead = "What a diagnosis can name, and an [[effect]] table of a card can have."
         return Result(payload, "Effects", lead, [table])
     effect, entry = chosen[0], entries[0]
+    keys = [{**one, "shown": "required" if one["required"] else one["default"]} for one in entry["parameters"]]
     said = {
         "Acts on": ", ".join(_words(effect)),
         "Drive that must be recorded and vary": ", ".join(entry["drives"]),
@@ -38,7 +41,11 @@ def effects(name: str = "") -> Result:
         f"{effect.summary}.",
         [
             Sentence(f"{effect.name}: {effect.summary}.", where="terminal"),
-            Table("Parameters of its [[effect]] table", entry["parameters"], "name: key | kind | bounds | meaning"),
+            Table(
+                "Keys of its [[effect]] table",
+                keys,
+                "name: key | unit | shown: default | bounds | kind: type | meaning",
+            ),
             *(f"{label}: {words}." for label, words in said.items() if words),
         ],
     )
@@ -58,21 +65,19 @@ def _words(effect: Effect) -> tuple[str, ...]:
     return tuple(RESPONSES[one].word for one in effect.responses)
 
 
-def parameters(effect: Effect) -> list[dict[str, str]]:
-    """Return every key of the effect's table: its shape, and its coefficients for the first response."""
-    rows = [
-        row_of(p, "name", "meaning")
-        | {"kind": "shape, optional" if p.steady else "shape", "bounds": f"{p.low:g} to {p.high:g}"}
-        for p in effect.shape
+def parameters(effect: Effect) -> list[dict[str, Any]]:
+    """Return every key of the effect's table as the reader of cards declares it, coefficients for each response."""
+    listed = [
+        (r, one) for r in effect.responses for one in list_keys(keys_of({"name": effect.name, "response": r}, ""))
     ]
-    names = effect.coefficient_names(effect.responses[0])
-    for name, coefficient in zip(names, effect.coefficients, strict=True):
-        many = len(coefficient.spread)
-        kind = "coefficient" if many == 1 else f"coefficient, or a list of {many}"
-        bounds = "0 and above" if effect.positive and name == names[0] else "any"
-        bounds = bounds.replace("and above", f"to {coefficient.most:g}") if coefficient.most < float("inf") else bounds
-        rows.append({"name": name, "kind": kind, "bounds": bounds, "meaning": "size, in the unit that the key names"})
-    return rows
+    rows: dict[str, dict[str, Any]] = {}
+    for response, row in listed:
+        of_all = sum(one["key"] == row["key"] for _, one in listed) == len(effect.responses)
+        meaning = row["meaning"] if of_all else f"with response = '{response}': {row['meaning']}"
+        rows[row["key"]] = row_of(row, "unit", "required", "default", "bounds", name="key", kind="type") | {
+            "meaning": meaning
+        }
+    return list(rows.values())
 
 
 def describe(effect: Effect) -> dict[str, Any]:

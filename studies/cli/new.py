@@ -68,8 +68,9 @@ def design(path: NewFile, *, like: str | None = None, card_: OtherCard = None) -
         like: A worked design: dome-8khz (default), light-cylinder, robust-dome; with --card by default a task for the wall
             and the radius of that card.
     """
-    own = card_ is not None and like is None
-    text = _own_task(path, card_) if own else _copy(like or "dome-8khz", shipped_tasks(), card_, "design")
+    text = (
+        _own_task(path, card_) if card_ and not like else _copy(like or "dome-8khz", shipped_tasks(), card_, "design")
+    )
     return _write(path, text, DesignKeys, read_task, "design", f"hrg optimise {quote(path)} --out FOLDER")
 
 
@@ -103,7 +104,8 @@ def _copy(like: str, shipped: dict[str, Path], card_: str | None, kind: str) -> 
     text = read_bytes(find_shipped(like, shipped, kind)).decode("utf-8-sig")
     if card_ is None:
         return text
-    return text.replace(*(f"card = {spell_value(one)}" for one in (tomllib.loads(text)["card"], card_)))
+    old, new = (f"card = {spell_value(one)}" for one in (tomllib.loads(text)["card"], card_))
+    return text.replace(old, new)
 
 
 def _write(path: str, text: str, keys: type[Keys], read: Callable[[str], Any], kind: str, then: str) -> int:

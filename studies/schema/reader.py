@@ -229,7 +229,8 @@ def _spell_list(node: inspect.ListType | inspect.VarTupleType) -> str:
             members = "lists"
         case _:
             members = "numbers"
-    return f"a list of {members}" if not node.min_length else f"a list of {node.min_length} or more {members}"
+    least, most = node.min_length, node.max_length
+    return f"a list of {least} {f'to {most}' if most else 'or more'} {members}" if least else f"a list of {members}"
 
 
 def _as_time(raw: Any) -> Any:

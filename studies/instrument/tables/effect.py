@@ -46,16 +46,18 @@ def _declare(effect: "Effect", response: str) -> Any:
     """Declare the parameters of the effect's shape with their bounds, and its coefficients for one response."""
     fields: list[Any] = [
         ("name", Annotated[str, says("hrg effects lists names, parameters and bounds", example=effect.name)]),
-        ("response", Literal[effect.responses], effect.responses[0]),
+        ("response", Annotated[Literal[effect.responses], says("what it changes")], effect.responses[0]),
     ]
     for shape in effect.shape:
-        kind = Annotated[float, number(least=shape.low, most=shape.high)]
+        kind = Annotated[float, number(shape.meaning, least=shape.low, most=shape.high)]
         fields.append((shape.name, kind, shape.low) if shape.steady else (shape.name, kind))
     coefficients = effect.coefficient_names(response)
     for key, coefficient in zip(coefficients, effect.coefficients, strict=True):
         positive = effect.positive and key == coefficients[0]
         most = coefficient.most if np.isfinite(coefficient.most) else None
-        weight: Any = Annotated[float, number(least=0.0 if positive else None, most=most)]
+        weight: Any = Annotated[
+            float, number("size; at least one is needed", least=0.0 if positive else None, most=most)
+        ]
         many = Annotated[list[float], msgspec.Meta(min_length=1, max_length=len(coefficient.spread))]
         fields.append((key, weight | many | None if len(coefficient.spread) > 1 else weight | None, None))
 

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from msgspec.structs import fields
 
 import studies.diagnosis
 import studies.inference
@@ -13,6 +14,7 @@ from studies.effects import Span, States, apply_effect, apply_effects, find_effe
 from studies.effects.states import lag
 from studies.errors import InputError
 from studies.instrument.card import load_card, save_card
+from studies.instrument.tables.effect import keys_of
 
 NAMES = {
     "second-lag",
@@ -60,6 +62,28 @@ def make_states(run=0):
 
 
 SPAN = Span(270.0, 315.0, 20000.0, 106400.0, 60.0, 1500.0, 2, (make_states().time, make_states(1).time), turns=True)
+
+
+@pytest.mark.parametrize("name", sorted(library()))
+def test_every_key_that_a_card_may_give_an_effect_is_listed(name, ask, capsys, monkeypatch):
+    """Against what the reader of cards takes, for each response: key, unit, default, bounds, and which responses there are."""
+    monkeypatch.setenv("COLUMNS", "300")
+    effect = find_effect(name)
+    listed = {row["name"]: row for row in ask(["effects", name])["effects"][0]["parameters"]}
+    assert main(["effects", name]) == 0
+    shown = capsys.readouterr().out
+    accepted = [field for r in effect.responses for field in fields(keys_of({"name": name, "response": r}, ""))]
+    assert set(listed) == {field.name for field in accepted}
+    for field in accepted:
+        row = listed[field.name]
+        assert f" {field.name} " in shown
+        assert row["required"] == field.required
+        assert row["default"] == (None if field.required else field.default)
+    assert listed["response"]["kind"].split(" | ") == sorted(effect.responses)
+    assert all(word in shown for word in effect.responses)
+    for one in effect.shape:
+        assert listed[one.name]["bounds"] == f"at least {one.low:g}, at most {one.high:g}"
+        assert listed[one.name]["meaning"] == one.meaning
 
 
 def test_library_has_every_name_of_the_contract():
@@ -208,7 +232,7 @@ def test_the_command_lists_every_effect_and_shows_one_in_full(capsys, ask, refus
     assert {entry["name"] for entry in listed["effects"]} == set(library())
     assert main(["effects", "hysteresis"]) == 0
     said = " ".join(capsys.readouterr().out.split())
-    for part in ("half_width_K", "0.02 to 40", "loop_deg_per_h_per_K", "To isolate it", "Source", "frequency"):
+    for part in ("half_width_K", "at least 0.02", "loop_deg_per_h_per_K", "To isolate it", "Source", "frequency"):
         assert part in said
     assert "hysteresis" in refuse(["effects", "histeresis"])
 
