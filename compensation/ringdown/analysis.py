@@ -16,6 +16,7 @@ from compensation.ringdown.window import find_end, find_free, find_jump
 RESOLVED = 3.0  # standard deviations above zero from which a split has an axis
 LENGTHS = ("split_Hz", "damping_split_per_s")
 DRAWS = 2000
+Z90 = 1.645  # standard deviations to an end of a 90 % interval
 ALIKE = 1e-6  # relative: two pick-offs differ by more, files of nine digits round to less
 SAID_OF = {
     "hardening": "The frequency depends on the amplitude (cubic stiffness)",
@@ -33,12 +34,18 @@ def analyse_decay(envelope: Envelope, *, harmonic: int = 2) -> RingDown:
         raise CompensationError(
             f"the samples make {rows} amplitudes of whole periods; a decay needs {LEAST} or more: record longer or sample faster."
         )
-    jump = find_jump(envelope)
     given = envelope
+    if envelope.clipped:
+        envelope = envelope.within(envelope.overload + envelope.width, float(envelope.time[-1]))
+    if envelope.time.size < LEAST:
+        raise CompensationError(
+            f"{100 * given.clipped:.2g} % of the first samples are clipped at one end, and some until {given.overload:.4g} s: the amplifier is overloaded to the end; lower the gain."
+        )
+    jump = find_jump(envelope)
     if jump is not None:
         if jump > (envelope.time[0] + envelope.time[-1]) / 2:
             raise CompensationError(
-                f"the phase jumps at {jump:.6g} s: the reference was lost, or samples are missing without a gap in time_s."
+                f"the phase jumps at {jump:.6g} s: the reference was lost, samples are missing without a gap in time_s, or a block is repeated."
                 " Cut the file there and fit the longer part."
             )
         envelope = envelope.within(jump, float(envelope.time[-1]))
@@ -61,10 +68,6 @@ def analyse_decay(envelope: Envelope, *, harmonic: int = 2) -> RingDown:
 def _check_decays(fit: DecayFit) -> None:
     rate, sd = fit.decay.decay, fit.sd("decay")
     if not rate > 2 * sd:
-        if fit.envelope.clipped:
-            raise CompensationError(
-                f"{100 * fit.envelope.clipped:.2g} % of the samples are clipped and nothing decays: the amplifier is overloaded to the end; lower the gain."
-            )
         span = fit.envelope.time[-1] - fit.envelope.time[0]
         raise CompensationError(
             f"nothing decays in the {span:.3g} s of this record (1/τ = {rate:.3g} ± {sd:.2g} 1/s); switch the drive off, or record longer."
@@ -131,9 +134,9 @@ def _remark(envelope: Envelope, fit: DecayFit, left: Leftover, jump: float | Non
     first, start = float(envelope.time[0]), float(fit.envelope.time[0])
     if jump is not None:
         said.append(
-            f"The phase jumps at {jump:.4g} s (reference or samples lost, or a drive switched): only the part after it is used."
+            f"The phase jumps at {jump:.4g} s (reference or samples lost, a block repeated, or a drive switched): only the part after it is used."
         )
-    if start - (first if jump is None else jump) > 2 * fit.envelope.width:
+    if start - max(first, jump or first, envelope.overload) > 3 * fit.envelope.width:
         said.append(f"The first {start - first:.4g} s are no free decay (drive or transient) and are left out.")
     said += [f"{SAID_OF[name]}." for name in fit.terms.curved]
     if fit.terms.drift:
@@ -147,7 +150,7 @@ def _remark(envelope: Envelope, fit: DecayFit, left: Leftover, jump: float | Non
         said.append(f"Interference at {at} Hz is removed; find its source.")
     if envelope.clipped:
         said.append(
-            f"{100 * envelope.clipped:.2g} % of the first samples are clipped: the early decay is distorted; lower the gain."
+            f"{100 * envelope.clipped:.2g} % of the first samples are clipped at one end, some until {envelope.overload:.4g} s: this part is left out; lower the gain."
         )
     if envelope.lost > 0.001:
         said.append(f"{100 * envelope.lost:.2g} % of the samples are lost.")
@@ -173,6 +176,13 @@ def _undetermined(fit: DecayFit, estimates: Mapping[str, Estimate]) -> list[str]
             said.append(f"The split is not resolved: below {split.high:.3g} Hz; its axis is not determined.")
         elif split.value < width:
             said.append(f"The split of {split.value:.3g} Hz is below the line width {width:.3g} Hz: the modes overlap.")
+    if {"frequency_1_Hz", "split_Hz", "damping_axis_deg"} <= set(estimates):
+        upper, lower, elastic = (estimates[name] for name in ("frequency_1_Hz", "frequency_2_Hz", "split_Hz"))
+        less = elastic.value - (upper.value - lower.value)
+        if less > Z90 * float(np.hypot(np.hypot(upper.sd, lower.sd), elastic.sd)):
+            said.append(
+                f"The two frequencies are {less:.2g} Hz closer than the split, which is of stiffness and mass alone: damping about another axis pulls them together."
+            )
     if "damping_split_per_s" in estimates:
         split = estimates["damping_split_per_s"]
         if not split.value > RESOLVED * split.sd:

@@ -31,6 +31,7 @@ class Envelope:
     width: float  # s, length of a block
     # part of the raw samples at the ends of their range where the record is flat there; 0 of a lock-in
     clipped: float = 0.0
+    overload: float = 0.0  # s, of the last sample that is clipped
     lost: float = 0.0  # part of the time without samples
     spread: float = 0.0  # s², variance of the times that a row averages; 0 of a lock-in's own rows
 
@@ -81,8 +82,10 @@ def mix_down(time: ArrayLike, channels: ArrayLike, carrier: float | None = None)
         )
     block = rows // size
     count = int(block[-1]) + 1
-    level = np.nanmean(x, axis=1, keepdims=True)
     fine = np.all(np.isfinite(x), axis=0) & ~_stuck(x, period)
+    clipped, after = _clipped(x)
+    true = fine & (np.arange(t.size) >= after)
+    level = np.mean(x[:, true if true.any() else fine], axis=1, keepdims=True)
     weight = np.bincount(block, fine, count)
     middle = np.bincount(block, fine * (t - t[0]), count) / np.maximum(weight, 1)
     keep = weight >= 0.5 * size
@@ -110,7 +113,7 @@ def mix_down(time: ArrayLike, channels: ArrayLike, carrier: float | None = None)
                 total[c, places] += np.bincount(index, terms.real) + 1j * np.bincount(index, terms.imag)
         values = total[:, keep] / weight[keep]
     return Envelope(
-        middle[keep], values, carrier, size * step, _clipped(x),
+        middle[keep], values, carrier, size * step, clipped, float(t[max(after, 1) - 1] - t[0]),
         1 - float(np.sum(weight)) / int(rows[-1] + 1), (size * step) ** 2 / 12,
     )  # fmt: skip
 
@@ -143,7 +146,7 @@ def from_lock_in(time: ArrayLike, amplitudes: ArrayLike, carrier: float = 0.0) -
     between = np.diff(t) / step
     if np.median(np.abs(between - 1)) < 0.01:  # an even clock: rows may be absent
         lost = max(lost, 1 - t.size / (1 + float(np.sum(np.rint(between)))))
-    return thin(Envelope(t - t[0], z, carrier, step, 0.0, lost), MOST_BLOCKS)
+    return thin(Envelope(t - t[0], z, carrier, step, lost=lost), MOST_BLOCKS)
 
 
 def estimate_noise(values: Complex) -> float:
@@ -182,16 +185,17 @@ def _stuck(x: Array | Complex, most: float) -> NDArray[np.bool_]:
     return found
 
 
-def _clipped(x: Array) -> float:
-    """Part of the samples that stand at the two ends of their range, beyond what a sine leaves there."""
-    worst = 0.0
-    for channel in x:
-        fine = channel[np.isfinite(channel)]
-        if not fine.size:
+def _clipped(x: Array) -> tuple[float, int]:
+    """Part of the first samples that stand at an end of their range, beyond what a sine leaves there, and the row after the last of them."""
+    worst, after = 0.0, 0
+    for channel in (*x, *-x):
+        loudest = (fine := channel[np.isfinite(channel)])[: max(fine.size // 10, 64)]
+        if not fine.size or not (span := float(np.ptp(fine))):
             continue
-        low, high = float(fine.min()), float(fine.max())
-        span = high - low
-        loudest = fine[: max(fine.size // 10, 64)]
-        at_ends = float(np.mean((loudest <= low + 1e-6 * span) | (loudest >= high - 1e-6 * span)))
-        worst = max(worst, at_ends if at_ends > 0.01 else 0.0)
-    return worst
+        step = float(np.min(np.diff(np.unique(loudest)), initial=span))
+        sine = np.sqrt(4 * step / span) / np.pi  # of few digits stands at its peak
+        at_end = channel >= float(fine.max()) - 1e-6 * span
+        part = float(np.mean(at_end[np.isfinite(channel)][: loudest.size]))
+        if part > max(0.005, 1.2 * sine):
+            worst, after = max(worst, part), max(after, int(np.flatnonzero(at_end)[-1]) + 1)
+    return worst, after

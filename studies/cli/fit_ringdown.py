@@ -53,7 +53,7 @@ def fit_ringdown(
     A file holds one decay: time_s and pickoff_cos_V (and pickoff_sin_V) as raw samples; from a lock-in amplifier
     amplitude_cos_V with phase_cos_deg, or in_phase_cos_V with out_of_phase_cos_V (and the same with sin); or power_dB, power_dBm or power_W. A spectrum analyser's trace has
     frequency_Hz and a power: Lorentzian lines on a background give frequency and Q. The drive, the release transient and the noise floor are
-    found and left out. Several files are several decays of one resonator: with comments such as '# pressure_Pa: 0.01',
+    found and left out. The split is of stiffness and mass alone; damping about another axis pulls the two frequencies closer. Several files are several decays of one resonator: with comments such as '# pressure_Pa: 0.01',
     '# temperature_degC: 22.5' and '# start: 2026-03-01T10:00:00', frequency and 1/Q are fitted against pressure, temperature and
     time (ageing, or steps between sessions). A table of earlier results does the same: frequency_Hz or inverse_q beside
     time_s, housing_temperature_degC, pressure_Pa or vibration_amplitude_V; with a column decay, rows are readings within one decay.

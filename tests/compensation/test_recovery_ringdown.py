@@ -147,6 +147,15 @@ def test_an_isotropic_resonator_has_no_axis_and_says_so():
     assert 0.29 < squares < 13.3  # 98 % of χ² with 4 degrees of freedom
 
 
+@pytest.mark.parametrize(("axis", "said"), [(0.2, False), (0.6, True)])
+def test_why_the_frequencies_are_closer_than_the_split_is_said_where_they_are(axis, said):
+    """Damping along the elastic axes leaves their distance the split; across them it pulls them together, here by 0.2 %."""
+    gyro = Gyro(4600.0, 4599.5, 8e3, 9e3, 0.2, axis)
+    x = gyro.samples(CLIPPED_TIME, [1.0, 1.0]) + 0.002 * np.random.default_rng(4).standard_normal((2, 40_000))
+    remarks = analyse_decay(mix_down(CLIPPED_TIME, x)).remarks
+    assert any("closer than the split" in one for one in remarks) is said
+
+
 def test_refused():
     random = np.random.default_rng(8)
     z = ring(draw_gyro(random), random)
@@ -264,6 +273,33 @@ def test_a_phase_jump_within_a_block_of_raw_samples_is_named_and_left_behind():
     assert found.remarks[0].startswith("The phase jumps at 2.0")
     z, _ = misses(found, truth_of(gyro))
     assert max(map(abs, z.values())) < 4
+
+
+CLIPPED_TIME = np.arange(40_000) / 16_000
+CLIPPED = Gyro(4600.0, 4598.0, 8e3, 9e3, 0.2, 0.5)  # τ 0.6 s
+
+
+@pytest.mark.parametrize(("rail", "noise"), [(0.1, 0.002), (0.9, 0.1)])
+def test_what_is_clipped_is_left_out_to_its_last_sample(rail, noise):
+    """Most of the record, and a few peaks lifted by noise: fitted with the rest they gave a wrong decay, Q 3 sd off, or none."""
+    x = CLIPPED.samples(CLIPPED_TIME, [1.0, 1.0]) + noise * np.random.default_rng(4).standard_normal((2, 40_000))
+    found = analyse_decay(mix_down(CLIPPED_TIME, np.clip(x, -rail, rail)))
+    assert found.window[0] > CLIPPED_TIME[np.flatnonzero(np.any(np.abs(x) >= rail, axis=0))[-1]]
+    for name in ("frequency_1_Hz", "q_1", "q_2"):
+        estimate = found.estimates[name]
+        assert abs(estimate.value - truth_of(CLIPPED)[name]) < 4 * estimate.sd, name
+    assert any("clipped" in one for one in found.remarks)
+    assert not any("drive" in one for one in found.remarks)
+    with pytest.raises(CompensationError, match="overloaded to the end"):
+        analyse_decay(mix_down(CLIPPED_TIME, np.clip(x, -0.005, 0.005)))
+
+
+def test_a_held_value_is_no_interference():
+    """The mean of rows that measure nothing shifted the rest, and its alias was named as a line whose source was to be found."""
+    x = CLIPPED.samples(CLIPPED_TIME, [1.0, 1.0]) + 0.002 * np.random.default_rng(4).standard_normal((2, 40_000))
+    x[:, 8000:12000] = 0.5
+    found = analyse_decay(mix_down(CLIPPED_TIME, x))
+    assert not any("Interference" in one for one in found.remarks)
 
 
 def test_a_line_at_half_the_sampling_rate_is_refused():
