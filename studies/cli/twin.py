@@ -32,14 +32,14 @@ def twin(
     """Write the virtual gyro of a card as an FMU for co-simulation, or as C11.
 
     The heat path, the frequency law, bias, 1/Q, effects, settled loops and noise are those of hrg simulate; without noise the
-    numbers are the same to 1e-9. Noise has the levels of [noise]: white, flicker as a sum of first-order processes, random walk.
+    numbers are the same to 1e-9 (with the effect thermometer-lag, whose rate hrg simulate takes between rows, to 3e-6). Noise has the levels of [noise]: white, flicker as a sum of first-order processes, random walk.
     Parameters are named as in the card; shape, material laws, the number of cells, and [law] with its lags are fixed when the twin is written.
 
     Args:
         fmu: The FMU to write, with sources, and a binary for 64-bit Linux if there is a compiler (CC, cc or gcc).
         c: Folder for the C sources. main.c runs a profile (CSV): cc -std=c11 -O2 *.c -lm -o twin
         fmi: Version of the FMU.
-        boundary: Input temperature: that of the chamber, or of the housing.
+        boundary: Input temperature: that of the chamber, or of the housing itself, ahead of its sensor. Without its slope it is held over a step.
     """
     if fmu is None and c is None:
         raise InputError("nothing to do: give --fmu FILE.fmu, --c FOLDER, or both.")

@@ -10,7 +10,7 @@ from typing import Any
 
 from studies.errors import InputError, nearest
 from studies.instrument.uncertain import UncertainValue, read_uncertain
-from studies.schema.keys import describe, holds_value, known_keys, structs
+from studies.schema.keys import bounds, describe, holds_value, known_keys, structs
 
 TABLES = "studies.instrument.tables"
 
@@ -139,22 +139,24 @@ def _read_array(entry: CardTable, raw: Any, place: CardPlace) -> ReadTable:
     return ReadTable({}, {entry.name: tuple(parts)}, tuple(uncertain), frozenset(stated))
 
 
-def possible_keys(content: Mapping[str, Any]) -> Iterable[str]:
-    """Yield the dotted names of the keys that this card has or may have, those in lists left out."""
+def possible_keys(content: Mapping[str, Any]) -> dict[str, tuple[float, float]]:
+    """Return the bounds of the keys that this card has or may have, by their dotted names; those in lists are left out."""
+    found: dict[str, tuple[float, float]] = {}
     for table, entries in card_tables().items():
         raw = content.get(table) or {}
         for entry in entries if isinstance(raw, Mapping) else ():
             if entry.keys is not None:
-                yield from _names(describe(entry.keys), raw, table)
+                found |= _names(describe(entry.keys), raw, table)
+    return found
 
 
-def _names(node: Any, raw: Any, before: str) -> Iterable[str]:
+def _names(node: Any, raw: Any, before: str) -> Iterable[tuple[str, tuple[float, float]]]:
     for struct in structs(node, raw):
         for field in struct.fields:
             name = f"{before}.{field.encode_name}"
             inner = raw.get(field.encode_name) if isinstance(raw, Mapping) else None
             below = structs(field.type)
             if holds_value(field.type):
-                yield name
+                yield name, bounds(field.type)
             elif inner is not None or not any(one.required for table in below for one in table.fields):
                 yield from _names(field.type, inner, name)

@@ -33,7 +33,7 @@ def find_nominal(instrument: Instrument, name: str, where: str) -> float | str |
     try:
         value = look_up(instrument.content, name)
     except (LookupError, ValueError, TypeError):
-        if name not in set(possible_keys(instrument.content)):
+        if name not in possible_keys(instrument.content):
             known = [*_named(instrument), *possible_keys(instrument.content), TEMPERATURE]
             raise InputError(f"{where}: card '{instrument.name}' has no parameter '{name}'{nearest(name, known)}") from None  # fmt: skip
         table, key = name.split(".", 1)

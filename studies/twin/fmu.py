@@ -118,7 +118,11 @@ def describe(plan: Plan, version: Version, name: str, token: str) -> str:
         structure = "".join(
             f'<{kind} valueReference="{ref}"/>' for kind in ("Output", "InitialUnknown") for ref in outputs
         )
-    lines += ["  <ModelVariables>", *(_variable(row, version) for row in _all(rows, version)), "  </ModelVariables>"]
+    lines += [
+        "  <ModelVariables>",
+        *(_variable(row, version, plan.limits.get(row[1])) for row in _all(rows, version)),
+        "  </ModelVariables>",
+    ]
     return "\n".join([*lines, f"  <ModelStructure>{structure}</ModelStructure>", "</fmiModelDescription>", ""])
 
 
@@ -147,7 +151,7 @@ def _all(rows: list[Row], version: Version) -> list[Row]:
     return [*([(0, "time", "independent", "s", None)] if version == "3.0" else []), *more, *rows]
 
 
-def _variable(row: Row, version: Version) -> str:
+def _variable(row: Row, version: Version, limits: tuple[float, float] | None) -> str:
     """Return the element of one variable."""
     reference, name, causality, unit, start = row
     kind = {"integer": ("Integer", "Int32"), "boolean": ("Boolean", "Boolean")}.get(causality, ("Real", "Float64"))[
@@ -159,6 +163,8 @@ def _variable(row: Row, version: Version) -> str:
     written = {"boolean": "true" if start else "false", "integer": f"{start or 0:.0f}"}.get(causality, repr(start))
     value = "" if start is None else f' start="{written}"'
     typed = f" unit={quoteattr(unit)}" if unit and not (fixed and causality != "parameter") else ""
+    ends = zip(("min", "max"), limits or (), strict=False) if causality == "parameter" else ()
+    typed += "".join(f' {word}="{end!r}"' for word, end in ends if abs(end) < float("inf"))
     common = f'name={quoteattr(name)} valueReference="{reference}" causality="{role}" variability="{variability}"'
     if version == "3.0":
         return f"    <{kind} {common}{typed}{value}/>"

@@ -13,6 +13,7 @@ from shell.constants import zero_Celsius
 from studies.effects import find_effect
 from studies.effects.effect import check_effect
 from studies.errors import InputError
+from studies.instrument.registry import possible_keys
 from studies.instrument.units import unit_of
 from studies.resonator.splitting import mean_shift, reference_split
 from studies.simulation.heat_path import SENSOR, behind_housing, build_network, slowest_lag, with_sensor
@@ -81,6 +82,13 @@ class Plan:
     def turns_freely(self) -> bool:
         """Whether the azimuth of the wave is an output."""
         return self.instrument.loop is not None and self.instrument.loop.mode == "whole-angle"
+
+    @property
+    def limits(self) -> dict[str, tuple[float, float]]:
+        """What a card allows of the parameters, by their names."""
+        effects = enumerate(self.instrument.effects, 1)
+        shapes = {f"effect.{k}.{p.name}": (p.low, p.high) for k, one in effects for p in find_effect(one.name).shape}
+        return possible_keys(self.instrument.content) | shapes
 
     @property
     def key_of(self) -> dict[str, str]:

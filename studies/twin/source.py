@@ -115,6 +115,7 @@ def card_body(plan: Plan) -> str:
         _table(
             "double", "twin_start", "TWIN_PARAMETERS", [_number(0.0 if v != v else v) for v in plan.parameters.values()]
         ),
+        _table("double", "twin_limits", "TWIN_PARAMETERS][2", [_limits(plan, key) for key in order]),
         _table("char *const", "twin_parameter_names", "TWIN_PARAMETERS", [_text(exposed(plan, key)) for key in order]),
         _table("TwinLink", "twin_links", "TWIN_LINKS", [link(part, "conducted") for part in network.conductors]),
         _table(
@@ -149,6 +150,11 @@ def exposed(plan: Plan, key: str) -> str:
     fixed = ("loss.",) * ("loss" in plan.splines) + ("thermal.",) * (plan.instrument.polynomial is not None)
     idle = key.startswith(fixed) or key == PRECESSION  # a command
     return "" if key.startswith(".") or value != value or idle else key
+
+
+def _limits(plan: Plan, key: str) -> str:
+    low, high = plan.limits.get(exposed(plan, key), (-math.inf, math.inf))
+    return _braced([_number(max(low, -1e300)), _number(min(high, 1e300))])
 
 
 def _coefficients(name: str, spline: Spline) -> str:

@@ -82,6 +82,8 @@ static void build(Twin *w) {
 const char *twin_settle(Twin *w, double boundary) {
     static const int steps = 50;
     double heat[N];
+    for (int k = 0; k < TWIN_PARAMETERS; ++k)
+        if (!(w->p[k] >= twin_limits[k][0] && w->p[k] <= twin_limits[k][1])) return "a parameter is not what a card allows; its min and max are in the model description.";
     build(w);
     w->boundary = boundary;
     w->time = 0.0;

@@ -62,6 +62,7 @@ typedef struct Twin {
 } Twin;
 
 extern const double twin_start[TWIN_PARAMETERS];
+extern const double twin_limits[TWIN_PARAMETERS][2]; /* lowest and highest value that a card allows */
 extern const char *const twin_parameter_names[TWIN_PARAMETERS]; /* as in the card; "" where there is no key */
 extern const TwinLink twin_links[TWIN_LINKS], twin_radiators[TWIN_RADIATORS];
 extern const TwinCapacity twin_capacities[TWIN_NODES];

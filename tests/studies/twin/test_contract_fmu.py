@@ -59,6 +59,9 @@ def test_limits_fmu_in_fmpy(version, tmp_path):
     for name in COLUMNS:
         assert np.abs(found[name] - expected[name]).max() < 1e-9 * np.abs(expected[name]).max(), name
     assert 'unit="W/K"' in text
+    assert 'unit="1" min="0.0" max="1.0" start="0.03"' in text  # of the emissivity, as in the card
+    with pytest.raises(Exception, match="ExitInitializationMode failed"):
+        simulate_fmpy(path, {"thermal.film_emissivity": -1.0})
 
 
 CHECKERS = [("fmuCheck.linux64", "2.0", ["-h", "1", "-s", "600"]), *(
