@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from studies.fleet.comparison import Share, compare
-from studies.fleet.device import Answer, Standing, interval
+from studies.fleet.device import Answer, Measured, Standing, interval
 from studies.fleet.folder import Device
 from studies.fleet.population import FEWEST, Quantity
-from studies.instrument.display import display_name
+from studies.instrument.display import display_name, spell_parameter
 from studies.results import row_of
 
 DESIGN = 0.05  # relative distance of a frequency from the lot's, beyond which a device is of another design
@@ -41,7 +41,7 @@ class Lot:
         for one in self.quantities:
             for serial, p in one.odd.items():
                 own = one.of[serial].value
-                out[serial].append(f"{one.name} is {own:.5g}, in the lot {one.population.mean:.5g}; chance {p:.1g}")
+                out[serial].append(f"{_words(one)} is {own:.5g}, in the lot {one.population.mean:.5g}; chance {p:.1g}")
         return out
 
     @property
@@ -56,8 +56,9 @@ class Lot:
         for one in self.quantities:
             for name, chance in one.bad_batches.items():
                 inside = one.among([s for s in one.of if one.batches.get(s) == name])
-                of = one.name if " " in one.name else display_name(one.name)
-                apart = f"{of} is {inside.mean:.5g}, in the lot {one.population.mean:.5g} (chance {chance:.1g})"
+                apart = (
+                    f"{_words(one)} is {inside.mean:.5g}, in the lot {one.population.mean:.5g} (chance {chance:.1g})"
+                )
                 out.setdefault(name, []).append(apart)
         for share in self.shares:
             if share.kind == "batch":
@@ -87,6 +88,10 @@ class Lot:
         }
 
 
+def _words(one: Quantity) -> str:
+    return one.name if " " in one.name else display_name(one.name)
+
+
 def _cause(one: Share) -> dict[str, Any]:
     row = row_of(one, "effect", "response", "equivalent", "kind", "having", "lacking", "odd", "evidence")
     sizes = {serial: interval(size.first, size.first_sd) for serial, size in one.sizes.items()}
@@ -114,14 +119,24 @@ def gather(devices: Sequence[Device], answers: Mapping[str, Answer], failed: Map
     alike = {s: own for s, own in answers.items() if s not in other}
     made = {one.serial: one.made for one in devices if one.made is not None}
     batches = {one.serial: one.batch for one in devices if one.batch}
-    return Lot(alike, failed, made, batches, _quantities(alike, batches), _shares(alike, batches))
+    shares = _shares(alike, batches)
+    return Lot(alike, failed, made, batches, _quantities(alike, batches, shares), shares)
 
 
-def _quantities(answers: Mapping[str, Answer], batches: Mapping[str, str]) -> tuple[Quantity, ...]:
+def _quantities(
+    answers: Mapping[str, Answer], batches: Mapping[str, str], shares: Sequence[Share]
+) -> tuple[Quantity, ...]:
+    """Return values of the card, settled readings, and coefficients of causes: of families, whose size hangs on the runs, none."""
     names = dict.fromkeys(name for own in answers.values() for name in own.measured)
     of = {name: {s: own.measured[name] for s, own in answers.items() if name in own.measured} for name in names}
+    for share in shares:
+        for key in {one.coefficient for one in share.sizes.values() if " " not in one.coefficient}:
+            words, factor = spell_parameter(key)
+            sizes = {s: one for s, one in share.sizes.items() if one.coefficient == key}
+            own = {s: Measured(factor * one.first, factor * one.first_sd) for s, one in sizes.items()}
+            of[f"{share.effect}: {words}"] = own
     told = {n: own for n, own in of.items() if sum(one.told for one in own.values()) >= max(2.0, TOLD * len(answers))}
-    looks = sum(len(own) for own in told.values() if len(own) > FEWEST)
+    looks = sum(len(own) for own in told.values() if len(own) >= FEWEST)
     return tuple(Quantity(name, own, max(looks, 1), batches) for name, own in told.items())
 
 

@@ -19,7 +19,9 @@ import scipy
 from compensation.arrays import Array
 from studies.fleet.device import Measured
 
-GRID = np.geomspace(1e-3, 3.0, 60)  # scatters that are tried, in parts of the range of the values
+GRID = np.geomspace(
+    1e-3, 1e3, 100
+)  # scatters that are tried, in parts of the range of the values: three may stand close by chance
 CHANCE = 0.01  # chance, with all looks counted, below which a device or a batch is odd
 FEWEST = 4  # devices from which on values tell who is odd
 CLEAR = 2.0  # scatter of the others, beyond which a batch is more than another batch
@@ -109,7 +111,7 @@ class Quantity:
     def odd(self) -> dict[str, float]:
         """Devices that are far from the others, with the counted chance: the farthest first, each against what then remains."""
         found: dict[str, float] = {}
-        while len(rest := self._usual(found)) > FEWEST:
+        while len(rest := self._usual(found)) >= FEWEST:
             chances = {
                 s: self.among([o for o in rest if o != s]).surprise(*self._arrays([s])) * self.looks for s in rest
             }

@@ -1,6 +1,6 @@
 """Names that people read for a card's keys, beside them or in their place: "temperature slope of the shear modulus"."""
 
-from studies.instrument.units import split_unit
+from studies.instrument.units import split_unit, unit_of
 
 WHOLE = {
     "inverse_q": "1/Q",
@@ -73,6 +73,16 @@ def display_name(key: str) -> str:
         return f"wall thickness at point {places[0]}"
     of = [" ".join([words[-2].replace("_", " "), *places])] if places else []
     return " ".join(of + parts)
+
+
+def spell_parameter(name: str) -> tuple[str, float]:
+    """Return a parameter's name with its unit in brackets, and what its value is multiplied by: rates are in K/min."""
+    words, unit = (display_name(name), unit_of(name)) if "." in name else split_unit(name)
+    factor = 1.0
+    if unit.endswith(("/(K/s)", "/(K²/s)")):
+        unit, factor = unit.replace("/(K/s)", " per K/min").replace("/(K²/s)", " per K²/min"), 1.0 / 60.0
+    unit = unit.replace("1 per ", "per ")
+    return (words if "." in name else words.replace("_", " ")) + (f" ({unit})" if unit != "1" else ""), factor
 
 
 def name_constant(name: str) -> str:

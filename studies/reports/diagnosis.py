@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING, Any
 from studies.diagnosis.response import RESPONSES
 from studies.diagnosis.verdict import Cause, Verdict, spell_structure
 from studies.effects import find_effect
-from studies.instrument.display import display_name
-from studies.instrument.units import split_unit, unit_of
+from studies.instrument.display import display_name, spell_parameter
 from studies.reports import diagnosis_pictures as pictures
 from studies.reports.digits import plain
 from studies.results import Chapter, Facts, Figure, Part, Sentence, Table
@@ -79,16 +78,6 @@ def name_cause(cause: Cause) -> str:
     *others, last = map(display_name, cause.names) if cause.kind == "value" else cause.names
     names = f"{'one of ' if len(others) > 1 else ''}{', '.join(others)}{' or ' if others else ''}{last}"
     return f"{names} in {spoken(cause.response)} (probability {cause.probability:.2f})"
-
-
-def spell_parameter(name: str) -> tuple[str, float]:
-    """Return a parameter's name with its unit in brackets, and what its value is multiplied by: rates are in K/min."""
-    words, unit = (display_name(name), unit_of(name)) if "." in name else split_unit(name)
-    factor = 1.0
-    if unit.endswith(("/(K/s)", "/(K²/s)")):
-        unit, factor = unit.replace("/(K/s)", " per K/min").replace("/(K²/s)", " per K²/min"), 1.0 / 60.0
-    unit = unit.replace("1 per ", "per ")
-    return (words if "." in name else words.replace("_", " ")) + (f" ({unit})" if unit != "1" else ""), factor
 
 
 def cause_table(verdict: Verdict) -> Table:

@@ -7,8 +7,9 @@ import numpy as np
 
 from studies.fleet.comparison import Share
 from studies.fleet.lot import Lot
-from studies.fleet.population import Quantity
-from studies.reports.diagnosis import NAMES, spell_parameter
+from studies.fleet.population import FEWEST, Quantity
+from studies.instrument.display import spell_parameter
+from studies.reports.diagnosis import NAMES
 from studies.reports.digits import plain
 from studies.reports.style import BLUE, ORANGE, VERMILION, panels
 from studies.results import Chapter, Column, Drawing, Facts, Figure, Sentence, Table
@@ -36,6 +37,8 @@ def headline(lot: Lot) -> str:
         text += f" Device {lot.odd[0]} differs from the others: {_first(lot.reasons[lot.odd[0]])}."
     elif lot.odd:
         text += f" Devices that differ from the others: {', '.join(lot.odd)}."
+    elif len(lot.answers) < FEWEST:
+        text += f" Too few devices to say that one differs; from {FEWEST} on their values tell."
     else:
         text += " No device differs from the others."
     return text + (f" No answer: {', '.join(sorted(lot.failed))}." if lot.failed else "")
@@ -71,9 +74,9 @@ VALUES = (
 
 
 def _sizes(one: Share) -> str:
-    values = [size.first for size in one.sizes.values()]
     name = next(iter(one.sizes.values())).coefficient
-    name = name if " " in name else spell_parameter(name)[0]
+    name, factor = (name, 1.0) if " " in name else spell_parameter(name)
+    values = [factor * size.first for size in one.sizes.values()]
     if len(values) == 1:
         return f"{name} {plain(values[0])}"
     return f"{name} {plain(min(values), 2)} … {plain(max(values), 2)}"

@@ -14,6 +14,7 @@ from studies.fleet.folder import Device, read_lot
 from studies.fleet.lot import gather
 from studies.fleet.population import Population, Quantity
 from studies.fleet.run import run_lot
+from studies.reports import fleet as parts
 from studies.sweeps.workers import Workers
 from tests.studies.fleet.lots import make_lot
 
@@ -78,6 +79,34 @@ def test_limits_a_chance_is_one(count, scatter):
     assert below <= 400 * 0.1 + 3 * (400 * 0.09) ** 0.5
     if scatter > 1.0:
         assert below >= 400 * 0.1 - 3 * (400 * 0.09) ** 0.5
+
+
+def test_limits_a_small_chance_of_one_among_four_is_one():
+    """Three others may stand close by chance: with 2 degrees of freedom the tail is long, and was cut off at three ranges."""
+    rng, chances = np.random.default_rng(1), []
+    for _ in range(4000):
+        value, sd = rng.standard_normal(4), np.full(4, 0.05)
+        chances.append(Population.of(value[1:], sd[1:]).surprise(value[:1], sd[:1]))
+    assert np.sum(np.array(chances) < 0.005) <= 20 + 3 * 20**0.5
+
+
+def test_the_odd_one_of_four_is_named_and_of_three_none():
+    assert set(lot_of([1.0, 1.01, 0.99, 5.0]).odd) == {"G03"}
+    assert not lot_of([1.0, 1.01, 5.0]).odd
+
+
+def test_a_device_whose_cause_is_larger_than_in_the_others_is_odd():
+    """Its coefficient was among the sizes of a cause common to all, in the heading's unit but not by it, and no device differed."""
+    cause = {"kind": "physics", "response": "bias_deg_per_h", "effect": "rate-bias", "equivalent": []}
+    key = "coefficient_deg_per_h_per_K_per_s"
+    answers = {}
+    for serial, size in zip("ABCD", (500.0, 510.0, 495.0, 3000.0), strict=True):
+        standing = {"bias_deg_per_h": {"rate-bias": Standing(50.0, 1.0, 0.05, size, 3.0, key)}}
+        answers[serial] = Answer(serial, "", {"causes": [cause], "verdict": "explained"}, 4432.0, {}, standing)
+    lot = gather([Device(s, ()) for s in answers], answers, {})
+    assert lot.odd == ["D"]
+    assert "rate-bias: coefficient (°/h per K/min) is 50," in lot.reasons["D"][0]
+    assert parts._sizes(lot.shares[0]) == "coefficient (°/h per K/min) 8.2 … 50"
 
 
 def test_recovery_of_mean_and_scatter():
