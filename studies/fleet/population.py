@@ -107,10 +107,20 @@ class Quantity:
             chances.append(others.surprise(value, sd) if apart > CLEAR * others.scatter else 1.0)
         return min(1.0, max(chances) * self.looks * len(set(self.batches.values())) / len(self.of))
 
-    @cached_property
+    @property
     def odd(self) -> dict[str, float]:
         """Devices that are far from the others, with the counted chance: the farthest first, each against what then remains."""
+        return self._judged[0]
+
+    @property
+    def farthest(self) -> tuple[float, str]:
+        """The counted chance of the device that is the farthest of those that are not odd, 1 where none can be judged."""
+        return min(((chance, s) for s, chance in self._judged[1].items()), default=(1.0, ""))
+
+    @cached_property
+    def _judged(self) -> tuple[dict[str, float], dict[str, float]]:
         found: dict[str, float] = {}
+        chances: dict[str, float] = {}
         while len(rest := self._usual(found)) >= FEWEST:
             chances = {
                 s: self.among([o for o in rest if o != s]).surprise(*self._arrays([s])) * self.looks for s in rest
@@ -118,8 +128,8 @@ class Quantity:
             worst = min(rest, key=lambda s: chances[s])
             if chances[worst] >= CHANCE:
                 break
-            found[worst] = chances[worst]
-        return found
+            found[worst] = chances.pop(worst)
+        return found, chances
 
     def _usual(self, odd: Mapping[str, float]) -> list[str]:
         return [s for s in self.of if s not in odd and self.batches.get(s, "") not in self.bad_batches]

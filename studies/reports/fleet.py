@@ -40,8 +40,14 @@ def headline(lot: Lot) -> str:
     elif len(lot.answers) < FEWEST:
         text += f" Too few devices to say that one differs; from {FEWEST} on their values tell."
     else:
-        text += " No device differs from the others."
+        text += f" No device differs from the others.{_farthest(lot)}"
     return text + (f" No answer: {', '.join(sorted(lot.failed))}." if lot.failed else "")
+
+
+def _farthest(lot: Lot) -> str:
+    """Return who is the farthest of those that are not odd: in a small lot a large distance may still be chance."""
+    chance, serial, name = min(((*one.farthest, _name(one)) for one in lot.quantities), default=(1.0, "", ""))
+    return f" The farthest is {serial} in {name}, by a chance of {chance:.1g}." if chance < 1 else ""
 
 
 def _first(reasons: list[str]) -> str:

@@ -93,6 +93,9 @@ def test_limits_a_small_chance_of_one_among_four_is_one():
 def test_the_odd_one_of_four_is_named_and_of_three_none():
     assert set(lot_of([1.0, 1.01, 0.99, 5.0]).odd) == {"G03"}
     assert not lot_of([1.0, 1.01, 5.0]).odd
+    near = lot_of([1.0, 1.04, 0.97, 1.4])
+    assert not near.odd
+    assert (near.farthest[1], near.farthest[0] < 1) == ("G03", True)
 
 
 def test_a_device_whose_cause_is_larger_than_in_the_others_is_odd():
