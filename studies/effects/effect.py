@@ -188,35 +188,13 @@ def find_effect(name: str) -> Effect:
         raise InputError(f"no effect is called '{name}'{nearest(name, library())}") from None
 
 
-def check_effect(name: str, parameters: Mapping[str, Numbers], response: str) -> tuple[list[float], FloatArray]:
-    """Return the shape and one value a column of an effect from the numbers of a card."""
-    effect = find_effect(name)
-    if response not in effect.responses:
-        raise InputError(f"effect '{name}' does not act on {response}{nearest(response, effect.responses)}")
-    names = effect.coefficient_names(response)
-    known = (*(p.name for p in effect.shape), *names)
-    for key in parameters:
-        if key not in known:
-            raise InputError(f"effect '{name}' has no parameter '{key}'{nearest(key, known)}")
-    missing = [p.name for p in effect.shape if p.name not in parameters and not p.steady]
-    if missing:
-        raise InputError(f"effect '{name}' needs the parameter '{missing[0]}'")
-    if not any(key in parameters for key in names):
-        raise InputError(f"effect '{name}' has no size; give it {' or '.join(names)}")
-    shape = []
-    for p in effect.shape:
-        value = parameters.get(p.name, p.low)
-        if not isinstance(value, (int, float)) or not p.low <= value <= p.high:
-            raise InputError(f"effect '{name}': {p.name} must be a number from {p.low:g} to {p.high:g}, not {value!r}")
-        shape.append(float(value))
+def spell_out(effect: Effect, parameters: Mapping[str, Numbers], response: str) -> tuple[list[float], FloatArray]:
+    """Return the shape and one value a column of an effect from the numbers of a card, which its reader has checked."""
+    shape = [float(np.ravel(parameters.get(p.name, p.low))[0]) for p in effect.shape]
     weights: list[float] = []
-    for key, coefficient in zip(names, effect.coefficients, strict=True):
-        given, most = np.atleast_1d(np.asarray(parameters.get(key, 0.0), dtype=float)), len(coefficient.spread)
-        if given.ndim != 1 or given.size > most:
-            raise InputError(f"effect '{name}': {key} takes a number or a list of at most {most}")
-        if given.max(initial=0.0) > coefficient.most:
-            raise InputError(f"effect '{name}': {key} must be at most {coefficient.most:g}, not {given.max():g}")
-        weights += [*given.tolist(), *[0.0] * (most - given.size)]
+    for key, coefficient in zip(effect.coefficient_names(response), effect.coefficients, strict=True):
+        given = np.atleast_1d(parameters.get(key, 0.0)).tolist()
+        weights += given + [0.0] * (len(coefficient.spread) - len(given))
     return shape, np.array(weights)
 
 
@@ -226,7 +204,7 @@ def apply_effect(
     """Run one effect forward, on an even grid: return its target and the change of it, zero where its drive is no part of the run."""
     effect = find_effect(name)
     response = effect.responses[0] if response is None else response
-    shape, weights = check_effect(name, parameters, response)
+    shape, weights = spell_out(effect, parameters, response)
     target = "resonator_temperature" if effect.thermal else response
     if any(getattr(states, drive) is None for drive in effect.needs):
         return target, np.zeros_like(states.time)

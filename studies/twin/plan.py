@@ -11,7 +11,7 @@ import numpy as np
 from compensation.arrays import Array
 from shell.constants import zero_Celsius
 from studies.effects import find_effect
-from studies.effects.effect import check_effect
+from studies.effects.effect import spell_out
 from studies.errors import InputError
 from studies.instrument.registry import possible_keys
 from studies.instrument.units import unit_of
@@ -231,7 +231,7 @@ def _spline(curve: "CubicSpline") -> Spline:
 def _place_effects(instrument: "Instrument", parameters: dict[str, float]) -> Iterator[EffectRow]:
     for number, one in enumerate(instrument.effects, 1):
         effect = find_effect(one.name)
-        shape, weights = check_effect(one.name, one.parameters, one.response)
+        shape, weights = spell_out(effect, one.parameters, one.response)
         names = [f"effect.{number}.{p.name}" for p in effect.shape]
         for name, c in zip(effect.coefficient_names(one.response), effect.coefficients, strict=True):
             more = range(len(c.spread))
