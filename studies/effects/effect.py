@@ -44,11 +44,6 @@ class Parameter:
         """Whether it is the place of a run in the campaign, from 0."""
         return self.name in ("run", "from_run")
 
-    @property
-    def unit(self) -> str:
-        """The unit that the name ends with."""
-        return next((u for u in ("degC", "deg_per_10K", "deg", "K", "s") if self.name.endswith(f"_{u}")), "1")
-
 
 @dataclass(frozen=True)
 class Coefficient:
