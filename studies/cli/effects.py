@@ -10,7 +10,7 @@ from studies.results import Result, Sentence, Table, row_of
 from studies.schema.reference import list_keys
 
 
-@answers("hrg.effects/1")
+@answers("hrg.effects/2")
 def effects(name: str = "") -> Result:
     """List the physical effects that a diagnosis can name and an `[[effect]]` table of a card can have.
 

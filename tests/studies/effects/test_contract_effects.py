@@ -217,7 +217,7 @@ def test_the_engine_knows_no_effect_by_its_name():
 def test_the_command_lists_every_effect_and_shows_one_in_full(capsys, ask, refuse):
     """Names, parameters with units and bounds, what drives it, where it is from, and the run that isolates it."""
     listed = ask(["effects"])
-    assert listed["schema"] == "hrg.effects/1"
+    assert listed["schema"] == "hrg.effects/2"
     assert {entry["name"] for entry in listed["effects"]} == set(library())
     assert main(["effects", "hysteresis"]) == 0
     said = " ".join(capsys.readouterr().out.split())
