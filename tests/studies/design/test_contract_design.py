@@ -38,6 +38,7 @@ column = "frequency_n2_Hz"
 low = 5000.0
 high = 5100.0
 """
+FEW = '\n[[quantity]]\nname = "mode-separation"\nhighest = 1\neach = 1\n[search]\nstarts = 1\n'
 
 
 def write(folder, text=TASK):
@@ -163,8 +164,7 @@ def test_recovery_dome_at_8_khz(tmp_path):
 @pytest.mark.slow
 def test_recovery_light_cylinder(tmp_path):
     """In whole steps, with the thinnest bottom: 15 % lighter than the best of some 8000 designs about [0.775, 19.3, 1.2], the next valley."""
-    few = '\n[[quantity]]\nname = "mode-separation"\nhighest = 1\neach = 1\n[search]\nstarts = 1\n'
-    task = write(tmp_path, shipped_tasks()["light-cylinder"].read_text(encoding="utf-8") + few)
+    task = write(tmp_path, shipped_tasks()["light-cylinder"].read_text(encoding="utf-8") + FEW)
     found = optimise(task, workers=1)
     assert found.best == pytest.approx([0.83, 18.2, 0.6])
     assert found.after[found.place("mass_g")] == pytest.approx(11.694, abs=1e-3)
@@ -174,7 +174,7 @@ def test_recovery_light_cylinder(tmp_path):
 @pytest.mark.slow
 def test_recovery_robust_dome(tmp_path, monkeypatch):
     """Limits are kept with their margins by full solves, something holds the objective back, and no design seen is better."""
-    task = write(tmp_path, shipped_tasks()["robust-dome"].read_text(encoding="utf-8") + "\n[search]\nstarts = 1\n")
+    task = write(tmp_path, shipped_tasks()["robust-dome"].read_text(encoding="utf-8") + FEW)
     monkeypatch.setattr("studies.design.answer.DRAWN", 4)
     found = optimise(task, workers=1)
     assert found.verified == pytest.approx(found.after, rel=1e-9)

@@ -135,12 +135,10 @@ def free_port() -> int:
 
 @contextmanager
 def started(file: Path, protocol: str = "tcp", *given: str):
-    """Run a scheduler of Dask and two workers as processes; the scheduler writes its address to a file."""
+    """Run a scheduler of Dask and two workers as processes, the scheduler first; it writes its address to a file."""
     common = ["--scheduler-file", str(file), "--no-dashboard", *given]
-    commands = (
-        ["scheduler", "--host", f"{protocol}://127.0.0.1", "--port", "0", *common],
-        ["worker", "--nworkers", "2", "--nthreads", "1", *common],
-    )
+    worker = ["worker", "--no-nanny", "--nthreads", "1", *common]
+    commands = (["scheduler", "--host", f"{protocol}://127.0.0.1", "--port", "0", *common], worker, worker)
     quiet = {"DASK_DISTRIBUTED__LOGGING__DISTRIBUTED": "error", "HRG_TEST_UNTIL": "0.02"}
     processes = [
         subprocess.Popen([sys.executable, "-m", "dask", *words], env=environment(**quiet), stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
@@ -162,14 +160,6 @@ def started(file: Path, protocol: str = "tcp", *given: str):
                 process.wait()
 
 
-@pytest.fixture
-def cluster(tmp_path, monkeypatch):
-    pytest.importorskip("distributed", reason="the extra 'cluster' (dask[distributed]) is not installed")
-    monkeypatch.setattr("studies.sweeps.cluster.PATIENCE", 120.0)
-    with started(tmp_path / "scheduler.json") as processes:
-        yield processes
-
-
 BRIEF = """
 import studies.sweeps.cluster as module
 check, module.PATIENCE = module.Cluster.check, 120.0
@@ -180,13 +170,13 @@ module.Cluster.check = brief
 """
 
 
-def started_slowly(folder, address):
+def started_slowly(folder, address, **more):
     """A study of slow cases that does not end, on a cluster, as a process of its own, when its first results are in the store."""
     spec = folder / "study.toml"
     spec.write_text(spec_of("slow", 'method = "grid"\nbatch = 4', 'name = "user.x"\nlow = 0\nhigh = 1\ncount = 3000'))
     words = words_of("study", "run", str(spec), "--out", str(folder / "out"), "--scheduler", address, "--allow-python")
     words[2] = BRIEF + words[2]
-    run = subprocess.Popen(words, stderr=subprocess.PIPE, text=True, env=environment(HRG_TEST_LOG=str(folder / "log")))
+    run = subprocess.Popen(words, stderr=subprocess.PIPE, text=True, env=environment(HRG_TEST_LOG=str(folder / "log"), **more))
     until = time.monotonic() + 600
     while run.poll() is None and time.monotonic() < until and not rows_of(folder / "out"):
         time.sleep(0.1)
@@ -194,13 +184,17 @@ def started_slowly(folder, address):
 
 
 @pytest.mark.slow
-def test_two_dask_workers_give_the_same_bits_and_a_lost_scheduler_is_resumable(cluster, results, tmp_path, functions):
-    address, scheduler, _ = cluster
-    again = run_study(SPEC, scheduler=address)
-    assert again.values.tobytes() == results.values.tobytes()
-    run = started_slowly(tmp_path, address)
-    scheduler.kill()
-    _, said = run.communicate(timeout=600)
+def test_two_dask_workers_give_the_same_bits_and_a_lost_scheduler_is_resumable(
+    results, tmp_path, functions, monkeypatch
+):
+    pytest.importorskip("distributed", reason="the extra 'cluster' (dask[distributed]) is not installed")
+    monkeypatch.setattr("studies.sweeps.cluster.PATIENCE", 120.0)
+    with started(tmp_path / "scheduler.json") as (address, scheduler, *_):
+        again = run_study(SPEC, scheduler=address)
+        assert again.values.tobytes() == results.values.tobytes()
+        run = started_slowly(tmp_path, address)
+        scheduler.kill()
+        _, said = run.communicate(timeout=600)
     assert run.returncode == 3, said
     assert "resume" in said
     assert "Traceback" not in said
@@ -256,19 +250,9 @@ def test_a_server_that_is_no_scheduler_is_named(greeting, monkeypatch):
 
 
 @pytest.mark.slow
-def test_the_end_of_the_last_worker_is_said_and_the_study_is_resumable(cluster, tmp_path, functions):
-    address, _, worker = cluster
-    run = started_slowly(tmp_path, address)
-    worker.terminate()
-    _, said = run.communicate(timeout=600)
-    assert run.returncode == 3, said
-    assert "the last worker has ended" in said
-    assert "no worker is left" in said
-    assert "Traceback" not in said
-
-
-@pytest.mark.slow
-def test_a_cluster_with_certificates(tmp_path, results, monkeypatch):
+def test_a_cluster_with_certificates_gives_the_same_bits_and_the_end_of_its_last_worker_is_said(
+    tmp_path, results, functions, monkeypatch
+):
     """Certificates as `openssl` makes them; the client takes them from Dask's own configuration."""
     pytest.importorskip("distributed", reason="the extra 'cluster' (dask[distributed]) is not installed")
     if shutil.which("openssl") is None:
@@ -278,17 +262,26 @@ def test_a_cluster_with_certificates(tmp_path, results, monkeypatch):
     subprocess.run(ask.split(), check=True, capture_output=True)
     monkeypatch.setattr("studies.sweeps.cluster.PATIENCE", 120.0)
     given = ["--tls-ca-file", str(cert), "--tls-cert", str(cert), "--tls-key", str(key)]
-    with started(tmp_path / "scheduler.json", "tls", *given) as (address, *_):
+    with started(tmp_path / "scheduler.json", "tls", *given) as (address, _, *workers):
         with pytest.raises(MissingEnvironment, match=r"distributed\.comm\.tls"):
             run_study(SPEC, scheduler=address)
         import dask
 
-        tls = "distributed.comm.tls"
-        with dask.config.set(
-            {f"{tls}.ca-file": str(cert), f"{tls}.client.cert": str(cert), f"{tls}.client.key": str(key)}
-        ):
+        tls = {"ca-file": str(cert), "client.cert": str(cert), "client.key": str(key)}
+        with dask.config.set({f"distributed.comm.tls.{name}": path for name, path in tls.items()}):
             again = run_study(SPEC, scheduler=address)
-    assert again.values.tobytes() == results.values.tobytes()
+        assert again.values.tobytes() == results.values.tobytes()
+        spelled = {name.upper().replace("-", "_").replace(".", "__"): path for name, path in tls.items()}
+        run = started_slowly(
+            tmp_path, address, **{f"DASK_DISTRIBUTED__COMM__TLS__{name}": path for name, path in spelled.items()}
+        )
+        for worker in workers:
+            worker.terminate()
+        _, said = run.communicate(timeout=600)
+    assert run.returncode == 3, said
+    assert "the last worker has ended" in said
+    assert "no worker is left" in said
+    assert "Traceback" not in said
 
 
 def test_missing_dask_is_said(monkeypatch):
