@@ -7,6 +7,7 @@ import shutil
 from base64 import b64decode
 from dataclasses import replace
 from pathlib import Path
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ import pytest
 from compensation.noise import Noise
 from compensation.spikes import STUCK, find_dropouts, find_stuck
 from studies.cli import main
+from studies.errors import InputError
 from studies.record import Record, read_record, write_record
 from studies.record.survey import find_density, find_steps, survey_column, survey_record
 from studies.reports import style
@@ -134,8 +136,11 @@ def test_contract_what_is_named_possible_runs_and_what_is_missing_is_said(tmp_pa
 
 @pytest.mark.slow
 def test_contract_every_line_that_is_named_possible_runs(tmp_path, capsys, monkeypatch):
-    """But for those that have a golden answer with the same words; of every fourth row."""
+    """But for those that have a golden answer with the same words; fits to their first step, the diagnosis up to its search."""
+    search = Mock(side_effect=InputError("as far as this"))
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("studies.calibration.fit.MOST_STEPS", 1)
+    monkeypatch.setattr("studies.inference.diagnosis.infer", search)
     run = read_record(INPUTS / "run1.csv")
     write_record(replace(run, columns={name: own[::4] for name, own in run.columns.items()}), "run1.csv")
     assert main(["show", "run1.csv", "--json"]) == 0
@@ -143,7 +148,8 @@ def test_contract_every_line_that_is_named_possible_runs(tmp_path, capsys, monke
         words = shlex.split(use["line"].replace("CARD.toml", "hrg-30mm"))[1:]
         known = any(case["words"] == shlex.join(words[: case["words"].count(" ") + 1]) for case in CASES.values())
         if use["ready"] and not known:
-            assert main(words) == 0, use["line"]
+            assert main(words) == (2 if words[0] == "diagnose" else 0), use["line"]
+    search.assert_called_once()
 
 
 def test_contract_bad_input_is_one_sentence(tmp_path, capsys):

@@ -176,7 +176,9 @@ def started_slowly(folder, address, **more):
     spec.write_text(spec_of("slow", 'method = "grid"\nbatch = 4', 'name = "user.x"\nlow = 0\nhigh = 1\ncount = 3000'))
     words = words_of("study", "run", str(spec), "--out", str(folder / "out"), "--scheduler", address, "--allow-python")
     words[2] = BRIEF + words[2]
-    run = subprocess.Popen(words, stderr=subprocess.PIPE, text=True, env=environment(HRG_TEST_LOG=str(folder / "log"), **more))
+    run = subprocess.Popen(
+        words, stderr=subprocess.PIPE, text=True, env=environment(HRG_TEST_LOG=str(folder / "log"), **more)
+    )
     until = time.monotonic() + 600
     while run.poll() is None and time.monotonic() < until and not rows_of(folder / "out"):
         time.sleep(0.1)
