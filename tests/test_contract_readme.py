@@ -60,8 +60,9 @@ def test_the_first_block_holds_the_two_commands():
 
 @pytest.mark.slow
 def test_commands_of_the_first_hour_run_in_order(folder, monkeypatch, capsys):
+    """But for those that have a golden answer with the same words; sliders have tests of their own."""
     monkeypatch.chdir(folder)
-    """But for those that have a golden answer with the same words."""
+    monkeypatch.setattr("studies.reports.live.live_blocks", lambda *_: [])
     assert len(COMMANDS) > 20
     known = {case["words"] for case in CASES.values()}
     for line in COMMANDS:

@@ -49,7 +49,7 @@ def records(device):
 
 @pytest.fixture(scope="module")
 def found(card, records):
-    return calibrate(card, records, hold_out=1)
+    return calibrate(card, records, hold_out=1, profile=False)
 
 
 @pytest.mark.slow

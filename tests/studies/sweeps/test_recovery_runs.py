@@ -76,7 +76,7 @@ def alive(pids: set[int]) -> set[int]:
 @pytest.mark.slow
 def test_many_kills_lose_nothing_kept_and_leave_no_process(tmp_path, functions, start, hrg):
     # a kill loses at most the tasks that were out: two for each of two workers, of at most four batches of four cases
-    cases, out = 400, 4 * 16
+    cases, out = 300, 4 * 16
     slow, log = write_slow(tmp_path, cases), tmp_path / "log"
     log.touch()
     command = ["study", "run", slow, "--out", tmp_path / "out", "--workers", 2, "--allow-python"]
@@ -295,20 +295,18 @@ def test_a_store_of_an_earlier_version_is_named_and_left_alone(tmp_path, functio
 @pytest.mark.slow
 def test_full_disk_keeps_what_was_written_and_says_so(tmp_path, functions, hrg):
     spec = tmp_path / "square.toml"
-    spec.write_text(
-        spec_of("square", 'method = "grid"\nbatch = 50', 'name = "user.x"\nlow = 0\nhigh = 1\ncount = 3000')
-    )
+    spec.write_text(spec_of("square", 'method = "grid"\nbatch = 20', 'name = "user.x"\nlow = 0\nhigh = 1\ncount = 600'))
     words = words_of("study", "run", str(spec), "--out", str(tmp_path / "out"), "--workers", "1", "--allow-python")
-    limit = "import resource, os, sys; resource.setrlimit(resource.RLIMIT_FSIZE, (40_000, 40_000)); os.execv(sys.argv[1], sys.argv[1:])"
+    limit = "import resource, os, sys; resource.setrlimit(resource.RLIMIT_FSIZE, (12_000, 12_000)); os.execv(sys.argv[1], sys.argv[1:])"
     command = [sys.executable, "-c", limit, *words]
     done = subprocess.run(command, capture_output=True, text=True, env=environment(), timeout=600, check=False)
     assert done.returncode == 3, done.stderr
     assert "run the same command again" in done.stderr
     assert "Traceback" not in done.stderr
     kept = len(rows_of(tmp_path / "out"))
-    assert 0 < kept < 3000
+    assert 0 < kept < 600
     assert hrg(*words[3:]).returncode == 0
-    assert len(rows_of(tmp_path / "out")) == 3000
+    assert len(rows_of(tmp_path / "out")) == 600
 
 
 def test_folder_that_cannot_be_made_and_folder_without_study(tmp_path, functions, hrg):
