@@ -11,7 +11,7 @@ from studies.errors import InputError
 from studies.files.writing import write_text
 from studies.papers.bvg_theory import compare_bell_theory
 from studies.progress import tell
-from studies.results import Chapter, Result, Sentence, Table
+from studies.results import Blocks, Chapter, Result, Sentence, Table
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -161,6 +161,6 @@ def _answer(
         for step in chain
     ]  # fmt: skip
     text = code["text"] if code else emit_latex(chain, latex_title) if latex else emit_text(chain)
-    chapters = [Chapter(step.heading, [Sentence(draw(step), "source", "page")]) for step in chain]
+    chapters = [Chapter(step.heading, [Blocks(lambda step=step: [Sentence(draw(step), "source")])]) for step in chain]  # type: ignore[misc]
     found = payload | {"equations": equations} | ({"code": code} if code else {})
     return Result(found, title, lead, chapters, printed=text)

@@ -31,6 +31,13 @@ SPEC = {
 }
 
 
+@pytest.fixture(autouse=True)
+def without_pictures(monkeypatch):
+    """Pictures and sliders have tests of their own."""
+    for name in ("mode_blocks", "moving_mode"):
+        monkeypatch.setattr(f"studies.reports.scenes.{name}", lambda *_: [])
+
+
 @pytest.fixture(scope="module")
 def results():
     return run_study(SPEC, workers=1)
@@ -84,16 +91,7 @@ def test_values_are_those_of_the_solver(results):
     assert results.values[3, 1] == pytest.approx(mode.bryan_factor, rel=1e-10)
 
 
-@pytest.mark.slow
-def test_two_workers_give_the_same_bits(results):
-    again = run_study(SPEC, workers=2)
-    assert again.values.tobytes() == results.values.tobytes()
-    assert again.parameter(again.study.names[0]).tobytes() == results.parameter(again.study.names[0]).tobytes()
-
-
-def test_page_is_self_contained_and_escapes(results, monkeypatch):
-    monkeypatch.setattr("studies.reports.scenes.mode_blocks", lambda *_: [])  # pictures have their own tests
-    monkeypatch.setattr("studies.reports.scenes.moving_mode", lambda *_: [])
+def test_page_is_self_contained_and_escapes(results):
     hostile = replace(results, study=replace(results.study, name="<script>alert(1)</script>"))
     page = render_result(study_result(hostile))
     assert "<script>alert" not in page
@@ -102,12 +100,10 @@ def test_page_is_self_contained_and_escapes(results, monkeypatch):
         assert part in page
 
 
-def test_page_of_a_study_of_which_nothing_is_computed_yet(results, monkeypatch):
+def test_page_of_a_study_of_which_nothing_is_computed_yet(results):
     from studies.sweeps.results import Results
     from studies.sweeps.store import memory_store
 
-    monkeypatch.setattr("studies.reports.scenes.mode_blocks", lambda *_: [])
-    monkeypatch.setattr("studies.reports.scenes.moving_mode", lambda *_: [])
     empty = memory_store()
     empty.describe(results.store.about() | {"cases": 8})
     page = render_result(study_result(Results(results.study, empty)))
@@ -115,9 +111,7 @@ def test_page_of_a_study_of_which_nothing_is_computed_yet(results, monkeypatch):
     assert len(Results(results.study, empty).table()) == 0
 
 
-def test_template_over_temperature_gives_table_1_and_2_for_any_card(tmp_path, monkeypatch):
-    monkeypatch.setattr("studies.reports.scenes.mode_blocks", lambda *_: [])
-    monkeypatch.setattr("studies.reports.scenes.moving_mode", lambda *_: [])
+def test_template_over_temperature_gives_table_1_and_2_for_any_card(tmp_path):
     found = run_study("frequency-over-temperature", tmp_path / "out", card="cvg-25mm", workers=1)
     assert found.study.instrument.name == "cvg-25mm"
     assert found.parameter("temperature_degC").tolist() == [-20, -10, 0, 10, 20, 30, 40]
