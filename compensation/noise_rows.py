@@ -10,7 +10,7 @@ uneven and have gaps. A run takes N³/3 operations per evaluation, once for all 
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
 
@@ -23,6 +23,7 @@ from compensation.errors import CompensationError
 from compensation.noise import SLOW_TIMES, Noise, flicker, random_walk
 
 COARSE = 150  # most rows of a run from which noise is estimated in a model with many unknowns
+KEPT = 6  # roots of covariances that are kept
 LEAST, MOST = -7.0, 8.0  # ln of the rms of slow noise within a run over that of a row's white noise
 KINDS = ("white", "flicker", "walk", "offset")
 WHITE = -0.3  # ln of white noise over the scatter of neighbouring rows, where the search begins
@@ -38,6 +39,7 @@ class NoiseRows:
     times: tuple[Array, ...]
     spans: tuple[Array, ...]
     stretch: tuple[Array, ...]
+    _roots: dict[Noise, "Whitener"] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     @classmethod
     def of(cls, times: Sequence[Array], spans: Sequence[Array] | None = None) -> "NoiseRows":
@@ -50,7 +52,7 @@ class NoiseRows:
         wide = [np.full(len(t), np.median(np.diff(t)) if len(t) > 1 else 1.0) for t in own] if spans is None else spans
         return cls(own, tuple(np.asarray(w, dtype=float) for w in wide), tuple(np.ones(len(t)) for t in own))
 
-    @property
+    @cached_property
     def count(self) -> int:
         """Number of rows of all runs."""
         return sum(len(t) for t in self.times)
@@ -97,7 +99,7 @@ class NoiseRows:
         total = np.concatenate(coarse.spans).reshape(-1, *[1] * (columns.ndim - 1))
         return np.asarray(np.add.reduceat(weights * columns, places, axis=0) / total)
 
-    @property
+    @cached_property
     def span(self) -> float:
         """Span of a usual row, s."""
         return float(np.median(np.concatenate(self.spans)))
@@ -120,6 +122,14 @@ class NoiseRows:
         return self.whitener(noise)(columns)
 
     def whitener(self, noise: Noise) -> "Whitener":
+        """Return the root of the covariance; the last few are kept."""
+        if noise not in self._roots:
+            for old in list(self._roots)[:-KEPT]:
+                del self._roots[old]
+            self._roots[noise] = self._factor(noise)
+        return self._roots[noise]
+
+    def _factor(self, noise: Noise) -> "Whitener":
         """Factor the covariance of every distinct set of rows once."""
         return Whitener(self.slices, tuple((cholesky(self.covariance(r[0], noise)), r) for _, _, r in self._groups))
 
@@ -136,7 +146,7 @@ class NoiseRows:
 
         By ln θ of a level Σ_ij (Σ⁻¹ − U Uᵀ)_ij θ ∂Σ_ij/∂θ, U = Σ⁻¹ [X C, e], C Cᵀ = (Λ + XᵀΣ⁻¹X)⁻¹, e what is left.
         """
-        whitener = self.whitener(noise)
+        whitener = self._factor(noise)
         white, total = whitener(np.column_stack([columns, target])), whitener.log_determinant
         X, r = white[:, :-1], white[:, -1]
         about = np.zeros(X.shape[1]) if mean is None else mean

@@ -132,17 +132,17 @@ def fit(problem: CardProblem, start: Array | None = None, progress: Progress = l
 
 
 def descend(problem: Problem, state: State, noise: Mapping[str, Noise], rows: Mapping[str, NoiseRows]) -> State:
-    """Step in given noise as long as the objective falls by `CLOSE`."""
+    """Step in given noise as long as the objective falls by `NEAR`: straight lines lead the rest of the way."""
     radius, left = LONGEST_STEP, objective(problem, state, noise, rows)
     for _ in range(MOST_STEPS):
         linear = _Linear.of(problem, state, noise, rows)
-        if linear.fall(linear.step(np.inf)[0]) < CLOSE:
+        if linear.fall(linear.step(np.inf)[0]) < NEAR:
             break
         reached, radius, _ = _advance(problem, state, linear, radius, noise, rows)
         if reached is None:
             break
         before, left, state = left, objective(problem, reached, noise, rows), reached
-        if before - left < CLOSE:
+        if before - left < NEAR:
             break
     return state
 

@@ -16,9 +16,10 @@ from studies.calibration.fit import fit
 from studies.calibration.priors import from_standard
 from studies.errors import InputError
 from studies.inference.diagnosis import build_problem
-from studies.inference.heat_path import LAGS, OF_LUMPS, SENSOR, SHARE, HeatPath, find_heat_path, slow_share
+from studies.inference.heat_path import LAGS, OF_LUMPS, SENSOR, HeatPath, find_heat_path, slow_share
 from studies.inference.polynomial_card import polynomial_card
 from studies.inference.records import driving, make_ready
+from studies.inference.signatures import SHARE
 from studies.instrument.card import Instrument
 from studies.record import Record
 from studies.resonator.law import law_of

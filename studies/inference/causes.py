@@ -13,12 +13,12 @@ from studies.diagnosis.verdict import NINETY, Cause, Interval, same_cause, weigh
 from studies.effects import library
 from studies.effects.effect import UNITS
 from studies.inference.generic_forms import offsets
-from studies.inference.heat_path import DIRECT, LAGS, SENSOR, SHARE
+from studies.inference.heat_path import DIRECT, LAGS, SENSOR
 from studies.inference.inferred import Inferred
 from studies.inference.model import Background, Term
 from studies.inference.records import REFERENCE, settle
 from studies.inference.search import MARGIN, Hypothesis, Outcome, Search
-from studies.inference.signatures import Signatures
+from studies.inference.signatures import SHARE, Signatures
 
 Array = NDArray[np.float64]
 DELAY = "law.delay_s"

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from compensation.noise import Noise, white_rms
+from compensation.noise import white_rms
 from shell.constants import zero_Celsius
 from studies.calibration.fit import IMPOSSIBLE, CardFit, fit, residual_noise
 from studies.calibration.observed import HOUSING, RESPONSES, observe
@@ -21,15 +21,15 @@ from studies.calibration.problem import CardProblem, wide_law
 from studies.diagnosis.constants import CONSTANTS
 from studies.diagnosis.response import SeenResponse
 from studies.inference.causes import only_apart, with_levels
-from studies.inference.heat_path import FREQUENCY, HeatPath, evidence_of, find_heat_path, residual_of, slow_share
+from studies.inference.heat_path import FREQUENCY, HeatPath, evidence_of, find_heat_path, residual_of
 from studies.inference.held_out import Kept, Model, Rows
 from studies.inference.housing import set_housing_apart
 from studies.inference.inferred import Inferred
 from studies.inference.lack_of_fit import generic_bank, is_rounding, look
-from studies.inference.model import Background, Linear, Term
+from studies.inference.model import Background, Linear
+from studies.inference.pursuit import Pursuit, on_all_rows
 from studies.inference.records import Campaign
-from studies.inference.relinearise import relinearise
-from studies.inference.search import MARGIN, SUSPICIOUS, Hypothesis, Outcome, Search, Shapes
+from studies.inference.search import MARGIN, Outcome, Search
 from studies.inference.sharp import RESOLVED, fast_line, longest_resolved
 from studies.inference.signatures import Signatures
 from studies.inference.verdict import judge
@@ -49,24 +49,14 @@ Left = tuple[dict[str, Rows], Mapping[str, Array]]
 """What a model leaves of the rows of every response, and of its blocks."""
 BLOCKS, BLOCKS_OF_RUN = 800, (100, 400)
 """Block averages of a campaign, and fewest and most of a run."""
-AGAIN, SETTLING = 7, 4
-"""Most linearisations after the first, and how many of these look for no further effects."""
-STRAYED = 1.0
-"""Error of −2 ln L up to which a linearisation is taken as it is."""
-STILL = 0.2
-"""Prior standard deviations by which it must have moved to be made anew once more."""
 FAR = 2.0
 """The same, beyond which the search begins from the card's own values too."""
-STRAIGHT = 1.0
-"""The same, up to which further effects are looked for beside one before the model is linearised anew."""
 FAINT = 60.0
 """Log evidence up to which a cause whose definite coefficients may all be 0 is not named: of 13 such names on 127 judged campaigns all 7 below were wrong, 4 of 6 above right."""
 FOLLOWS = 0.1
 """Part of what one lag leaves."""
 BEATEN = 100.0
-"""Log evidence behind another heat path, from which on a search is given up."""
-SAME_PATH = 0.02
-"""Part of its range by which the resonator's temperature may move before the columns of all effects are computed anew."""
+"""Log evidence behind another search, from which on one is given up."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -181,7 +171,7 @@ def infer(card: "Instrument", campaign: Campaign, progress: Report = lambda _: N
     problem = found.problem
     path = None
     if card.polynomial is None:
-        search, outcome = _from(found, told, progress)
+        search, outcome = Pursuit(found, told, progress).outcome()
     else:
         path, search, outcome = _with_heat_path(found, told, progress)
     values = len(problem.priors.values)
@@ -190,8 +180,9 @@ def infer(card: "Instrument", campaign: Campaign, progress: Report = lambda _: N
         progress("again from the card's own values")
         state = problem.evaluate(np.zeros(problem.count))
         noise = residual_noise(problem, problem.rows, state)
-        there = _from(replace(found, state=state, noise=noise, rows=problem.rows), told, progress)
-        search, outcome = max((there, (search, outcome)), key=lambda found: _on_all_rows(found[0], found[1].final))
+        pursuit = Pursuit(replace(found, state=state, noise=noise, rows=problem.rows), told, progress)
+        there = pursuit.outcome(on_all_rows(search, outcome.final) - BEATEN)
+        search, outcome = max((there, (search, outcome)), key=lambda found: on_all_rows(found[0], found[1].final))
     # one lag in its own noise: in that of a longer path its straight lines lead out of the world
     alone = outcome.plain.noise if path is None else found.noise
     paths = search.signatures.there(found.point) if path is None else Signatures.at(problem, found.point)
@@ -219,20 +210,21 @@ def infer(card: "Instrument", campaign: Campaign, progress: Report = lambda _: N
 
 
 def _with_heat_path(found: CardFit, told: Array | None, progress: Report) -> tuple[HeatPath | None, Search, Outcome]:
-    """Search beside one lag, and beside several where one leaves slow noise; the likelier heat path stays."""
-    path = find_heat_path(found, progress=progress) if slow_share(found) > SUSPICIOUS else None
+    """Search beside one lag, and beside several where one leaves slow noise that no effect explains; the likelier heat path stays."""
+    own = Pursuit(found, told, progress)
+    path = find_heat_path(found, progress=progress) if own.asks_for_lags else None
     if path is None or not (path.lags > 1 or path.radiates):
-        return (None, *_from(found, told, progress))
+        return (None, *own.outcome())
     alone = evidence_of(found)
 
     def beside() -> tuple[Search, Outcome, float]:
         progress(f"effects beside a heat path with {path.lags} time constants")
-        there, grown = _from(path.fit, told, progress)
-        return there, grown, _on_all_rows(there, grown.final) + path.price
+        there, grown = Pursuit(path.fit, told, progress).outcome()
+        return there, grown, on_all_rows(there, grown.final) + path.price
 
     first = beside() if residual_of(path.fit) < FOLLOWS * residual_of(found) else None
-    search, outcome = _from(found, told, progress, first[2] - BEATEN if first else None)
-    one_lag = _on_all_rows(search, outcome.final)
+    search, outcome = own.outcome(first[2] - BEATEN if first else None)
+    one_lag = on_all_rows(search, outcome.final)
     brought = [term.brought for term in outcome.final.terms if term.response == FREQUENCY]
     if first is None and brought and path.evidence > alone + max(brought):
         first = beside()
@@ -242,83 +234,6 @@ def _with_heat_path(found: CardFit, told: Array | None, progress: Report) -> tup
     if levels > first[2] - alone + MARGIN:
         return None, search, outcome
     return replace(path, evidence=first[2] - alone, lead=first[2] - one_lag), *first[:2]
-
-
-def _on_all_rows(search: Search, final: Hypothesis) -> float:
-    """Log posterior of a model, no row taken for an outlier."""
-    alone = Background(search.linear.on_all_rows, final.terms, final.noise).evidence
-    return alone + sum(term.price for term in final.terms)
-
-
-def _from(start: CardFit, told: Array | None, progress: Report, least: float | None = None) -> tuple[Search, Outcome]:
-    """Search with the values linearised at a start, and again where they are most probable beside the effects; given up below a `least` score."""
-    progress("all effects in all shapes")
-    problem, point = start.problem, start.point
-    search = Search(Linear.of(start, told), Signatures.at(problem, point), start.noise, progress=progress)
-
-    def reached(final: Hypothesis) -> Array:
-        """Most probable values and starts beside the effects."""
-        model = Model(search.linear, search.signatures, final.terms, final.noise)
-        return model.kept(model.mean()).point
-
-    def near(final: Hypothesis) -> bool:
-        return bool(np.abs(reached(final) - point).max(initial=0.0) < STRAIGHT)
-
-    def holds(final: Hypothesis) -> bool:
-        """Whether the straight lines are those of the simulation where they end."""
-        model = Model(search.linear, search.signatures, final.terms, final.noise)
-        linear, mean = model.linear, model.mean()
-        try:
-            left = model.left(model.kept(mean))
-        except IMPOSSIBLE:
-            return False
-        apart = {n: linear.target[n] - linear.columns(final.terms, n) @ mean - left[n] for n in linear.responses}
-        return STRAYED > sum(np.sum(linear.rows[n].whiten(own, final.noise[n]) ** 2) for n, own in apart.items())
-
-    def linearise(
-        terms: Sequence[Term], noise: Mapping[str, Noise], bank: Sequence[Shapes] | None = None
-    ) -> tuple[Search, Array, tuple[Term, ...]]:
-        there = relinearise(start, search.linear, point, terms, noise)
-        if bank is None and there.signatures.away(search.signatures) < SAME_PATH:
-            bank = search.bank
-        return Search(there.linear, there.signatures, noise, bank, progress), there.values, there.terms
-
-    def straightened(plain: Hypothesis, final: Hypothesis) -> tuple[Hypothesis, Hypothesis]:
-        nonlocal search, point
-        for left in range(AGAIN, 0, -1):
-            if holds(final) or not (final.terms or left == AGAIN) or beaten(final):
-                break
-            progress("linearising the model again with the effects found")
-            before = point
-            search, point, terms = linearise(final.terms, final.noise)
-            if left > SETTLING:
-                plain, final = search.grow(terms, near if left > SETTLING + 1 else lambda _: True)
-            else:
-                plain, final = search.grow(terms, most=0)
-            if np.abs(point - before).max(initial=0.0) < STILL:
-                break
-        return plain, final
-
-    def beaten(final: Hypothesis) -> bool:
-        return least is not None and _on_all_rows(search, final) < least
-
-    plain, final = straightened(*search.grow(near=near))
-    if beaten(final):
-        return search, Outcome(plain, final, (), ())
-    if problem.instrument.polynomial is None:
-        return search, search.compare(plain, final)
-    tried = []
-    for terms, noise in search.suspects(final):
-        there, at, own = linearise(terms, noise, [])
-        grown = there.grow(own, noise=noise, most=0)[1]
-        tried.append((_on_all_rows(there, grown), there, at, grown))
-    best = max(tried, key=lambda one: one[0], default=None)
-    if best is not None and best[0] > _on_all_rows(search, final) + STRAYED:
-        progress("a better minimum found elsewhere; continuing there")
-        _, there, point, grown = best
-        search = Search(there.linear, there.signatures, grown.noise, None, progress)
-        plain, final = straightened(*search.grow(grown.terms, near, grown.noise))
-    return search, search.compare(plain, final)
 
 
 def _confirmed(

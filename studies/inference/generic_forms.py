@@ -9,6 +9,8 @@ from studies.effects import Coefficient, Effect, Parameter, Span
 from studies.effects.states import FloatArray, States, lag, play
 
 TEMPERATURE_ORDERS, TIME_ORDERS = 24, 24
+LAGS = tuple(2.0**k for k in range(-4, 4))
+"""Time constants of a heat path over that of the resonator."""
 STRONG = {"frequency_Hz": 1e-4, "bias_deg_per_h": 10.0, "inverse_q": 0.3}
 
 
@@ -102,6 +104,19 @@ def generic_forms(span: Span, runs: Sequence[States]) -> list[Effect]:
         count = 16 if field != "pattern_angle" else 8
         forms.append(_generic(word, drive(field), [1.0] * count, (field,)))
     return forms
+
+
+def any_lags(span: Span) -> Effect:
+    """Return the form of a heat path of any kind: the housing through lags of all lengths, and that times the temperature, in which radiation and capacities go."""
+
+    def columns(states: States, shape: Sequence[float], response: str) -> FloatArray:
+        x = (states.resonator - states.reference) / max(span.temperature_range, 1e-3)
+        behind = np.stack([lag(states.housing, states.step, span.tau * part) for part in LAGS], axis=1)
+        away = behind - states.resonator[:, None]
+        return np.concatenate([away, away * x[:, None]], axis=1)
+
+    form = _generic("a heat path", columns, [1.0] * 2 * len(LAGS))
+    return replace(form, acts_on="temperature", sizes={"frequency_Hz": 1.0})
 
 
 def offsets(count: int) -> Effect:

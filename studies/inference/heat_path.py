@@ -9,13 +9,16 @@ from numpy.typing import NDArray
 from studies.calibration.fit import CardFit, fit
 from studies.calibration.priors import gather_priors
 from studies.calibration.problem import CardProblem
+from studies.inference.generic_forms import any_lags
 from studies.inference.model import PRICE, Background, Linear
+from studies.inference.search import Hypothesis, Search
+from studies.inference.signatures import SHARE, Signatures
 from studies.instrument.card import Instrument
 
 Array = NDArray[np.float64]
 FREQUENCY = "frequency_Hz"
 LAGS = ("lag_s", "second_lag_s", "third_lag_s")
-SHARE, DIRECT = "law.radiated_share", "law.direct_share"
+DIRECT = "law.direct_share"
 PLAIN, FULL, LATE = range(3)
 PATHS = (
     ((1.0,), PLAIN),
@@ -111,9 +114,10 @@ def find_heat_path(
     lean = replace(whole, runs=tuple(run.explaining((FREQUENCY,)) for run in whole.runs))
     lag = whole.priors.at(baseline.point[: len(whole.priors.values)])["law.lag_s"]
     best: HeatPath | None = None
+    followed = False
     for parts, kind in PATHS:
         number = len(parts)
-        if lags not in (None, number) or (best is not None and slow_share(best.fit) < FOLLOWED):
+        if lags not in (None, number) or followed:
             continue
         progress(
             f"a heat path with {number} {'lag' if number == 1 else 'lags in series'} and radiation{', its sensor late' * (kind == LATE)}"
@@ -121,6 +125,7 @@ def find_heat_path(
         path = _calibrated(lean, with_lags(whole.instrument, [part * lag for part in parts], kind))
         if best is None or path.evidence > best.evidence + WORTH * (path.lags - best.lags):
             best = path
+            followed = slow_share(path.fit) < FOLLOWED or lags_would_bring(path.fit) < WORTH
     assert best is not None
     if whole.responses == lean.responses or not (best.lags > 1 or best.radiates):
         return best
@@ -136,6 +141,15 @@ def _calibrated(problem: CardProblem, card: Instrument, start: Array | None = No
 def evidence_of(found: CardFit) -> float:
     """Log evidence of a calibrated card, no row taken for an outlier."""
     return Background(Linear.of(found).on_all_rows, (), found.noise).evidence
+
+
+def lags_would_bring(found: CardFit) -> float:
+    """Log evidence that lags of any lengths and shares would bring beside a calibration: a heat path of any form, to first order."""
+    signatures = Signatures.at(found.problem, found.point)
+    search = Search(Linear.of(found), signatures, found.noise, [])
+    plain = Hypothesis((), found.noise, 0.0)
+    seen = search.scan(plain, search.shapes_of([(any_lags(signatures.span), FREQUENCY)]))
+    return max((one.gain for one in seen), default=-np.inf)
 
 
 def slow_share(found: CardFit, name: str = FREQUENCY) -> float:

@@ -16,7 +16,6 @@ from shell.constants import zero_Celsius
 from studies.calibration.problem import CardProblem, Part
 from studies.effects import Effect, Span, library
 from studies.effects.states import States, remembered
-from studies.inference.heat_path import SHARE
 from studies.simulation.heat_path import slowest_lag
 from studies.simulation.prediction import Prediction
 from studies.simulation.response import Temperatures, read_out
@@ -34,6 +33,8 @@ VARIES = 1e-3
 """Relative change from which on a drive varies."""
 
 
+SHARE = "law.radiated_share"
+"""A value that only a card with a heat path of its own has."""
 DIRECT, WARMED, DAMPED = "direct", "warmed", "damped"
 """Ways in which an effect reaches a response: by itself, through the temperature, through the anisotropy of damping."""
 

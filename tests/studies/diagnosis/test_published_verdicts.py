@@ -74,6 +74,7 @@ SLOW = "ageing", "jump", "hysteresis", "second-lag", "mounting-stress"
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("fine")
 def test_a_resistor_that_relaxes_from_run_to_run_ages(only):
     """Known: -8.8, -1.7 and -2.6 ppm from run to run, white noise 0.08 ppm of 10 kilohm. Of the effects those that are slow contend."""
     only(*SLOW)
