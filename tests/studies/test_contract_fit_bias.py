@@ -70,6 +70,13 @@ def test_a_compensated_record_is_flat_and_complete(calibrated, tmp_path, capsys)
     assert again["bias_deg_per_h"] == pytest.approx(read_record(calibrated / "run1.csv")["bias_deg_per_h"], abs=1e-12)
 
 
+@pytest.fixture(scope="module")
+def causal(calibrated):
+    runs = [str(calibrated / f"run{k}.csv") for k in range(3)]
+    assert main(["fit", "bias", *runs, "--causal", "--save", str(calibrated / "causal.toml")]) == 0
+    return read_model(calibrated / "causal.toml")
+
+
 def compiled(source, folder):
     """Return the emitted source as a library, after its own test has passed."""
     library = compile_c(source, folder, " 0 differ")
@@ -89,32 +96,27 @@ def run_c(library, time, output, value):
 
 
 @pytest.mark.parametrize("spacing", ["even", "uneven with holes", "slower than a block"])
-def test_the_c_code_computes_what_the_causal_model_computes(calibrated, tmp_path, spacing):
+def test_the_c_code_computes_what_the_causal_model_computes(calibrated, causal, tmp_path, spacing):
     """Sample by sample through a whole record; the two were 3.7e-4 °/h apart when only one of them averaged."""
-    runs = [str(calibrated / f"run{k}.csv") for k in range(3)]
-    assert main(["fit", "bias", *runs, "--causal", "--save", str(tmp_path / "m.toml")]) == 0
-    model = read_model(tmp_path / "m.toml")
-    record = read_record(runs[1])
+    record = read_record(calibrated / "run1.csv")
     time, f, output = record["time_s"], record["frequency_Hz"].copy(), record["bias_deg_per_h"]
     rows = {"even": slice(None), "slower than a block": slice(None, None, 7)}.get(spacing, slice(None))
     time, f, output = time[rows], f[rows], output[rows]
     if spacing == "uneven with holes":
         time = time + np.random.default_rng(1).uniform(-2, 2, time.size)
         f[40:60], f[1000:1200] = np.nan, np.nan
-    expected = compensate(model, Record({"time_s": time, "frequency_Hz": f, "bias_deg_per_h": output}))
-    found = run_c(compiled(emit_c(model), tmp_path), time, output, f)
+    expected = compensate(causal, Record({"time_s": time, "frequency_Hz": f, "bias_deg_per_h": output}))
+    found = run_c(compiled(emit_c(causal), tmp_path), time, output, f)
     assert np.array_equal(np.isnan(found), np.isnan(expected["compensated_bias_deg_per_h"]))
     assert np.mean(np.isfinite(found)) > 0.9
     np.testing.assert_allclose(found, expected["compensated_bias_deg_per_h"], atol=1e-9, rtol=0)
 
 
-def test_a_causal_model_uses_nothing_that_comes_later(calibrated, tmp_path):
-    runs = [str(calibrated / f"run{k}.csv") for k in range(3)]
-    assert main(["fit", "bias", *runs, "--causal", "--save", str(tmp_path / "m.toml")]) == 0
-    model, record = read_model(tmp_path / "m.toml"), read_record(runs[0])
-    whole = compensate(model, record)["compensated_bias_deg_per_h"]
+def test_a_causal_model_uses_nothing_that_comes_later(calibrated, causal):
+    record = read_record(calibrated / "run0.csv")
+    whole = compensate(causal, record)["compensated_bias_deg_per_h"]
     part = Record({name: values[:2000] for name, values in record.columns.items()})
-    np.testing.assert_allclose(compensate(model, part)["compensated_bias_deg_per_h"], whole[:2000], atol=1e-9)
+    np.testing.assert_allclose(compensate(causal, part)["compensated_bias_deg_per_h"], whole[:2000], atol=1e-9)
 
 
 def make_thermometer_gyro(seed, cooling, loop=0.0, lag=200.0):
