@@ -281,34 +281,40 @@ def test_contract_record_of_the_program(mode, folder, capsys):
         )
 
 
+@pytest.fixture(scope="module")
+def draw(folder):
+    """Draws of the C code, 64 runs of 4096 rows."""
+    program = compile_twin(load_card("free-dome"), folder / "draws", main=str(HERE / "draw.c"))
+
+    def make(noise, span):
+        words = map(repr, (noise.white, noise.flicker, noise.walk, noise.offset, span))
+        said = subprocess.run([program, *words, "64", "4096"], check=True, capture_output=True, text=True).stdout
+        return np.array(said.split(), float).reshape(64, 4096)
+
+    return make
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "noise",
     [Noise(white=1.0), Noise(flicker=1.0), Noise(walk=1.0), Noise(0.3, 0.5, 0.02)],
     ids=["white", "flicker", "walk", "all"],
 )
-def test_limits_allan_variance_of_the_draws(noise, folder):
-    """Draws of the C code, 64 runs of 4096 rows of 2 s, against the closed-form Allan variance; 5 standard errors of their scatter."""
-    program = compile_twin(load_card("free-dome"), folder / "draws", main=str(HERE / "draw.c"))
-    runs, rows, span = 64, 4096, 2.0
-    words = [program, *map(repr, (noise.white, noise.flicker, noise.walk, noise.offset, span)), str(runs), str(rows)]
-    values = np.array(subprocess.run(words, check=True, capture_output=True, text=True).stdout.split(), float).reshape(
-        runs, rows
-    )
+def test_limits_allan_variance_of_the_draws(noise, draw):
+    """Rows of 2 s against the closed-form Allan variance; 5 standard errors of their scatter."""
+    values = draw(noise, 2.0)
     for count in (1, 8, 64, 512):
-        means = values.reshape(runs, rows // count, count).mean(axis=2)
+        means = values.reshape(64, -1, count).mean(axis=2)
         each = (np.diff(means, axis=1) ** 2).mean(axis=1) / 2
-        scatter = each.std(ddof=1) / np.sqrt(runs)
-        assert abs(each.mean() - noise.allan_variance(count * span)) < 5 * scatter
+        scatter = each.std(ddof=1) / np.sqrt(64)
+        assert abs(each.mean() - noise.allan_variance(count * 2.0)) < 5 * scatter
         assert scatter < 0.2 * each.mean()
 
 
 @pytest.mark.slow
-def test_limits_draws_are_normal_and_seeded(folder):
+def test_limits_draws_are_normal_and_seeded(draw, folder):
     """Moments of 262 144 white draws within 5 standard errors; the same seed gives the same run, another one does not."""
-    program = compile_twin(load_card("free-dome"), folder / "draws", main=str(HERE / "draw.c"))
-    words = [program, "1.0", "0.0", "0.0", "0.0", "1.0", "64", "4096"]
-    x = np.array(subprocess.run(words, check=True, capture_output=True, text=True).stdout.split(), float)
+    x = draw(Noise(white=1.0), 1.0).ravel()
     for power, moment, variance in ((1, 0.0, 1.0), (2, 1.0, 2.0), (3, 0.0, 15.0), (4, 3.0, 96.0)):
         assert abs((x**power).mean() - moment) < 5 * np.sqrt(variance / x.size)
     assert np.unique(x).size == x.size
