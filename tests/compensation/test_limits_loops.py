@@ -16,7 +16,6 @@ from compensation.whole_angle import simulate_whole_angle
 from tests.compensation.carrier import simulate_carrier
 
 DEG_PER_H = np.degrees(1.0) * 3600
-EARTH = 15.041 / DEG_PER_H
 ERRORS = Electronics(Channels(0.01, 0.002, 0.003, 0.001, 0.01), Channels(-0.02, 0.001, 0.002, 0.0005, 0.02))
 
 
