@@ -21,7 +21,7 @@ from studies.calibration.problem import CardProblem, wide_law
 from studies.diagnosis.constants import CONSTANTS
 from studies.diagnosis.response import SeenResponse
 from studies.inference.causes import only_apart, with_levels
-from studies.inference.heat_path import FREQUENCY, HeatPath, evidence_of, find_heat_path, residual_of
+from studies.inference.heat_path import FREQUENCY, HeatPath, evidence_of, find_heat_path
 from studies.inference.held_out import Kept, Model, Rows
 from studies.inference.housing import set_housing_apart
 from studies.inference.inferred import Inferred
@@ -53,8 +53,6 @@ FAR = 2.0
 """The same, beyond which the search begins from the card's own values too."""
 FAINT = 60.0
 """Log evidence up to which a cause whose definite coefficients may all be 0 is not named: of 13 such names on 127 judged campaigns all 7 below were wrong, 4 of 6 above right."""
-FOLLOWS = 0.1
-"""Part of what one lag leaves."""
 BEATEN = 100.0
 """Log evidence behind another search, from which on one is given up."""
 
@@ -215,25 +213,15 @@ def _with_heat_path(found: CardFit, told: Array | None, progress: Report) -> tup
     path = find_heat_path(found, progress=progress) if own.asks_for_lags else None
     if path is None or not (path.lags > 1 or path.radiates):
         return (None, *own.outcome())
-    alone = evidence_of(found)
-
-    def beside() -> tuple[Search, Outcome, float]:
-        progress(f"effects beside a heat path with {path.lags} time constants")
-        there, grown = Pursuit(path.fit, told, progress).outcome()
-        return there, grown, on_all_rows(there, grown.final) + path.price
-
-    first = beside() if residual_of(path.fit) < FOLLOWS * residual_of(found) else None
-    search, outcome = own.outcome(first[2] - BEATEN if first else None)
-    one_lag = on_all_rows(search, outcome.final)
-    brought = [term.brought for term in outcome.final.terms if term.response == FREQUENCY]
-    if first is None and brought and path.evidence > alone + max(brought):
-        first = beside()
-    if first is None or first[2] < one_lag + MARGIN:
-        return None, search, outcome
+    progress(f"effects beside a heat path with {path.lags} time constants")
+    there, grown = Pursuit(path.fit, told, progress).outcome()
+    score = on_all_rows(there, grown.final) + path.price
+    search, outcome = own.outcome(score - BEATEN)
+    gain, lead = score - evidence_of(found), score - on_all_rows(search, outcome.final)
     levels = with_levels(search, outcome.plain, FREQUENCY).score - outcome.plain.score
-    if levels > first[2] - alone + MARGIN:
+    if lead < MARGIN or levels > gain + MARGIN:
         return None, search, outcome
-    return replace(path, evidence=first[2] - alone, lead=first[2] - one_lag), *first[:2]
+    return replace(path, evidence=gain, lead=lead), there, grown
 
 
 def _confirmed(

@@ -155,8 +155,3 @@ def lags_would_bring(found: CardFit) -> float:
 def slow_share(found: CardFit, name: str = FREQUENCY) -> float:
     """Rms of the slow noise of a response within a usual run over that of a row; 0 where it is not measured."""
     return found.rows[name].slow_share(found.noise[name]) if name in found.noise else 0.0
-
-
-def residual_of(found: CardFit, name: str = FREQUENCY) -> float:
-    """Rms of what a calibration leaves of a response that is measured."""
-    return float(np.sqrt(np.mean(found.state.residual[name] ** 2)))
