@@ -105,9 +105,11 @@ def _add(envelope: Envelope, fit: DecayFit, tones_first: bool, most: int) -> Dec
 
 
 def _tried(fit: DecayFit, rivals: list[Rival]) -> list[Rival]:
-    """Return the two rivals that promise most and the best curved one, whose promise is of first order only."""
-    curved = (k for k, one in enumerate(rivals) if len(one[1].curved) > len(fit.terms.curved))
-    return [rivals[k] for k in sorted({0, 1, next(curved, 0)}) if k < len(rivals)]
+    """Return the two rivals that promise most and the best curved one, whose promise is of first order only; none beside a frequency that wanders."""
+    wanders = fit.terms.drift > DEGREES
+    curved = [k for k, one in enumerate(rivals) if len(one[1].curved) > len(fit.terms.curved)]
+    first = [k for k in range(len(rivals)) if not (wanders and k in curved)][:2]
+    return [rivals[k] for k in sorted({*first, *([] if wanders else curved[:1])})]
 
 
 def _drop(envelope: Envelope, fit: DecayFit) -> DecayFit:
