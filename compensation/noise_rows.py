@@ -23,7 +23,6 @@ from compensation.errors import CompensationError
 from compensation.noise import SLOW_TIMES, Noise, flicker, random_walk
 
 COARSE = 150  # most rows of a run from which noise is estimated in a model with many unknowns
-KEPT = 6  # roots of covariances that are kept
 LEAST, MOST = -7.0, 8.0  # ln of the rms of slow noise within a run over that of a row's white noise
 KINDS = ("white", "flicker", "walk", "offset")
 WHITE = -0.3  # ln of white noise over the scatter of neighbouring rows, where the search begins
@@ -122,10 +121,9 @@ class NoiseRows:
         return self.whitener(noise)(columns)
 
     def whitener(self, noise: Noise) -> "Whitener":
-        """Return the root of the covariance; the last few are kept."""
+        """Return the root of the covariance; the last one is kept."""
         if noise not in self._roots:
-            for old in list(self._roots)[:-KEPT]:
-                del self._roots[old]
+            self._roots.clear()
             self._roots[noise] = self._factor(noise)
         return self._roots[noise]
 
