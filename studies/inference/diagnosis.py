@@ -21,7 +21,15 @@ from studies.calibration.problem import CardProblem, wide_law
 from studies.diagnosis.constants import CONSTANTS
 from studies.diagnosis.response import SeenResponse
 from studies.inference.causes import only_apart, with_levels
-from studies.inference.heat_path import FREQUENCY, HeatPath, evidence_of, find_heat_path
+from studies.inference.heat_path import (
+    FREQUENCY,
+    WORTH,
+    HeatPath,
+    evidence_of,
+    find_heat_path,
+    lags_would_bring,
+    slow_share,
+)
 from studies.inference.held_out import Kept, Model, Rows
 from studies.inference.housing import set_housing_apart
 from studies.inference.inferred import Inferred
@@ -29,7 +37,7 @@ from studies.inference.lack_of_fit import generic_bank, is_rounding, look
 from studies.inference.model import Background, Linear
 from studies.inference.pursuit import Pursuit, on_all_rows
 from studies.inference.records import Campaign
-from studies.inference.search import MARGIN, Outcome, Search
+from studies.inference.search import MARGIN, SUSPICIOUS, Outcome, Search
 from studies.inference.sharp import RESOLVED, fast_line, longest_resolved
 from studies.inference.signatures import Signatures
 from studies.inference.verdict import judge
@@ -208,9 +216,9 @@ def infer(card: "Instrument", campaign: Campaign, progress: Report = lambda _: N
 
 
 def _with_heat_path(found: CardFit, told: Array | None, progress: Report) -> tuple[HeatPath | None, Search, Outcome]:
-    """Search beside one lag, and beside several where one leaves slow noise that no effect explains; the likelier heat path stays."""
-    own = Pursuit(found, told, progress)
-    path = find_heat_path(found, progress=progress) if own.asks_for_lags else None
+    """Search beside one lag, and beside several where one leaves slow noise of which other lags would take something; the likelier heat path stays."""
+    own, slow = Pursuit(found, told, progress), slow_share(found) > SUSPICIOUS
+    path = find_heat_path(found, progress=progress) if slow and lags_would_bring(found) > WORTH else None
     if path is None or not (path.lags > 1 or path.radiates):
         return (None, *own.outcome())
     progress(f"effects beside a heat path with {path.lags} time constants")

@@ -125,7 +125,7 @@ def find_heat_path(
         path = _calibrated(lean, with_lags(whole.instrument, [part * lag for part in parts], kind))
         if best is None or path.evidence > best.evidence + WORTH * (path.lags - best.lags):
             best = path
-            followed = slow_share(path.fit) < FOLLOWED or lags_would_bring(path.fit) < WORTH
+            followed = slow_share(path.fit) < FOLLOWED or (path.lags == 1 and lags_would_bring(path.fit) < WORTH)
     assert best is not None
     if whole.responses == lean.responses or not (best.lags > 1 or best.radiates):
         return best

@@ -1,18 +1,16 @@
 """A search that follows what it finds: the model is linearised anew where values are most probable beside the effects, and searched again."""
 
 from collections.abc import Callable, Mapping, Sequence
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from compensation.noise import Noise
 from studies.calibration.fit import IMPOSSIBLE, CardFit
-from studies.inference.heat_path import FREQUENCY, WORTH, lags_would_bring
 from studies.inference.held_out import Model
 from studies.inference.model import Background, Linear, Term
 from studies.inference.relinearise import relinearise
-from studies.inference.search import SUSPICIOUS, Hypothesis, Outcome, Search, Shapes
+from studies.inference.search import Hypothesis, Outcome, Search, Shapes
 from studies.inference.signatures import Signatures
 
 Array = NDArray[np.float64]
@@ -40,22 +38,10 @@ class Pursuit:
         self.search = Search(Linear.of(start, told), paths, start.noise, progress=progress)
         self.least = -np.inf
 
-    @cached_property
-    def first(self) -> tuple[Hypothesis, Hypothesis]:
-        """The models without effects and with what was found before the model is linearised anew."""
-        return self.search.grow(near=self._near)
-
-    @property
-    def asks_for_lags(self) -> bool:
-        """Whether the effects that are found first leave slow noise of the frequency, of which other lags would take something."""
-        rows, noise = self.search.linear.rows, self.first[1].noise
-        slow = FREQUENCY in noise and rows[FREQUENCY].slow_share(noise[FREQUENCY]) > SUSPICIOUS
-        return slow and lags_would_bring(self.start) > WORTH
-
     def outcome(self, least: float | None = None) -> tuple[Search, Outcome]:
         """Return the last search and what it found; given up below a `least` score."""
         self.least = -np.inf if least is None else least
-        plain, final = self._straightened(*self.first)
+        plain, final = self._straightened(*self.search.grow(near=self._near))
         if self._beaten(final):
             return self.search, Outcome(plain, final, (), ())
         if self.start.problem.instrument.polynomial is not None:
