@@ -190,13 +190,12 @@ def test_inseparable_pair_gets_a_measurement_and_no_run():
     assert "reference clock" in verdict.next_experiment
 
 
-def lumps_of_silica(words, seed):
-    """A record of a base and a shell of fused silica that loads it, hung on a thin stem and radiating to the housing, by the implicit integrator."""
-    capacity, stem, seen = 60.0, 0.05, 2e-3  # J/K, W/K, m²
+def lumps_of_silica(words, seed, base=(200.0, 0.25), capacity=60.0, stem=0.05, seen=2e-3, growth=1.8e-3):
+    """A record of a base and a shell of fused silica that loads it, hung on a thin stem and radiating to the housing, by the implicit integrator (J/K, W/K, m²)."""
     parts = [
         Boundary("chamber"), Node("housing", 1e6), Conductor("chamber", "housing", 2500.0),
-        Node("base", 200.0), Conductor("housing", "base", 0.25),
-        Node("shell", lambda T: capacity * (1.0 + 1.8e-3 * (T - 293.15))), Conductor("base", "shell", stem),
+        Node("base", base[0]), Conductor("housing", "base", base[1]),
+        Node("shell", lambda T: capacity * (1.0 + growth * (T - 293.15))), Conductor("base", "shell", stem),
         Radiator("housing", "shell", seen),
     ]  # fmt: skip
     profile = parse_profile(words)
@@ -226,6 +225,16 @@ def test_a_healthy_gyro_of_several_lumps_is_followed_to_its_noise_and_its_card_p
     told = simulate_run(extend(found).instrument, drive_by_record(unseen), noise=False).record
     for name, noise in (("frequency_Hz", 2e-3), ("bias_deg_per_h", 0.02)):  # its start is settled at one noisy reading
         assert np.sqrt(np.mean((told[name] - unseen[name]) ** 2)) < 1.5 * noise
+
+
+@pytest.mark.slow
+def test_a_light_shell_whose_capacity_grows_is_followed_to_its_noise_and_gets_no_effect():
+    """The search for a heat path once ended where straight lines had no more to take: 6 mHz were left, and two effects named."""
+    light = {"base": (1e4, 1e4 / 900.0), "capacity": 1.0, "stem": 1.0 / 500.0, "seen": 1e-9, "growth": 1e-3}
+    words = "step 20 45 3h then step 45 -15 4h", "cycle 20 -10 40 1 30min 2"
+    verdict = diagnose_records([lumps_of_silica(one, k, **light) for k, one in enumerate(words, 1)]).verdict
+    assert {cause.effect for cause in verdict.causes} <= {"second-lag", "radiation"}
+    assert verdict.responses["frequency_Hz"].extended[0] == pytest.approx(2e-3, rel=0.1)
 
 
 LUMPS = {
