@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from compensation.errors import CompensationError
-from compensation.ringdown.answer import Curve, Estimate, RingDown
+from compensation.ringdown.answer import NINETY, Curve, Estimate, RingDown
 from compensation.ringdown.envelope import LEAST, Envelope
 from compensation.ringdown.fit import DecayFit, drift_shapes
 from compensation.ringdown.model import Decay
@@ -16,7 +16,6 @@ from compensation.ringdown.window import find_end, find_free, find_jump
 RESOLVED = 3.0  # standard deviations above zero from which a split has an axis
 LENGTHS = ("split_Hz", "damping_split_per_s")
 DRAWS = 2000
-Z90 = 1.645  # standard deviations to an end of a 90 % interval
 ALIKE = 1e-6  # relative: two pick-offs differ by more, files of nine digits round to less
 SAID_OF = {
     "hardening": "The frequency depends on the amplitude (cubic stiffness)",
@@ -179,7 +178,7 @@ def _undetermined(fit: DecayFit, estimates: Mapping[str, Estimate]) -> list[str]
     if {"frequency_1_Hz", "split_Hz", "damping_axis_deg"} <= set(estimates):
         upper, lower, elastic = (estimates[name] for name in ("frequency_1_Hz", "frequency_2_Hz", "split_Hz"))
         less = elastic.value - (upper.value - lower.value)
-        if less > Z90 * float(np.hypot(np.hypot(upper.sd, lower.sd), elastic.sd)):
+        if less > NINETY * float(np.hypot(np.hypot(upper.sd, lower.sd), elastic.sd)):
             said.append(
                 f"The two frequencies are {less:.2g} Hz closer than the split, which is of stiffness and mass alone: damping about another axis pulls them together."
             )

@@ -19,9 +19,8 @@ import scipy
 from compensation.arrays import Array
 from studies.fleet.device import Measured
 
-GRID = np.geomspace(
-    1e-3, 1e3, 100
-)  # scatters that are tried, in parts of the range of the values: three may stand close by chance
+# Scatters that are tried, in parts of the range of the values: three may stand close by chance.
+GRID = np.geomspace(1e-3, 1e3, 100)
 CHANCE = 0.01  # chance, with all looks counted, below which a device or a batch is odd
 FEWEST = 4  # devices from which on values tell who is odd
 CLEAR = 2.0  # scatter of the others, beyond which a batch is more than another batch

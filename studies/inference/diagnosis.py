@@ -218,7 +218,7 @@ def infer(card: "Instrument", campaign: Campaign, progress: Report = lambda _: N
 def _with_heat_path(found: CardFit, told: Array | None, progress: Report) -> tuple[HeatPath | None, Search, Outcome]:
     """Search beside one lag, and beside several where one leaves slow noise of which other lags would take something; the likelier heat path stays."""
     own, slow = Pursuit(found, told, progress), slow_share(found) > SUSPICIOUS
-    path = find_heat_path(found, progress=progress) if slow and lags_would_bring(found) > WORTH else None
+    path = find_heat_path(found, progress=progress) if slow and lags_would_bring(own.search) > WORTH else None
     if path is None or not (path.lags > 1 or path.radiates):
         return (None, *own.outcome())
     progress(f"effects beside a heat path with {path.lags} time constants")

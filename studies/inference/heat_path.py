@@ -125,7 +125,9 @@ def find_heat_path(
         path = _calibrated(lean, with_lags(whole.instrument, [part * lag for part in parts], kind))
         if best is None or path.evidence > best.evidence + WORTH * (path.lags - best.lags):
             best = path
-            followed = slow_share(path.fit) < FOLLOWED or (path.lags == 1 and lags_would_bring(path.fit) < WORTH)
+            followed = slow_share(path.fit) < FOLLOWED or (
+                number == 1 and lags_would_bring(_linearised(path.fit)) < WORTH
+            )
     assert best is not None
     if whole.responses == lean.responses or not (best.lags > 1 or best.radiates):
         return best
@@ -138,17 +140,20 @@ def _calibrated(problem: CardProblem, card: Instrument, start: Array | None = No
     return replace(path, evidence=evidence_of(path.fit) + path.price)
 
 
+def _linearised(found: CardFit) -> Search:
+    """A search without effects of its own."""
+    return Search(Linear.of(found), Signatures.at(found.problem, found.point), found.noise, [])
+
+
 def evidence_of(found: CardFit) -> float:
     """Log evidence of a calibrated card, no row taken for an outlier."""
     return Background(Linear.of(found).on_all_rows, (), found.noise).evidence
 
 
-def lags_would_bring(found: CardFit) -> float:
-    """Log evidence that lags of any lengths and shares would bring beside a calibration: a heat path of any form, to first order."""
-    signatures = Signatures.at(found.problem, found.point)
-    search = Search(Linear.of(found), signatures, found.noise, [])
-    plain = Hypothesis((), found.noise, 0.0)
-    seen = search.scan(plain, search.shapes_of([(any_lags(signatures.span), FREQUENCY)]))
+def lags_would_bring(search: Search) -> float:
+    """Log evidence that lags of any lengths and shares would bring in a linearised campaign: a heat path of any form, to first order."""
+    plain = Hypothesis((), search.noise, 0.0)
+    seen = search.scan(plain, search.shapes_of([(any_lags(search.signatures.span), FREQUENCY)]))
     return max((one.gain for one in seen), default=-np.inf)
 
 

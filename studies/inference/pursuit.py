@@ -38,9 +38,9 @@ class Pursuit:
         self.search = Search(Linear.of(start, told), paths, start.noise, progress=progress)
         self.least = -np.inf
 
-    def outcome(self, least: float | None = None) -> tuple[Search, Outcome]:
+    def outcome(self, least: float = -np.inf) -> tuple[Search, Outcome]:
         """Return the last search and what it found; given up below a `least` score."""
-        self.least = -np.inf if least is None else least
+        self.least = least
         plain, final = self._straightened(*self.search.grow(near=self._near))
         if self._beaten(final):
             return self.search, Outcome(plain, final, (), ())
