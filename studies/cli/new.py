@@ -14,11 +14,12 @@ from studies.cli.output import say
 from studies.design.keys import DesignKeys
 from studies.design.task import read_task, shipped_tasks
 from studies.errors import InputError
-from studies.files.reading import find_shipped, read_bytes
+from studies.files.reading import find_shipped
 from studies.files.writing import write_text
 from studies.instrument.card import build_instrument, load_card, spell_card
 from studies.instrument.registry import card_tables
 from studies.schema.keys import Keys, spell_value
+from studies.schema.reader import read_text
 from studies.schema.reference import write_form
 from studies.sweeps.keys import StudyKeys
 from studies.sweeps.parameters import find_nominal
@@ -101,23 +102,23 @@ within = 50.0
 
 def _copy(like: str, shipped: dict[str, Path], card_: str | None, kind: str) -> str:
     """Return the text of a shipped file, for another card if one is given."""
-    text = read_bytes(find_shipped(like, shipped, kind)).decode("utf-8-sig")
+    text = read_text(find_shipped(like, shipped, kind))
     if card_ is None:
         return text
     old, new = (f"card = {spell_value(one)}" for one in (tomllib.loads(text)["card"], card_))
     return text.replace(old, new)
 
 
-def _write(path: str, text: str, keys: type[Keys], read: Callable[[str], Any], kind: str, then: str) -> int:
+def _write(path: str, text: str, keys: type[Keys], read: Callable[..., Any], kind: str, then: str) -> int:
     """Write a file that fits its card, with all entries that it may have as comments."""
     _refuse_existing(path)
     form = [f"All entries of a {kind}, by example:", *write_form([(keys, "")])]
-    write_text(path, "\n".join([text.rstrip("\n"), "", *(f"# {line}".rstrip() for line in form)]) + "\n")
+    whole = "\n".join([text.rstrip("\n"), "", *(f"# {line}".rstrip() for line in form)]) + "\n"
     try:
-        read(path)
+        read(path, text=whole)
     except InputError as error:
-        Path(path).unlink()
         raise InputError(f"not written, since it does not fit the card: {error}") from None
+    write_text(path, whole)
     say(f"{path}: written. Edit it, then run: {then}")
     return 0
 

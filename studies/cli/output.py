@@ -2,17 +2,16 @@
 
 import functools
 import inspect
-import json as json_module
-import math
 import re
 import sys
 import tomllib
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
-from dataclasses import fields, is_dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+import msgspec
 from cyclopts import Parameter
 
 from shell.errors import ShellError
@@ -140,7 +139,7 @@ def print_json(payload: Mapping[str, Any]) -> None:
 
 def dump_json(payload: Mapping[str, Any]) -> str:
     """Return the text of one JSON object; NaN and infinity become null, numpy values plain numbers, what has fields an object."""
-    return json_module.dumps(_plain(payload), indent=2, allow_nan=False, ensure_ascii=False) + "\n"
+    return msgspec.json.format(msgspec.json.encode(payload, enc_hook=_plain), indent=2).decode() + "\n"
 
 
 def say(message: str) -> None:
@@ -149,14 +148,5 @@ def say(message: str) -> None:
 
 
 def _plain(value: Any) -> Any:
-    if is_dataclass(value):
-        return {one.name: _plain(getattr(value, one.name)) for one in fields(value)}
-    if isinstance(value, Mapping):
-        return {str(key): _plain(item) for key, item in value.items()}
-    if hasattr(value, "tolist"):
-        return _plain(value.tolist())
-    if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    return value
+    """Return a number or an array of numpy, or another mapping, as the builtin type that it stands for."""
+    return value.tolist() if hasattr(value, "tolist") else dict(value)

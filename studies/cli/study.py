@@ -108,25 +108,19 @@ def status(folder: Folder) -> Result:
 
 
 @answers("hrg.study-report/1", page=False)
-def report(
-    folder: Folder, *, report: str | None = None, out: Annotated[str | None, Parameter(show=False)] = None
-) -> Result:
+def report(folder: Folder, *, report: Annotated[str | None, Parameter(name=("--report", "--out"))] = None) -> Result:
     """Write a self-contained HTML page: definition, results, figures, sensitivities, yield and provenance.
 
     Args:
         report: The page; default: report.html in the folder.
-        out: The same.
     """
     from studies.reports.sweep import study_result
     from studies.results.page import render_result
 
     results = open_results(folder)
-    if report is not None and out is not None:
-        raise InputError("--report and --out cannot be combined: they name the same page.")
-    for option, name in (("--report", report), ("--out", out)):
-        if name is not None:
-            check_ending(option, name, "a report is an HTML page", ".html", ".htm")
-    page = Path(report or out or Path(folder) / "report.html")
+    if report is not None:
+        check_ending("--report", report, "a report is an HTML page", ".html", ".htm")
+    page = Path(report or Path(folder) / "report.html")
     say("writing the page, with mode shapes if the study has modes ...")
     found = study_result(results)
     write_text(page, render_result(found))

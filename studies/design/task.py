@@ -15,7 +15,7 @@ from studies.design.slopes import STEP, Slopes
 from studies.errors import InputError, nearest
 from studies.files.reading import find_shipped, list_shipped
 from studies.instrument.card import load_card
-from studies.schema.reader import read_keys, read_toml
+from studies.schema.reader import read_keys, read_text, read_toml
 from studies.sweeps.definition import Study
 from studies.sweeps.keys import Requirement
 from studies.sweeps.parameters import find_nominal, set_parameters
@@ -66,10 +66,11 @@ class Task:
         return next((one for one in self.keys.tolerance if one.name == name), None)
 
 
-def read_task(source: str | Path) -> Task:
-    """Read a task from a TOML file, or by the name of one that ships."""
+def read_task(source: str | Path, text: str | None = None) -> Task:
+    """Read a task from a TOML file (of that `text`), or by the name of one that ships."""
     path = find_shipped(source, shipped_tasks(), "design")
-    content, where = read_toml(path, SCHEMA), str(path)
+    text = read_text(path) if text is None else text
+    content, where = read_toml(path, SCHEMA, text), str(path)
     keys = read_keys(content, DesignKeys, where)
     for table, members in (("parameter", keys.parameter), ("objective", keys.objective)):
         if not members:
@@ -102,7 +103,7 @@ def read_task(source: str | Path) -> Task:
         "derived": content.get("derived", []),
         "quantity": list(_quantities(keys, content, where)),
     }
-    study = check_study(spec, instrument, where, str(path.parent.resolve()), path.read_text(encoding="utf-8-sig"))
+    study = check_study(spec, instrument, where, str(path.parent.resolve()), text)
     if study.functions:
         raise InputError(f"{where}: a design asks for no Python function; use hrg study for that.")
     of = tuple(one for one in study.asked if one.is_stationary and one.options.get("theory") != "rayleigh")

@@ -27,15 +27,19 @@ def read_file(path: str | FilePath, keys: type[T], schema: str) -> T:
     return read_keys(read_toml(path, schema), keys, str(path))
 
 
-def read_toml(path: str | FilePath, schema: str | None = None) -> dict[str, Any]:
-    """Read a TOML file and check its `schema` key."""
-    data = read_bytes(path, MOST_BYTES)
-    text = ""
+def read_text(path: str | FilePath) -> str:
+    """Read the text of a TOML file."""
     try:
-        text = data.decode("utf-8-sig")
-        content = tomllib.loads(text)
+        return read_bytes(path, MOST_BYTES).decode("utf-8-sig")
     except UnicodeDecodeError:
         raise InputError(f"{path}: not UTF-8 text; save the file as UTF-8.") from None
+
+
+def read_toml(path: str | FilePath, schema: str | None = None, text: str | None = None) -> dict[str, Any]:
+    """Read a TOML file, or the `text` that it has or will have, and check its `schema` key."""
+    text = read_text(path) if text is None else text
+    try:
+        content = tomllib.loads(text)
     except ValueError as error:  # a TOMLDecodeError, or a number of more digits than Python converts
         raise InputError(f"{path}{_spell_syntax(text, str(error).partition(';')[0])}") from None
     except RecursionError:

@@ -9,7 +9,7 @@ from msgspec.structs import replace
 from studies.errors import InputError, nearest
 from studies.files.reading import find_shipped, list_shipped
 from studies.instrument.card import Instrument, load_card
-from studies.schema.reader import read_keys, read_toml
+from studies.schema.reader import read_keys, read_text, read_toml
 from studies.sweeps.definition import Study, StudyParameter
 from studies.sweeps.keys import SCHEMA, ParameterKeys, Search, StudyKeys, ToleranceSearch, WorstCase
 from studies.sweeps.parameters import find_nominal
@@ -17,15 +17,15 @@ from studies.sweeps.quantity import Quantity
 from studies.sweeps.validity import check_nominal, check_sample
 
 
-def read_study(source: str | Path | Mapping[str, Any], card: str | None = None) -> Study:
-    """Read a study from a TOML file, by a shipped one's name, or from a mapping; `card` stands in place of its own."""
+def read_study(source: str | Path | Mapping[str, Any], card: str | None = None, text: str | None = None) -> Study:
+    """Read a study from a TOML file (of that `text`), by a shipped one's name, or a mapping; `card` stands in place of its own."""
     if isinstance(source, Mapping):
         content, where, folder, text = {"schema": SCHEMA, **source}, "study", Path(), ""
     else:
         path = find_shipped(source, shipped_specs(), "study")
-        content, folder = read_toml(path, SCHEMA), path.parent
+        text = read_text(path) if text is None else text
+        content, folder = read_toml(path, SCHEMA, text), path.parent
         where = f"the shipped study '{source}'" if path in shipped_specs().values() else str(path)
-        text = path.read_text(encoding="utf-8-sig")
     if card is not None:
         content["card"] = card
         text = f"# computed with --card {card} instead of the card below\n{text}"

@@ -98,7 +98,7 @@ def test_an_output_onto_an_input_or_another_output_is_refused_before_any_work(fo
 def test_the_folder_of_a_study_keeps_its_store_its_lock_and_what_its_spec_names(folder, capsys):
     assert main(["study", "run", "spec.toml", "--out", "study", "--workers", "1", "--quiet"]) == 0
     before = contents(folder)
-    ways = (("export", "--out", ".csv"), ("report", "--out", ".html"), ("report", "--report", ".html"))
+    ways = (("export", "--out", ".csv"), ("report", "--report", ".html"))
     for command, option, kind in ways:
         for name in ("study/study.store", "study/lock", "mapped.toml", "outer.csv"):
             assert main(["study", command, "study", option, name]) == 2, name
