@@ -1,15 +1,20 @@
-"""A user's Python function in a process of its own (lines of JSON over its pipes), killed with a reason when a case takes too long."""
+"""A user's Python function in a process of its own (JSON over a pipe), killed with a reason when a case takes too long."""
 
 import atexit
-import contextlib
+import importlib.util
+import inspect
 import json
+import math
 import os
-import selectors
+import resource
 import signal
 import subprocess
 import sys
 import threading
 from collections.abc import Mapping
+from contextlib import suppress
+from hashlib import blake2b
+from multiprocessing.connection import Connection, Pipe
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
@@ -20,6 +25,7 @@ if TYPE_CHECKING:
 
 MOST_MEMORY = 8 * 1024**3  # bytes of address space of the process
 IMPORT_LIMIT = 120.0  # s for the process to start and import the user's module
+START = "from studies.sweeps.child import serve; serve()"
 
 
 class FunctionFailed(RuntimeError):
@@ -38,56 +44,41 @@ class Child:
     """One process that holds one user function."""
 
     def __init__(self, function: str) -> None:
-        start = "from studies.sweeps.child import serve; serve()"
-        command = [sys.executable, "-P", "-c", start, function, str(os.getpid())]
-        path = os.pathsep.join([str(Path(__file__).parents[2]), *filter(None, [os.environ.get("PYTHONPATH")])])
         self.function = function
-        self.asked = 0
-        self.process = subprocess.Popen(
-            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, env={**os.environ, "PYTHONPATH": path}, bufsize=0
-        )
-        self.selector = selectors.DefaultSelector()
-        assert self.process.stdout is not None
-        self.selector.register(self.process.stdout, selectors.EVENT_READ)
-        self.received = b""
+        self.pipe, theirs = Pipe()
+        path = os.pathsep.join([str(Path(__file__).parents[2]), *filter(None, [os.environ.get("PYTHONPATH")])])
+        with theirs:
+            self.process = subprocess.Popen(
+                [sys.executable, "-P", "-c", START, function, str(os.getpid()), str(theirs.fileno())],
+                stdin=subprocess.DEVNULL, stdout=2, pass_fds=[theirs.fileno()], env={**os.environ, "PYTHONPATH": path},
+            )  # fmt: skip
         greeting = self.read(IMPORT_LIMIT, "its import")
         if "problem" in greeting:
             self.kill()
             raise FunctionFailed(greeting["problem"])
         self.source: str = greeting["source"]
 
-    def ask(self, request: Mapping[str, Any], limit: float) -> float:
-        """Send one case and return the number that comes back within `limit` seconds."""
-        assert self.process.stdin is not None
-        self.asked += 1
+    def ask(self, request: Mapping[str, Any], limit: float) -> dict[str, Any]:
+        """Send one case and return what comes back within `limit` seconds."""
         try:
-            self.process.stdin.write(json.dumps({**request, "request": self.asked}).encode() + b"\n")
+            self.pipe.send_bytes(json.dumps(request).encode())
         except OSError:
             self.lose()
-        answer = self.read(limit, "one case")
-        if answer.get("request") != self.asked:
-            self.fail("answered another request than the last")
-        if "problem" in answer:
-            raise FunctionFailed(answer["problem"])
-        return float(answer["value"])
+        return self.read(limit, "one case")
 
     def read(self, limit: float, what: str) -> dict[str, Any]:
-        """Return the next line; kill the process when it does not come in time."""
-        assert self.process.stdout is not None
-        while b"\n" not in self.received:
-            if not self.selector.select(limit):
+        """Return the next answer; kill the process when it does not come in time."""
+        try:
+            if not self.pipe.poll(limit):
                 self.fail(f"took longer than its time limit of {limit:g} s for {what} and was stopped")
-            piece = os.read(self.process.stdout.fileno(), 65536)
-            if not piece:
-                self.lose()
-            self.received += piece
-        line, _, self.received = self.received.partition(b"\n")
-        answer: dict[str, Any] = json.loads(line)
+            answer: dict[str, Any] = json.loads(self.pipe.recv_bytes())
+        except (EOFError, OSError):
+            self.lose()
         return answer
 
     def lose(self) -> NoReturn:
         """Say how the process ended: by itself, or stopped from outside."""
-        with contextlib.suppress(subprocess.TimeoutExpired):
+        with suppress(subprocess.TimeoutExpired):
             self.process.wait(10.0)  # the pipe closes a moment before the end is known
         stopped = -(self.process.returncode or 0)
         if stopped in STOPPED:
@@ -101,14 +92,10 @@ class Child:
         raise FunctionFailed(f"{self.function} {how}.")
 
     def kill(self) -> None:
-        """End the process and close its pipes."""
+        """End the process and close the pipe."""
         self.process.kill()
         self.process.wait()
-        self.selector.close()
-        for pipe in (self.process.stdin, self.process.stdout):
-            assert pipe is not None
-            with contextlib.suppress(OSError):
-                pipe.close()
+        self.pipe.close()
 
 
 _children: dict[str, Child] = {}
@@ -127,21 +114,26 @@ def ask(function: str, limit: float, case: "Case") -> float:
     instrument = case.instrument
     request = {"content": instrument.content, "path": instrument.path, "parameters": dict(case.parameters)}
     try:
-        return _ask(function, request, limit)
+        answer = _ask(function, request, limit)
     except FunctionLost:  # by chance, perhaps; not so the second time
-        return _ask(function, request, limit)
+        answer = _ask(function, request, limit)
+    if "problem" in answer:
+        raise FunctionFailed(answer["problem"])
+    return float(answer["value"])
 
 
-def _ask(function: str, request: Mapping[str, Any], limit: float) -> float:
+def _ask(function: str, request: Mapping[str, Any], limit: float) -> dict[str, Any]:
     with _lock:
-        child = _children.get(function)
+        child = _children.pop(function, None)
         if child is None or child.process.poll() is not None:
-            child = _children[function] = Child(function)
+            child = Child(function)
         try:
-            return child.ask(request, limit)
-        finally:
-            if child.process.poll() is not None:
-                _children.pop(function).kill()
+            answer = child.ask(request, limit)
+        except BaseException:  # also an interrupt: nobody will read that answer
+            child.kill()
+            raise
+        _children[function] = child
+    return answer
 
 
 def check_function(function: str) -> str:
@@ -155,47 +147,29 @@ def check_function(function: str) -> str:
 
 
 def serve() -> None:
-    """Answer requests until standard input ends (runs in the child process)."""
+    """Answer requests until the parent closes the pipe (runs in the child process)."""
     from studies.instrument.card import build_instrument
     from studies.sweeps.workers import die_with_parent
 
-    function, parent = sys.argv[1:3]
+    function, parent, place = sys.argv[1:4]
     die_with_parent(int(parent))
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # an interrupt is the parent's to tell
-    _limit_memory()
-    answers = os.fdopen(os.dup(1), "wb", buffering=0)
-    os.dup2(2, 1)  # what the function prints must not mix with the answers
+    _, hard = resource.getrlimit(resource.RLIMIT_AS)  # who asks for more fails by itself, before the machine suffers
+    resource.setrlimit(resource.RLIMIT_AS, (MOST_MEMORY if hard < 0 else min(MOST_MEMORY, hard), hard))
+    pipe = Connection(int(place))
     try:
         call = _load(function)
+        greeting = {"source": _hash_source(call)}
     except BaseException as error:
-        answers.write(json.dumps({"problem": _describe(function, error)}).encode() + b"\n")
-        return
-    answers.write(json.dumps({"source": _hash_source(call)}).encode() + b"\n")
-    for line in sys.stdin.buffer:
-        asked = json.loads(line)
-        number = asked.pop("request")
-        answer = _answer(function, call, build_instrument, asked)
-        try:
-            answers.write(json.dumps({**answer, "request": number}).encode() + b"\n")
-        except BrokenPipeError:  # the parent was interrupted and no longer reads
-            return
-
-
-def _limit_memory() -> None:
-    """Let a function that asks for too much memory fail by itself, before the machine suffers."""
-    try:
-        import resource
-    except ImportError:  # Windows knows no such limit
-        return
-    _, hard = resource.getrlimit(resource.RLIMIT_AS)
-    most = MOST_MEMORY if hard == resource.RLIM_INFINITY else min(MOST_MEMORY, hard)
-    resource.setrlimit(resource.RLIMIT_AS, (most, hard))
+        greeting = {"problem": _describe(function, error)}
+    with suppress(EOFError, OSError):
+        pipe.send_bytes(json.dumps(greeting).encode())
+        while "source" in greeting:
+            asked = json.loads(pipe.recv_bytes())
+            pipe.send_bytes(json.dumps(_answer(function, call, build_instrument, asked)).encode())
 
 
 def _load(function: str) -> Any:
-    import importlib
-    import importlib.util
-
     module_name, _, name = function.rpartition(":")
     if module_name.endswith(".py"):
         path = Path(module_name).resolve()
@@ -215,23 +189,18 @@ def _load(function: str) -> Any:
 
 
 def _hash_source(call: Any) -> str:
-    import hashlib
-    import inspect
-
     try:
         content = Path(inspect.getfile(inspect.unwrap(call))).read_bytes()
     except (TypeError, OSError):  # written in C, or an object that can be called
         content = repr(type(call)).encode()
-    return hashlib.blake2b(content, digest_size=16).hexdigest()
+    return blake2b(content, digest_size=16).hexdigest()
 
 
 def _answer(function: str, call: Any, build: Any, request: dict[str, Any]) -> dict[str, Any]:
-    import math
-
     parameters = request.pop("parameters")
     try:
         value = call(build(**request), parameters)
-        if isinstance(value, bool) or (not isinstance(value, int | float) and not hasattr(value, "__float__")):
+        if isinstance(value, bool) or not hasattr(value, "__float__"):
             return {"problem": f"{function} returned {value!r:.80}, not a number."}
         value = float(value)
     except Exception as error:
