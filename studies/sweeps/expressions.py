@@ -3,7 +3,9 @@
 import ast
 import math
 import operator
+import re
 from collections.abc import Callable, Mapping, Sequence
+from itertools import product
 from typing import Annotated, Any
 
 from studies.errors import InputError, nearest
@@ -15,6 +17,8 @@ BINARY: dict[type[ast.operator], Callable[[float, float], float]] = {
     ast.Pow: operator.pow,
 }  # fmt: skip
 UNARY: dict[type[ast.unaryop], Callable[[float], float]] = {ast.UAdd: operator.pos, ast.USub: operator.neg}
+ALLOWED = (ast.BinOp, ast.UnaryOp, ast.Load, *BINARY, *UNARY)
+NAME = re.compile(r"(?<![\w.])[^\W\d][\w.]*")  # also a dotted one
 LONGEST = 500  # characters
 MOST_POWER = 100.0
 
@@ -31,7 +35,7 @@ class Derived(Keys, frozen=True, kw_only=True):
     @property
     def names(self) -> tuple[str, ...]:
         """The names that the formula uses, in their order."""
-        return tuple(dict.fromkeys(_names(parse(self.expression))))
+        return tuple(dict.fromkeys(NAME.findall(re.sub(r"\s*\.\s*", ".", self.expression))))
 
     def value(self, known: Mapping[str, Any]) -> float:
         """Return the value for known names."""
@@ -53,7 +57,8 @@ def parse(text: str) -> ast.expr:
         tree = ast.parse(text, mode="eval").body
     except (SyntaxError, ValueError, RecursionError, MemoryError):
         raise ValueError(f"'{text}' is not a formula; write one such as \"radius_mm + 4\".") from None
-    _check(tree, text)
+    if not all(map(_is_allowed, ast.walk(tree))):
+        raise ValueError(f"'{text}' may contain only numbers, names of parameters, + - * / ** and brackets.")
     return tree
 
 
@@ -69,52 +74,28 @@ def _look_up(one: Derived, name: str, values: Mapping[str, Any], in_card: LookUp
     beside = f"{one.name.rpartition('.')[0]}.{name}"
     table = f"{one.name.split('.')[0]}.{name}"
     ending = [known for known in values if known.endswith(f".{name}")]
-    for candidate in (name, beside, table, *(ending if len(ending) == 1 else [])):
-        if candidate in values:
-            found = values[candidate]
+    candidates = (name, beside, table, *(ending if len(ending) == 1 else []))
+    for look, candidate in product((values.__getitem__, in_card), candidates):
+        try:
+            found = look(candidate)
             break
+        except (KeyError, InputError):
+            continue
     else:
-        for candidate in (name, beside, table):
-            try:
-                found = in_card(candidate)
-                break
-            except InputError:
-                continue
-        else:
-            raise InputError(f"{one.name} = '{one.expression}': '{name}' is neither a parameter nor a key of the card{nearest(name, values)}")  # fmt: skip
+        raise InputError(f"{one.name} = '{one.expression}': '{name}' is neither a parameter nor a key of the card{nearest(name, values)}")  # fmt: skip
     if isinstance(found, str) or found is None:
         raise InputError(f"{one.name} = '{one.expression}': '{name}' has no usable number.")
     return float(found)
 
 
-def _check(node: ast.expr, text: str) -> None:
-    if isinstance(node, ast.BinOp) and type(node.op) in BINARY:
-        _check(node.left, text)
-        _check(node.right, text)
-    elif isinstance(node, ast.UnaryOp) and type(node.op) in UNARY:
-        _check(node.operand, text)
-    elif _spell(node) is None and not (
-        isinstance(node, ast.Constant) and isinstance(node.value, int | float) and not isinstance(node.value, bool)
-    ):
-        raise ValueError(f"'{text}' may contain only numbers, names of parameters, + - * / ** and brackets.")
+def _is_allowed(node: ast.AST) -> bool:
+    if isinstance(node, ast.Constant):
+        return isinstance(node.value, int | float) and not isinstance(node.value, bool)
+    return isinstance(node, ALLOWED) or _is_name(node)
 
 
-def _spell(node: ast.expr) -> str | None:
-    """Return the dotted name that a node is, None where it is none."""
-    if isinstance(node, ast.Name):
-        return node.id
-    if isinstance(node, ast.Attribute) and (before := _spell(node.value)):
-        return f"{before}.{node.attr}"
-    return None
-
-
-def _names(node: ast.expr) -> list[str]:
-    if isinstance(node, ast.BinOp):
-        return [*_names(node.left), *_names(node.right)]
-    if isinstance(node, ast.UnaryOp):
-        return _names(node.operand)
-    name = _spell(node)
-    return [] if name is None else [name]
+def _is_name(node: ast.AST) -> bool:
+    return isinstance(node, ast.Name) or (isinstance(node, ast.Attribute) and _is_name(node.value))
 
 
 def _evaluate(node: ast.expr, known: Mapping[str, Any]) -> float:
@@ -125,6 +106,4 @@ def _evaluate(node: ast.expr, known: Mapping[str, Any]) -> float:
         return BINARY[type(node.op)](left, right)
     if isinstance(node, ast.UnaryOp):
         return UNARY[type(node.op)](_evaluate(node.operand, known))
-    if isinstance(node, ast.Constant):
-        return float(node.value)  # type: ignore[arg-type]
-    return float(known[str(_spell(node))])
+    return float(node.value if isinstance(node, ast.Constant) else known[ast.unparse(node)])  # type: ignore[arg-type]

@@ -11,14 +11,12 @@ from studies.files.writing import written_whole
 from studies.sweeps.sealed import SealedFile
 from studies.sweeps.store import FILE, Store, now_utc, say_damaged
 
-FORMER = "study.sqlite"  # of versions before
 LOCK = "lock"
 
 
 def open_store(folder: str | Path) -> Store:
     """Open the store of a study for reading, also while it is being written."""
     path = Path(folder) / FILE
-    _refuse_former(folder)
     if not os.path.isfile(path):
         raise InputError(f"{folder}: there is no study in it (no {FILE}); give the folder that was named with 'hrg study run --out'.")  # fmt: skip
     try:
@@ -34,7 +32,6 @@ def open_store(folder: str | Path) -> Store:
 def claim_store(folder: str | Path) -> Store:
     """Open or make the store of a study for writing, lock its folder, and leave out what is damaged."""
     path = Path(folder) / FILE
-    _refuse_former(folder)
     if not path.parent.absolute().parent.exists():
         raise InputError(f"{folder}: there is no folder '{path.parent.parent}'; create it, or correct --out.")
     try:
@@ -99,11 +96,3 @@ def _leave_out(file: SealedFile, path: Path) -> None:
                 new.write(piece)
                 at += len(piece)
             at = stop
-
-
-def _refuse_former(folder: str | Path) -> None:
-    if os.path.isfile(Path(folder) / FORMER) and not os.path.isfile(Path(folder) / FILE):
-        raise InputError(
-            f"{folder}: its results are in {FORMER}, written by an earlier version of the workbench. Export them with that"
-            " version (hrg study export), or run the study again into another folder."
-        )

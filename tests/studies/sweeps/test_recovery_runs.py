@@ -3,7 +3,6 @@
 import contextlib
 import json
 import math
-import os
 import signal
 import subprocess
 import sys
@@ -279,17 +278,6 @@ def test_a_torn_store_holds_what_was_whole(tmp_path, functions, capsys, ask):
     path.write_bytes(b"")
     with pytest.raises(InputError, match="or the file was truncated"):
         open_results(tmp_path / "out").study  # noqa: B018
-
-
-def test_a_store_of_an_earlier_version_is_named_and_left_alone(tmp_path, functions):
-    spec = tmp_path / "square.toml"
-    spec.write_text(spec_of("square", 'method = "grid"', 'name = "user.x"\nvalues = [1, 2]'))
-    (tmp_path / "out").mkdir()
-    (tmp_path / "out" / "study.sqlite").write_bytes(b"SQLite format 3")
-    for use in (lambda: open_results(tmp_path / "out"), lambda: run_study(spec, tmp_path / "out", allow_python=True)):
-        with pytest.raises(InputError, match="earlier version"):
-            use()
-    assert os.listdir(tmp_path / "out") == ["study.sqlite"]
 
 
 @pytest.mark.slow
