@@ -128,9 +128,15 @@ class _Course:
         rows = self.rows
         n = rows.harmonic
         self.start = float(rows.at_row(0).omega)
-        parts = [part for one in (rows.damped(), rows.detuned()) for part in (one.real, one.imag)]
         drift = np.asarray(rows.omega) - self.start
-        columns = [1 / np.asarray(rows.tau), *parts, drift, rows.coupling * self.rate, self.command]
+        columns = [
+            1 / np.asarray(rows.tau),
+            drift,
+            rows.coupling * self.rate,
+            self.command,
+            rows.damped(),
+            rows.detuned(),
+        ]
         self.columns = np.stack(columns, axis=1).tolist()
         self.columns.append(self.columns[-1])
         pickoff, drive = self.electronics.pickoff, self.electronics.drive
@@ -139,12 +145,13 @@ class _Course:
         self.stiff = self.electronics.actuators.stiff
         self.ideal = pickoff == type(pickoff)() and drive == type(drive)()
 
-    def values(self, row: int, fraction: float) -> list[float]:
-        """1/τ, ½Δ(1/τ) cos and sin, ½Δω cos and sin, ω − ω₀, n k Ω, commanded ψ̇: linear between rows."""
+    def values(self, row: int, fraction: float, psi: float) -> tuple[list[float], complex, complex]:
+        """1/τ, ω − ω₀, n k Ω and commanded ψ̇, linear between rows; ½Δ(1/τ) e^{2i(ψ_τ − ψ)} and ½Δω e^{2i(ψ_ω − ψ)}."""
         now = self.columns[row]
-        if fraction == 0.0:
-            return list(now)
-        return [a + fraction * (b - a) for a, b in zip(now, self.columns[row + 1], strict=True)]
+        if fraction:
+            now = [a + fraction * (b - a) for a, b in zip(now, self.columns[row + 1], strict=True)]
+        turned = cmath.exp(-2j * psi)
+        return [one.real for one in now[:4]], now[4] * turned, now[5] * turned
 
     def measured(self, psi: float) -> float:
         """The angle ψ that the pick-offs show."""
@@ -170,29 +177,24 @@ class _Course:
 
     def turn(self, row: int, fraction: float, psi: float, means: Means) -> float:
         """ψ̇ (rad/s)."""
-        _, dc, ds, wc, ws, _, coriolis, command = self.values(row, fraction)
-        c, s = math.cos(2 * psi), math.sin(2 * psi)
-        damping = dc * s - ds * c
-        detuned = 2 * (wc * c + ws * s) * means[2] / means[3]
+        (_, _, coriolis, command), damped, detuned = self.values(row, fraction, psi)
         across = self.forces(psi, command, means)[1]
-        return coriolis + damping + detuned + (across.real + across.imag * means[4]) / means[3]
+        forced = 2 * detuned.real * means[2] + across.real + across.imag * means[4]
+        return coriolis - damped.imag + forced / means[3]
 
     def forcing(self, row: int, fraction: float, psi: float, means: Means) -> Array:
         """What drives amplitude, phase and quadrature from their commands (1/s)."""
-        decay, dc, ds, wc, ws, drift, _, command = self.values(row, fraction)
-        c, s = math.cos(2 * psi), math.sin(2 * psi)
+        (decay, drift, _, command), damped, detuned = self.values(row, fraction, psi)
         along, across = self.forces(psi, command, means)
-        detuned = wc * s - ws * c
-        if self.stiff:  # couples the patterns as the split does, with the opposite sign
-            detuned -= means[1]
-        return np.array(
-            [
-                -(decay + dc * c + ds * s) + detuned * means[2] + along.real - means[0],
-                drift + wc * c + ws * s + (dc * s - ds * c) * means[2] + along.imag,
-                0.0,
-                -detuned * means[3] + across.imag - means[1],
-            ]
-        )
+        coupled = -detuned.imag - (
+            means[1] if self.stiff else 0.0
+        )  # a stiffness couples the patterns against the split
+        return np.array([
+            -decay - damped.real + coupled * means[2] + along.real - means[0],
+            drift + detuned.real - damped.imag * means[2] + along.imag,
+            0.0,
+            -coupled * means[3] + across.imag - means[1],
+        ])  # fmt: skip
 
     def offset(self, row: int, psi: float) -> Array:
         """What the pick-offs add to amplitude, phase and quadrature."""

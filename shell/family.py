@@ -47,6 +47,11 @@ class Axis:
     low: float
     high: float
 
+    @property
+    def varies(self) -> bool:
+        """Whether there is a range at all."""
+        return self.high > self.low
+
 
 @dataclass(frozen=True, eq=False)
 class FamilyResult:
@@ -89,44 +94,38 @@ class Family:
         self, values: ArrayLike, *, nu: ArrayLike, E: ArrayLike, rho: ArrayLike, growth: ArrayLike = 1.0
     ) -> FamilyResult:
         """Give the mode of m designs (m, axes), each for itself; `growth` is the factor of all lengths."""
-        x, poisson = self._unit(values, nu)
+        x = self._unit(values, nu)
         found = np.full((len(x), 4), np.nan)
         known = self.polynomial(x)
         found[:, : known.shape[1]] = known
         frequency = np.exp(found[:, 0]) * np.sqrt(np.asarray(E) / np.asarray(rho)) / np.asarray(growth)
-        return FamilyResult(np.broadcast_to(frequency, poisson.shape), *found.T[1:])
+        return FamilyResult(np.broadcast_to(frequency, len(x)), *found.T[1:])
 
     def slope(self, values: ArrayLike, *, nu: ArrayLike, name: str) -> Array:
         """∂ ln f by one axis, per unit of its name, of m designs."""
-        x, _ = self._unit(values, nu)
-        names = [axis.name for axis in self._varied]
-        if name not in names:
-            raise ShellError(f"the family has no axis '{name}'; it has {', '.join(names) or 'none'}.")
-        axis = self._varied[names.index(name)]
-        return np.asarray(self.polynomial(x, names.index(name))[:, 0] * 2 / (axis.high - axis.low))
+        x = self._unit(values, nu)
+        varied = {axis.name: axis for axis in _with_ratio(self.axes, self.nu) if axis.varies}
+        if name not in varied:
+            raise ShellError(f"the family has no axis '{name}'; it has {', '.join(varied) or 'none'}.")
+        axis = varied[name]
+        return np.asarray(self.polynomial(x, [*varied].index(name))[:, 0] * 2 / (axis.high - axis.low))
 
-    @property
-    def _varied(self) -> list[Axis]:
-        return _varied(self.axes, self.nu)
-
-    def _unit(self, values: ArrayLike, nu: ArrayLike) -> tuple[Array, Array]:
-        """Return the points of the cube (m, coordinates) and ν (m,)."""
+    def _unit(self, values: ArrayLike, nu: ArrayLike) -> Array:
+        """Return the points of the cube (m, coordinates)."""
         given = np.atleast_2d(np.asarray(values, dtype=float))
         if given.ndim != 2 or given.shape[1] != len(self.axes):
             raise ShellError(f"a family of {len(self.axes)} axes takes (designs, {len(self.axes)}), not {given.shape}.")
-        poisson = np.asarray(nu, dtype=float)
-        count = max(len(given), poisson.size)
-        poisson = np.broadcast_to(poisson, (count,))
-        columns = [np.broadcast_to(column, (count,)) for column in given.T]
-        for axis, column in zip((*self.axes, Axis("Poisson's ratio", *self.nu)), (*columns, poisson), strict=True):
+        columns = np.broadcast_arrays(*given.T, np.ravel(np.asarray(nu, dtype=float)))
+        unit = []
+        for axis, column in zip(_with_ratio(self.axes, self.nu), columns, strict=True):
             slack = 1e-9 * max(abs(axis.low), abs(axis.high))
             if not (column.min() >= axis.low - slack and column.max() <= axis.high + slack):
                 raise ShellError(
                     f"the family holds for {axis.name} from {axis.low:g} to {axis.high:g}, not for {column.min():g} to {column.max():g}: build it with wider ranges."
                 )
-        inside = zip((*self.axes, Axis("", *self.nu)), (*columns, poisson), strict=True)
-        unit = [(2 * c - axis.low - axis.high) / (axis.high - axis.low) for axis, c in inside if axis.high > axis.low]
-        return np.stack(unit, axis=1) if unit else np.zeros((count, 0)), poisson
+            if axis.varies:
+                unit.append((2 * column - axis.low - axis.high) / (axis.high - axis.low))
+        return np.stack(unit, axis=1) if unit else np.zeros((len(columns[0]), 0))
 
 
 def build_family(
@@ -156,17 +155,8 @@ def build_family(
     bounds = np.full(4, np.nan)
     bounds[: len(errors)] = errors
     return Family(
-        tuple(axes),
-        nu,
-        harmonic,
-        index,
-        theory,
-        polynomial,
-        Errors(*bounds),
-        solve.theory_error,
-        solver_tolerance,
-        count,
-    )
+        tuple(axes), nu, harmonic, index, theory, polynomial, Errors(*bounds), solve.theory_error, solver_tolerance, count
+    )  # fmt: skip
 
 
 @dataclass
@@ -184,16 +174,14 @@ class _Solve:
 
     @property
     def dimensions(self) -> int:
-        return len(_varied(self.axes, self.nu))
+        return sum(axis.varies for axis in _with_ratio(self.axes, self.nu))
 
     def at(self, unit: Array) -> tuple[Resonator, Elastic]:
         """Return a design."""
         rest = iter(unit)
         *values, nu = (
-            (axis.low + axis.high) / 2 + (axis.high - axis.low) / 2 * float(next(rest))
-            if axis.high > axis.low
-            else axis.low
-            for axis in (*self.axes, Axis("", *self.nu))
+            (axis.low + axis.high) / 2 + (axis.high - axis.low) / 2 * float(next(rest)) if axis.varies else axis.low
+            for axis in _with_ratio(self.axes, self.nu)
         )
         return self.build(np.array(values)), Elastic(1.0, nu, 1.0)
 
@@ -250,8 +238,8 @@ def unseen_points(dimensions: int) -> Array:
     return np.vstack([inside, faces, rng.choice([-1.0, 1.0], (CORNERS, dimensions))])
 
 
-def _varied(axes: Sequence[Axis], nu: Range) -> list[Axis]:
-    return [axis for axis in (*axes, Axis("Poisson's ratio", *nu)) if axis.high > axis.low]
+def _with_ratio(axes: Sequence[Axis], nu: Range) -> tuple[Axis, ...]:
+    return (*axes, Axis("Poisson's ratio", *nu))
 
 
 def _check(axes: Sequence[Axis], nu: Range, tolerance: float, most: int) -> None:

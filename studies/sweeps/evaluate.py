@@ -110,51 +110,37 @@ def failed_cases(plan: WorkPlan, batch: Batch, status: str, reason: str) -> Case
 
 def evaluate_case(plan: WorkPlan, parameters: Mapping[str, Any]) -> Row:
     """Evaluate every quantity of one design; one that cannot be computed fails the case and leaves NaN."""
-    began = time.perf_counter()
-    values: list[float] = []
-    errors: list[float] = []
-    reasons: list[str] = []
-    with warnings.catch_warnings(record=True) as heard:
-        warnings.simplefilter("always")
-        try:
-            case = _make_case(plan, parameters)
-        except UNUSABLE_INPUT as error:
-            return failed_row(plan, "failed", str(error))
-        for asked in plan.asked:
-            try:
-                numbers, reason = _evaluate(asked, case)
-            except FunctionLost as error:
-                return failed_row(plan, "lost", f"{asked.name}: {error}; the next run tries again.")
-            values += (number.value for number in numbers)
-            errors += (number.error for number in numbers)
-            reasons += [reason] if reason else []
-    remarks = dict.fromkeys(str(warning.message) for warning in heard)
-    status = "failed" if reasons else "ok"
-    seconds = time.perf_counter() - began
-    return Row(status, " ".join([*reasons, *remarks]), tuple(values), tuple(errors), seconds)
 
-
-def _make_case(plan: WorkPlan, parameters: Mapping[str, Any]) -> Case:
     def build(given: Mapping[str, Any]) -> Instrument:
         return set_parameters(plan.instrument, given, plan.derived)
 
-    return Case(build(parameters), parameters, build, plan.start, plan.wanted)
-
-
-def failed_row(plan: WorkPlan, status: str, reason: str) -> Row:
-    """Return the row of a case that cannot be built, or whose function's process was ended."""
-    nothing = (math.nan,) * plan.width
-    return Row(status, reason, nothing, nothing, 0.0)
+    began = time.perf_counter()
+    with warnings.catch_warnings(record=True) as heard:
+        warnings.simplefilter("always")
+        try:
+            case = Case(build(parameters), parameters, build, plan.start, plan.wanted)
+            answers = [_evaluate(asked, case) for asked in plan.asked]
+        except (*UNUSABLE_INPUT, FunctionLost) as error:
+            nothing = (math.nan,) * plan.width
+            return Row("lost" if isinstance(error, FunctionLost) else "failed", str(error), nothing, nothing, 0.0)
+    numbers = [number for found, _ in answers for number in found]
+    reasons = [reason for _, reason in answers if reason]
+    remarks = dict.fromkeys(str(warning.message) for warning in heard)
+    return Row(
+        "failed" if reasons else "ok", " ".join([*reasons, *remarks]), tuple(one.value for one in numbers),
+        tuple(one.error for one in numbers), time.perf_counter() - began,
+    )  # fmt: skip
 
 
 def _evaluate(asked: Quantity, case: Case) -> tuple[Sequence[Number], str]:
+    """Return the numbers of a quantity, or why there are none."""
     nothing, name = (Number(math.nan),) * len(asked.columns), asked.name
     try:
         numbers = asked.evaluate(case)
     except (*UNUSABLE_INPUT, FunctionFailed) as error:
         return nothing, f"{name}: {error}"
-    except FunctionLost:
-        raise
+    except FunctionLost as error:
+        raise FunctionLost(f"{name}: {error}; the next run tries again.") from error
     except Exception as error:
         return nothing, f"{name}: {type(error).__name__}: {error}"
     if not all(math.isfinite(number.value) for number in numbers):
