@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike
 
 from shell.cross_section import cut
 from shell.errors import ShellError
-from shell.imperfection.field import Complex, Field, values_around
+from shell.imperfection.field import NOTHING, Complex, Field, values_around
 from shell.imperfection.pair import Pair
 from shell.imperfection.split import Split
 from shell.quadrature import Array, gauss
@@ -62,7 +62,7 @@ class Electrodes:
     electrodes: tuple[Electrode, ...]  # patches with their voltages
     gap: float  # mean gap, m
     # relative departure of the gap over the shell, g = gap (1 + departure); its waves 1, 2, ... are the gap harmonics
-    departure: Field | None = None
+    departure: Field = NOTHING
     face: Literal["inner", "outer"] = "inner"  # "inner" or "outer", the face that they look at
 
     def __post_init__(self) -> None:
@@ -170,8 +170,7 @@ class Electrodes:
         theta = (starts + one.width / pieces * (x + 1) / 2).ravel()
         weight = np.tile(weights * one.width / pieces / 2, pieces)
         gap = np.full((position.size, theta.size), self.gap)
-        if self.departure is not None:
-            gap = gap * (1 + values_around(self.departure, self.departure.orders, position, theta))
+        gap = gap * (1 + values_around(self.departure, self.departure.orders, position, theta))
         if np.any(gap <= 0):
             raise ShellError("the gap closes somewhere: its relative departure falls below -1.")
         return area, w, theta, weight, gap

@@ -12,7 +12,6 @@ mirror plane are solved apart; the split is half the difference of their δλ/λ
 """
 
 from dataclasses import dataclass
-from functools import cache
 from typing import Literal, TypeAlias
 
 import numpy as np
@@ -23,7 +22,7 @@ from shell.cross_section import cut
 from shell.elastic import COSINE
 from shell.errors import ShellError, mm
 from shell.imperfection import Pair
-from shell.quadrature import Array, gauss
+from shell.quadrature import Array, at_gauss, gauss, nodal
 from shell.resonator import Resonator
 from shell.sparse import Index, assemble_elements, dissect, factor_symmetric
 
@@ -158,15 +157,6 @@ def _graded(length: float, fine: float, both: bool | int, largest: float = np.in
     return np.concatenate([[0.0], np.cumsum(steps)]) * length / total
 
 
-@cache
-def _quadratic(count: int) -> tuple[Array, Array, Array, Array]:
-    """Values and slopes of the quadratic functions at Gauss points of 0 ... 1, with points and weights."""
-    x, w = gauss(count)
-    values = np.stack([x * (x - 1) / 2, 1 - x**2, x * (x + 1) / 2], axis=1)
-    slopes = np.stack([x - 0.5, -2 * x, x + 0.5], axis=1)
-    return values, slopes, x, w
-
-
 class _Nodes:
     """Nodes and elements of a grid, in Cartesian components."""
 
@@ -220,12 +210,12 @@ class _Nodes:
 
     def strains(self, which: Index) -> tuple[Array, Array]:
         """Strain (elements, points, 6, 81) of elements in x, y, z and volumes (elements, points)."""
-        values, slopes, _, w = _quadratic(3)
+        line, w = at_gauss(nodal, 2, 3), gauss(3)[1]
         parts = [
-            np.einsum("ai,bj,ck->abcijk", *(slopes if axis == d else values for axis in range(3))).reshape(27, 27)
+            np.einsum("ai,bj,ck->abcijk", *(line.slopes if axis == d else line.values for axis in range(3)))
             for d in range(3)
         ]
-        D = np.stack(parts, axis=1)  # points, 3, functions
+        D = np.stack([part.reshape(27, 27) for part in parts], axis=1)  # points, 3, functions
         X = self.points[self.elements[which]]
         J = np.einsum("pdf,efx->epdx", D, X)
         g = np.linalg.solve(J, np.broadcast_to(D, (len(X), *D.shape)))
@@ -252,7 +242,7 @@ class _Nodes:
 def _loads(pair: Pair, grid: _Grid, nodes: _Nodes, lam: float, G: float, rho: float) -> tuple[Array, Array, float]:
     """The forces f of both modes, ∫_Ω (σ : ε - λ ρ u²) of both, and the volume, of the whole cut."""
     n, eigenvalue = pair.mode.harmonic, pair.solution.eigenvalue
-    values, _, x, _ = _quadratic(3)
+    values, x = at_gauss(nodal, 2, 3).values, gauss(3)[0]
     functions = np.einsum("ai,bj,ck->abcijk", values, values, values).reshape(27, 27)
     gone = np.flatnonzero(nodes.gone)
     B, volume = nodes.strains(gone)

@@ -7,12 +7,11 @@
 """
 
 from shell.imperfection.coupled import CoupledHarmonics
-from shell.imperfection.field import Field, Sum, Waves, wave
+from shell.imperfection.field import Field, wave
 from shell.imperfection.imperfect import Imperfection, PointMass
 from shell.imperfection.pair import Pair
 from shell.imperfection.split import Split, find_split
 
 __all__ = [
-    "CoupledHarmonics", "Field", "Imperfection", "Pair", "PointMass", "Split", "Sum", "Waves", "find_split",
-    "wave",
+    "CoupledHarmonics", "Field", "Imperfection", "Pair", "PointMass", "Split", "find_split", "wave",
 ]  # fmt: skip

@@ -28,12 +28,9 @@ class Body:
         self.around = go_around(together.harmonics, theta)
         self.walls = _walls(together, flaw, waves, theta)
         self.cores: list[tuple[Core, Array, Array]] = []
-        for core in cores if flaw.modulus is not None or flaw.density is not None else ():
+        for core in cores if flaw.modulus or flaw.density else ():
             x = together.groups[core.number].table.position[:1, 0]
-            stiff, heavy = (
-                np.zeros(theta.size) if field is None else values_around(field, waves, x, theta)[0]
-                for field in (flaw.modulus, flaw.density)
-            )
+            stiff, heavy = (values_around(field, waves, x, theta)[0] for field in (flaw.modulus, flaw.density))
             self.cores.append((core, stiff * (2 * pi / theta.size), heavy * (2 * pi / theta.size)))
         self.masses: list[tuple[tuple[float, float], Array, Around]] = []
         for place in dict.fromkeys((m.position, m.height) for m in flaw.masses):
@@ -86,11 +83,11 @@ def _walls(together: Together, flaw: Imperfection, waves: tuple[int, ...], theta
             section = Section(**{name: value[run] for name, value in vars(group.section).items()})
             here = Stretch(section, c.at(run), run, table.along, orders, table.transverse_shear, theta)
             stiff, heavy = here.values(flaw.modulus, waves), here.values(flaw.density, waves)
-            if faces != (None, None):
+            if any(faces):
                 walls += here.layers(faces, waves, 1 + stiff, 1 + heavy)
-            if flaw.modulus is not None or flaw.density is not None:
+            if flaw.modulus or flaw.density:
                 walls.append(here.change(stiff, heavy))
-    if flaw.rim is not None:
+    if flaw.rim:
         edge, _ = free_edge(resonator, system, 1.0)
         width = values_around(flaw.rim, flaw.rim.orders, np.ones(1), theta)[0]
         c, at = together.constants[edge.group], slice(edge.element, edge.element + 1)

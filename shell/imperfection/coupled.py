@@ -26,7 +26,6 @@ from shell.errors import ShellError
 from shell.imperfection.block import Block, condense
 from shell.imperfection.body import Body
 from shell.imperfection.core import Core
-from shell.imperfection.field import Field
 from shell.imperfection.imperfect import FIELDS, Imperfection
 from shell.imperfection.split import Split
 from shell.imperfection.together import Together
@@ -168,8 +167,7 @@ def _difference(B: Array) -> complex:
 def _waves_that_count(imperfection: Imperfection) -> set[int]:
     x = np.linspace(0.0, 1.0, 33)
     found: set[int] = set()
-    fields: list[Field] = [getattr(imperfection, name) for name in FIELDS if getattr(imperfection, name) is not None]
-    for one in fields:
+    for one in (getattr(imperfection, name) for name in FIELDS):
         size = {m: float(np.abs(one.wave(m, x)).max()) for m in one.orders}
         found |= {m for m, value in size.items() if value > SMALL * max(size.values())}
     return found

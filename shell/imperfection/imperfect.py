@@ -6,7 +6,7 @@ from math import sqrt
 
 import numpy as np
 
-from shell.imperfection.field import Faded, Field, add, scaled
+from shell.imperfection.field import NOTHING, Field
 from shell.quadrature import Array
 from shell.resonator import Resonator
 from shell.system import ShellGroup, System
@@ -26,34 +26,32 @@ class PointMass:
 class Imperfection:
     """Small departures from the body of revolution; lengths in m, densities and moduli relative."""
 
-    thickness: Field | None = None  # change of the wall, the middle surface kept
-    outer: Field | None = None  # outer, inner: how far the outer and the inner face stand out of the material
-    inner: Field | None = None
+    thickness: Field = NOTHING  # change of the wall, the middle surface kept
+    outer: Field = NOTHING  # outer, inner: how far the outer and the inner face stand out of the material
+    inner: Field = NOTHING
     # how far the middle surface stands out along its normal, the wall kept (a radius that varies around)
-    offset: Field | None = None
-    density: Field | None = None  # density, modulus: of ρ, and of E at constant ν
-    modulus: Field | None = None
+    offset: Field = NOTHING
+    density: Field = NOTHING  # density, modulus: of ρ, and of E at constant ν
+    modulus: Field = NOTHING
     # how far the edge of the rim stands out along the meridian; its value at position 1 counts
-    rim: Field | None = None
+    rim: Field = NOTHING
     masses: tuple[PointMass, ...] = ()
 
     def __add__(self, other: "Imperfection") -> "Imperfection":
         """Both together."""
-        joined = {name: add(getattr(self, name), getattr(other, name)) for name in FIELDS}
+        joined = {name: getattr(self, name) + getattr(other, name) for name in FIELDS}
         return Imperfection(**joined, masses=self.masses + other.masses)
 
-    def faces(self, fade: Callable[[Array], Array] | None = None) -> tuple[Field | None, Field | None]:
+    def faces(self, fade: Callable[[Array], Array] | None = None) -> tuple[Field, Field]:
         """How far the inner and the outer face stand out of the material: thickness, faces and offset, times `fade` along the meridian."""
-        half = scaled(self.thickness, 0.5)
-        inner, outer = add(half, self.inner, scaled(self.offset, -1.0)), add(half, self.outer, self.offset)
-        if fade is None:
-            return inner, outer
-        return inner and Faded(inner, fade), outer and Faded(outer, fade)
+        half = self.thickness * 0.5
+        inner, outer = half + self.inner + self.offset * -1.0, half + self.outer + self.offset
+        return (inner, outer) if fade is None else (inner * fade, outer * fade)
 
     def faded(self, fade: Callable[[Array], Array] | None) -> "Imperfection":
         """The same with its shape given by the faces, which `fade` along the meridian."""
         inner, outer = self.faces(fade)
-        return replace(self, thickness=None, offset=None, inner=inner, outer=outer)
+        return replace(self, thickness=NOTHING, offset=NOTHING, inner=inner, outer=outer)
 
 
 def fade(resonator: Resonator, system: System) -> Callable[[Array], Array] | None:

@@ -38,10 +38,8 @@ class Density:
 
     def apply(self, field: Field, harmonic: int) -> tuple[float, complex]:
         """The mean shift and z, both relative to ω²."""
-        mean = float(self.mean @ field.wave(0, self.position).real) if 0 in field.orders else 0.0
-        around = 2 * harmonic
-        z = complex(self.wave @ field.wave(around, self.position)) if around in field.orders else 0j
-        return mean, z
+        mean = float(self.mean @ field.wave(0, self.position).real)
+        return mean, complex(self.wave @ field.wave(2 * harmonic, self.position))
 
 
 @dataclass(frozen=True, eq=False)

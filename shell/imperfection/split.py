@@ -58,15 +58,9 @@ def find_split(pair: Pair, imperfection: Imperfection) -> Split:
     """The split to first order in the imperfection: only its harmonics 0 and 2n act."""
     mean, z = 0.0, 0j
     n = pair.mode.harmonic
-    inner, outer = imperfection.faces(pair.fade)
-    terms = [
-        (getattr(pair, name), field)
-        for name, field in (("density", imperfection.density), ("modulus", imperfection.modulus))
-        if field is not None
-    ]
-    if inner is not None or outer is not None:
-        terms += [(rho, field) for rho, field in zip(pair.faces, (inner, outer), strict=True) if field is not None]
-    if imperfection.rim is not None:
+    terms = [(pair.density, imperfection.density), (pair.modulus, imperfection.modulus)]
+    terms += zip(pair.faces, imperfection.faces(pair.fade), strict=True)
+    if imperfection.rim:
         terms.append((pair.rim(), imperfection.rim))
     for density, field in terms:
         one, two = density.apply(field, n)

@@ -38,12 +38,10 @@ def find_departures(
     for field, way in (
         (inner, -(1 - through) / 2 * normal),
         (outer, (1 + through) / 2 * normal),
-        (imperfection.rim, edge * tangent),
+        (imperfection.rim, edge * tangent),  # at x = 1
     ):
-        for m in field.orders if field is not None else ():
-            assert field is not None
-            at = x if field is not imperfection.rim else np.ones(len(x))
-            found[m] = found.get(m, 0j) + field.wave(m, at) * np.where(r > 0, way, 0.0)
+        for m in field.orders:
+            found[m] = found.get(m, 0j) + field.wave(m, x) * np.where(r > 0, way, 0.0)
     return found
 
 

@@ -152,9 +152,7 @@ class Stretch:
     transverse: float
     theta: Array
 
-    def layers(
-        self, faces: tuple[Field | None, Field | None], waves: tuple[int, ...], stiff: Array, heavy: Array
-    ) -> list[Wall]:
+    def layers(self, faces: tuple[Field, Field], waves: tuple[int, ...], stiff: Array, heavy: Array) -> list[Wall]:
         """What the faces stand out of the perfect wall, m; stiff, heavy : 1 + changes of E and of ρ, (stations, 1, θ)."""
         eta, volumes = [], []
         for sign, face in ((-1, faces[0]), (1, faces[1])):
@@ -185,13 +183,10 @@ class Stretch:
         volume = width * (self._thickness / 2 * weights)[:, :, None]
         return self._wall(points[None], volume, volume)
 
-    def values(self, field: Field | None, waves: tuple[int, ...]) -> Array:
-        """Values of a field, (stations, 1, θ); zeros for none."""
-        x = self.section.position.ravel()
-        orders = [m for m in field.orders if m in waves] if field is not None else []
-        if field is None or not orders:
-            return np.zeros((x.size, 1, self.theta.size))
-        return values_around(field, orders, x, self.theta)[:, None]
+    def values(self, field: Field, waves: tuple[int, ...]) -> Array:
+        """Values of a field, (stations, 1, θ)."""
+        orders = [m for m in field.orders if m in waves]
+        return values_around(field, orders, self.section.position.ravel(), self.theta)[:, None]
 
     @property
     def _thickness(self) -> Array:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from shell.curves import Arc
 from shell.errors import ShellError
-from shell.imperfection.field import Complex, Waves, fourier
+from shell.imperfection.field import Complex, Field, fourier
 from shell.imperfection.pair import Density
 from shell.quadrature import Array
 from shell.scan.alignment import RigidMotion
@@ -88,9 +88,9 @@ class Face:
         return self.waves.highest
 
     @cached_property
-    def field(self) -> Waves:
+    def field(self) -> Field:
         """Its waves as a field, constant beyond the covered positions."""
-        return Waves({m: _Profile(self, m) for m in range(self.highest + 1)})
+        return Field(tuple((m, 1.0, (_Profile(self, m),)) for m in range(self.highest + 1)))
 
     def project(self, density: Density, order: int) -> tuple[complex, Array]:
         """Σ density c_order over the shell and the covariance of its real and imaginary part."""

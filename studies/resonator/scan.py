@@ -11,6 +11,7 @@ from compensation.arrays import Array
 from shell.elastic import Elastic
 from shell.errors import ShellError
 from shell.imperfection import CoupledHarmonics, Imperfection, Pair, Split, find_split
+from shell.imperfection.field import NOTHING
 from shell.modes import solve_modes
 from shell.resonator import Resonator
 from shell.scan.alignment import RigidMotion, align
@@ -127,8 +128,8 @@ def scan_faces(
             faces[name] = survey_map(cloud.position, cloud.azimuth, cloud.values, SIDES[name], files[name], highest)
     faces = {name: faces[name] for name in ("inner", "outer") if name in faces}
     _check_wall(faces, resonator)
-    fields = {name: face.field for name, face in faces.items()}
-    imperfection = Imperfection(inner=fields.get("inner"), outer=fields.get("outer"))
+    inner, outer = (faces[name].field if name in faces else NOTHING for name in ("inner", "outer"))
+    imperfection = Imperfection(inner=inner, outer=outer)
     splits = []
     for n in harmonics:
         say(f"computing the split of n = {n}")

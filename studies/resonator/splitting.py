@@ -88,7 +88,7 @@ def _check_wall(instrument: Instrument, fields: Imperfection) -> None:
     """Refuse waves of the wall that would go through it."""
     position, wall = zip(*instrument.resonator.thickness, strict=True)
     at = np.linspace(0.0, 1.0, PLACES)
-    faces = [face for face in fields.faces() if face is not None]
+    faces = fields.faces()
     orders = {m for face in faces for m in face.orders if m > 0}
     deep = sum((np.abs(sum(face.wave(m, at) for face in faces)) for m in orders), np.zeros_like(at))
     wall_there = np.interp(at, position, wall)

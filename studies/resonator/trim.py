@@ -59,10 +59,10 @@ class PlannedCut:
         """Relative standard error of what the cut does: of its relieved stress, and that it changes with the depth."""
         return max(hypot(x.error, x.relief * self.scatter) / abs(x.wave) for x in self.splits.values())
 
-    def gain(self, harmonic: int) -> float:
-        """The change of the split over that by the shape derivative."""
+    def gain(self, harmonic: int, deeper: float = 1.0) -> float:
+        """The change of the split over that by the shape derivative; of a cut some times as deep relief grows with the square of the depth."""
         split = self.splits[harmonic]
-        return split.wave / (split.mass * self.first[harmonic])
+        return (split.layer + split.relief * deeper) / (split.mass * self.first[harmonic])
 
     def depth(self, mass: float) -> float:
         """Depth of a cut of some mass, m."""
@@ -88,7 +88,7 @@ class CardPlan:
 SURE = 1.645  # standard errors of a 90 % interval
 LEAST_KNOWN = 0.5  # half-width of that of the gain, relative, with which a cut is still planned
 SAME_DEPTH = 0.03
-MOST_PLANS = 8
+MOST_PLANS = 60
 WIDER = "Make wider, shallower cuts (--width-mm), or use teeth."
 TOOL = Tool()
 MOST_TEETH = 1000
@@ -189,17 +189,18 @@ def plan_for_card(
     if teeth is not None or kind == "mass":
         return CardPlan(plan_with(sites.gain, gain_error), {})
     cuts: dict[float, PlannedCut] = {}
+    planned: dict[float, tuple[float, float, float]] = {}
     for _ in range(MOST_PLANS):
+        deeper = {x: planned[x][0] / cut.mass if x in planned else 1.0 for x, cut in cuts.items()}
         gains = {
-            n: w * np.array([cuts[x].gain(n) if x in cuts else 1.0 for x in sites.position])
+            n: w * np.array([cuts[x].gain(n, deeper[x]) if x in cuts else 1.0 for x in sites.position])
             for n, w in sites.gain.items()
         }
-        plan = plan_with(gains, error_of_gain(cuts, gain_error))
+        plan, before = plan_with(gains, error_of_gain(cuts, gain_error)), planned
         planned = {x: _typical(plan, sites, x) for x in sorted({cut.position for cut in plan.cuts})}
-        if all(
-            x in cuts and max(abs(mass / cuts[x].mass - 1), abs(touching / cuts[x].touching - 1)) < SAME_DEPTH
-            for x, (mass, _, touching) in planned.items()
-        ):
+        if not all(x in before and _same(planned[x], before[x]) for x in planned):
+            continue
+        if all(x in cuts and _same(one, (cuts[x].mass, 0.0, cuts[x].touching)) for x, one in planned.items()):
             used = {x: cuts[x] for x in planned}
             for cut in used.values():
                 cut.check()
@@ -214,6 +215,11 @@ def plan_for_card(
                 groove, {n: solve_groove(pair, groove) for n, pair in pairs.items()}, first, spread, touching
             )
     raise ShellError(f"no depth of these cuts achieves the plan: the stress that narrow grooves relieve cancels the effect of the mass they remove. {WIDER}")  # fmt: skip
+
+
+def _same(one: tuple[float, float, float], other: tuple[float, float, float]) -> bool:
+    """Whether cuts of a typical mass, with so many side by side, are as deep and wide as others."""
+    return all(abs(one[k] / other[k] - 1) < SAME_DEPTH for k in (0, 2))
 
 
 def error_of_gain(cuts: Mapping[float, PlannedCut], common: float) -> float:

@@ -21,7 +21,7 @@ from compensation.wave import from_quality
 from compensation.wave_fit import fit_whole_angle
 from compensation.whole_angle import simulate_whole_angle
 from shell.elastic import Elastic
-from shell.imperfection import CoupledHarmonics, Imperfection, Pair, PointMass, Sum, find_split, wave
+from shell.imperfection import CoupledHarmonics, Imperfection, Pair, PointMass, find_split, wave
 from shell.meridian import hemisphere
 from shell.modes import solve_modes
 from shell.resonator import Stem
@@ -132,8 +132,8 @@ def loss() -> None:
 def split() -> None:
     """First order after a solved mode, cold and again; coupled harmonics, prepared; and how far the two lie apart."""
     silica, one = Elastic(72.7e9, 0.17, 2203.0), Imperfection(thickness=wave(4, 0.01 * H, 0.3))
-    waves = ((1.0, wave(1, 0.02 * H)), (1.0, wave(3, 0.01 * H, 0.4)), (1.0, wave(4, 0.01 * H, 0.3)))
-    three = Imperfection(thickness=Sum(waves), masses=(PointMass(1e-8, 0.2),))
+    waves = wave(1, 0.02 * H) + wave(3, 0.01 * H, 0.4) + wave(4, 0.01 * H, 0.3)
+    three = Imperfection(thickness=waves, masses=(PointMass(1e-8, 0.2),))
     stem = {"support": "stem", "stem": Stem(2.5e-3, -5e-3, 0.5e-3)}
     for name, more in (("free dome", {}), ("dome on a stem", stem)):
         (mode,) = solve_modes(hemisphere(radius=15e-3, thickness=H, **more), silica, 2)

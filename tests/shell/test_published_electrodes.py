@@ -9,7 +9,7 @@ import pytest
 from shell.elastic import Elastic
 from shell.electrodes import VACUUM, Electrode, Electrodes, reach, ring_of_electrodes, trim_voltages
 from shell.errors import ShellError
-from shell.imperfection import Pair, Sum, wave
+from shell.imperfection import Pair, wave
 from shell.meridian import hemisphere
 from shell.modes import solve_modes
 
@@ -71,7 +71,7 @@ def test_waves_of_the_gap_split_as_the_inverse_cube_says(pair):
     fourth = Electrodes(pair, ring, 100e-6, wave(4, 1e-3, 0.2)).soften()
     assert fourth.wave / fourth.shift == pytest.approx(-3e-3 * np.exp(0.8j), rel=1e-5)
     # 1/(1 + x)³ = 1 - 3 x + 6 x²: waves 1 and 3 of 1 % each make 6 · 1e-4 of the wave 4
-    pairwise = Electrodes(pair, ring, 100e-6, Sum(((1.0, wave(1, 0.01)), (1.0, wave(3, 0.01))))).soften()
+    pairwise = Electrodes(pair, ring, 100e-6, wave(1, 0.01) + wave(3, 0.01)).soften()
     assert (pairwise.wave / pairwise.shift).real == pytest.approx(6e-4, rel=2e-3)
     first = Electrodes(pair, ring, 100e-6, wave(1, 0.01)).soften()
     assert first.relative < 1e-5 * abs(first.shift)

@@ -63,8 +63,7 @@ class CardElectrodes:
     def on(self, pair: "Pair", temperature: float, voltage: float | None = None) -> "Electrodes":
         """Return them over a mode's face at a temperature (K), with another common voltage if one is given."""
         from shell.electrodes import Electrodes, ring_of_electrodes
-        from shell.imperfection import wave
-        from shell.imperfection.field import add
+        from shell.imperfection import Field, wave
 
         k = self.keys
         common = k.voltage_V if voltage is None else voltage
@@ -73,8 +72,8 @@ class CardElectrodes:
         volts = np.sqrt(common**2 + trims**2)
         patches = ring_of_electrodes(k.count, k.coverage, volts.tolist(), np.deg2rad(k.azimuth_deg), k.first, k.last)
         gap = 1e-6 * k.gap_um * (1 + k.gap_expansion_per_K * (temperature - self.reference_temperature))
-        waves = [wave(w.order, w.amplitude_percent / 100, np.deg2rad(w.azimuth_deg)) for w in k.gap_wave]
-        return Electrodes(pair, patches, gap, add(*waves), k.face)
+        waves = (wave(w.order, w.amplitude_percent / 100, np.deg2rad(w.azimuth_deg)) for w in k.gap_wave)
+        return Electrodes(pair, patches, gap, sum(waves, Field()), k.face)
 
 
 def build(keys: ElectrodeKeys, place: CardPlace) -> CardElectrodes:

@@ -1,6 +1,7 @@
 """`[imperfection]`: how the resonator differs from the body of revolution of `[resonator]`."""
 
-from dataclasses import dataclass, replace
+from collections import defaultdict
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
@@ -133,27 +134,24 @@ def build(keys: ImperfectionKeys, place: CardPlace) -> CardImperfection:
         split = MeasuredSplit(keys.split.harmonic, keys.split.split_Hz, float(np.deg2rad(keys.split.slow_axis_deg)))
     if not (keys.wave or keys.mass or keys.map or keys.wall.waves):
         return CardImperfection(None, split)
-    from shell.imperfection import Imperfection, PointMass, Waves
-    from shell.imperfection.field import add
+    from shell.imperfection import Field, Imperfection, PointMass
 
-    gathered: dict[str, Any] = {}
+    gathered: dict[str, Any] = defaultdict(Field)
     for one in keys.wave:
-        name = (LENGTHS | SHARES)[one.of]
-        gathered[name] = add(gathered.get(name), _wave(one))
-    if keys.wall.waves:
-        gathered["thickness"] = add(gathered.get("thickness"), Waves(keys.wall.waves))
+        gathered[(LENGTHS | SHARES)[one.of]] += _wave(one)
+    gathered["thickness"] += Field(tuple((m, c, ()) for m, c in keys.wall.waves.items()))
     for table in keys.map:
-        name = LENGTHS[table.of]
-        gathered[name] = add(gathered.get(name), _map(table, place))
+        gathered[LENGTHS[table.of]] += _map(table, place)
     masses = tuple(PointMass(1e-9 * m.mass_ug, np.deg2rad(m.azimuth_deg), m.position, m.height) for m in keys.mass)
-    return CardImperfection(replace(Imperfection(masses=masses), **gathered), split)
+    return CardImperfection(Imperfection(**gathered, masses=masses), split)
 
 
 def _wave(keys: WaveKeys) -> "Field":
     from shell.imperfection import wave
 
     size = 1e-6 * (keys.amplitude_um if keys.amplitude_um is not None else keys.amplitude_ppm or 0.0)
-    return wave(keys.order, size, np.deg2rad(keys.azimuth_deg), Power(keys.power) if keys.power else None)
+    one = wave(keys.order, size, np.deg2rad(keys.azimuth_deg))
+    return one * Power(keys.power) if keys.power else one
 
 
 def _map(keys: MapKeys, place: CardPlace) -> "Field":

@@ -11,7 +11,6 @@ from shell.imperfection import (
     Imperfection,
     Pair,
     PointMass,
-    Sum,
     find_split,
     wave,
 )
@@ -101,7 +100,7 @@ def test_the_edge_of_the_rim_moves_as_a_longer_dome_does(pair):
 def test_turning_the_imperfection_turns_the_axes_and_nothing_else(coupled, rounds):
     def flaw(turn):
         return Imperfection(
-            thickness=Sum(((1.0, wave(1, 0.02 * H, turn)), (1.0, wave(4, 0.01 * H, 0.2 + turn)))),
+            thickness=wave(1, 0.02 * H, turn) + wave(4, 0.01 * H, 0.2 + turn),
             density=wave(3, 0.02, 0.1 + turn),
             masses=(PointMass(2e-7, turn),),
         )
@@ -116,7 +115,7 @@ def test_harmonics_m_and_m_plus_4_act_together_as_their_product(coupled):
     """Second order: split ∝ a b, along the difference (or sum) of their phases; each alone does nothing."""
 
     def split(a, b):
-        return coupled.solve(Imperfection(density=Sum(((1.0, wave(1, a, 0.5)), (1.0, wave(3, b, -0.2))))))
+        return coupled.solve(Imperfection(density=wave(1, a, 0.5) + wave(3, b, -0.2)))
 
     base = split(1e-3, 1e-3)
     assert split(2e-3, 1e-3).relative == pytest.approx(2 * base.relative, rel=1e-4)
@@ -141,7 +140,7 @@ def test_rounds_end_where_more_would_change_nothing(coupled, faces):
     """Two waves together, which first order does not see at all: the split of a default solve against many rounds."""
     ((name, (one, other)),) = faces.items()
     size = 1.0 if name in ("density", "modulus") else H
-    flaw = Imperfection(**{name: Sum(((1.0, wave(one, 0.02 * size, 0.1)), (1.0, wave(other, 0.03 * size, 0.7))))})
+    flaw = Imperfection(**{name: wave(one, 0.02 * size, 0.1) + wave(other, 0.03 * size, 0.7)})
     many = coupled.solve(flaw, 0.0, 8)
     assert abs(coupled.solve(flaw).wave - many.wave) < 1e-5 * many.relative
     assert many.relative > 1e-6
