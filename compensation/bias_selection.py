@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from compensation.arrays import Array
 from compensation.bias import PARENTS, TERMS, BiasDesign, BiasFit, BiasRun, fit_terms
 from compensation.errors import CompensationError
+from compensation.improvement import FEWEST
 from compensation.memory import NO_MEMORY, Memory
 from compensation.noise_regression import estimate_theta, whiten
 from compensation.samples import block_means
@@ -207,7 +208,7 @@ def _pool(folds: Sequence[_Fold], fits: Sequence[BiasFit], *, by_runs: bool, eve
         inside = within(run.state, fit.state_range) & within(run.rate, fit.rate_range) | everywhere
         left = fit.left(run)
         averages = [_averages(values[inside], run) for values in (run.bias, left)]
-        if averages[0].size > 2:
+        if averages[0].size >= FEWEST:
             raw.append(averages[0] - averages[0].mean())
             compensated.append(averages[1] - averages[1].mean())
     if not raw:

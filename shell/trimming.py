@@ -10,13 +10,14 @@ the goal even where the gain of the cuts is `SURE` standard errors too large: re
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import pi, sqrt
 
 import numpy as np
 import scipy
 
 from shell.errors import ShellError
+from shell.imperfection import Split
 from shell.quadrature import Array
 
 BALANCED = (1, 2, 3)  # harmonics of the mass that must not grow
@@ -27,13 +28,10 @@ DIRECTIONS = 24  # sides of the polygon that stands for a circle
 
 
 @dataclass(frozen=True)
-class SplitWave:
-    """A split as a vector (f_fast - f_slow)/f exp(2 i n α_fast), most probable, with the standard error of either part."""
+class SplitWave(Split):
+    """A split as it is measured or expected, most probable, with the standard error of either part of its wave."""
 
-    harmonic: int
-    frequency: float
-    wave: complex
-    error: float
+    error: float = 0.0
 
     @classmethod
     def of(cls, harmonic: int, frequency: float, split: float, slow_axis: float, error: float) -> "SplitWave":
@@ -44,19 +42,8 @@ class SplitWave:
             raise ShellError(
                 f"the split of n = {harmonic}, {1e3 * split:.3g} mHz, cannot be distinguished from its reading error of {1e3 * error:.3g} mHz: measure more accurately before cutting."
             )
-        return cls(
-            harmonic, frequency, complex(-split / frequency * np.exp(2j * harmonic * slow_axis)), error / frequency
-        )
-
-    @property
-    def hertz(self) -> float:
-        """The split, Hz."""
-        return abs(self.wave) * self.frequency
-
-    @property
-    def slow_axis(self) -> float:
-        """Azimuth of an antinode of the slower mode, rad, in 0 ... π/n."""
-        return float(np.angle(-self.wave) / (2 * self.harmonic) % (pi / self.harmonic))
+        wave = complex(-split / frequency * np.exp(2j * harmonic * slow_axis))
+        return cls(harmonic, frequency, 0.0, wave, error / frequency)
 
     @property
     def most(self) -> float:
@@ -130,7 +117,7 @@ def plan_trim(
         total = complex(moves.sum())
         # what is left before it is measured: the reading, the error of each cut and that of all
         spread = state.error**2 + removal_error**2 * float((abs(moves) ** 2).sum()) / 2 + (gain_error * abs(total)) ** 2
-        after.append(SplitWave(state.harmonic, state.frequency, state.wave + total, sqrt(spread)))
+        after.append(replace(state, wave=state.wave + total, error=sqrt(spread)))
     known = {k: u - complex(masses @ np.exp(1j * k * sites.azimuth)) for k, u in known.items()}
     cuts = tuple(
         Cut(float(a), float(p), float(m))

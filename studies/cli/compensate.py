@@ -7,6 +7,7 @@ import numpy as np
 from compensation.arrays import Array
 from compensation.decimation import average_blocks
 from compensation.errors import CompensationError
+from compensation.improvement import AVERAGING, FEWEST
 from studies import models
 from studies.cli.output import answers, keep_record, say
 from studies.errors import InputError
@@ -16,7 +17,7 @@ from studies.record import COMPENSATED, RESONATOR, Record, read_record
 from studies.reports import style
 from studies.results import Drawing, Figure, Part, Result, Sentence, Table
 
-AVERAGE, FEWEST = 100.0, 10  # s; how many averages a stability is the standard deviation of, at least
+WANTED = 10  # averages of a record that is too short for as many of 100 s
 NOISE = 0.02  # relative: what the noise of a model's inputs may add to a record that has nothing to compensate
 WORSE = "{} is worse than the record: the standard deviation of {:.3g} s averages increases from {:.4g} to {:.4g}. Use it only if the model is of this gyro."
 OPPOSITE = 0.5  # of the record's deviation: what a correction of the opposite sign leaves where the output's is changed
@@ -135,8 +136,8 @@ def _draw(record: Record, result: Record, name: str) -> Drawing:
 
 
 def _width(record: Record) -> float:
-    """Return AVERAGE, or what makes FEWEST averages of a shorter record (s)."""
-    return min(AVERAGE, float(np.ptp(record["time_s"])) / FEWEST)
+    """Return AVERAGING, or what makes WANTED averages of a shorter record (s)."""
+    return min(AVERAGING, float(np.ptp(record["time_s"])) / WANTED)
 
 
 def _stability(record: Record, values: Array) -> float | None:
@@ -144,4 +145,4 @@ def _stability(record: Record, values: Array) -> float | None:
         means = average_blocks(record["time_s"], {"output": values}, _width(record)).columns["output"]
     except CompensationError:
         return None
-    return float(means.std()) if means.size > 2 else None
+    return float(means.std()) if means.size >= FEWEST else None

@@ -175,5 +175,5 @@ def test_the_upper_limit_of_a_split_holds_95_of_100_of_its_vectors(errors):
     """At many errors the limit was short: 1.2 of them hold 88 of 100."""
     rng = np.random.default_rng(2)
     drawn = abs(errors + rng.normal(size=(2, 100_000)).T @ [1.0, 1.0j])
-    share = np.mean(drawn < SplitWave(2, 1.0, complex(errors), 1.0).most)
+    share = np.mean(drawn < SplitWave(2, 1.0, 0.0, complex(errors), 1.0).most)
     assert share == pytest.approx(0.95, abs=0.003)
