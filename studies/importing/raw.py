@@ -159,6 +159,12 @@ def _wrong_encoding(path: str | Path, encoding: str) -> InputError:
     return InputError(f"{path}: not {encoding} text; set 'encoding' in the map (cp1252 is common).")
 
 
+def _checked(path: str | Path, part: str) -> str:
+    if "\0" in part:
+        raise InputError(f"{path}: not a text table (it holds zero bytes); is it UTF-16 or a binary file?")
+    return part
+
+
 def digest(path: str | Path) -> str:
     """Return the hash of a file."""
     found = hashlib.sha256()
@@ -180,16 +186,9 @@ def decode(path: str | Path, data: bytes, encoding: str) -> str:
     """Return the text of a file; a byte that the encoding does not know is an error that names its line."""
     try:
         text = data.decode("utf-8-sig" if encoding == "utf-8" else encoding)
-    except UnicodeDecodeError as error:
-        line = data.count(b"\n", 0, error.start) + 1
-        raise InputError(
-            f"{path}, line {line}: not {encoding} text; set 'encoding' in the map (cp1252 is common)."
-        ) from None
     except UnicodeError:
-        raise InputError(f"{path}: not {encoding} text; set 'encoding' in the map.") from None
-    if "\0" in text:
-        raise InputError(f"{path}: not a text table (it holds zero bytes); is it UTF-16 or a binary file?")
-    return text.replace("\r\n", "\n").replace("\r", "\n")
+        raise _wrong_encoding(path, encoding) from None
+    return _checked(path, text).replace("\r\n", "\n").replace("\r", "\n")
 
 
 def read_sheet(path: str | Path, sheet: str | None) -> list[list[str]]:
@@ -275,7 +274,7 @@ class _Body:
 
     def __init__(self, path: str | Path, text: io.TextIOWrapper, head: list[str], file: FileMap) -> None:
         self.path, self.text = path, text
-        self.head, self.first = self._checked("".join(head)), "".join(head[file.data_line - 1 :])
+        self.head, self.first = _checked(path, "".join(head)), "".join(head[file.data_line - 1 :])
 
     def __iter__(self) -> Iterator[str]:
         return iter(self.read, "")
@@ -284,12 +283,8 @@ class _Body:
         """The next lines, as many as there are at hand."""
         part, self.first = self.first or self.text.read(PORTION), ""
         part += self.text.readline() if part and not part.endswith("\n") else ""
-        return self.padding.sub("", self._checked(part)) if self.padding else self._checked(part)
-
-    def _checked(self, part: str) -> str:
-        if "\0" in part:
-            raise InputError(f"{self.path}: not a text table (it holds zero bytes); is it UTF-16 or a binary file?")
-        return part
+        part = _checked(self.path, part)
+        return self.padding.sub("", part) if self.padding else part
 
 
 def _parse_text(path: str | Path, body: _Body, file: FileMap, names: list[str]) -> "Iterator[pd.DataFrame]":

@@ -9,25 +9,9 @@ from studies.importing.look import is_stamp
 from studies.importing.mapping import SECONDS
 from studies.importing.meaning import find_meanings
 
-STAMPS = (
-    "%Y-%m-%d %H:%M:%S",
-    "%Y-%m-%d %H:%M:%S.%f",
-    "%Y/%m/%d %H:%M:%S",
-    "%Y/%m/%d %H:%M:%S.%f",
-    "%d.%m.%Y %H:%M:%S",
-    "%d.%m.%Y %H:%M:%S.%f",
-    "%d.%m.%Y %H:%M",
-    "%d/%m/%Y %H:%M:%S",
-    "%d/%m/%Y %H:%M:%S.%f",
-    "%m/%d/%Y %H:%M:%S",
-    "%m/%d/%Y %H:%M:%S.%f",
-    "%m/%d/%Y %I:%M:%S %p",
-    "%d.%m.%y %H:%M:%S",
-    "%d/%m/%y %H:%M:%S",
-    "%m/%d/%y %H:%M:%S",
-    "%H:%M:%S",
-    "%H:%M:%S.%f",
-)
+DATES = ("%Y-%m-%d", "%Y/%m/%d", "%d.%m.%Y", "%d/%m/%Y", "%m/%d/%Y", "%d.%m.%y", "%d/%m/%y", "%m/%d/%y")
+CLOCKS = ("%H:%M:%S", "%H:%M:%S.%f", "%H:%M")
+STAMPS = (*map(" ".join, itertools.product(DATES, CLOCKS)), "%m/%d/%Y %I:%M:%S %p", *CLOCKS[:2])
 TIME_WORDS = r"time|elapsed|zeit|date|datum|clock|stamp|uhr|^t$|^t\s*[ _/\[(]\s*[mµun]?s\b"
 UNIX_BY_SIZE = ((1e9, "unix-s"), (1e12, "unix-ms"), (1e15, "unix-us"), (1e18, "unix-ns"))
 LONGEST_RUN = 1000.0  # days of a file whose times look like Excel's
