@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from compensation.arrays import Array
 from compensation.errors import CompensationError
 from compensation.polynomial import PolynomialFit, count_apart, fit_polynomial
-from compensation.regression import FTest, compare_nested
+from compensation.regression import FTest, LinearFit, compare_nested
 
 FARTHEST_REFERENCE = 1e4  # °C
 GRID = 2001  # temperatures at which a curve is looked at
@@ -38,29 +38,9 @@ class FrequencyFit:
         return self.polynomial.order
 
     @property
-    def residuals(self) -> Array:
-        """Measured less fitted frequency (Hz), in the order of the data."""
-        return self.polynomial.regression.residuals
-
-    @property
-    def sum_of_squares(self) -> float:
-        """Residual sum of squares (Hz²)."""
-        return self.polynomial.regression.sum_of_squares
-
-    @property
-    def degrees_of_freedom(self) -> int:
-        """Number of readings less number of coefficients."""
-        return self.polynomial.regression.degrees_of_freedom
-
-    @property
-    def leave_one_out_rms(self) -> float:
-        """Rms error (Hz) of predicting each reading from a curve fitted to the others."""
-        return self.polynomial.regression.leave_one_out_rms
-
-    @property
-    def reading_variance(self) -> float:
-        """Variance of one reading (Hz²): of the residuals, but never below that of rounding, resolution²/12."""
-        return self.polynomial.regression.variance
+    def regression(self) -> LinearFit:
+        """Residuals (Hz, in the order of the data), their sum of squares, and what else the fit tells; variance not below that of rounding."""
+        return self.polynomial.regression
 
     @property
     def standard_errors(self) -> Array:
@@ -70,13 +50,13 @@ class FrequencyFit:
     @property
     def chi_squared(self) -> float | None:
         """Sum of squares over the variance of rounding, resolution²/12; None when no resolution is known."""
-        return None if self.resolution is None else self.sum_of_squares / (self.resolution**2 / 12)
+        return None if self.resolution is None else self.regression.sum_of_squares / (self.resolution**2 / 12)
 
     @property
     def largest_residual_of_span(self) -> float:
         """Largest |residual| over the span of the measured frequencies (1)."""
-        measured = self.polynomial.regression.fitted + self.residuals
-        return float(np.max(np.abs(self.residuals)) / np.ptp(measured))
+        measured = self.regression.fitted + self.regression.residuals
+        return float(np.max(np.abs(self.regression.residuals)) / np.ptp(measured))
 
     def frequency(self, temperature_degC: ArrayLike, *, extrapolate: bool = False) -> Array:
         """Return f(T) in Hz; temperatures that were not covered raise unless `extrapolate`."""
@@ -112,7 +92,7 @@ class FrequencyFit:
     def _bracket(self) -> tuple[float, float]:
         """Return the measured range, widened by the fit's own errors."""
         low, high = self.temperature_range_degC
-        margin = max(3 * np.sqrt(self.reading_variance), float(np.max(np.abs(self.residuals))))
+        margin = max(3 * np.sqrt(self.regression.variance), float(np.max(np.abs(self.regression.residuals))))
         slopes = np.abs(self.polynomial.slope(np.array([low, high])))
         reach = np.minimum(margin / np.maximum(slopes, 1e-300), 0.05 * (high - low))
         return low - float(reach[0]), high + float(reach[1])
@@ -202,9 +182,7 @@ def compare_orders(
         fit_frequency(temperature_degC, frequency, order, reference_temperature_degC, resolution)
         for order in range(1, highest + 1)
     )
-    tests = tuple(
-        compare_nested(small.polynomial.regression, large.polynomial.regression) for small, large in pairwise(fits)
-    )
+    tests = tuple(compare_nested(small.regression, large.regression) for small, large in pairwise(fits))
     needed = [test.p_value < level for test in tests]
     recommended = needed.index(False) + 1 if False in needed else highest
     return OrderComparison(fits, tests, level, recommended)

@@ -50,16 +50,6 @@ class PolynomialFit:
         rows = self.powers(x)
         return np.asarray(np.einsum("...i,ij,...j->...", rows, self.regression.covariance, rows))
 
-    def turning_points(self, low: float, high: float) -> Array:
-        """Return the x between low and high, in rising order, at which dy/dx = 0."""
-        c = self.regression.coefficients
-        derivative = np.arange(1, c.size) * c[1:]
-        # A leading coefficient that is only rounding would throw the true roots away.
-        trimmed = np.polynomial.polynomial.polytrim(derivative, 1e-12 * float(np.abs(derivative).max()))
-        roots = np.polynomial.polynomial.polyroots(trimmed)
-        real = roots[np.abs(roots.imag) < 1e-9].real * self.half_span + self.centre
-        return np.sort(real[(real >= low) & (real <= high)])
-
     def about(self, reference: float, covariance: Array | None = None) -> tuple[Array, Array]:
         """Return coefficients b and covariance (of c: the regression's unless given) of the same curve, y = Σ bⱼ (x − reference)ʲ."""
         own = self.regression.covariance if covariance is None else covariance

@@ -67,8 +67,9 @@ class TwoPatternModel:
     mass: float  # m₀, kg
     coupling: float  # b, kg
     stiffness: float  # c₀, N/m
-    membrane_share: float  # part of the strain energy that goes into stretching the middle surface, 0 … 1
-    membrane_strain: float  # rms membrane strain over rms displacement/R, no unit; zero if (17) were true
+    membrane_share: (
+        float  # part of the strain energy that goes into stretching the middle surface, 0 … 1; 0 if (17) were true
+    )
 
     @property
     def frequency(self) -> float:
@@ -91,23 +92,18 @@ def two_pattern_model(resonator: Resonator, elastic: Elastic, pattern: Pattern) 
     if not resonator.starts_on_axis:
         raise ShellError("the bell's theory needs a meridian that starts at the pole; close the opening.")
     pieces = _cut(resonator)
-    mass = coupling = membrane = bending = stretch = motion = 0.0
+    mass = coupling = membrane = bending = 0.0
     plate = elastic.E / (1 - elastic.nu**2)
     for piece, shape in zip(pieces, pattern(resonator, pieces), strict=True):
         points, strain = piece.points, strains(piece, shape)
         area, h = points.r * piece.weights, points.thickness
         radial = shape.u * points.normal_z + shape.w * points.normal_r
-        squared = shape.u**2 + shape.v**2 + shape.w**2
-        mass += pi * elastic.rho * np.sum(h * squared * area)
+        mass += pi * elastic.rho * np.sum(h * (shape.u**2 + shape.v**2 + shape.w**2) * area)
         coupling -= 2 * pi * elastic.rho * np.sum(h * shape.v * radial * area)
         membrane += pi * plate * np.sum(h * _form(strain[:3], elastic.nu, 0.5) * area)
         bending += pi * plate / 12 * np.sum(h**3 * _form(strain[3:], elastic.nu, 2.0) * area)
-        stretch += np.sum(_form(strain[:3], 0.0, 0.5) * area)
-        motion += np.sum(squared * area)
-    waist = pieces[0].points.r.max()
     energy = membrane + bending
-    strain_norm = waist * sqrt(stretch / motion)
-    return TwoPatternModel(float(mass), float(coupling), float(energy), float(membrane / energy), float(strain_norm))
+    return TwoPatternModel(float(mass), float(coupling), float(energy), float(membrane / energy))
 
 
 def rayleigh_functions(resonator: Resonator, pieces: Sequence[Piece]) -> list[Amplitudes]:

@@ -59,7 +59,7 @@ def fit_frequency(
         **row_of(
             fit, "order", "reference_temperature_degC", "coefficients", "standard_errors", resolution_Hz="resolution"
         ),
-        **row_of(fit, sum_of_squares_Hz2="sum_of_squares", leave_one_out_Hz="leave_one_out_rms"),
+        **row_of(fit, sum_of_squares_Hz2="regression.sum_of_squares", leave_one_out_Hz="regression.leave_one_out_rms"),
         **row_of(study, "calculated_degC", "error_degC", recommended_order="orders.recommended"),
         **({"soaks": rows, "time_constant_s": slowest} if soaks else {}),
     }

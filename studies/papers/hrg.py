@@ -33,7 +33,6 @@ class FrequencyStudy:
     calculated_degC: Array  # from the fit's inverse
     local_degC: Array  # between neighbouring points, as the slopes
     local_slope_ppm: Array
-    local_uncertainty_ppm: float
 
     @property
     def error_degC(self) -> Array:
@@ -98,7 +97,6 @@ def study_table(
     T, f = temperature_degC[ascending], frequency[ascending]
     fit = fit_frequency(T, f, order, reference_temperature_degC, resolution)
     orders = compare_orders(T, f, order + 2, reference_temperature_degC, resolution)
-    rounding = 0.0 if resolution is None else resolution / np.sqrt(6)
     at, slopes = local_slopes(T, f)
     return FrequencyStudy(
         temperature_degC=T,
@@ -108,7 +106,6 @@ def study_table(
         calculated_degC=fit.temperature(f),
         local_degC=at,
         local_slope_ppm=slopes,
-        local_uncertainty_ppm=float(1e6 * np.max(rounding / np.diff(np.unique(T))) / f.min()),
     )
 
 

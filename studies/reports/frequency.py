@@ -28,7 +28,7 @@ def facts(study: FrequencyStudy) -> Facts:
     return Facts([
         (f"Slope at {round(middle, 1) + 0.0:g} °C", f"{float(fit.slope_ppm(middle)):.2f} ppm/°C", "middle of the range"),
         ("Largest temperature error", f"{np.abs(study.error_degC).max():.3f} K", "temperature from frequency"),
-        ("Leave-one-out error", f"{fit.leave_one_out_rms:.4f} Hz", "rms of points left out of the fit"),
+        ("Leave-one-out error", f"{fit.regression.leave_one_out_rms:.4f} Hz", "rms of points left out of the fit"),
         ("Order supported by the data", name_order(study.orders.recommended), "F-test at the 5 % level"),
     ])  # fmt: skip
 
@@ -48,7 +48,9 @@ def coefficients_table(study: FrequencyStudy) -> Table:
 def inverse_table(study: FrequencyStudy) -> Table:
     """Return the temperatures that the inverse of the fit gives."""
     actual = np.round(study.temperature_degC, 3)
-    found = row_of(study, "frequency", calculated="calculated_degC", error="error_degC", residual="fit.residuals")
+    found = row_of(
+        study, "frequency", calculated="calculated_degC", error="error_degC", residual="fit.regression.residuals"
+    )
     rows = rows_of({"actual": actual, **found})
     columns = "frequency: Frequency (Hz) .2f | actual: Actual (°C) g | calculated: Calculated (°C) .3f | error: Error (K) +.3f | residual: Fit residual (Hz) +.4f"
     return Table("Temperature from frequency", rows, columns, "Error: actual minus calculated temperature.")
@@ -59,8 +61,8 @@ def order_table(study: FrequencyStudy) -> Table:
     rows = list(zip(study.orders.fits, [None, *study.orders.against_next], strict=False))
     columns: Head = [
         Column(lambda row: name_order(row[0].order), "Order"),
-        "0.degrees_of_freedom: Degrees of freedom | 0.sum_of_squares: Sum of squares (Hz²) .3e | 0.chi_squared: χ² .3g"
-        " | 0.leave_one_out_rms: Leave-one-out error (Hz) .4f | 1.statistic: F .3g | 1.p_value: p .2g",
+        "0.regression.degrees_of_freedom: Degrees of freedom | 0.regression.sum_of_squares: Sum of squares (Hz²) .3e | 0.chi_squared: χ² .3g"
+        " | 0.regression.leave_one_out_rms: Leave-one-out error (Hz) .4f | 1.statistic: F .3g | 1.p_value: p .2g",
     ]
     note = "χ² assumes that rounding to the last digit is the only noise. F and p test each order against the one below."  # fmt: skip
     return Table("Polynomials of rising order", rows, columns, note)
@@ -72,7 +74,7 @@ def order_sentence(study: FrequencyStudy) -> str:
     if asked <= order:
         other = name_order(order + 1 if asked == order else order)
         return f"A {name_order(asked)} is sufficient: a {other} is not significantly better."
-    before, after = (study.orders.fits[n - 1].leave_one_out_rms for n in (order, asked))
+    before, after = (study.orders.fits[n - 1].regression.leave_one_out_rms for n in (order, asked))
     return f"A {name_order(order)} is not sufficient: a {name_order(asked)} is significantly better. The leave-one-out error changes from {before:.4f} to {after:.4f} Hz."
 
 
@@ -94,7 +96,13 @@ def fit_figure(study: FrequencyStudy) -> Figure:
             upper.ticklabel_format(axis="y", useOffset=False)
             lower.axhline(0, color=style.BLACK, linewidth=0.8)
             for fit, colour, mark in _fits(study):
-                lower.plot(study.temperature_degC, 1e3 * fit.residuals, mark, color=colour, label=name_order(fit.order))
+                lower.plot(
+                    study.temperature_degC,
+                    1e3 * fit.regression.residuals,
+                    mark,
+                    color=colour,
+                    label=name_order(fit.order),
+                )
             return made
 
     return Figure(draw, "Measured frequency, fitted curve and residuals.", "Frequency and residuals over temperature.")

@@ -107,7 +107,7 @@ def _summarise(parts: Reproduction) -> dict[str, Any]:
     study, physics = parts.study, parts.physics
     fit, better = study.fit, study.next_fit
     assert better is not None
-    fitted = {"sum_of_squares_Hz2": "sum_of_squares", "leave_one_out_Hz": "leave_one_out_rms"}
+    fitted = {"sum_of_squares_Hz2": "regression.sum_of_squares", "leave_one_out_Hz": "regression.leave_one_out_rms"}
     names = ("curvature_measured", "curvature_law", "curvature_uncertainty")
     curvatures = {f"{name}_ppm_per_degC2": name for name in names}
     return {
@@ -117,10 +117,10 @@ def _summarise(parts: Reproduction) -> dict[str, Any]:
                 fit, "reference_temperature_degC", "coefficients", "standard_errors",
                 "largest_residual_of_span", **fitted,
             ),
-            "largest_residual_Hz": float(np.abs(fit.residuals).max()),
+            "largest_residual_Hz": float(np.abs(fit.regression.residuals).max()),
         },
         "quartic": {
-            **row_of(better, "chi_squared", "degrees_of_freedom", **fitted),
+            **row_of(better, "chi_squared", degrees_of_freedom="regression.degrees_of_freedom", **fitted),
             "F_against_cubic": study.orders.against_next[fit.order - 1].statistic,
         },
         "table2": row_of(study, "calculated_degC", "error_degC"),
@@ -164,8 +164,8 @@ def _short(parts: Reproduction) -> list[Part]:
             "The two published coefficients of the cubic are reproduced to the last digit, and the temperatures of Table 2 to within"
             f" {farthest:.4f} K. At −10 °C the columns of the paper disagree: it gives −10.058 °C but an error of 0.0578 K"
             f" (here {study.error_degC[1]:.4f} K). The paper concludes that higher orders have little effect; this is not reproduced."
-            f" The residual sum of squares is {better.sum_of_squares:.1e} Hz² for a quartic and {study.fit.sum_of_squares:.2e} Hz² for the cubic, and the quartic predicts omitted points"
-            f" {study.fit.leave_one_out_rms / better.leave_one_out_rms:.1f} times better."
+            f" The residual sum of squares is {better.regression.sum_of_squares:.1e} Hz² for a quartic and {study.fit.regression.sum_of_squares:.2e} Hz² for the cubic, and the quartic predicts omitted points"
+            f" {study.fit.regression.leave_one_out_rms / better.regression.leave_one_out_rms:.1f} times better."
         ),
         Sentence(
             f"Physics predicts the magnitude of the slope: at 20 °C the prediction is {abs(away):.1f} standard deviations"
@@ -184,11 +184,11 @@ def _short(parts: Reproduction) -> list[Part]:
 
 
 def _table1(study: FrequencyStudy) -> list[Part]:
-    fit, largest = study.fit, 1e3 * np.abs(study.fit.residuals).max()
+    fit, largest = study.fit, 1e3 * np.abs(study.fit.regression.residuals).max()
     share = 100 * fit.largest_residual_of_span
     note = f"Largest residual {largest:.1f} mHz = {share:.2f} % of the span; the paper gives 0.12 %."
-    found = row_of(study, "frequency", temperature="temperature_degC", residual="fit.residuals")
-    rows = rows_of({**found, "cubic": study.frequency - fit.residuals})
+    found = row_of(study, "frequency", temperature="temperature_degC", residual="fit.regression.residuals")
+    rows = rows_of({**found, "cubic": study.frequency - fit.regression.residuals})
     return [Table("Table 1 and the fitted cubic", rows, TABLE1, note), coefficients_table(study), fit_figure(study)]
 
 

@@ -41,16 +41,16 @@ def test_slopes():
 
 def test_the_cubic_leaves_structure_and_the_quartic_only_rounding():
     cubic, quartic = fit(3), fit(4)
-    assert cubic.sum_of_squares == pytest.approx(2.150e-3, abs=5e-7)
-    assert cubic.leave_one_out_rms == pytest.approx(0.0868, abs=5e-5)
-    assert np.max(np.abs(cubic.residuals)) == pytest.approx(0.026904762, rel=1e-7)
+    assert cubic.regression.sum_of_squares == pytest.approx(2.150e-3, abs=5e-7)
+    assert cubic.regression.leave_one_out_rms == pytest.approx(0.0868, abs=5e-5)
+    assert np.max(np.abs(cubic.regression.residuals)) == pytest.approx(0.026904762, rel=1e-7)
     assert cubic.largest_residual_of_span == pytest.approx(0.0012, abs=5e-5)  # the paper's "0.12 %"
-    assert chi2.sf(cubic.chi_squared, cubic.degrees_of_freedom) < 1e-20
-    assert quartic.sum_of_squares == pytest.approx(4.03e-5, abs=5e-8)
+    assert chi2.sf(cubic.chi_squared, cubic.regression.degrees_of_freedom) < 1e-20
+    assert quartic.regression.sum_of_squares == pytest.approx(4.03e-5, abs=5e-8)
     assert quartic.chi_squared == pytest.approx(4.8, abs=0.05)
-    assert quartic.degrees_of_freedom == 2
-    assert chi2.sf(quartic.chi_squared, quartic.degrees_of_freedom) > 0.05
-    assert quartic.leave_one_out_rms == pytest.approx(0.0216, abs=5e-5)
+    assert quartic.regression.degrees_of_freedom == 2
+    assert chi2.sf(quartic.chi_squared, quartic.regression.degrees_of_freedom) > 0.05
+    assert quartic.regression.leave_one_out_rms == pytest.approx(0.0216, abs=5e-5)
 
 
 def test_the_f_test_asks_for_the_quartic():

@@ -23,7 +23,7 @@ def test_intervals_of_coefficients_and_temperature_cover_the_truth():
     runs = 400
     for _ in range(runs):
         fit = fit_frequency(T, reading(rng))
-        t = stats.t.ppf(0.95, fit.degrees_of_freedom)
+        t = stats.t.ppf(0.95, fit.regression.degrees_of_freedom)
         inside[:4] += np.abs(fit.coefficients - TRUTH) < t * fit.standard_errors
         found = float(fit.temperature(np.polynomial.polynomial.polyval(13.7, TRUTH)))
         inside[4] += abs(found - 13.7) < t * temperature_error(save_frequency(fit, (), "test"), found)
@@ -64,7 +64,7 @@ def test_rounding_alone_passes_its_own_test():
     for _ in range(300):
         truth = rng.uniform(4400, 4500) + rng.uniform(0.3, 0.4) * T + rng.uniform(-1e-3, 0) * T**2
         fit = fit_frequency(T, np.round(truth, 2), 2, resolution=0.01)
-        rejected.append(stats.chi2.sf(fit.chi_squared, fit.degrees_of_freedom) < 0.05)
+        rejected.append(stats.chi2.sf(fit.chi_squared, fit.regression.degrees_of_freedom) < 0.05)
     assert np.mean(rejected) < 0.09
 
 

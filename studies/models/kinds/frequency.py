@@ -124,8 +124,9 @@ def _is_monotonic(model: Model) -> bool:
 
 def _widen(fit: "FrequencyFit") -> tuple[float, float]:
     """Return the fitted range, wider by a twentieth on each side, but not beyond where the curve turns round."""
+    from compensation.frequency import find_turn
+
     low, high = fit.temperature_range_degC
     lowest, highest = widen(low, high)
-    turns = fit.polynomial.turning_points(lowest, highest)
-    below, above = turns[turns <= low], turns[turns >= high]
-    return max([lowest, *below.tolist()]), min([highest, *above.tolist()])
+    below, above = (find_turn(fit.polynomial.value, span) for span in ((lowest, low), (high, highest)))
+    return lowest if below is None else below, highest if above is None else above

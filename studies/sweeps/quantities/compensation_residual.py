@@ -37,4 +37,7 @@ class CompensationResidual(HarmonicQuantity, frozen=True, kw_only=True, tag="com
         T = np.linspace(self.from_degC, self.to_degC, self.points)
         f = np.array([case.modes(self.harmonic, 1, self.theory, x + zero_Celsius)[0].frequency for x in T])
         fit = fit_frequency(T, f, self.order, float(np.mean(T)))
-        return (Number(float(np.sqrt(np.mean(fit.residuals**2)))), Number(float(np.abs(fit.temperature(f) - T).max())))
+        return (
+            Number(float(np.sqrt(np.mean(fit.regression.residuals**2)))),
+            Number(float(np.abs(fit.temperature(f) - T).max())),
+        )
