@@ -1,13 +1,12 @@
 """Tables of numbers as Parquet files (the extra `formats`): columns by name, comment lines in the metadata of the schema."""
 
-import hashlib
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
 from studies.errors import InputError
-from studies.files.reading import PORTION, load_library, opened
+from studies.files.reading import digest, load_library, opened
 from studies.progress import tell
 
 if TYPE_CHECKING:
@@ -40,10 +39,6 @@ def read_table(path: str | Path) -> "tuple[dict[str, NDArray[np.float64]], str]"
     """Return the columns as numbers, missing ones NaN, and the hash of the file."""
     import numpy as np
 
-    found = hashlib.sha256()
-    with opened(path) as file:
-        while portion := file.read(PORTION):
-            found.update(portion)
     parquet, values = _open(path), {}
     for field in parquet.schema_arrow:
         if not str(field.type).startswith(("double", "float", "halffloat", "int", "uint")):
@@ -54,7 +49,7 @@ def read_table(path: str | Path) -> "tuple[dict[str, NDArray[np.float64]], str]"
             raise _damaged(path, error) from None
     if not values or not len(next(iter(values.values()))):
         raise InputError(f"{path}: the table has no rows.")
-    return values, found.hexdigest()
+    return values, digest(path)
 
 
 def write_table(file: IO[bytes], columns: "Table", comments: Sequence[str], path: str | Path) -> None:

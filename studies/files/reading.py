@@ -1,12 +1,14 @@
 """Files that a user names: read with one sentence where that fails, and found by bare name where they ship."""
 
+import hashlib
 import importlib
 import logging
 import stat
 from collections.abc import Iterator
 from contextlib import contextmanager
+from io import BufferedReader
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 from studies.errors import InputError, MissingEnvironment, nearest
 
@@ -23,13 +25,19 @@ def read_bytes(path: str | Path, most: int = MOST_BYTES, first: int = -1) -> byt
 
 
 @contextmanager
-def opened(path: str | Path, most: int = MOST_BYTES) -> Iterator[IO[bytes]]:
+def opened(path: str | Path, most: int = MOST_BYTES) -> Iterator[BufferedReader]:
     """Open a regular file of at most so many bytes for reading."""
     try:
         with check_file(path, most).open("rb") as file:
             yield file
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror}).") from error
+
+
+def digest(path: str | Path, most: int = MOST_BYTES) -> str:
+    """Return the SHA-256 of a file."""
+    with opened(path, most) as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def check_file(path: str | Path, most: int = MOST_BYTES) -> Path:

@@ -17,11 +17,11 @@ import numpy as np
 
 from compensation.arrays import Array
 from studies.errors import InputError, MissingEnvironment, nearest
-from studies.files.reading import ANY_SIZE, opened
+from studies.files.reading import ANY_SIZE, digest, opened
 from studies.files.stored import portions
 from studies.importing.formats import KINDS, READERS, Channel, Clock
 from studies.importing.mapping import FileMap
-from studies.importing.raw import digest, name_columns, read_text, shorten
+from studies.importing.raw import name_columns, read_text, shorten
 from studies.importing.tables import Part, RawTable
 from studies.progress import tell
 
@@ -153,7 +153,7 @@ def read_channel_tables(paths: Sequence[str | Path], file: FileMap) -> Generator
                     f"{path}: {', '.join(repr(channel.name) for channel in used.values())} have several clocks or lengths; give each its own"
                     " [[file]] table (same_file = true)."
                 )
-            part, rows = Part(str(path), digest(path), 1, "row"), used[wanted[0]].rows
+            part, rows = Part(str(path), digest(path, ANY_SIZE), 1, "row"), used[wanted[0]].rows
             for k in portions(rows):
                 tell(f"reading {path}", k.start / rows)
                 yield ChannelTable(part, file.missing, k.start, k.stop - k.start, used)

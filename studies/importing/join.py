@@ -15,9 +15,10 @@ from compensation.decimation import average_groups
 from studies.errors import InputError
 from studies.files.stored import Stored, portions
 from studies.importing.channels import read_tables
-from studies.importing.clock import Clock, Order, rises, seconds_between
+from studies.importing.clock import Clock, seconds_between
 from studies.importing.doubtful import LOOKED_AT, drop_doubtful
 from studies.importing.mapping import OWN, TABLE_TARGETS, ColumnMap, FileMap, LoadedMap
+from studies.importing.order import Order, rises
 from studies.importing.raw import NotPlain
 from studies.importing.tables import RawTable, Rows
 from studies.record import Record, check_plausible

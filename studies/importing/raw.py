@@ -2,7 +2,6 @@
 
 import codecs
 import csv
-import hashlib
 import importlib
 import io
 import itertools
@@ -18,7 +17,7 @@ import numpy as np
 from compensation.arrays import Array
 from studies.errors import InputError, MissingEnvironment, nearest
 from studies.files.columns import ROWS_AT_ONCE, parse_portions
-from studies.files.reading import ANY_SIZE, PORTION, opened, read_bytes
+from studies.files.reading import ANY_SIZE, PORTION, digest, opened, read_bytes
 from studies.importing.mapping import NUMERIC_TIMES, SEPARATORS, FileMap
 from studies.importing.tables import ParsedTable, Part, RawTable, check_column
 
@@ -111,7 +110,7 @@ def read_raw(path: str | Path, file: FileMap) -> Iterator[tuple[list[str], RawTa
     """Yield the columns' names and the next rows of one raw file, as its map describes it, with cells of text."""
     import pandas as pd
 
-    part = Part(str(path), digest(path), file.data_line)
+    part = Part(str(path), digest(path, ANY_SIZE), file.data_line)
     if Path(path).suffix.lower() in EXCEL:
         lines = read_sheet(path, file.sheet or None)
         names, rows = _head(path, lines, file), lines[file.data_line - 1 : file.last_line]
@@ -163,15 +162,6 @@ def _checked(path: str | Path, part: str) -> str:
     if "\0" in part:
         raise InputError(f"{path}: not a text table (it holds zero bytes); is it UTF-16 or a binary file?")
     return part
-
-
-def digest(path: str | Path) -> str:
-    """Return the hash of a file."""
-    found = hashlib.sha256()
-    with opened(path, ANY_SIZE) as file:
-        while portion := file.read(PORTION):
-            found.update(portion)
-    return found.hexdigest()
 
 
 def read_filled(path: str | Path, most: int) -> bytes:
