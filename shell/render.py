@@ -77,8 +77,10 @@ def _draw(scenes: Scene | Sequence[Scene], view: View, window: tuple[int, int], 
         axes.set_axis_off()
         _paint(axes, scene, turn, norm, swing)
         title, _, remark = scene.title.partition("\n")
-        figure.text((k + 0.5) / count, 0.95, title, ha="center", size=13)
-        figure.text((k + 0.02) / count, 0.92, remark.replace(", ", "\n"), va="top", size=9, color=GREY)
+        figure.text((k + 0.5) / count, 0.95, title, ha="center", size=13, parse_math=False)
+        figure.text(
+            (k + 0.02) / count, 0.92, remark.replace(", ", "\n"), va="top", size=9, color=GREY, parse_math=False
+        )
     if together[0].legend:
         bar = figure.add_axes((0.5 - 0.3 / count, 0.14, 0.6 / count, 0.035))
         figure.colorbar(ScalarMappable(norm, "cividis"), cax=bar, orientation="horizontal", label=together[0].legend)
