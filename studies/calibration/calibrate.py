@@ -167,7 +167,7 @@ def calibrate(
     ladder = build_ladder(found)
     return Calibration(
         instrument,
-        _calibrated(instrument, found, estimates),
+        posterior_card(instrument, found.problem.priors, found.point, found.covariance, estimates, _turn_on(found)),
         found,
         estimates,
         find_groups(problem.priors, found.covariance),
@@ -195,14 +195,6 @@ def _pose(
     check_exact(instrument, exact)
     priors = gather_priors(instrument, exact)
     return CardProblem(instrument, priors, runs, wide_law(instrument, runs, tables), tables)
-
-
-def _calibrated(instrument: "Instrument", found: CardFit, estimates: Sequence[Estimate]) -> "Instrument":
-    priors: Priors = found.problem.priors
-    count = len(priors.values)
-    return posterior_card(
-        instrument, priors, found.point[:count], found.covariance[:count, :count], estimates, _turn_on(found)
-    )
 
 
 def _turn_on(found: CardFit) -> dict[str, float]:

@@ -53,7 +53,7 @@ class Estimate:
 def estimate(fit: CardFit, profile: bool = True) -> tuple[Estimate, ...]:
     """Return the estimates of all values of the card."""
     priors = fit.problem.priors
-    polar, best, mean, covariance = _over_the_wave(fit)
+    polar, best, mean, covariance = over_the_wave(priors, fit.point, fit.covariance)
     z, bounds, at = priors.standard(best), priors.bound(best), priors.at(best)
     middle = priors.standard(mean)
     C = priors.covariance(covariance)
@@ -94,19 +94,19 @@ def estimate(fit: CardFit, profile: bool = True) -> tuple[Estimate, ...]:
     return tuple(found)
 
 
-def _over_the_wave(fit: CardFit) -> tuple[dict[int, Polar], Array, Array, Array]:
-    """Most probable coordinates, their mean and covariance, with length and axis of the damping's anisotropy by their places."""
-    priors = fit.problem.priors
+def over_the_wave(priors: Priors, point: Array, covariance: Array) -> tuple[dict[int, Polar], Array, Array, Array]:
+    """Length and axis of the damping's anisotropy by their places; the coordinates' most probable values, mean and covariance over all that these may be."""
     count = len(priors.values)
-    point, C, pair = fit.point[:count], fit.covariance[:count, :count], priors.pair
+    point, C, pair = point[:count], covariance[:count, :count], priors.pair
     if priors.wave is None:
         return {}, point, point, C
-    own = np.linalg.inv(C[np.ix_(pair, pair)])
-    found = priors.wave.posterior(own - np.eye(2), point[pair])
-    gain = C[:, pair] @ own
+    seen = priors.root[pair]  # the components of unit prior variance
+    before, after = (np.asarray(np.linalg.inv(seen @ own @ seen.T)) for own in (np.eye(count), C))
+    found = priors.wave.posterior(after - before, seen @ point, before)
+    gain = C @ seen.T @ after
+    best, mean = (point + gain @ (there - seen @ point) for there in (found.best, found.mean))
     polar = dict(zip(pair, (found.length, found.axis), strict=True))
-    best, mean = (point + gain @ (there - point[pair]) for there in (found.best, found.mean))
-    return polar, best, mean, C + gain @ (found.covariance - C[np.ix_(pair, pair)]) @ gain.T
+    return polar, best, mean, C + gain @ (found.covariance - seen @ C @ seen.T) @ gain.T
 
 
 def _told_polar(value: UncertainValue, one: Polar, seen: bool) -> Estimate:
@@ -189,7 +189,11 @@ def posterior_card(
     more: dict[str, float] | None = None,
 ) -> "Instrument":
     """Return the card with posterior values, widths, correlations and intervals; `more` are further values of it."""
+    _, point, _, covariance = over_the_wave(priors, point, covariance)
     moves = priors.slopes(point)
+    if priors.wave is not None:
+        seen = priors.root[priors.pair]
+        moves[priors.pair] = priors.wave.turned(*(seen @ point)) @ seen
     C = moves @ covariance @ moves.T
     sd = np.sqrt(np.diag(C))
     R = np.clip(C / np.outer(sd, sd), -1.0, 1.0)
@@ -199,9 +203,11 @@ def posterior_card(
         ends = {"low": prior.low if prior.low != 0.0 else -np.inf, "high": prior.high}
         hard = {name: end for name, end in ends.items() if np.isfinite(end)}
         values[one.parameter] = {"value": one.value, "sd": one.sd, **hard}
-    posterior = {
+    posterior: dict[str, object] = {
         "names": [one.parameter for one in estimates],
         "correlation": R.round(DIGITS).tolist(),
         "interval": [[one.low, one.high] for one in estimates],
     }
+    if priors.wave is not None:
+        posterior["anisotropy_sd"] = sd[priors.pair].tolist()
     return instrument.with_values(values | (more or {})).with_table("posterior", posterior)

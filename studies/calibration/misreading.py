@@ -9,17 +9,21 @@ from compensation.noise import white_rms
 from shell.constants import zero_Celsius
 from shell.errors import ShellError
 from studies.calibration.ahead import BIAS
+from studies.calibration.priors import gather_priors
 from studies.calibration.problem import FARTHEST
 from studies.calibration.settled import READ_AS
 from studies.errors import InputError
 from studies.resonator.law import law_of
 from studies.simulation.drive import COLUMN, drive_by_record
+from studies.simulation.heat_path import slowest_lag
 from studies.simulation.noise import bias_noise
 from studies.simulation.prediction import predict
 from thermal.errors import ThermalError
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
+
+    from numpy.typing import NDArray
 
     from shell.law import FrequencyLaw
     from studies.instrument.card import Instrument
@@ -33,6 +37,8 @@ FOLLOWED, REFUSED = 0.3, 0.4
 """Parts of a frequency's changes: left of them by a reading that agrees, and by one that does not."""
 AGAINST = 0.5
 """The same of a reading that agrees, where the other one leaves more than there was: a sign is told by less."""
+LIKELY, STARTED = 3.0, 2.0
+"""Standard deviations up to which a value of the card is likely; changes by which a frequency may start elsewhere."""
 CLEAR = 20.0
 """Times its own noise by which a frequency must change before it says how a temperature is to be read."""
 SECONDS = 3600.0
@@ -59,20 +65,41 @@ def _check_temperatures(instrument: "Instrument", record: "Record", as_read: "Le
     changes = float(np.std(known)) if known.size > 2 else 0.0
     if changes <= CLEAR * white_rms(known):
         return
-    left = as_read[FREQUENCY][0]
+    left, whole = as_read[FREQUENCY][0], law_of(instrument)
     if left < REFUSED * changes:
         return
-    whole = law_of(instrument)
     for words, read in READ_AS.items():
         columns = {name: read(record[name] + zero_Celsius) - zero_Celsius for name in names}
         other = _left(instrument, record.with_columns(columns), whole)[FREQUENCY][0]
-        if other < min((AGAINST if left > changes else FOLLOWED) * changes, left / 3):
+        agrees = other < min((AGAINST if left > changes else FOLLOWED) * changes, left / 3)
+        if agrees and not _could_be(instrument, record, whole, changes):
             right = columns[COLUMN["housing"] if COLUMN["housing"] in names else names[0]]
             wrong = [one for one in names if _apart(columns[one], right) <= _apart(record[one], right)]
             raise InputError(
                 f"{record.path}: frequency_Hz does not follow the temperatures as the card predicts, unless they are read {words}:"
                 f" {other:.2g} Hz of its {changes:.2g} Hz (rms) then remain. Correct {' and '.join(wrong)}."
             )
+
+
+def _could_be(instrument: "Instrument", record: "Record", law: "FrequencyLaw", changes: float) -> bool:
+    """Whether the frequency follows the temperatures as read with values of the card where their priors have them, and another start."""
+    priors, places = gather_priors(instrument), _places(record)
+    try:
+        found = predict(instrument, drive_by_record(record, time=record["time_s"][places]), priors.names, law, FARTHEST)
+    except (ShellError, ThermalError):
+        return False
+    y, f, t = record[FREQUENCY][places], found.columns[FREQUENCY], found.drive.time
+    fades = (t[0] - t) / slowest_lag(found.network, instrument.reference_temperature)
+    starts = STARTED * changes * np.exp(np.outer(fades, [1.0, 2.0, 4.0]))
+    slopes = np.column_stack([found.derivatives[name][FREQUENCY] for name in priors.names])
+    J = np.column_stack([slopes @ priors.slopes(np.zeros(len(priors.values))), starts])[np.isfinite(y)]
+    J, rest = J - J.mean(axis=0), (y - f)[np.isfinite(y)]
+    rest = rest - rest.mean()
+    precise = len(rest) ** 0.5 / (FOLLOWED * changes)
+    z = np.linalg.lstsq(np.vstack([precise * J, np.eye(J.shape[1])]), np.append(precise * rest, np.zeros(J.shape[1])))[
+        0
+    ]
+    return bool(np.abs(z).max() < LIKELY and np.std(rest - J @ z) < FOLLOWED * changes)
 
 
 def _apart(one: Array, two: Array) -> float:
@@ -110,13 +137,16 @@ def _check_unit(instrument: "Instrument", record: "Record") -> None:
 
 def _left(instrument: "Instrument", record: "Record", law: "FrequencyLaw") -> "Left":
     """Rms of frequency and bias, and of these with the sign changed, minus predicted about its mean, with the card as given; infinite where it cannot be predicted."""
-    time, names = record["time_s"], [name for name in (FREQUENCY, BIAS) if name in record]
-    places = np.unique(np.linspace(0, len(time) - 1, min(ROWS, len(time))).astype(int))
+    places, names = _places(record), [name for name in (FREQUENCY, BIAS) if name in record]
     try:
-        found = predict(instrument, drive_by_record(record, time=time[places]), (), law, FARTHEST).columns
+        found = predict(instrument, drive_by_record(record, time=record["time_s"][places]), (), law, FARTHEST).columns
     except (ShellError, ThermalError):
         return dict.fromkeys(names, (np.inf, np.inf))
     pairs = {name: (record[name][places], found[name]) for name in names}
     return {
         name: (float(np.nanstd(own - other)), float(np.nanstd(own + other))) for name, (own, other) in pairs.items()
     }
+
+
+def _places(record: "Record") -> "NDArray[np.intp]":
+    return np.unique(np.linspace(0, len(record) - 1, min(ROWS, len(record))).astype(int))

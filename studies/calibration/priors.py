@@ -120,12 +120,13 @@ def gather_priors(instrument: "Instrument", exact: Sequence[str] = ()) -> Priors
         for j, other in enumerate(values[:i]):
             R[i, j] = R[j, i] = correlation.get((one.name, other.name), correlation.get((other.name, one.name), 0.0))
     known = {value.name: value for value in values}
+    told: tuple[float, float] | None = instrument.part("posterior").anisotropy_sd
     wave = (
-        WavePrior(known[ANISOTROPY], known[AXIS])
+        WavePrior(known[ANISOTROPY], known[AXIS], told)
         if {ANISOTROPY, AXIS} <= set(known) and known[ANISOTROPY].logarithmic
         else None
     )
-    if wave is not None:
+    if wave is None or told is None:  # what others have in common with the components is theirs alone
         pair = [k for k, value in enumerate(values) if value.name in (ANISOTROPY, AXIS)]
         R[pair], R[:, pair] = 0.0, 0.0
         R[pair, pair] = 1.0

@@ -5,7 +5,8 @@
 A pattern that stands at one azimuth sees only one direction of (a, b), so that neither A nor θ is known from it although
 their product with a cosine is; and the sign of a cosine may be negative. The fit moves a and b, with a normal prior of the
 same mean and spread; what A and θ may be is then summed over the plane of (a, b), with the priors that the card states:
-ln A and θ normal, dlnA dθ = da db/(4 A²).
+ln A and θ normal, dlnA dθ = da db/(4 A²). Of a card that was calibrated a and b themselves are what is known, with
+their standard deviations and correlations.
 """
 
 from dataclasses import dataclass
@@ -52,10 +53,13 @@ class WavePrior:
 
     length: "UncertainValue"
     axis: "UncertainValue"
+    sd: tuple[float, float] | None = None  # of a and b, where a calibration told them
 
     @property
     def moments(self) -> tuple[float, float, float]:
-        """Mean of a, and standard deviations of a and b, of a log-normal length and a normal angle."""
+        """Mean of a, and standard deviations of a and b: as they were told, else of a log-normal length and a normal angle."""
+        if self.sd is not None:
+            return self.length.value, *self.sd
         s, turn = self.length.sd / self.length.value, self.axis.sd * PER_DEGREE
         mean = self.length.value * float(np.exp(s**2 / 2 - turn**2 / 2))
         square = self.length.value**2 * float(np.exp(2 * s**2))
@@ -75,15 +79,17 @@ class WavePrior:
 
     def slopes(self, x: float, y: float) -> Array:
         """∂(length, axis)/∂(x, y), (2, 2)."""
-        A, axis = self.at(x, y)
-        phi = (axis - self.axis.value) * PER_DEGREE
-        _, spread_a, spread_b = self.moments
-        turn = np.array([[np.cos(phi), np.sin(phi)], np.array([-np.sin(phi), np.cos(phi)]) / (A * PER_DEGREE)])
-        return np.asarray(turn * [spread_a, spread_b])
+        return np.asarray(self.turned(x, y) / np.array([[1.0], [self.at(x, y)[0] * PER_DEGREE]]))
 
-    def posterior(self, information: Array, mean: Array) -> WavePosterior:
-        """Length and axis, from the data's information (2, 2) on (x, y) and the mean that it has beside the unit prior."""
-        pull = (information + np.eye(2)) @ mean
+    def turned(self, x: float, y: float) -> Array:
+        """∂/∂(x, y), (2, 2), of the components along the axis that is there and across it."""
+        phi = (self.at(x, y)[1] - self.axis.value) * PER_DEGREE
+        turn = np.array([[np.cos(phi), np.sin(phi)], [-np.sin(phi), np.cos(phi)]])
+        return np.asarray(turn * self.moments[1:])
+
+    def posterior(self, information: Array, mean: Array, prior: Array) -> WavePosterior:
+        """Length and axis, from the data's information (2, 2) on (x, y) and the mean that it has beside that of a normal prior."""
+        pull = (information + prior) @ mean
         strength, ways = np.linalg.eigh(information)
         told = strength > 1.0
         middle = np.where(told, (ways.T @ pull) / np.maximum(strength, 1.0), 0.0)
@@ -96,7 +102,10 @@ class WavePrior:
         angle = np.arctan2(b, a) / PER_DEGREE
         log = np.log(A / self.length.value)
         likely = pull[0] * x + pull[1] * y - (strength[0] * p**2 + strength[1] * q**2) / 2
-        polar = likely - (log * self.length.value / self.length.sd) ** 2 / 2 - (angle / self.axis.sd) ** 2 / 2
+        if self.sd is None:
+            polar = likely - (log * self.length.value / self.length.sd) ** 2 / 2 - (angle / self.axis.sd) ** 2 / 2
+        else:
+            polar = likely - (prior[0, 0] * x**2 + prior[1, 1] * y**2) / 2 - prior[0, 1] * x * y + 2 * log
         inside = (A >= self.length.low) & (A <= self.length.high)
         polar = np.where(inside, polar, -np.inf) if inside.any() else polar
         weight = np.exp(polar - polar.max()) / A**2

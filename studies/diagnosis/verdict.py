@@ -22,6 +22,8 @@ NINETY = 1.645
 """Standard deviations on either side that hold 90 % of a normal distribution."""
 FAR = 2.0
 """Prior standard deviations beyond which a value of the card is wrong."""
+SHOWN_IN = {"bias": "bias_deg_per_h", "loss": "inverse_q"}
+"""Response that shows the values of a table; of the others it is the frequency."""
 
 
 @dataclass(frozen=True)
@@ -259,7 +261,7 @@ def wrong_values(shifts: Sequence[Shift]) -> list[Cause]:
     return [
         Cause(
             shift.parameter,
-            "frequency_Hz",
+            SHOWN_IN.get(shift.parameter.partition(".")[0], "frequency_Hz"),
             float(scipy.special.erf(abs(shift.shift_sd) / np.sqrt(2.0))),
             (),
             {shift.parameter: Interval(shift.value, shift.low, shift.high)},

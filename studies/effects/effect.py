@@ -114,6 +114,7 @@ class Effect:
     event: bool = False  # whether other runs know nothing of it, so that no held-out run can confirm it
     # Whether time alone drives it, so that no programme of temperatures and drives shows it better than another.
     by_clock: bool = False
+    dated: bool = False  # whether it counts its time from the start of the campaign
     # Whether it happens once in a gyro's life rather than in every run, so that a saved card does not repeat it.
     once: bool = False
     # The shape parameter that is the time constant with which fades what it had at the start of a run: of what came
@@ -206,15 +207,18 @@ def apply_effect(
     return target, np.asarray(effect.columns(states, shape, response) @ weights)
 
 
-def apply_effects(entries: Sequence[tuple[str, str, Mapping[str, Numbers]]], states: States) -> dict[str, FloatArray]:
-    """Run effects (name, response, parameters) forward, those on the temperature first; return the change of each target."""
+def apply_effects(
+    entries: Sequence[tuple[str, str, Mapping[str, Numbers], float]], states: States
+) -> dict[str, FloatArray]:
+    """Run effects (name, response, parameters, its time (s) at the start of the run) forward, those on the temperature first; return the change of each target."""
     changes: dict[str, FloatArray] = {}
     warmed = states
     for stage in range(3):  # on the temperature; on the temperature that these leave; on the responses
-        for name, response, parameters in entries:
+        for name, response, parameters, begun in entries:
             effect = find_effect(name)
             if stage == (2 if not effect.thermal else int(effect.sees_heat)):
-                target, change = apply_effect(name, parameters, warmed if stage else states, response)
+                own = replace(warmed if stage else states, campaign_time=states.time + begun)
+                target, change = apply_effect(name, parameters, own, response)
                 changes[target] = changes.get(target, np.zeros_like(states.time)) + change
         if "resonator_temperature" in changes:
             warming = changes["resonator_temperature"]

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studies.diagnosis.verdict import Interval
-from studies.effects import Parameter
+from studies.effects import Effect, Parameter
 from studies.inference.causes import parameters_of
 from studies.inference.diagnosis import Inference
 from studies.inference.model import Term
@@ -51,7 +51,16 @@ def entry_of(found: Inference, k: int) -> dict[str, Any]:
         sd = spread_of_shape(shapes[key], known) if key in shapes else WIDER * known.sd
         if sd > 0 and isinstance(numbers.get(key), float):
             numbers[key] = {"value": numbers[key], "sd": float(sd)}
-    return {"name": effect.name, "response": term.response, **numbers}
+    return {"name": effect.name, "response": term.response, **_date(found, effect), **numbers}
+
+
+def _date(found: Inference, effect: Effect) -> dict[str, str]:
+    """From when an effect counts its time: the start of the first run, where all runs say theirs."""
+    starts = [record.start for record in found.campaign.records]
+    known = [start for start in starts if start is not None]
+    return (
+        {"since": min(known, key=lambda one: one.timestamp()).isoformat()} if effect.dated and known == starts else {}
+    )
 
 
 def spread_of_shape(parameter: Parameter, known: Interval) -> float:

@@ -5,8 +5,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from compensation.lines import Line
-from studies.calibration.estimates import SILENT
-from studies.calibration.priors import from_standard
+from studies.calibration.estimates import SILENT, over_the_wave
+from studies.calibration.priors import from_standard, to_standard
 from studies.diagnosis.constants import CONSTANTS
 from studies.diagnosis.response import RESPONSES
 from studies.diagnosis.verdict import (
@@ -62,14 +62,17 @@ def skipped_results(campaign: Campaign) -> dict[str, ResponseResult]:
 
 def shifts_of(model: Background) -> list[Shift]:
     """Return the values of the card that the data determine or have moved, with 90 % intervals."""
-    priors, (mean, C) = model.linear.problem.priors, model.posterior
-    count = len(priors.values)
-    z, cov = priors.standard(mean[:count]), priors.covariance(C)
-    at, out = priors.at(mean[:count]), []
-    for value, own, sd in zip(priors.values, z, np.sqrt(np.diag(cov)), strict=True):
-        low, high = (from_standard(value, own + side * NINETY * sd) for side in (-1.0, 1.0))
-        if sd < SILENT or abs(own) > FAR:
-            out.append(Shift(value.name, value.value, at[value.name], min(low, high), max(low, high), float(own)))
+    priors, posterior = model.linear.problem.priors, model.posterior
+    polar, best, _, C = over_the_wave(priors, *posterior)
+    at, out = priors.at(best), []
+    for k, (value, z, sd) in enumerate(
+        zip(priors.values, priors.standard(best), np.sqrt(np.diag(priors.covariance(C))), strict=True)
+    ):
+        low, high = (from_standard(value, z + side * NINETY * sd) for side in (-1.0, 1.0))
+        if k in polar:
+            low, high, sd, z = polar[k].low, polar[k].high, polar[k].width, to_standard(value, polar[k].value)
+        if sd < SILENT or abs(z) > FAR:
+            out.append(Shift(value.name, value.value, at[value.name], min(low, high), max(low, high), float(z)))
     return out
 
 

@@ -104,6 +104,14 @@ class Record:
         return f"Record({self.path or self.instrument or 'in memory'!s}, {len(self)} rows{span}: {', '.join(self.columns)})"
 
     @property
+    def moment(self) -> float | None:
+        """When it starts, s, POSIX, where it says so."""
+        try:
+            return None if self.start is None else self.start.timestamp()
+        except (OverflowError, OSError):
+            return None
+
+    @property
     def notes(self) -> list[str]:
         """What the header says of the record, a line each."""
         said = {"instrument": _one_line(self.instrument), "source": _one_line(self.source)}
@@ -145,14 +153,9 @@ def with_bias(record: Record) -> Record:
 
 def place_in_time(records: Sequence[Record]) -> tuple[list[float], bool]:
     """Return when each run starts (s) since the first of them, and whether the records say so; else one follows the other."""
-    starts = [record.start for record in records]
-    if all(start is not None for start in starts):
-        try:
-            moments = [start.timestamp() for start in starts if start is not None]
-        except (OverflowError, OSError):
-            moments = []
-        if len(set(moments)) == len(records):
-            return [moment - min(moments) for moment in moments], True
+    moments = [moment for record in records if (moment := record.moment) is not None]
+    if len(set(moments)) == len(records):
+        return [moment - min(moments) for moment in moments], True
     offsets, now = [], 0.0
     for record in records:
         offsets.append(now)

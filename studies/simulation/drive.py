@@ -50,6 +50,7 @@ class Drive:
     commands: Mapping[str, Array] = field(default_factory=dict)
     shift: float = 0.0  # how much later than its profile says the boundary changes: the clock of a chamber
     start: float = 0.0  # since the start of the first run of the campaign
+    moment: float | None = None  # s, POSIX: of the first row, where the record says it
     rate: Array | None = None  # array (N,), rad/s, or None: That is applied, at the rows
     source: str = ""  # file that the commands and the rate are from
     # How much later (s) single jumps of the profile are, in their order from 0: between which two rows they were is all
@@ -188,7 +189,13 @@ def drive_by_record(record: Record, boundary: Boundary | None = None, time: Arra
     if RATE in record and np.isfinite(record[RATE]).all():
         turned = np.radians(record[RATE] if time is None else np.interp(time, rows, record[RATE]))
     return Drive(
-        rows if time is None else time, boundary, Profile(t, T), commands=commands, rate=turned, source=record.path
+        rows if time is None else time,
+        boundary,
+        Profile(t, T),
+        moment=record.moment,
+        commands=commands,
+        rate=turned,
+        source=record.path,
     )
 
 

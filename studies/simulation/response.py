@@ -28,6 +28,7 @@ from thermal.sweeping import cubic
 if TYPE_CHECKING:
     from shell.law import FrequencyLaw
     from studies.instrument.card import Instrument
+    from studies.instrument.tables.effect import EffectEntry
     from studies.loss.damping_law import DampingLaw
 
 
@@ -144,6 +145,11 @@ def check_loss(instrument: "Instrument", inverse_q: Array) -> None:
         raise InputError(f"{instrument.path} [loss]: 1/Q becomes negative here; correct its slope or curvature.")
 
 
+def begun_in(effect: "EffectEntry", drive: Drive) -> float:
+    """Time of an effect (s) at the start of a run: since its date, where both have one, else since the first run of the campaign."""
+    return drive.start if effect.since is None or drive.moment is None else max(drive.moment - effect.since, 0.0)
+
+
 def _apply_effects(
     instrument: "Instrument", drive: Drive, housing: Array, resonator: Array, rate: Array, tau: float
 ) -> Mapping[str, Array]:
@@ -173,5 +179,7 @@ def _apply_effects(
         **driven,
     )
     with naming(f"{instrument.path} [[effect]]"):
-        changes = apply_effects([(one.name, one.response, one.parameters) for one in instrument.effects], states)
+        changes = apply_effects(
+            [(one.name, one.response, one.parameters, begun_in(one, drive)) for one in instrument.effects], states
+        )
     return changes if even is time else {name: np.interp(time, even, values) for name, values in changes.items()}

@@ -1,5 +1,6 @@
 """A card and a drive become a record: the prediction of the one forward model, read with sensor, noise and rounding."""
 
+import datetime
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -120,6 +121,7 @@ def simulate_run(
         columns,
         instrument=instrument.name,
         source=f"simulated, rate {rate:g} Hz, " + (f"seed {seed}" if noise else "without noise"),
+        start=None if drive.moment is None else datetime.datetime.fromtimestamp(drive.moment, datetime.UTC),
         resolution={name: step for name, step in resolution.items() if step > 0},
     )
     warnings = idle_effects(instrument, drive)
@@ -167,11 +169,16 @@ def _observe(
 
 
 def idle_effects(instrument: "Instrument", drive: Drive) -> tuple[str, ...]:
-    """Name the effects whose drive (amplitude, voltage, quadrature) the run does not have; an azimuth it always has."""
+    """Name the effects whose drive (amplitude, voltage, quadrature) the run does not have, an azimuth it always has, and those whose time it does not know."""
     if not instrument.effects:
         return ()
-    return tuple(
+    found = [
         f"the effect '{effect.name}' does not act in this run, which lacks its drive ({', '.join(find_effect(effect.name).needs)})."
         for effect in instrument.effects
         if any(need not in (*drive.commands, "pattern_angle") for need in find_effect(effect.name).needs)
-    )
+    ]
+    for effect in instrument.effects:
+        if effect.since is not None and (drive.moment is None or drive.moment < effect.since):
+            why = "says no '# start'" if drive.moment is None else "is from before"
+            found.append(f"the effect '{effect.name}' has a date (since) and the run {why}: it begins with the run.")
+    return tuple(found)

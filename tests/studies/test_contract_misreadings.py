@@ -17,8 +17,9 @@ from studies.instrument.card import load_card, save_card
 from studies.record import Record, drop_repeats
 from studies.record.plausible import records_of_one_gyro
 from studies.record.rest import check_temperatures
+from studies.resonator.law import law_of
 from studies.simulation.chamber import load_profile
-from studies.simulation.drive import drive_by_record
+from studies.simulation.drive import drive_by_profile, drive_by_record
 from studies.simulation.virtual_gyro import simulate_run
 from studies.workbench import diagnose
 
@@ -68,6 +69,19 @@ def test_a_right_record_and_one_of_a_card_somewhat_off_are_not_questioned(card, 
     check_readings(card.with_values({stiff.name: 3.0 * stiff.sd, "thermal.mount_conductance_W_per_K": 0.007}), [record])
     flat = spoilt(record, frequency_Hz=lambda f: 4432.0 + 1e-3 * np.random.default_rng(1).standard_normal(f.size))
     check_readings(card, [flat])
+
+
+def test_a_metal_of_a_likely_slope_and_a_start_that_is_not_settled_are_not_read_in_fahrenheit(card):
+    """A slope within 1.4 of its standard deviations is 5/9 of the card's; the resonator had not settled yet."""
+    metal = load_card("cvg-25mm")
+    device = metal.with_values({"material.deviation.youngs_modulus.log_slope_per_K": -8e-6})
+    profile = load_profile("step 20 60 2h then step 60 -20 3h")
+    check_readings(metal, [simulate_run(device, profile, 1 / 60, 1).record])
+    early = drive_by_profile(load_profile("step 40 20 1h"), np.arange(0.0, 3600.0, 60.0))
+    run = simulate_run(
+        card, dataclasses.replace(early, initial={"resonator": -9.0, "base": -9.0}), 1 / 60, 1, law=law_of(card)
+    ).record
+    check_readings(card, [run])
 
 
 def test_a_bias_in_degrees_per_second_is_refused_before_the_fit(card, record):

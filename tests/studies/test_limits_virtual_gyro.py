@@ -1,5 +1,6 @@
 """The virtual gyro against its parts: shell solver, heat path, bias formula, record contract."""
 
+import datetime
 from dataclasses import replace
 
 import allantools
@@ -10,7 +11,7 @@ from compensation.noise import Noise
 from shell.elastic import VaryingElastic
 from shell.modes import solve_modes
 from studies.errors import InputError
-from studies.instrument.card import load_card, shipped_cards
+from studies.instrument.card import load_card, save_card, shipped_cards
 from studies.instrument.tables.bias import Bias
 from studies.instrument.tables.loss import Loss
 from studies.instrument.tables.noise import NoiseKeys
@@ -185,6 +186,28 @@ def test_an_effect_of_the_card_is_added(card, law):
     rated = run(card.with_table("effect", jump), law, noise=False).record
     rate = np.gradient(plain["resonator_temperature_degC"])
     assert rated["bias_deg_per_h"] - plain["bias_deg_per_h"] == pytest.approx(100 * rate, abs=2e-3)
+
+
+def test_an_ageing_with_a_date_goes_on_from_it(card, law, tmp_path):
+    """Once every run began as new: a leak was wrong by 89 times the noise three days later."""
+    aged = card.with_table("effect", [{"name": "clock-drift", "drift_Hz_per_day": 0.5, "since": "2026-03-01T12:00:00"}])
+    save_card(aged, tmp_path / "card.toml")
+    aged = load_card(str(tmp_path / "card.toml"))
+    plain = run(card, law, "soak 20 1h", noise=False)
+    for start, days in (
+        (None, 0.0),
+        ("2026-03-01T12:00:00", 0.0),
+        ("2026-03-05T18:00:00", 4.25),
+        ("2026-02-28T12:00:00", 0.0),
+    ):
+        moment = None if start is None else datetime.datetime.fromisoformat(start).timestamp()
+        later = simulate_run(aged, replace(plain.prediction.drive, moment=moment), noise=False, law=law)
+        grown = later.record["frequency_Hz"] - plain.record["frequency_Hz"]
+        assert grown == pytest.approx(0.5 * (days + later.record["time_s"] / 86400), abs=2e-6)
+        assert (later.record.moment or None) == moment
+        assert len(later.warnings) == (start is None or start.startswith("2026-02"))
+    with pytest.raises(InputError, match=r"since must be an ISO 8601 time such as 2026-01-31T12:00:00, not 'today'"):
+        card.with_table("effect", [{"name": "clock-drift", "drift_Hz_per_day": 0.5, "since": "today"}])
 
 
 def test_an_effect_whose_drive_stays_is_named(card, law):

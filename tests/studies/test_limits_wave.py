@@ -28,7 +28,7 @@ def test_length_and_axis_are_what_draws_that_agree_with_the_data_say(priors, x, 
     seen = (A * np.cos(axis * PER_DEGREE) - mean) / spread_a
     weight = np.exp(-(((seen - x) / sd) ** 2) / 2)
     information = np.diag([1 / sd**2, 0.0])
-    found = wave.posterior(information, np.linalg.solve(information + np.eye(2), information @ [x, 0.0]))
+    found = wave.posterior(information, np.linalg.solve(information + np.eye(2), information @ [x, 0.0]), np.eye(2))
     for one, values in ((found.length, A), (found.axis, axis)):
         order = np.argsort(values)
         total = np.cumsum(weight[order]) / weight.sum()

@@ -8,6 +8,7 @@ from scipy.stats import chi2
 
 from studies.calibration.ahead import spread_of_prediction
 from studies.calibration.calibrate import calibrate
+from studies.calibration.estimates import over_the_wave
 from studies.calibration.observed import HOUSING, SETTLED, read_settled
 from studies.calibration.priors import gather_priors, to_standard
 from studies.errors import InputError
@@ -54,18 +55,18 @@ def found(card, records):
 
 @pytest.mark.slow
 def test_a_saved_card_states_of_a_run_what_the_fit_knows(found, tmp_path):
-    """1 − ρ² of two values that only their sum tells was once lost in the digits of a card: it stated up to twice the spread."""
+    """1 − ρ² of two values that only their sum tells was once lost in the digits of a card, and what offset and anisotropy have in common wholly."""
     save_card(found.instrument, tmp_path / "card.toml")
     saved = load_card(str(tmp_path / "card.toml"))
     profile = load_profile(UNSEEN)
     drive = drive_by_profile(profile, rows_of(profile, 1 / 300))
     priors = found.fit.problem.priors
-    count = len(priors.names)
-    predicted = predict(found.instrument, drive, priors.names)
-    J = np.column_stack([predicted.derivatives[name]["frequency_Hz"] for name in priors.names])
-    J = J @ priors.slopes(found.fit.point[:count])
-    known = np.sqrt(np.einsum("ij,jk,ik->i", J, found.fit.covariance[:count, :count], J))
-    np.testing.assert_allclose(spread_of_prediction(saved, drive)["frequency_Hz"], known, rtol=0.02)
+    _, best, _, C = over_the_wave(priors, found.fit.point, found.fit.covariance)
+    predicted, spread = predict(found.instrument, drive, priors.names), spread_of_prediction(saved, drive)
+    for name, turn_on in (("frequency_Hz", 0.0), ("bias_deg_per_h", saved.noise.bias_turn_on_deg_per_h)):
+        J = np.column_stack([predicted.derivatives[one][name] for one in priors.names]) @ priors.slopes(best)
+        known = np.hypot(np.sqrt(np.einsum("ij,jk,ik->i", J, C, J)), turn_on)
+        np.testing.assert_allclose(spread[name], known, rtol=0.02)
 
 
 @pytest.mark.slow

@@ -24,6 +24,7 @@ def grid(span: Span, response: str) -> list[tuple[float, ...]]:
 
 EFFECT = Effect(
     name="ageing",
+    dated=True,
     summary="the response drifts with time and slows down: relaxation of glass, bond or coating",
     source="logarithmic and exponential ageing, Vig and Meeker, Proc. 45th Frequency Control Symposium (1991) 77",
     isolate="repeat one run days later at the same temperature, against a reference clock",

@@ -11,6 +11,7 @@ def columns(states: States, shape: Shape, response: str) -> FloatArray:
 
 EFFECT = Effect(
     name="clock-drift",
+    dated=True,
     summary="the clock that counts the frequency drifts",
     source="f_measured = f (1 + c t)",
     isolate="count the same frequency with a reference clock (column reference_frequency_Hz)",

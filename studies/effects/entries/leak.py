@@ -28,6 +28,7 @@ def grid(span: Span, response: str) -> list[tuple[float, ...]]:
 
 EFFECT = Effect(
     name="leak",
+    dated=True,
     summary="gas leaks into the housing: the damping grows with time",
     source="free molecular gas damping, Christian, Vacuum 16 (1966) 175; diffusion-limited outgassing ∝ t^-1/2, O'Hanlon",
     isolate="store the gyro warm for a known time and repeat the run; heat the getter",

@@ -55,6 +55,7 @@ HARMONICS = (1.0, 0.3, 0.1)
 
 EFFECT = Effect(
     name="periodic",
+    dated=True,
     summary="a disturbance of one period: an air conditioner, a table, a beat of two clocks",
     source="harmonic regression",
     isolate="change the period of the chamber's control, or let the table turn at a known rate",

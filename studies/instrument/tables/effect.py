@@ -3,6 +3,7 @@
 An entry has the effect's whole shape and at least one coefficient; all are exact unless the card states otherwise.
 """
 
+import datetime
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -25,6 +26,8 @@ class EffectEntry:
     name: str
     response: str
     parameters: Mapping[str, float | list[float]]
+    since: float | None = None
+    """s, POSIX: from when it counts its time."""
 
 
 def keys_of(raw: Mapping[str, Any], where: str) -> Any:
@@ -48,6 +51,9 @@ def _declare(effect: "Effect", response: str) -> Any:
         ("name", Annotated[str, says("hrg effects lists names, parameters and bounds", example=effect.name)]),
         ("response", Annotated[Literal[effect.responses], says("what it changes")], effect.responses[0]),
     ]
+    if effect.dated:
+        meaning = "from when it counts its time, where the run says when it starts; else it begins with the run"
+        fields.append(("since", Annotated[str, says(meaning, example="2026-01-31T12:00:00")], ""))
     for shape in effect.shape:
         kind = Annotated[float, number(shape.meaning, least=shape.low, most=shape.high)]
         fields.append((shape.name, kind, shape.low) if shape.steady else (shape.name, kind))
@@ -64,6 +70,7 @@ def _declare(effect: "Effect", response: str) -> Any:
     def check(entry: Any) -> None:
         if all(getattr(entry, key) is None for key in coefficients):
             raise ValueError(f"the effect '{effect.name}' needs a coefficient; add {' or '.join(coefficients)}.")
+        _moment(getattr(entry, "since", ""))
 
     return msgspec.defstruct(
         "Entry", fields, bases=(Keys,), namespace={"__post_init__": check}, frozen=True, kw_only=True
@@ -72,8 +79,16 @@ def _declare(effect: "Effect", response: str) -> Any:
 
 def build_entry(keys: Any, place: CardPlace) -> EffectEntry:
     """Return an entry without the parameters that it leaves out."""
-    given = {key: getattr(keys, key) for key in keys.__struct_fields__ if key not in ("name", "response")}
-    return EffectEntry(keys.name, keys.response, {key: value for key, value in given.items() if value is not None})
+    given = {key: getattr(keys, key) for key in keys.__struct_fields__ if key not in ("name", "response", "since")}
+    parameters = {key: value for key, value in given.items() if value is not None}
+    return EffectEntry(keys.name, keys.response, parameters, _moment(getattr(keys, "since", "")))
+
+
+def _moment(date: str) -> float | None:
+    try:
+        return datetime.datetime.fromisoformat(date).timestamp() if date else None
+    except (ValueError, OverflowError, OSError):
+        raise ValueError(f"since must be an ISO 8601 time such as 2026-01-31T12:00:00, not '{date}'.") from None
 
 
 TABLE = CardTable("effect", part="effects", build=build_entry, keys_of=keys_of)

@@ -12,6 +12,12 @@ class Correlations(Keys, frozen=True, kw_only=True):
     names: Annotated[tuple[str, ...], says("keys of the card with an uncertainty")] = ()
     correlation: Annotated[tuple[tuple[float, ...], ...], says("of their normal coordinates")] = ()
     interval: Annotated[tuple[tuple[float, float], ...], says("90 %, in the unit of each key")] = ()
+    anisotropy_sd: Annotated[
+        tuple[float, float] | None,
+        says(
+            "of the components of bias.damping_anisotropy along its axis and across it, which the correlations of length and axis then mean"
+        ),
+    ] = None
     note: Note = ""
 
     def __post_init__(self) -> None:

@@ -193,8 +193,8 @@ def test_static_effects_see_the_temperature_that_thermal_effects_leave():
     from dataclasses import replace
 
     states = make_states()
-    warm = ("self-heating", "frequency_Hz", {"heating_K_per_V2": 3.0})
-    rate = ("rate-bias", "bias_deg_per_h", {"coefficient_deg_per_h_per_K_per_s": 100.0})
+    warm = ("self-heating", "frequency_Hz", {"heating_K_per_V2": 3.0}, 0.0)
+    rate = ("rate-bias", "bias_deg_per_h", {"coefficient_deg_per_h_per_K_per_s": 100.0}, 0.0)
     changes = apply_effects([rate, warm], states)
     _, warmer = apply_effect(warm[0], warm[2], states)
     assert np.allclose(changes["resonator_temperature"], warmer)
