@@ -15,7 +15,7 @@ class InputError(ValueError):
 
 
 class MissingEnvironment(RuntimeError):
-    """Something that the machine lacks (an extra, the right packages, room on the disk); exit status 3."""
+    """Something that the machine lacks (OpenGL, an extra, the right packages); exit status 3."""
 
 
 UNUSABLE_INPUT = (InputError, ShellError, ThermalError, CompensationError)

@@ -26,7 +26,7 @@ def sketch_pages(patch: Any) -> dict[str, Any]:
 
     sketches = {
         "studies.results.page.draw": sketch,
-        "studies.reports.scenes.render_png": lambda shown: PIXEL,
+        "studies.reports.scenes.draw_still": lambda shown: PIXEL,
         "studies.reports.live.MOST_AXES": 1,
     }
     whole = {}

@@ -21,9 +21,14 @@ OPTIONAL = (
 
 @answers("hrg.doctor/1")
 def doctor() -> Result:
-    """Show versions and the optional parts, and how to install what is missing; exit status 3 when a package is missing."""
+    """Show versions, OpenGL and the optional parts, and how to install what is missing.
+
+    Exit status 3 when pictures cannot be drawn.
+
+    """
     from importlib.metadata import PackageNotFoundError, version
 
+    from shell.render import can_draw
     from studies.cli.guard import PACKAGES, package_home
 
     def installed(name: str, missing: tuple[bool, str, str]) -> tuple[str, bool, str, str]:
@@ -35,6 +40,8 @@ def doctor() -> Result:
     checks = [("Python", True, platform.python_version(), "")]
     checks += [installed(name, (False, "missing", f"pip install {name}")) for name in NEEDED]
     checks += [(f"package '{name}'", True, str(package_home(name)), "") for name in PACKAGES]
+    drawn, remedy = can_draw()
+    checks.append(("OpenGL", drawn, "pictures can be drawn" if drawn else "no pictures", remedy))
     compiler = shutil.which("cc")
     needed = "" if compiler else "needed only to compile code that 'hrg twin', 'hrg derive' and models emit"
     checks.append(("C compiler", True, compiler or "not found (optional)", needed))
@@ -47,7 +54,7 @@ def doctor() -> Result:
     return Result(
         {"healthy": healthy, "checks": described},
         "Environment",
-        "Versions and optional parts.",
+        "Versions, OpenGL and optional parts.",
         [Table("Environment", rows, "name: part | state | found | remedy")],
         status=0 if healthy else 3,
     )

@@ -8,11 +8,10 @@ from cyclopts import Parameter
 
 from shell.constants import zero_Celsius
 from shell.mesh import encode_animation, encode_mesh
-from shell.render import View, render_animation, render_png
 from shell.scene import EXAGGERATION
 from studies.cli.arguments import MANY, WHOLE, Out, Theory, ending_of
 from studies.cli.output import answers
-from studies.errors import InputError
+from studies.errors import InputError, MissingEnvironment
 from studies.files.writing import written_whole
 from studies.instrument.card import load_card
 from studies.progress import tell
@@ -21,6 +20,7 @@ from studies.results import Blocks, Chapter, Result, Sentence, Table, row_of
 from studies.results.page import render_result
 
 KINDS = (".png", ".webp", ".gif", ".html", ".glb", ".stl", ".ply")
+View = Literal["oblique", "axis", "side"]
 HIDDEN = Parameter(show_default=False)
 MOST = 4  # resonators in one picture
 MODE = "harmonic: n | index | frequency_Hz: f (Hz) .4f"
@@ -46,6 +46,7 @@ def render(
     A card with an imperfection shows the slower mode of the split pair on its axis, its imperfections exaggerated in
     pictures and to scale in .stl and .ply; lines across the rim are the axes of the slower (blue) and the faster mode (orange).
     Several cards, or one card at several temperatures, stand side by side in pictures and animations on one scale.
+    A PNG, WebP or GIF needs OpenGL; without it the exit status is 3 and the message says what to install.
 
     Args:
         card: Cards by path, or the names of built-in ones (hrg cards).
@@ -104,10 +105,16 @@ def _solve(
 def _picture(
     shown: Sequence[ModeScene], kind: str, colour: Colour, field: ShellTemperature | None, view: View
 ) -> bytes:
+    from shell.render import NoOpenGL, render_animation, render_png
+
     scenes = [one.scene(colour, field) for one in shown]
-    if kind == ".png":
-        return render_png(scenes, view)
-    return render_animation(scenes, "webp" if kind == ".webp" else "gif", view, progress=partial(tell, "drawing"))
+    try:
+        if kind == ".png":
+            return render_png(scenes, view)
+        told = partial(tell, "drawing")
+        return render_animation(scenes, "webp" if kind == ".webp" else "gif", view, progress=told)
+    except NoOpenGL as error:
+        raise MissingEnvironment(f"{error} An .html page or a mesh needs none.") from None
 
 
 def _page(shown: Sequence[ModeScene]) -> bytes:

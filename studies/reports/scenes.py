@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from compensation.arrays import Array
 from shell.constants import zero_Celsius
 from shell.layout import Theory
-from shell.render import render_png
 from shell.resonator import Resonator
 from shell.scene import Scene, compose_scene
+from shell.still import draw_still
 from shell.surface import Surface, build_surface
 from studies.errors import InputError
 from studies.instrument.card import Instrument
@@ -199,6 +199,6 @@ def view_blocks(shown: Sequence[ModeScene], remark: str = "") -> "list[Block]":
     alt = f"The resonator with its rim bent into {lobes} lobes, nodes between them."
     splits = [None if one.split is None else Drawn(one.split, one.imperfection, one.exaggeration) for one in shown]
     view = view_modes(
-        first.resonator, [one.mode for one in shown], first.title, render_png(first.scene()), alt, caption, splits
+        first.resonator, [one.mode for one in shown], first.title, draw_still(first.scene()), alt, caption, splits
     )
     return [view]

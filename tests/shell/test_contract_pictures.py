@@ -1,6 +1,8 @@
-"""Pictures: what is drawn is counted in the pixels."""
+"""Pictures: what is drawn is counted in the pixels; without OpenGL there is a sentence, never a crash."""
 
 import io
+import subprocess
+import sys
 from dataclasses import replace
 from functools import lru_cache
 
@@ -8,13 +10,15 @@ import numpy as np
 import pytest
 from PIL import Image
 
+import shell.render
 from shell.elastic import Elastic
 from shell.errors import ShellError
 from shell.meridian import hemisphere
 from shell.modes import solve_modes
-from shell.render import render_animation, render_png
+from shell.render import NoOpenGL, can_draw, render_animation, render_png
 from shell.resonator import Stem
 from shell.scene import compose_scene
+from shell.still import draw_still
 from shell.surface import build_surface
 
 RESONATOR = hemisphere(15e-3, 0.9e-3, support="stem", stem=Stem(2.5e-3, -5e-3, 0.5e-3))
@@ -54,7 +58,14 @@ def count_clusters(angles, gap=0.15):
 
 
 @pytest.fixture(scope="module")
-def drawn():
+def opengl():
+    draws, remedy = can_draw()
+    if not draws:
+        pytest.skip(remedy)
+
+
+@pytest.fixture(scope="module")
+def drawn(opengl):
     """The axial view of n = 2, swinging and at rest, side by side in one picture."""
     row = pixels(render_png(plain_pair(2), "axis", 500, 500))[:400]  # without the legend below
     return row[:, :500], row[:, 500:]
@@ -75,10 +86,17 @@ def nodal_lines(swinging, rest):
     return count_clusters(angle[ring])
 
 
+@pytest.mark.slow
 def test_nodal_lines_in_the_picture_are_2n(drawn):
     assert nodal_lines(*drawn) == 4
 
 
+def test_nodal_lines_of_a_still_are_2n():
+    swinging, rest = (pixels(draw_still(scene, "axis", 500, 500))[40:410] for scene in plain_pair(3))
+    assert nodal_lines(swinging, rest) == 6
+
+
+@pytest.mark.slow
 def test_the_drawn_rim_crosses_the_circle_at_rest_2n_times(drawn):
     swinging, rest = drawn
     rows, columns = np.nonzero(is_body(rest))
@@ -92,6 +110,7 @@ def test_the_drawn_rim_crosses_the_circle_at_rest_2n_times(drawn):
     assert int((told != np.roll(told, 1)).sum()) == 4
 
 
+@pytest.mark.slow
 def test_the_rim_shows_the_thickness_and_the_stem(drawn):
     _, rest = drawn
     rows, columns = np.nonzero(is_body(rest))
@@ -107,9 +126,14 @@ def test_the_rim_shows_the_thickness_and_the_stem(drawn):
         assert abs(distance - expected).min() < 2 * pixel
 
 
-def test_animations_loop_and_move():
+@pytest.mark.slow
+@pytest.mark.usefixtures("opengl")
+def test_animations_loop_and_move(monkeypatch):
+    scene = scene_of(2)
+    pictures = shell.render._draw(scene, "oblique", (160, 140), [1.0, 0.0, -1.0, 0.0])
+    monkeypatch.setattr(shell.render, "_draw", lambda *_: pictures)
     for kind in ("gif", "webp"):
-        picture = Image.open(io.BytesIO(render_animation(scene_of(2), kind, width=160, height=140, frames=4)))
+        picture = Image.open(io.BytesIO(render_animation(scene, kind, frames=4)))
         frames = []
         for k in range(picture.n_frames):
             picture.seek(k)
@@ -121,3 +145,32 @@ def test_animations_loop_and_move():
 def test_an_unknown_view_is_refused():
     with pytest.raises(ShellError, match="oblique, axis, side"):
         render_png(scene_of(2), "above")
+
+
+@pytest.mark.parametrize("status", [-11, 139, 1])
+def test_a_child_that_dies_gives_the_remedy(monkeypatch, status):
+    def die(command, **_):
+        return subprocess.CompletedProcess(command, status)
+
+    monkeypatch.setattr(subprocess, "run", die)
+    drawn, remedy = can_draw()
+    assert not drawn
+    assert "apt install libegl1" in remedy
+
+
+def test_a_child_that_hangs_is_stopped(monkeypatch):
+    def hang(command, timeout, **_):
+        raise subprocess.TimeoutExpired(command, timeout)
+
+    monkeypatch.setattr(subprocess, "run", hang)
+    with pytest.raises(NoOpenGL, match="stopped"):
+        render_png(scene_of(2))
+
+
+def test_a_real_child_that_is_killed_does_not_take_us_along(monkeypatch, tmp_path):
+    killer = tmp_path / "killer"
+    killer.write_text("#!/bin/sh\nkill -SEGV $$\n")
+    killer.chmod(0o755)
+    monkeypatch.setattr(shell.render.sys, "executable", str(killer))
+    assert can_draw()[0] is False
+    assert sys.executable == str(killer)

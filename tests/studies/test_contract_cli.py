@@ -121,6 +121,7 @@ def test_what_a_file_says_cannot_act_on_the_terminal(tmp_path, refuse):
 def test_doctor_looks_for_the_package_of_the_cluster_and_not_for_a_program(capsys, monkeypatch):
     pytest.importorskip("distributed", reason="the extra 'cluster' (dask[distributed]) is not installed")
     monkeypatch.setenv("PATH", "")
+    monkeypatch.setattr("shell.render.can_draw", lambda: (True, ""))
     main(["doctor", "--json"])
     (found,) = [one for one in json.loads(capsys.readouterr().out)["checks"] if one["name"] == "distributed"]
     assert found["found"] == version("distributed")

@@ -1,12 +1,11 @@
 """`hrg render`: every kind of file, side by side, colours with units, and the exits that a user can mend."""
 
-from functools import partial
+import subprocess
+import sys
 
 import numpy as np
 import pytest
-from PIL import Image
 
-from shell.surface import build_surface
 from studies.cli import main
 from studies.errors import InputError
 from studies.instrument.card import load_card
@@ -17,16 +16,20 @@ def hrg_render(*words):
     return main(["render", *(str(word) for word in words)])
 
 
-@pytest.mark.parametrize(("ending", "count"), [("png", 1), ("webp", 24), ("gif", 24)])
-def test_a_picture_or_an_animation_is_written(tmp_path, ending, count, monkeypatch):
-    file = tmp_path / f"mode.{ending}"
-    monkeypatch.setattr("studies.reports.scenes.build_surface", partial(build_surface, spacing=2e-3, count=32))
-    assert hrg_render("free-dome", "--theory", "shell", "--out", file) == 0
-    with Image.open(file) as picture:
-        assert (picture.n_frames if count > 1 else 1) == count
+@pytest.fixture
+def no_opengl(monkeypatch, drawn):
+    """A machine whose child process cannot draw."""
+    monkeypatch.setattr("shell.render._run_child", lambda *_: None)
 
 
-def test_a_page_has_its_view_and_a_still_picture(tmp_path, drawn):
+@pytest.mark.parametrize("ending", ["png", "webp", "gif"])
+def test_without_opengl_a_picture_is_status_3_and_nothing_is_left(tmp_path, capsys, no_opengl, ending):
+    assert hrg_render("free-dome", "--theory", "shell", "--out", tmp_path / f"mode.{ending}") == 3
+    assert "apt install libegl1" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_without_opengl_the_page_has_its_view_and_a_still_picture(tmp_path, no_opengl):
     page = tmp_path / "mode.html"
     assert hrg_render("free-dome", "--theory", "shell", "--harmonic", "2", "3", "--out", page) == 0
     text = page.read_text()
@@ -67,3 +70,13 @@ def test_the_strain_energy_of_the_picture_is_that_of_the_solver():
     mean = float((surface.energy[surface.triangles].mean(axis=1) * areas).sum() / areas.sum())
     # pure bending: the mean through the thickness is a third of the faces'; membrane strain makes it more
     assert 1.0 < mean * volume / energy < 3.2
+
+
+def test_the_drawing_process_ends_with_the_one_that_wants_it(tmp_path):
+    """Where the parent was killed its end of the pipe closes: no process and no folder stay behind."""
+    folder = tmp_path / "job"
+    folder.mkdir()
+    child = [sys.executable, "-m", "shell.render", str(folder)]
+    done = subprocess.run(child, stdin=subprocess.DEVNULL, capture_output=True, timeout=600, check=False)
+    assert done.returncode == 1
+    assert not folder.exists()
