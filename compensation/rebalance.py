@@ -134,9 +134,9 @@ def settle_rebalance(
     )
 
 
-def leak_quadrature(quadrature: ArrayLike, phase: ArrayLike, coupling: float = 1.0) -> Array:
-    """Rate error (rad/s) by which the quadrature force leaks into the rate channel, ε q/(n k); the loop indicates its negative."""
-    return np.asarray(np.asarray(quadrature) * np.asarray(phase) / coupling)
+def leak_quadrature(quadrature: ArrayLike, phase: ArrayLike) -> Array:
+    """Rate error (rad/s) by which the quadrature force leaks into the rate channel, ε q/(n k), times n k; the loop indicates its negative."""
+    return np.asarray(np.asarray(quadrature) * np.asarray(phase))
 
 
 def samples_in_row(time: Array, loops: Loops) -> int:

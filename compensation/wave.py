@@ -104,9 +104,9 @@ def see_across(angle: ArrayLike, axis: ArrayLike, harmonic: int = 2) -> Array:
     return np.asarray(np.sin(2 * harmonic * (np.asarray(angle, dtype=float) - np.asarray(axis, dtype=float))))
 
 
-def see_along(angle: ArrayLike, axis: ArrayLike, harmonic: int = 2) -> Array:
-    """Cos 2n(θ − θ_axis): its effect on the decay or frequency of the wave."""
-    return np.asarray(np.cos(2 * harmonic * (np.asarray(angle, dtype=float) - np.asarray(axis, dtype=float))))
+def see_along(angle: ArrayLike, axis: ArrayLike) -> Array:
+    """Cos 2n(θ − θ_axis), n = 2: its effect on the decay or frequency of the wave."""
+    return np.asarray(np.cos(4 * (np.asarray(angle, dtype=float) - np.asarray(axis, dtype=float))))
 
 
 def feign_rate(across: ArrayLike, harmonic: int, bryan_factor: float) -> Array:

@@ -157,9 +157,9 @@ class Electrodes:
         """df/dV when all voltages change together by the same volts, over f, 1/V."""
         return float(2 * self.per_square_volt[0] @ self.voltages)
 
-    def per_kelvin(self, gap_expansion: float, voltage_slope: float = 0.0) -> float:
-        """Relative change of f per kelvin by the electrodes alone, from (1/g) dg/dT and (1/V) dV/dT, 1/K."""
-        return float(self.per_square_volt[0] @ self.voltages**2) * (2 * voltage_slope - 3 * gap_expansion)
+    def per_kelvin(self, gap_expansion: float) -> float:
+        """Relative change of f per kelvin by the electrodes alone, from (1/g) dg/dT, 1/K."""
+        return float(self.per_square_volt[0] @ self.voltages**2) * -3 * gap_expansion
 
     def _patch(self, one: Electrode) -> tuple[Array, Array, Array, Array, Array]:
         """Area per radian and w at places along the meridian; azimuths with weights; the gap (places, azimuths)."""

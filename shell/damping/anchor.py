@@ -56,7 +56,7 @@ class Unbalance:
         return 4 * self.joint * first * third
 
 
-def unbalance_loss(mode: Mode, elastic: Elastic | VaryingElastic, base: Elastic | None = None) -> Unbalance:
+def unbalance_loss(mode: Mode, elastic: Elastic | VaryingElastic) -> Unbalance:
     """Loss of a mode n = 2 through its stem, due to an unbalanced rim.
 
     Masses that move with the mode push the motion of n = 1, which reaches the base: of a mass density with the wave k around,
@@ -66,7 +66,7 @@ def unbalance_loss(mode: Mode, elastic: Elastic | VaryingElastic, base: Elastic 
     solution = _solved(mode)
     if solution.system.n != 2:
         raise ShellError("only the first and third harmonics of the rim's mass couple a mode with n = 2 to the stem.")
-    system, waves = _stand(mode, elastic, base, 1)
+    system, waves = _stand(mode, elastic, None, 1)
     assert mode.resonator is not None
     raw = solution.system.constraint @ solution.vector
     radial, around, axial = (float(row @ raw) for row in _rim(mode.resonator, solution.system))

@@ -50,14 +50,14 @@ def read_printed_chain() -> BellChain:
     )
 
 
-def simulate_runs(generator: np.random.Generator, random_walk: float = RANDOM_WALK) -> tuple[BellRun, BellRun, BellRun]:
-    """Return virtual runs with so much white noise (°/√h): rates ±360 °/s at 25 °C, rest and 300 °/s over −45…55 °C."""
+def simulate_runs(generator: np.random.Generator) -> tuple[BellRun, BellRun, BellRun]:
+    """Return virtual runs: rates ±360 °/s at 25 °C, rest and 300 °/s over −45…55 °C."""
     gyro = read_printed_chain()
     sweep = (zero_Celsius + np.linspace(LOWEST, HIGHEST, round(SWEEP / STEP))).astype(np.float64)
     plateaus = np.repeat(np.arange(-360.0, 361.0, 40.0) * DEG, round(DWELL / STEP)).astype(np.float64)
 
     def run(rate: Array, temperature: Array) -> BellRun:
-        white = random_walk * 60 / np.sqrt(STEP) * generator.standard_normal(len(rate))
+        white = RANDOM_WALK * 60 / np.sqrt(STEP) * generator.standard_normal(len(rate))
         wander = WANDER * np.sqrt(STEP / 3600) * np.cumsum(generator.standard_normal(len(rate)))
         noise = (white + wander) / 3600 * DEG / gyro.scale
         time = (STEP * np.arange(len(rate))).astype(np.float64)

@@ -38,7 +38,7 @@ class BellTheory:
     free: PatternRow
 
 
-def compare_bell_theory(card: str = CARD) -> BellTheory:
+def compare_bell_theory() -> BellTheory:
     """Hold the pattern (19), the same without its factor cos(5πφ/φ_b), and one that does not stretch against the solver."""
     from shell.bell_theory import (
         inextensional_functions,
@@ -48,7 +48,7 @@ def compare_bell_theory(card: str = CARD) -> BellTheory:
     )
     from shell.modes import solve_modes
 
-    instrument = load_card(card)
+    instrument = load_card(CARD)
     resonator = instrument.resonator
     elastic = instrument.material.elastic(instrument.reference_temperature)
     patterns = (

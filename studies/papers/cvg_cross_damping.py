@@ -43,12 +43,12 @@ def read_shape() -> Array:
     return np.array([float(row[1]) for row in rows])
 
 
-def make_profile(soak_h: float = 1.0, slope_K_per_min: float = 1.0) -> tuple[Array, Array]:
-    """Return times (s) and chamber temperatures (K) of a usual cycle 20 → 60 → −40 → 20 °C with soaks; figure 1 is a picture only."""
+def make_profile(soak_h: float = 1.0) -> tuple[Array, Array]:
+    """Return times (s) and chamber temperatures (K) of a usual cycle 20 → 60 → −40 → 20 °C at 1 K/min with soaks; figure 1 is a picture only."""
     corners_degC = [20.0, 60.0, -40.0, 20.0]
     time, temperature = [0.0], [corners_degC[0]]
     for corner in corners_degC:
-        ramp = abs(corner - temperature[-1]) / slope_K_per_min * 60
+        ramp = abs(corner - temperature[-1]) * 60
         time += [time[-1] + ramp, time[-1] + ramp + soak_h * 3600]
         temperature += [corner, corner]
     at = np.arange(0.0, time[-1], STEP)
@@ -109,9 +109,9 @@ def _improve(seed: int, lag: float, random_walk: float) -> Change:
     return compare_outputs([second.time], [second.rate], [after]).rows
 
 
-def count_bias_of_printed_values(carrier: float = FREQUENCY) -> float:
+def count_bias_of_printed_values() -> float:
     """Return the bias (rad/s) that the printed ζ₀ would mean as it stands, 2k/g₂ ζ₀: why it is shape only."""
-    return float(2 * np.pi * carrier * read_shape()[0])
+    return float(2 * np.pi * FREQUENCY * read_shape()[0])
 
 
 SOURCES = ("Apostolyuk V., Chikovani V., Temperature error model in Coriolis vibratory gyroscopes: eqs. (1)–(10).",)

@@ -1,11 +1,11 @@
 """Rayleigh's closed form, shell theory and the solid on one free hemisphere: how far apart, and how they close."""
 
 import warnings
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from shell.constants import zero_Celsius
 from shell.elastic import Elastic
 from shell.law import build_law
 from shell.layout import Theory
@@ -41,15 +41,15 @@ class TheoryComparison:
         return float(self.excess / self.ratio**0.5)
 
 
-def compare_theories(ratios: Sequence[float] = RATIOS, n: int = 2) -> list[TheoryComparison]:
+def compare_theories() -> list[TheoryComparison]:
     """Solve the free hemisphere of 15 mm at falling thickness with all three theories."""
     rows = []
-    for ratio in ratios:
+    for ratio in RATIOS:
         dome = hemisphere(RADIUS, ratio * RADIUS)
         # The Rayleigh form is known to be far off the solid for thick shells: that is what is shown here.
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", TheoryRangeWarning)
-            f = [solve_modes(dome, SILICA, n, theory=theory, tolerance=1e-6)[0].frequency for theory in THEORIES]
+            f = [solve_modes(dome, SILICA, theory=theory, tolerance=1e-6)[0].frequency for theory in THEORIES]
         rows.append(TheoryComparison(ratio, *f))
     return rows
 
@@ -60,9 +60,10 @@ def thin_limit(thinner: TheoryComparison, thicker: TheoryComparison) -> float:
     return float((thinner.coefficient * b - thicker.coefficient * a) / (b - a))
 
 
-def slopes_by_theory(ratio: float = 0.06, temperature: float = 293.15) -> dict[str, float]:
-    """Return the slope of ln f at one temperature (1/K) by theory, default silica, free hemisphere."""
-    dome, silica = hemisphere(RADIUS, ratio * RADIUS), find_material("fused-silica")
+def slopes_by_theory() -> dict[str, float]:
+    """Return the slope of ln f at 20 °C (1/K) by theory, default silica, free hemisphere of h/R = 0.06."""
+    temperature = 20.0 + zero_Celsius
+    dome, silica = hemisphere(RADIUS, 0.06 * RADIUS), find_material("fused-silica")
     return {
         theory: float(build_law(dome, silica, temperature, temperature, temperature, theory).parts(temperature).total)
         for theory in THEORIES

@@ -60,16 +60,15 @@ class CardElectrodes:
         """Whether any electrode has a voltage."""
         return bool(self.keys.voltage_V or any(self.keys.trim_V))
 
-    def on(self, pair: "Pair", temperature: float, voltage: float | None = None) -> "Electrodes":
-        """Return them over a mode's face at a temperature (K), with another common voltage if one is given."""
+    def on(self, pair: "Pair", temperature: float) -> "Electrodes":
+        """Return them over a mode's face at a temperature (K)."""
         from shell.electrodes import Electrodes, ring_of_electrodes
         from shell.imperfection import Field, wave
 
         k = self.keys
-        common = k.voltage_V if voltage is None else voltage
         trims = np.zeros(k.count)
         trims[: len(k.trim_V)] = k.trim_V
-        volts = np.sqrt(common**2 + trims**2)
+        volts = np.sqrt(k.voltage_V**2 + trims**2)
         patches = ring_of_electrodes(k.count, k.coverage, volts.tolist(), np.deg2rad(k.azimuth_deg), k.first, k.last)
         gap = 1e-6 * k.gap_um * (1 + k.gap_expansion_per_K * (temperature - self.reference_temperature))
         waves = (wave(w.order, w.amplitude_percent / 100, np.deg2rad(w.azimuth_deg)) for w in k.gap_wave)
