@@ -4,7 +4,7 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass, fields
 from functools import cached_property
 from math import atan2, hypot, pi
-from typing import Any, Self
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from shell.errors import ShellError, mm
 from shell.quadrature import Array, gauss
 
 Point = tuple[float, float]
+Shape = TypeVar("Shape")
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,20 +27,21 @@ class Jet:
     ddz: Array
 
 
+def scaled(one: Shape, factor: float) -> Shape:
+    """A curve or a stem with all lengths multiplied by `factor`; angles and words stay."""
+    given: dict[str, Any] = {field.name: getattr(one, field.name) for field in fields(one)}  # type: ignore[arg-type]
+    for name, value in given.items():
+        if not (isinstance(value, str) or name.endswith("_angle")):
+            given[name] = tuple(factor * x for x in value) if isinstance(value, tuple) else factor * value
+    return type(one)(**given)
+
+
 class Curve(ABC):
     """A smooth curve x -> (r, z), x in [0, 1]."""
 
     @abstractmethod
     def jet(self, x: Array) -> Jet:
         """Position, first and second derivative at the parameters x."""
-
-    def scaled(self, factor: float) -> Self:
-        """The curve with all lengths multiplied by `factor`; what is an angle stays."""
-        given: dict[str, Any] = {field.name: getattr(self, field.name) for field in fields(self)}  # type: ignore[arg-type]
-        for name, value in given.items():
-            if not name.endswith("_angle"):
-                given[name] = tuple(factor * x for x in value) if isinstance(value, tuple) else factor * value
-        return type(self)(**given)
 
     @cached_property
     def length(self) -> float:

@@ -13,7 +13,7 @@ from typing import Literal, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from shell.curves import Curve
+from shell.curves import Curve, scaled
 from shell.errors import ShellError, mm
 from shell.quadrature import Array
 
@@ -163,19 +163,11 @@ class Resonator:
 
     def scaled(self, factor: float) -> "Resonator":
         """The same resonator with every length multiplied by `factor`: free uniform thermal expansion."""
-        stem = self.stem and Stem(
-            self.stem.radius * factor,
-            tuple(end * factor for end in self.stem.ends)
-            if isinstance(self.stem.ends, tuple)
-            else self.stem.ends * factor,  # type: ignore[arg-type]
-            self.stem.fillet * factor,
-            self.stem.side,
-        )
         return replace(
             self,
-            segments=tuple(segment.scaled(factor) for segment in self.segments),
+            segments=tuple(scaled(segment, factor) for segment in self.segments),
             thickness=tuple((position, value * factor) for position, value in self.thickness),
-            stem=stem,
+            stem=self.stem and scaled(self.stem, factor),
             clamp_radius=self.clamp_radius * factor,
         )
 
