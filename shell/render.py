@@ -41,9 +41,10 @@ def render_animation(
     """Return a looping WebP or GIF of one period of the swing, which lasts `period` seconds; `progress` is told which part is drawn."""
     from PIL import Image
 
-    swings = [float(np.cos(2 * pi * k / frames)) for k in range(frames)]
+    swings = [float(np.cos(2 * pi * k / frames)) for k in range(frames // 2 + 1)]  # and back again
     pictures = _draw(scenes, view, (width, height), swings, progress)
     drawn = [Image.open(io.BytesIO(png)).convert("RGB") for png in pictures]
+    drawn += drawn[frames - len(drawn) : 0 : -1]
     buffer = io.BytesIO()
     more: dict[str, Any] = {"quality": 80, "method": 4} if kind == "webp" else {"optimize": True}
     drawn[0].save(

@@ -130,7 +130,7 @@ def test_the_rim_shows_the_thickness_and_the_stem(drawn):
 @pytest.mark.usefixtures("opengl")
 def test_animations_loop_and_move(monkeypatch):
     scene = scene_of(2)
-    pictures = shell.render._draw(scene, "oblique", (160, 140), [1.0, 0.0, -1.0, 0.0])
+    pictures = shell.render._draw(scene, "oblique", (160, 140), [1.0, 0.0, -1.0])
     monkeypatch.setattr(shell.render, "_draw", lambda *_: pictures)
     for kind in ("gif", "webp"):
         picture = Image.open(io.BytesIO(render_animation(scene, kind, frames=4)))
@@ -140,6 +140,10 @@ def test_animations_loop_and_move(monkeypatch):
             frames.append(np.asarray(picture.convert("RGB")).astype(int))
         assert (picture.n_frames, picture.info["loop"]) == (4, 0)
         assert abs(frames[0] - frames[2]).max() > 50
+
+
+def test_a_name_is_drawn_as_it_is_written():
+    assert draw_still(replace(scene_of(3), title="a$\\frac{b$c")).startswith(b"\x89PNG")
 
 
 def test_an_unknown_view_is_refused():
