@@ -60,7 +60,6 @@ def test_printed_equilibrium_holds_around_and_errs_along_the_meridian():
     assert sp.simplify(left - (bell.stress(0, 2) - bell.stress(0, 1)) * sp.sin(phi) / bell.r_z) == 0
 
 
-@pytest.mark.slow
 def test_acceleration_is_the_second_derivative_in_a_fixed_frame():
     """A point of the body at distance a from the origin, moved by u, in a frame that turns about z by ∫Ω dt."""
     turn = sp.Function("psi")(t)
@@ -74,7 +73,7 @@ def test_acceleration_is_the_second_derivative_in_a_fixed_frame():
     acceleration = frame.T * (frame * body).diff(t, 2)
     for found, axis in zip(bell.accelerations(), (meridian, normal, around), strict=True):
         expected = acceleration.dot(axis).subs(turn.diff(t), -bell.Omega_t).doit()
-        assert sp.simplify(sp.expand(expected - found)) == 0
+        assert sp.expand((expected - found).rewrite(sp.exp)) == 0
 
 
 def test_printed_slow_acceleration_lacks_a_term_around():
