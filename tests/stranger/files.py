@@ -76,4 +76,4 @@ def write_campaign(folder: Path, truth: Truth, runs: list[Run], times: list[np.n
 
 
 def _text(values: np.ndarray, digits: int) -> list[str]:
-    return ["" if np.isnan(v) else f"{v:.{digits}f}" for v in values]
+    return (f"%.{digits}f " * len(values) % tuple(values)).replace("nan", "").split(" ")[:-1]

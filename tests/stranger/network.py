@@ -7,6 +7,7 @@ the linear part exact for a driving temperature that is linear within a step, th
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.signal import lfilter
 
 STEP_S = 10.0
 RINGS = 12
@@ -48,8 +49,6 @@ def housing_of(network: Network, chamber: np.ndarray) -> np.ndarray:
 
 def lag(drive: np.ndarray, tau: float, start: float | None = None) -> np.ndarray:
     """First-order lag on the uniform grid, the drive linear between its points."""
-    from scipy.signal import lfilter
-
     keep = np.exp(-STEP_S / tau)
     mean = tau / STEP_S * (1 - keep)
     old, new = mean - keep, 1 - mean
@@ -74,21 +73,18 @@ def integrate(network: Network, housing: np.ndarray, start_offset: float = 0.0) 
     share = network.t4_share * network.spread
     heat = right[:, 0] * share / network.main_s
     state = right @ np.full(len(drive), housing[0] + start_offset)
-    out = np.empty((len(housing), 2))
     read = np.vstack([weight @ left[3:], left[2]])
-    out[0] = read @ state
-    forced = (
-        STEP_S * (phi1 - phi2)[:, None] * b[:, None] * housing[:-1] + STEP_S * phi2[:, None] * b[:, None] * housing[1:]
-    )
-    for i in range(len(housing) - 1):
-        new = decay * state + forced[:, i]
-        if share:
-            first = _t4_excess(housing[i], float(left[0] @ state))
-            last = _t4_excess(housing[i + 1], float(left[0] @ new))
-            new = new + STEP_S * phi1 * heat * 0.5 * (first + last)
-        state = new
-        out[i + 1] = read @ state
-    return out[:, 0], out[:, 1]
+    forced = STEP_S * b[:, None] * ((phi1 - phi2)[:, None] * housing[:-1] + phi2[:, None] * housing[1:])
+    if not share:
+        inputs = np.column_stack([state, forced])
+        return tuple(read @ [lfilter([1.0], [1.0, -keep], own) for keep, own in zip(decay, inputs, strict=True)])
+    states, around = [state], housing.tolist()
+    for now, after, push in zip(around, around[1:], forced.T, strict=False):
+        new = decay * state + push
+        excess = _t4_excess(now, float(left[0] @ state)) + _t4_excess(after, float(left[0] @ new))
+        state = new + STEP_S * phi1 * heat * 0.5 * excess
+        states.append(state)
+    return tuple(read @ np.transpose(states))
 
 
 def _t4_excess(housing: float, base: float) -> float:
