@@ -762,6 +762,7 @@ def test_plain_numbers_are_read_as_numbers_and_equal_to_the_last_digit_what_is_r
         list(read_plain(raw, file))
 
 
+@pytest.mark.slow
 def test_portions_change_nothing(tmp_path, monkeypatch):
     """Stamps of summer and winter time, repeated times, and a counter brought onto them: whole, and 7 rows at a time."""
     begin = datetime.datetime(2026, 10, 25, 0, 30, tzinfo=datetime.UTC)

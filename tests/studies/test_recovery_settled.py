@@ -14,7 +14,7 @@ from studies.simulation.virtual_gyro import simulate_run
 
 @pytest.fixture(scope="module")
 def run():
-    return simulate_run(load_card("hrg-30mm"), load_profile("staircase -20 40 20 6h"), 1 / 30, 3)
+    return simulate_run(load_card("hrg-30mm"), load_profile("staircase -20 40 20 6h"), 1 / 60, 3)
 
 
 def test_what_has_not_settled_is_no_soak(run):
@@ -29,9 +29,10 @@ def test_what_has_not_settled_is_no_soak(run):
         find_soaks([Record({"time_s": np.arange(100.0), "housing_temperature_degC": np.ones(100)})])
 
 
+@pytest.mark.slow
 def test_holds_that_end_before_they_have_settled_are_extrapolated_onto_the_law():
     """Nine soaks of 4 h, of which the last readings are 20 to 70 mK short of the law; the extrapolated ones lie on it."""
-    run = simulate_run(load_card("hrg-30mm"), load_profile("staircase -20 60 10 4h"), 1 / 30, 3)
+    run = simulate_run(load_card("hrg-30mm"), load_profile("staircase -20 60 10 4h"), 1 / 60, 3)
     soaks = find_soaks([run.record])
     assert [round(soak.temperature_degC) for soak in soaks] == list(range(-20, 61, 10))
     extrapolated = [soak for soak in soaks if soak.extrapolated_K]
@@ -47,7 +48,7 @@ def test_holds_that_end_before_they_have_settled_are_extrapolated_onto_the_law()
 
 
 def test_a_hold_far_from_settled_is_not_extrapolated():
-    record = simulate_run(load_card("hrg-30mm"), load_profile("staircase -20 40 20 2h"), 1 / 30, 3).record
+    record = simulate_run(load_card("hrg-30mm"), load_profile("staircase -20 40 20 2h"), 1 / 60, 3).record
     assert [round(soak.temperature_degC) for soak in find_soaks([record])] == [-20]
 
 

@@ -46,6 +46,7 @@ evaluations = 10
 """
 
 
+@pytest.mark.slow
 def test_limits_slopes_of_full_solves(tmp_path):
     path = tmp_path / "task.toml"
     path.write_text(TASK)

@@ -60,8 +60,9 @@ def test_a_delay_is_said():
 
 @pytest.mark.slow
 @pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_a_drift_of_the_frequency_is_no_reason_for_one_of_the_loss_and_damping_that_falls_is_no_leak(sign):
+def test_a_drift_of_the_frequency_is_no_reason_for_one_of_the_loss_and_damping_that_falls_is_no_leak(sign, only):
     """A clock that drifts looks like a resonator that ages; the loss of a gyro that leaks is not its doing. A leak only adds gas."""
+    only("clock-drift", "ageing", "leak", "jump", "hysteresis", "mounting-stress")
     records = []
     for k in range(3):
         bench = Bench([(0, 20), (1, 20), (2, -10 + 15 * k), (4, -10 + 15 * k), (6, 35), (8, 35)], seed=60 + k)

@@ -89,6 +89,7 @@ def test_rows_of_two_gyros_one_after_the_other_are_no_noise_and_no_dip(rows, abo
     assert any(warning.startswith("poor fit in the settled frequency") for warning in warned), warned
 
 
+@pytest.mark.slow
 def test_few_rows_of_pure_noise_name_no_row_and_no_step():
     tables = [study(np.linspace(-40.0, 60.0, 9 + k % 9), 0.0, seed=k, white=1e-2) for k in range(18)]
     assert sum(found.verdict.verdict != "adequate" for found in tables) <= 1

@@ -55,6 +55,7 @@ def test_noise_of_the_third_axis_is_split_into_white_and_wander(chamber):
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("coarser")
 def test_bursts_whose_range_a_law_explains_get_no_name(tmp_path):
     scale = ("scale = 1.0 ", "scale = 0.00390625 "), ("offset = 0.0 ", "offset = -231.0 ")
     bring_in("pan_bursts.csv", tmp_path, *scale)
