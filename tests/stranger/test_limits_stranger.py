@@ -56,8 +56,8 @@ def test_a_null_departs_from_the_baseline_by_less_than_can_be_seen(tmp_path):
 @pytest.mark.slow
 def test_the_same_seed_gives_the_same_files(tmp_path):
     for folder in ("a", "b"):
-        make_campaign(8, "effect", "hysteresis", 3.0, runs=1, folder=tmp_path / folder)
-    make_campaign(9, "effect", "hysteresis", 3.0, runs=1, folder=tmp_path / "c")
+        make_campaign(8, "effect", "curvature", 3.0, runs=1, folder=tmp_path / folder)
+    make_campaign(9, "effect", "curvature", 3.0, runs=1, folder=tmp_path / "c")
     text = {f: (tmp_path / f / "run_1.csv").read_bytes() for f in "abc"}
     assert text["a"] == text["b"] != text["c"]
-    assert json.loads((tmp_path / "a/truth.json").read_text())["hidden"][0]["effect"] == "hysteresis"
+    assert json.loads((tmp_path / "a/truth.json").read_text())["hidden"][0]["effect"] == "curvature"

@@ -20,10 +20,10 @@ def priors():
 @pytest.mark.slow
 @pytest.mark.parametrize(("x", "sd"), [(-0.9, 0.05), (0.3, 0.1)])
 def test_length_and_axis_are_what_draws_that_agree_with_the_data_say(priors, x, sd):
-    """Of 4 million draws of ln A and θ, those are weighed with the data's likelihood of one component; a cosine may be negative."""
+    """Of a million draws of ln A and θ, those are weighed with the data's likelihood of one component; a cosine may be negative."""
     wave, rng = priors.wave, np.random.default_rng(3)
     mean, spread_a, _ = wave.moments
-    A = wave.length.value * np.exp(rng.standard_normal(4_000_000) * wave.length.sd / wave.length.value)
+    A = wave.length.value * np.exp(rng.standard_normal(1_000_000) * wave.length.sd / wave.length.value)
     axis = wave.axis.sd * rng.standard_normal(A.size)
     seen = (A * np.cos(axis * PER_DEGREE) - mean) / spread_a
     weight = np.exp(-(((seen - x) / sd) ** 2) / 2)
