@@ -119,7 +119,8 @@ def _starts(samples: list[tuple[Array, int]], resonator: Resonator) -> list[Rigi
         center = np.linalg.lstsq(A, (points**2).sum(axis=1), rcond=None)[0][:3]
         axis = (points - center).mean(axis=0)
         nominal = float((line.r * (line.z - dome.center[1])).sum())
-        spin = _turn(axis, np.array([0.0, 0.0, np.sign(nominal) or 1.0]))
+        wanted = np.array([0.0, 0.0, np.sign(nominal) or 1.0])
+        spin = scipy.spatial.transform.Rotation.align_vectors(wanted, axis)[0].as_matrix()  # the smallest one
         starts.append(RigidMotion(spin, np.array([0.0, 0.0, dome.center[1]]) - spin @ center, unknown))
     middle = (np.percentile(points, 1, axis=0) + np.percentile(points, 99, axis=0)) / 2
     wanted = np.array([0.0, 0.0, (line.z.min() + line.z.max()) / 2])
@@ -127,16 +128,6 @@ def _starts(samples: list[tuple[Array, int]], resonator: Resonator) -> list[Rigi
     flip = np.diag([1.0, -1.0, -1.0])
     starts.append(RigidMotion(flip, wanted - flip @ middle, unknown))
     return starts
-
-
-def _turn(one: Array, other: Array) -> Array:
-    """The smallest rotation that takes one direction to another."""
-    one, other = one / np.linalg.norm(one), other / np.linalg.norm(other)
-    axis = np.cross(one, other)
-    sine, cosine = float(np.linalg.norm(axis)), float(one @ other)
-    if sine < 1e-12:
-        return np.eye(3) if cosine > 0 else np.diag([1.0, -1.0, -1.0])
-    return np.asarray(scipy.spatial.transform.Rotation.from_rotvec(axis / sine * np.arctan2(sine, cosine)).as_matrix())
 
 
 def _check(samples: list[tuple[Array, int]], projector: Projector, motion: RigidMotion, names: Sequence[str]) -> None:

@@ -9,7 +9,7 @@ left out. The noise is what the fit leaves between the cells, so that form which
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,8 +56,8 @@ class Face:
         assert self.span is not None
         first, last = self.span
         phi = first + (last - first) * position
-        m = np.arange(self.highest + 1)
-        theta = 2 * np.pi * np.arange(4 * self.highest) / (4 * self.highest)
+        m = np.arange(self.waves.highest + 1)
+        theta = 2 * np.pi * np.arange(4 * self.waves.highest) / (4 * self.waves.highest)
         step = 1e-4
         c = self.waves.along(position) @ self.coefficients.T
         slope = (
@@ -72,25 +72,10 @@ class Face:
         )
         return [fourier(one, order)[..., order] for one in moved]
 
-    @property
-    def low(self) -> float:
-        """Where the covered positions start."""
-        return self.waves.low
-
-    @property
-    def high(self) -> float:
-        """Where they end."""
-        return self.waves.high
-
-    @property
-    def highest(self) -> int:
-        """The highest wave."""
-        return self.waves.highest
-
     @cached_property
     def field(self) -> Field:
         """Its waves as a field, constant beyond the covered positions."""
-        return Field(tuple((m, 1.0, (_Profile(self, m),)) for m in range(self.highest + 1)))
+        return Field(tuple((m, 1.0, (_Profile(self, m),)) for m in range(self.waves.highest + 1)))
 
     def project(self, density: Density, order: int) -> tuple[complex, Array]:
         """Σ density c_order over the shell and the covariance of its real and imaginary part."""
@@ -121,8 +106,8 @@ class Face:
         return replace(self, coefficients=coefficients, covariance=turn @ self.covariance @ turn.T)
 
     def _combine(self, L: Array, order: int) -> tuple[complex, Array]:
-        if order > self.highest:
-            raise ShellError(f"harmonics are fitted up to {self.highest}; harmonic {order} is beyond.")
+        if order > self.waves.highest:
+            raise ShellError(f"harmonics are fitted up to {self.waves.highest}; harmonic {order} is beyond.")
         count = len(L)
         first = order * 2 * count - count if order else 0
         rows = np.zeros((2, len(self.covariance)))
@@ -131,10 +116,10 @@ class Face:
             rows[1, first + count : first + 2 * count] = L
         return complex(self.coefficients[order] @ L), rows @ self.covariance @ rows.T
 
-    def profile(self, position: float, azimuth: Array) -> Array:
-        """δ around a circle, m."""
-        c = self.waves.along(np.array([position]))[0] @ self.coefficients.T
-        return np.asarray((c * np.exp(-1j * np.multiply.outer(azimuth, np.arange(len(c))))).real.sum(axis=1))
+    def profile(self, position: Array, azimuth: Array, first: int = 0) -> Array:
+        """δ around circles, (positions, azimuths), m; of the waves from the `first` on."""
+        c, m = self.waves.along(position) @ self.coefficients.T, np.arange(first, self.waves.highest + 1)
+        return np.asarray((c[:, first:] @ np.exp(-1j * np.multiply.outer(m, azimuth))).real)
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,13 +156,10 @@ def survey(
     if len(off) < 500 or not high - low > 0.05:
         raise ShellError(f"{name}: {len(off)} points on the face are too few to fit harmonics.")
     waves = WaveBasis(low, high, highest, degree)
-    rough, limit = waves.fit_roughly(x, theta, off)
-    portions = (place(points[k : k + CHUNK]) for k in range(0, len(points), CHUNK))
-    sums, used = _sum_cells(waves, rough, limit, portions)
     dome = projector.resonator.segments[0]
     alone = len(projector.resonator.segments) == 1 and isinstance(dome, Arc) and not (motion.told[3] and motion.told[4])
     turning = (dome.first_angle, dome.last_angle) if alone and isinstance(dome, Arc) else None
-    return _finish(waves, sums, rough, side, (len(points), used), motion, name, turning)
+    return _fit(waves, (x, theta, off), points, place, side, motion, name, turning)
 
 
 def survey_map(
@@ -193,10 +175,7 @@ def survey_map(
         return position[cells // len(azimuth)], azimuth[cells % len(azimuth)], values.ravel()[cells]
 
     there = np.flatnonzero(np.isfinite(values.ravel()))
-    rough, limit = waves.fit_roughly(*place(there[:: max(1, len(there) // SAMPLE)]))
-    portions = (place(there[k : k + CHUNK]) for k in range(0, len(there), CHUNK))
-    sums, used = _sum_cells(waves, rough, limit, portions)
-    return _finish(waves, sums, rough, side, (len(there), used), None, name)
+    return _fit(waves, place(there[:: max(1, len(there) // SAMPLE)]), there, place, side, None, name)
 
 
 def rigid_shapes(waves: WaveBasis, projector: Projector) -> Array:
@@ -228,10 +207,13 @@ def _sum_cells(waves: WaveBasis, rough: Array, limit: float, portions: Iterable[
     return sums, used
 
 
-def _finish(
-    waves: WaveBasis, sums: Array, rough: Array, side: int, numbers: tuple[int, int], motion: RigidMotion | None,
-    name: str, turning: tuple[float, float] | None = None,
+def _fit(
+    waves: WaveBasis, sample: Points, points: NDArray[Any], place: Callable[[Any], Points], side: int,
+    motion: RigidMotion | None, name: str, turning: tuple[float, float] | None = None,
 ) -> Face:  # fmt: skip
+    rough, limit = waves.fit_roughly(*sample)
+    portions = (place(points[k : k + CHUNK]) for k in range(0, len(points), CHUNK))
+    sums, used = _sum_cells(waves, rough, limit, portions)
     full = sums[0] > 0
     count = sums[0, full]
     x, theta, left = sums[1:4, full] / count
@@ -249,14 +231,14 @@ def _finish(
     change = inverse @ (design.T @ (count * left))
     rest = left - design @ change
     freedom = max(len(rest) - design.shape[1], 1)
-    within = float((sums[4, full] - count * left**2).sum() / max(numbers[1] - len(count), 1))
+    within = float((sums[4, full] - count * left**2).sum() / max(used - len(count), 1))
     # noise of one point as the cells show it, form left over included
     between = float((count * rest**2).sum() / freedom)
-    variance = max(between, within if numbers[1] > 2 * len(count) else 0.0)
+    variance = max(between, within if used > 2 * len(count) else 0.0)
     cells = (x, theta, left + design @ rough, count)
     return Face(
-        side, waves, waves.complex(rough + change), inverse * variance, float(np.sqrt(variance)), numbers[0],
-        numbers[0] - numbers[1], cells, motion, turning,
+        side, waves, waves.complex(rough + change), inverse * variance, float(np.sqrt(variance)), len(points),
+        len(points) - used, cells, motion, turning,
     )  # fmt: skip
 
 

@@ -137,7 +137,7 @@ def _facts(payload: dict[str, Any]) -> list[tuple[str, str, str]]:
 def _payload(found: Scan, name: str, temperature: float, files: dict[str, str]) -> dict[str, Any]:
     degrees = float(np.rad2deg(1.0))
     faces = {
-        side: {"file": files[side], "position": [face.low, face.high]}
+        side: {"file": files[side], "position": [face.waves.low, face.waves.high]}
         | row_of(face, "points", "outliers", noise_um=("noise", 1e6))
         | row_of(face.motion, offset_um=("offset", 1e6), tilt_deg=("tilt", degrees), told="told")
         for side, face in found.faces.items()

@@ -1,6 +1,6 @@
 """From measured faces of a card's resonator to its waves, its roundness and the split that they cause."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from math import pi
 from typing import Literal
@@ -79,19 +79,21 @@ class Scan:
 
     def map_of(self, quantity: str, rows: int = 60, columns: int = 180) -> tuple[Array, Array, Array]:
         """Positions, azimuths and the fitted departure (m) on a grid of what was covered."""
-        low, high = max(f.low for f in self.faces.values()), min(f.high for f in self.faces.values())
-        x, theta = np.linspace(low, high, rows), 2 * pi * np.arange(columns) / columns
-        parts = {name: np.array([face.profile(float(at), theta) for at in x]) for name, face in self.faces.items()}
-        return x, theta, combine(parts, quantity)
+        x, theta = np.linspace(*covered(self.faces), rows), 2 * pi * np.arange(columns) / columns
+        parts = (factor * self.faces[name].profile(x, theta) for name, factor in parts_of(quantity))
+        return x, theta, np.asarray(sum(parts))
 
 
-def combine(parts: dict[str, Array], quantity: str) -> Array:
+def covered(faces: Mapping[str, Face]) -> tuple[float, float]:
+    """Where the positions that all faces cover start and end."""
+    waves = [face.waves for face in faces.values()]
+    return max(one.low for one in waves), min(one.high for one in waves)
+
+
+def parts_of(quantity: str) -> list[tuple[str, float]]:
     """Wall = inner + outer, offset of the middle surface = (outer - inner)/2, of departures out of the material."""
-    if quantity in parts:
-        return parts[quantity]
-    if quantity == "wall":
-        return np.asarray(sum(parts.values()))
-    return np.asarray((parts["outer"] - parts["inner"]) / 2)
+    both = {"wall": [("inner", 1.0), ("outer", 1.0)], "offset": [("inner", -0.5), ("outer", 0.5)]}
+    return both.get(quantity, [(quantity, 1.0)])
 
 
 def scan_faces(
@@ -141,10 +143,10 @@ def scan_faces(
 def _check_wall(faces: dict[str, Face], resonator: Resonator) -> None:
     if len(faces) < 2:
         return
-    x = np.linspace(max(f.low for f in faces.values()), min(f.high for f in faces.values()), 40)
+    x = np.linspace(*covered(faces), 40)
     theta = 2 * pi * np.arange(72) / 72
     nominal = resonator.at(x * resonator.length).thickness[:, None]
-    wall = nominal + sum(np.array([face.profile(float(at), theta) for at in x]) for face in faces.values())
+    wall = nominal + sum(face.profile(x, theta) for face in faces.values())
     if np.any(wall <= 0):
         raise ShellError("the measured faces cross each other: they do not share one frame, or belong to different resonators; check the files.")  # fmt: skip
 
@@ -187,19 +189,17 @@ def polar_intervals(wave: complex, covariance: Array, fold: int) -> tuple[ScanIn
 def _waves(faces: dict[str, Face]) -> tuple[FaceWave, ...]:
     """Waves 0 ... 8 of each face, the wall and the offset, at the rim end of what was covered and at its middle."""
     found = []
-    low, high = max(f.low for f in faces.values()), min(f.high for f in faces.values())
+    low, high = covered(faces)
     for quantity in (*faces, *(("wall", "offset") if len(faces) == 2 else ())):
         for position in ((low + high) / 2, high):
-            orders = range(min(8, *(f.highest for f in faces.values())) + 1)
+            orders = range(min(8, *(f.waves.highest for f in faces.values())) + 1)
             found += [_wave(faces, quantity, order, position) for order in orders]
     return tuple(found)
 
 
 def _wave(faces: dict[str, Face], quantity: str, order: int, position: float) -> FaceWave:
-    both = {"wall": {"inner": 1.0, "outer": 1.0}, "offset": {"inner": -0.5, "outer": 0.5}}
-    factors = both.get(quantity, {quantity: 1.0})
     c, covariance = 0j, np.zeros((2, 2))
-    for name, factor in factors.items():
+    for name, factor in parts_of(quantity):
         one, own = faces[name].at(position, order)
         c, covariance = c + factor * one, covariance + factor**2 * own
     if order == 0:
@@ -213,10 +213,8 @@ def _roundness(faces: dict[str, Face]) -> tuple[Roundness, ...]:
     theta = 2 * pi * np.arange(720) / 720
     found = []
     for name, face in faces.items():
-        for position in np.linspace(face.low, face.high, 11)[1:]:
-            c = face.waves.along(np.array([position]))[0] @ face.coefficients.T
-            c = np.where(np.arange(len(c)) >= 2, c, 0)
-            departure = (c * np.exp(-1j * np.multiply.outer(theta, np.arange(len(c))))).real.sum(axis=1)
+        x = np.linspace(face.waves.low, face.waves.high, 11)[1:]
+        for position, departure in zip(x.tolist(), face.profile(x, theta, first=2), strict=True):
             rms = float(np.sqrt(np.mean(departure**2)))
-            found.append(Roundness(name, float(position), float(np.ptp(departure)), rms))
+            found.append(Roundness(name, position, float(np.ptp(departure)), rms))
     return tuple(found)
