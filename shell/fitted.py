@@ -28,39 +28,6 @@ WORTH = 0.2  # a cut leaves at most this share of the squares
 SECOND_ORDER = 5.0
 
 
-@dataclass(frozen=True)
-class Fitted(Resonator):
-    """A resonator whose thickness is a polynomial between each two knots: Legendre coefficients (m), lowest first."""
-
-    pieces: tuple[tuple[float, ...], ...] = ()
-
-    def _thickness_near(self, s: Array, inside: float) -> tuple[Array, Array]:
-        _, slope = super()._thickness_near(s, inside)
-        knots, _, slopes = self._profile
-        nudged = s + 1e-9 * (inside - s)
-        which = np.clip(np.searchsorted(knots, nudged, side="right") - 1, 0, len(slopes) - 1)
-        thickness, slope = np.empty_like(s), np.empty_like(s)
-        real = np.flatnonzero(np.diff(knots) > 0)  # a step is two knots in one place
-        for k, coefficients in zip(real, self.pieces, strict=True):
-            here = which == k
-            half = (knots[k + 1] - knots[k]) / 2
-            x = (s[here] - knots[k]) / half - 1
-            thickness[here] = series.legval(x, coefficients)
-            slope[here] = series.legval(x, series.legder(coefficients)) / half if len(coefficients) > 1 else 0.0
-        return thickness, slope
-
-    def scaled(self, factor: float) -> "Resonator":
-        """See `Resonator.scaled`."""
-        grown = super().scaled(factor)
-        assert isinstance(grown, Fitted)
-        return replace(grown, pieces=_times(self.pieces, factor))
-
-    def thickened(self, factor: float) -> "Resonator":
-        """See `Resonator.thickened`."""
-        thickness = tuple((position, value * factor) for position, value in self.thickness)
-        return replace(self, thickness=thickness, pieces=_times(self.pieces, factor))
-
-
 @dataclass(frozen=True, eq=False)
 class Rest:
     """What the polynomials leave of the thickness: δ/h at positions 0 ... 1 with their weights (sum 1)."""
@@ -81,7 +48,7 @@ class Rest:
 def fit_profile(resonator: Resonator) -> tuple[Resonator, Rest | None]:
     """Fit the thickness by polynomials; return the resonator to solve and the remaining deviation. A few knots are kept as they are."""
     position, value = np.array(resonator.thickness).T
-    if type(resonator) is not Resonator or len(position) - 2 <= FEW:
+    if resonator.pieces or len(position) - 2 <= FEW:
         return resonator, None
     steps = np.flatnonzero(np.diff(position) == 0) + 1
     bounds = np.concatenate([[0], steps, [len(position)]])
@@ -92,14 +59,8 @@ def fit_profile(resonator: Resonator) -> tuple[Resonator, Rest | None]:
     for piece in pieces:
         ends = series.legval(np.array([-1.0, 1.0]), piece.coefficients)
         knots += [(float(piece.position[0]), float(ends[0])), (float(piece.position[-1]), float(ends[1]))]
-    fitted = Fitted(
-        resonator.segments,
-        tuple(knots),
-        resonator.support,
-        resonator.stem,
-        resonator.clamp_radius,
-        tuple(tuple(piece.coefficients.tolist()) for piece in pieces),
-    )
+    polynomials = tuple(tuple(piece.coefficients.tolist()) for piece in pieces)
+    fitted = replace(resonator, thickness=tuple(knots), pieces=polynomials)
     rest = Rest(*(np.concatenate([getattr(piece, name) for piece in pieces]) for name in ("at", "weight", "relative")))
     return fitted, rest
 
@@ -151,7 +112,3 @@ def _cut(piece: _Piece) -> list[_Piece]:
     if left > WORTH * piece.squares:
         return [piece]
     return [part for half in halves for part in _cut(half)]
-
-
-def _times(pieces: tuple[tuple[float, ...], ...], factor: float) -> tuple[tuple[float, ...], ...]:
-    return tuple(tuple(factor * c for c in piece) for piece in pieces)

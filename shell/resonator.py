@@ -11,6 +11,7 @@ from math import hypot
 from typing import Literal, TypeAlias
 
 import numpy as np
+from numpy.polynomial.legendre import legder, legval
 from numpy.typing import ArrayLike
 
 from shell.curves import Curve, scaled
@@ -85,8 +86,9 @@ class MeridianPoints:
 
 @dataclass(frozen=True)
 class Resonator:
-    """A shell of revolution: segments of its meridian, thickness [(position, h in m)] along it, linear between, and support.
+    """A shell of revolution: segments of its meridian, thickness [(position, h in m)] along it, and support.
 
+    Between two knots the thickness is linear, or a polynomial, `pieces`: Legendre coefficients (m), lowest first.
     A clamp holds the edge through its thickness, "clamped-face" the lower face within the clamp radius, m.
     """
 
@@ -95,6 +97,7 @@ class Resonator:
     support: Support = "free"
     stem: Stem | None = None
     clamp_radius: float = 0.0
+    pieces: tuple[tuple[float, ...], ...] = ()
     _starts: tuple[float, ...] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -157,7 +160,7 @@ class Resonator:
 
     def slope_jumps(self, start: float, stop: float) -> Array:
         """Changes of dh/ds at the knots of the thickness between two arc lengths (m)."""
-        knots, _, slopes = self._profile
+        knots, _, slopes, _ = self._profile
         inside = (knots[1:-1] > start) & (knots[1:-1] < stop)
         return np.asarray(np.diff(slopes)[inside])
 
@@ -169,11 +172,16 @@ class Resonator:
             thickness=tuple((position, value * factor) for position, value in self.thickness),
             stem=self.stem and scaled(self.stem, factor),
             clamp_radius=self.clamp_radius * factor,
+            pieces=self._times(factor),
         )
 
     def thickened(self, factor: float) -> "Resonator":
         """The same middle surface and support with every thickness multiplied by `factor`."""
-        return replace(self, thickness=tuple((position, value * factor) for position, value in self.thickness))
+        thickness = tuple((position, value * factor) for position, value in self.thickness)
+        return replace(self, thickness=thickness, pieces=self._times(factor))
+
+    def _times(self, factor: float) -> tuple[tuple[float, ...], ...]:
+        return tuple(tuple(factor * c for c in piece) for piece in self.pieces)
 
     def _on_segment(self, s: Array, segment: int) -> MeridianPoints:
         jet = self.segments[segment].at_length(s - self._starts[segment])
@@ -187,19 +195,26 @@ class Resonator:
 
     def _thickness_near(self, s: Array, inside: float) -> tuple[Array, Array]:
         """Thickness and slope; at a step of the profile the side on which `inside` lies counts."""
-        knots, value, slopes = self._profile
+        knots, value, slopes, curved = self._profile
         nudged = s + 1e-9 * (inside - s)
         k = np.minimum(np.maximum(np.searchsorted(knots, nudged, side="right") - 1, 0), len(slopes) - 1)
         slope = slopes[k]
-        return value[k] + slope * (s - knots[k]), slope
+        thickness = value[k] + slope * (s - knots[k])
+        for piece, coefficients in curved:
+            here, half = k == piece, (knots[piece + 1] - knots[piece]) / 2
+            x = (s[here] - knots[piece]) / half - 1
+            thickness[here], slope[here] = legval(x, coefficients), legval(x, legder(coefficients)) / half
+        return thickness, slope
 
     @cached_property
-    def _profile(self) -> tuple[Array, Array, Array]:
-        """Arc lengths of the knots of the thickness, its values there, and its slopes between them."""
+    def _profile(self) -> tuple[Array, Array, Array, list[tuple[int, tuple[float, ...]]]]:
+        """Arc lengths of the knots of the thickness, its values there, its slopes between them, and the polynomials."""
         position, value = np.array(self.thickness).T
         knots = position * self.length
         with np.errstate(divide="ignore", invalid="ignore"):  # a step of the profile is two knots in one place
-            return knots, value, np.diff(value) / np.diff(knots)
+            slopes = np.diff(value) / np.diff(knots)
+        real = np.flatnonzero(np.diff(knots) > 0).tolist() if self.pieces else []
+        return knots, value, slopes, list(zip(real, self.pieces, strict=True))
 
 
 def _check_chain(resonator: Resonator) -> None:
