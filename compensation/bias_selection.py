@@ -26,7 +26,6 @@ from compensation.samples import block_means
 from compensation.stepwise import StepwiseSelection, select_stepwise
 
 Method = Literal["paper", "guarded"]
-ENTER, REMOVE = 0.05, 0.10
 # Bias stability is the standard deviation of averages over this many seconds; the paper does not state its own.
 AVERAGING = 100.0
 BLOCKS = 5
@@ -134,12 +133,12 @@ def _select(pieces: Sequence[BiasRun], method: Method, reference: float | None, 
     everything = np.column_stack([design.constants, design.candidates])
     theta = estimate_theta(everything, design.bias, design.rows, CAUTION)
     if method == "paper":
-        selection = select_stepwise(design.constants, design.candidates, design.bias, names, PARENTS, ENTER, REMOVE)
+        selection = select_stepwise(design.constants, design.candidates, design.bias, names, PARENTS)
         return fit_terms(design, selection.terms, selection=selection)
     constants, candidates, bias = (
         whiten(part, theta, design.rows) for part in (design.constants, design.candidates, design.bias)
     )
-    selection = select_stepwise(constants, candidates, bias, names, PARENTS, ENTER, REMOVE, shared=True)
+    selection = select_stepwise(constants, candidates, bias, names, PARENTS, shared=True)
     if not by_runs or not selection.steps:
         return fit_terms(design, selection.terms, selection=selection)
     try:

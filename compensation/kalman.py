@@ -64,13 +64,6 @@ def weigh(model: LinearModel, P: Array) -> tuple[Array, Array, Array]:
     return K, S, kept @ P @ kept.T + K @ R @ K.T
 
 
-def update(model: LinearModel, x: Array, P: Array, z: Array) -> tuple[Array, Array, Array, Array]:
-    """Return state and covariance after a measurement z (m,), its innovation (m,) and the innovation's covariance."""
-    K, S, after = weigh(model, P)
-    innovation = z - model.measurement @ x
-    return x + K @ innovation, after, innovation, S
-
-
 @dataclass(frozen=True)
 class KalmanRun:
     """States (N, n) and covariances (N, n, n) after each measurement, innovations (N, m), their covariances (N, m, m)."""

@@ -16,6 +16,7 @@ import scipy
 from compensation.arrays import Array
 from compensation.errors import CompensationError
 
+ENTER, REMOVE = 0.05, 0.10
 # A candidate of which less than this part is not already in the model cannot be told apart from it.
 OWN_PART = 1e-7
 
@@ -35,40 +36,37 @@ class SelectionStep:
 
 @dataclass(frozen=True)
 class StepwiseSelection:
-    """The path of a stepwise selection, its final `terms`, and why candidates were `refused` from the start."""
+    """The path of a stepwise selection, its final `terms`, and the candidates that are `constant`, which can never enter."""
 
     start: SelectionStep
     steps: tuple[SelectionStep, ...]
     terms: tuple[str, ...]
-    refused: Mapping[str, str]
+    constant: tuple[str, ...]
 
 
 def select_stepwise(
     forced: Array, candidates: Array, y: Array, names: Sequence[str],
-    parents: Mapping[str, Sequence[str]] | None = None, enter: float = 0.05, remove: float = 0.10, *,
-    shared: bool = False,
+    parents: Mapping[str, Sequence[str]] | None = None, *, shared: bool = False,
 ) -> StepwiseSelection:  # fmt: skip
     """Select candidate columns by partial F-tests after the forced ones and a term's parents; `shared`: candidates share the level."""
-    if not 0 < enter <= remove < 1:
-        raise CompensationError(f"levels must satisfy 0 < entry ≤ removal < 1, not {enter:g} and {remove:g}.")
     m, q = forced.shape
     if m < q + len(names) + 1:
         raise CompensationError(f"{len(names)} candidate terms and {q} constants need at least {q + len(names) + 1} rows, not {m}; record longer or average less.")  # fmt: skip
     search = _Search(forced, candidates, y, tuple(names), parents or {})
-    refused = {name: why for name in names if (why := search.refusal(name))}
+    constant = tuple(name for name in names if search.own_part([], name) < OWN_PART)
     chosen: list[str] = []
     steps: list[SelectionStep] = []
     for _ in range(10 * len(names)):
-        step = search.addition(chosen, refused, enter, shared) or search.removal(chosen, remove)
+        step = search.addition(chosen, constant, shared) or search.removal(chosen)
         if step is None:
             break
         steps.append(step)
         chosen = list(step.terms)
-        while (step := search.removal(chosen, remove)) is not None:
+        while (step := search.removal(chosen)) is not None:
             steps.append(step)
             chosen = list(step.terms)
     start = search.step(True, "", math.nan, math.nan, [])
-    return StepwiseSelection(start, tuple(steps), tuple(sorted(chosen, key=list(names).index)), refused)
+    return StepwiseSelection(start, tuple(steps), tuple(sorted(chosen, key=list(names).index)), constant)
 
 
 class _Search:
@@ -84,46 +82,35 @@ class _Search:
         self.names = names
         self.parents = parents
 
-    def refusal(self, name: str) -> str:
-        """Say why a candidate can never enter: empty when it can."""
-        k = self.names.index(name)
-        own = self._own_part([], name)
-        if self.lengths[k] == 0 or own < OWN_PART:
-            return "constant"
-        return ""
-
     def sum_of_squares(self, chosen: Sequence[str]) -> float:
         """Residual sum of squares of y on the forced columns and the chosen ones."""
         rest = self._residual(chosen, self.R[:, -1])
         return float(rest @ rest)
 
-    def addition(
-        self, chosen: Sequence[str], refused: Mapping[str, str], level: float, shared: bool
-    ) -> SelectionStep | None:
+    def addition(self, chosen: Sequence[str], constant: Sequence[str], shared: bool) -> SelectionStep | None:
         """Return the step that adds the candidate with the largest F, if its p-value is below the level."""
         ready = [
             name
             for name in self.names
-            if name not in chosen
-            and name not in refused
-            and all(parent in chosen or parent in refused for parent in self.parents.get(name, ()))
-            and self._own_part(chosen, name) > OWN_PART
+            if name not in (known := {*chosen, *constant})
+            and known.issuperset(self.parents.get(name, ()))
+            and self.own_part(chosen, name) > OWN_PART
         ]
         tests = [(*self._test(chosen, [*chosen, name]), name) for name in ready]
         if not tests:
             return None
         F, p, name = max(tests)
-        allowed = level / len(ready) if shared else level
+        allowed = ENTER / len(ready) if shared else ENTER
         return self.step(True, name, F, p, [*chosen, name]) if p < allowed else None
 
-    def removal(self, chosen: Sequence[str], level: float) -> SelectionStep | None:
+    def removal(self, chosen: Sequence[str]) -> SelectionStep | None:
         """Return the step that removes the term with the smallest F, if its p-value is above the level."""
         free = [n for n in chosen if not any(n in self.parents.get(other, ()) for other in chosen)]
         tests = [(*self._test([c for c in chosen if c != name], chosen), name) for name in free]
         if not tests:
             return None
         F, p, name = min(tests)
-        return self.step(False, name, F, p, [c for c in chosen if c != name]) if p > level else None
+        return self.step(False, name, F, p, [c for c in chosen if c != name]) if p > REMOVE else None
 
     def step(self, added: bool, term: str, F: float, p: float, terms: Sequence[str]) -> SelectionStep:
         """Describe the model that a step leaves."""
@@ -138,7 +125,8 @@ class _Search:
         F = max(without - within, 0.0) / max(within / freedom, 1e-300)
         return F, float(scipy.special.fdtrc(1, freedom, F))
 
-    def _own_part(self, chosen: Sequence[str], name: str) -> float:
+    def own_part(self, chosen: Sequence[str], name: str) -> float:
+        """Part of a candidate's length that neither the forced columns nor the chosen ones have: 0 of none."""
         k = self.names.index(name)
         rest = self._residual(chosen, self.R[:, self.forced + k])
         return float(np.linalg.norm(rest) / max(self.lengths[k], 1e-300))

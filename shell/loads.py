@@ -36,12 +36,11 @@ ACROSS = np.linspace(-1.0, 1.0, 9) * (1 - 1e-9)  # of a cell; its edges, but not
 
 @dataclass(frozen=True)
 class Peak:
-    """Largest stress: `tension` the largest principal one, `mises` the largest von Mises stress, Pa; each in its part (wall, root or stem)."""
+    """Largest stress: `tension` the largest principal one, `mises` the largest von Mises stress, Pa, in its `part` (wall, root or stem)."""
 
     tension: float
     mises: float
     part: str
-    tension_part: str
 
     @property
     def worst(self) -> float:
@@ -118,7 +117,7 @@ class Loads:
     def peak(self, amounts: dict[Kind, float]) -> Peak:
         """Largest stresses of the parts that are `counted` under so many units of each load at once."""
         stresses = [self._stress(kind, amount) for kind, amount in amounts.items() if amount]
-        tension, mises = (0.0, "wall"), (0.0, "wall")
+        tension, mises = 0.0, (0.0, "wall")
         for k, part in enumerate(self._parts):
             if not set(part) & set(self.counted):
                 continue
@@ -136,9 +135,9 @@ class Loads:
                 bent = np.sqrt(((one - two) ** 2 + (two - three) ** 2 + (three - one) ** 2) / 2).T
                 for name in sorted(set(part) & set(self.counted)):
                     chosen = np.array([p == name for p in part])
-                    tension = max(tension, (float(three.T[chosen].max()), name))
+                    tension = max(tension, float(three.T[chosen].max()))
                     mises = max(mises, (float(bent[chosen].max()), name))
-        return Peak(tension[0], mises[0], mises[1], tension[1])
+        return Peak(tension, *mises)
 
     def sag(self, amounts: dict[Kind, float]) -> Sag:
         """Displacement of the rim's middle surface under loads, and its tilt, the slope of its axial displacement."""

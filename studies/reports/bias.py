@@ -130,9 +130,8 @@ def path_table(judged: Judged, where: Where = "everywhere") -> Table:
         }
         for k, (step, score) in enumerate(zip(steps, judged.path_scores or (math.nan,) * len(steps), strict=True))
     ]
-    refused = {} if selection is None else selection.refused
-    left_out = ", ".join(f"{_symbol(name, symbol)} ({why})" for name, why in refused.items())
-    notes = [f"Candidates left out: {left_out}."] if refused else []
+    left_out = [f"{_symbol(name, symbol)} (constant)" for name in selection.constant] if selection else []
+    notes = [f"Candidates left out: {', '.join(left_out)}."] if left_out else []
     if len(steps) < 2:
         notes.append("No candidate is significant.")
     elif judged.fit.held_out or judged.path_scores:

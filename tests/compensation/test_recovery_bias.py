@@ -141,7 +141,7 @@ def test_constant_candidates_are_refused_by_name():
     rng = np.random.default_rng(1)
     X = np.column_stack([rng.normal(size=30), np.full(30, 4.0)])
     path = select_stepwise(np.ones((30, 1)), X, X[:, 0], ["a", "level"])
-    assert path.refused == {"level": "constant"}
+    assert path.constant == ("level",)
 
 
 def test_a_longer_term_enters_only_after_its_factors():

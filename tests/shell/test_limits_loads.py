@@ -87,7 +87,7 @@ def test_a_fillet_bounds_the_stress_that_a_beam_has() -> None:
     coarse, fine = (loads_on(body, tolerance) for tolerance in (1e-5, 1e-7))
     one, two = (found.peak({"lateral": 1e3, "axial": 1e3}) for found in (coarse, fine))
     assert one.worst == pytest.approx(two.worst, rel=0.01)
-    assert one.tension_part == "root"
+    assert one.part == "root"
     beam = coarse.beam(0.0, 1e3)
     assert 0.5 * beam < one.tension < 3 * beam
 
