@@ -11,19 +11,19 @@ SPIKE, ALONE = 6.0, 4.0
 STUCK = 20  # readings in a row that are alike, where those beside them mostly differ, make a sensor that is stuck
 
 
-def find_spikes(values: Array, least: float = 0.0, step: float = 0.0) -> NDArray[np.bool_]:
+def find_spikes(values: Array, least: float = 0.0) -> NDArray[np.bool_]:
     """Mark readings (m,) that stand out from their neighbours by more than 6 robust standard deviations.
 
     Neighbours say the median of (y_{i−k} + y_{i+k})/2, k = 1, 2, 3; at the ends that of 2 y_{i+k} − y_{i+2k}, whose
     distance counts half. The distance must exceed 6 · 1.4826 times the series' median, be the largest within two rows,
-    and 4 times what is usual beside it. What is left is searched again. `least` is a part of the span, `step` the
-    rounding, that a spike exceeds too.
+    and 4 times what is usual beside it. What is left is searched again. `least` is a part of the span that
+    a spike exceeds too.
     """
     marked, rows = np.zeros(len(values), dtype=bool), np.flatnonzero(np.isfinite(values))
     if len(rows) < NEIGHBOURS:
         return marked
     known = values[rows]
-    marked[rows] = _stand_out(known, 0.5 * step)
+    marked[rows] = _stand_out(known)
     if least and marked.any():
         around = np.lib.stride_tricks.sliding_window_view(np.pad(known, REACH, "reflect"), NEIGHBOURS)
         smooth = np.partition(around, REACH, axis=1)[:, REACH]  # `scipy.ndimage` has it too, and takes 0.1 s to load
@@ -64,12 +64,12 @@ def find_dropouts(values: Array) -> NDArray[np.bool_]:
     return np.asarray((values == 0) & bool(low - room > 0 or high + room < 0))
 
 
-def _stand_out(values: Array, least: float) -> NDArray[np.bool_]:
+def _stand_out(values: Array) -> NDArray[np.bool_]:
     left = values.copy()
     distance = _distance(left)
     positive = distance[distance > 0]
     # Rounded readings may have no spread at all: then the smallest distance takes its place.
-    spread = max(1.4826 * float(np.median(distance)), float(positive.min()) if positive.size else 1.0, least)
+    spread = max(1.4826 * float(np.median(distance)), float(positive.min()) if positive.size else 1.0)
     while True:
         around = np.pad(distance, REACH)
         peak = distance >= np.fmax.reduce([_shifted(around, k) for k in (-2, -1, 1, 2)])

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from compensation.spikes import find_spikes, find_step
+from compensation.spikes import find_spikes
 
 ROWS = np.arange(600.0)
 SHAPES = {
@@ -66,15 +66,3 @@ def test_gaussian_noise_has_next_to_none():
     """Six robust deviations of the distance, about seven of the noise, are passed by 1e-11 of Gaussian rows."""
     found = sum(int(find_spikes(np.random.default_rng(k).standard_normal(600)).sum()) for k in range(100))
     assert found <= 1
-
-
-def test_one_digit_more_or_less_is_no_spike_where_a_smooth_model_was_taken_away():
-    """Readings that change by their last digit now and then: beside a smooth model that digit is many of the usual distances."""
-    readings = np.round(np.cumsum(0.1 * np.random.default_rng(4).standard_normal(4000)) + 20.0)
-    rests = readings - 20.0 + 1e-3 * np.random.default_rng(5).standard_normal(readings.size)
-    step = find_step(readings)
-    assert step == 1.0
-    assert find_spikes(rests).any()
-    assert not find_spikes(rests, step=step).any()
-    rests[2000] += 10.0
-    assert np.flatnonzero(find_spikes(rests, step=step)).tolist() == [2000]
