@@ -189,9 +189,9 @@ def score_path(runs: Sequence[BiasRun], selection: StepwiseSelection) -> tuple[f
     return tuple(scores)
 
 
-def score_runs(fit: BiasFit, runs: Sequence[BiasRun], *, extrapolate: bool = False) -> HeldOutRows:
-    """Apply a fitted model to held-out runs, less each run's own mean; rows out of range only to `extrapolate`."""
-    return _pool([_Fold(run, []) for run in runs], [fit] * len(runs), by_runs=True, everywhere=extrapolate)
+def score_runs(fit: BiasFit, runs: Sequence[BiasRun]) -> HeldOutRows:
+    """Apply a fitted model to held-out runs, less each run's own mean, also to rows out of its range."""
+    return _pool([_Fold(run, []) for run in runs], [fit] * len(runs), by_runs=True, everywhere=True)
 
 
 def bias_stability(run: BiasRun, bias: Array | None = None) -> float:

@@ -109,7 +109,7 @@ def study_twin(seed: int) -> tuple[TwinFit, ...]:
             fit = fit_bias(runs[:count], method)
             left = fit.left(first)
             training = bias_stability(first), bias_stability(first, left)
-            met, warmed = (score_runs(fit, [run], extrapolate=True) for run in (cooling, warming))
+            met, warmed = (score_runs(fit, [run]) for run in (cooling, warming))
             fits.append(TwinFit(method, count, fit.terms, training, met, warmed, (first.time, first.bias, left)))
     return tuple(fits)
 

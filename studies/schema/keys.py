@@ -26,10 +26,9 @@ def number(
     )
 
 
-def says(meaning: str, *, example: Any = None, least: int | None = None, most: int | None = None) -> msgspec.Meta:
-    """Annotate a text, a truth, a list or a table with its meaning; `least` and `most` are lengths."""
-    examples = None if example is None else [example]
-    return msgspec.Meta(description=meaning, examples=examples, min_length=least, max_length=most)
+def says(meaning: str, *, example: Any = None, least: int | None = None) -> msgspec.Meta:
+    """Annotate a text, a truth, a list or a table with its meaning; `least` is a length."""
+    return msgspec.Meta(description=meaning, examples=None if example is None else [example], min_length=least)
 
 
 Note = Annotated[str, says("free text")]

@@ -101,11 +101,10 @@ def test_a_run_too_short_to_hold_out_says_so():
 
 def test_a_cooling_run_says_nothing_of_a_warming_one():
     rng = np.random.default_rng(5)
-    fit = fit_bias([make_run(rng)])
-    warming = make_run(rng, amplitude=17.0)
+    cooling, warming = make_run(rng), make_run(rng, amplitude=17.0)
     with pytest.raises(NoHeldOut, match="two runs of each kind"):
-        score_runs(fit, [warming])
-    assert score_runs(fit, [warming], extrapolate=True).coverage == 1.0
+        score_held_out([cooling, warming])
+    assert score_runs(fit_bias([cooling]), [warming]).coverage == 1.0
 
 
 def test_stepwise_path_agrees_with_fitting_each_model():
