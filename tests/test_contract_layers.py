@@ -70,6 +70,7 @@ def test_no_imports_run_in_a_circle():
     assert len(order) == len(MODULES)
 
 
+@pytest.mark.slow
 def test_heavy_packages_are_imported_where_they_are_needed():
     for name, path in MODULES.items():
         lazy = LAZY if name.split(".")[1:2] == ["derivation"] else LAZY | {"sympy"}

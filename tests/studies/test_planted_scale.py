@@ -343,6 +343,7 @@ def test_fewer_records_tell_less(records, files, tmp_path, ask, refuse):
     assert ask(["compensate", model, records[0], "--out", str(tmp_path / "out.csv")])["columns"]
 
 
+@pytest.mark.slow
 def test_a_rate_table_over_temperature_is_enough(tmp_path, ask):
     """Nineteen rates again and again while the chamber warms: every step from the one record, as the planted chain."""
     chain, rng = read_printed_chain(), np.random.default_rng(8)

@@ -89,7 +89,7 @@ def test_planted_a_line_stands_out_of_the_spectrum_of_a_record_with_a_gap(noise)
     assert found.density.max() > 10 * level
 
 
-@pytest.mark.parametrize("even", [True, False])
+@pytest.mark.parametrize("even", [True, pytest.param(False, marks=pytest.mark.slow)])
 def test_limits_the_density_of_white_noise_is_twice_variance_times_step(noise, even):
     time = T if even else np.sort(np.random.default_rng(2).uniform(0, T.size, T.size))
     found = find_density(time, noise + 3 + 0.01 * time)

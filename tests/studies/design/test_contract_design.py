@@ -147,7 +147,7 @@ def test_recovery_dome_at_8_khz(tmp_path):
     text = shipped_tasks()["dome-8khz"].read_text(encoding="utf-8")
     first, _, rest = text.partition('[[objective]]\ncolumn = "tcf_n2')
     rest = rest[rest.index("[[constraint]]") :]
-    task = write(tmp_path, first + rest.replace("starts = 2\nfront = 2", "starts = 1\nevaluations = 16"))
+    task = write(tmp_path, first + rest.replace("starts = 2\nfront = 2", "starts = 1\nevaluations = 10"))
     found = optimise(task, tmp_path / "dome", workers=1)
     after = dict(zip(found.task.columns, found.after, strict=True))
     before = dict(zip(found.task.columns, found.before, strict=True))

@@ -230,6 +230,7 @@ def test_a_healthy_gyro_of_several_lumps_is_followed_to_its_noise_and_its_card_p
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("coarser")
 def test_a_light_shell_whose_capacity_grows_is_followed_to_its_noise_and_gets_no_effect():
     """The search for a heat path once ended where straight lines had no more to take: 6 mHz were left, and two effects named."""
     light = {"base": (1e4, 1e4 / 900.0), "capacity": 1.0, "stem": 1.0 / 500.0, "seen": 1e-9, "growth": 1e-3}
