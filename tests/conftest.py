@@ -3,6 +3,7 @@
 import gc
 import json
 import os
+from collections import Counter
 from functools import cache, lru_cache
 
 import pytest
@@ -11,6 +12,12 @@ from tests.sketches import coarsen, sketch_pages
 
 for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
     os.environ.setdefault(name, "1")  # the solver's matrices are small
+
+
+def pytest_collection_modifyitems(items) -> None:
+    """Files of many slow tests come first: at the end no process waits for the long last test of another."""
+    slow = Counter(item.path for item in items if item.get_closest_marker("slow"))
+    items.sort(key=lambda item: -slow[item.path])
 
 
 def pytest_collection_finish() -> None:

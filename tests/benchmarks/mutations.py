@@ -94,7 +94,7 @@ def blind(name: str) -> Callable[[], None]:
 
 
 TABLE = "tests/stranger/test_planted_campaigns.py::test_share"
-"""The batch of campaigns is drawn anew for each stub: about a minute of processor time."""
+"""The batch of campaigns is drawn anew for each stub: some twenty seconds of processor time."""
 MUTATIONS: dict[str, tuple[Callable[[], None], list[str]]] = {
     "prediction": (scale_prediction, ["tests/studies/test_limits_prediction.py"]),
     "solver": (scale_modes, ["tests/shell/test_published_modes.py::test_solid_frequencies_of_two_spectral_codes"]),
