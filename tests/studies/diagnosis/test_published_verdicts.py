@@ -62,17 +62,13 @@ def test_bursts_whose_range_a_law_explains_get_no_name(tmp_path):
     assert not diagnose(tmp_path / "run_x.csv").causes
 
 
-def resistor(gap):
-    """Four repeats of one staircase, `gap` s apart; None: nobody says when they began."""
+def resistor():
+    """Four repeats of one staircase, two hours apart."""
     records, start = [], datetime.datetime(2018, 2, 3)
     for k in (1, 2, 3, 4):
-        record = read_record(str(DATA / f"resistor_run{k}.csv"))
-        records.append(record if gap is None else replace(record, start=start))
-        start += datetime.timedelta(seconds=float(record["time_s"][-1]) + (gap or 0.0))
+        records.append(replace(read_record(str(DATA / f"resistor_run{k}.csv")), start=start))
+        start += datetime.timedelta(seconds=float(records[-1]["time_s"][-1]) + 7200.0)
     return records
-
-
-SLOW = "ageing", "jump", "hysteresis", "second-lag", "mounting-stress"
 
 
 @pytest.mark.slow
@@ -80,7 +76,7 @@ def test_a_resistor_that_relaxes_from_run_to_run_ages(only, monkeypatch):
     """Known: -8.8, -1.7 and -2.6 ppm from run to run, white noise 0.08 ppm of 10 kilohm."""
     only("ageing", "jump")
     coarsen(monkeypatch, 50)
-    verdict = diagnose(*resistor(7200.0))
+    verdict = diagnose(*resistor())
     if verdict.verdict == "unexplained" and not verdict.causes:
         pytest.xfail("left unexplained: the lag of the first fit, 1.6 h, follows what relaxes from run to run")
     (cause,) = verdict.causes
@@ -118,7 +114,7 @@ def test_the_thermometer_of_a_crystal_is_slower_than_the_crystal(tmp_path):
 @pytest.mark.usefixtures("coarser")
 def test_steps_of_liquid_on_a_crystal_are_not_adequate(only, tmp_path):
     """Of every sixth row, and of the effects those that are slow."""
-    only(*SLOW)
+    only("ageing", "jump", "hysteresis", "second-lag", "mounting-stress")
     record = read_record(str(bring_in("qcm_steps.txt", tmp_path)))
     thin = {name: own[::6] for name, own in record.columns.items()}
     assert diagnose(replace(record, columns=thin)).verdict != "adequate"
