@@ -35,7 +35,7 @@ class Pursuit:
         progress("all effects in all shapes")
         self.start, self.progress, self.point = start, progress, start.point
         paths = Signatures.at(start.problem, start.point)
-        self.search = Search(Linear.of(start, told), paths, start.noise, progress=progress)
+        self.first = self.search = Search(Linear.of(start, told), paths, start.noise, progress=progress)
         self.least = -np.inf
 
     def outcome(self, least: float = -np.inf) -> tuple[Search, Outcome]:
@@ -64,6 +64,9 @@ class Pursuit:
             best, waited = max(best, score), 0 if score > best else waited + 1
             if waited == PATIENCE or np.abs(self.point - before).max(initial=0.0) < STILL:
                 break
+        if not final.terms and self.search is not self.first:  # it begins where values are likeliest without effects
+            self.search, self.point = self.first, self.start.point
+            return self.search.grow(most=0)
         return plain, final
 
     def _elsewhere(self, plain: Hypothesis, final: Hypothesis) -> tuple[Hypothesis, Hypothesis]:
