@@ -27,6 +27,7 @@ from studies.inference.heat_path import (
     HeatPath,
     evidence_of,
     find_heat_path,
+    is_ahead,
     lags_would_bring,
     slow_share,
 )
@@ -216,10 +217,11 @@ def infer(card: "Instrument", campaign: Campaign, progress: Report = lambda _: N
 
 
 def _with_heat_path(found: CardFit, told: Array | None, progress: Report) -> tuple[HeatPath | None, Search, Outcome]:
-    """Search beside one lag, and beside several where one leaves slow noise of which other lags would take something; the likelier heat path stays."""
-    own, slow = Pursuit(found, told, progress), slow_share(found) > SUSPICIOUS
-    path = find_heat_path(found, progress=progress) if slow and lags_would_bring(own.search) > WORTH else None
-    if path is None or not (path.lags > 1 or path.radiates):
+    """Search beside one lag, beside several where one leaves slow noise of which others would take something, and beside a late sensor; the likelier heat path stays."""
+    own = Pursuit(found, told, progress)
+    other = slow_share(found) > SUSPICIOUS and lags_would_bring(own.search) > WORTH
+    path = find_heat_path(found, None if other else 1, progress) if other or is_ahead(found) else None
+    if path is None or not path.departs:
         return (None, *own.outcome())
     progress(f"effects beside a heat path with {path.lags} time constants")
     there, grown = Pursuit(path.fit, told, progress).outcome()

@@ -18,18 +18,15 @@ from studies.instrument.card import Instrument
 Array = NDArray[np.float64]
 FREQUENCY = "frequency_Hz"
 LAGS = ("lag_s", "second_lag_s", "third_lag_s")
-DIRECT = "law.direct_share"
-PLAIN, FULL, LATE = range(3)
+DIRECT, DELAY = "law.direct_share", "law.delay_s"
 PATHS = (
-    ((1.0,), PLAIN),
-    ((0.7, 0.3), PLAIN),
-    ((0.7, 0.3), FULL),
-    ((0.3, 0.7), FULL),
-    ((0.7, 0.3), LATE),
-    ((0.3, 0.7), LATE),
-    ((0.65, 0.05, 0.3), FULL),
+    ((1.0,), False),
+    ((0.7, 0.3), False),
+    ((0.7, 0.3), True),
+    ((0.3, 0.7), True),
+    ((0.65, 0.05, 0.3), True),
 )
-"""Lags in series over the one lag that stood for them, where their priors are centred, whether they have what `OF_LUMPS` says, and a housing whose sensor is late."""
+"""Lags in series over the one lag that stood for them, where their priors are centred, and whether they have what `OF_LUMPS` says."""
 LAG_WIDTH = 0.7
 """Standard deviation of the logarithm of each."""
 RADIATED = {"value": 0.3, "sd": 0.3}
@@ -42,13 +39,13 @@ OF_LUMPS = {
 }
 """The same of what lumps have besides, where plain lags in series leave slow noise."""
 SENSOR, LATENESS = "noise.housing_lag_s", {"value": 5.0, "sd": 20.0}
-"""The sensor of the housing, and what is known of its lag (s) where it may be late."""
+"""The sensor of the housing, and what is known of its lag (s) where the resonator is ahead of it."""
 WORTH = 10.0
 """Log evidence that one more lag must bring."""
 FOLLOWED = 3.0
 """Slow noise within a run over that of a row, up to which no more is asked of a path."""
 SURE_SHARE = 3.0
-"""Standard deviations from which on a radiated share, or a late sensor, is named."""
+"""Standard deviations from which on a radiated share, or a late sensor, is named; and of the prior, by which a resonator is ahead of its sensor."""
 
 
 @dataclass(frozen=True)
@@ -69,8 +66,13 @@ class HeatPath:
 
     @property
     def price(self) -> float:
-        """Log prior of the choice: one for each lag beyond the first, and one for radiation."""
-        return PRICE * self.lags
+        """Log prior of the choice: one for each lag beyond the first, one for radiation, and one for a sensor that may be late."""
+        return PRICE * (self.lags + (SENSOR in self.fit.problem.priors.names))
+
+    @property
+    def departs(self) -> bool:
+        """Whether it is other than one lag behind a prompt sensor."""
+        return self.lags > 1 or self.radiates or self.is_late
 
     @property
     def radiates(self) -> bool:
@@ -93,15 +95,15 @@ class HeatPath:
         return priors.at(self.fit.point[:count])[name], sd
 
 
-def with_lags(card: Instrument, lags: Sequence[float], kind: int = PLAIN) -> Instrument:
-    """Return a polynomial card with such lags (s) in series, and radiation; a full one with all that lumps have, and a cubic law."""
+def with_lags(card: Instrument, lags: Sequence[float], lumps: bool, late: bool = False) -> Instrument:
+    """Return a polynomial card with such lags (s) in series, and radiation; if `lumps`, with all that lumps have, and a cubic law; a sensor may be `late`."""
     law = dict(card.content["law"])
     law |= {key: {"value": lag, "sd": LAG_WIDTH * lag} for key, lag in zip(LAGS, lags, strict=False)}
-    law |= {"radiated_share": dict(RADIATED)} | (OF_LUMPS if kind >= FULL else {})
+    law |= {"radiated_share": dict(RADIATED)} | (OF_LUMPS if lumps else {})
     slope, bend = (law.get(key, {}).get("sd", 0.0) for key in ("a1_per_K", "a2_per_K2"))
-    if kind >= FULL and slope and bend:
+    if lumps and slope and bend:
         law["a3_per_K3"] = {"value": 0.0, "sd": bend**2 / slope}
-    if kind == LATE:
+    if late:
         card = card.with_table("noise", card.content["noise"] | {"housing_lag_s": dict(LATENESS)})
     return card.with_table("law", law)
 
@@ -115,21 +117,24 @@ def find_heat_path(
     lag = whole.priors.at(baseline.point[: len(whole.priors.values)])["law.lag_s"]
     best: HeatPath | None = None
     followed = False
-    for parts, kind in PATHS:
-        number = len(parts)
+    for parts, lumps in PATHS:
+        number, own = len(parts), [part * lag for part in parts]
         if lags not in (None, number) or followed:
             continue
-        progress(
-            f"a heat path with {number} {'lag' if number == 1 else 'lags in series'} and radiation{', its sensor late' * (kind == LATE)}"
-        )
-        path = _calibrated(lean, with_lags(whole.instrument, [part * lag for part in parts], kind))
+        words = f"a heat path with {number} {'lag' if number == 1 else 'lags in series'} and radiation"
+        progress(words)
+        path = _calibrated(lean, with_lags(whole.instrument, own, lumps))
+        if is_ahead(path.fit):
+            progress(f"{words}, its sensor late")
+            late = _calibrated(lean, with_lags(whole.instrument, own, lumps, True))
+            path = max(path, late, key=lambda one: one.evidence)
         if best is None or path.evidence > best.evidence + WORTH * (path.lags - best.lags):
             best = path
             followed = slow_share(path.fit) < FOLLOWED or (
                 number == 1 and lags_would_bring(_linearised(path.fit)) < WORTH
             )
     assert best is not None
-    if whole.responses == lean.responses or not (best.lags > 1 or best.radiates):
+    if whole.responses == lean.responses or not best.departs:
         return best
     progress("the other responses beside it")
     return _calibrated(whole, best.card, best.fit.point if whole.starts == lean.starts else None)
@@ -148,6 +153,15 @@ def _linearised(found: CardFit) -> Search:
 def evidence_of(found: CardFit) -> float:
     """Log evidence of a calibrated card, no row taken for an outlier."""
     return Background(Linear.of(found).on_all_rows, (), found.noise).evidence
+
+
+def is_ahead(found: CardFit) -> bool:
+    """Whether the resonator is ahead of its sensor, by more than clocks and sensors usually make; without a delay, whether slow noise may be that."""
+    priors = found.problem.priors
+    if DELAY not in priors.names:
+        return slow_share(found) > FOLLOWED
+    k = priors.names.index(DELAY)
+    return bool(priors.standard(found.point[: len(priors.values)])[k] < -SURE_SHARE)
 
 
 def lags_would_bring(search: Search) -> float:

@@ -187,9 +187,9 @@ class Search:
         own = self.term(term.effect, term.response, shape, term.price, term.members)
         return replace(own, scale=term.scale, bend=term.bend)
 
-    def contenders(self, now: Hypothesis) -> list[Hypothesis]:
+    def contenders(self, now: Hypothesis, less: Sequence[float] = LESS) -> list[Hypothesis]:
         """Return the models with one effect more, best first: each with shape, noise and size of its own where it is near enough."""
-        seen = self.scan(now)[:CONTENDERS]
+        seen = self.scan(now, less=less)[:CONTENDERS]
         tried: list[tuple[float, Term, Mapping[str, Noise]]] = []
         plain = Background(self.linear, now.terms, now.noise)
         for one in seen:
@@ -284,7 +284,8 @@ class Search:
             others = (*final.terms[:k], *final.terms[k + 1 :])
             base = self.settle(others, final.noise) if others else plain
             same = replace(final, terms=(*others, term))
-            known = [h for h in self.contenders(base) if h.terms[-1].key != term.key]
+            quiet = replace(base, noise=final.noise)  # a rival leaves as little
+            known = [h for h in self.contenders(quiet, ()) if h.terms[-1].key != term.key]
             rivals.append(tuple(sorted([same, *known], key=lambda h: -h.score)))
             without.append(base)
         return Outcome(plain, final, tuple(rivals), tuple(without))

@@ -138,6 +138,7 @@ def trace(instrument: "Instrument", found: Prediction, run: int) -> Path:
         campaign_time=even + drive.start,
         housing=np.interp(even, time, found.housing),
         resonator=np.interp(even, time, found.columns["resonator_temperature_degC"]) + zero_Celsius,
+        known_rate=np.interp(even, time, found.temperatures.rate[:, 1]),
         tau=slowest_lag(found.network, instrument.reference_temperature),
         reference=instrument.reference_temperature,
         **commands,
