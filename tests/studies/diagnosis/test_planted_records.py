@@ -192,6 +192,37 @@ def test_inseparable_pair_gets_a_measurement_and_no_run():
     assert "reference clock" in verdict.next_experiment
 
 
+def one_lag(k, late=0.0, by_rate=0.0):
+    """A run behind one lag whose thermometer is `late` (s), of a frequency that follows the rate too (Hz per K/s)."""
+    time, noise = np.arange(0.0, 7 * 3600.0, 2.0), np.random.default_rng(k)
+    housing = lag(time, 20.0 + 25.0 * np.clip(np.sin(2 * np.pi * time / (9000.0 + 4000.0 * k) + k), -0.6, 0.6), 500.0)
+    x = lag(time, housing, 1500.0) - 20.0
+    f = 6200.0 * (1.0 + 7e-5 * x - 8e-8 * x**2) + by_rate * np.gradient(x, time)
+    read = lag(time, housing, late) if late else housing
+    columns = {"time_s": time, "housing_temperature_degC": read + 1e-3 * noise.standard_normal(time.size)}
+    columns["frequency_Hz"] = f + 2e-3 * noise.standard_normal(time.size)
+    return Record({name: values[::10] for name, values in columns.items()}, path=f"run{k}.csv", sha256=str(k))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("hidden", "said"),
+    [
+        ({"late": 60.0}, {"thermometer-lag"}),
+        ({"by_rate": 40.0}, {"rate-frequency", "mounting-stress"}),
+    ],
+    ids=["a late thermometer", "a frequency that follows the rate"],
+)
+def test_a_resonator_ahead_of_its_thermometer_has_a_late_one_or_follows_the_rate(hidden, said):
+    """The first was called a mounting stress beside a delay, the second a mounting stress that nothing equals."""
+    verdict = judge([one_lag(k, **hidden) for k in range(2)])
+    (cause,) = verdict.causes
+    assert {cause.effect, *cause.equivalent} >= said
+    assert verdict.responses["frequency_Hz"].extended[0] == pytest.approx(2e-3, rel=0.1)
+    if "late" in hidden:
+        assert cause.parameters["sensor_time_constant_s"].value == pytest.approx(60.0, abs=3.0)
+
+
 def lumps_of_silica(words, seed, base=(200.0, 0.25), capacity=60.0, stem=0.05, seen=2e-3, growth=1.8e-3):
     """A record of a base and a shell of fused silica that loads it, hung on a thin stem and radiating to the housing, by the implicit integrator (J/K, W/K, m²)."""
     parts = [

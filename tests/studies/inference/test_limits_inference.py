@@ -10,15 +10,20 @@ from compensation.noise import Noise
 from studies.inference.causes import parameters_of
 from studies.inference.diagnosis import build_problem
 from studies.inference.held_out import Kept, Model
+from studies.calibration.fit import fit
 from studies.inference.model import SCALES, Background, Linear
+from studies.inference.polynomial_card import polynomial_card
+from studies.inference.pursuit import Pursuit
 from studies.inference.search import Search
 from studies.inference.signatures import Signatures
 from studies.instrument.card import load_card
+from studies.simulation.chamber import load_profile
 from studies.simulation.prediction import predict
 from studies.simulation.virtual_gyro import simulate_run
 from tests.studies.diagnosis.unseen import COMMANDED, run_drive
 
 CARD = "hrg-30mm"
+RUNS = "step 20 40 3h", "ramp 20 0 0.3 then soak 0 2h"
 
 
 @pytest.fixture(scope="module")
@@ -154,3 +159,25 @@ def test_a_block_whose_gaps_leave_no_row_for_the_fit_is_not_held_out(search):
         False, Model(search.linear, search.signatures, (), search.noise).residuals(model.kept(model.mean()))
     )
     assert {one.beside(one) for one in unseen.values()} == {(None, None)}
+
+
+@pytest.mark.slow
+def test_a_search_whose_effects_fall_away_ends_where_the_values_are_likeliest_without_them(monkeypatch):
+    """It once ended where it was linearised beside them: 24 to 49 mHz were left of 2, and called noise."""
+    made = [simulate_run(load_card(CARD), load_profile(words), 1 / 60, k).record for k, words in enumerate(RUNS)]
+    records = [replace(one, path=f"run{k}.csv") for k, one in enumerate(made)]
+    found = fit(build_problem(polynomial_card(records), records))
+    pursuit, grow = Pursuit(found, None), Search.grow
+
+    def first_one_then_none(self, before=(), *_, **more):
+        plain, _ = grow(self, most=0)
+        effect, response = next(own for own in self.signatures.applicable() if own[0].name == "thermometer-scale")
+        lasting = self is pursuit.first and "most" not in more
+        return plain, self.settle((self.term(effect, response, (0.0,)),), plain.noise) if lasting else plain
+
+    monkeypatch.setattr(Search, "grow", first_one_then_none)
+    monkeypatch.setattr(Pursuit, "_holds", lambda self, final: False)
+    search, outcome = pursuit.outcome()
+    assert outcome.final.terms == ()
+    assert search is pursuit.first
+    np.testing.assert_array_equal(pursuit.point, found.point)
