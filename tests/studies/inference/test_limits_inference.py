@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from compensation.noise import Noise
+from studies.calibration.fit import fit
 from studies.inference.causes import parameters_of
 from studies.inference.diagnosis import build_problem
 from studies.inference.held_out import Kept, Model
-from studies.calibration.fit import fit
 from studies.inference.model import SCALES, Background, Linear
 from studies.inference.polynomial_card import polynomial_card
 from studies.inference.pursuit import Pursuit
