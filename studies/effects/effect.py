@@ -221,7 +221,5 @@ def apply_effects(
                 target, change = apply_effect(name, parameters, own, response)
                 changes[target] = changes.get(target, np.zeros_like(states.time)) + change
         if "resonator_temperature" in changes:
-            warming = changes["resonator_temperature"]
-            rate = None if states.known_rate is None else states.known_rate + np.gradient(warming, states.step)
-            warmed = replace(states, resonator=states.resonator + warming, known_rate=rate)
+            warmed = states.warmed(changes["resonator_temperature"])
     return changes

@@ -2,7 +2,7 @@
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -55,6 +55,11 @@ class States:
         if self.time.size < 2:
             return np.zeros_like(self.time)
         return np.asarray(np.gradient(self.resonator, self.step))
+
+    def warmed(self, warming: FloatArray) -> "States":
+        """Return them with a resonator that is warmer (K)."""
+        rate = None if self.known_rate is None else self.known_rate + np.gradient(warming, self.step)
+        return replace(self, resonator=self.resonator + warming, known_rate=rate)
 
 
 def remembered(runs: Sequence[States]) -> list[FloatArray]:

@@ -158,7 +158,7 @@ def evidence_of(found: CardFit) -> float:
 def is_ahead(found: CardFit) -> bool:
     """Whether the resonator is ahead of its sensor, by more than clocks and sensors usually make; without a delay, whether slow noise may be that."""
     priors = found.problem.priors
-    if DELAY not in priors.names:
+    if DELAY not in priors.names or FREQUENCY not in found.noise:
         return slow_share(found) > FOLLOWED
     k = priors.names.index(DELAY)
     return bool(priors.standard(found.point[: len(priors.values)])[k] < -SURE_SHARE)

@@ -184,11 +184,12 @@ class Beside:
             for boundary in {part.drive.boundary for part in problem.parts}:
                 lags[boundary] = slowest_lag(build_network(card, boundary=boundary), card.reference_temperature)
         for path, ways in zip(paths.paths, along, strict=True):
-            states, moved = path.states, {}
+            states, steps = path.states, {}
             for state, (slopes, own) in ways.items():
                 step = STEP * slopes[:, np.isin(own, places)].sum(axis=1)
-                moved[state] = getattr(states, state) + np.interp(states.time, path.time, step)
-            found.append(replace(states, tau=lags.get(path.prediction.drive.boundary, states.tau), **moved))
+                steps[state] = np.interp(states.time, path.time, step)
+            tau = lags.get(path.prediction.drive.boundary, states.tau)
+            found.append(replace(states.warmed(steps["resonator"]), housing=states.housing + steps["housing"], tau=tau))
         return found
 
     def _rows_of(self, response: str, k: int) -> slice:
