@@ -1,7 +1,7 @@
 """Values with which the data agree: they stay as the card has them.
 
-Values z of one table of the card (posterior covariance C) with zᵀ C⁻¹ z below the 90 % quantile of χ² are held at the
-card's, z = 0, and the others solved for anew, if that costs the fit no more than the same quantile.
+Values of one table of the card, away from it by z (posterior covariance C) with zᵀ C⁻¹ z below the 90 % quantile of χ²,
+are held at the card's, and the others solved for anew, if that costs the fit no more than the same quantile.
 """
 
 from collections.abc import Sequence
@@ -11,7 +11,8 @@ import numpy as np
 import scipy
 
 from studies.calibration.estimates import Estimate
-from studies.calibration.fit import CardFit, objective, whitened
+from studies.calibration.fit import CardFit, covariance_at, objective, whitened
+from studies.calibration.priors import to_standard
 
 AGREEING = 0.9  # quantile up to which values of a table are where the card has them
 STEPS = 3
@@ -21,7 +22,7 @@ ZERO = 1e-9  # prior standard deviations: what rounding leaves of a value that i
 def keep_agreeing(found: CardFit) -> CardFit:
     """Return the fit with the values of each table that the data do not contradict at the card's."""
     problem, priors = found.problem, found.problem.priors
-    z = priors.standard(found.point[: len(priors.values)])
+    z = priors.standard(found.point[: len(priors.values)]) - priors.shipped
     C = priors.covariance(found.covariance)
     tables: dict[str, list[int]] = {}
     for k, name in enumerate(priors.names):
@@ -46,26 +47,26 @@ def keep_agreeing(found: CardFit) -> CardFit:
 
 def _hold(found: CardFit, held: Sequence[int]) -> CardFit:
     """Solve for the coordinates u whose values `held` are the card's, in the noise of the fit."""
-    problem = found.problem
-    root = scipy.linalg.block_diag(problem.priors.root, np.eye(problem.count - len(problem.priors.values)))
-    ways = scipy.linalg.null_space(root[list(held)])
+    problem, priors = found.problem, found.problem.priors
+    root = scipy.linalg.block_diag(priors.root, np.eye(problem.count - len(priors.values)))[list(held)]
+    fixed, ways = np.linalg.lstsq(root, priors.shipped[list(held)], rcond=None)[0], scipy.linalg.null_space(root)
     state = found.state
     for _ in range(STEPS):
         J, r = whitened(problem, state, found.noise, found.rows)
-        target = np.concatenate([r + J @ state.point, np.zeros(problem.count)])
+        target = np.concatenate([r + J @ (state.point - fixed), -fixed])
         sizes = np.linalg.lstsq(np.vstack([J @ ways, ways]), target, rcond=None)[0]
-        state = problem.evaluate(np.clip(ways @ sizes, *problem.ends))
-    return replace(found, state=state)
+        state = problem.evaluate(np.clip(fixed + ways @ sizes, *problem.ends))
+    return replace(found, state=state, covariance=covariance_at(problem, state, found.noise, found.rows))
 
 
 def put_back(estimates: Sequence[Estimate], kept: CardFit) -> tuple[Estimate, ...]:
     """Return estimates with the values of the kept fit; intervals stay, and hold them."""
     priors = kept.problem.priors
     point = kept.point[: len(priors.values)]
-    at, z = priors.at(point), priors.standard(point)
+    at, away = priors.at(point), priors.standard(point) - priors.shipped
     out = []
-    for one, prior, shift in zip(estimates, priors.values, z, strict=True):
-        value = prior.value if abs(shift) < ZERO else at[one.parameter]
+    for one, prior, moved in zip(estimates, priors.values, np.abs(away) > ZERO, strict=True):
+        value = at[one.parameter] if moved else prior.value
         low, high = min(one.low, value), max(one.high, value)
-        out.append(replace(one, value=value, low=low, high=high, shift_sd=0.0 if abs(shift) < ZERO else float(shift)))
+        out.append(replace(one, value=value, low=low, high=high, shift_sd=to_standard(prior, value)))
     return tuple(out)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from shell.errors import ShellError
 from studies.calibration.agreement import keep_agreeing, put_back
 from studies.calibration.ahead import BIAS
-from studies.calibration.estimates import Estimate, estimate, find_groups, posterior_card
+from studies.calibration.estimates import Estimate, estimate, find_groups, over_the_wave, posterior_card
 from studies.calibration.fit import CardFit, fit, whitened
 from studies.calibration.ladder import Rung, build_ladder, noise_rms, spread_of, usual_mean
 from studies.calibration.misreading import check_readings
@@ -162,12 +162,14 @@ def calibrate(
     if profile:
         progress("computing the intervals")
     estimates, kept = estimate(found, profile), keep_agreeing(found) if keep else found
-    if kept is not found:
-        estimates, found = put_back(estimates, kept), kept
+    if kept is found:
+        _, point, _, covariance = over_the_wave(problem.priors, found.point, found.covariance)
+    else:
+        estimates, found, point, covariance = put_back(estimates, kept), kept, kept.point, kept.covariance
     ladder = build_ladder(found)
     return Calibration(
         instrument,
-        posterior_card(instrument, found.problem.priors, found.point, found.covariance, estimates, _turn_on(found)),
+        posterior_card(instrument, problem.priors, point, covariance, estimates, _turn_on(found)),
         found,
         estimates,
         find_groups(problem.priors, found.covariance),

@@ -189,25 +189,25 @@ def posterior_card(
     more: dict[str, float] | None = None,
 ) -> "Instrument":
     """Return the card with posterior values, widths, correlations and intervals; `more` are further values of it."""
-    _, point, _, covariance = over_the_wave(priors, point, covariance)
-    moves = priors.slopes(point)
+    count, pair = len(priors.values), priors.pair
+    moves = priors.slopes(point[:count])
     if priors.wave is not None:
-        seen = priors.root[priors.pair]
-        moves[priors.pair] = priors.wave.turned(*(seen @ point)) @ seen
-    C = moves @ covariance @ moves.T
+        seen = priors.root[pair]
+        moves[pair] = priors.wave.turned(*(seen @ point[:count])) @ seen
+    C = moves @ covariance[:count, :count] @ moves.T
     sd = np.sqrt(np.diag(C))
     R = np.clip(C / np.outer(sd, sd), -1.0, 1.0)
     np.fill_diagonal(R, 1.0)
     values = {}
-    for one, prior in zip(estimates, priors.values, strict=True):
+    for k, (one, prior) in enumerate(zip(estimates, priors.values, strict=True)):
         ends = {"low": prior.low if prior.low != 0.0 else -np.inf, "high": prior.high}
         hard = {name: end for name, end in ends.items() if np.isfinite(end)}
-        values[one.parameter] = {"value": one.value, "sd": one.sd, **hard}
+        values[one.parameter] = {"value": one.value, "sd": one.sd if k in pair else float(sd[k]), **hard}
     posterior: dict[str, object] = {
         "names": [one.parameter for one in estimates],
         "correlation": R.round(DIGITS).tolist(),
         "interval": [[one.low, one.high] for one in estimates],
     }
     if priors.wave is not None:
-        posterior["anisotropy_sd"] = sd[priors.pair].tolist()
+        posterior["anisotropy_sd"] = sd[pair].tolist()
     return instrument.with_values(values | (more or {})).with_table("posterior", posterior)

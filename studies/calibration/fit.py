@@ -125,10 +125,15 @@ def fit(problem: CardProblem, start: Array | None = None, progress: Progress = l
             converged = size < NEAR and straight
             break
         state, straight = reached, straight or whole
+    covariance = covariance_at(problem, state, noise, rows)
+    return CardFit(problem, state, noise, rows, covariance, outliers, step, converged)
+
+
+def covariance_at(problem: Problem, state: State, noise: Mapping[str, Noise], rows: Mapping[str, NoiseRows]) -> Array:
+    """(JᵀJ + 1)⁻¹ at a state."""
     J, _ = whitened(problem, state, noise, rows)
     _, S, ways = np.linalg.svd(np.vstack([J, np.eye(problem.count)]), full_matrices=False)
-    covariance = np.asarray((ways.T / S**2) @ ways)
-    return CardFit(problem, state, noise, rows, covariance, outliers, step, converged)
+    return np.asarray((ways.T / S**2) @ ways)
 
 
 def descend(problem: Problem, state: State, noise: Mapping[str, Noise], rows: Mapping[str, NoiseRows]) -> State:

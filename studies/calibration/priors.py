@@ -40,6 +40,15 @@ class Priors:
         """Places of the length and the axis whose coordinates are components; none without."""
         return [] if self.wave is None else [self.names.index(name) for name in (ANISOTROPY, AXIS)]
 
+    @property
+    def shipped(self) -> Array:
+        """Coordinates z of the card's own values: 0, but for components, which are 0 at their mean."""
+        z = np.zeros(len(self.values))
+        if self.wave is not None:
+            mean, spread, _ = self.wave.moments
+            z[self.pair[0]] = (self.wave.length.value - mean) / spread
+        return z
+
     def standard(self, u: Array) -> Array:
         """Coordinates z of unit prior variance from independent ones."""
         return np.asarray(self.root @ u)

@@ -20,7 +20,7 @@ from studies.instrument.uncertain import UncertainValue
 from studies.record import Record
 from studies.resonator.law import law_of
 from studies.simulation.chamber import load_profile
-from studies.simulation.drive import Drive, drive_by_profile, rows_of
+from studies.simulation.drive import Drive, drive_by_profile, drive_by_record, rows_of
 from studies.simulation.heat_path import build_network, slowest_lag
 from studies.simulation.noise import bias_noise, frequency_noise
 from studies.simulation.prediction import law_for, predict
@@ -92,6 +92,20 @@ def test_a_calibrated_card_states_the_turn_on_that_its_runs_show():
     assert np.std(offsets, ddof=1) / 1.5 < stated < 1.5 * np.std(offsets, ddof=1)
     single = calibrate(card, records[3:], exact=known, profile=False)
     assert single.instrument.noise.bias_turn_on_deg_per_h == 0.0
+
+
+@pytest.mark.slow
+def test_a_bias_that_agrees_with_the_card_keeps_its_level():
+    """The anisotropy was held where its components are 0, not at the card's length: the saved card was 12 °/h off."""
+    card, profile = load_card("cvg-25mm"), load_profile("step 20 50 3h")
+    made = simulate_run(card, profile, rate=1 / 60, seed=1).record
+    record = replace(made, columns={name: own for name, own in made.columns.items() if name != "inverse_q"})
+    found = calibrate(card, [record], profile=False)
+    assert found.instrument.bias.damping_anisotropy == card.bias.damping_anisotropy
+    told = simulate_run(found.instrument, drive_by_record(record), noise=False).record["bias_deg_per_h"]
+    noise = float(np.std(record["bias_deg_per_h"] - told))
+    assert float(np.mean(record["bias_deg_per_h"] - told)) == pytest.approx(0.0, abs=0.5 * noise)
+    assert noise < 1.1 * found.ladder["bias_deg_per_h"].noise
 
 
 @dataclass(frozen=True)
