@@ -37,8 +37,8 @@ FOLLOWED, REFUSED = 0.3, 0.4
 """Parts of a frequency's changes: left of them by a reading that agrees, and by one that does not."""
 AGAINST = 0.5
 """The same of a reading that agrees, where the other one leaves more than there was: a sign is told by less."""
-LIKELY, STARTED = 3.0, 2.0
-"""Standard deviations up to which a value of the card is likely; changes by which a frequency may start elsewhere."""
+LIKELY, STARTED, STEPS = 3.0, 2.0, 4
+"""Standard deviations up to which a value of the card is likely; changes by which a frequency may start elsewhere; steps to the likeliest values."""
 CLEAR = 20.0
 """Times its own noise by which a frequency must change before it says how a temperature is to be read."""
 SECONDS = 3600.0
@@ -72,7 +72,7 @@ def _check_temperatures(instrument: "Instrument", record: "Record", as_read: "Le
         columns = {name: read(record[name] + zero_Celsius) - zero_Celsius for name in names}
         other = _left(instrument, record.with_columns(columns), whole)[FREQUENCY][0]
         agrees = other < min((AGAINST if left > changes else FOLLOWED) * changes, left / 3)
-        if agrees and not _could_be(instrument, record, whole, changes):
+        if agrees and not _could_be(instrument, record, changes):
             right = columns[COLUMN["housing"] if COLUMN["housing"] in names else names[0]]
             wrong = [one for one in names if _apart(columns[one], right) <= _apart(record[one], right)]
             raise InputError(
@@ -81,25 +81,29 @@ def _check_temperatures(instrument: "Instrument", record: "Record", as_read: "Le
             )
 
 
-def _could_be(instrument: "Instrument", record: "Record", law: "FrequencyLaw", changes: float) -> bool:
+def _could_be(instrument: "Instrument", record: "Record", changes: float) -> bool:
     """Whether the frequency follows the temperatures as read with values of the card where their priors have them, and another start."""
     priors, places = gather_priors(instrument), _places(record)
-    try:
-        found = predict(instrument, drive_by_record(record, time=record["time_s"][places]), priors.names, law, FARTHEST)
-    except (ShellError, ThermalError):
-        return False
-    y, f, t = record[FREQUENCY][places], found.columns[FREQUENCY], found.drive.time
-    fades = (t[0] - t) / slowest_lag(found.network, instrument.reference_temperature)
-    starts = STARTED * changes * np.exp(np.outer(fades, [1.0, 2.0, 4.0]))
-    slopes = np.column_stack([found.derivatives[name][FREQUENCY] for name in priors.names])
-    J = np.column_stack([slopes @ priors.slopes(np.zeros(len(priors.values))), starts])[np.isfinite(y)]
-    J, rest = J - J.mean(axis=0), (y - f)[np.isfinite(y)]
-    rest = rest - rest.mean()
-    precise = len(rest) ** 0.5 / (FOLLOWED * changes)
-    z = np.linalg.lstsq(np.vstack([precise * J, np.eye(J.shape[1])]), np.append(precise * rest, np.zeros(J.shape[1])))[
-        0
-    ]
-    return bool(np.abs(z).max() < LIKELY and np.std(rest - J @ z) < FOLLOWED * changes)
+    drive = drive_by_record(record, time=record["time_s"][places])
+    known = np.isfinite(record[FREQUENCY][places])
+    u = np.zeros(len(priors.values))
+    for _ in range(STEPS):
+        own = instrument.with_values(priors.at(u))
+        try:
+            found = predict(own, drive, priors.names, law_of(own), FARTHEST)
+        except (ShellError, ThermalError):
+            return False
+        slopes = np.column_stack([found.derivatives[name][FREQUENCY] for name in priors.names]) @ priors.slopes(u)
+        fades = (drive.time[0] - drive.time) / slowest_lag(found.network, instrument.reference_temperature)
+        starts = STARTED * changes * np.exp(np.outer(fades, [1.0, 2.0, 4.0]))
+        J = np.column_stack([slopes, starts])[known] / (FOLLOWED * changes)
+        rest = (record[FREQUENCY][places] - found.columns[FREQUENCY] + slopes @ u)[known] / (FOLLOWED * changes)
+        J, rest = J - J.mean(axis=0), rest - rest.mean()
+        z = np.linalg.lstsq(
+            np.vstack([J * len(J) ** 0.5, np.eye(J.shape[1])]), np.append(rest * len(J) ** 0.5, np.zeros(J.shape[1]))
+        )[0]
+        u = priors.inside(z[: len(u)])
+    return bool(np.abs(z).max() < LIKELY and np.std(rest - J @ z) < 1.0)
 
 
 def _apart(one: Array, two: Array) -> float:
