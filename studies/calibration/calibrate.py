@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from shell.errors import ShellError
 from studies.calibration.agreement import keep_agreeing, put_back
 from studies.calibration.ahead import BIAS
+from studies.calibration.apart import fit_explained
 from studies.calibration.estimates import Estimate, estimate, find_groups, over_the_wave, posterior_card
 from studies.calibration.fit import CardFit, fit, whitened
 from studies.calibration.ladder import Rung, build_ladder, noise_rms, spread_of, usual_mean
@@ -154,11 +155,11 @@ def calibrate(
         raise
     check_readings(instrument, records, problem.law)
     settled = compare_settled(problem)
-    found = fit(problem, progress=progress)
+    found, apart = fit_explained(problem, progress)
     held_out = None
     if hold_out is not None and len(records) > 1:
         progress("held-out run")
-        held_out = predict_held_out(instrument, runs, tables, hold_out, exact, found)
+        held_out = predict_held_out(instrument, found.problem.runs, tables, hold_out, exact, found)
     if profile:
         progress("computing the intervals")
     estimates, kept = estimate(found, profile), keep_agreeing(found) if keep else found
@@ -177,6 +178,7 @@ def calibrate(
         held_out,
         (
             *repeated,
+            *apart,
             *doubts,
             *(one.scatter.sentence for one in settled if one.scatter),
             *warn(found, estimates, ladder),

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from compensation.noise import white_rms
 from shell.constants import zero_Celsius
-from studies.calibration.fit import IMPOSSIBLE, CardFit, fit, residual_noise
+from studies.calibration.apart import fit_explained
+from studies.calibration.fit import IMPOSSIBLE, CardFit, residual_noise
 from studies.calibration.observed import HOUSING, RESPONSES, observe
 from studies.calibration.priors import gather_priors
 from studies.calibration.problem import CardProblem, wide_law
@@ -174,7 +175,9 @@ def blocks_of(records: Sequence[Record]) -> int:
 def infer(card: "Instrument", campaign: Campaign, progress: Report = lambda _: None) -> Inference:
     """Find what records say of a card and of effects that it lacks."""
     progress("calibration without effects")
-    found, told = set_housing_apart(fit(build_problem(card, campaign.records), progress=progress))
+    found, apart = fit_explained(build_problem(card, campaign.records), progress)
+    found, told = set_housing_apart(found)
+    campaign = replace(campaign, notes=(*campaign.notes, *apart))
     problem = found.problem
     path = None
     if card.polynomial is None:
