@@ -230,7 +230,7 @@ def _clock_cause(found: Inferred) -> list[Cause]:
 def with_levels(search: Search, now: Hypothesis, name: str) -> Hypothesis:
     """Return a model with a level of every run of a response, where that is more probable by far; else the model."""
     problem = search.linear.problem
-    if problem.instrument.polynomial is None or len(problem.runs) == 1 or name not in LASTING:
+    if len(problem.runs) == 1 or name not in LASTING:
         return now
     form = offsets(len(problem.runs))
     bank = search.shapes_of([(form, name)])

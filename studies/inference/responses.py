@@ -71,7 +71,7 @@ def _judge(
     if left.significant and (share is None or not clean or patched):
         return "unexplained", ""
     apart = _apart(found, name)
-    if apart and not terms and not mine:
+    if apart and not terms and not mine and found.card.polynomial is not None:
         return "not-identifiable", apart
     if slow > CONSTANTS["wander_usual"]:
         return "not-identifiable", (
@@ -81,7 +81,7 @@ def _judge(
     if terms or mine:
         return ("not-identifiable" if any(cause.equivalent for cause in mine) else "explained"), apart
     if values:
-        return "explained", ""
+        return "explained", apart
     paths = found.search.signatures.paths
     if found.card.polynomial is not None:
         lasts = sum(float(np.ptp(path.time)) for path in paths)
@@ -95,7 +95,7 @@ def _judge(
     if np.ptp(resonator) < NARROW_RANGE:
         remark = f"the resonator's temperature changes by {np.ptp(resonator):.2g} K only: what follows it cannot show"
     else:
-        remark = ""
+        remark = apart
     return ("not-identifiable", doubt_of(left.input, left.evidence)) if left.doubtful else ("adequate", remark)
 
 
@@ -136,7 +136,7 @@ def _turned_on(found: Inferred, name: str, verdict: str) -> str:
 
 def _apart(found: Inferred, name: str) -> str:
     """Return the sentence on runs of a response without turn-on that lie farther apart than what is left within them."""
-    if name not in LASTING or found.card.polynomial is None:
+    if name not in LASTING:
         return ""
     shifts, within = _shifts_and_rest(found, name)
     apart = float(np.sqrt(np.mean(shifts**2)))
@@ -164,6 +164,11 @@ def _slow(found: Inferred, name: str) -> float:
     stated = stated_noise(found.card.noise, name) or Noise(0.0)
     slow = noise_rms(found.fit, name, replace(stated, white=0.0, offset=0.0))
     return rows.rms / max(float(np.hypot(white_rms(*rows.residual), slow)), 1e-300)
+
+
+def is_slow(found: Inferred, name: str) -> bool:
+    """Whether more slow noise is left of a response than is usual."""
+    return _slow(found, name) > CONSTANTS["wander_usual"]
 
 
 def _shifts_and_rest(found: Inferred, name: str) -> tuple[Array, float]:

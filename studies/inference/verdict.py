@@ -1,6 +1,7 @@
 """From an inference to the verdict of the contract: causes, values that moved, each response, and what to measure next."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -26,7 +27,7 @@ from studies.inference.causes import candidates_of, causes_of
 from studies.inference.inferred import Inferred
 from studies.inference.model import Background
 from studies.inference.records import Campaign
-from studies.inference.responses import result_of
+from studies.inference.responses import is_slow, result_of
 from studies.inference.sharp import longest_resolved
 
 
@@ -36,14 +37,16 @@ def judge(found: Inferred) -> Verdict:
     causes = tuple(sorted((*wrong_values(shifts), *causes_of(found)), key=lambda cause: -cause.evidence))
     results = {name: result_of(found, name, causes) for name in found.search.linear.responses}
     results |= skipped_results(found.campaign)
-    verdict = overall([result.verdict for result in results.values()])
     named = tuple(cause for cause in doubted(causes) if cause.probability >= CONSTANTS["member"])
     told = {cause.response for cause in named}
     for name in found.search.linear.responses:
         if results[name].verdict == "not-identifiable" and name not in told:
-            named += tuple(candidates_of(found, name))
+            candidates = candidates_of(found, name)
+            named += tuple(candidates)
+            if not candidates and found.card.polynomial is None and is_slow(found, name):
+                results[name] = replace(results[name], verdict="unexplained")  # nothing known is slow in this way
     return Verdict(
-        verdict,
+        overall([result.verdict for result in results.values()]),
         named,
         results,
         next_step(named, results, {name: left.line for name, left in found.left.items()}),
