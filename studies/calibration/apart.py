@@ -3,10 +3,14 @@
 from collections.abc import Callable
 from dataclasses import replace
 
+import numpy as np
+
 from studies.calibration.fit import CardFit, fit
 from studies.calibration.observed import HOUSING
 from studies.calibration.problem import CardProblem
 
+LATE, FAR = "noise.housing_lag_s", 2.0
+"""The lag of the housing's sensor, and prior standard deviations up to which it is what the card says."""
 APART = (
     "The chamber's temperatures do not explain the housing's by the heat path of this card (a set point that the air follows late, say):"
     " the chamber is left out, and the measured housing drives the gyro."
@@ -14,10 +18,17 @@ APART = (
 
 
 def fit_explained(problem: CardProblem, progress: Callable[[str], None]) -> tuple[CardFit, tuple[str, ...]]:
-    """Find the most probable point; where there is none with the housing explained, that of the other responses, and say so."""
+    """Find the most probable point; where there is none with the housing explained, or only with a sensor so late that the gyro denies it, that of the other responses, and say so."""
     found = fit(problem, progress=progress)
     others = [name for name in problem.responses if name != HOUSING]
-    if found.converged or len(others) == len(problem.responses):
+    if len(others) == len(problem.responses) or _is_sound(found):
         return found, ()
     alone = fit(replace(problem, runs=tuple(run.explaining(others) for run in problem.runs)), progress=progress)
-    return (alone, (APART,)) if alone.converged else (found, ())
+    return (alone, (APART,)) if _is_sound(alone) else (found, ())
+
+
+def _is_sound(found: CardFit) -> bool:
+    """Whether it has converged with a sensor as late as the card says."""
+    priors = found.problem.priors
+    late = priors.standard(found.point[: len(priors.values)])[[name == LATE for name in priors.names]]
+    return found.converged and bool(np.all(np.abs(late) < FAR))

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from studies.calibration.apart import APART
 from studies.cli import main
 from studies.effects import find_effect
 from studies.instrument.card import load_card
@@ -38,6 +39,18 @@ def test_a_virtual_record_of_the_card_is_adequate(shipped):
     verdict = diagnose_records(simulated(stated, *PROFILES), stated).verdict
     assert (verdict.verdict, verdict.causes) == ("adequate", ())
     assert max(abs(shift.shift_sd) for shift in verdict.calibration) < 1.0
+
+
+@pytest.mark.slow
+def test_a_set_point_that_the_air_follows_late_is_no_second_lag(shipped, only):
+    """A minute between set point and housing was read as a slow sensor, carried into the frequency and mended by a second lag."""
+    only("second-lag", "thermometer-lag")
+    runs = simulated(shipped, *PROFILES)
+    name = "chamber_temperature_degC"
+    early = [run.with_columns({name: np.interp(run["time_s"] + 60.0, run["time_s"], run[name])}) for run in runs]
+    verdict = diagnose_records(early, shipped).verdict
+    assert (verdict.verdict, verdict.causes) == ("adequate", ())
+    assert APART in verdict.notes
 
 
 @pytest.mark.slow
