@@ -285,7 +285,7 @@ class Search:
             base = self.settle(others, final.noise) if others else plain
             same = replace(final, terms=(*others, term))
             quiet = replace(base, noise=final.noise)  # a rival leaves as little
-            known = [h for h in self.contenders(quiet, ()) if h.terms[-1].key != term.key]
+            known = [h for h in self.contenders(quiet, ()) if h.terms[-1].key != term.key and h.score > base.score]
             rivals.append(tuple(sorted([same, *known], key=lambda h: -h.score)))
             without.append(base)
         return Outcome(plain, final, tuple(rivals), tuple(without))
