@@ -37,7 +37,7 @@ def warn(found: CardFit, estimates: Sequence[Estimate], ladder: Mapping[str, Run
         usual = usual_mean(found, name)
         if len(rows[name].times) > 1 and rung.offset > max(CONTRADICTION * usual, TURNED_ON * stated):
             warnings.append(
-                f"the runs disagree in the {WORDS[name]}: after the calibration their means lie {rung.offset:.3g} {UNITS[name]}"
+                f"the runs disagree in the {WORDS[name]}: after the calibration their means lie {rung.offset:.3g}{_unit(name)}"
                 f" (rms) from the model, but the noise within a run explains only {usual:.2g}"
                 + (f" and the card states {stated:.3g} from run to run" if stated else "")
                 + (". Are they of one device?" if stated else ". Are they of one device and one turn-on?")
@@ -63,6 +63,10 @@ def _moved(estimates: Sequence[Estimate]) -> list[str]:
     ]
 
 
+def _unit(name: str) -> str:
+    return "" if UNITS[name] == "1" else f" {UNITS[name]}"
+
+
 def _misfit(found: CardFit, ladder: Mapping[str, Rung]) -> list[str]:
     """Name the responses that the model does not follow: what it leaves stands out of what their rows scatter and the card states."""
     said = []
@@ -74,7 +78,7 @@ def _misfit(found: CardFit, ladder: Mapping[str, Rung]) -> list[str]:
             usual, most = near, NEIGHBOURS * near
         if rung.calibrated > most:
             said.append(
-                f"poor fit in the {WORDS[name]}: residual {rung.calibrated:.2g} {UNITS[name]} (rms), noise {usual:.2g}. The calibrated values"
+                f"poor fit in the {WORDS[name]}: residual {rung.calibrated:.2g}{_unit(name)} (rms), noise {usual:.2g}. The calibrated values"
                 f" absorb part of this misfit; hrg diagnose --card looks for the missing effect."
             )
     return said

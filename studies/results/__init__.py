@@ -45,7 +45,9 @@ class Column:
         return f"{self.heading} ({self.unit})" if self.unit else self.heading
 
     def write(self, row: Any) -> str:
-        """Return the cell of a row: here a number becomes text."""
+        """Return the cell of a row: here a number becomes text; what is exact has no interval."""
+        if self.interval is not None and len({find(row, key) for key in self.interval}) == 1:
+            return ""
         ends = self.within or (self.interval if not self.digits else None)
         if ends is not None:
             keys = (self.key if self.within else ends[0], *ends)
