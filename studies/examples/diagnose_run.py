@@ -10,7 +10,7 @@ import numpy as np
 
 import hrg
 
-STEP, HOURS, LAG = 20.0, 8, 1800.0  # s between rows, length of a run, s
+STEP, ROW, HOURS, LAG = 1.0, 20, 8, 1800.0  # s, steps between rows, length of a run, s
 RATE_BIAS = 900.0  # deg/h per K/s
 
 
@@ -29,6 +29,7 @@ def make_run(chamber: tuple[float, ...], generator: np.random.Generator) -> hrg.
         resonator[k] = keep * resonator[k - 1] + (1 - keep) * housing[k]
     frequency = 4425 + 0.37 * resonator - 1e-3 * resonator**2
     bias = 2.0 * (frequency - 4432) + RATE_BIAS * np.gradient(resonator, t)
+    t, housing, frequency, bias = (values[::ROW] for values in (t, housing, frequency, bias))
     return hrg.Record(
         {
             "time_s": t,
