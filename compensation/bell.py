@@ -8,14 +8,18 @@ rough null and scale; bias over temperature; scale over rate; scale over tempera
 `compensation.bell_calibration` fits it to runs.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from compensation.arrays import Array
+from compensation.constants import zero_Celsius
 from compensation.errors import CompensationError
 from compensation.samples import read_columns, require_regular
+
+MARGIN = 0.01  # part of a fitted range by which noise may lead out of it before that counts as extrapolation
 
 
 @dataclass(frozen=True)
@@ -39,6 +43,16 @@ class PolynomialCurve:
         shift = c0 - np.asarray(y, dtype=float)
         with np.errstate(invalid="ignore"):
             return np.asarray(self.reference - 2 * shift / (c1 + np.sqrt(c1**2 - 4 * c2 * shift)))
+
+    def refuse_outside(self, x: Array, name: str, show: Callable[[float], str]) -> None:
+        """Raise when x leaves the fitted range by more than `MARGIN` of it; `show` writes an x for people."""
+        beyond = MARGIN * (self.highest - self.lowest)
+        low, high = float(np.min(x)), float(np.max(x))
+        if low < self.lowest - beyond or high > self.highest + beyond:
+            raise CompensationError(
+                f"the {name} runs from {show(low)} to {show(high)}, but the chain was fitted between "
+                f"{show(self.lowest)} and {show(self.highest)}; allow extrapolation or calibrate over that range."
+            )
 
 
 @dataclass(frozen=True)
@@ -95,11 +109,17 @@ class ChainOutput:
     filtered: Array
 
 
-def apply_chain(chain: BellChain, time: ArrayLike, output: ArrayLike, temperature: ArrayLike) -> ChainOutput:
-    """Return the rate after each step of eq. (32), and after the filter, also outside the ranges of the curves."""
+def apply_chain(
+    chain: BellChain, time: ArrayLike, output: ArrayLike, temperature: ArrayLike, *, extrapolate: bool = False
+) -> ChainOutput:
+    """Return the rate after each step of eq. (32), and after the filter."""
     t, A, T = read_columns(time=time, output=output, temperature=temperature)
     rough = chain.scale * ((chain.warming.undo(A, T) if chain.warming else A) - chain.null)
     straight = rough - chain.bias.value(T)
+    if not extrapolate:
+        chain.bias.refuse_outside(T, "temperature", _show_celsius)
+        chain.scale_over_temperature.refuse_outside(T, "temperature", _show_celsius)
+        chain.scale_over_rate.refuse_outside(straight, "rate", lambda rate: f"{np.degrees(rate):.2f} °/s")
     linear = chain.scale_over_rate.value(straight)
     steady = linear * chain.scale_over_temperature.value(T)
     if len(chain.taps):
@@ -117,6 +137,10 @@ def invert_chain(chain: BellChain, rate: ArrayLike, temperature: ArrayLike) -> A
     if not np.all(np.isfinite(counts)):
         raise CompensationError("the scale over rate has a turning point in this range and cannot be inverted.")
     return counts
+
+
+def _show_celsius(temperature: float) -> str:
+    return f"{temperature - zero_Celsius:.2f} °C"
 
 
 def design_smoother(sampling: float, cutoff: float, order: int = 50) -> Array:

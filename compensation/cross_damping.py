@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from compensation.arrays import Array
+from compensation.constants import zero_Celsius
 from compensation.errors import CompensationError
 from compensation.noise_regression import correlated_covariance
 from compensation.regression import fit_linear, refuse_constant_columns
@@ -51,20 +52,27 @@ class CrossDampingModel:
         """Return ζ₁₂ (1) at a temperature (K): eq. (10)."""
         return evaluate_cross_damping(self.coefficients, np.asarray(temperature) - self.calibration_temperature)
 
-    def predict(self, time: ArrayLike, temperature: ArrayLike) -> Array:
-        """Return the erroneous rate (rad/s) over time: ζ₁₂(T(t)) through the filter (9), settled at the start; also out of range."""
+    def predict(self, time: ArrayLike, temperature: ArrayLike, *, extrapolate: bool = False) -> Array:
+        """Return the erroneous rate (rad/s) over time: ζ₁₂(T(t)) through the filter (9), settled at the start."""
         t, T = read_columns(time=time, temperature=temperature)
+        low, high, lowest, highest = (x - zero_Celsius for x in (T.min(), T.max(), self.lowest, self.highest))
+        if not extrapolate and (low < lowest or high > highest):
+            raise CompensationError(
+                f"the temperature runs from {low:.2f} to {high:.2f} °C, but the model was fitted between {lowest:.2f} and {highest:.2f} °C; allow extrapolation or fit a wider record."
+            )
         return simulate_bias(t, self.cross_damping(T), self.k, self.zeta, self.g2)
 
-    def compensate(self, time: ArrayLike, rate: ArrayLike, temperature: ArrayLike) -> Array:
+    def compensate(
+        self, time: ArrayLike, rate: ArrayLike, temperature: ArrayLike, *, extrapolate: bool = False
+    ) -> Array:
         """Return the rate (rad/s) less its predicted cross-damping error; parameters as for `predict`."""
         _, Omega, _ = read_columns(time=time, rate=rate, temperature=temperature)
-        return Omega - self.predict(time, temperature)
+        return Omega - self.predict(time, temperature, extrapolate=extrapolate)
 
     def memory(self, time: ArrayLike, temperature: ArrayLike) -> float:
         """Return the largest part (rad/s) that the dynamics of (9) has in this profile beside 2k/g₂ ζ₁₂(T): below the noise it is not seen."""
         static = 2 * self.k / self.g2 * self.cross_damping(temperature)
-        return float(np.max(np.abs(self.predict(time, temperature) - static)))
+        return float(np.max(np.abs(self.predict(time, temperature, extrapolate=True) - static)))
 
 
 def simulate_bias(time: ArrayLike, cross_damping: ArrayLike, k: float, zeta: float, g2: float = 2.0) -> Array:

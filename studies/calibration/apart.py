@@ -8,9 +8,9 @@ import numpy as np
 from studies.calibration.fit import CardFit, fit
 from studies.calibration.observed import HOUSING
 from studies.calibration.problem import CardProblem
+from studies.calibration.remarks import FAR
+from studies.simulation.variations import LAG
 
-LATE, FAR = "noise.housing_lag_s", 2.0
-"""The lag of the housing's sensor, and prior standard deviations up to which it is what the card says."""
 APART = (
     "The chamber's temperatures do not explain the housing's by the heat path of this card (a set point that the air follows late, say):"
     " the chamber is left out, and the measured housing drives the gyro."
@@ -30,5 +30,5 @@ def fit_explained(problem: CardProblem, progress: Callable[[str], None]) -> tupl
 def _is_sound(found: CardFit) -> bool:
     """Whether it has converged with a sensor as late as the card says."""
     priors = found.problem.priors
-    late = priors.standard(found.point[: len(priors.values)])[[name == LATE for name in priors.names]]
+    late = priors.standard(found.point[: len(priors.values)])[[name == LAG for name in priors.names]]
     return found.converged and bool(np.all(np.abs(late) < FAR))

@@ -65,9 +65,10 @@ def _check_temperatures(instrument: "Instrument", record: "Record", as_read: "Le
     changes = float(np.std(known)) if known.size > 2 else 0.0
     if changes <= CLEAR * white_rms(known):
         return
-    left, whole = as_read[FREQUENCY][0], law_of(instrument)
+    left = as_read[FREQUENCY][0]
     if left < REFUSED * changes:
         return
+    whole = law_of(instrument)
     for words, read in READ_AS.items():
         columns = {name: read(record[name] + zero_Celsius) - zero_Celsius for name in names}
         other = _left(instrument, record.with_columns(columns), whole)[FREQUENCY][0]

@@ -43,7 +43,7 @@ def study_cross_damping(
         return fit_cross_damping(chosen, k=k, zeta=zeta, calibration_temperature=calibration_temperature, order=order)
 
     def compensate(chosen: Sequence[RestRun], run: RestRun) -> Array:
-        return fit(chosen).compensate(run.time, run.rate, run.temperature)
+        return fit(chosen).compensate(run.time, run.rate, run.temperature, extrapolate=True)
 
     model = fit(runs)
     if len(runs) == 1 and len(runs[0].time) < LEAST_ROWS:

@@ -75,7 +75,10 @@ def judge_steps(
     runs = (rates, rest, turning)
     even = all(is_regular(run.time) for run in runs if run is not None)
     static = chain if even else replace(chain, taps=np.empty(0))
-    outputs = [None if run is None else apply_chain(static, run.time, run.output, run.temperature) for run in runs]
+    outputs = [
+        None if run is None else apply_chain(static, run.time, run.output, run.temperature, extrapolate=True)
+        for run in runs
+    ]
     figures = []
     for step in STEPS if even else STEPS[:-1]:
         at_rates, at_rest, at_turning = (None if one is None else np.asarray(getattr(one, step)) for one in outputs)
@@ -304,7 +307,7 @@ def _hold_out(runs: Runs, rough: BellRun | None = None, form: str | None = None)
         assert first is not None
         chain = fit_chain(first, *(seen for seen, _ in rest), rough=rough, cutoff=None, form=form)
         for run in (unseen for unseen in (one, *(own for _, own in rest)) if unseen is not None):
-            result = apply_chain(chain, run.time, run.output, run.temperature)
+            result = apply_chain(chain, run.time, run.output, run.temperature, extrapolate=True)
             before.append(result.rough - run.rate)
             after.append(result.temperature_compensated - run.rate)
     known = np.isfinite(np.concatenate(after))  # not within a dead band

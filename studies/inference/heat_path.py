@@ -14,6 +14,7 @@ from studies.inference.model import PRICE, Background, Linear
 from studies.inference.search import Hypothesis, Search
 from studies.inference.signatures import SHARE, Signatures
 from studies.instrument.card import Instrument
+from studies.simulation.variations import LAG
 
 Array = NDArray[np.float64]
 FREQUENCY = "frequency_Hz"
@@ -38,7 +39,7 @@ OF_LUMPS = {
     "capacity_slope_per_K": {"value": 1e-3, "sd": 1e-3},
 }
 """The same of what lumps have besides, where plain lags in series leave slow noise."""
-SENSOR, LATENESS = "noise.housing_lag_s", {"value": 5.0, "sd": 20.0}
+SENSOR, LATENESS = LAG, {"value": 5.0, "sd": 20.0}
 """The sensor of the housing, and what is known of its lag (s) where the resonator is ahead of it."""
 WORTH = 10.0
 """Log evidence that one more lag must bring."""

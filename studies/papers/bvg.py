@@ -227,7 +227,7 @@ def draw_steps(chain: BellChain, runs: Runs) -> Drawing:
             over_rate = run is rates
             x = run.rate / DEG if over_rate else run.temperature - zero_Celsius
             label = "applied rate (°/s)" if over_rate else "temperature (°C)"
-            result = apply_chain(unfiltered, run.time, run.output, run.temperature)
+            result = apply_chain(unfiltered, run.time, run.output, run.temperature, extrapolate=True)
             rows = style.few_rows(len(run.time))
             for values, colour, name in (
                 (result.rough, style.ORANGE, "rough"),
@@ -244,7 +244,7 @@ def draw_steps(chain: BellChain, runs: Runs) -> Drawing:
 
 def _draw_allan(chain: BellChain, rest: BellRun) -> Drawing:
     """Draw the Allan deviation at rest after the rough step, after the chain, and after the filter (figure 19)."""
-    result = apply_chain(chain, rest.time, rest.output, rest.temperature)
+    result = apply_chain(chain, rest.time, rest.output, rest.temperature, extrapolate=True)
     step = float(rest.time[1] - rest.time[0])
     with style.figure(height=3.4, x="averaging time τ (s)", y="Allan deviation (°/h)") as (made, axes):
         for values, colour, name in (

@@ -155,7 +155,7 @@ def draw_runs(runs: tuple[RestRun, ...], model: CrossDampingModel, unit: float, 
     with style.figure(2, 1, 4.8, "time (h)", labels, sharex=True, height_ratios=heights) as (made, (upper, lower)):
         begin = 0.0
         for i, run in enumerate(runs):
-            after = model.compensate(run.time, run.rate, run.temperature)
+            after = model.compensate(run.time, run.rate, run.temperature, extrapolate=True)
             width = max(AVERAGING, 2 * float(np.median(np.diff(run.time))))
             blocks = average_blocks(run.time, {"T": run.temperature, "before": run.rate, "after": after}, width)
             means = blocks.columns

@@ -201,6 +201,8 @@ RATES, REST, TURNING = make_runs(np.random.default_rng(8), 0.06)
         (lambda: fit_chain(RATES, REST, replace(TURNING, rate=0 * TURNING.rate)), r"\(36\)"),
         (lambda: replace(RATES, output=np.r_[np.nan, RATES.output[1:]]), "'output' has 1 missing"),
         (lambda: replace(RATES, output=RATES.output[1:]), "'output' has shape"),
+        (lambda: apply_chain(fit_planted(1)[0], [0, 1], [0, 0], [200.0, 300.0]), "extrapolation"),
+        (lambda: apply_chain(fit_planted(1)[0], [0, 1], [0, 1e5], [290.0, 300.0]), "rate runs"),
         (lambda: measure_nonlinearity([1, 1, 2], [1, 1, 2]), "three applied rates"),
         (
             lambda: apply_chain(fit_chain(RATES, REST, TURNING), np.arange(9.0), np.full(9, -703.0), np.full(9, 300.0)),

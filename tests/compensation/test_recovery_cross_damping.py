@@ -5,6 +5,7 @@ import pytest
 import sympy
 
 from compensation.cross_damping import (
+    CrossDampingModel,
     RestRun,
     evaluate_cross_damping,
     fit_cross_damping,
@@ -125,6 +126,11 @@ def test_two_runs_are_fitted_together():
     np.testing.assert_allclose(model.coefficients, planted, rtol=1e-3)
 
 
+def some_model() -> CrossDampingModel:
+    time, rate, temperature, _ = record(lambda rows: np.zeros(rows), noise=0.0)
+    return fit_cross_damping([RestRun(time, rate, temperature)], k=K, zeta=ZETA)
+
+
 @pytest.mark.parametrize(
     ("act", "words"),
     [
@@ -145,6 +151,7 @@ def test_two_runs_are_fitted_together():
         ),
         (lambda: fit_cross_damping([], k=K, zeta=ZETA), "at least one run"),
         (lambda: relate_cross_damping_to_rate_when_tuned(0.0, 0.1), "positive"),
+        (lambda: some_model().predict([0, 1], [200.0, 201.0]), "extrapolation"),
     ],
 )
 def test_what_cannot_be_fitted_is_refused(act, words):

@@ -71,7 +71,9 @@ def compensate(model: Model, record: Record, *, extrapolate: bool) -> dict[str, 
     known = np.isfinite(temperature)
     if np.count_nonzero(known) < 2:
         raise InputError(f"the column '{column}' has fewer than two values; nothing can be compensated.")
-    predicted = load_cross_damping(model).predict(record["time_s"][known], temperature[known] + zero_Celsius)
+    predicted = load_cross_damping(model).predict(
+        record["time_s"][known], temperature[known] + zero_Celsius, extrapolate=True
+    )
     compensated = np.full(len(record), np.nan)
     compensated[known] = record[output][known] - predicted / OUTPUTS[output]
     return {f"{COMPENSATED}{output}": compensated}
@@ -104,7 +106,7 @@ def _test_rows(model: Model) -> list[tuple[float, ...]]:
     steps = np.array([0.0, *np.resize([1.0, 2.0, 4.0, 2.0, 0.5], 23)])
     temperature = np.round((low + high) / 2 + 0.45 * (high - low) * np.sin(0.5 * np.arange(24)), 9)
     fit = load_cross_damping(model)
-    error = fit.predict(np.cumsum(steps), temperature + zero_Celsius) / OUTPUTS[model.compensates]
+    error = fit.predict(np.cumsum(steps), temperature + zero_Celsius, extrapolate=True) / OUTPUTS[model.compensates]
     return list(zip(steps.tolist(), temperature.tolist(), error.tolist(), strict=True))
 
 

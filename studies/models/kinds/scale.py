@@ -136,7 +136,11 @@ def compensate(model: Model, record: Record, *, extrapolate: bool) -> dict[str, 
     model.check_range(column, record[column][judged], extrapolate)
     compensated = np.full(len(record), np.nan)
     result = apply_chain(
-        chain, record["time_s"][complete], record[output][complete], record[column][complete] + zero_Celsius
+        chain,
+        record["time_s"][complete],
+        record[output][complete],
+        record[column][complete] + zero_Celsius,
+        extrapolate=True,
     )
     model.check_range(RATE, result.bias_compensated[judged[complete]] / DEG, extrapolate)
     compensated[complete] = result.filtered / DEG
