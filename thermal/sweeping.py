@@ -35,10 +35,6 @@ SOON, CLOSER = 96, 4  # usual distances over which they are, and how much: a par
 MOST_CORNERS = 200  # of profiles whose every corner is a knot; a measured column of more rows is averaged for δ
 
 
-class SweepError(ThermalError):
-    """Radiation is too strong for the sweeps to converge."""
-
-
 @dataclass(frozen=True)
 class Grid:
     """Knots of a run with their midpoints, and the modes between; (3, K, …) are start, middle and end (before a jump) of intervals."""
@@ -140,6 +136,20 @@ class Sweep:
         return Transient(self.first.nodes, self.first.knots, evaluate)
 
 
+def simulate(network: Network, boundaries: Mapping[str, Profile], initial: ArrayLike | None = None) -> Transient:
+    """Propagate exactly where the network is linear, else sweep."""
+    return (propagate if network.is_linear else sweep)(network, boundaries, initial)
+
+
+def step_remaining(network: Network, before: float, after: float, weights: Array, time: ArrayLike) -> Array:
+    """Share of a step of all boundaries from `before` to `after` (K) that a mean over nodes lacks, `time` (s) after it."""
+    time = np.asarray(time, dtype=float)
+    profile = Profile(np.array([0.0, 0.0, time.max()]), np.array([before, after, after]))
+    transient = simulate(network, {boundary.name: profile for boundary in network.boundaries})
+    left: Array = (transient.observe(time, weights[None, :])[:, 0] - after) / (before - after)
+    return left
+
+
 def sweep(network: Network, boundaries: Mapping[str, Profile], initial: ArrayLike | None = None) -> Transient:
     """Follow profiles through a network with radiation, or capacities that depend on temperature (see the module)."""
     return run_sweeps(network, boundaries, initial).transient()
@@ -161,21 +171,17 @@ def run_sweeps(
     start = np.zeros((1, network.count))
     moments = grid.moments
     T1 = np.array([first.evaluate(t) for t in moments])
-    T, delta, rate = T1, np.zeros_like(T1), np.zeros_like(T1)
-    for _ in range(MOST_SWEEPS if not network.is_linear else 0):
+    T = T1
+    for _ in range(MOST_SWEEPS):
         beyond = _beyond(network, linear, T, held, power)[:, :, None]
         delta = grid.answer(beyond, start)[:, :, 0]
         last, T = T, T1 + delta
         change = np.abs(T - last).max()
         if change < SWEEP_TOLERANCE:
-            rate = grid.rates(beyond, start)[:, :, 0]
-            break
+            return Sweep(network, linear, grid, held, power, T, delta, grid.rates(beyond, start)[:, :, 0], first)
         if not change < 1e4:
-            raise SweepError("the radiation is too strong to be swept; integrate the network instead.")
-    else:
-        if not network.is_linear:
-            raise SweepError("the radiation is too strong to be swept; integrate the network instead.")
-    return Sweep(network, linear, grid, held, power, T, delta, rate, first)
+            break
+    raise ThermalError("the radiation is too strong to be followed; take a profile of temperatures closer together.")
 
 
 def _beyond(network: Network, linear: Network, T: Array, held: Array, power: Array) -> Array:

@@ -18,7 +18,7 @@ from studies.simulation.virtual_gyro import simulate_run
 from thermal.lag import lag
 from thermal.network import Boundary, Conductor, Node, Radiator, assemble
 from thermal.profile import Profile, parse_profile
-from thermal.radiative import integrate
+from tests.thermal.radau import integrate
 
 ROOM = 293.15
 SLOPE, CURVATURE = 0.3716, -9.7e-4

@@ -18,7 +18,7 @@ from tests.studies.diagnosis.bench import searched
 from thermal.lag import lag
 from thermal.network import Boundary, Conductor, Node, Radiator, assemble
 from thermal.profile import Profile, parse_profile
-from thermal.radiative import integrate
+from tests.thermal.radau import integrate
 
 STEP, RUN, PAUSE = 60.0, 9000.0, 2400.0  # s
 SLOW, SHARE, NOISE = 15000.0, 0.08, 1e-3  # s, –, Hz
