@@ -120,7 +120,7 @@ def answer(task: Task, explorer: Explorer, plan: WorkPlan) -> Answer:
         design,
         values,
         foretold,
-        np.array(row.values[: len(values)]),
+        row.values[: len(values)],
         limits,
         spreads,
         search.low + search.x[front] * search.width,

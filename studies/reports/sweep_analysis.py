@@ -9,12 +9,11 @@ from studies.errors import InputError
 from studies.reports import sweep_figures as figures
 from studies.reports.digits import plain, to_numerical_error
 from studies.results import Column, Head, Part, Sentence, Table, row_of, rows_of
-from studies.sweeps.definition import StudyParameter
 from studies.sweeps.quantity import Column as Output
 from studies.sweeps.results import Results
 from studies.sweeps.search import name_search
 from studies.sweeps.sensitivity import linear_shares, local_slopes, sobol_indices
-from studies.sweeps.tolerance import Yield, find_reach, find_yield, resolve_limits
+from studies.sweeps.tolerance import Yield, find_yield, resolve_limits
 
 SOBOL = "Parameter | first: First order .4f | first_low … first_high: 90 % interval .4f | total: Total .4f | total_low … total_high: 90 % interval .4f"
 SHARES = "Parameter | slope: Slope .6g | half_width: ± .2g | Unit | share: Share of variance (%) ×100 .2f"
@@ -87,7 +86,7 @@ def _slope_units(results: Results, column: Output) -> dict[str, str]:
 
 
 def tolerance_parts(results: Results) -> list[Part]:
-    """Return the yield under the requirements, and how far the tolerances may reach."""
+    """Return what was found on tolerances, and the yield under the requirements."""
     study = results.study
     if not study.requirements or not len(results):
         return []
@@ -98,19 +97,10 @@ def tolerance_parts(results: Results) -> list[Part]:
             ends = {"from": _end(limits.low), "to": _end(limits.high)}
             rows.append({"requirement": limits.column} | ends | _yield_row(results, (requirement,)))
         rows.append({"requirement": "all requirements"} | _yield_row(results, study.requirements))
-        reach = find_reach(results, study.requirements)
     except InputError as error:
         return [Sentence(str(error), "warning")]
     note = "In the interval, a design without a result counts as failed at the lower end, passed at the upper."
-    if reach.part is None:
-        words = "No sampled design fails: the tolerances can be wider than the ranges of the study."
-    else:
-        reached = ", ".join(_reach(p, reach.part) for p in study.parameters if not isinstance(p.nominal, str))
-        words = (
-            f"The largest box around the nominal design without a failed design covers {100 * reach.part:.3g} % of every range"
-            f" ({reach.inside} sampled design{'s' * (reach.inside != 1)} inside it): {reached}. This is based on the sampled designs only; confirm it with a worst-case search."
-        )
-    return [*search_parts(results, "tolerance"), Table("Yield", rows, YIELD, note), Sentence(words, "note")]
+    return [*search_parts(results, "tolerance"), Table("Yield", rows, YIELD, note)]
 
 
 def _end(value: float) -> float | None:
@@ -119,12 +109,6 @@ def _end(value: float) -> float | None:
 
 def _yield_row(results: Results, requirements: Any) -> dict[str, Any]:
     return row_of(find_yield(results, requirements), "share", "low", "high", "unknown")
-
-
-def _reach(parameter: StudyParameter, part: float) -> str:
-    nominal = float(parameter.nominal)
-    low, high = (nominal + part * (end - nominal) for end in (parameter.low, parameter.high))
-    return f"{figures.label(parameter.name, parameter.unit)} {low:.4g} … {high:.4g}"
 
 
 def search_parts(results: Results, *kinds: str) -> list[Part]:
@@ -204,7 +188,7 @@ def summarise(results: Results) -> dict[str, Any]:
         found[key] = {c.name: _data(analyse, results, c.name) for c in results.study.columns}
     whole = yield_of(results)
     if whole is not None:
-        found["yield"] = {k: v for k, v in vars(whole).items() if k != "limits"} | {"share": whole.share}
+        found["yield"] = vars(whole) | {"share": whole.share}
     return found
 
 

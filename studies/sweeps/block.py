@@ -17,7 +17,7 @@ from compensation.arrays import Array
 class Batch:
     """Designs to be computed together."""
 
-    # array (m,) of int, among the unique designs of the study, ascending; -1 for a design of a search
+    # array (m,) of int, among the designs of the study, ascending; -1 for a design of a search
     places: NDArray[np.int64]
     designs: Array  # array (m, parameters), texts as their place in the parameter's values, -1 for the nominal one
 
@@ -27,6 +27,15 @@ class Batch:
     def part(self, first: int, last: int) -> "Batch":
         """Return some of the designs."""
         return Batch(self.places[first:last], self.designs[first:last])
+
+
+class Row(NamedTuple):
+    """What became of one design: `remark` is the reason of a failure, or a warning of the solver."""
+
+    status: str
+    remark: str
+    values: Array
+    errors: Array
 
 
 class Remark(NamedTuple):

@@ -1,11 +1,9 @@
 """The designs of a study: grids, lists, Latin hypercubes, Sobol sequences, Saltelli's and one-at-a-time designs."""
 
-from dataclasses import dataclass
 from hashlib import blake2b
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from compensation.arrays import Array
 from studies.errors import InputError
@@ -17,28 +15,16 @@ if TYPE_CHECKING:
 LEVELS = (-1.0, -0.5, 0.5, 1.0)  # of one parameter at a time, in half ranges about the nominal value
 
 
-@dataclass(frozen=True)
-class Design:
-    """The designs, in order."""
-
-    # array (cases, parameters), in the unit of each name; texts as their place in the parameter's `values`
-    values: Array
-    # array of int, places of the designs that differ from all before them: only these are computed
-    unique: NDArray[np.intp]
-    inverse: NDArray[np.intp]  # array (cases,) of int, for every design its place in `unique`
-
-    @property
-    def digest(self) -> str:
-        """A hash of all values, to notice a sampler that gives other designs than it did before."""
-        return blake2b(np.ascontiguousarray(self.values, dtype="<f8").tobytes(), digest_size=16).hexdigest()
-
-
-def draw(study: "Study") -> Design:
-    """Return the designs that a study asks for; the same for the same spec and seed."""
+def draw(study: "Study") -> Array:
+    """Return the designs that a study asks for, (cases, parameters); texts as their place in the parameter's `values`."""
     if not study.parameters:
-        return _unique(np.empty((1, 0)))
-    values = SAMPLERS[study.sampling.method](study)
-    return _unique(np.ascontiguousarray(values, dtype=float))
+        return np.empty((1, 0))
+    return np.ascontiguousarray(SAMPLERS[study.sampling.method](study), dtype=float)
+
+
+def hash_designs(designs: Array) -> str:
+    """A hash of all values, to notice a sampler that gives other designs than it did before."""
+    return blake2b(designs.astype("<f8").tobytes(), digest_size=16).hexdigest()
 
 
 def count_cases(study: "Study") -> int:
@@ -157,17 +143,6 @@ def _quantile(parameter: "StudyParameter", p: Array) -> Array:
             stats.truncnorm.ppf(p, (low - middle) / deviation, (high - middle) / deviation, middle, deviation)
         )
     return np.asarray(stats.norm.ppf(p, middle, deviation))
-
-
-def _unique(values: Array) -> Design:
-    if any(len(np.unique(column)) == len(values) for column in values.T):  # a sample; a million rows take a second
-        rows = np.arange(len(values))
-        return Design(values, rows, rows)
-    _, first, inverse = np.unique(values, axis=0, return_index=True, return_inverse=True)
-    order = np.argsort(first)
-    place = np.empty_like(order)
-    place[order] = np.arange(len(order))
-    return Design(values, first[order], place[inverse.ravel()])
 
 
 SAMPLERS = {

@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from studies.errors import MissingEnvironment
 from studies.sweeps.block import Batch, Cases, join
-from studies.sweeps.design import Design
 from studies.sweeps.evaluate import WorkPlan, evaluate_task, failed_cases
 from studies.sweeps.workers import Here, Pool, Workers, cores, say_gone
 
@@ -43,9 +43,9 @@ class _Task:
 
 @dataclass
 class Batches:
-    """Batches of a design still to be computed, made when they are taken: `places` of the unique designs in each."""
+    """Batches still to be computed, made when they are taken: `places` of the designs in each."""
 
-    design: Design
+    designs: Array  # (cases, parameters)
     places: deque[NDArray[np.intp]]
 
     def __len__(self) -> int:
@@ -54,17 +54,17 @@ class Batches:
     def popleft(self) -> Batch:
         """Return the next batch."""
         places = self.places.popleft()
-        return Batch(places, self.design.values[self.design.unique[places]])
+        return Batch(places, self.designs[places])
 
 
-def missing_batches(study: "Study", design: Design, store: "Store", vectorised: bool) -> Batches:
+def missing_batches(study: "Study", designs: Array, store: "Store", vectorised: bool) -> Batches:
     """Return, in order, the cases that the store lacks, in the batches that the spec fixes."""
-    count, done = len(design.unique), store.done
+    count, done = len(designs), store.done
     lacking = np.ones(count, dtype=bool)
     lacking[: len(done)] = ~done[:count]
     places = np.flatnonzero(lacking)
     parts = np.split(places, np.searchsorted(places, range(0, count, batch_size(study, vectorised))))
-    return Batches(design, deque(part for part in parts if len(part)))
+    return Batches(designs, deque(part for part in parts if len(part)))
 
 
 def batch_size(study: "Study", vectorised: bool) -> int:

@@ -6,13 +6,13 @@ import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from studies.errors import UNUSABLE_INPUT
 from studies.instrument.card import Instrument
-from studies.sweeps.block import Batch, Cases, Remark, decode, each_design, join
+from studies.sweeps.block import Batch, Cases, Remark, Row, decode, each_design, join
 from studies.sweeps.case import Case
 from studies.sweeps.child import FunctionFailed, FunctionLost
 from studies.sweeps.design import coding
@@ -23,16 +23,6 @@ from studies.sweeps.quantity import HarmonicQuantity, Number, Quantity
 if TYPE_CHECKING:
     from studies.sweeps.definition import Study
     from studies.sweeps.families import Families
-
-
-class Row(NamedTuple):
-    """What became of one design: `remark` is the reason of a failure, or a warning of the solver."""
-
-    status: str
-    remark: str
-    values: tuple[float, ...]
-    errors: tuple[float, ...]
-    seconds: float
 
 
 @dataclass(frozen=True)
@@ -74,6 +64,7 @@ def evaluate_task(plan: WorkPlan, batches: Sequence[Batch]) -> list[Cases]:
 
 
 def _evaluate_each(plan: WorkPlan, batch: Batch) -> Cases:
+    began = time.perf_counter()
     rows = [evaluate_case(plan, design) for design in each_design(decode(plan.coding, batch.designs), len(batch))]
     remarks: dict[tuple[str, str], list[int]] = {}
     for place, row in enumerate(rows):
@@ -83,7 +74,7 @@ def _evaluate_each(plan: WorkPlan, batch: Batch) -> Cases:
         batch,
         np.array([row.values for row in rows]),
         np.array([row.errors for row in rows]),
-        sum(row.seconds for row in rows),
+        time.perf_counter() - began,
         tuple(Remark(*key, places) for key, places in remarks.items()),
     )
 
@@ -114,22 +105,19 @@ def evaluate_case(plan: WorkPlan, parameters: Mapping[str, Any]) -> Row:
     def build(given: Mapping[str, Any]) -> Instrument:
         return set_parameters(plan.instrument, given, plan.derived)
 
-    began = time.perf_counter()
     with warnings.catch_warnings(record=True) as heard:
         warnings.simplefilter("always")
         try:
             case = Case(build(parameters), parameters, build, plan.start, plan.wanted)
             answers = [_evaluate(asked, case) for asked in plan.asked]
         except (*UNUSABLE_INPUT, FunctionLost) as error:
-            nothing = (math.nan,) * plan.width
-            return Row("lost" if isinstance(error, FunctionLost) else "failed", str(error), nothing, nothing, 0.0)
+            nothing = np.full(plan.width, math.nan)
+            return Row("lost" if isinstance(error, FunctionLost) else "failed", str(error), nothing, nothing)
     numbers = [number for found, _ in answers for number in found]
     reasons = [reason for _, reason in answers if reason]
     remarks = dict.fromkeys(str(warning.message) for warning in heard)
-    return Row(
-        "failed" if reasons else "ok", " ".join([*reasons, *remarks]), tuple(one.value for one in numbers),
-        tuple(one.error for one in numbers), time.perf_counter() - began,
-    )  # fmt: skip
+    values, errors = np.array([(one.value, one.error) for one in numbers]).T
+    return Row("failed" if reasons else "ok", " ".join([*reasons, *remarks]), values, errors)
 
 
 def _evaluate(asked: Quantity, case: Case) -> tuple[Sequence[Number], str]:

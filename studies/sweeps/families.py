@@ -22,7 +22,6 @@ from studies.sweeps.quantity import ModeQuantity, Quantity
 
 if TYPE_CHECKING:
     from studies.sweeps.definition import Study
-    from studies.sweeps.design import Design
 
 Designs = Mapping[str, NDArray[Any]]  # columns of parameters by name
 FEWEST = 64  # cases from which a family may cost less than solving each design
@@ -104,12 +103,12 @@ def _choices(count: int) -> Iterator[tuple[int, ...]]:
     return product(range(len(NODES)), repeat=count)
 
 
-def _build_nodes(study: "Study", design: "Design") -> _Nodes | None:
+def _build_nodes(study: "Study", design: Array) -> _Nodes | None:
     """Return materials at nodes where many designs have one of their own; None where these are few, or not followed."""
     places = [k for k, p in enumerate(study.parameters) if p.name.startswith(MATERIAL)]
     if not 0 < len(places) <= MOST_AXES or any(isinstance(study.parameters[k].nominal, str) for k in places):
         return None
-    if len(np.unique(design.values[:, places], axis=0)) < FEWEST * len(NODES) ** len(places):
+    if len(np.unique(design[:, places], axis=0)) < FEWEST * len(NODES) ** len(places):
         return None
     names = tuple(study.parameters[k].name for k in places)
     low, high = np.array([_range(study, design, k) for k in places]).T
@@ -118,7 +117,7 @@ def _build_nodes(study: "Study", design: "Design") -> _Nodes | None:
         nodes = _Nodes(names, low, high, tuple(
             set_parameters(study.instrument, dict(zip(names, map(float, one), strict=True))).material for one in at
         ))  # fmt: skip
-        some = design.values[:: -(-len(design.values) // FEWEST)]
+        some = design[:: -(-len(design) // FEWEST)]
         columns = {p.name: some[:, k] for k, p in enumerate(study.parameters) if p.name in (*names, TEMPERATURE)}
         exact, found = (_describe(study.instrument, columns, len(some), None, one) for one in (None, nodes))
     except UNUSABLE_INPUT:
@@ -146,7 +145,7 @@ def why_not(study: "Study") -> str:
     return ""
 
 
-def build_families(study: "Study", design: "Design", most: int = MOST_SOLVES) -> Families | str:
+def build_families(study: "Study", design: Array, most: int = MOST_SOLVES) -> Families | str:
     """Build the families that a study asks for, or say why it must be computed design by design."""
     reason = why_not(study)
     if reason:
@@ -177,9 +176,9 @@ def build_families(study: "Study", design: "Design", most: int = MOST_SOLVES) ->
     return Families(study.instrument, study.asked, members, _build_nodes(study, design))
 
 
-def choose_solver(study: "Study", design: "Design") -> Families | None:
+def choose_solver(study: "Study", design: Array) -> Families | None:
     """Return the families where the spec asks for them or lets them be, None where every design is solved in full."""
-    wanted, count = study.sampling.solver, len(design.unique)
+    wanted, count = study.sampling.solver, len(design)
     if wanted == "full" or (wanted == "auto" and count < FEWEST):
         return None
     found = build_families(study, design, min(count // SHARE, MOST_SOLVES) if wanted == "auto" else MOST_SOLVES)
@@ -257,12 +256,12 @@ def _describe(
     return _Bodies(T, growth, E, nu, rho, materials)
 
 
-def _range(study: "Study", design: "Design", k: int) -> tuple[float, float]:
-    p, values = study.parameters[k], design.values[:, k]
+def _range(study: "Study", design: Array, k: int) -> tuple[float, float]:
+    p, values = study.parameters[k], design[:, k]
     return min(float(values.min()), p.low, float(p.nominal)), max(float(values.max()), p.high, float(p.nominal))
 
 
-def _ends(study: "Study", design: "Design") -> dict[str, NDArray[Any]]:
+def _ends(study: "Study", design: Array) -> dict[str, NDArray[Any]]:
     """Return designs at the ends of temperature and every material parameter, which bound ν of all designs."""
     fixed = [T for T in (one.options["temperature_degC"] for one in study.asked) if T is not None]
     choices: dict[str, Sequence[Any]] = {}

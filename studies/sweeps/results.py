@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 from compensation.arrays import Array
 from studies.instrument.card import build_instrument
 from studies.results.shown import Shown
-from studies.sweeps.block import decode
+from studies.sweeps.block import Row, decode
 from studies.sweeps.definition import Study
 from studies.sweeps.design import coding, nominal_row
 from studies.sweeps.opening import open_store
 from studies.sweeps.spec import check_study
-from studies.sweeps.store import Store, Stored
+from studies.sweeps.store import Store
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -42,16 +42,16 @@ class Results(Shown):
 
     @property
     def total(self) -> int:
-        """Number of different designs that the study has."""
+        """Number of designs that the study has."""
         return int(self.about["cases"])
 
     @property
     def done(self) -> int:
-        """Number of different designs that are computed."""
+        """Number of designs that are computed."""
         return int(self.store.done.sum())
 
     def __len__(self) -> int:
-        return self.done if self._repeats is None else len(self._repeats)
+        return self.done
 
     @property
     def values(self) -> Array:
@@ -95,7 +95,7 @@ class Results(Shown):
         return np.array(sorted(k for k, (status, _) in self._remarks.items() if status != "ok"), dtype=np.intp)
 
     @cached_property
-    def nominal(self) -> Stored | None:
+    def nominal(self) -> Row | None:
         """The nominal design, None before it has been computed."""
         return self.store.find(nominal_row(self.study))
 
@@ -125,10 +125,7 @@ class Results(Shown):
         return {c.name: {name: float(values[k]) for name, values in some.items()} for k, c in enumerate(columns)}
 
     def blocks(self, places: Sequence[int]) -> Iterator[Array]:
-        """Give columns of the store (columns, m), some thousand cases at a time; all at once where the spec repeats some."""
-        if self._repeats is not None:
-            yield np.array([self._column(k) for k in places])
-            return
+        """Give columns of the store (columns, m), some thousand cases at a time."""
         for _, found in self.store.read(places):
             yield found
 
@@ -143,11 +140,7 @@ class Results(Shown):
 
         d, w = len(self.study.names), len(self.study.columns)
         wanted, remarks = range(1, 1 + d + 2 * w), self.store.remarks
-        streams = self.store.read(wanted)
-        if self._repeats is not None:
-            streams = iter([(np.arange(len(self)), np.array([self._column(k) for k in wanted]))])
-            remarks = self._remarks
-        for places, found in streams:
+        for places, found in self.store.read(wanted):
             columns: dict[str, Any] = dict(decode(coding(self.study), found[:d].T))
             for column, judged, value, error in zip(
                 self.study.columns, self.judged, found[d : d + w], found[d + w :], strict=True
@@ -204,35 +197,20 @@ class Results(Shown):
         """One column of the store; those that were read last are kept, as many as memory is meant for."""
         found = self._read.pop(k, None)
         if found is None:
-            whole, filled = np.empty(self.done), 0
+            found, filled = np.empty(self.done), 0
             for places, columns in self.store.read([k]):
-                whole[filled : filled + len(places)] = columns[0]
+                found[filled : filled + len(places)] = columns[0]
                 filled += len(places)
-            found = whole if self._repeats is None else whole[self._repeats]
         self._read[k] = found
         while len(self._read) > 1 and len(self._read) * found.nbytes > KEPT_BYTES:
             del self._read[next(iter(self._read))]
         return found
 
     @cached_property
-    def _repeats(self) -> NDArray[np.intp] | None:
-        """For every design of the spec its row among those that are computed, where the spec repeats some."""
-        if not self.about["repeats"]:
-            return None
-        done = np.zeros(self.total, dtype=bool)
-        done[: len(self.store.done)] = self.store.done[: self.total]
-        places = np.array(self.about["repeats"])
-        return np.asarray((np.cumsum(done) - 1)[places[done[places]]])
-
-    @cached_property
     def _remarks(self) -> dict[int, tuple[str, str]]:
         """Status and remark by the place of a case among these results."""
         there = np.flatnonzero(self.store.done)
-        rows = np.arange(len(there)) if self._repeats is None else self._repeats
-        if not self.store.remarks:
-            return {}
-        said = {int(np.searchsorted(there, place)): one for place, one in self.store.remarks.items()}
-        return {place: said[row] for place, row in enumerate(rows.tolist()) if row in said}
+        return {int(np.searchsorted(there, place)): one for place, one in self.store.remarks.items()}
 
 
 def open_results(folder: str | Path) -> Results:

@@ -10,13 +10,14 @@ from typing import Any
 
 import numpy as np
 
+from compensation.arrays import Array
 from studies.errors import InputError
 from studies.progress import Progress
 from studies.sweeps.block import Batch
 from studies.sweeps.child import check_function
 from studies.sweeps.cluster import check_private
 from studies.sweeps.definition import FREE, Study
-from studies.sweeps.design import Design, draw, nominal_row
+from studies.sweeps.design import draw, hash_designs, nominal_row
 from studies.sweeps.engine import BATCH, BATCH_VECTORISED, compute, hire, missing_batches
 from studies.sweeps.evaluate import WorkPlan, evaluate_task
 from studies.sweeps.families import Families, choose_solver, why_not
@@ -110,7 +111,7 @@ def estimate_study(study: Study, workers: int | None = None) -> Effort:
     began = time.perf_counter()
     evaluate_task(plan, [_nominal(study, trials)])
     each = (time.perf_counter() - began) / trials + STORE_SECONDS
-    cases = len(design.unique)
+    cases = len(design)
     resident = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
     processes = 1 if families else 1 + count
     row = 16 * (len(study.parameters) + len(study.columns))  # the designs, and what is read back
@@ -134,11 +135,11 @@ def check_functions(study: Study, allowed: bool) -> dict[str, str]:
     return {Path(function).name: check_function(function) for function in study.functions}
 
 
-def identify(study: Study, design: Design, sources: Mapping[str, str], solver: Any) -> dict[str, Any]:
+def identify(study: Study, design: Array, sources: Mapping[str, str], solver: Any) -> dict[str, Any]:
     """Return everything that the results depend on; `base` is the hash of the physics in it."""
     physics = {**physics_of(study), "functions": dict(sources), "solver": solver}
     spec = {key: value for key, value in study.content.items() if key not in (*FREE, "card", "quantity")}
-    return {**physics, "base": digest(physics), "spec": spec, "design": design.digest}
+    return {**physics, "base": digest(physics), "spec": spec, "design": hash_designs(design)}
 
 
 def physics_of(study: Study) -> dict[str, Any]:
@@ -153,7 +154,7 @@ def physics_of(study: Study) -> dict[str, Any]:
     }
 
 
-def describe_study(store: Store, study: Study, identity: Mapping[str, Any], design: Design | None = None) -> None:
+def describe_study(store: Store, study: Study, identity: Mapping[str, Any], design: Array | None = None) -> None:
     """Note in a store what it is of; InputError where it is of another study."""
     store.check_same(identity)
     instrument = study.instrument
@@ -164,15 +165,14 @@ def describe_study(store: Store, study: Study, identity: Mapping[str, Any], desi
             "spec_text": study.text,
             "instrument": {name: getattr(instrument, name) for name in INSTRUMENT},
             "folder": study.folder,
-            "cases": 0 if design is None else len(design.unique),
-            "repeats": design.inverse.tolist() if design and len(design.unique) < len(design.values) else [],
+            "cases": 0 if design is None else len(design),
         }
     )
 
 
-def _is_finished(store: Store, study: Study, design: Design, sources: Mapping[str, str]) -> bool:
+def _is_finished(store: Store, study: Study, design: Array, sources: Mapping[str, str]) -> bool:
     """Return whether everything that is asked is in the store; if so its families need not be built again to know it."""
-    done = store.study and int(store.done.sum()) == len(design.unique) and store.find(nominal_row(study)) is not None
+    done = store.study and int(store.done.sum()) == len(design) and store.find(nominal_row(study)) is not None
     if not done or not {name_search(search) for search in study.searches} <= store.findings.keys():
         return False
     solver = store.about()["identity"]["solver"]
@@ -201,13 +201,13 @@ def _describe_families(families: Families | None) -> Any:
     ]
 
 
-def _run(store: Store, study: Study, design: Design, plan: WorkPlan, crew: Workers, show_progress: bool) -> None:
+def _run(store: Store, study: Study, design: Array, plan: WorkPlan, crew: Workers, show_progress: bool) -> None:
     outcome = "stopped"
     store.begin_run(describe_environment())
     try:
         batches = missing_batches(study, design, store, plan.families is not None)
         done = sum(store.counts().values())
-        with Progress(len(design.unique), done, show_progress) as progress:
+        with Progress(len(design), done, show_progress) as progress:
             compute(plan, batches, crew, store, progress)
         run_searches(study, plan, crew, store)
         outcome = "finished"

@@ -9,7 +9,7 @@ import numpy as np
 
 from compensation.arrays import Array
 from studies.progress import Progress
-from studies.sweeps.block import Batch, decode, each_design
+from studies.sweeps.block import Batch, Row, decode, each_design
 from studies.sweeps.design import draw, nominal_row
 from studies.sweeps.engine import BATCH_VECTORISED, compute
 from studies.sweeps.evaluate import WorkPlan
@@ -19,7 +19,7 @@ from studies.sweeps.workers import Workers
 
 if TYPE_CHECKING:
     from studies.sweeps.definition import Study, StudyParameter
-    from studies.sweeps.store import Store, Stored
+    from studies.sweeps.store import Store
 
 STEP = 1e-2  # of a range, for differences: large against the solver's noise
 MOST_FACTORS = 20  # factors of the tolerances that are tried
@@ -44,7 +44,7 @@ class Explorer:
         self.study, self.plan, self.workers, self.store, self.progress = study, plan, workers, store, progress
         self.columns = [column.name for column in study.columns]
 
-    def cases(self, designs: Array) -> "list[Stored]":
+    def cases(self, designs: Array) -> list[Row]:
         """Return designs as the store has them, after computing those that lack."""
         lacking = {design.tobytes(): design for design in designs if self.store.find(design) is None}
         if lacking:
@@ -125,7 +125,7 @@ def find_tolerance(explorer: Explorer, search: ToleranceSearch) -> dict[str, Any
     from scipy.stats import binom
 
     study = explorer.study
-    nominal, drawn = nominal_row(study), draw(study).values
+    nominal, drawn = nominal_row(study), draw(study)
     varied = np.array([p.name in search.vary for p in study.parameters])
     columns = [requirement.column for requirement in study.requirements]
     middle = explorer.values(nominal[None], columns)[0]

@@ -15,21 +15,12 @@ from numpy.typing import NDArray
 
 from compensation.arrays import Array
 from studies.errors import InputError, MissingEnvironment
-from studies.sweeps.block import Cases, pack, unpack, unpack_head
+from studies.sweeps.block import Cases, Row, pack, unpack, unpack_head
 from studies.sweeps.provenance import digest, find_changes, spell
 from studies.sweeps.sealed import SealedFile
 
 FILE = "study.store"
 SHOWN_CHANGES = 6
-
-
-class Stored(NamedTuple):
-    """One computed design of a search."""
-
-    status: str
-    remark: str
-    values: Array
-    errors: Array
 
 
 class Stretch(NamedTuple):
@@ -53,11 +44,11 @@ class Store:
         self.runs: list[dict[str, Any]] = []
         self.findings: dict[str, Any] = {}  # outcomes of searches by name
         self._stretches: list[Stretch] = []
-        self.done = np.zeros(0, dtype=bool)  # for every unique design whether it is computed
+        self.done = np.zeros(0, dtype=bool)  # for every design whether it is computed
         self.remarks: dict[
             int, tuple[str, str]
         ] = {}  # status and remark of cases that failed or were warned of, by place
-        self._searched: dict[bytes, Stored] = {}
+        self._searched: dict[bytes, Row] = {}
         for block in self.file.scan():
             self._take(block.kind, block.at, block.content)
 
@@ -104,7 +95,7 @@ class Store:
             del self.remarks[place]
         self._searched = {key: one for key, one in self._searched.items() if one.status not in statuses}
 
-    def find(self, design: Array) -> Stored | None:
+    def find(self, design: Array) -> Row | None:
         """Return one design of a search."""
         return self._searched.get(design.tobytes())
 
@@ -149,6 +140,8 @@ class Store:
             changes = list(find_changes({**self.study["identity"], "base": now["base"]}, now))
         elif self._of - {_name(now)}:  # what the study is was damaged, its cases were not
             changes = ["its card, its quantities or its designs"]
+        if self.study and self.study.get("repeats"):
+            changes.append("an earlier version computed its repeated designs once")
         if changes:
             shown = "; ".join(changes[:SHOWN_CHANGES])
             more = f"; and {len(changes) - SHOWN_CHANGES} more" if len(changes) > SHOWN_CHANGES else ""
@@ -196,7 +189,7 @@ class Store:
         notes = {row: (status, text) for status, text, rows in head["remarks"] for row in rows}
         for row, numbers in enumerate(columns):
             design, values, errors = np.split(numbers, [len(numbers) - 2 * width, len(numbers) - width])
-            self._searched[design.tobytes()] = Stored(*notes.get(row, ("ok", "")), values, errors)
+            self._searched[design.tobytes()] = Row(*notes.get(row, ("ok", "")), values, errors)
 
     def _groups(self) -> Iterator[list[Stretch]]:
         """Give the blocks by their first place; together where they overlap, in the order in which they were written."""

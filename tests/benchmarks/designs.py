@@ -23,8 +23,8 @@ from studies.design.task import Task
 from studies.errors import InputError
 from studies.instrument.card import load_card
 from studies.schema.reader import read_keys
+from studies.sweeps.block import Row
 from studies.sweeps.parameters import find_nominal, set_parameters
-from studies.sweeps.store import Stored
 
 CARDS = {
     "free-dome": ("thickness_mm", "radius_mm"),
@@ -60,7 +60,7 @@ class Columns:
         return np.column_stack([column for one in found for column in (one.frequency, one.bryan_factor)])
 
     def cases(self, designs):
-        return [Stored("ok", "", row, np.full_like(row, np.nan)) for row in self(designs)]
+        return [Row("ok", "", row, np.full_like(row, np.nan)) for row in self(designs)]
 
 
 def pose(columns: Columns, rng: np.random.Generator, draws):

@@ -8,7 +8,7 @@ import pytest
 from studies.design.keys import DesignKeys
 from studies.design.task import Task
 from studies.schema.reader import read_keys
-from studies.sweeps.store import Stored
+from studies.sweeps.block import Row
 
 
 class Formulas:
@@ -20,7 +20,7 @@ class Formulas:
     def cases(self, designs):
         self.asked += len(designs)
         values = [np.array(self.function(row), dtype=float) for row in designs]
-        return [Stored("ok", "", v, np.full_like(v, np.nan)) for v in values]
+        return [Row("ok", "", v, np.full_like(v, np.nan)) for v in values]
 
 
 @pytest.fixture

@@ -68,7 +68,7 @@ def test_designs_lie_within_their_stated_error_of_the_full_solve(results):
 def test_a_design_is_the_same_alone_and_among_others(spec, results):
     design = draw(results.study)
     plan = WorkPlan.of(results.study, choose_solver(results.study, design))
-    (alone,) = evaluate_task(plan, [Batch(np.array([7]), design.values[7:8])])
+    (alone,) = evaluate_task(plan, [Batch(np.array([7]), design[7:8])])
     assert alone.values.tobytes() == results.values[7].tobytes()
     smaller = run_study({**spec, "sampling": {**spec["sampling"], "batch": 7}})
     assert smaller.values.tobytes() == results.values.tobytes()
@@ -77,7 +77,7 @@ def test_a_design_is_the_same_alone_and_among_others(spec, results):
 def test_a_design_that_cannot_be_computed_fails_alone(results):
     design = draw(results.study)
     plan = WorkPlan.of(results.study, choose_solver(results.study, design))
-    designs = design.values[:5].copy()
+    designs = design[:5].copy()
     designs[1, results.study.names.index("resonator.thickness_mm")] = 2.0
     (found,) = evaluate_task(plan, [Batch(np.arange(5), designs)])
     assert [(remark.status, list(remark.rows)) for remark in found.remarks] == [("failed", [1])]
@@ -95,7 +95,7 @@ def test_materials_between_nodes_are_those_of_every_design(spec):
     design = draw(study)
     families = choose_solver(study, design)
     assert families.nodes is not None
-    some = design.values[:90].copy()
+    some = design[:90].copy()
     some[5, 0] = 2230.0
     columns = dict(zip(study.names, some.T, strict=True))
     found, exact = (one.evaluate(columns, len(some))[0] for one in (families, replace(families, nodes=None)))

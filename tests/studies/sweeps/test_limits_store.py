@@ -48,7 +48,7 @@ def fill(store, total, size):
 
 def begin(store):
     store.check_same(IDENTITY)
-    store.describe({"identity": IDENTITY, "cases": 1, "repeats": []})
+    store.describe({"identity": IDENTITY, "cases": 1})
     store.begin_run({"packages": {}})
 
 

@@ -10,7 +10,7 @@ from studies.sweeps.run import run_study
 from studies.sweeps.search import name_search
 from studies.sweeps.sensitivity import linear_shares, local_slopes, sobol_indices
 from studies.sweeps.spec import read_study
-from studies.sweeps.tolerance import find_reach, find_yield
+from studies.sweeps.tolerance import find_yield
 
 
 def study(folder, function, sampling, *parameters, **more):
@@ -106,7 +106,7 @@ def test_slopes_and_tornado_of_a_cubic_law(tmp_path, functions):
 
 
 @pytest.mark.slow
-def test_yield_and_reach_of_a_disc(tmp_path, functions):
+def test_yield_of_a_disc(tmp_path, functions):
     limit = 0.5
     sampling = {"method": "sobol", "cases": 1024, "seed": 2}
     parameters = [
@@ -119,9 +119,6 @@ def test_yield_and_reach_of_a_disc(tmp_path, functions):
     truth = math.pi * limit / 4  # area of the disc over the area of the box
     assert found.low <= truth <= found.high
     assert found.share == pytest.approx(truth, abs=0.02)
-    reach = find_reach(results, results.study.requirements)
-    # the largest square inside a disc of radius sqrt(1/2) has the half side 1/2
-    assert 0.5 <= reach.part < 0.56
 
 
 def test_yield_counts_unknown_designs_both_ways(tmp_path, functions):
