@@ -12,8 +12,7 @@ from compensation.arrays import Array
 from studies.errors import InputError
 from studies.files.stored import PORTION, Stored
 from studies.importing.mapping import NUMERIC_TIMES, OWN, SECONDS, UNIX, FileMap
-from studies.importing.raw import shorten
-from studies.importing.tables import RawTable
+from studies.importing.tables import RawTable, shorten
 
 if TYPE_CHECKING:
     import pandas as pd

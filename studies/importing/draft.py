@@ -3,25 +3,25 @@
 import re
 import statistics
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from studies.errors import InputError
 from studies.files.stored import Stored
 from studies.importing.channels import is_container, open_channels, sort_groups
+from studies.importing.draft_columns import comment_of, draft_column, draft_unknown, find_markers, guess_meanings
 from studies.importing.look import Look, as_number, find_nominal, find_period, is_stamp, look_at, look_at_group
 from studies.importing.mapping import NUMERIC_TIMES, SCHEMA, TABLE_TARGETS, FileMap, ImportMap
-from studies.importing.meaning import BRACKETED, Meaning, find_meanings, find_unit
+from studies.importing.meaning import Meaning, find_meanings
 from studies.importing.offset import Offset, estimate_offset
-from studies.importing.raw import shorten
+from studies.importing.tables import shorten
 from studies.importing.timing import TIME_WORDS, find_time
-from studies.importing.units import split_nominal, units_of
 from studies.schema.keys import spell_value
 from studies.schema.reader import read_keys
 
 if TYPE_CHECKING:
-    from studies.importing.join import ClockedFile
+    from studies.importing.resampling import ClockedFile
 
 JUMPS = 20.0  # times that rows of one time lie farther apart than those of neighbouring times
 MOST_DEVICES = 50  # that one file may hold
@@ -63,7 +63,7 @@ def draft_map(paths: Sequence[str]) -> Draft:
                 written.insert(2, "same_file = true")
             elif len(group) > 1:
                 written.insert(
-                    2, f"parts = {len(group)}    # CHECK: consecutive files: {', '.join(map(_comment, group))}"
+                    2, f"parts = {len(group)}    # CHECK: consecutive files: {', '.join(map(comment_of, group))}"
                 )
             begun = begun or bool(found)
             files.append(written if found or look.group is None else [f"# {line}".rstrip() for line in written])
@@ -138,7 +138,7 @@ def _find_offsets(paths: Sequence[str], files: list[list[str]]) -> list[str]:
         ours, theirs = _source_of(base, one), _source_of(other, two)
         place = next(k for k, line in enumerate(written) if line.startswith("# clock_offset_s"))
         written[place : place + 1] = [
-            f"# {_comment(theirs)} here follows {_comment(ours)} of the first file best with an offset of",
+            f"# {comment_of(theirs)} here follows {comment_of(ours)} of the first file best with an offset of",
             f"# {said}, correlation {offset.correlation:.4f};",
             "# a thermal lag between two places looks the same: use it only if both sensors are at one place.",
             f"# clock_offset_s = {offset.value:.2f}    # CHECK: added to this file's times",
@@ -177,17 +177,17 @@ def _draft_table(path: str) -> list[str] | None:
         place = look.names.index(name)
         cells = [row[place] for row in body if place < len(row)]
         numbers = [n for cell in cells if (n := as_number(cell, look.decimal)) is not None]
-        lines += ["", *_draft_column(name, Meaning(target), hints[name], numbers, nominal=find_nominal([*above, name]))]
+        lines += ["", *draft_column(name, Meaning(target), hints[name], numbers, nominal=find_nominal([*above, name]))]
     return lines
 
 
 def _describe_notation(path: str, look: Look) -> list[str]:
-    lines = ["[[file]]", f"# {_comment(path)}"]
+    lines = ["[[file]]", f"# {comment_of(path)}"]
     if look.group is not None:
         named, clock = look.group, look.group.clock
         units = ", ".join(f"{name} [{c.unit}]" if c.unit else name for name, c in named.channels.items())
         about = f", {clock.step!r} s apart" if clock and clock.step else ", with their own clock" if clock else ""
-        said = [f"# {_comment(units)}: {named.rows} rows{about}"]
+        said = [f"# {comment_of(units)}: {named.rows} rows{about}"]
         return [*lines, *([f"group = {spell_value(named.name)}"] if named.name else []), *said]
     if look.kind == "text":
         lines += [
@@ -219,7 +219,7 @@ def _draft_look(path: str, look: Look, taken: Sequence[str]) -> tuple[list[str],
     known = ([], "", "") if own else find_time(names, cells, hints, numbers, look.decimal, evenly=period is not None)
     time, form, unsure = known
     lines = _describe_notation(path, look)
-    markers = _find_markers(names, cells, time, look.decimal)
+    markers = find_markers(names, cells, time, look.decimal)
     if markers:
         lines.append(f"missing = {spell_value(markers)}    # CHECK: these cells mean 'no value'")
     if time:
@@ -248,15 +248,15 @@ def _draft_look(path: str, look: Look, taken: Sequence[str]) -> tuple[list[str],
         lines.append('repeated_times = "spread"    # CHECK: some times repeat; "first" keeps one row of each')
     lines.append("# clock_offset_s = 0.0    # added to this file's times: positive when its clock is behind")
     usable = {name: hints[name] for name in names if name not in time and numbers[name]}
-    meanings = find_meanings(usable, taken) if look.header is not None else _guess_meanings(usable, numbers)
+    meanings = find_meanings(usable, taken) if look.header is not None else guess_meanings(usable, numbers)
     others = [name for name in names if name not in time and name not in meanings and any(cells[name])]
     for name in names:
         if name in others:
-            lines += ["", *_draft_unknown(name, numbers[name])]
+            lines += ["", *draft_unknown(name, numbers[name])]
         elif name in meanings:
             guessed = "    # CHECK: guessed from its values" if look.header is None else ""
             nominal = find_nominal([*above, name])
-            drafted = _draft_column(name, meanings[name], hints[name], numbers[name], guessed, nominal)
+            drafted = draft_column(name, meanings[name], hints[name], numbers[name], guessed, nominal)
             if look.group is not None and taken:
                 drafted.append('resample = "mean"    # onto the times of the first [[file]]')
             lines += ["", *drafted]
@@ -278,79 +278,3 @@ def _alternates(times: Sequence[str], numbers: Sequence[float]) -> bool:
         return False
     apart, on = ([abs(b - a) for a, b in zip(numbers, numbers[step:], strict=False)] for step in (1, many))
     return statistics.median(apart) > JUMPS * statistics.median(on)
-
-
-def _guess_meanings(hints: Mapping[str, str], numbers: Mapping[str, Sequence[float]]) -> dict[str, Meaning]:
-    """Guess columns without a name by their values: a frequency is large and hardly changes, a temperature is moderate."""
-    found: dict[str, Meaning] = {}
-    for name in hints:
-        ordered = sorted(numbers[name])
-        low, middle, high = ordered[0], ordered[len(ordered) // 2], ordered[-1]
-        targets = [meaning.target for meaning in found.values()]
-        if middle > 900 and high - low < 0.05 * middle and "frequency_Hz" not in targets:
-            found[name] = Meaning("frequency_Hz")
-        elif -80 < low <= high < 150 and high - low > 0.2 and middle > 5 and "housing_temperature_degC" not in targets:
-            found[name] = Meaning("housing_temperature_degC")
-    return found
-
-
-def _draft_column(
-    name: str, meaning: Meaning, hint: str, numbers: Sequence[float], remark: str = "", nominal: float | None = None
-) -> list[str]:
-    target = meaning.target
-    units, stated = units_of(target), find_unit(target, hint)
-    unit = stated or next(iter(units))
-    remark = remark or ("" if stated else "    # CHECK: the name states no unit")
-    middle = sorted(numbers)[len(numbers) // 2]
-    lines = [f"from = {spell_value(name)}", f'to = "{target}"']
-    if target.endswith("_degC") and unit == "degC" and 200 < middle < 500:
-        unit, remark = "K", "    # CHECK: the values look like kelvin"
-    lines.append(f'unit = "{unit}"{remark}')
-    if target.endswith("_degC") and abs(middle) >= 500:
-        lines += [
-            "scale = 1.0     # CHECK: the values look like raw counts; reading × scale + offset is the temperature",
-            "offset = 0.0    # CHECK",
-        ]
-    for key in units[unit].settings:
-        nominal = next((f for one in re.findall(BRACKETED, hint) if (f := split_nominal(one)[1])), nominal)
-        stated_here = key == "nominal_Hz" and nominal is not None
-        value, said = (nominal, "stated in the file; ") if stated_here else (0.0, "")
-        lines.append(f"{key} = {value!r}    # CHECK: {said}{_SETTING_WORDS[key]}")
-    if meaning.axis:
-        lines.append(f'axis = "{meaning.axis}"')
-    return ["[[file.column]]", *lines]
-
-
-def _draft_unknown(name: str, numbers: Sequence[float]) -> list[str]:
-    """Leave a form to fill for a column without a meaning."""
-    span = f"{min(numbers):.6g} to {max(numbers):.6g}; " if numbers else ""
-    return [
-        f"# unknown column: {spell_value(name)}",
-        f"# {span}if it belongs to the record:",
-        "# [[file.column]]",
-        f"# from = {spell_value(name)}",
-        '# to = "..."',
-        '# unit = "..."',
-    ]
-
-
-_SETTING_WORDS = {
-    "clock_Hz": "frequency of the clock that is counted",
-    "periods": "number of periods in which it is counted",
-    "gate_s": "length of the gate in which periods are counted",
-    "nominal_Hz": "frequency from which the reading is counted",
-}
-
-
-def _find_markers(names: Sequence[str], cells: Mapping[str, list[str]], time: Sequence[str], decimal: str) -> list[str]:
-    """Return texts that stand in columns of numbers."""
-    markers: list[str] = []
-    for name in names:
-        words = [cell for cell in cells[name] if cell and as_number(cell, decimal) is None]
-        if name not in time and 0 < 2 * len(words) < len(cells[name]):
-            markers += [word for word in dict.fromkeys(words) if word not in markers]
-    return markers[:20]
-
-
-def _comment(text: str) -> str:
-    return "".join(c if c.isprintable() else " " for c in text)

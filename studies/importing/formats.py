@@ -1,11 +1,9 @@
 """How each format gives its channels: TDMS (npTDMS), MDF (asammdf), HDF5 and MATLAB 7.3 (h5py), MATLAB to 7.2 (scipy), Parquet (pyarrow)."""
 
-import datetime
 import subprocess
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack
-from dataclasses import dataclass, field
 from functools import cache, partial
 from pathlib import Path
 from typing import Any
@@ -16,6 +14,7 @@ from compensation.arrays import Array
 from studies.errors import InputError
 from studies.files.reading import ANY_SIZE, load_library, opened
 from studies.files.stored import PORTION
+from studies.importing.channel import RATES, STARTS, STEPS, UNITS, Channel, Clock, even_clock, find_unit, stamp_clock
 
 KINDS = {
     ".tdms": "TDMS",
@@ -26,10 +25,6 @@ KINDS = {
     ".mat": "MATLAB",
     ".parquet": "Parquet",
 }
-STEPS = ("dt", "wf_increment", "increment", "sample_period", "sampling_period", "sample_interval", "sampling_interval", "sample_period_s")  # fmt: skip
-RATES = ("fs", "sample_rate", "sampling_rate", "samplerate", "sampling_frequency", "sample_rate_hz")
-STARTS = ("start", "start_time", "wf_start_time")
-UNITS = ("unit", "units", "unit_string")
 NUMBERS = "iufb"
 MOST_WIDE = 64  # columns of a matrix that are channels
 OBJECT = "holds objects, not numbers, and is not opened: save it as plain numbers"
@@ -50,29 +45,6 @@ with h5py.File(sys.argv[1], "r") as file:
 """
 FRAGMENT = 1 << 24  # bytes of an MDF file at once
 PATIENCE, PACE = 20.0, 1e7  # s for which the library may read a file, and bytes for which it gets a second more
-
-
-@dataclass(frozen=True)
-class Clock:
-    """The clock of channels: `seconds` of rows from one to before another, and when it started; one `key`, the same times."""
-
-    key: str
-    seconds: Callable[[int, int], Array] = field(repr=False)
-    step: float | None = None
-    start: datetime.datetime | None = None
-
-
-@dataclass(frozen=True)
-class Channel:
-    """One channel: what reads its values from one row to before another, its clock, or why it cannot be read."""
-
-    group: str
-    name: str
-    unit: str = ""
-    rows: int = 0
-    read: Callable[[int, int], Array] = field(default=lambda *_: np.empty(0), repr=False)
-    clock: Clock | None = None
-    refused: str = ""
 
 
 class _Stream:
@@ -115,18 +87,6 @@ def read_tdms(path: str, files: ExitStack) -> Iterator[Channel]:
 
 def _tdms_values(channel: Any, begin: int, end: int) -> Any:
     return channel.read_data(begin, end - begin)
-
-
-def stamp_clock(key: str, read: Callable[[int, int], Any], utc: bool) -> Clock | None:
-    """Return the clock of a channel of time stamps; None where the first is missing."""
-    first, nanosecond = read(0, 1)[0], np.timedelta64(1, "ns")
-    if np.isnat(first):
-        return None
-
-    def seconds(begin: int, end: int) -> Array:
-        return np.asarray((read(begin, end) - first) / nanosecond * 1e-9, dtype=float)
-
-    return Clock(key, seconds, start=_moment(first, utc))
 
 
 def read_mdf(path: str, files: ExitStack) -> Iterator[Channel]:
@@ -279,51 +239,6 @@ def read_parquet(path: str, files: ExitStack) -> Iterator[Channel]:
 def _parquet_values(file: Any, name: str) -> Iterator[Any]:
     for part in file.iter_batches(batch_size=PORTION, columns=[name]):
         yield part.column(0).to_numpy(zero_copy_only=False)
-
-
-def even_clock(about: Mapping[str, Any]) -> Clock | None:
-    """Return the clock that properties such as dt, wf_increment or sample_rate state."""
-    known = {str(name).lower(): value for name, value in about.items()}
-    step = next((_number(known[name]) for name in STEPS if name in known), None)
-    rate = next((_number(known[name]) for name in RATES if name in known), None)
-    step = step or (1 / rate if rate else None)
-    if step is None or not 0 < step < np.inf:
-        return None
-    start = next((moment for name in STARTS if name in known and (moment := _moment(known[name])) is not None), None)
-    offset = _number(known.get("wf_start_offset")) or 0.0
-    return Clock(
-        f"{step!r} s from {start} + {offset!r}",
-        lambda begin, end: np.asarray(offset + step * np.arange(float(begin), float(end))),
-        step,
-        start,
-    )
-
-
-def find_unit(about: Mapping[str, Any]) -> str:
-    """Return the unit that properties state."""
-    known = {str(name).lower(): value for name, value in about.items()}
-    found = next((known[name] for name in UNITS if name in known), "")
-    return found.decode(errors="replace") if isinstance(found, bytes) else str(found)
-
-
-def _number(value: Any) -> float | None:
-    try:
-        return float(np.asarray(value).flat[0])
-    except (TypeError, ValueError, IndexError):
-        return None
-
-
-def _moment(value: Any, utc: bool = True) -> datetime.datetime | None:
-    """Return the moment of a stamp (numpy's are in UTC or without a zone); None where it is none, or the zero of a clock never set."""
-    try:
-        if isinstance(value, np.datetime64):
-            found = value.astype("datetime64[us]").item()
-            found = found.replace(tzinfo=datetime.UTC) if utc else found
-        else:
-            found = datetime.datetime.fromisoformat(value.decode() if isinstance(value, bytes) else str(value))
-    except (ValueError, UnicodeDecodeError, AttributeError, TypeError):
-        return None
-    return found if found.year >= 1970 else None
 
 
 READERS: Mapping[str, Callable[[str, ExitStack], Iterator[Channel]]] = {

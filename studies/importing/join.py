@@ -11,50 +11,20 @@ from typing import Any
 import numpy as np
 
 from compensation.arrays import Array
-from compensation.decimation import average_groups
 from studies.errors import InputError
 from studies.files.stored import Stored, portions
 from studies.importing.channels import read_tables
 from studies.importing.clock import Clock, seconds_between
-from studies.importing.doubtful import LOOKED_AT, drop_doubtful
+from studies.importing.doubtful import drop_doubtful
 from studies.importing.mapping import OWN, TABLE_TARGETS, ColumnMap, FileMap, LoadedMap
 from studies.importing.order import Order, rises
 from studies.importing.raw import NotPlain
+from studies.importing.resampling import ClockedFile, take_over
 from studies.importing.tables import RawTable, Rows
 from studies.record import Record, check_plausible
 
 SHORT = 2_000_000  # rows of a record that is held in memory
 LARGEST = 50_000_000  # rows of a regular grid
-USUAL_GAP = 10.0  # sampling steps that a gap may have before nothing is interpolated across it
-
-
-@dataclass(frozen=True)
-class ClockedFile:
-    """One raw file after its own map: times by its clock, converted columns, and what was changed, in words."""
-
-    file: FileMap
-    path: str
-    time: Stored
-    origin: datetime.datetime | None
-    columns: dict[tuple[str, str], Stored]
-    notes: tuple[str, ...]
-
-    @property
-    def longest_gap(self) -> float:
-        """The longest gap across which values are interpolated, s."""
-        if self.file.longest_gap is not None:
-            return self.file.longest_gap
-        return USUAL_GAP * self.usual_step if len(self.time) > 1 else 0.0
-
-    @property
-    def usual_step(self) -> float:
-        """The median step of the (first million) rows, s."""
-        return float(np.median(np.diff(self.time[:LOOKED_AT])))
-
-    @property
-    def span(self) -> tuple[float, float]:
-        """The first and the last time, s."""
-        return self.time.at(0), self.time.at(-1)
 
 
 def import_records(paths: Sequence[str], import_map: LoadedMap, folder: str | None = None) -> dict[str, Record]:
@@ -79,7 +49,7 @@ def import_records(paths: Sequence[str], import_map: LoadedMap, folder: str | No
         for column in one.file.columns:
             values = one.columns[column.target, column.axis]
             if moved:
-                values = _resample(one, values, shift - begin, time, column.resample, folder)
+                values = take_over(one, values, shift - begin, time, column.resample, folder)
             columns[column.target, column.axis] = values
             notes.append(_describe(column, values, moved))
         if moved:
@@ -238,64 +208,6 @@ def convert(table: RawTable, column: ColumnMap) -> tuple[Array, int]:
     values = column.sign * column.conversion.convert(reading, *column.settings)
     check_plausible({column.target: values}, lambda row: f"{table.place(row)}, '{column.source}'")
     return np.asarray(values, dtype=float), zeros
-
-
-def _resample(one: ClockedFile, values: Stored, shift: float, time: Stored, how: str, folder: str | None) -> Stored:
-    """Return a column of a file, whose clock is `shift` ahead of the record's, at the times of the record."""
-    found, held, done = Stored(folder), np.full((2, 1), np.nan), 0
-    for k in portions(len(time)):
-        before, after = min(k.start, 1), min(len(time) - k.stop, 1)
-        grid = time[k.start - before : k.stop + after]
-        # what lies farther than a gap tells nothing, but for the value that is held
-        begin = one.time.find(float(grid[0]) - shift - one.longest_gap)
-        end = one.time.find(float(grid[-1]) - shift + one.longest_gap, right=True)
-        if how == "previous" and done < begin:
-            held = _last_known(one, values, slice(done, begin), held)
-            done = begin
-        t, v = (np.append(old, new) for old, new in zip(held, (one.time[begin:end], values[begin:end]), strict=True))
-        part = resample(t + shift, v, grid, how, one.longest_gap)
-        found.append(part[before : part.size - after])
-    return found
-
-
-def _last_known(one: ClockedFile, values: Stored, rows: slice, held: Array) -> Array:
-    """Return time and value (2, 1) of the last reading among rows, or what was held before."""
-    for k in portions(rows.stop - rows.start):
-        at = slice(rows.start + k.start, rows.start + k.stop)
-        if (known := np.flatnonzero(np.isfinite(part := values[at]))).size:
-            held = np.array([[one.time.at(at.start + int(known[-1]))], [part[known[-1]]]])
-    return held
-
-
-def resample(time: Array, values: Array, grid: Array, how: str, longest_gap: float) -> Array:
-    """Return values at the times of the grid, NaN outside and within gaps: linear, the mean of nearer samples, the nearest, the previous."""
-    known = np.isfinite(values)
-    t, v = time[known], values[known]
-    if not len(t):
-        return np.full(len(grid), np.nan)
-    after = np.searchsorted(t, grid)
-    left, right = np.clip(after - 1, 0, len(t) - 1), np.clip(after, 0, len(t) - 1)
-    if how == "previous":
-        held = np.searchsorted(t, grid, side="right") - 1
-        return np.where(held >= 0, v[np.clip(held, 0, None)], np.nan)
-    if how == "mean":
-        return _bin_means(t, v, grid)
-    if how == "nearest":
-        nearest = np.where(abs(grid - t[left]) <= abs(t[right] - grid), left, right)
-        return np.where(abs(t[nearest] - grid) <= longest_gap / 2, v[nearest], np.nan)
-    exact = t[right] == grid
-    reachable = exact | ((after > 0) & (after < len(t)) & (t[right] - t[left] <= longest_gap))
-    return np.where(reachable, np.interp(grid, t, v), np.nan)
-
-
-def _bin_means(t: Array, v: Array, grid: Array) -> Array:
-    if len(grid) < 2:
-        return np.full(len(grid), float(np.mean(v)))
-    middles = (grid[1:] + grid[:-1]) / 2
-    edges = np.concatenate([[grid[0] - (middles[0] - grid[0])], middles, [grid[-1] + (grid[-1] - middles[-1])]])
-    which = np.searchsorted(edges, t, side="right") - 1
-    inside = (which >= 0) & (which < len(grid))
-    return average_groups(v[inside], which[inside], len(grid))
 
 
 def _lay_grid(base: ClockedFile, import_map: LoadedMap, folder: str | None) -> Stored:

@@ -9,7 +9,8 @@ from pathlib import Path
 from studies.errors import InputError
 from studies.importing.channels import Group, is_container, open_channels, sort_groups
 from studies.importing.mapping import SEPARATORS
-from studies.importing.raw import EXCEL, decode, name_columns, read_filled, read_sheet
+from studies.importing.raw import decode, name_columns, read_filled
+from studies.importing.sheets import EXCEL, read_sheet
 
 SEEN = 2000  # lines that are looked at
 HEAD = 1 << 24  # bytes

@@ -2,7 +2,6 @@
 
 import codecs
 import csv
-import importlib
 import io
 import itertools
 import re
@@ -15,19 +14,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from compensation.arrays import Array
-from studies.errors import InputError, MissingEnvironment, nearest
+from studies.errors import InputError
 from studies.files.columns import ROWS_AT_ONCE, parse_portions
 from studies.files.reading import ANY_SIZE, PORTION, digest, opened, read_bytes
 from studies.importing.mapping import NUMERIC_TIMES, SEPARATORS, FileMap
-from studies.importing.tables import ParsedTable, Part, RawTable, check_column
+from studies.importing.sheets import EXCEL, read_sheet
+from studies.importing.tables import ParsedTable, Part, RawTable, check_column, shorten
 
 if TYPE_CHECKING:
     import pandas as pd
     from numpy.typing import NDArray
 
-EXCEL = (".xlsx", ".xlsm")
 OVERFLOW = "(beyond the header)"
-MOST_CELLS = 20_000_000
 
 
 class NotPlain(Exception):
@@ -179,44 +177,6 @@ def decode(path: str | Path, data: bytes, encoding: str) -> str:
     except UnicodeError:
         raise _wrong_encoding(path, encoding) from None
     return _checked(path, text).replace("\r\n", "\n").replace("\r", "\n")
-
-
-def read_sheet(path: str | Path, sheet: str | None) -> list[list[str]]:
-    """Return the rows of an Excel sheet as text: dates in ISO 8601, numbers with all their digits."""
-    try:
-        openpyxl = importlib.import_module("openpyxl")
-    except ImportError:
-        raise MissingEnvironment(
-            f"{path}: reading Excel needs openpyxl: pip install 'hrg-workbench[excel]', or export the sheet as CSV."
-        ) from None
-    try:
-        book = openpyxl.load_workbook(path, read_only=True, data_only=True)
-        if sheet is not None and sheet not in book.sheetnames:
-            raise InputError(f"{path}: there is no sheet '{sheet}'{nearest(sheet, book.sheetnames)}")
-        page = book[sheet] if sheet is not None else book.worksheets[0]
-        cells = (page.max_row or 0) * (page.max_column or 0)
-        if cells > MOST_CELLS:
-            raise InputError(
-                f"{path}: its sheet extends to row {page.max_row}, column {page.max_column}, more than the limit of {MOST_CELLS:,}"
-                " cells. Delete cells far from the table, or export the sheet as CSV."
-            )
-        return [[_cell_text(value) for value in row] for row in page.iter_rows(values_only=True)]
-    except InputError:
-        raise
-    except Exception as error:  # openpyxl lets errors of zip, XML and its own through, also while it reads
-        raise InputError(f"{path}: not an Excel workbook that can be read ({shorten(str(error))}).") from None
-
-
-def shorten(text: str) -> str:
-    """Return at most 60 characters of somebody's text, on one line."""
-    line = " ".join(text.split())
-    return line if len(line) <= 60 else line[:57] + "..."
-
-
-def _cell_text(value: object) -> str:
-    if value is None:
-        return ""
-    return value.isoformat(sep=" ") if hasattr(value, "isoformat") else str(value)
 
 
 def _split_lines(path: str | Path, text: str, file: FileMap) -> list[list[str]]:

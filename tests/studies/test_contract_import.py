@@ -15,9 +15,10 @@ from studies.errors import InputError, MissingEnvironment
 from studies.files import columns, stored
 from studies.importing import clock, raw
 from studies.importing.draft import draft_map
-from studies.importing.join import import_records, resample
+from studies.importing.join import import_records
 from studies.importing.mapping import load_map
 from studies.importing.raw import NotPlain, read_plain, read_raw
+from studies.importing.resampling import resample
 from studies.importing.units import TARGETS, units_of
 from studies.record import read_record, write_record
 

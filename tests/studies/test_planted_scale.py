@@ -15,7 +15,8 @@ from compensation.bell_calibration import BellRun, fit_chain
 from compensation.rate_law import RateCurve, fit_rate_law
 from studies.cli import main
 from studies.errors import InputError
-from studies.fits.scale import read_law, settled_rows
+from studies.fits.scale import settled_rows
+from studies.fits.scale_law import read_law
 from studies.models import compensate, emit_c, read_model
 from studies.models.kinds.scale import load_scale
 from studies.papers.bvg import (

@@ -1,0 +1,91 @@
+"""The entry of one column in a draft of a map: what it means, its unit, and what must be checked."""
+
+import re
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+from studies.importing.look import as_number
+from studies.importing.meaning import BRACKETED, Meaning, find_unit
+from studies.importing.units import split_nominal, units_of
+from studies.schema.keys import spell_value
+
+if TYPE_CHECKING:
+    pass
+
+
+def guess_meanings(hints: Mapping[str, str], numbers: Mapping[str, Sequence[float]]) -> dict[str, Meaning]:
+    """Guess columns without a name by their values: a frequency is large and hardly changes, a temperature is moderate."""
+    found: dict[str, Meaning] = {}
+    for name in hints:
+        ordered = sorted(numbers[name])
+        low, middle, high = ordered[0], ordered[len(ordered) // 2], ordered[-1]
+        targets = [meaning.target for meaning in found.values()]
+        if middle > 900 and high - low < 0.05 * middle and "frequency_Hz" not in targets:
+            found[name] = Meaning("frequency_Hz")
+        elif -80 < low <= high < 150 and high - low > 0.2 and middle > 5 and "housing_temperature_degC" not in targets:
+            found[name] = Meaning("housing_temperature_degC")
+    return found
+
+
+def draft_column(
+    name: str, meaning: Meaning, hint: str, numbers: Sequence[float], remark: str = "", nominal: float | None = None
+) -> list[str]:
+    """Return the entry of a column with a meaning, and what must be checked in it."""
+    target = meaning.target
+    units, stated = units_of(target), find_unit(target, hint)
+    unit = stated or next(iter(units))
+    remark = remark or ("" if stated else "    # CHECK: the name states no unit")
+    middle = sorted(numbers)[len(numbers) // 2]
+    lines = [f"from = {spell_value(name)}", f'to = "{target}"']
+    if target.endswith("_degC") and unit == "degC" and 200 < middle < 500:
+        unit, remark = "K", "    # CHECK: the values look like kelvin"
+    lines.append(f'unit = "{unit}"{remark}')
+    if target.endswith("_degC") and abs(middle) >= 500:
+        lines += [
+            "scale = 1.0     # CHECK: the values look like raw counts; reading × scale + offset is the temperature",
+            "offset = 0.0    # CHECK",
+        ]
+    for key in units[unit].settings:
+        nominal = next((f for one in re.findall(BRACKETED, hint) if (f := split_nominal(one)[1])), nominal)
+        stated_here = key == "nominal_Hz" and nominal is not None
+        value, said = (nominal, "stated in the file; ") if stated_here else (0.0, "")
+        lines.append(f"{key} = {value!r}    # CHECK: {said}{_SETTING_WORDS[key]}")
+    if meaning.axis:
+        lines.append(f'axis = "{meaning.axis}"')
+    return ["[[file.column]]", *lines]
+
+
+def draft_unknown(name: str, numbers: Sequence[float]) -> list[str]:
+    """Leave a form to fill for a column without a meaning."""
+    span = f"{min(numbers):.6g} to {max(numbers):.6g}; " if numbers else ""
+    return [
+        f"# unknown column: {spell_value(name)}",
+        f"# {span}if it belongs to the record:",
+        "# [[file.column]]",
+        f"# from = {spell_value(name)}",
+        '# to = "..."',
+        '# unit = "..."',
+    ]
+
+
+_SETTING_WORDS = {
+    "clock_Hz": "frequency of the clock that is counted",
+    "periods": "number of periods in which it is counted",
+    "gate_s": "length of the gate in which periods are counted",
+    "nominal_Hz": "frequency from which the reading is counted",
+}
+
+
+def find_markers(names: Sequence[str], cells: Mapping[str, list[str]], time: Sequence[str], decimal: str) -> list[str]:
+    """Return texts that stand in columns of numbers."""
+    markers: list[str] = []
+    for name in names:
+        words = [cell for cell in cells[name] if cell and as_number(cell, decimal) is None]
+        if name not in time and 0 < 2 * len(words) < len(cells[name]):
+            markers += [word for word in dict.fromkeys(words) if word not in markers]
+    return markers[:20]
+
+
+def comment_of(text: str) -> str:
+    """Return somebody's text as it may stand behind a #."""
+    return "".join(c if c.isprintable() else " " for c in text)

@@ -1,0 +1,48 @@
+"""Excel sheets as rows of text."""
+
+import importlib
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from studies.errors import InputError, MissingEnvironment, nearest
+
+if TYPE_CHECKING:
+    pass
+
+
+from studies.importing.tables import shorten
+
+EXCEL = (".xlsx", ".xlsm")
+MOST_CELLS = 20_000_000
+
+
+def read_sheet(path: str | Path, sheet: str | None) -> list[list[str]]:
+    """Return the rows of an Excel sheet as text: dates in ISO 8601, numbers with all their digits."""
+    try:
+        openpyxl = importlib.import_module("openpyxl")
+    except ImportError:
+        raise MissingEnvironment(
+            f"{path}: reading Excel needs openpyxl: pip install 'hrg-workbench[excel]', or export the sheet as CSV."
+        ) from None
+    try:
+        book = openpyxl.load_workbook(path, read_only=True, data_only=True)
+        if sheet is not None and sheet not in book.sheetnames:
+            raise InputError(f"{path}: there is no sheet '{sheet}'{nearest(sheet, book.sheetnames)}")
+        page = book[sheet] if sheet is not None else book.worksheets[0]
+        cells = (page.max_row or 0) * (page.max_column or 0)
+        if cells > MOST_CELLS:
+            raise InputError(
+                f"{path}: its sheet extends to row {page.max_row}, column {page.max_column}, more than the limit of {MOST_CELLS:,}"
+                " cells. Delete cells far from the table, or export the sheet as CSV."
+            )
+        return [[_cell_text(value) for value in row] for row in page.iter_rows(values_only=True)]
+    except InputError:
+        raise
+    except Exception as error:  # openpyxl lets errors of zip, XML and its own through, also while it reads
+        raise InputError(f"{path}: not an Excel workbook that can be read ({shorten(str(error))}).") from None
+
+
+def _cell_text(value: object) -> str:
+    if value is None:
+        return ""
+    return value.isoformat(sep=" ") if hasattr(value, "isoformat") else str(value)
