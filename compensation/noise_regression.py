@@ -58,7 +58,7 @@ def _factor(theta: float, rows: int) -> Array:
 def restricted_deviance(X: Array, y: Array, theta: float, runs: Runs) -> float:
     """Return −2 ln L = (m − k) ln RSS + ln det XᵀX + ln det Σ of the whitened rows; columns of X should be of length one."""
     # The triangle R of [X, y]: its last corner is the root of RSS, the rest the determinant.
-    both = np.column_stack([whiten(X, theta, runs), whiten(y, theta, runs)])
+    both = whiten(np.column_stack([X, y]), theta, runs)
     R = np.maximum(np.abs(np.diag(scipy.linalg.qr(both, mode="r", check_finite=False)[0])), 1e-300)
     total = 2 * (y.size - X.shape[1]) * np.log(R[-1]) + 2 * np.sum(np.log(R[:-1]))
     if theta != 1.0:

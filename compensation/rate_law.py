@@ -186,10 +186,18 @@ def _fit(name: str, x: Array, y: Array, over: Mapping[str, Array]) -> tuple[dict
     if name in SHAPED:
         most = float(np.max(np.abs(x)))
         grid = most * (np.geomspace(0.65, 30, 40) if name == "sine" else np.r_[1e-4, np.linspace(0, 0.5, 41)[1:]])
-        costs = [float(np.sum((y - solve(one)[1]) ** 2)) for one in grid]
-        at = int(np.argmin(costs))
+        Q = np.linalg.qr(np.column_stack([np.ones_like(x), *over.values()]))[0]
+        free = y - Q @ (Q.T @ y)
+
+        def cost(s: float) -> float:
+            """The sum of squares, the other coefficients at their best."""
+            c = FORMS[name].columns(x, s)[0]
+            c = c - Q @ (Q.T @ c)
+            left = free - c * (c @ free / max(c @ c, 1e-300))
+            return float(left @ left)
+
+        at = int(np.argmin([cost(one) for one in grid]))
         ends = grid[max(at - 1, 0)], grid[min(at + 1, len(grid) - 1)]
-        cost = lambda s: float(np.sum((y - solve(s)[1]) ** 2))  # noqa: E731
         shape = float(scipy.optimize.minimize_scalar(cost, bounds=ends, options={"xatol": 1e-8 * most}).x)
     last = [names.pop()] if name in SHAPED else []
     names += [*(f"{one}{SUFFIX[key]}" for key in over for one in "ak"), *last]

@@ -1,6 +1,8 @@
 """Start-up of the primary vibration: acquisition under a limited drive."""
 
+import cmath
 import math
+from collections import deque
 from dataclasses import dataclass
 
 import numpy as np
@@ -45,15 +47,14 @@ def start_up(tau: float, loops: Loops, *, headroom: float = 20.0, offset: float 
     require_stable(slow, 1 / tau, ("amplitude", "phase"))
     (K_a, I_a), (K_p, I_p) = slow.gains("amplitude"), slow.gains("phase")
     most, smoothing, (late, rest) = headroom / tau, slow.smoothing, slow.late
-    steps = math.ceil(seconds / T)
-    course = np.empty((steps, 3))
+    course = []
     Z = seen = 1j * NOTHING
     drive_integral = phase_integral = 0.0
-    waiting = [(0.0, 0.0)] * (late + (rest > 0) + 1)
-    for n in range(steps):
-        u, nu = waiting[-1]
+    waiting = deque([(0.0, 0.0)] * (late + (rest > 0) + 1))
+    for _ in range(math.ceil(seconds / T)):
+        u, nu = waiting.popleft()
         rate = complex(-1 / tau, offset - nu)
-        grown = np.exp(rate * T)
+        grown = cmath.exp(rate * T)
         Z = Z * grown + u * (grown - 1) / rate
         seen += smoothing * (Z - seen)
         size, phase = abs(seen), math.atan2(seen.imag, seen.real)
@@ -63,13 +64,12 @@ def start_up(tau: float, loops: Loops, *, headroom: float = 20.0, offset: float 
             drive_integral += I_a * T * (1 - size)
         nu = K_p * phase + phase_integral
         phase_integral += I_p * T * phase
-        waiting = [(given, nu), *waiting[:-1]]
-        course[n] = abs(Z), phase, nu
-    time = np.asarray(T * np.arange(1, steps + 1), dtype=float)
-    return StartUp(
-        time, course[:, 0], course[:, 1], course[:, 2], _since(time, np.abs(course[:, 1]) < LOCKED),
-        _since(time, np.abs(course[:, 0] - 1) < SETTLED),
-    )  # fmt: skip
+        waiting.append((given, nu))
+        course.append((abs(Z), phase, nu))
+    size, phase, nu = np.array(course).T
+    time = np.asarray(T * np.arange(1, len(size) + 1), dtype=float)
+    locked, ready = _since(time, np.abs(phase) < LOCKED), _since(time, np.abs(size - 1) < SETTLED)
+    return StartUp(time, size, phase, nu, locked, ready)
 
 
 def _since(time: Array, holds: NDArray[np.bool_]) -> float:

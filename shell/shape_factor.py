@@ -15,8 +15,8 @@ from shell.quadrature import Array
 from shell.rayleigh import rayleigh_log_derivatives
 from shell.resonator import Resonator
 
-NODES = (8, 12)  # Poisson's ratios tried, until the error is small enough
-CLOSE = 1e-9  # wanted error of ln Φ between them
+NODES = (6, 8, 12)  # Poisson's ratios tried, until the error is small enough
+CLOSE = 1e-8  # wanted error of ln Φ between them
 
 
 @dataclass(frozen=True, eq=False)

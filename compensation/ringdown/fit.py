@@ -109,7 +109,7 @@ def drift_shapes(envelope: Envelope, count: int) -> Array:
     y = 2 * (envelope.time - envelope.time[0]) / (envelope.time[-1] - envelope.time[0]) - 1
     size = np.linalg.norm(envelope.values, axis=0)
     line = np.vander(y, 2)
-    shapes = np.array([np.polynomial.Legendre.basis(k)(y) for k in range(2, count + 2)]).reshape(count, y.size)
+    shapes = np.polynomial.legendre.legvander(y, count + 1)[:, 2:].T
     return np.asarray(shapes - (line @ np.linalg.lstsq(line * size[:, None], (shapes * size).T, rcond=None)[0]).T)
 
 

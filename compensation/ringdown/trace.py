@@ -129,7 +129,9 @@ class _Power:
         return self.signal(x) + self.floor
 
     def variance(self, x: Array) -> Array:
-        m = self.mean(x)
+        return self.variance_at(self.mean(x))
+
+    def variance_at(self, m: Array) -> Array:
         return np.asarray(self.scatter * m**2 + self.noise * (m - self.floor / 2))
 
     def slopes(self, x: Array) -> Array:
@@ -211,8 +213,12 @@ def _fit_scatter(fit: _Power, x: Array, y: Array) -> _Power:
     def put(point: Array) -> _Power:
         return replace(fit, scatter=float(np.exp(point[0])), noise=float(np.exp(point[1])))
 
+    m = fit.mean(x)
+    square = (y - m) ** 2
+
     def cost(point: Array) -> float:
-        return _cost(put(point), x, y)
+        V = put(point).variance_at(m)
+        return float(np.sum(np.log(V) + square / V))
 
     start = np.log([fit.scatter if fit.noise else usual, fit.noise or fit.floor])
     limits = [(-40.0, 5.0), (-60.0, 5.0)]

@@ -192,28 +192,31 @@ def _sampling(
 ) -> tuple[float, list[np.ndarray], Rows, list[np.ndarray]]:
     """Draw rows from which the drive of the baseline can be had: a step missed between two rows is no effect."""
     total = sum(r.time[-1] for r in runs)
+    _let_run(device, runs, 1e-3)
     possible = [d for d in (1.0, 2.0, 5.0, 10.0, 20.0, 30.0, 60.0) if total / d < 30000]
     for dt in possible[int(rng.integers(0, len(possible))) :: -1]:
         for holes in (True, True, False):
             times = sample_times(rng, runs, dt, holes)
             pick = [np.unique(np.linspace(0, len(t) - 1, max(150, 1500 // len(runs))).astype(int)) for t in times]
             rows = Rows([t[p] for t, p in zip(times, pick, strict=True)], [r.time for r in runs], times)
-            worst = _departure(device, runs, rows, present, sigma, 1e-3)
+            worst = _departure(device, runs, rows, present, sigma)
             if worst < 0.5 * (limit or 2 / np.sqrt(sum(map(len, times)))):
                 return dt, times, rows, pick
     return dt, times, rows, pick
 
 
-def _departure(
-    device: Device, runs: list[Run], rows: Rows, present: list[str], sigma: dict[str, float], spread: float
-) -> float:
-    """What the baseline leaves of the bare device at this spread, the worst response, over the noise."""
+def _let_run(device: Device, runs: list[Run], spread: float) -> None:
+    """The courses of the bare device at this spread."""
     device.spread = spread
     network = device.network.scaled(spread)
     for run in runs:
         run.main_s = network.main_s
         run.housing = housing_of(network, run.chamber)
         run.mode, run.stem = integrate(network, run.housing, run.start_offset)
+
+
+def _departure(device: Device, runs: list[Run], rows: Rows, present: list[str], sigma: dict[str, float]) -> float:
+    """What the baseline leaves of the bare device, the worst response, over the noise."""
     fits = _fit(device, [], runs, rows, present)
     return max(rms(fits[r].residual) / sigma[r] for r in present)
 
@@ -224,7 +227,8 @@ def _settle(
     """Bring the device's own departures from the baseline (chain, T⁴, cubic law) below `allowed` noise."""
     spread = 1.0
     for _ in range(12):
-        worst = _departure(device, runs, rows, present, sigma, spread)
+        _let_run(device, runs, spread)
+        worst = _departure(device, runs, rows, present, sigma)
         if worst <= allowed:
             break
         spread *= min(0.6, 0.8 * allowed / worst)

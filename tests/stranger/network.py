@@ -75,19 +75,20 @@ def integrate(network: Network, housing: np.ndarray, start_offset: float = 0.0) 
     state = right @ np.full(len(drive), housing[0] + start_offset)
     read = np.vstack([weight @ left[3:], left[2]])
     forced = STEP_S * b[:, None] * ((phi1 - phi2)[:, None] * housing[:-1] + phi2[:, None] * housing[1:])
-    if not share:
-        inputs = np.column_stack([state, forced])
-        return tuple(read @ [lfilter([1.0], [1.0, -keep], own) for keep, own in zip(decay, inputs, strict=True)])
-    states, around = [state], housing.tolist()
-    for now, after, push in zip(around, around[1:], forced.T, strict=False):
-        new = decay * state + push
-        excess = _t4_excess(now, float(left[0] @ state)) + _t4_excess(after, float(left[0] @ new))
-        state = new + STEP_S * phi1 * heat * 0.5 * excess
-        states.append(state)
-    return tuple(read @ np.transpose(states))
+    kick = (STEP_S * phi1 * heat * 0.5)[:, None]
+    excess = np.zeros(len(housing) - 1)
+    for _ in range(60):  # the excess of the course before, until it is that of the course itself
+        inputs = np.column_stack([state, forced + kick * excess])
+        states = np.array([lfilter([1.0], [1.0, -keep], own) for keep, own in zip(decay, inputs, strict=True)])
+        new = decay[:, None] * states[:, :-1] + forced
+        around = (housing[:-1], left[0] @ states[:, :-1]), (housing[1:], left[0] @ new)
+        before, excess = excess, sum(_t4_excess(*pair) for pair in around)
+        if not share or np.abs(excess - before).max() < 1e-12:
+            break
+    return tuple(read @ states)
 
 
-def _t4_excess(housing: float, base: float) -> float:
+def _t4_excess(housing: np.ndarray, base: np.ndarray) -> np.ndarray:
     h, b, reference = housing + KELVIN, base + KELVIN, 293.15
     return (h**4 - b**4) / (4 * reference**3) - (h - b)
 
