@@ -193,7 +193,7 @@ def _fit(name: str, x: Array, y: Array, over: Mapping[str, Array]) -> tuple[dict
             """The sum of squares, the other coefficients at their best."""
             c = FORMS[name].columns(x, s)[0]
             c = c - Q @ (Q.T @ c)
-            left = free - c * (c @ free / max(c @ c, 1e-300))
+            left = free - c * (float(c @ free) / max(float(c @ c), 1e-300))
             return float(left @ left)
 
         at = int(np.argmin([cost(one) for one in grid]))
