@@ -4,18 +4,17 @@ Equation numbers are those of the BVG paper (Sensors 2015, 15, 23684). The chain
 
     Ω = S₃(T) { S₂(Ω) [ S₁ (A − N₁) − N(T) ] }
 
-rough null and scale; bias over temperature; scale over rate; scale over temperature; then a FIR filter.
+rough null and scale; bias over temperature; scale over rate; scale over temperature; then a FIR filter. Rates are in °/s and
+temperatures in °C, as in the paper, in records and in a model's file.
 `compensation.bell_calibration` fits it to runs.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from compensation.arrays import Array
-from compensation.constants import zero_Celsius
 from compensation.errors import CompensationError
 from compensation.samples import read_columns, require_regular
 
@@ -24,34 +23,32 @@ MARGIN = 0.01  # part of a fitted range by which noise may lead out of it before
 
 @dataclass(frozen=True)
 class PolynomialCurve:
-    """y = Σ cᵢ (x − reference)ⁱ between `lowest` and `highest` x, with the covariance of c."""
+    """y = Σ cᵢ xⁱ between `lowest` and `highest` x, with the covariance of c."""
 
     coefficients: Array
     covariance: Array
-    reference: float
     lowest: float
     highest: float
 
     def value(self, x: ArrayLike) -> Array:
         """Return y at x."""
-        shift = np.asarray(x, dtype=float) - self.reference
-        return np.asarray(np.polynomial.polynomial.polyval(shift, self.coefficients), dtype=float)
+        return np.asarray(np.polynomial.polynomial.polyval(np.asarray(x, dtype=float), self.coefficients), dtype=float)
 
     def inverse(self, y: ArrayLike) -> Array:
         """Return x at y, on the rising branch of a parabola."""
         c0, c1, c2 = np.pad(self.coefficients, (0, 3))[:3]
         shift = c0 - np.asarray(y, dtype=float)
         with np.errstate(invalid="ignore"):
-            return np.asarray(self.reference - 2 * shift / (c1 + np.sqrt(c1**2 - 4 * c2 * shift)))
+            return np.asarray(-2 * shift / (c1 + np.sqrt(c1**2 - 4 * c2 * shift)))
 
-    def refuse_outside(self, x: Array, name: str, show: Callable[[float], str]) -> None:
-        """Raise when x leaves the fitted range by more than `MARGIN` of it; `show` writes an x for people."""
+    def refuse_outside(self, x: Array, name: str, unit: str) -> None:
+        """Raise when x leaves the fitted range by more than `MARGIN` of it."""
         beyond = MARGIN * (self.highest - self.lowest)
         low, high = float(np.min(x)), float(np.max(x))
         if low < self.lowest - beyond or high > self.highest + beyond:
             raise CompensationError(
-                f"the {name} runs from {show(low)} to {show(high)}, but the chain was fitted between "
-                f"{show(self.lowest)} and {show(self.highest)}; allow extrapolation or calibrate over that range."
+                f"the {name} runs from {low:.2f} to {high:.2f} {unit}, but the chain was fitted between "
+                f"{self.lowest:.2f} and {self.highest:.2f} {unit}; allow extrapolation or calibrate over that range."
             )
 
 
@@ -83,11 +80,11 @@ class BellChain:
     """The fitted steps (33)–(36) and the filter."""
 
     null: float  # N₁ (counts)
-    scale: float  # S₁ (rad/s per count)
+    scale: float  # S₁ (°/s per count)
     rough_covariance: Array  # array (2, 2), covariance of null and scale
-    bias: PolynomialCurve  # N(T), rad/s over kelvin: eq. (34)
-    scale_over_rate: PolynomialCurve  # rate (rad/s) over rate (rad/s): eq. (35), or a `rate_law.RateCurve`
-    scale_over_temperature: PolynomialCurve  # factor (1) over kelvin: eq. (36)
+    bias: PolynomialCurve  # N(T), °/s over °C: eq. (34)
+    scale_over_rate: PolynomialCurve  # rate over rate, °/s: eq. (35), or a `rate_law.RateCurve`
+    scale_over_temperature: PolynomialCurve  # factor (1) over °C: eq. (36)
     taps: Array  # array, FIR coefficients, empty for none
     sampling: float  # step (s) that the taps were designed for
     warming: Warming | None = None  # taken out of the output before all steps
@@ -100,7 +97,7 @@ class BellChain:
 
 @dataclass(frozen=True)
 class ChainOutput:
-    """Rate (rad/s) after each step: (33), (34), (35), (36) and the filter."""
+    """Rate (°/s) after each step: (33), (34), (35), (36) and the filter."""
 
     rough: Array
     bias_compensated: Array
@@ -117,9 +114,9 @@ def apply_chain(
     rough = chain.scale * ((chain.warming.undo(A, T) if chain.warming else A) - chain.null)
     straight = rough - chain.bias.value(T)
     if not extrapolate:
-        chain.bias.refuse_outside(T, "temperature", _show_celsius)
-        chain.scale_over_temperature.refuse_outside(T, "temperature", _show_celsius)
-        chain.scale_over_rate.refuse_outside(straight, "rate", lambda rate: f"{np.degrees(rate):.2f} °/s")
+        chain.bias.refuse_outside(T, "temperature", "°C")
+        chain.scale_over_temperature.refuse_outside(T, "temperature", "°C")
+        chain.scale_over_rate.refuse_outside(straight, "rate", "°/s")
     linear = chain.scale_over_rate.value(straight)
     steady = linear * chain.scale_over_temperature.value(T)
     if len(chain.taps):
@@ -130,17 +127,13 @@ def apply_chain(
 
 
 def invert_chain(chain: BellChain, rate: ArrayLike, temperature: ArrayLike) -> Array:
-    """Return the raw output (counts) that the chain, without its filter and warming, turns into this rate (rad/s)."""
+    """Return the raw output (counts) that the chain, without its filter and warming, turns into this rate (°/s)."""
     T = np.asarray(temperature, dtype=float)
     target = np.asarray(rate, dtype=float) / chain.scale_over_temperature.value(T)
     counts: Array = (chain.scale_over_rate.inverse(target) + chain.bias.value(T)) / chain.scale + chain.null
     if not np.all(np.isfinite(counts)):
         raise CompensationError("the scale over rate has a turning point in this range and cannot be inverted.")
     return counts
-
-
-def _show_celsius(temperature: float) -> str:
-    return f"{temperature - zero_Celsius:.2f} °C"
 
 
 def design_smoother(sampling: float, cutoff: float, order: int = 50) -> Array:

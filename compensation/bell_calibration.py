@@ -10,7 +10,6 @@ from numpy.typing import ArrayLike
 
 from compensation.arrays import Array
 from compensation.bell import BellChain, PolynomialCurve, design_smoother
-from compensation.constants import zero_Celsius
 from compensation.errors import CompensationError
 from compensation.noise_regression import correlated_covariance
 from compensation.polynomial import fit_polynomial
@@ -23,7 +22,7 @@ NEAR = 0.5  # K from a run within which what it tells is taken to hold
 
 @dataclass(frozen=True)
 class BellRun:
-    """One calibration run: time (s), raw output (counts), temperature (K), applied rate (rad/s); arrays (N,)."""
+    """One calibration run: time (s), raw output (counts), temperature (°C), applied rate (°/s); arrays (N,)."""
 
     time: Array
     output: Array
@@ -35,7 +34,7 @@ class BellRun:
 
 
 def fit_rough(run: BellRun) -> tuple[float, float, Array]:
-    """Fit null N₁ (counts) and scale S₁ (rad/s per count), with covariance, to a run at rest and then at one rate: eq. (33)."""
+    """Fit null N₁ (counts) and scale S₁ (°/s per count), with covariance, to a run at rest and then at one rate: eq. (33)."""
     line = fit_polynomial(run.rate, run.output, 1, "rate")
     (null, slope), covariance = line.about(0.0, correlated_covariance(line.regression))
     if slope == 0:
@@ -45,23 +44,23 @@ def fit_rough(run: BellRun) -> tuple[float, float, Array]:
 
 
 def fit_bias(temperature: ArrayLike, rough: ArrayLike, order: int = 2) -> PolynomialCurve:
-    """Fit N(T) to the rough output (rad/s) of a gyro at rest, over temperature (K): eq. (34)."""
-    return _fit_curve(temperature, rough, order, "temperature", zero_Celsius)
+    """Fit N(T) to the rough output (°/s) of a gyro at rest, over temperature (°C): eq. (34)."""
+    return _fit_curve(temperature, rough, order, "temperature")
 
 
 def fit_scale_over_rate(bias_compensated: ArrayLike, rate: ArrayLike, order: int = 2) -> PolynomialCurve:
-    """Fit the applied rate over the measured one (both rad/s), at one temperature: eq. (35); its noise flattens the line by some 1e-7."""
-    return _fit_curve(bias_compensated, rate, order, "measured rate", 0.0)
+    """Fit the applied rate over the measured one (both °/s), at one temperature: eq. (35); its noise flattens the line by some 1e-7."""
+    return _fit_curve(bias_compensated, rate, order, "measured rate")
 
 
 def fit_scale_over_temperature(
     temperature: ArrayLike, rate_compensated: ArrayLike, rate: ArrayLike, order: int = 2
 ) -> PolynomialCurve:
-    """Fit the factor that brings the output (rad/s) to the applied rate (rad/s), over temperature (K): eq. (36)."""
+    """Fit the factor that brings the output to the applied rate (°/s), over temperature (°C): eq. (36)."""
     T, measured, applied = read_columns(temperature=temperature, rate_compensated=rate_compensated, rate=rate)
     if np.any(applied == 0) or np.any(np.abs(measured) < 0.1 * np.abs(applied)):
         raise CompensationError("the scale over temperature needs an applied rate in every row of the run.")
-    return _fit_curve(T, applied / measured, order, "temperature", zero_Celsius)
+    return _fit_curve(T, applied / measured, order, "temperature")
 
 
 def fit_chain(
@@ -99,13 +98,13 @@ def _nothing(run: BellRun, value: float) -> PolynomialCurve:
     """Return the curve of a step for which there is no run: it changes nothing, where the temperature of another run is."""
     T = run.temperature
     ends = float(T.min()) - NEAR, float(T.max()) + NEAR
-    return PolynomialCurve(np.array([value, 0.0, 0.0]), np.zeros((3, 3)), zero_Celsius, *ends)
+    return PolynomialCurve(np.array([value, 0.0, 0.0]), np.zeros((3, 3)), *ends)
 
 
-def _fit_curve(x: ArrayLike, y: ArrayLike, order: int, name: str, reference: float) -> PolynomialCurve:
+def _fit_curve(x: ArrayLike, y: ArrayLike, order: int, name: str) -> PolynomialCurve:
     fit = fit_polynomial(x, y, order, name)
-    coefficients, covariance = fit.about(reference, correlated_covariance(fit.regression))
-    return PolynomialCurve(coefficients, covariance, reference, float(np.min(x)), float(np.max(x)))
+    coefficients, covariance = fit.about(0.0, correlated_covariance(fit.regression))
+    return PolynomialCurve(coefficients, covariance, float(np.min(x)), float(np.max(x)))
 
 
 def _step(name: str, fit: Callable[..., Fitted], *arguments: Any) -> Fitted:

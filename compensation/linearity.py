@@ -18,7 +18,7 @@ def same_rate(rate: ArrayLike) -> Array:
 
 
 def measure_nonlinearity(applied: ArrayLike, measured: ArrayLike) -> float:
-    """Return the largest departure of means from the line over the applied rate (rad/s), over the largest applied rate (BVG paper)."""
+    """Return the largest departure of means from the line over the applied rate, over the largest applied rate (BVG paper)."""
     x, y = read_columns(applied=applied, measured=measured)
     _, kind = np.unique(same_rate(x), return_inverse=True)
     rates = np.bincount(kind, x) / np.bincount(kind)

@@ -109,14 +109,14 @@ def fit_rate_curve(form: str, averaged: float, measured: Array, rate: Array) -> 
     values, _ = _fit(form, rate, measured, {})
     _, k, s = found = np.array([values[name] for name in ("a", "k", *FORMS[form].own)])
     if form == "cubic" and k + 3 * s * np.max(rate**2) < 0:
-        turn = np.degrees(np.sqrt(-k / (3 * s)))
+        turn = np.sqrt(-k / (3 * s))
         raise CompensationError(f"the output turns back at {turn:.4g} °/s; leave out the rates beyond.")
     columns = FORMS[form].columns(rate, s)
     if form in SHAPED:
         columns.append(k * (FORMS[form].columns(rate, s * (1 + 1e-4))[0] - columns[0]) / (1e-4 * s))
     near = fit_linear(np.stack(columns, axis=1), measured, ("k", *FORMS[form].own))
     blind = BLIND * near.standard_deviation * np.sqrt(averaged) / k if form == "dead band" else 0.0
-    return RateCurve(found, correlated_covariance(near), 0.0, measured.min(), measured.max(), form, blind)
+    return RateCurve(found, correlated_covariance(near), measured.min(), measured.max(), form, blind)
 
 
 def fit_rate_law(

@@ -1,13 +1,11 @@
 """`hrg fit scale`: bias and scale of a bell-shaped gyro, step by step."""
 
-import math
 import re
 from dataclasses import replace
 from typing import Any
 
 from compensation.bell import PolynomialCurve
 from compensation.rate_law import CARRIED, SURE, RateCurve, RateLaw
-from shell.constants import zero_Celsius
 from studies.cli.arguments import Records, SaveModel
 from studies.cli.output import answers, keep_model
 from studies.errors import InputError
@@ -136,7 +134,7 @@ def _law_words(law: RateLaw, curve: PolynomialCurve) -> str:
     if law.chosen.name in CARRIED and not isinstance(curve, RateCurve):
         words += " The run at one temperature has too few rates for it: the model keeps the paper's parabola."
     if isinstance(curve, RateCurve) and curve.blind:
-        d = math.degrees(curve.coefficients[2] + curve.blind)  # the band, and what noise hides beside it
+        d = curve.coefficients[2] + curve.blind  # the band, and what noise hides beside it
         words += f" Within ±{d:.2g} °/s the output does not tell the rate: such rows stay empty, and errors here are without them."
     if "warming" in law.chosen.over:
         words += " The model first takes the difference between warming and cooling out of the output."
@@ -169,7 +167,7 @@ def _undetermined(study: ScaleStudy) -> list[tuple[str, str]]:
 
 
 def _remarks(study: ScaleStudy) -> list[str | Sentence]:
-    ends = (f"{T - zero_Celsius:.1f}" for T in (study.runs[0].temperature.min(), study.runs[0].temperature.max()))
+    ends = (f"{T:.1f}" for T in (study.runs[0].temperature.min(), study.runs[0].temperature.max()))
     where = " … ".join(dict.fromkeys(ends))
     lacks: list[str | Sentence] = [
         Sentence(f"The {what} is not determined: the model holds near {where} °C. Add a record {record}.", "warning")

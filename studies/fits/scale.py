@@ -15,9 +15,8 @@ from compensation.linearity import measure_nonlinearity, same_rate
 from compensation.rate_law import CARRIED, LEAST, RateLaw
 from compensation.samples import is_regular
 from compensation.stability import allan_deviation
-from shell.constants import zero_Celsius
 from studies.errors import InputError, naming
-from studies.fits.scale_law import BLOCKS, DEG, SWEPT, read_law, warming_of, without_warming
+from studies.fits.scale_law import BLOCKS, SWEPT, read_law, warming_of, without_warming
 from studies.models.kinds.scale import RAW
 from studies.record import Record
 from studies.record.rest import LARGEST_REST, MOST_ROWS, TEMPERATURES, choose_column, drop_spikes
@@ -85,7 +84,7 @@ def judge_steps(
         at_rest, at_turning = (None if one is None or np.isnan(one).any() else one for one in (at_rest, at_turning))
         if len(np.unique(same_rate(rates.rate)[steady])) > 2:
             nonlinearity = measure_nonlinearity(rates.rate[steady], at_rates[steady])
-        spreads = (None if one is None else float(np.std(one)) / DEG for one in (at_rest, at_turning))
+        spreads = (None if one is None else float(np.std(one)) for one in (at_rest, at_turning))
         allan: tuple[float | None, ...] = (None, None, None)
         if rest is not None and at_rest is not None:
             allan = _read_allan((rest.time[-1] - rest.time[0]) / (len(rest.time) - 1), at_rest)
@@ -171,7 +170,7 @@ def _parts_of(table: BellRun) -> dict[str, BellRun]:
     level = same_rate(table.rate)
     held, counts = np.unique(level, return_counts=True)
     held = held[counts > PLATEAU * level.size / len(held)]
-    at_rest = np.abs(level) <= LARGEST_REST * DEG
+    at_rest = np.abs(level) <= LARGEST_REST
     middle = np.abs(table.temperature - np.median(table.temperature)) < SWEPT / 2
     kinds = dict(zip(KINDS, (middle, at_rest, level == held[np.argmax(np.abs(held))]), strict=True))
     found = {}
@@ -188,16 +187,16 @@ def _parts_of(table: BellRun) -> dict[str, BellRun]:
 def _classify(run: BellRun, path: str) -> str:
     several, at_rest, turning = KINDS
     swept = float(np.ptp(run.temperature)) > SWEPT
-    if np.ptp(run.rate) > max(LARGEST_REST * DEG, STEADY * np.max(np.abs(run.rate))):
+    if np.ptp(run.rate) > max(LARGEST_REST, STEADY * np.max(np.abs(run.rate))):
         if swept:
             return TABLES
         levels, counts = np.unique(same_rate(run.rate), return_counts=True)
         held = levels[counts > PLATEAU * len(run.rate)]
-        two = len(held) == 2 and float(np.min(np.abs(held))) <= LARGEST_REST * DEG
+        two = len(held) == 2 and float(np.min(np.abs(held))) <= LARGEST_REST
         return ROUGH if two else several
     if not swept:
         raise InputError(f"{path}: neither rate nor temperature changes; it cannot calibrate the chain.")
-    return at_rest if abs(np.mean(run.rate)) <= LARGEST_REST * DEG else turning
+    return at_rest if abs(np.mean(run.rate)) <= LARGEST_REST else turning
 
 
 def _read_run(record: Record, output: str, column: str) -> tuple[BellRun, int]:
@@ -209,7 +208,7 @@ def _read_run(record: Record, output: str, column: str) -> tuple[BellRun, int]:
     if np.count_nonzero(complete) < 2:
         raise InputError(f"{record.path}: no rows with {output}, {column} and rate_deg_per_s together.")
     time, raw, temperature, rate = (values[complete] for values in columns)
-    return BellRun(time, raw, temperature + zero_Celsius, rate * DEG), int(np.count_nonzero(~complete))
+    return BellRun(time, raw, temperature, rate), int(np.count_nonzero(~complete))
 
 
 def _thin(run: BellRun) -> BellRun:
@@ -240,7 +239,7 @@ def _hold_out(runs: Runs, rough: BellRun | None = None, form: str | None = None)
             before.append(result.rough - run.rate)
             after.append(result.temperature_compensated - run.rate)
     known = np.isfinite(np.concatenate(after))  # not within a dead band
-    errors = [float(np.sqrt(np.mean(np.concatenate(parts)[known] ** 2))) / DEG for parts in (before, after)]
+    errors = [float(np.sqrt(np.mean(np.concatenate(parts)[known] ** 2))) for parts in (before, after)]
     return errors[0], errors[1]
 
 
@@ -257,7 +256,7 @@ def _cut(run: BellRun, block: int) -> tuple[BellRun, BellRun]:
 def _read_allan(step: float, rate: Array) -> tuple[float | None, float | None, float | None]:
     if len(rate) * step < 10 * LONG:
         return None, None, None
-    allan = allan_deviation(rate / DEG * 3600, step)
+    allan = allan_deviation(rate * 3600, step)
     curve = np.interp(np.log([SHORT, LONG]), np.log(allan.tau), np.log(allan.deviation))
     short, long = (np.exp(curve) * np.sqrt([SHORT, LONG]) / 60).tolist()
     return allan.bias_instability[0], short, long

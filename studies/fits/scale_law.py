@@ -11,7 +11,6 @@ from compensation.bell_calibration import BellRun
 from compensation.linearity import same_rate
 from compensation.rate_law import RateLaw, fit_rate_law
 
-DEG = float(np.pi / 180)
 SWEPT = 5.0  # span of temperature (K) from which a run counts as one over temperature
 BLOCKS = 5
 TURN = 0.05  # K by which a temperature at least goes back before it turns
@@ -49,7 +48,7 @@ def read_law(runs: Sequence[BellRun]) -> RateLaw | None:
         if not fifths:
             continue
         y, T = (np.array([x[rows].mean(axis=1) for rows in fifths]) for x in (run.output, run.temperature))
-        rate.append(np.array([run.rate[rows].mean() for rows in fifths]) / DEG)
+        rate.append(np.array([run.rate[rows].mean() for rows in fifths]))
         output.append(y.mean(axis=1))
         temperature.append(T.mean(axis=1))
         scatter.append(_off_line(y))

@@ -11,12 +11,10 @@ from compensation.bell import BellChain, PolynomialCurve, apply_chain, design_sm
 from compensation.bell_calibration import BellRun, fit_chain
 from compensation.linearity import measure_nonlinearity
 from compensation.stability import allan_deviation
-from shell.constants import zero_Celsius
 from studies.fits.scale import Runs, StepFigures, judge_steps
 from studies.reports import style
 from studies.results import Chapter, Column, Drawing, Figure, Table
 
-DEG = float(np.pi / 180)
 STEP = 0.1  # output step (s), printed
 RANDOM_WALK, WANDER = 2.7821, 20.0
 """White noise (°/√h): the printed random walk before compensation. Random walk of the bias (°/h per √h): assumed."""
@@ -35,16 +33,16 @@ def read_printed_chain() -> BellChain:
     lines = [line.split(",") for line in text.splitlines() if line and not line.startswith(("#", "quantity"))]
     row = {name: np.array([float(value) for value in values]) for name, *values in lines}
 
-    def curve(coefficients: Array, reference: float) -> PolynomialCurve:
-        return PolynomialCurve(coefficients, np.zeros((3, 3)), reference, -np.inf, np.inf)
+    def curve(name: str) -> PolynomialCurve:
+        return PolynomialCurve(row[name], np.zeros((3, 3)), -np.inf, np.inf)
 
     return BellChain(
         null=float(row["rough"][0]),
-        scale=float(row["rough"][1]) * DEG,
+        scale=float(row["rough"][1]),
         rough_covariance=np.zeros((2, 2)),
-        bias=curve(row["bias"] * DEG, zero_Celsius),
-        scale_over_rate=curve(row["scale_over_rate"] * DEG ** np.array([1.0, 0.0, -1.0]), 0.0),
-        scale_over_temperature=curve(row["scale_over_temperature"], zero_Celsius),
+        bias=curve("bias"),
+        scale_over_rate=curve("scale_over_rate"),
+        scale_over_temperature=curve("scale_over_temperature"),
         taps=np.empty(0),
         sampling=STEP,
     )
@@ -53,20 +51,20 @@ def read_printed_chain() -> BellChain:
 def simulate_runs(generator: np.random.Generator) -> tuple[BellRun, BellRun, BellRun]:
     """Return virtual runs: rates ±360 °/s at 25 °C, rest and 300 °/s over −45…55 °C."""
     gyro = read_printed_chain()
-    sweep = (zero_Celsius + np.linspace(LOWEST, HIGHEST, round(SWEEP / STEP))).astype(np.float64)
-    plateaus = np.repeat(np.arange(-360.0, 361.0, 40.0) * DEG, round(DWELL / STEP)).astype(np.float64)
+    sweep = np.linspace(LOWEST, HIGHEST, round(SWEEP / STEP))
+    plateaus = np.repeat(np.arange(-360.0, 361.0, 40.0), round(DWELL / STEP)).astype(np.float64)
 
     def run(rate: Array, temperature: Array) -> BellRun:
         white = RANDOM_WALK * 60 / np.sqrt(STEP) * generator.standard_normal(len(rate))
         wander = WANDER * np.sqrt(STEP / 3600) * np.cumsum(generator.standard_normal(len(rate)))
-        noise = (white + wander) / 3600 * DEG / gyro.scale
+        noise = (white + wander) / 3600 / gyro.scale
         time = (STEP * np.arange(len(rate))).astype(np.float64)
         return BellRun(time, invert_chain(gyro, rate, temperature) + noise, temperature, rate)
 
     return (
-        run(plateaus, np.full(len(plateaus), zero_Celsius + ROOM)),
+        run(plateaus, np.full(len(plateaus), ROOM)),
         run(np.zeros(len(sweep)), sweep),
-        run(np.full(len(sweep), 300 * DEG), sweep),
+        run(np.full(len(sweep), 300.0), sweep),
     )
 
 
@@ -110,18 +108,18 @@ def examine_claims() -> Claims:
     from scipy.optimize import brentq
 
     gyro = read_printed_chain()
-    sweep = zero_Celsius + np.linspace(LOWEST, HIGHEST, 2001)
-    rates = np.linspace(-360, 360, 2001) * DEG
+    sweep = np.linspace(LOWEST, HIGHEST, 2001)
+    rates = np.linspace(-360, 360, 2001)
     curved = measure_nonlinearity(rates, gyro.scale_over_rate.value(rates))
-    over_rate = float(gyro.scale_over_rate.value(-361.4 * DEG))
+    over_rate = float(gyro.scale_over_rate.value(-361.4))
     taps = design_smoother(STEP, CUTOFF, ORDER)
     before, after = PRINTED["random_walk"]
     cutoff = brentq(lambda f: reduce_white(design_smoother(STEP, f, ORDER), 10) - before / after, 0.05, 4.0)
     return Claims(
-        (float(np.std(gyro.bias.value(sweep))) / DEG, _removed("deviation_at_rest")),
+        (float(np.std(gyro.bias.value(sweep))), _removed("deviation_at_rest")),
         (float(np.std(gyro.scale_over_temperature.value(sweep))) * 300, _removed("deviation_turning")),
         curved,
-        (over_rate / DEG, over_rate * float(gyro.scale_over_temperature.value(zero_Celsius + ROOM)) / DEG),
+        (over_rate, over_rate * float(gyro.scale_over_temperature.value(ROOM))),
         float(before / 60 / np.sqrt(STEP)),
         tuple((rows * STEP, reduce_white(taps, rows)) for rows in (1, 10, 100, 1000)),
         float(cutoff),
@@ -225,7 +223,7 @@ def draw_steps(chain: BellChain, runs: Runs) -> Drawing:
         axes[0].set_ylabel("rate error (°/s)")
         for panel, (title, run) in zip(axes, panels, strict=True):
             over_rate = run is rates
-            x = run.rate / DEG if over_rate else run.temperature - zero_Celsius
+            x = run.rate if over_rate else run.temperature
             label = "applied rate (°/s)" if over_rate else "temperature (°C)"
             result = apply_chain(unfiltered, run.time, run.output, run.temperature, extrapolate=True)
             rows = style.few_rows(len(run.time))
@@ -233,7 +231,7 @@ def draw_steps(chain: BellChain, runs: Runs) -> Drawing:
                 (result.rough, style.ORANGE, "rough"),
                 (result.temperature_compensated, style.BLUE, "compensated"),
             ):
-                error = ((values - run.rate) / DEG)[rows]
+                error = (values - run.rate)[rows]
                 panel.plot(x[rows], error, ".", markersize=1.5, color=colour, label=name, rasterized=True)
             panel.axhline(0, color=style.BLACK, linewidth=0.8)
             panel.set_xlabel(label)
@@ -252,6 +250,6 @@ def _draw_allan(chain: BellChain, rest: BellRun) -> Drawing:
             (result.temperature_compensated, style.BLUE, "compensated"),
             (result.filtered, style.GREEN, f"and filtered, {len(chain.taps)} taps"),
         ):
-            style.draw_allan(axes, allan_deviation(values / DEG * 3600, step), colour, name)
+            style.draw_allan(axes, allan_deviation(values * 3600, step), colour, name)
         axes.axvline(step * len(chain.taps), color=style.BLACK, linewidth=0.8, linestyle=":")
         return made

@@ -16,16 +16,15 @@ from compensation.errors import CompensationError
 from compensation.linearity import measure_nonlinearity
 from compensation.polynomial import fit_polynomial
 
-DEG = np.pi / 180
 NONE = np.zeros((3, 3))
 EVERYWHERE = (-1e9, 1e9)
 PRINTED = BellChain(
     null=-703.3858,
-    scale=0.0242 * DEG,
+    scale=0.0242,
     rough_covariance=np.zeros((2, 2)),
-    bias=PolynomialCurve(np.array([0.1673, -0.0056, 2.52e-5]) * DEG, NONE, 273.15, *EVERYWHERE),
-    scale_over_rate=PolynomialCurve(np.array([-0.12 * DEG, 0.99, 5.89e-6 / DEG]), NONE, 0.0, *EVERYWHERE),
-    scale_over_temperature=PolynomialCurve(np.array([0.9979, -1.83e-5, -1.26e-7]), NONE, 273.15, *EVERYWHERE),
+    bias=PolynomialCurve(np.array([0.1673, -0.0056, 2.52e-5]), NONE, *EVERYWHERE),
+    scale_over_rate=PolynomialCurve(np.array([-0.12, 0.99, 5.89e-6]), NONE, *EVERYWHERE),
+    scale_over_temperature=PolynomialCurve(np.array([0.9979, -1.83e-5, -1.26e-7]), NONE, *EVERYWHERE),
     taps=np.empty(0),
     sampling=0.1,
 )
@@ -37,8 +36,8 @@ def make_runs(generator, noise, rows=4000, dwell=200):
 
     `noise` is the standard deviation (°/s) of the output, brought to counts by the rough scale.
     """
-    sweep = 273.15 + np.linspace(-45, 55, rows)
-    plateaus = np.repeat(np.arange(-360, 361, 40) * DEG, dwell)
+    sweep = np.linspace(-45, 55, rows)
+    plateaus = np.repeat(np.arange(-360.0, 361, 40), dwell)
 
     def run(rate, temperature):
         counts = invert_chain(PRINTED, rate, temperature)
@@ -46,9 +45,9 @@ def make_runs(generator, noise, rows=4000, dwell=200):
         return BellRun(STEP * np.arange(len(rate)), counts, temperature, rate)
 
     return (
-        run(plateaus, np.full(len(plateaus), 298.15)),
+        run(plateaus, np.full(len(plateaus), 25.0)),
         run(np.zeros(rows), sweep),
-        run(np.full(rows, 300 * DEG), sweep),
+        run(np.full(rows, 300.0), sweep),
     )
 
 
@@ -58,7 +57,7 @@ def fit_planted(seed, noise=0.06):
 
 
 def test_inverse_then_chain_is_the_identity():
-    rate, temperature = np.linspace(-6, 6, 50), np.linspace(230, 328, 50)
+    rate, temperature = np.linspace(-340, 340, 50), np.linspace(-43, 55, 50)
     counts = invert_chain(PRINTED, rate, temperature)
     result = apply_chain(PRINTED, np.arange(50.0), counts, temperature)
     np.testing.assert_allclose(result.filtered, rate, rtol=1e-12, atol=1e-14)
@@ -69,14 +68,14 @@ def test_noise_free_records_are_compensated_and_give_the_printed_coefficients():
     chain, (rates, rest, turning) = fit_planted(0, noise=0.0)
     for run in (rates, rest, turning):
         result = apply_chain(chain, run.time, run.output, run.temperature)
-        np.testing.assert_allclose(result.temperature_compensated, run.rate, atol=2e-5 * 360 * DEG)
+        np.testing.assert_allclose(result.temperature_compensated, run.rate, atol=2e-5 * 360)
     share = chain.scale / PRINTED.scale
-    at_25 = PRINTED.scale_over_temperature.value(298.15)
+    at_25 = PRINTED.scale_over_temperature.value(25.0)
     bias = chain.bias.coefficients - share * PRINTED.bias.coefficients
-    np.testing.assert_allclose(bias[1:], 0, atol=1e-9 * DEG)
+    np.testing.assert_allclose(bias[1:], 0, atol=1e-9)
     slope = chain.scale_over_rate.coefficients[1] * share / at_25
     assert slope == pytest.approx(PRINTED.scale_over_rate.coefficients[1], rel=1e-5)
-    assert chain.scale_over_rate.coefficients[2] * share**2 / at_25 == pytest.approx(5.89e-6 / DEG, rel=1e-3)
+    assert chain.scale_over_rate.coefficients[2] * share**2 / at_25 == pytest.approx(5.89e-6, rel=1e-3)
     np.testing.assert_allclose(
         chain.scale_over_temperature.coefficients * at_25, PRINTED.scale_over_temperature.coefficients, rtol=1e-4
     )
@@ -84,11 +83,11 @@ def test_noise_free_records_are_compensated_and_give_the_printed_coefficients():
 
 def test_rough_step_of_two_plateaus_passes_both_means():
     generator = np.random.default_rng(4)
-    rate = np.repeat([0.0, 100 * DEG], 300)
-    counts = invert_chain(PRINTED, rate, np.full(600, 298.15)) + generator.standard_normal(600)
-    null, scale, _ = fit_rough(BellRun(STEP * np.arange(600), counts, np.full(600, 298.15), rate))
+    rate = np.repeat([0.0, 100], 300)
+    counts = invert_chain(PRINTED, rate, np.full(600, 25.0)) + generator.standard_normal(600)
+    null, scale, _ = fit_rough(BellRun(STEP * np.arange(600), counts, np.full(600, 25.0), rate))
     assert null == pytest.approx(np.mean(counts[:300]), rel=1e-10)
-    assert scale == pytest.approx(100 * DEG / (np.mean(counts[300:]) - null), rel=1e-10)
+    assert scale == pytest.approx(100 / (np.mean(counts[300:]) - null), rel=1e-10)
 
 
 @pytest.mark.slow
@@ -125,8 +124,8 @@ def test_intervals_allow_for_a_bias_that_wanders():
     for seed in range(runs):
         generator = np.random.default_rng(seed)
         noise = 0.06 * generator.standard_normal(600) + 0.003 * np.cumsum(generator.standard_normal(600))
-        curve = fit_bias(rest.temperature, rough + DEG * noise)
-        white = fit_polynomial(rest.temperature, rough + DEG * noise, 2).about(273.15)[1]
+        curve = fit_bias(rest.temperature, rough + noise)
+        white = fit_polynomial(rest.temperature, rough + noise, 2).about(0.0)[1]
         off = np.abs(curve.coefficients - truth)
         held += off < 1.96 * np.sqrt(np.diag(curve.covariance))
         naive += off < 1.96 * np.sqrt(np.diag(white))
@@ -153,7 +152,7 @@ def test_held_out_records_are_compensated_to_the_noise():
             getattr(apply_chain(chain, run.time, run.output, run.temperature), step) - run.rate
             for step in ("rough", "temperature_compensated")
         )
-        assert np.std(after) / DEG == pytest.approx(0.06, rel=0.05)
+        assert np.std(after) == pytest.approx(0.06, rel=0.05)
         assert np.sqrt(np.mean(before**2)) > 1.5 * np.sqrt(np.mean(after**2))
 
 
@@ -195,17 +194,17 @@ RATES, REST, TURNING = make_runs(np.random.default_rng(8), 0.06)
         (lambda: design_smoother(0.1, 200.0), "200 Hz is impossible"),
         (lambda: fit_chain(replace(RATES, rate=np.full(3800, 1.0)), REST, TURNING), r"\(33\): 'rate' is constant"),
         (
-            lambda: fit_chain(RATES, replace(REST, temperature=np.full(4000, 300.0)), TURNING),
+            lambda: fit_chain(RATES, replace(REST, temperature=np.full(4000, 27.0)), TURNING),
             r"\(34\): 'temperature' is constant",
         ),
         (lambda: fit_chain(RATES, REST, replace(TURNING, rate=0 * TURNING.rate)), r"\(36\)"),
         (lambda: replace(RATES, output=np.r_[np.nan, RATES.output[1:]]), "'output' has 1 missing"),
         (lambda: replace(RATES, output=RATES.output[1:]), "'output' has shape"),
-        (lambda: apply_chain(fit_planted(1)[0], [0, 1], [0, 0], [200.0, 300.0]), "extrapolation"),
-        (lambda: apply_chain(fit_planted(1)[0], [0, 1], [0, 1e5], [290.0, 300.0]), "rate runs"),
+        (lambda: apply_chain(fit_planted(1)[0], [0, 1], [0, 0], [-73.0, 27.0]), "extrapolation"),
+        (lambda: apply_chain(fit_planted(1)[0], [0, 1], [0, 1e5], [17.0, 27.0]), "rate runs"),
         (lambda: measure_nonlinearity([1, 1, 2], [1, 1, 2]), "three applied rates"),
         (
-            lambda: apply_chain(fit_chain(RATES, REST, TURNING), np.arange(9.0), np.full(9, -703.0), np.full(9, 300.0)),
+            lambda: apply_chain(fit_chain(RATES, REST, TURNING), np.arange(9.0), np.full(9, -703.0), np.full(9, 27.0)),
             "designed for an output every 0.1 s",
         ),
     ],

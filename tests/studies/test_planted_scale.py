@@ -20,7 +20,6 @@ from studies.fits.scale_law import read_law
 from studies.models import compensate, emit_c, read_model
 from studies.models.kinds.scale import load_scale
 from studies.papers.bvg import (
-    DEG,
     bell_chapters,
     examine_claims,
     read_printed_chain,
@@ -40,7 +39,7 @@ def write(path, run, missing=(), stride=STRIDE):
     lines = ["time_s,housing_temperature_degC,output_counts,rate_deg_per_s"]
     for i, row in enumerate(range(0, len(run.time), stride)):
         output = "" if i in missing else f"{run.output[row]:.6f}"
-        lines.append(f"{0.1 * i:.1f},{run.temperature[row] - 273.15:.6f},{output},{run.rate[row] / DEG:.9g}")
+        lines.append(f"{0.1 * i:.1f},{run.temperature[row]:.6f},{output},{run.rate[row]:.9g}")
     path.write_text("\n".join(lines) + "\n")
     return str(path)
 
@@ -66,7 +65,7 @@ def test_planted_chain_is_recovered_in_any_order_of_files(fitted):
     assert set(found["parts"]) == {"rough", "bias", "scale_over_rate", "scale_over_temperature"}
     gyro, parts = read_printed_chain(), found["parts"]
     # The factors of the scale are shared between three steps; their product at 25 °C and their shape are planted.
-    at_25 = float(gyro.scale_over_temperature.value(298.15))
+    at_25 = float(gyro.scale_over_temperature.value(25.0))
     share = parts["rough"]["scale"]["value"] / 0.0242
     assert parts["scale_over_rate"]["c1"]["value"] * share / at_25 == pytest.approx(0.99, abs=2e-4)
     quadratic = parts["scale_over_rate"]["c2"]
@@ -108,7 +107,7 @@ def test_a_rate_table_over_temperature_tells_warming_from_cooling(settled):
         away = np.repeat([*up, *down], 13 * 26) + 0.01 * rng.standard_normal(time.size)
         warming = np.repeat([1.0] * len(up) + [-1.0] * len(down), 13 * 26)
     output = -690 + 40 * rate + 2 * away + 0.01 * away * rate + 3 * warming + 0.5 * rng.standard_normal(time.size)
-    law = read_law([BellRun(time, output, 293.15 + away, rate * DEG)])
+    law = read_law([BellRun(time, output, 20 + away, rate)])
     assert law.chosen.name == "line"
     assert set(law.chosen.over) == {"temperature", "warming"}
     assert not law.structure
@@ -137,7 +136,7 @@ def test_the_saved_model_takes_the_law_that_was_chosen(planted, tmp_path, ask):
     def table(name, rates):
         rate, rows = np.repeat(rates, 200), np.arange(200 * len(rates))
         counts = -690 + 40 * (output_of(rate) + 0.05 * rng.standard_normal(rate.size))
-        run = BellRun(0.1 * rows, counts, np.full(rate.size, 298.15) + 0.01 * np.sin(rows), rate * DEG)
+        run = BellRun(0.1 * rows, counts, np.full(rate.size, 25.0) + 0.01 * np.sin(rows), rate)
         return write(tmp_path / name, run, stride=1), rate
 
     seen, _ = table("seen.csv", np.r_[-300.0, -200:201:50, 300, -20, -8, -4, 4, 8, 20])
@@ -165,10 +164,8 @@ def test_saved_model_is_the_fitted_chain_and_compensates(records, fitted):
     column = compensate(model, data)["compensated_measured_rate_deg_per_s"]
     assert np.mean(column[100:]) == pytest.approx(300, abs=0.1)
     assert np.std(column[100:]) < 0.1
-    again = apply_chain(
-        load_scale(model), data["time_s"], data["output_counts"], data["housing_temperature_degC"] + 273.15
-    )
-    np.testing.assert_allclose(again.filtered / DEG, column, rtol=1e-12)
+    again = apply_chain(load_scale(model), data["time_s"], data["output_counts"], data["housing_temperature_degC"])
+    np.testing.assert_allclose(again.filtered, column, rtol=1e-12)
     with pytest.raises(InputError, match="extrapolate"):
         compensate(model, data.with_columns({"housing_temperature_degC": data["housing_temperature_degC"] + 20}))
 
@@ -182,7 +179,7 @@ def test_the_records_of_the_fit_are_compensated(tmp_path, capsys):
         output = run.output[rows].copy()
         output[777] += 1e6
         lines = [
-            f"{t:.3f},{T - 273.15:.6f},{counts:.6f},{rate / DEG:.9g}"
+            f"{t:.3f},{T:.6f},{counts:.6f},{rate:.9g}"
             for t, T, counts, rate in zip(run.time[rows], run.temperature[rows], output, run.rate[rows], strict=True)
         ]
         records.append(str(tmp_path / f"{name}.csv"))
@@ -306,7 +303,7 @@ def test_long_runs_are_averaged_for_the_fit(monkeypatch):
     monkeypatch.setattr(scale, "MOST_ROWS", 2000)
     thin = [scale._thin(run) for run in (rates, rest, turning)]
     assert all(1900 < len(run.time) <= 2001 for run in thin)
-    assert len(np.unique(np.round(thin[0].rate / DEG, 6))) == 19
+    assert len(np.unique(np.round(thin[0].rate, 6))) == 19
     averaged = fit_chain(*thin, cutoff=None)
     for name in ("bias", "scale_over_rate", "scale_over_temperature"):
         one, other = getattr(whole, name), getattr(averaged, name)
@@ -335,7 +332,7 @@ def test_fewer_records_tell_less(records, files, tmp_path, ask, refuse):
     assert found["undetermined"] == [what for what, file in lacking if file not in files]
     whole = read_printed_chain()
     share = found["parts"]["rough"]["scale"]["value"] / 0.0242
-    at_25 = float(whole.scale_over_temperature.value(298.15))
+    at_25 = float(whole.scale_over_temperature.value(25.0))
     c1 = found["parts"]["scale_over_rate"]["c1"]["value"] * share
     assert c1 == pytest.approx(0.99 * at_25, rel=5e-3)
     assert found["parts"]["bias"]["c2"]["value"] == 0.0 or 1 in files
@@ -349,12 +346,12 @@ def test_a_rate_table_over_temperature_is_enough(tmp_path, ask):
     """Nineteen rates again and again while the chamber warms: every step from the one record, as the planted chain."""
     chain, rng = read_printed_chain(), np.random.default_rng(8)
     time = 0.1 * np.arange(60_000)
-    rate = np.repeat(np.tile(np.linspace(-270.0, 270.0, 19), 32), 99)[: time.size] * DEG
+    rate = np.repeat(np.tile(np.linspace(-270.0, 270.0, 19), 32), 99)[: time.size]
     rate = np.pad(rate, (0, time.size - rate.size), "edge")
-    T = 273.15 - 20 + 60 * time / time[-1]
+    T = -20 + 60 * time / time[-1]
     output = invert_chain(replace(chain, taps=np.empty(0)), rate, T) + 0.2 * rng.standard_normal(time.size)
     path = tmp_path / "table.csv"
-    rows = zip(time, T - 273.15, output, rate / DEG, strict=True)
+    rows = zip(time, T, output, rate, strict=True)
     head = "time_s,housing_temperature_degC,output_counts,rate_deg_per_s\n"
     path.write_text(head + "".join(f"{t:.1f},{c:.6f},{a:.6f},{r:.9g}\n" for t, c, a, r in rows))
     found = ask(["fit", "scale", str(path)])
@@ -420,7 +417,7 @@ def test_the_saved_model_tells_warming_from_cooling(tmp_path, ask):
             + warming * (8 + 0.02 * rate)
             + rng.standard_normal(time.size)
         )
-        return write(tmp_path / name, BellRun(time, output, 293.15 + away, rate * DEG), stride=1), rate, away
+        return write(tmp_path / name, BellRun(time, output, 20 + away, rate), stride=1), rate, away
 
     seen, unseen = table("seen.csv", 1, 1), table("unseen.csv", 2, 2)
     model, out = tmp_path / "m.toml", tmp_path / "out.csv"
@@ -442,6 +439,6 @@ def test_a_filter_leaves_out_what_a_dead_band_hides():
 
 @pytest.mark.parametrize(("form", "s"), [("cubic", -1e-7), ("sine", 400.0), ("dead band", 1.5), ("directions", 4e-3)])
 def test_limits_the_inverse_of_a_law_gives_its_rate_back(form, s):
-    curve = RateCurve(np.array([0.3, 1.02, s]), np.zeros((3, 3)), 0.0, -300.0, 300.0, form)
+    curve = RateCurve(np.array([0.3, 1.02, s]), np.zeros((3, 3)), -300.0, 300.0, form)
     rate = np.array([-250.0, -20.0, 10.0, 299.0])
     np.testing.assert_allclose(curve.value(curve.inverse(rate)), rate, rtol=1e-12)

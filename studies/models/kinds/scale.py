@@ -8,7 +8,6 @@ output is first rid of what differs while the temperature rises and falls. Range
 length, because readings scatter; outliers, which the fit leaves out, are not judged.
 """
 
-import math
 from collections.abc import Sequence
 from dataclasses import astuple
 from typing import TYPE_CHECKING
@@ -16,26 +15,24 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from compensation.arrays import Array
-from shell.constants import zero_Celsius
 from studies.errors import InputError
 from studies.models.c_source import head, polynomial, write_c
 from studies.models.file import Model, ModelPart, ModelSource, Setting, make_part, widen
 from studies.record import COMPENSATED, Record
-from studies.record.rest import celsius_range, drop_spikes
+from studies.record.rest import drop_spikes
 
 if TYPE_CHECKING:
     from compensation.bell import BellChain, PolynomialCurve
 
-DEG = math.radians(1.0)
 RAW = ("output_counts", "measured_rate_deg_per_s")
 """Columns that can be the raw output; the first needs the rough scale, the second is a rate already."""
 RATE = "measured_rate_deg_per_s"
 FORM, BLIND, WARMING = "rate_form", "blind_deg_per_s", "warming"
-C_FORMS = {  # a rate law's own coefficient: its unit, the power of an angle in it; and Ω over u = (y − a)/k in C
-    "directions": ("1", 0.0, "u / (u < 0.0 ? 1.0 : 1.0 + {s} / {k})"),
-    "cubic": ("s^2/deg^2", -2.0, "2.0 * {t} * ({s} > 0.0 ? sinh(asinh({w}) / 3.0) : sin(asin(fmax(-1.0, fmin(1.0, {w}))) / 3.0))"),
-    "sine": ("deg/s", 1.0, "{s} * asin(fmax(-1.0, fmin(1.0, u / {s})))"),
-    "dead band": ("deg/s", 1.0, "fabs(u) < {blind} ? NAN : u + copysign({s}, u)"),
+C_FORMS = {  # a rate law's own coefficient: its unit; and Ω over u = (y − a)/k in C
+    "directions": ("1", "u / (u < 0.0 ? 1.0 : 1.0 + {s} / {k})"),
+    "cubic": ("s^2/deg^2", "2.0 * {t} * ({s} > 0.0 ? sinh(asinh({w}) / 3.0) : sin(asin(fmax(-1.0, fmin(1.0, {w}))) / 3.0))"),
+    "sine": ("deg/s", "{s} * asin(fmax(-1.0, fmin(1.0, u / {s})))"),
+    "dead band": ("deg/s", "fabs(u) < {blind} ? NAN : u + copysign({s}, u)"),
 }  # fmt: skip
 
 
@@ -46,22 +43,20 @@ def save_scale(
     from compensation.rate_law import RateCurve
 
     raw = "counts" if output == "output_counts" else "deg/s"
-    covariance = np.diag([1.0, 1 / DEG]) @ chain.rough_covariance @ np.diag([1.0, 1 / DEG])
-    rough = make_part(
-        "rough", ("null", "scale"), (chain.null, chain.scale / DEG), (raw, f"deg/s per {raw}"), covariance
-    )
+    units = raw, f"deg/s per {raw}"
+    rough = make_part("rough", ("null", "scale"), (chain.null, chain.scale), units, chain.rough_covariance)
     over_temperature = ("1/degC", "1/degC^2")
     curve = chain.scale_over_rate
-    law: dict[str, Setting] = {FORM: curve.form, BLIND: curve.blind / DEG} if isinstance(curve, RateCurve) else {}
+    law: dict[str, Setting] = {FORM: curve.form, BLIND: curve.blind} if isinstance(curve, RateCurve) else {}
     law |= {WARMING: astuple(chain.warming)} if chain.warming else {}
     return Model(
         kind="scale",
         compensates=output,
         parts=(
             rough,
-            _save_curve("bias", chain.bias, 1.0, 0.0, ("deg/s", "deg/s/degC", "deg/s/degC^2")),
-            _save_curve("scale_over_rate", curve, 1.0, 1.0, ("deg/s", "1", "s/deg")),
-            _save_curve("scale_over_temperature", chain.scale_over_temperature, 0.0, 0.0, ("1", *over_temperature)),
+            _save_curve("bias", chain.bias, ("deg/s", "deg/s/degC", "deg/s/degC^2")),
+            _save_curve("scale_over_rate", curve, ("deg/s", "1", "s/deg")),
+            _save_curve("scale_over_temperature", chain.scale_over_temperature, ("1", *over_temperature)),
         ),
         settings={
             "temperature_column": temperature_column,
@@ -71,12 +66,10 @@ def save_scale(
         },
         validity={
             temperature_column: widen(
-                *celsius_range(
-                    max(chain.bias.lowest, chain.scale_over_temperature.lowest),
-                    min(chain.bias.highest, chain.scale_over_temperature.highest),
-                )
+                max(chain.bias.lowest, chain.scale_over_temperature.lowest),
+                min(chain.bias.highest, chain.scale_over_temperature.highest),
             ),
-            RATE: widen(chain.scale_over_rate.lowest / DEG, chain.scale_over_rate.highest / DEG),
+            RATE: widen(curve.lowest, curve.highest),
         },
         sources=sources,
         made_by=made_by,
@@ -93,8 +86,7 @@ def load_scale(model: Model) -> "BellChain":
             raise InputError(f"{model.where} [[part]] rough: the coefficient '{name}' is missing.")
     if rough["scale"] == 0:
         raise InputError(f"{model.where}: [[part]] rough: scale is 0, so the output has no effect; correct it.")
-    low, high = (value + zero_Celsius for value in model.range_of(column))
-    slow, fast = (value * DEG for value in model.range_of(RATE))
+    range_ = model.range_of(column)
     taps = model.settings.get("fir_taps", ())
     if isinstance(taps, str | float):
         raise InputError(f"{model.where} [settings]: fir_taps must be a list of numbers, [] for no filter.")
@@ -103,14 +95,13 @@ def load_scale(model: Model) -> "BellChain":
         warming and not (len(warming) == 4 and abs(warming[2]) < 1 and warming[3] > 0)
     ):
         raise InputError(f"{model.where} [settings]: {WARMING} must be a, b, g and turn, |g| below 1 and turn above 0.")
-    errors = np.array(rough.covariance) if rough.covariance else np.zeros((2, 2))
     return BellChain(
         null=rough["null"],
-        scale=rough["scale"] * DEG,
-        rough_covariance=np.diag([1.0, DEG]) @ errors @ np.diag([1.0, DEG]),
-        bias=_load_curve(model, "bias", 1.0, 0.0, zero_Celsius, (low, high)),
-        scale_over_rate=_load_curve(model, "scale_over_rate", 1.0, 1.0, 0.0, (slow, fast)),
-        scale_over_temperature=_load_curve(model, "scale_over_temperature", 0.0, 0.0, zero_Celsius, (low, high)),
+        scale=rough["scale"],
+        rough_covariance=np.array(rough.covariance) if rough.covariance else np.zeros((2, 2)),
+        bias=_load_curve(model, "bias", range_),
+        scale_over_rate=_load_curve(model, "scale_over_rate", model.range_of(RATE)),
+        scale_over_temperature=_load_curve(model, "scale_over_temperature", range_),
         taps=np.array(taps, dtype=float),
         sampling=model.number("sampling_s", least=0),
         warming=Warming(*warming) if warming else None,
@@ -139,11 +130,11 @@ def compensate(model: Model, record: Record, *, extrapolate: bool) -> dict[str, 
         chain,
         record["time_s"][complete],
         record[output][complete],
-        record[column][complete] + zero_Celsius,
+        record[column][complete],
         extrapolate=True,
     )
-    model.check_range(RATE, result.bias_compensated[judged[complete]] / DEG, extrapolate)
-    compensated[complete] = result.filtered / DEG
+    model.check_range(RATE, result.bias_compensated[judged[complete]], extrapolate)
+    compensated[complete] = result.filtered
     return {f"{COMPENSATED}{RATE}": compensated}
 
 
@@ -170,45 +161,34 @@ def emit_c(model: Model) -> str:
     return f"{head(model)}\n{code}"
 
 
-def _save_curve(name: str, curve: "PolynomialCurve", y: float, x: float, units: Sequence[str]) -> ModelPart:
-    """A curve in degrees: y and x are the powers of an angle in its value and its variable."""
+def _save_curve(name: str, curve: "PolynomialCurve", units: Sequence[str]) -> ModelPart:
     from compensation.rate_law import FORMS, RateCurve
 
-    power = x * np.arange(len(curve.coefficients)) - y
-    names = [f"c{i}" for i in range(len(power))]
+    names = [f"c{i}" for i in range(len(curve.coefficients))]
     if isinstance(curve, RateCurve):
-        unit, own, _ = C_FORMS[curve.form]
-        names, units, power = ["a", "k", *FORMS[curve.form].own], ("deg/s", "1", unit), -np.array([1.0, 0.0, own])
-    size = DEG**power
-    more = [f"{units[-1]} per power" for _ in power[3:]]
-    covariance = size[:, None] * curve.covariance * size
-    return make_part(name, names, size * curve.coefficients, [*units, *more][: len(power)], covariance)
+        names, units = ["a", "k", *FORMS[curve.form].own], ("deg/s", "1", C_FORMS[curve.form][0])
+    more = [f"{units[-1]} per power" for _ in names[3:]]
+    return make_part(name, names, curve.coefficients, [*units, *more][: len(names)], curve.covariance)
 
 
-def _load_curve(
-    model: Model, name: str, y: float, x: float, reference: float, limits: tuple[float, float]
-) -> "PolynomialCurve":
+def _load_curve(model: Model, name: str, limits: tuple[float, float]) -> "PolynomialCurve":
     from compensation.bell import PolynomialCurve
     from compensation.rate_law import FORMS, RateCurve
 
     part, form = model.part(name), str(model.settings.get(FORM, "")) if name == "scale_over_rate" else ""
-    power = y - x * np.arange(len(part.values))
     if not form:
         model.check_names(part, "c")
-    elif form in C_FORMS and part.names == ("a", "k", *FORMS[form].own) and part["k"] > 0:
-        power = np.array([1.0, 0.0, C_FORMS[form][1]])
-    else:
+    elif not (form in C_FORMS and part.names == ("a", "k", *FORMS[form].own) and part["k"] > 0):
         laws = "; ".join(f"{one}: a, k, {FORMS[one].own[0]}" for one in C_FORMS)
         raise InputError(f"{model.where}: {FORM} and the coefficients of {name} must be one of {laws}; k above 0.")
-    size = DEG**power
     covariance = np.array(part.covariance) if part.covariance else np.zeros((len(part.values),) * 2)
-    found = size * np.array(part.values), size[:, None] * covariance * size, reference, *limits
-    return RateCurve(*found, form, model.number(BLIND, least=0) * DEG) if form else PolynomialCurve(*found)
+    found = np.array(part.values), covariance, *limits
+    return RateCurve(*found, form, model.number(BLIND, least=0)) if form else PolynomialCurve(*found)
 
 
 def _emit_law(model: Model) -> str:
     form, (a, k, s) = str(model.settings[FORM]), model.part("scale_over_rate").values
-    t = math.sqrt(k / (3 * max(abs(s), 1e-30)))
+    t = (k / (3 * max(abs(s), 1e-30))) ** 0.5
     told = C_FORMS[form][-1].format(k=k, s=f"({s!r})", t=t, w=f"1.5 * u / {t!r}", blind=model.number(BLIND))
     return f"""/* Law over rate: {form}; NAN where the output does not tell the rate. */
 static double hrg_scale_over_rate(double rate) {{
