@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from compensation.arrays import Array
-from compensation.constants import zero_Celsius
 from compensation.errors import CompensationError
 from compensation.noise_regression import correlated_covariance
 from compensation.regression import fit_linear, refuse_constant_columns
@@ -40,25 +39,24 @@ class CrossDampingModel:
 
     coefficients: Array  # array (n + 1,), ζᵢ (K⁻ⁱ), constant first
     covariance: Array  # array (n + 1, n + 1), covariance of the coefficients
-    calibration_temperature: float  # temperature (K) from which T is counted
+    calibration_temperature: float  # temperature (°C) from which T is counted
     k: float  # k, zeta, g2: natural frequency (rad/s), relative damping (1) and Coriolis coefficient (1) of eq. (9)
     zeta: float
     g2: float
-    lowest: float  # lowest, highest: temperatures (K) between which it was fitted
+    lowest: float  # lowest, highest: temperatures (°C) between which it was fitted
     highest: float
     noise: float  # standard deviation (rad/s) of what the fit left
 
     def cross_damping(self, temperature: ArrayLike) -> Array:
-        """Return ζ₁₂ (1) at a temperature (K): eq. (10)."""
+        """Return ζ₁₂ (1) at a temperature (°C): eq. (10)."""
         return evaluate_cross_damping(self.coefficients, np.asarray(temperature) - self.calibration_temperature)
 
     def predict(self, time: ArrayLike, temperature: ArrayLike, *, extrapolate: bool = False) -> Array:
         """Return the erroneous rate (rad/s) over time: ζ₁₂(T(t)) through the filter (9), settled at the start."""
         t, T = read_columns(time=time, temperature=temperature)
-        low, high, lowest, highest = (x - zero_Celsius for x in (T.min(), T.max(), self.lowest, self.highest))
-        if not extrapolate and (low < lowest or high > highest):
+        if not extrapolate and (T.min() < self.lowest or T.max() > self.highest):
             raise CompensationError(
-                f"the temperature runs from {low:.2f} to {high:.2f} °C, but the model was fitted between {lowest:.2f} and {highest:.2f} °C; allow extrapolation or fit a wider record."
+                f"the temperature runs from {T.min():.2f} to {T.max():.2f} °C, but the model was fitted between {self.lowest:.2f} and {self.highest:.2f} °C; allow extrapolation or fit a wider record."
             )
         return simulate_bias(t, self.cross_damping(T), self.k, self.zeta, self.g2)
 
@@ -83,7 +81,7 @@ def simulate_bias(time: ArrayLike, cross_damping: ArrayLike, k: float, zeta: flo
 
 @dataclass(frozen=True)
 class RestRun:
-    """One run of a gyro at rest: time (s), output (rad/s), temperature (K); arrays (N,)."""
+    """One run of a gyro at rest: time (s), output (rad/s), temperature (°C); arrays (N,)."""
 
     time: Array
     rate: Array
@@ -95,7 +93,7 @@ class RestRun:
 
 
 def fit_cross_damping(
-    runs: Sequence[RestRun], *, k: float, zeta: float, g2: float = 2.0, calibration_temperature: float = 293.15,
+    runs: Sequence[RestRun], *, k: float, zeta: float, g2: float = 2.0, calibration_temperature: float = 20.0,
     order: int = 3,
 ) -> CrossDampingModel:  # fmt: skip
     """Fit ζ₁₂(T) to a gyro at rest, eq. (10) through eq. (9): columns Tⁱ after the filter, errors that wander (see `correlated`)."""

@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 
 from compensation.improvement import Change
-from shell.constants import zero_Celsius
 from studies.cli.arguments import Records, SaveModel
 from studies.cli.output import answers, keep_model, say
 from studies.errors import InputError, naming
@@ -69,10 +68,11 @@ def fit_cross_damping(
     if not abs(calibration_temperature) <= 1000:
         raise InputError(f"--calibration-temperature {calibration_temperature:g} °C: no gyro has this temperature; give one within the record, in °C.")  # fmt: skip
     gathered = gather_rest(records, OUTPUTS)
-    T = calibration_temperature + zero_Celsius
     with naming(", ".join(data)):
         k, zeta = 2 * math.pi * carrier, 1 / (2 * quality)
-        study = study_cross_damping(gathered.runs, k=k, zeta=zeta, calibration_temperature=T, order=order)
+        study = study_cross_damping(
+            gathered.runs, k=k, zeta=zeta, calibration_temperature=calibration_temperature, order=order
+        )
     sources, made_by = tuple(map(source_of, records)), "hrg-workbench, hrg fit cross-damping"
     model = save_cross_damping(study.model, gathered.output, gathered.temperature_column, sources, made_by)
     keep_model(model, save)
@@ -128,10 +128,9 @@ def _draw_curve(study: CrossDampingStudy) -> Drawing:
     size = model.coefficients[0]
     spread = 1.645 * np.sqrt(np.einsum("ni,ij,nj->n", powers, model.covariance, powers)) / abs(size)
     middle = powers @ model.coefficients / size
-    degrees = T - zero_Celsius
     with style.figure(height=3.0, x="temperature (°C)", y="ζ₁₂ / ζ₀") as (made, axes):
-        axes.fill_between(degrees, middle - spread, middle + spread, color=style.SKY, alpha=0.4, label="90 % band")
-        axes.plot(degrees, middle, label="fitted")
+        axes.fill_between(T, middle - spread, middle + spread, color=style.SKY, alpha=0.4, label="90 % band")
+        axes.plot(T, middle, label="fitted")
         return made
 
 
@@ -143,7 +142,7 @@ def _summarise(study: CrossDampingStudy, data: RestData) -> dict[str, Any]:
         **row_of(data, "output", temperature="temperature_column", rows_left_out="left_out"),
         "frequency_Hz": model.k / (2 * math.pi),
         "quality": 1 / (2 * model.zeta),
-        "calibration_temperature_degC": round(model.calibration_temperature - zero_Celsius, 9),
+        "calibration_temperature_degC": model.calibration_temperature,
         "coefficients": model.coefficients,
         "standard_errors": np.sqrt(np.diag(model.covariance)),
         **{name: _change(one.rows, unit) for name, one in judged.items()},

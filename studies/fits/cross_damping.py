@@ -35,7 +35,7 @@ class CrossDampingStudy:
 
 
 def study_cross_damping(
-    runs: Sequence[RestRun], *, k: float, zeta: float, calibration_temperature: float = 293.15, order: int = 3
+    runs: Sequence[RestRun], *, k: float, zeta: float, calibration_temperature: float = 20.0, order: int = 3
 ) -> CrossDampingStudy:
     """Fit ζ₁₂(T) and judge it; parameters as for `compensation.cross_damping.fit_cross_damping`."""
 

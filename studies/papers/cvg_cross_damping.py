@@ -16,13 +16,12 @@ from compensation.cross_damping import (
 from compensation.decimation import average_blocks
 from compensation.improvement import AVERAGING, Change, compare_outputs
 from compensation.transfer import TransferFunction
-from shell.constants import zero_Celsius
 from studies.fits.cross_damping import CrossDampingStudy, study_cross_damping
 from studies.reports import style
 from studies.results import Chapter, Drawing, Figure, Sentence, Table
 
 DEG_PER_H = np.pi / 180 / 3600
-CALIBRATION = 293.15
+CALIBRATION = 20.0
 FREQUENCY, QUALITY = 5000.0, 10_000.0  # a metal cylinder of a few centimetres (Hz, 1): assumed
 K, ZETA = 2 * np.pi * FREQUENCY, 1 / (2 * QUALITY)
 BIAS_AT_CALIBRATION = 40.0  # scale that the printed shape is given (°/h): assumed; over −40…60 °C it makes 4…290 °/h
@@ -44,15 +43,15 @@ def read_shape() -> Array:
 
 
 def make_profile(soak_h: float = 1.0) -> tuple[Array, Array]:
-    """Return times (s) and chamber temperatures (K) of a usual cycle 20 → 60 → −40 → 20 °C at 1 K/min with soaks; figure 1 is a picture only."""
-    corners_degC = [20.0, 60.0, -40.0, 20.0]
-    time, temperature = [0.0], [corners_degC[0]]
-    for corner in corners_degC:
+    """Return times (s) and chamber temperatures (°C) of a usual cycle 20 → 60 → −40 → 20 °C at 1 K/min with soaks; figure 1 is a picture only."""
+    corners = [20.0, 60.0, -40.0, 20.0]
+    time, temperature = [0.0], [corners[0]]
+    for corner in corners:
         ramp = abs(corner - temperature[-1]) * 60
         time += [time[-1] + ramp, time[-1] + ramp + soak_h * 3600]
         temperature += [corner, corner]
     at = np.arange(0.0, time[-1], STEP)
-    return at, np.interp(at, time, temperature) + zero_Celsius
+    return at, np.interp(at, time, temperature)
 
 
 def simulate_rest(
@@ -161,7 +160,7 @@ def draw_runs(runs: tuple[RestRun, ...], model: CrossDampingModel, unit: float, 
             means = blocks.columns
             hours = (blocks.time - run.time[0]) / 3600 + begin
             begin = hours[-1]
-            upper.plot(hours, means["T"] - zero_Celsius, color=style.VERMILION)
+            upper.plot(hours, means["T"], color=style.VERMILION)
             for when, colour in (("before", style.ORANGE), ("after", style.BLUE)):
                 label = None if i else {"before": "uncompensated", "after": "compensated"}[when]
                 lower.plot(hours, means[when] / unit, color=colour, linewidth=0.9, label=label)

@@ -12,7 +12,6 @@ from compensation.cross_damping import RestRun
 from compensation.decimation import average_blocks
 from compensation.memory import follow_lag
 from compensation.spikes import find_spikes
-from shell.constants import zero_Celsius
 from studies.errors import InputError
 from studies.record import Record
 
@@ -54,16 +53,6 @@ def drop_spikes(keep: NDArray[np.bool_], *columns: Array) -> NDArray[np.bool_]:
     return cleaned
 
 
-def celsius_range(lowest: float, highest: float) -> tuple[float, float]:
-    """Return a fitted range (K) in °C so that the readings at its ends lie inside, whatever rounding kelvin brought."""
-    ends = []
-    for kelvin, outward in ((lowest, -1.0), (highest, 1.0)):
-        exact = kelvin - zero_Celsius
-        short = round(exact, 9)
-        ends.append(short if abs(short - exact) < 1e-11 else exact + outward * 1e-9)
-    return ends[0], ends[1]
-
-
 def choose_column(records: Sequence[Record], candidates: Sequence[str], purpose: str) -> str:
     """Return the first candidate that every record has."""
     for name in candidates:
@@ -100,7 +89,7 @@ def gather_rest(records: Sequence[Record], outputs: dict[str, float]) -> RestDat
             blocks = average_blocks(time, {"output": values, "temperature": temperature}, width)
             time, values, temperature = blocks.time, blocks.columns["output"], blocks.columns["temperature"]
             widest = max(widest, width)
-        runs.append(RestRun(time, values * outputs[output], temperature + zero_Celsius))
+        runs.append(RestRun(time, values * outputs[output], temperature))
     return RestData(tuple(runs), output, column, left_out, widest)
 
 

@@ -10,12 +10,10 @@ import numpy as np
 
 from compensation.arrays import Array
 from compensation.cross_damping import CrossDampingModel
-from shell.constants import zero_Celsius
 from studies.errors import InputError
 from studies.models.c_source import head, polynomial, self_test, write_c
 from studies.models.file import Model, ModelPart, ModelSource, make_part, widen
 from studies.record import COMPENSATED, Record
-from studies.record.rest import celsius_range
 
 OUTPUTS = {"bias_deg_per_h": math.radians(1 / 3600), "measured_rate_deg_per_s": math.radians(1.0)}
 """Columns that a cross-damping model can compensate, with the size of their unit in rad/s."""
@@ -33,13 +31,13 @@ def save_cross_damping(
         compensates=output,
         parts=(make_part("cross-damping", names, fit.coefficients, units, fit.covariance),),
         settings={
-            "calibration_temperature_degC": fit.calibration_temperature - zero_Celsius,
+            "calibration_temperature_degC": fit.calibration_temperature,
             "frequency_Hz": fit.k / (2 * math.pi),
             "relative_damping": fit.zeta,
             "g2": fit.g2,
             "temperature_column": temperature_column,
         },
-        validity={temperature_column: widen(*celsius_range(fit.lowest, fit.highest))},
+        validity={temperature_column: widen(fit.lowest, fit.highest)},
         sources=sources,
         made_by=made_by,
     )
@@ -48,16 +46,16 @@ def save_cross_damping(
 def load_cross_damping(model: Model) -> CrossDampingModel:
     """Return the fit that a model file holds."""
     part = _part(model)
-    low, high = model.range_of(model.temperature_column)
+    lowest, highest = model.range_of(model.temperature_column)
     return CrossDampingModel(
         coefficients=np.array(part.values),
         covariance=np.array(part.covariance) if part.covariance else np.full((len(part.values),) * 2, np.nan),
-        calibration_temperature=model.number("calibration_temperature_degC") + zero_Celsius,
+        calibration_temperature=model.number("calibration_temperature_degC"),
         k=2 * math.pi * model.number("frequency_Hz", above=0),
         zeta=model.number("relative_damping", above=0),
         g2=model.number("g2", above=0),
-        lowest=low + zero_Celsius,
-        highest=high + zero_Celsius,
+        lowest=lowest,
+        highest=highest,
         noise=math.nan,
     )
 
@@ -71,9 +69,7 @@ def compensate(model: Model, record: Record, *, extrapolate: bool) -> dict[str, 
     known = np.isfinite(temperature)
     if np.count_nonzero(known) < 2:
         raise InputError(f"the column '{column}' has fewer than two values; nothing can be compensated.")
-    predicted = load_cross_damping(model).predict(
-        record["time_s"][known], temperature[known] + zero_Celsius, extrapolate=True
-    )
+    predicted = load_cross_damping(model).predict(record["time_s"][known], temperature[known], extrapolate=True)
     compensated = np.full(len(record), np.nan)
     compensated[known] = record[output][known] - predicted / OUTPUTS[output]
     return {f"{COMPENSATED}{output}": compensated}
@@ -106,7 +102,7 @@ def _test_rows(model: Model) -> list[tuple[float, ...]]:
     steps = np.array([0.0, *np.resize([1.0, 2.0, 4.0, 2.0, 0.5], 23)])
     temperature = np.round((low + high) / 2 + 0.45 * (high - low) * np.sin(0.5 * np.arange(24)), 9)
     fit = load_cross_damping(model)
-    error = fit.predict(np.cumsum(steps), temperature + zero_Celsius, extrapolate=True) / OUTPUTS[model.compensates]
+    error = fit.predict(np.cumsum(steps), temperature, extrapolate=True) / OUTPUTS[model.compensates]
     return list(zip(steps.tolist(), temperature.tolist(), error.tolist(), strict=True))
 
 
