@@ -113,7 +113,7 @@ def prepare_run(
 ) -> BiasRun:  # fmt: skip
     """Decimate one run to blocks of a width (s), and add the rate over a window (s), `causal` (lag window/2) or not, behind `memory`."""
     blocks = average_run(time, state, bias, width, variable)
-    lagged = follow_lag(blocks.time, blocks.columns[variable.name], memory.lag)
+    lagged = follow_lag(blocks.columns[variable.name], np.diff(blocks.time), memory.lag)
     return rate_run(blocks, lagged, window, causal=causal, variable=variable, memory=memory)
 
 

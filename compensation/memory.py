@@ -5,12 +5,15 @@ than w, yₖ = min(max(yₖ₋₁, xₖ − w), xₖ + w); the elementary hyster
 first value at the start.
 """
 
+import itertools
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from compensation.arrays import Array
-from compensation.transfer import TransferFunction
+from compensation.transfer import recur
 
 
 @dataclass(frozen=True)
@@ -24,20 +27,32 @@ class Memory:
 NO_MEMORY = Memory()
 
 
-def follow_lag(time: Array, values: Array, lag: float) -> Array:
-    """Return the values (m,) behind a first-order lag (s), settled at the start."""
-    if lag == 0 or values.size < 2:
+def follow_lag(values: Array, step: ArrayLike, lag: float, start: float | None = None) -> Array:
+    """Return the values (N,) or (N, m) behind a first-order lag (s), settled at first or from `start`; `step` (s) is one or (N − 1,)."""
+    if lag == 0:
         return values
-    return np.asarray(TransferFunction((1.0,), (lag, 1.0)).simulate(time, values, settled=True))
+    ratio = np.maximum(np.asarray(step) / lag, 1e-12)
+    decay = np.exp(-ratio)
+    ramp = -np.expm1(-ratio) / ratio
+    first = values[:1] if start is None else np.full_like(values[:1], start)
+    return recur(decay, np.concatenate([first, ((1 - ramp) * values[1:].T + (ramp - decay) * values[:-1].T).T]))
 
 
-def follow_play(values: Array, width: float) -> Array:
-    """Return the backlash of half-width `width` that follows the values (m,)."""
-    if width == 0:
-        return values
-    followed = np.empty_like(values)
-    last = float(values[0])
-    for k, x in enumerate(values.tolist()):
-        last = min(max(last, x - width), x + width)
-        followed[k] = last
-    return followed
+def follow_play(values: Array, radius: float | Sequence[float], start: float = 0.0) -> Array:
+    """Return the play of one half-width, or of several, (N, R), that follows the values (N,).
+
+    p_k = min(u_k + r, max(u_k − r, p_{k−1})), with p_0 = u_0 + start · r: each rising or falling branch is done at once.
+    """
+    radii = np.atleast_1d(np.asarray(radius, dtype=float))
+    out = np.empty((values.size, radii.size))
+    state = values[0] + start * radii
+    rising = np.diff(values) >= 0.0
+    turns = np.flatnonzero(rising[1:] != rising[:-1]) + 1
+    out[0] = state
+    for begin, end in itertools.pairwise([0, *turns.tolist(), rising.size]):
+        if end > begin:
+            branch = values[begin + 1 : end + 1, None]
+            up = bool(rising[begin])
+            out[begin + 1 : end + 1] = np.maximum(branch - radii, state) if up else np.minimum(branch + radii, state)
+            state = out[end]
+    return out[:, 0] if np.ndim(radius) == 0 else out

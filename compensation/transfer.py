@@ -180,12 +180,12 @@ def _march(A: Complex, B: Complex, t: NDArray[np.float64], u: NDArray[Any], x0: 
     return x
 
 
-def recur(pole: complex, forced: ArrayLike) -> NDArray[Any]:
-    """Return y_k = pole · y_{k−1} + forced_k from rest, along the first axis of one column or of several."""
+def recur(pole: ArrayLike, forced: ArrayLike) -> NDArray[Any]:
+    """Return y_k = pole · y_{k−1} + forced_k from rest, along the first axis of one column or of several; one pole, or one a step."""
     forced = np.asarray(forced)
     is_complex = np.iscomplexobj(pole) or np.iscomplexobj(forced)
     columns = forced.astype(complex if is_complex else float).reshape(len(forced), -1)
     band = np.ones((2, len(columns)), order="F", dtype=columns.dtype)
-    band[1] = -pole
+    band[1, :-1] = -np.asarray(pole)
     solve = scipy.linalg.lapack.ztbtrs if is_complex else scipy.linalg.lapack.dtbtrs
     return np.asarray(solve(band, columns, uplo="L", diag="U")[0]).reshape(forced.shape)

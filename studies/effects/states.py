@@ -1,13 +1,12 @@
 """What one run goes through on an even time grid, and the operators with memory that act on it."""
 
-import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from compensation.arrays import Array
-from compensation.transfer import recur
+from compensation.memory import follow_lag, follow_play
 
 FloatArray = Array
 
@@ -72,35 +71,7 @@ def remembered(runs: Sequence[States]) -> list[FloatArray]:
     return out
 
 
-def lag(drive: FloatArray, step: float, tau: float, start: float | None = None) -> FloatArray:
-    """Return the response of a first-order lag, τ y′ = u − y, to drives (N,) or (N, m) linear between samples; settled at first, or from a value."""
-    ratio = step / tau
-    decay = np.exp(-ratio)
-    ramp = -np.expm1(-ratio) / ratio if ratio > 1e-12 else 1.0
-    ahead, behind = 1.0 - ramp, ramp - decay
-    first = drive[:1] if start is None else np.full_like(drive[:1], start)
-    return recur(decay, np.concatenate([first, ahead * drive[1:] + behind * drive[:-1]]))
-
-
-def play(drive: FloatArray, radius: float | Sequence[float], start: float = 0.0) -> FloatArray:
-    """Return the play (backlash) operator, the elementary rate-independent hysteresis, of one half width or of several, (N, R).
-
-    p_k = min(u_k + r, max(u_k − r, p_{k−1})), with p_0 = u_0 + start · r: each rising or falling branch is done at once.
-    """
-    radii = np.atleast_1d(np.asarray(radius, dtype=float))
-    out = np.empty((drive.size, radii.size))
-    state = drive[0] + start * radii
-    rising = np.diff(drive) >= 0.0
-    turns = np.flatnonzero(rising[1:] != rising[:-1]) + 1
-    out[0] = state
-    for begin, end in itertools.pairwise([0, *turns.tolist(), rising.size]):
-        if end > begin:
-            branch = drive[begin + 1 : end + 1, None]
-            up = bool(rising[begin])
-            out[begin + 1 : end + 1] = np.maximum(branch - radii, state) if up else np.minimum(branch + radii, state)
-            state = out[end]
-    return out[:, 0] if np.ndim(radius) == 0 else out
-
+lag, play = follow_lag, follow_play
 
 ORDERS = 12  # a knee of a tenth of the range is followed, fringes of a sixth of it are not
 

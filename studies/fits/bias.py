@@ -88,7 +88,7 @@ def study_bias(
 
     @cache
     def lagged(lag: float) -> list[Array]:
-        return [follow_lag(blocks.time, blocks.columns[variable.name], lag) for blocks in averaged]
+        return [follow_lag(blocks.columns[variable.name], np.diff(blocks.time), lag) for blocks in averaged]
 
     def prepare(memory: Memory) -> list[BiasRun]:
         runs = []

@@ -171,7 +171,7 @@ def _lag_of(time: Array, T: Array, f: Array) -> float | None:
     time, T, f = time[known], (T[known] - T[known].mean()) / np.ptp(T[known]), f[known]
 
     def left(lag: float) -> float:
-        x = follow_lag(time, T, lag)
+        x = follow_lag(T, np.diff(time), lag)
         terms = np.column_stack([np.ones_like(x), x, x**2, np.exp(-time / lag) if lag else 0 * x])
         return float(np.std(f - terms @ np.linalg.lstsq(terms, f, rcond=None)[0]))
 

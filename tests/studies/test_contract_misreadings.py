@@ -207,7 +207,7 @@ def test_a_housing_that_follows_a_jump_of_its_chamber_tells_minutes_by_itself(re
     with pytest.raises(InputError, match=r"faster than any housing\. time_s must be in seconds"):
         check_temperatures(dataclasses.replace(record, columns=jumped | {"time_s": time / 60.0}))
     slow = jumped | {
-        "frequency_Hz": 4433.0 + follow_lag(time, jumped["housing_temperature_degC"], 1800.0),
+        "frequency_Hz": 4433.0 + follow_lag(jumped["housing_temperature_degC"], np.diff(time), 1800.0),
         "time_s": 1e3 * time,
     }
     with pytest.raises(InputError, match="is it in milliseconds"):  # most of its rows have settled
@@ -247,7 +247,7 @@ def test_a_resonator_however_quick_or_slow_in_seconds_is_not_refused(rate, lasts
     """A quick one in a usual chamber, a slow one in a quick chamber, and a slow one through a season."""
     time = np.linspace(0.0, lasts, 600)
     T = rate * (lasts / 2 - np.abs(time - lasts / 2))
-    f = 4432.0 + 0.4 * follow_lag(time, T, lag) + 1e-4 * np.random.default_rng(1).standard_normal(time.size)
+    f = 4432.0 + 0.4 * follow_lag(T, np.diff(time), lag) + 1e-4 * np.random.default_rng(1).standard_normal(time.size)
     said = check_temperatures(Record({"time_s": time, "housing_temperature_degC": T, "frequency_Hz": f}))
     assert ("milliseconds" in said) == (lasts > 1e6)
 

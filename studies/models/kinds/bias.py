@@ -102,7 +102,7 @@ def _predict_centred(model: Model, time: Array, values: Array, extrapolate: bool
     window = model.number("rate_window_s", above=0)
     check_time(time)
     blocks = average_blocks(time, {"state": values}, min(max(BLOCK, float(np.median(np.diff(time)))), window / 2))
-    state = follow_lag(blocks.time, blocks.columns["state"], memory_of(model).lag)
+    state = follow_lag(blocks.columns["state"], np.diff(blocks.time), memory_of(model).lag)
     rate = differentiate(blocks.time, state, window).slope
     predicted = _evaluate(model, state, rate, extrapolate)
     after = np.clip(np.searchsorted(blocks.time, time), 1, blocks.time.size - 1)
@@ -124,7 +124,7 @@ def _predict_causally(model: Model, time: Array, values: Array, extrapolate: boo
     middle = np.add.reduceat(time[known], starts) / counts
     zero = float(values[known][0])
     state = np.add.reduceat(values[known] - zero, starts) / counts + zero
-    state = follow_lag(middle, state, memory_of(model).lag) if middle.size > 1 else state
+    state = follow_lag(state, np.diff(middle), memory_of(model).lag)
     if middle.size < LEAST_BLOCKS:
         return np.full(time.shape, np.nan)
     rate = differentiate(middle, state, window, causal=True).slope
