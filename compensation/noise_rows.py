@@ -11,7 +11,7 @@ uneven and have gaps. A run takes N³/3 operations per evaluation, once for all 
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import pairwise
 
 import numpy as np
@@ -70,7 +70,7 @@ class NoiseRows:
             x = np.round(t - t[0], 3)
             key = x.tobytes() + np.round(spans, 6).tobytes() + np.round(stretch, 9).tobytes()
             if key not in found:
-                found[key] = (flicker(x, spans), random_walk(x, spans), [])
+                found[key] = (*_slow(x.tobytes(), spans.tobytes()), [])
             found[key][2].append(run)
         return tuple((F, W, tuple(runs)) for F, W, runs in found.values())
 
@@ -144,8 +144,12 @@ class NoiseRows:
 
         By ln θ of a level Σ_ij (Σ⁻¹ − U Uᵀ)_ij θ ∂Σ_ij/∂θ, U = Σ⁻¹ [X C, e], C Cᵀ = (Λ + XᵀΣ⁻¹X)⁻¹, e what is left.
         """
-        whitener = self._factor(noise)
-        white, total = whitener(np.column_stack([columns, target])), whitener.log_determinant
+        roots = [invert_lower(cholesky(self.covariance(runs[0], noise))) for _, _, runs in self._groups]
+        white, total = np.column_stack([columns, target]), 0.0
+        for K, (_, _, runs) in zip(roots, self._groups, strict=True):
+            total -= 2 * len(runs) * float(np.log(K.diagonal()).sum())
+            for run in runs:
+                white[self.slices[run]] = K @ white[self.slices[run]]
         X, r = white[:, :-1], white[:, -1]
         about = np.zeros(X.shape[1]) if mean is None else mean
         A = X.T @ X
@@ -156,12 +160,10 @@ class NoiseRows:
         total += float(rest @ rest + (found - about) @ (precision * (found - about)))
         total += 2 * float(np.log(np.diag(root)).sum())
         both, slopes = np.column_stack([beside, rest]), dict.fromkeys(KINDS, 0.0)
-        for (L, runs), (F, W, _) in zip(whitener.roots, self._groups, strict=True):
-            lower = len(runs) * scipy.linalg.lapack.dpotri(L, lower=1)[0]
-            S = lower + lower.T
-            np.einsum("ii->i", S)[:] -= lower.diagonal()
+        for K, (F, W, runs) in zip(roots, self._groups, strict=True):
+            S = len(runs) * (K.T @ K)
             for run in runs:
-                U = solve_lower(L, both[self.slices[run]], transposed=True)
+                U = K.T @ both[self.slices[run]]
                 S -= U @ U.T
             slopes["white"] += 2 * noise.white**2 * float(S.diagonal() @ (self.stretch[runs[0]] / self.spans[runs[0]]))
             for kind, level, own in (("flicker", noise.flicker, F), ("walk", noise.walk, W)):
@@ -170,12 +172,24 @@ class NoiseRows:
         return total, slopes
 
 
+@lru_cache(maxsize=8)
+def _slow(times: bytes, spans: bytes) -> tuple[Array, Array]:
+    """Flicker and walk matrices of rows, which many sets share."""
+    x, wide = np.frombuffer(times), np.frombuffer(spans)
+    return flicker(x, wide), random_walk(x, wide)
+
+
 def cholesky(matrix: Array) -> Array:
     """Lower root of a symmetric matrix straight from LAPACK: of small ones, checks cost as much as the work."""
     root, failed = scipy.linalg.lapack.dpotrf(matrix, lower=1, clean=1)
     if failed:
         raise np.linalg.LinAlgError("the covariance of the rows is not positive definite.")
     return np.asarray(root)
+
+
+def invert_lower(root: Array) -> Array:
+    """Return L⁻¹, with which products cost less than solutions where both L⁻¹ and Σ⁻¹ = L⁻ᵀ L⁻¹ are wanted."""
+    return np.asarray(scipy.linalg.lapack.dtrtri(root, lower=1)[0])
 
 
 def solve_lower(root: Array, columns: Array, transposed: bool = False) -> Array:
