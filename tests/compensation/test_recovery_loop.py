@@ -36,7 +36,7 @@ def integrate(rate, rebalance, seconds=0.03):
 @pytest.mark.parametrize("rebalance", [0.0, 4.0], ids=["open loop", "force rebalance"])
 def test_planted_rate_is_read(rebalance):
     planted = 3.0
-    time, p, q, force = integrate(lambda t: planted * np.clip(t / 0.01, 0, 1), rebalance)
+    time, p, q, force = integrate(lambda t: planted * min(t / 0.01, 1.0), rebalance)
     at, P = demodulate(time, p, OMEGA)
     Q, F = demodulate(time, q, OMEGA)[1], demodulate(time, force, OMEGA)[1]
     read = read_rate_from_loop(BELL, OMEGA, at, P, Q, F if rebalance else None)

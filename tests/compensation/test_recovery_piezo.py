@@ -42,31 +42,19 @@ def run_gyro(planted, gain, sensed, driven, seconds=0.03):
     e = RING.coupling
     c = -RING.capacitance  # volts of an amplifier to charge
 
-    def voltages_on(y):
-        rates = -(e @ y[2:]) / RING.capacitance  # of the amplifiers, V/s
-        on = np.zeros(8)
-        # on the driven pair, against what the sensed pair sees, with the sign that damps
-        sign = np.sign(sum(e[i - 1, 1] for i in sensed) * sum(e[i - 1, 1] for i in driven))
-        for i in driven:
-            on[i - 1] = sign * gain * sum(rates[j - 1] for j in sensed)
-        return on
-
-    def slope(_, y):
-        p, q, dp, dq = y
-        f_p, f_q = e.T @ voltages_on(y)
-        coupling = 2 * planted * BELL.b
-        return [
-            dp,
-            dq,
-            (f_p + coupling * dq - BELL.c0 * p - BELL.c1 * q) / BELL.m0,
-            (f_q - coupling * dp - BELL.c0 * q - BELL.c1 * p) / BELL.m0,
-        ]
-
+    # the rates of the sensed amplifiers, on the driven pair, against what they see, with the sign that damps
+    seen = -sum(e[j - 1] for j in sensed) / RING.capacitance
+    sign = np.sign(sum(e[i - 1, 1] for i in sensed) * sum(e[i - 1, 1] for i in driven))
+    on = np.zeros(8)
+    on[[i - 1 for i in driven]] = sign * gain
+    volts = np.outer(on, seen)  # of the drives, by ṗ and q̇
+    turning = 2 * planted * BELL.b * np.array([[0.0, 1.0], [-1.0, 0.0]])
+    elastic = np.array([[BELL.c0, BELL.c1], [BELL.c1, BELL.c0]])
+    motion = np.block([[np.zeros((2, 2)), np.eye(2)], [-elastic / BELL.m0, (e.T @ volts + turning) / BELL.m0]])
     time = STEP * np.arange(int(seconds / STEP))
-    y = solve_ivp(slope, (0, time[-1]), [0, 0, BELL.omega * 1e-6, 0], "DOP853", time, rtol=1e-10, atol=1e-16).y
-    amplifiers = (e @ y[:2]) / c
-    drives = np.array([voltages_on(column) for column in y.T]).T
-    return time, amplifiers, drives, y
+    start = [0, 0, BELL.omega * 1e-6, 0]
+    y = solve_ivp(lambda _, y: motion @ y, (0, time[-1]), start, "DOP853", time, rtol=1e-10, atol=1e-16).y
+    return time, (e @ y[:2]) / c, volts @ y[2:], y
 
 
 @pytest.mark.parametrize(

@@ -54,7 +54,8 @@ def random_shells(seed, count=20):
         }
 
 
-@pytest.mark.parametrize("case", [pytest.param(CASES[0], marks=pytest.mark.slow), *CASES[1:]], ids=str)
+@pytest.mark.slow
+@pytest.mark.parametrize("case", CASES, ids=str)
 def test_emitted_code_agrees_with_quadrature(case, tmp_path, capsys):
     """Python, and C where there is a compiler: one derivation for both."""
     status, said = speak(capsys, "--code", "python", *options(*case))

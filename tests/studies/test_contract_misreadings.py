@@ -71,6 +71,7 @@ def test_a_right_record_and_one_of_a_card_somewhat_off_are_not_questioned(card, 
     check_readings(card, [flat])
 
 
+@pytest.mark.slow
 def test_a_metal_of_a_likely_slope_and_a_start_that_is_not_settled_are_not_read_in_fahrenheit(card):
     """A slope within 1.4 of its standard deviations is 5/9 of the card's; the resonator had not settled yet."""
     metal = load_card("cvg-25mm")

@@ -50,6 +50,13 @@ def results(spec):
     return run_study(spec)
 
 
+@pytest.fixture(scope="module")
+def through(results):
+    """The plan of the same study through families, and its designs."""
+    design = draw(results.study)
+    return WorkPlan.of(results.study, choose_solver(results.study, design)), design.values
+
+
 def test_designs_lie_within_their_stated_error_of_the_full_solve(results):
     plan = WorkPlan.of(results.study)
     assert results.about["identity"]["solver"] != "full"
