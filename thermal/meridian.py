@@ -17,6 +17,7 @@ from thermal.network import Array, Conductor, Node, Part, Radiator
 
 Along = Callable[[Array], Array]
 Capacity = float | Callable[[float], float]
+POINTS, WEIGHTS = np.polynomial.legendre.leggauss(12)
 
 
 @dataclass(frozen=True)
@@ -119,8 +120,7 @@ def scale(value: Capacity, factor: float) -> Capacity:
 
 
 def _integrate(function: Along, start: Array, end: Array) -> Array:
-    x, w = np.polynomial.legendre.leggauss(12)
     half = (end - start)[:, None] / 2
-    s = start[:, None] + half * (x + 1)
-    integral: Array = (half * w * np.broadcast_to(function(s), s.shape)).sum(axis=1)
+    s = start[:, None] + half * (POINTS + 1)
+    integral: Array = (half * WEIGHTS * np.broadcast_to(function(s), s.shape)).sum(axis=1)
     return integral

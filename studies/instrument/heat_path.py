@@ -1,6 +1,7 @@
 """The heat path of an instrument, from its geometry, its material and its table `[thermal]`, in SI units."""
 
 from collections.abc import Callable
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 from studies.errors import InputError, naming
@@ -48,6 +49,7 @@ def build_heat_path(
         )
 
 
+@lru_cache(maxsize=64)
 def _cut_shell(resonator: "Resonator", stem_radius: float, count: int) -> "MeridianCells":
     from thermal.meridian import cut_meridian_table, lump
 
