@@ -2,8 +2,8 @@
 
 import json
 from collections import deque
-from collections.abc import Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, wait
+from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 
 from compensation.errors import CompensationError
@@ -14,12 +14,11 @@ from studies.fleet.device import SCHEMA, Answer, diagnose_device
 from studies.fleet.folder import Device
 from studies.fleet.lot import Lot, gather
 from studies.progress import Progress
-from studies.sweeps.engine import LOOK_EVERY, MOST_TASKS
-from studies.sweeps.workers import Here, Workers, say_gone
+from studies.sweeps.workers import Here, Workers, run_tasks
 from thermal.errors import ThermalError
 
 FOLDER = "devices"
-Done = tuple[Device, Answer | str]
+KILLED = "its process was ended each time (killed, or out of memory)."
 
 
 def run_lot(
@@ -34,11 +33,14 @@ def run_lot(
     failed: dict[str, str] = {}
     crew, progress = crew or Here(), progress or Progress()
     try:
-        for device, answer in _all(devices, out, crew):
+        queue = deque(devices)
+        for (device,), answer in run_tasks(
+            crew, lambda: [queue.popleft()] if queue else [], partial(_answer, out), tries=1
+        ):
             if isinstance(answer, Answer):
                 answers[device.serial] = answer
             else:
-                failed[device.serial] = answer
+                failed[device.serial] = answer or f"device {device.serial}: {KILLED}"
             progress.advance(1, not isinstance(answer, Answer))
     finally:
         crew.close()
@@ -48,39 +50,9 @@ def run_lot(
     return gather(devices, {one.serial: answers[one.serial] for one in order}, failed)
 
 
-def _all(devices: Sequence[Device], out: str | None, crew: Workers) -> Iterator[Done]:
-    """Yield the answers of all devices as they come, or why there is none; what a lost worker had is tried again, alone."""
-    queue, running, alone = deque(devices), dict[Future[Answer | str], Device](), set[str]()
-    while queue or running:
-        while queue and len(running) < (1 if alone else MOST_TASKS * crew.count):
-            device = queue.popleft()
-            running[crew.submit(_answer, device, out)] = device
-        finished = wait(running, LOOK_EVERY, FIRST_COMPLETED).done
-        if not finished:
-            crew.check()
-        for future in finished:
-            if (one := running.pop(future, None)) is None:
-                continue
-            try:
-                yield one, future.result()
-                alone.discard(one.serial)
-            except crew.lost:
-                again = [*running.values()] if crew.restart() else []
-                if again:
-                    running.clear()
-                if one.serial in alone:
-                    yield one, f"device {one.serial}: its process was ended each time (killed, or out of memory)."
-                    alone.discard(one.serial)
-                else:
-                    again.append(one)
-                alone |= {device.serial for device in again}
-                queue.extendleft(again)
-            except crew.gone as error:
-                raise say_gone(error) from error
-
-
-def _answer(device: Device, out: str | None) -> Answer | str:
-    """Return the answer of a device, kept or new; a sentence where its files cannot be used."""
+def _answer(out: str | None, devices: Sequence[Device]) -> Answer | str:
+    """Return the answer of one device, kept or new; a sentence where its files cannot be used."""
+    (device,) = devices
     try:
         key = device.key
         if (kept := _kept(device, key, out)) is not None:

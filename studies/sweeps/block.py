@@ -28,6 +28,10 @@ class Batch:
         """Return some of the designs."""
         return Batch(self.places[first:last], self.designs[first:last])
 
+    def cases(self) -> "list[Batch]":
+        """Return each design alone."""
+        return [self.part(k, k + 1) for k in range(len(self))]
+
 
 class Row(NamedTuple):
     """What became of one design: `remark` is the reason of a failure, or a warning of the solver."""

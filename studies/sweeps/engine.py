@@ -6,19 +6,18 @@ pieces, to find a design that kills it; such a case is noted as lost and tried b
 
 from collections import deque
 from collections.abc import Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, wait
 from dataclasses import dataclass
+from functools import partial
 from math import ceil
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from compensation.arrays import Array
-from studies.errors import MissingEnvironment
 from studies.sweeps.block import Batch, Cases, join
 from studies.sweeps.evaluate import WorkPlan, evaluate_task, failed_cases
-from studies.sweeps.workers import Here, Pool, Workers, cores, say_gone
+from studies.sweeps.workers import Here, Pool, Workers, cores, run_tasks
 
 if TYPE_CHECKING:
     from studies.progress import Progress
@@ -28,17 +27,7 @@ if TYPE_CHECKING:
 TASK_SECONDS = 1.0  # a task should last so long: long against its cost, short against what kill -9 may lose
 BATCH, BATCH_VECTORISED = 8, 16384  # cases, where the spec says nothing
 BLOCK = 65536  # cases that are kept together, and read together
-TRIES_ALONE = 2  # of a case whose worker is lost
-STILLBORN = 3  # losses before anything was computed, after which the workers cannot be started
-LOOK_EVERY = 2.0  # s without an answer, after which the workers are looked after
-MOST_TASKS = 2  # queued for each worker, so that millions of cases do not swamp a scheduler
-
-
-@dataclass
-class _Task:
-    batches: list[Batch]
-    alone: bool = False  # after a worker was lost: nothing else runs beside it
-    tries: int = 0  # that were alone and lost their worker
+KILLED = "the worker process ended each time it computed this case alone (killed or crashed); the next run tries again."
 
 
 @dataclass
@@ -86,51 +75,18 @@ def compute(
     plan: WorkPlan, batches: Batches | deque[Batch], workers: Workers, store: "Store", progress: "Progress"
 ) -> None:
     """Evaluate all batches and keep their rows; returns when every case is in the store."""
-    suspects: deque[_Task] = deque()
-    running: dict[Future[Any], _Task] = {}
-    size, losses, computed = 1, 0, False
-    while batches or suspects or running:
-        if suspects and not running:
-            _submit(suspects.popleft(), plan, workers, running)
-        while (
-            batches
-            and not suspects
-            and len(running) < MOST_TASKS * workers.count
-            and not any(task.alone for task in running.values())
-        ):
-            _submit(_Task([batches.popleft() for _ in range(min(size, len(batches)))]), plan, workers, running)
-        finished = wait(running, LOOK_EVERY, FIRST_COMPLETED).done
-        if not finished:
-            workers.check()
-        for future in finished:
-            task = running.pop(future, None)
-            if task is None:
-                continue
-            try:
-                found: list[Cases] = future.result()
-            except workers.lost as error:
-                losses += 1
-                if losses >= STILLBORN and not computed:
-                    raise MissingEnvironment(
-                        "the worker processes end before they compute anything. In a script, call run_study under"
-                        " 'if __name__ == \"__main__\":' or with workers=1; otherwise check what ends them (memory?)."
-                    ) from error
-                _divide(task, plan, suspects, store, progress)
-                if workers.restart():
-                    for other in running.values():
-                        _divide(_Task(other.batches), plan, suspects, store, progress)
-                    running.clear()
-                continue
-            except workers.gone as error:
-                raise say_gone(error) from error
-            _keep(found, store, progress)
-            computed = True
-            each = sum(cases.seconds for cases in found) / len(found)
-            size = max(1, min(int(TASK_SECONDS / max(each, 1e-9)), ceil(len(batches) / (8 * workers.count))))
+    size = 1
 
+    def take() -> list[Batch]:
+        return [batches.popleft() for _ in range(min(size, len(batches)))]
 
-def _submit(task: _Task, plan: WorkPlan, workers: Workers, running: dict[Future[Any], _Task]) -> None:
-    running[workers.submit(evaluate_task, plan, task.batches)] = task
+    for tried, found in run_tasks(workers, take, partial(evaluate_task, plan), Batch.cases):
+        if found is None:
+            _keep([failed_cases(plan, batch, "lost", KILLED) for batch in tried], store, progress)
+            continue
+        _keep(found, store, progress)
+        each = sum(cases.seconds for cases in found) / len(found)
+        size = max(1, min(int(TASK_SECONDS / max(each, 1e-9)), ceil(len(batches) / (8 * workers.count))))
 
 
 def _keep(found: Sequence[Cases], store: "Store", progress: "Progress") -> None:
@@ -139,17 +95,3 @@ def _keep(found: Sequence[Cases], store: "Store", progress: "Progress") -> None:
         cases = join(found[first : first + together])
         store.add(cases)
         progress.advance(len(cases.batch), cases.failed)
-
-
-def _divide(task: _Task, plan: WorkPlan, suspects: deque[_Task], store: "Store", progress: "Progress") -> None:
-    """Put what a lost worker had into the queue of suspects; a case alone that loses it again and again is noted as lost."""
-    if not task.alone:
-        suspects.extend(_Task([batch], alone=True) for batch in task.batches)
-    elif len(task.batches[0]) > 1:
-        batch = task.batches[0]
-        suspects.extendleft(_Task([batch.part(k, k + 1)], alone=True) for k in reversed(range(len(batch))))
-    elif task.tries + 1 < TRIES_ALONE:
-        suspects.appendleft(_Task(task.batches, alone=True, tries=task.tries + 1))
-    else:
-        reason = "the worker process ended each time it computed this case alone (killed or crashed); the next run tries again."
-        _keep([failed_cases(plan, task.batches[0], "lost", reason)], store, progress)

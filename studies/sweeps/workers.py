@@ -5,19 +5,27 @@ import multiprocessing
 import os
 import signal
 import sys
+from collections import deque
 from collections.abc import Callable, Iterator
-from concurrent.futures import Executor, Future, ProcessPoolExecutor
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, TypeVar
 
 from studies.errors import MissingEnvironment
 from studies.threads import ONE_THREAD
 
+Part = TypeVar("Part")
+Found = TypeVar("Found")
 # One thread each, and no module of the working directory: a signal.py there must not be run by a worker.
 # glibc keeps the memory of one solve for the next: fresh pages cost a sixth of a design
 KEPT = {"MALLOC_MMAP_THRESHOLD_": "1073741824", "MALLOC_TRIM_THRESHOLD_": "1073741824", "MALLOC_TOP_PAD_": "67108864"}
 ENVIRONMENT = {**ONE_THREAD, **KEPT, "PYTHONSAFEPATH": "1"}
 PR_SET_PDEATHSIG = 1
+TRIES_ALONE = 2  # of a part whose worker is lost
+STILLBORN = 3  # losses before anything was computed, after which the workers cannot be started
+LOOK_EVERY = 2.0  # s without an answer, after which the workers are looked after
+MOST_TASKS = 2  # queued for each worker, so that millions of cases do not swamp a scheduler
 
 
 class Workers:
@@ -90,6 +98,68 @@ class Pool(Workers):
             self._executor: Executor = ProcessPoolExecutor(
                 self.count, mp_context=context, initializer=become_worker, initargs=(os.getpid(),)
             )
+
+
+@dataclass
+class _Task:
+    parts: list[Any]
+    alone: bool = False  # after a worker was lost: nothing else runs beside it
+    tries: int = 0  # that were alone and lost their worker
+
+
+def run_tasks(
+    workers: Workers, take: Callable[[], list[Part]], function: Callable[[list[Part]], Found],
+    split: Callable[[Part], list[Part]] = lambda part: [part], tries: int = TRIES_ALONE,
+) -> Iterator[tuple[list[Part], Found | None]]:  # fmt: skip
+    """Yield parts with what the function makes of them, as it comes; `take` gives the next ones, none at the end.
+
+    What a lost worker had is tried again, alone and `split`, to find the part that kills it: of that comes None.
+    """
+    suspects, running = deque[_Task](), dict[Future[Any], _Task]()
+    losses, computed = 0, False
+    while True:
+        if suspects and not running:
+            task = suspects.popleft()
+            running[workers.submit(function, task.parts)] = task
+        usable = not suspects and not any(task.alone for task in running.values())
+        while usable and len(running) < MOST_TASKS * workers.count and (parts := take()):
+            running[workers.submit(function, parts)] = _Task(parts)
+        if not running:
+            return
+        finished = wait(running, LOOK_EVERY, FIRST_COMPLETED).done
+        if not finished:
+            workers.check()
+        for future in finished:
+            if (done := running.pop(future, None)) is None:
+                continue
+            try:
+                found = future.result()
+            except workers.lost as error:
+                losses += 1
+                if losses >= STILLBORN and not computed:
+                    raise MissingEnvironment(
+                        "the worker processes end before they compute anything. In a script, call run_study under"
+                        " 'if __name__ == \"__main__\":' or with workers=1; otherwise check what ends them (memory?)."
+                    ) from error
+                lost = [done]
+                if workers.restart():
+                    lost += [_Task(task.parts) for task in running.values()]
+                    running.clear()
+                for task in lost:
+                    if not task.alone:
+                        suspects.extend(_Task([part], alone=True) for part in task.parts)
+                    elif len(pieces := split(task.parts[0])) > 1:
+                        suspects.extendleft(_Task([piece], alone=True) for piece in reversed(pieces))
+                    elif task.tries + 1 < tries:
+                        suspects.appendleft(_Task(task.parts, alone=True, tries=task.tries + 1))
+                    else:
+                        computed = True
+                        yield task.parts, None
+            except workers.gone as error:
+                raise say_gone(error) from error
+            else:
+                computed = True
+                yield done.parts, found
 
 
 def cores() -> int:

@@ -199,8 +199,8 @@ class Losing(Workers):
 
     count, lost = 2, (BrokenPipeError,)
 
-    def submit(self, function, device, out):
-        done = Future()
+    def submit(self, function, devices):
+        (device,), done = devices, Future()
         if device.serial == "B":
             done.set_exception(BrokenPipeError())
         else:
