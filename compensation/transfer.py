@@ -123,7 +123,7 @@ class TransferFunction:
             if self.denominator[-1] == 0:
                 raise CompensationError("a transfer function with a pole at s = 0 has no settled start.")
             x0 = np.linalg.solve(A, -B * u[0]).astype(complex)
-        x = _march_evenly(A, B, t, u, x0) if is_regular(t) else _march(A, B, t, u, x0)
+        x = _march(A, B, t, u, x0)
         y = C @ x + D * u
         return y.real if self.is_real and not np.iscomplexobj(u) else y
 
@@ -147,12 +147,6 @@ def _step(A: Complex, B: Complex, steps: NDArray[np.float64]) -> tuple[Complex, 
     return exponential[:, :n, :n], exponential[:, :n, n], exponential[:, :n, n + 1]
 
 
-def _march_evenly(A: Complex, B: Complex, t: NDArray[np.float64], u: NDArray[Any], x0: Complex) -> Complex:
-    """States on an even grid."""
-    (transition,), (held,), (ramp,) = _step(A, B, np.array([(t[-1] - t[0]) / (len(t) - 1)]))
-    return np.asarray(run_states(transition, np.outer(held, u[:-1]) + np.outer(ramp, np.diff(u)), x0), dtype=complex)
-
-
 def run_states(transition: NDArray[Any], forcing: NDArray[Any], start: NDArray[Any]) -> NDArray[Any]:
     """States x_{k+1} = A x_k + f_k, (n, rows + 1): by Schur's form of A a chain of first-order recursions."""
     from scipy.linalg import rsf2csf, schur
@@ -168,16 +162,21 @@ def run_states(transition: NDArray[Any], forcing: NDArray[Any], start: NDArray[A
 
 
 def _march(A: Complex, B: Complex, t: NDArray[np.float64], u: NDArray[Any], x0: Complex) -> Complex:
-    """States on any grid, step by step; equal steps share one matrix exponential."""
-    grain = SAME_STEP * float(np.median(np.diff(t)))
-    steps, kind = np.unique(np.maximum(np.round(np.diff(t) / grain), 1) * grain, return_inverse=True)
+    """States on any grid; equal steps share one matrix exponential."""
+    steps, kind = np.array([(t[-1] - t[0]) / (len(t) - 1)]), np.zeros(len(t) - 1, dtype=np.intp)
+    if not is_regular(t):
+        grain = SAME_STEP * float(np.median(np.diff(t)))
+        steps, kind = np.unique(np.maximum(np.round(np.diff(t) / grain), 1) * grain, return_inverse=True)
     transition, held, ramp = _step(A, B, steps)
-    x = np.empty((len(B), len(t)), dtype=complex)
-    x[:, 0] = x0
-    rise = np.diff(u)
-    for i, k in enumerate(kind):
-        x[:, i + 1] = transition[k] @ x[:, i] + held[k] * u[i] + ramp[k] * rise[i]
-    return x
+    forcing = held[kind].T * u[:-1] + ramp[kind].T * np.diff(u)
+    if len(steps) == 1:
+        return np.asarray(run_states(transition[0], forcing, x0), dtype=complex)
+    if len(B) == 1:
+        return recur(transition[kind, 0, 0], np.r_[x0, forcing[0]])[None]
+    x = [x0]
+    for k, push in zip(kind, forcing.T, strict=True):
+        x.append(transition[k] @ x[-1] + push)
+    return np.array(x).T
 
 
 def recur(pole: ArrayLike, forced: ArrayLike) -> NDArray[Any]:

@@ -14,7 +14,7 @@ def head(model: Model) -> str:
         *(f"Fitted to {s.path}, {s.rows} rows, sha256 {s.sha256 or 'unknown'}." for s in model.sources),
         *(f"Valid for {name} from {low:.9g} to {high:.9g}." for name, (low, high) in model.validity.items()),
     ]
-    return "\n".join(f"/* {_one_comment(line)} */" for line in lines) + "\n#include <math.h>\n"
+    return "\n".join(f"/* {one_line(line)} */" for line in lines) + "\n#include <math.h>\n"
 
 
 def write_c(name: str, **values: object) -> str:
@@ -31,8 +31,10 @@ def polynomial(name: str, variable: str, coefficients: Sequence[float]) -> str:
     return f"static double {name}(double {variable}) {{\n    return {expression};\n}}"
 
 
-def _one_comment(text: str) -> str:
-    return " ".join(text.split()).replace("*/", "* /").replace("/*", "/ *")
+def one_line(words: str) -> str:
+    """Return somebody's words fit for a comment of C and for XML: one line, no characters that are not shown."""
+    words = "".join(c if c.isprintable() else " " for c in words)
+    return " ".join(words.split()).replace("*/", "* /").replace("/*", "/ *")
 
 
 def self_test(rows: Sequence[Sequence[float]], meaning: str, step: str) -> str:

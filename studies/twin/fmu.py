@@ -13,8 +13,9 @@ from typing import Literal
 from xml.sax.saxutils import quoteattr
 
 from studies.files.writing import written_whole
+from studies.models.c_source import one_line
 from studies.twin.plan import Plan, idle_input, input_starts, symbol
-from studies.twin.source import CORE, FMI, exposed, one_line, outputs_of, sources
+from studies.twin.source import CORE, FMI, exposed, outputs_of, sources
 
 Version = Literal["2.0", "3.0"]
 OUT, USE, IN, PARAMETER = 100, 199, 200, 1000  # value references, as fmi.c has them

@@ -8,6 +8,7 @@ from importlib.resources import files
 import numpy as np
 
 from studies.effects.effect import AROUND
+from studies.models.c_source import one_line
 from studies.simulation.heat_path import LEAST_LAG, SENSOR, SENSOR_SHARE
 from studies.simulation.virtual_gyro import COMMAND_DIGITS, DIGITS
 from studies.twin.plan import EFFECTS, MEMORY, PAST, PRECESSION, Plan, Spline, input_starts
@@ -189,9 +190,3 @@ def _text(words: str) -> str:
     return (
         '"' + "".join(chr(b) if 32 <= b < 127 and chr(b) not in '"\\?%' else f"\\{b:03o}" for b in words.encode()) + '"'
     )
-
-
-def one_line(words: str) -> str:
-    """Return a card's name fit for a comment of C and for XML: one line, no characters that are not shown."""
-    words = "".join(c if c.isprintable() else " " for c in words)
-    return " ".join(words.split()).replace("*/", "* /").replace("/*", "/ *")
