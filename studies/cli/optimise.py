@@ -15,6 +15,7 @@ from studies.design.run import optimise as find_best
 from studies.reports import style
 from studies.reports.digits import plain
 from studies.reports.scenes import moving_mode, show_mode
+from studies.reports.sweep_figures import column_label
 from studies.results import Blocks, Chapter, Column, Drawing, Facts, Figure, Result, Table, row_of
 from studies.results.page import Block
 
@@ -93,10 +94,7 @@ def _front(found: Answer) -> list[dict[str, Any]]:
 def _parts(found: Answer, payload: dict[str, Any]) -> list[Any]:
     unit = {row["column"]: f" {row['unit']}" if row["unit"] != "1" else "" for row in payload["columns"]}
     label = {row["column"]: row["label"] for row in payload["columns"]}
-
-    def named(column: str) -> str:
-        return f"{label[column]}{unit[column].replace(' ', ' (', 1) + ')' if unit[column] else ''}"
-
+    named = {column.name: column_label(column) for column in found.task.study.columns}
     goals = [(goal.column, found.place(goal.column)) for goal in found.task.keys.objective]
     facts = [(label[n], f"{plain(found.after[k])}{unit[n]}", f"before: {plain(found.before[k])}") for n, k in goals]
     reasons = Counter(reason for _, reason in found.failures)
@@ -109,7 +107,7 @@ def _parts(found: Answer, payload: dict[str, Any]) -> list[Any]:
     )
     keys = found.task.study.names[: found.task.free]
     front = [Column(itemgetter(name), name.removeprefix("resonator."), digits=5) for name in keys]
-    front += [Column(itemgetter(name), named(name), digits=6) for name in found.task.wanted]
+    front += [Column(itemgetter(name), named[name], digits=6) for name in found.task.wanted]
     return [
         Chapter("The design", [
             Facts(facts),
@@ -128,7 +126,7 @@ def _parts(found: Answer, payload: dict[str, Any]) -> list[Any]:
         Chapter("About the best design", [Blocks(lambda: _live(found))]),
         Chapter("Constraints", [
             Table("Cost of the limits", payload["constraints"], [
-                Column(lambda row: named(row["column"]), "quantity"), "kind: bound | limit: limit .7 | value: value .7 | room: distance to the limit .3",
+                Column(lambda row: named[row["column"]], "quantity"), "kind: bound | limit: limit .7 | value: value .7 | room: distance to the limit .3",
                 Column(lambda row: row["margin"] or None, "margin for tolerances", digits=3), Column("price", price, digits=3),
             ], "Price: gain of the objective per unit by which the limit is relaxed, to first order and before rounding; empty where the limit"
                " is not active."),
@@ -140,7 +138,7 @@ def _parts(found: Answer, payload: dict[str, Any]) -> list[Any]:
         ]),
         Chapter("Tolerances", [
             Table("Effect of the tolerances", payload["tolerances"], [
-                Column(lambda row: named(row["column"]), "quantity"),
+                Column(lambda row: named[row["column"]], "quantity"),
                 "value: value .6 | worst_case: worst case ± .3 | sd: standard deviation .3 | low … high: full solves .6 | passed: within limits (%) ×100 .1f",
             ], "Worst case and standard deviation to first order; full solves: the extremes among the worst corners and designs drawn from the tolerances."),
         ]),
@@ -179,10 +177,8 @@ def _draw_history(found: Answer) -> Drawing:
 
 
 def _draw_front(found: Answer) -> Drawing:
-    columns = {column.name: column for column in found.task.study.columns}
-    names = [one.column for one in found.task.keys.objective[:2]]
-    titles = [f"{columns[n].label}{f' ({columns[n].unit})' if columns[n].unit != '1' else ''}" for n in names]
-    a, b = (found.place(name) for name in names)
+    a, b = (found.place(one.column) for one in found.task.keys.objective[:2])
+    titles = [column_label(found.task.study.columns[k]) for k in (a, b)]
     held = found.history[:, 0] == 0
     with style.figure(height=3.8, x=titles[0], y=titles[1]) as (made, axis):
         axis.plot(found.values[held, a], found.values[held, b], ".", color=style.SKY, label="keeps all limits")

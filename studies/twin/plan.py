@@ -45,15 +45,6 @@ CAPACITY_STEP = 0.25  # K, of the knots of a heat capacity that varies
 
 
 @dataclass(frozen=True)
-class Spline:
-    """Even knots from `first` (K), and four rows of coefficients, the highest power first."""
-
-    first: float
-    step: float
-    coefficients: Array
-
-
-@dataclass(frozen=True)
 class EffectRow:
     """One effect: its name, target ("temperature" or a response) and the places of its shape and weights among the parameters."""
 
@@ -75,7 +66,9 @@ class Plan:
     rows: Array  # array (5, nodes): Resonator's mean temperature and what is uneven in it
     uneven: Array
     constants: dict[str, float]  # mapping from macro to number
-    splines: dict[str, Spline]  # mapping of "law", "heat_capacity", "loss" and the two parts of "wave"
+    splines: (
+        "dict[str, CubicSpline]"  # over even knots (K) of "law", "heat_capacity", "loss" and the two parts of "wave"
+    )
     effects: tuple[EffectRow, ...]
 
     @property
@@ -118,9 +111,9 @@ def plan_twin(instrument: "Instrument", boundary: "Boundary" = "chamber", theory
     law = law_of(instrument, T0 - reach, T0 + reach, theory)
     parameters = dict(_card_numbers(instrument))
     if instrument.polynomial is not None:
-        network, splines = _lumps(instrument, parameters), {"law": _spline(_curve_of(law))}
+        network, splines = _lumps(instrument, parameters), {"law": _curve_of(law)}
     else:
-        network, splines = _shell_and_mount(instrument, parameters), {"law": _spline(law._spline)}
+        network, splines = _shell_and_mount(instrument, parameters), {"law": law._spline}
     splines |= _splines(instrument, law)
     network = behind_housing(network) if boundary == "housing" else with_sensor(network, 1.0)
     effects = tuple(_place_effects(instrument, parameters))
@@ -198,13 +191,13 @@ def _card_numbers(instrument: "Instrument") -> Iterator[tuple[str, float]]:
             yield key, math.nan if value is None else float(value)
 
 
-def _splines(instrument: "Instrument", law: "FrequencyLaw") -> dict[str, Spline]:
+def _splines(instrument: "Instrument", law: "FrequencyLaw") -> "dict[str, CubicSpline]":
     """Splines of a heat capacity that varies, and of the parts of a loss budget."""
     from scipy.interpolate import CubicSpline
 
     from studies.loss.damping_law import NODE_STEP, damping_law
 
-    found: dict[str, Spline] = {}
+    found: dict[str, CubicSpline] = {}
     if (own := instrument.polynomial) is not None:
         capacity = own.capacity(1.0)
     else:
@@ -212,20 +205,15 @@ def _splines(instrument: "Instrument", law: "FrequencyLaw") -> dict[str, Spline]
         capacity = partial(instrument.material.value, "heat_capacity") if varies else 1.0
     if callable(capacity):
         T = np.arange(law.lowest, law.highest + CAPACITY_STEP, CAPACITY_STEP)
-        found["heat_capacity"] = _spline(CubicSpline(T, capacity(T)))
+        found["heat_capacity"] = CubicSpline(T, capacity(T))
     damping = damping_law(instrument, law.lowest, law.highest)
     if damping is not None:
         T = np.linspace(law.lowest, law.highest, 4 * math.ceil((law.highest - law.lowest) / NODE_STEP))
-        found["loss"] = _spline(CubicSpline(T, np.log(damping.inverse_q(T))))
+        found["loss"] = CubicSpline(T, np.log(damping.inverse_q(T)))
         if damping.wave is not None:
             wave = damping.wave(T)
-            found |= {"wave_0": _spline(CubicSpline(T, wave.real)), "wave_1": _spline(CubicSpline(T, wave.imag))}
+            found |= {"wave_0": CubicSpline(T, wave.real), "wave_1": CubicSpline(T, wave.imag)}
     return found
-
-
-def _spline(curve: "CubicSpline") -> Spline:
-    x = curve.x
-    return Spline(float(x[0]), float(x[-1] - x[0]) / (len(x) - 1), np.asarray(curve.c))
 
 
 def _place_effects(instrument: "Instrument", parameters: dict[str, float]) -> Iterator[EffectRow]:

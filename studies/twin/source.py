@@ -4,6 +4,7 @@ import hashlib
 import math
 from collections.abc import Iterable, Sequence
 from importlib.resources import files
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,9 +12,12 @@ from studies.effects.effect import AROUND
 from studies.models.c_source import one_line
 from studies.simulation.heat_path import LEAST_LAG, SENSOR, SENSOR_SHARE
 from studies.simulation.virtual_gyro import COMMAND_DIGITS, DIGITS
-from studies.twin.plan import EFFECTS, MEMORY, PAST, PRECESSION, Plan, Spline, input_starts
+from studies.twin.plan import EFFECTS, MEMORY, PAST, PRECESSION, Plan, input_starts
 from thermal.constants import Stefan_Boltzmann
 from thermal.network import Conductor, Radiator
+
+if TYPE_CHECKING:
+    from scipy.interpolate import CubicSpline
 
 CORE = ("heat.c", "effects.c", "loops.c", "gyro.c")
 SHARED = ("twin.h", *CORE)
@@ -158,15 +162,16 @@ def _limits(plan: Plan, key: str) -> str:
     return _braced([_number(max(low, -1e300)), _number(min(high, 1e300))])
 
 
-def _coefficients(name: str, spline: Spline) -> str:
-    values = [_number(v) for v in spline.coefficients.ravel()]
+def _coefficients(name: str, spline: "CubicSpline") -> str:
+    values = [_number(v) for v in spline.c.ravel()]
     return _table("double", f"of_{name}", str(len(values)), values, static=True)
 
 
-def _head(name: str, spline: Spline | None) -> str:
+def _head(name: str, spline: "CubicSpline | None") -> str:
     if spline is None:
         return "{0, 1, 0, 0}"
-    return f"{{{_number(spline.first)}, {_number(spline.step)}, {spline.coefficients.shape[1]}, of_{name}}}"
+    first, count = spline.x[0], len(spline.x) - 1
+    return f"{{{_number(first)}, {_number((spline.x[-1] - first) / count)}, {count}, of_{name}}}"
 
 
 def _table(kind: str, name: str, size: str, values: Sequence[str], static: bool = False) -> str:
