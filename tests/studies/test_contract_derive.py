@@ -13,6 +13,7 @@ from scipy.integrate import quad
 from studies.cli import main
 from tests.compiled import compile_c
 
+pytestmark = pytest.mark.slow  # each derives
 CASES = [(2, 0.0, 90.0), (3, 12.5, 77.0), (7, 0.0, 20.0)]
 
 
@@ -54,7 +55,6 @@ def random_shells(seed, count=20):
         }
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("case", CASES, ids=str)
 def test_emitted_code_agrees_with_quadrature(case, tmp_path, capsys):
     """Python, and C where there is a compiler: one derivation for both."""
@@ -163,7 +163,6 @@ def test_latex_fragment_is_balanced_and_tagged(capsys):
     assert said.out.isascii()
 
 
-@pytest.mark.slow
 def test_latex_equations_are_typeset_by_an_independent_parser(capsys):
     from matplotlib.mathtext import MathTextParser
 
@@ -185,7 +184,6 @@ def test_json_carries_the_published_integrals(capsys):
     assert payload["bryan_factor"]["value"] == pytest.approx(0.27699, abs=5e-6)
 
 
-@pytest.mark.slow
 def test_the_bell_is_derived_beside_its_numbers(capsys):
     status, said = speak(capsys, "--bell", "--json")
     assert status == 0
@@ -212,7 +210,6 @@ def test_code_says_how_far_rayleigh_is_off_for_its_harmonic(n, solid, capsys):
         assert f"lower, by {100 * (1 - solid / assumed):.1f} % at h/R = 0.06" in said
 
 
-@pytest.mark.slow
 def test_both_languages_agree(tmp_path, capsys):
     space = {}
     exec(speak(capsys, "--dynamics", "--code", "python")[1].out, space)
@@ -225,7 +222,6 @@ def test_both_languages_agree(tmp_path, capsys):
         assert list(rates) == pytest.approx(list(space["averaged_rates"](*values)), rel=1e-12)
 
 
-@pytest.mark.slow
 def test_latex_is_plain_ascii(capsys):
     """Letters that pdflatex does not know end the run of the document that reads the fragment."""
     assert speak(capsys, "--dynamics", "--latex")[1].out.isascii()

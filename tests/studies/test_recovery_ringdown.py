@@ -204,7 +204,12 @@ def test_decays_over_pressure_give_the_gas_law(tmp_path, ask):
 
 
 @pytest.mark.parametrize(
-    ("kind", "word"), [("cubic", "cubic stiffness"), ("crosstalk", "Interference"), ("drift", "drifts with time")]
+    ("kind", "word"),
+    [
+        pytest.param("cubic", "cubic stiffness", marks=pytest.mark.slow),
+        ("crosstalk", "Interference"),
+        ("drift", "drifts with time"),
+    ],
 )
 def test_decays_of_an_independent_generator_are_named_and_fitted(tmp_path, kind, word):
     """A shift of 6.6 line widths of an ellipse, a drive that leaks into the pick-offs, a drift: no interval misses by twice its width."""
