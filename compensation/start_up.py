@@ -4,6 +4,7 @@ import cmath
 import math
 from collections import deque
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +31,7 @@ class StartUp:
     ready: float
 
 
+@lru_cache(maxsize=32)
 def start_up(tau: float, loops: Loops, *, headroom: float = 20.0, offset: float = 0.0) -> StartUp:
     """Start the vibration from almost nothing, a quarter cycle off: nothing is linearised here.
 
@@ -59,7 +61,7 @@ def start_up(tau: float, loops: Loops, *, headroom: float = 20.0, offset: float 
         seen += smoothing * (Z - seen)
         size, phase = abs(seen), math.atan2(seen.imag, seen.real)
         wanted = K_a * (1 - size) + drive_integral
-        given = min(max(wanted, 0.0), most)
+        given = 0.0 if wanted < 0 else most if wanted > most else wanted
         if wanted == given:  # the integral waits while the drive is at its limit
             drive_integral += I_a * T * (1 - size)
         nu = K_p * phase + phase_integral

@@ -132,7 +132,11 @@ REFUSED = {
 }
 
 
-SLOW = "trim free-dome --split 0.5 --axis 3 --cut edge"
+SLOW = (
+    "trim free-dome --split 0.5 --axis 3 --cut edge",
+    "derive --harmonic 12 --rim-angle-deg 0.001",
+    "derive --rim-angle-deg 1e-9",
+)
 
 
 @pytest.fixture(scope="module")
@@ -159,7 +163,7 @@ def given(tmp_path_factory, pytestconfig):
     }
 
 
-@pytest.mark.parametrize("words", [pytest.param(w, marks=[pytest.mark.slow] * (w == SLOW)) for w in REFUSED])
+@pytest.mark.parametrize("words", [pytest.param(w, marks=[pytest.mark.slow] * (w in SLOW)) for w in REFUSED])
 def test_it_is_refused_in_one_message(words, given, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "file").write_text("")
