@@ -189,6 +189,15 @@ class ClosedLoop:
         state[kept] = np.linalg.solve(left, F[np.ix_(kept, given)] @ state[given])
         return state
 
+    def walk(self, channel: str) -> float:
+        """Return the random walk (1/√s) of a command's integral: white noise of density S(0), which means over long times show."""
+        F, noise = self.sample
+        kept, place = self.kept, self.places["sum"].start + CHANNELS.index(channel)
+        answer = np.zeros(self.size)  # of the command's sum to what enters the state once
+        answer[place] = 1.0
+        answer[kept] = np.linalg.solve((np.eye(len(kept)) - F[np.ix_(kept, kept)]).T, F[place, kept])
+        return float(np.sqrt(answer @ noise @ answer * self.loops.step))
+
     def answer_step(self, channel: str, samples: int, count: int) -> tuple[Array, Array]:
         """Return times (s) and what a channel commands against a forcing of 1 that sets in at 0, every `samples` samples."""
         at, k = self.places, CHANNELS.index(channel)

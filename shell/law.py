@@ -201,6 +201,7 @@ class FrequencyLaw:
     def _check(self, temperature: ArrayLike) -> Array:
         T = np.asarray(temperature, dtype=float)
         if T.size and not (T.min() >= self.lowest - 1e-6 and T.max() <= self.highest + 1e-6):
+            self.material.check(T)
             raise ShellError(
                 f"the resonator reaches {T.min() - zero_Celsius:.2f} to {T.max() - zero_Celsius:.2f} °C, but its frequency"
                 f" is known from {self.lowest - zero_Celsius:.2f} to {self.highest - zero_Celsius:.2f} °C only."

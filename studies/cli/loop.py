@@ -107,8 +107,8 @@ def _describe(study: LoopStudy) -> dict[str, Any]:
         "settled": study.settled,
         "bias": [row_of(s, source="name", deg_per_h="bias", sd_deg_per_h="sd") for s in study.sources],
         "noise": [
-            {"source": name, "deg_per_h_over_1s": one, "deg_per_rt_h": walk}
-            for name, (one, walk) in study.noise.items()
+            {"source": name, "deg_per_h_over_1s": one, "deg_per_rt_h": walk, "angle_arcsec": angle}
+            for name, (one, walk, angle) in study.noise.items()
         ],
         "margins": [
             row_of(m, "loop", crossover_Hz="crossover", phase_margin_deg=("phase", degrees(1)), reversal_Hz="reversal")

@@ -71,8 +71,8 @@ def loop_parts(study: LoopStudy, payload: dict[str, Any], run: Record | None) ->
         ]),
         Chapter("Rate noise", [
             Table("Rate noise by source", named("noise"),
-                "name: source | deg_per_h_over_1s: 1 s average (°/h) .3 | deg_per_rt_h: angle random walk (°/√h) .3g",
-                "Standard deviations; the angle random walk is taken from 100 s averages."),
+                "name: source | deg_per_h_over_1s: 1 s average (°/h) .3 | deg_per_rt_h: angle random walk (°/√h) .3g | angle_arcsec: angle white noise (″) .3g",
+                "Standard deviations. Over t the rate scatters by √(N²/t + 2Q²/t²): N, the angle random walk, is white noise of the rate, Q of the angle (IEEE 952)."),
             Figure(lambda: _noise(study), "Noise of the averaged rate: white angle noise falls as 1/t, white rate noise as 1/√t."),
         ]),
         Chapter("Stability and range", [
@@ -107,7 +107,7 @@ def _facts(study: LoopStudy, payload: dict[str, Any]) -> list[tuple[str, str, st
     total, noise = study.sources[-1], payload["noise"]
     largest = max(study.sources[:-1], key=lambda one: one.sd).name
     single = [one for one in noise if one["source"] != "all"]
-    loudest = max(single, key=lambda one: one["deg_per_h_over_1s"])["source"] if single else ""
+    loudest = max(single, key=lambda one: one["deg_per_rt_h"])["source"] if single else ""
     margins = payload["margins"]
     phase, gain = (min(m[key] for m in margins) for key in ("phase_margin_deg", "gain_margin_dB"))
     near = [
@@ -117,7 +117,7 @@ def _facts(study: LoopStudy, payload: dict[str, Any]) -> list[tuple[str, str, st
     ]
     return [
         ("Bias", f"{' ± '.join(to_error(total.bias, total.sd))} °/h", f"largest uncertainty: {NAMES.get(largest, largest)}"),
-        ("Angle random walk", f"{noise[-1]['deg_per_rt_h']:.3g} °/√h", f"largest source over 1 s: {NAMES.get(loudest, 'none')}"),
+        ("Angle random walk", f"{noise[-1]['deg_per_rt_h']:.3g} °/√h", f"largest source: {NAMES.get(loudest, 'none')}; angle white noise {noise[-1]['angle_arcsec']:.3g}″"),
         ("Smallest margins", f"{phase:.0f}°, {gain:.0f} dB", f"{' and '.join(near)} loop{'s' * (len(near) > 1)}"),
         ("Start-up", f"{study.start.ready:.3g} s", f"phase locked after {study.start.locked:.2g} s"),
     ]  # fmt: skip

@@ -70,7 +70,7 @@ class BiasSlope:
 
 @dataclass(frozen=True)
 class LoopStudy:
-    """What the loops of a card are like at one temperature; `noise` by source: deg/h over 1 s, deg/√h over 100 s."""
+    """What the loops of a card are like at one temperature; `noise` by source: deg/h over 1 s, walk (deg/√h) and white noise (arcsec) of the angle."""
 
     instrument: Instrument
     frequency: float
@@ -81,7 +81,7 @@ class LoopStudy:
     loops: Loops
     settled: dict[str, float]
     sources: tuple[BiasSource, ...]
-    noise: dict[str, tuple[float, float]]
+    noise: dict[str, tuple[float, float, float]]
     margins: tuple[Margin, ...]
     start: StartUp
     use: RangeUse
@@ -116,8 +116,8 @@ def study_loops(
         _close(instrument, wave, electronics, loops).require_stable()
         start = start_up(1 / decay, loops, headroom=loop.drive_headroom, offset=2 * np.pi * loop.start_offset_Hz)
         noise = {
-            name: (float(over[0]), float(over[1]) * 10 / 60)
-            for name, over in _noise(instrument, wave, electronics, loops, (1.0, 100.0)).items()
+            name: (float(over[0]), walk / 60, float(np.sqrt(max((100 * over[1]) ** 2 - 100 * walk**2, 0.0) / 2)))
+            for name, (walk, over) in _noise(instrument, wave, electronics, loops, (1.0, 100.0)).items()
         }
     settled = settled_columns(instrument, np.array([frequency]), np.array([inverse_q]), bryan_factor)
     return LoopStudy(
@@ -139,7 +139,8 @@ def study_loops(
 
 def noise_over(study: LoopStudy, seconds: tuple[float, ...]) -> dict[str, Array]:
     """Return the standard deviation (deg/h) of means of the rate over these times, by source and of all."""
-    return _noise(study.instrument, study.wave, study.electronics, study.loops, seconds)
+    found = _noise(study.instrument, study.wave, study.electronics, study.loops, seconds)
+    return {name: over for name, (_, over) in found.items()}
 
 
 def answer_steps(study: LoopStudy, points: int = 300) -> dict[str, tuple[Array, Array]]:
@@ -233,26 +234,25 @@ def _close(instrument: Instrument, wave: StandingWave, electronics: Electronics,
 
 def _noise(
     instrument: Instrument, wave: StandingWave, electronics: Electronics, loops: Loops, seconds: tuple[float, ...]
-) -> dict[str, Array]:
-    """Standard deviation (deg/h) of means of the rate over these times, of each source that there is and of all."""
+) -> dict[str, tuple[float, Array]]:
+    """Of each source and of all: the walk N of the angle (deg/h √s), the standard deviation (deg/h) of means of the rate over t.
+
+    σ² = N²/t + 2 Q²/t²: rate that is white, as of forces, and angle that is white at both ends, as of readings (IEEE 952's N, Q).
+    """
     there = [name for name in NOISES if getattr(electronics.noise, name) > 0]
-    found = {}
+    found, t = {}, np.array(seconds)
     for label, names in (*((name, (name,)) for name in there), ("all", NOISES)):
         only = LoopNoise(**{name: getattr(electronics.noise, name) for name in names})
         if require_loop(instrument).mode == "whole-angle":
-            spread = [_free_spread(wave, only, loops, one) for one in seconds]
+            # forces across the wave walk, readings at both ends scatter
+            walk = float(np.hypot(only.thermal, np.sqrt(only.command_variance(loops.sampling) / loops.sampling)))
+            reading = only.measurement_variance(loops.sampling) * loops.smoothing / (2 - loops.smoothing)
+            spread = np.sqrt(walk**2 / t + 2 * reading / t**2)
         else:
-            held = replace(electronics, noise=only)
-            spread = _held_spread(_close(instrument, wave, held, loops), seconds)
-        found[label] = np.array(spread) / wave.coupling * DEG_PER_H
+            held = _close(instrument, wave, replace(electronics, noise=only), loops)
+            walk, spread = held.walk("rate"), np.array(_held_spread(held, seconds))
+        found[label] = walk / wave.coupling * DEG_PER_H, spread / wave.coupling * DEG_PER_H
     return found
-
-
-def _free_spread(wave: StandingWave, noise: LoopNoise, loops: Loops, seconds: float) -> float:
-    """Spread of the mean turn ψ̇ (1/s) of a free wave: forces across it walk, readings at both ends scatter."""
-    walk = noise.thermal**2 + noise.command_variance(loops.sampling) / loops.sampling
-    reading = noise.measurement_variance(loops.sampling) * loops.smoothing / (2 - loops.smoothing)
-    return float(np.sqrt(walk / seconds + 2 * reading / seconds**2))
 
 
 def _held_spread(loop: ClosedLoop, lengths: tuple[float, ...]) -> list[float]:

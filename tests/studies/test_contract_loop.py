@@ -76,6 +76,24 @@ def test_noise_of_a_free_wave_is_what_its_run_shows(card, tmp_path, ask):
     assert np.std(read_record(out)["bias_deg_per_h"]) == pytest.approx(one, rel=0.06)
 
 
+def test_limits_white_pickoff_noise_is_no_walk_of_the_angle(ask):
+    """A reading e (1/√Hz) costs the force e √(1/τ² + Δω² cos² φ + ¼Δω² sin² φ), φ = 2n(θ − θ_ω): decay, quadrature left, phase; the DAC's walks as it is."""
+    card, found = load_card("hrg-30mm-loops"), ask(["loop", "hrg-30mm-loops"])
+    loop, coupling = card.loop, 2 * found["bryan_factor"]
+    decay = np.pi * found["frequency_Hz"] / found["quality_factor"]
+    phi = np.radians(4 * (card.bias.pattern_angle_deg - loop.frequency_axis_deg))
+    split = 2e-3 * np.pi * loop.frequency_split_mHz * np.hypot(np.cos(phi), np.sin(phi) / 2)
+    reading = 1e-6 * loop.pickoff_noise_uV_per_rt_Hz * np.hypot(decay, split)
+    force = coupling * np.radians(loop.rate_range_deg_per_s) * 2 / 2**loop.dac_bits / np.sqrt(12 * loop.sampling_Hz)
+    said = {noise["source"]: noise for noise in found["noise"]}
+    for source, walk in (("pickoff", reading), ("dac_step", force)):
+        assert said[source]["deg_per_rt_h"] == pytest.approx(np.degrees(walk / coupling) * 60, rel=0.01), source
+    # over 1 s the angle's white noise at both ends: 2 Q²
+    assert said["pickoff"]["angle_arcsec"] == pytest.approx(said["pickoff"]["deg_per_h_over_1s"] / 2**0.5, rel=0.01)
+    whole = np.hypot.reduce([noise["angle_arcsec"] for source, noise in said.items() if source != "all"])
+    assert said["all"]["angle_arcsec"] == pytest.approx(whole, rel=1e-3)
+
+
 def test_a_profile_drives_the_resonator_not_its_reading(card, tmp_path):
     """What the loops read is the resonator, not what they have read already."""
     path, out = card("pickoff_phase_deg = 3.0\n"), tmp_path / "run.csv"

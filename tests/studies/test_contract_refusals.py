@@ -97,6 +97,7 @@ REFUSED = {
     "tcf": "CARD is missing",
     "tcf hrg-30m": "hrg-30mm",
     "tcf hrg-30mm --from -300 --theory shell": "outside the range",
+    "loop hrg-30mm-loops --temperature 300": "300 °C is outside the range of fused-silica, law 'spinner' (-60 to 150 °C)",
     "loads hrg-30mm --rotation 1e14": "a relative shift of f of 4.11e+15; the theory is linear",
     "loads hrg-30mm --across 1e8": "MPa; the theory is linear and does not hold from 7.26e+03 MPa up",
     "simulate free-dome 'soak 20 1h' --out run.csv --row 1e-300": "make 3.6e+297 million rows",
