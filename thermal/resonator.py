@@ -33,6 +33,8 @@ class HeatPath:
     mount_exchange: float  # base to housing, exchange area in m²
     chamber_conductance: float  # housing to chamber, W/K
     drive_power: float = 0.0  # heat of the vibration, W, spread evenly over the shell's volume
+    second_mass: float = 0.0  # J/K, of a part that hangs on the base
+    second_mass_conductance: float = 0.0  # base to that part, W/K
 
     def __post_init__(self) -> None:
         if not 0 <= self.emissivity <= 1:
@@ -64,6 +66,8 @@ def describe_resonator(path: HeatPath) -> list[Part]:
     ]
     if path.mount_exchange:
         parts.append(Radiator("housing", "base", path.mount_exchange))
+    if path.second_mass:
+        parts += [Node("mass", path.second_mass), Conductor("base", "mass", path.second_mass_conductance)]
     if path.drive_power:
         share = path.cells.volume / path.cells.volume.sum()
         names = cell_names(path.cells.count)

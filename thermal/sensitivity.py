@@ -142,7 +142,7 @@ class _Slopes:
         fading = self.departing * self._faded(swept.grid.moments)[:, :, None] @ modes.shapes.T
         feedback = self._feedback()
         forcing += np.concatenate([fading, held], axis=3) @ feedback
-        self.slope, self.rate = swept.grid.answer_with(forcing, feedback[:, :, :n], start)
+        self.modes, self.mode_rates = swept.grid.answer_with(forcing, feedback[:, :, :n], start)
 
     def _faded(self, time: Array) -> Array:
         """What is left of the modes since the start, (..., n)."""
@@ -186,12 +186,13 @@ class _Slopes:
 
     def at(self, rows: Array, weights: Array) -> tuple[Array, Array]:
         """Sums over the nodes at the rows, (changes, M, sums), and their rates."""
-        both = hermite(self.swept.grid, rows, self.slope @ weights.T, self.rate @ weights.T)
-        slope, rate = (np.moveaxis(own, 1, 0) for own in both)
         modes = self.swept.grid.modes
+        sums = (weights @ modes.shapes).T
+        both = hermite(self.swept.grid, rows, self.modes @ sums, self.mode_rates @ sums)
+        slope, rate = (np.moveaxis(own, 1, 0) for own in both)
         for k, begin in enumerate(self.departing):
             if begin.any():
-                seen, left = begin[:, None] * (weights @ modes.shapes).T, self._faded(rows)
+                seen, left = begin[:, None] * sums, self._faded(rows)
                 slope[k] += left @ seen
                 rate[k] -= left @ (seen / modes.time_constants[:, None])
         return slope, rate

@@ -29,10 +29,15 @@ SWEEP_TOLERANCE = 1e-7  # K
 LONGEST_ROW = 60.0  # s, between which what radiation adds is a parabola
 MEAN_LINE = np.array([[2.0, 2.0, -1.0], [-1.0, 2.0, 2.0]])[:, :, None, None] / 3
 """Both ends of the straight line of a parabola's mean, from its values at start, middle and end."""
+PROMPT = 0.1  # of an interval, within which a mode fades
 INTERVALS = 32  # solved together: their matrices stay in the cache
 FEW_CORNERS = 20  # of a profile after whose corners knots are closer, where they are closer than usual everywhere
 SOON, CLOSER = 96, 4  # usual distances over which they are, and how much: a parabola is far from what begins there
 MOST_CORNERS = 200  # of profiles whose every corner is a knot; a measured column of more rows is averaged for δ
+
+
+class SweepError(ThermalError):
+    """Radiation is too strong for the sweeps to converge."""
 
 
 @dataclass(frozen=True)
@@ -85,25 +90,30 @@ class Grid:
         return np.array([x[:-1], decay2[:, None] * x[:-1] + half, x[1:]])
 
     def answer_with(self, power: Array, feedback: Array, start: Array) -> tuple[Array, Array]:
-        """Temperatures and rates where the power is itself `power` + T · `feedback`, (3, K, n, n): in every interval three moments at once."""
-        shapes, n = self.modes.shapes, start.shape[1]
-        u, (decay, weights), now = power @ shapes, self._weights, (start * self.modes.capacity) @ shapes
-        forced, x, gain = self._forced(u), np.empty_like(u), np.empty_like(u)
+        """Amplitudes of the modes and their rates where the power is itself `power` + T · `feedback`, (3, K, n, n): in every interval three moments at once.
+
+        Modes that fade `PROMPT`ly are fed by the slow ones; what they feed back is of second order, 1e-6 of a slope.
+        """
+        shapes, (decay, weights) = self.modes.shapes, self._weights
+        u, start = power @ shapes, (start * self.modes.capacity) @ shapes
+        n = int(np.sum(self.modes.time_constants > PROMPT * self.length.max()))
+        x, gain, forced, now = np.empty_like(u), np.empty_like(u), self._forced(u)[..., :n], start[:, :n]
         for first in range(0, u.shape[1], INTERVALS):
             at = slice(first, first + INTERVALS)
-            F = shapes.T @ feedback[:, at] @ shapes
+            F = shapes[:, :n].T @ feedback[:, at] @ shapes
             # x_h = decay_h x_0 + Σ_j w_hj (u_j + x_j F_j) of h = half, whole; x_1 and x_2 by x_0 and by what is forced
-            own = weights[:, :, at, None] * F
+            own = weights[:, :, at, None, :n] * F[..., :n]
             matrix = np.eye(2 * n) - np.concatenate([np.concatenate([*own[:, j]], axis=-1) for j in (1, 2)], axis=-2)
-            begin = np.concatenate([*(own[:, 0] + decay[:, at, None] * np.eye(n))], axis=-1)
+            begin = np.concatenate([*(own[:, 0] + decay[:, at, None, :n] * np.eye(n))], axis=-1)
             right = np.concatenate([begin, np.concatenate([*forced[:, at]], axis=-1)], axis=-2)
             both = np.linalg.solve(matrix.swapaxes(-1, -2), right.swapaxes(-1, -2)).swapaxes(-1, -2)
             for k, step in enumerate(both, first):
                 after = now @ step[:n] + step[n:]
-                x[:, k] = now, after[:, :n], after[:, n:]
+                x[:, k, :, :n] = now, after[:, :n], after[:, n:]
                 now = after[:, n:]
-            gain[:, at] = u[:, at] + x[:, at] @ F
-        return x @ shapes.T, (gain - x / self.modes.time_constants) @ shapes.T
+            gain[:, at] = u[:, at] + x[:, at, :, :n] @ F
+        x[..., n:] = self._states(gain, start)[..., n:]
+        return x, gain - x / self.modes.time_constants
 
 
 @dataclass(frozen=True)
@@ -136,20 +146,6 @@ class Sweep:
         return Transient(self.first.nodes, self.first.knots, evaluate)
 
 
-def simulate(network: Network, boundaries: Mapping[str, Profile], initial: ArrayLike | None = None) -> Transient:
-    """Propagate exactly where the network is linear, else sweep."""
-    return (propagate if network.is_linear else sweep)(network, boundaries, initial)
-
-
-def step_remaining(network: Network, before: float, after: float, weights: Array, time: ArrayLike) -> Array:
-    """Share of a step of all boundaries from `before` to `after` (K) that a mean over nodes lacks, `time` (s) after it."""
-    time = np.asarray(time, dtype=float)
-    profile = Profile(np.array([0.0, 0.0, time.max()]), np.array([before, after, after]))
-    transient = simulate(network, {boundary.name: profile for boundary in network.boundaries})
-    left: Array = (transient.observe(time, weights[None, :])[:, 0] - after) / (before - after)
-    return left
-
-
 def sweep(network: Network, boundaries: Mapping[str, Profile], initial: ArrayLike | None = None) -> Transient:
     """Follow profiles through a network with radiation, or capacities that depend on temperature (see the module)."""
     return run_sweeps(network, boundaries, initial).transient()
@@ -171,17 +167,21 @@ def run_sweeps(
     start = np.zeros((1, network.count))
     moments = grid.moments
     T1 = np.array([first.evaluate(t) for t in moments])
-    T = T1
-    for _ in range(MOST_SWEEPS):
+    T, delta, rate = T1, np.zeros_like(T1), np.zeros_like(T1)
+    for _ in range(MOST_SWEEPS if not network.is_linear else 0):
         beyond = _beyond(network, linear, T, held, power)[:, :, None]
         delta = grid.answer(beyond, start)[:, :, 0]
         last, T = T, T1 + delta
         change = np.abs(T - last).max()
         if change < SWEEP_TOLERANCE:
-            return Sweep(network, linear, grid, held, power, T, delta, grid.rates(beyond, start)[:, :, 0], first)
-        if not change < 1e4:
+            rate = grid.rates(beyond, start)[:, :, 0]
             break
-    raise ThermalError("the radiation is too strong to be followed; take a profile of temperatures closer together.")
+        if not change < 1e4:
+            raise SweepError("the radiation is too strong to be swept; integrate the network instead.")
+    else:
+        if not network.is_linear:
+            raise SweepError("the radiation is too strong to be swept; integrate the network instead.")
+    return Sweep(network, linear, grid, held, power, T, delta, rate, first)
 
 
 def _beyond(network: Network, linear: Network, T: Array, held: Array, power: Array) -> Array:

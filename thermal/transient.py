@@ -62,7 +62,7 @@ def propagate(network: Network, boundaries: Mapping[str, Profile], initial: Arra
     Modes x = shapesᵀ C T obey dx/dt = −λ x + u₀ + u₁ s: x = u₀/λ − u₁/λ² + (u₁/λ) s + c e^(−λ s) after a corner.
     """
     if not network.is_linear:
-        raise ThermalError("exact only without radiation and with constant capacities; linearise the network or sweep it.")  # fmt: skip
+        raise ThermalError("exact only without radiation and with constant capacities; linearise the network or integrate it.")  # fmt: skip
     knots = find_corners(network, boundaries)
     modes = find_relaxation(network, 1.0)  # a linear network has the same modes at every temperature
     rate, shapes = 1 / modes.time_constants, modes.shapes

@@ -17,9 +17,9 @@ from studies.simulation.chamber import check_profile, load_profile
 from studies.simulation.heat_path import build_network, build_shell_and_stem
 from thermal.network import Network
 from thermal.profile import Profile
+from thermal.radiative import simulate
 from thermal.relaxation import find_relaxation, time_constant_sensitivities
 from thermal.resonator import shell_weights
-from thermal.sweeping import simulate
 from thermal.transient import Transient, check_energy
 
 

@@ -13,7 +13,7 @@ from studies.diagnosis.verdict import NINETY, Cause, Interval, same_cause, weigh
 from studies.effects import library
 from studies.effects.effect import UNITS
 from studies.inference.generic_forms import offsets
-from studies.inference.heat_path import DIRECT, LAGS, SENSOR
+from studies.inference.heat_path import DIRECT, LAGS, MASS, SENSOR
 from studies.inference.inferred import Inferred
 from studies.inference.model import Background, Term
 from studies.inference.records import REFERENCE, settle
@@ -51,9 +51,6 @@ def _cause(found: Inferred, k: int) -> Cause:
         name = rival.terms[-1].effect.name
         best[name] = max(best.get(name, -np.inf), rival.score)
     members, probability = weigh(list(best), list(best.values()), outcome.without[k].score, found.unknown[k])
-    left = found.left[term.response]
-    if left.significant and 0.0 < left.share < CONSTANTS["believed"]:
-        probability *= left.share  # whatever made the larger rest may have made this too
     exact = term.effect.equivalents.get(term.response, ())
     names = list(dict.fromkeys([term.effect.name, *members, *exact]))
     for judge in (one for one in library().values() if one.judge == REFERENCE and term.response in one.sizes):
@@ -180,7 +177,10 @@ def _path_causes(found: Inferred) -> list[Cause]:
     peak = float(np.ptp(np.concatenate([before - after for before, after in pairs])))
     causes, names = [], {effect.card_key: effect.name for effect in library().values()}
     if path.lags > 1:
-        numbers = {key: Interval.about(*path.value(f"law.{key}")) for key in LAGS[: path.lags]}
+        keys = MASS if found.card.polynomial is None else [f"law.{key}" for key in LAGS[: path.lags]]
+        numbers = {key.partition(".")[2]: Interval.about(*path.value(key)) for key in keys}
+        if keys is MASS:
+            numbers["second_time_constant_s"] = Interval.about(*path.value(*MASS))
         causes.append(
             Cause(names[f"law.{LAGS[1]}"], name, probability, (), numbers, evidence, peak=peak, together=True)
         )

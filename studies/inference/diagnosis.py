@@ -26,20 +26,21 @@ from studies.inference.heat_path import (
     FREQUENCY,
     WORTH,
     HeatPath,
-    evidence_of,
+    effects_would_bring,
     find_heat_path,
     is_ahead,
     lags_would_bring,
     slow_share,
+    with_second_mass,
 )
 from studies.inference.held_out import Kept, Model, Rows
-from studies.inference.housing import set_housing_apart
+from studies.inference.housing import evidence_of, set_housing_apart
 from studies.inference.inferred import Inferred
 from studies.inference.lack_of_fit import generic_bank, is_rounding, look
 from studies.inference.model import Background, Linear
 from studies.inference.pursuit import Pursuit, on_all_rows
 from studies.inference.records import Campaign
-from studies.inference.search import MARGIN, SUSPICIOUS, Outcome, Search
+from studies.inference.search import FURTHER, MARGIN, SUSPICIOUS, Outcome, Search
 from studies.inference.sharp import RESOLVED, fast_line, longest_resolved
 from studies.inference.signatures import Signatures
 from studies.inference.verdict import judge
@@ -175,28 +176,28 @@ def blocks_of(records: Sequence[Record]) -> int:
 def infer(card: "Instrument", campaign: Campaign, progress: Report = lambda _: None) -> Inference:
     """Find what records say of a card and of effects that it lacks."""
     progress("calibration without effects")
-    found, apart = fit_explained(build_problem(card, campaign.records), progress)
-    found, told = set_housing_apart(found)
+    whole, apart = fit_explained(build_problem(card, campaign.records), progress)
+    found = set_housing_apart(whole)
     campaign = replace(campaign, notes=(*campaign.notes, *apart))
     problem = found.problem
-    path = None
-    if card.polynomial is None:
-        search, outcome = Pursuit(found, told, progress).outcome()
-    else:
-        path, search, outcome = _with_heat_path(found, told, progress)
+    path, search, outcome = _with_heat_path(whole, found, progress)
     values = len(problem.priors.values)
-    if card.polynomial is None and np.abs(problem.priors.standard(found.point[:values])).max(initial=0.0) > FAR:
+    if (
+        card.polynomial is None
+        and path is None
+        and np.abs(problem.priors.standard(found.point[:values])).max(initial=0.0) > FAR
+    ):
         # values may have gone far to do what an effect does: look from the card as shipped too
         progress("again from the card's own values")
         state = problem.evaluate(np.zeros(problem.count))
         noise = residual_noise(problem, problem.rows, state)
-        pursuit = Pursuit(replace(found, state=state, noise=noise, rows=problem.rows), told, progress)
+        pursuit = Pursuit(replace(found, state=state, noise=noise, rows=problem.rows), progress)
         there = pursuit.outcome(on_all_rows(search, outcome.final) - BEATEN)
         search, outcome = max((there, (search, outcome)), key=lambda found: on_all_rows(found[0], found[1].final))
     # one lag in its own noise: in that of a longer path its straight lines lead out of the world
     alone = outcome.plain.noise if path is None else found.noise
     paths = search.signatures.there(found.point) if path is None else Signatures.at(problem, found.point)
-    plain = Model(Linear.of(found, told), paths, (), alone)
+    plain = Model(Linear.of(found), paths, (), alone)
     shipped = {name: rows.rms for name, rows in plain.residuals(Kept(np.zeros(problem.count), ())).items()}
     calibrated, blocks = plain.residuals(Kept(found.point, ())), found.state.residual
     if path is not None:
@@ -219,20 +220,24 @@ def infer(card: "Instrument", campaign: Campaign, progress: Report = lambda _: N
     )
 
 
-def _with_heat_path(found: CardFit, told: Array | None, progress: Report) -> tuple[HeatPath | None, Search, Outcome]:
-    """Search beside one lag, beside several where one leaves slow noise of which others would take something, and beside a late sensor; the likelier heat path stays."""
-    own = Pursuit(found, told, progress)
-    other = slow_share(found) > SUSPICIOUS and lags_would_bring(own.search) > WORTH
-    path = find_heat_path(found, None if other else 1, progress) if other or is_ahead(found) else None
+def _with_heat_path(whole: CardFit, found: CardFit, progress: Report) -> tuple[HeatPath | None, Search, Outcome]:
+    """Search beside the path of the card, or one lag, and where that leaves slow noise of which other lags would take something, or the sensor is late, beside a longer one; the likelier heat path stays."""
+    own, given, path = Pursuit(found, progress), whole.problem.instrument.polynomial is None, None
+    bring = lags_would_bring(own.search) if slow_share(found) > SUSPICIOUS else -np.inf
+    if given and bring > WORTH and bring > effects_would_bring(own.search):
+        path = with_second_mass(whole, progress)
+    elif not given and (bring > WORTH or is_ahead(found)):
+        path = find_heat_path(found, None if bring > WORTH else 1, progress)
     if path is None or not path.departs:
         return (None, *own.outcome())
     progress(f"effects beside a heat path with {path.lags} time constants")
-    there, grown = Pursuit(path.fit, told, progress).outcome()
-    score = on_all_rows(there, grown.final) + path.price
-    search, outcome = own.outcome(score - BEATEN)
-    gain, lead = score - evidence_of(found), score - on_all_rows(search, outcome.final)
+    there, grown = Pursuit(path.fit, progress).outcome()
+    score = on_all_rows(there, grown.final) + path.fit.apart + path.price
+    search, outcome = own.outcome(score - found.apart - BEATEN)
+    gain, lead = score - evidence_of(found), score - found.apart - on_all_rows(search, outcome.final)
     levels = with_levels(search, outcome.plain, FREQUENCY).score - outcome.plain.score
-    if lead < MARGIN or levels > gain + MARGIN:
+    needed = MARGIN + given * FURTHER * sum(term.brought for term in outcome.final.terms if term.response == FREQUENCY)
+    if lead < needed or levels > gain + MARGIN:
         return None, search, outcome
     return replace(path, evidence=gain, lead=lead), there, grown
 
@@ -304,7 +309,7 @@ def _left_out(search: Search, outcome: Outcome, gone: int) -> Outcome:
     for k in range(len(outcome.final.terms)):
         if k != gone:
             others = tuple(t for j, t in enumerate(outcome.final.terms) if j not in (k, gone))
-            base = search.settle(others, outcome.final.noise) if others else outcome.plain
+            base = search.beside(others, outcome.plain, outcome.final.noise)
             drop = outcome.without[k].score - base.score
             without.append(base)
             rivals.append(tuple(replace(h, evidence=h.evidence - drop) for h in outcome.rivals[k]))

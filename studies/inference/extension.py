@@ -10,6 +10,7 @@ from studies.diagnosis.verdict import Interval
 from studies.effects import Effect, Parameter
 from studies.inference.causes import parameters_of
 from studies.inference.diagnosis import Inference
+from studies.inference.heat_path import MASS
 from studies.inference.model import Term
 from studies.record import Record
 
@@ -28,9 +29,11 @@ def extend(found: Inference, progress: Callable[[str], None] = lambda words: Non
     progress("calibrating the extended card")
     named = [entry_of(found, k) for k, term in enumerate(found.final.terms) if not term.effect.once]
     card = found.card
-    if card.polynomial is not None:  # begin in the valley that was found: what is known beforehand is wide
+    if found.path is not None or card.polynomial is not None:
+        # begin in the valley that was found: what is known beforehand is wide
         priors = found.search.linear.problem.priors
-        card = card.with_values(priors.at(found.numbers.point[: len(priors.values)]))
+        at = priors.at(found.numbers.point[: len(priors.values)])
+        card = card.with_values({name: at[name] for name in (MASS if card.polynomial is None else at)})
     card = card.with_table("effect", [*card.content.get("effect", []), *named])
     return calibrate(card, without_events(found), profile=False, progress=progress, keep=False)
 

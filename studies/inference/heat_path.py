@@ -1,4 +1,4 @@
-"""A heat path longer than one lag, of a gyro without a card: lumps in series, with radiation along and past them, as a card of its own."""
+"""A heat path longer than one lag, as a card of its own: without one, lumps in series with radiation along and past them; of a card, its own with a second mass on the base."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -10,10 +10,12 @@ from studies.calibration.fit import CardFit, fit
 from studies.calibration.priors import gather_priors
 from studies.calibration.problem import CardProblem
 from studies.inference.generic_forms import any_lags
-from studies.inference.model import PRICE, Background, Linear
-from studies.inference.search import Hypothesis, Search
+from studies.inference.housing import evidence_of, set_housing_apart
+from studies.inference.model import PRICE, Linear
+from studies.inference.search import Hypothesis, Search, Shapes
 from studies.inference.signatures import SHARE, Signatures
 from studies.instrument.card import Instrument
+from studies.simulation.heat_path import build_network, slowest_lag
 from studies.simulation.variations import LAG
 
 Array = NDArray[np.float64]
@@ -41,6 +43,9 @@ OF_LUMPS = {
 """The same of what lumps have besides, where plain lags in series leave slow noise."""
 SENSOR, LATENESS = LAG, {"value": 5.0, "sd": 20.0}
 """The sensor of the housing, and what is known of its lag (s) where the resonator is ahead of it."""
+MASS = ("thermal.second_mass_J_per_K", "thermal.second_mass_conductance_W_per_K")
+MASS_SHARE = 0.2
+"""Of the heat capacity of the base, about which the prior of a second mass is centred, as slow as the path itself."""
 WORTH = 10.0
 """Log evidence that one more lag must bring."""
 FOLLOWED = 3.0
@@ -60,10 +65,9 @@ class HeatPath:
 
     @property
     def lags(self) -> int:
-        """How many there are."""
+        """How many there are, or stand out: the resonator's and the second mass's."""
         law = self.card.polynomial
-        assert law is not None
-        return len(law.lags)
+        return 2 if law is None else len(law.lags)
 
     @property
     def price(self) -> float:
@@ -78,22 +82,43 @@ class HeatPath:
     @property
     def radiates(self) -> bool:
         """Whether the share is above 0 beyond its error."""
-        share, sd = self.value(SHARE)
-        return share > SURE_SHARE * sd
+        return self._is_sure(SHARE)
 
     @property
     def is_late(self) -> bool:
         """Whether the sensor of the housing is slow beyond its error."""
-        late, sd = self.value(SENSOR) if SENSOR in self.fit.problem.priors.names else (0.0, 1.0)
-        return late > SURE_SHARE * sd
+        return self._is_sure(SENSOR)
 
-    def value(self, name: str) -> tuple[float, float]:
-        """Return a value of the card and its standard deviation."""
+    def _is_sure(self, name: str) -> bool:
+        """Whether a value that no card of a user states is above 0 beyond its error."""
+        if self.card.polynomial is None or name not in self.fit.problem.priors.names:
+            return False
+        value, sd = self.value(name)
+        return value > SURE_SHARE * sd
+
+    def value(self, name: str, over: str = "") -> tuple[float, float]:
+        """Return a value of the card, or its ratio to another one, and its standard deviation."""
         priors, count = self.fit.problem.priors, len(self.fit.problem.priors.values)
-        slope = priors.slopes(self.fit.point[:count])
-        own = slope[priors.names.index(name)]
-        sd = float(np.sqrt(own @ self.fit.covariance[:count, :count] @ own))
-        return priors.at(self.fit.point[:count])[name], sd
+        slope, at = priors.slopes(self.fit.point[:count]), priors.at(self.fit.point[:count])
+        value, own = at[name], slope[priors.names.index(name)]
+        if over:
+            value, own = value / at[over], (own - value / at[over] * slope[priors.names.index(over)]) / at[over]
+        return value, float(np.sqrt(own @ self.fit.covariance[:count, :count] @ own))
+
+
+def with_second_mass(found: CardFit, progress: Callable[[str], None] = lambda _: None) -> HeatPath | None:
+    """Return a calibrated card with another part on its base, whose heat capacity and conductance are free, calibrated; None where it is no likelier."""
+    progress("a second mass on the base")
+    whole = found.problem
+    card, thermal = whole.instrument, whole.instrument.thermal
+    capacity = MASS_SHARE * thermal.base_heat_capacity_J_per_K
+    lag = slowest_lag(build_network(card), card.reference_temperature)
+    numbers = (capacity, capacity / lag)
+    added = {name.partition(".")[2]: {"value": one, "sd": one} for name, one in zip(MASS, numbers, strict=True)}
+    own = card.with_table("thermal", {**card.content.get("thermal", {}), **added})
+    there = fit(replace(whole, instrument=own, priors=gather_priors(own)), progress=progress)
+    path = HeatPath(own, set_housing_apart(there))
+    return path if evidence_of(there) + path.price > evidence_of(found) else None
 
 
 def with_lags(card: Instrument, lags: Sequence[float], lumps: bool, late: bool = False) -> Instrument:
@@ -151,11 +176,6 @@ def _linearised(found: CardFit) -> Search:
     return Search(Linear.of(found), Signatures.at(found.problem, found.point), found.noise, [])
 
 
-def evidence_of(found: CardFit) -> float:
-    """Log evidence of a calibrated card, no row taken for an outlier."""
-    return Background(Linear.of(found).on_all_rows, (), found.noise).evidence
-
-
 def is_ahead(found: CardFit) -> bool:
     """Whether the resonator is ahead of its sensor, by more than clocks and sensors usually make; without a delay, whether slow noise may be that."""
     priors = found.problem.priors
@@ -167,9 +187,16 @@ def is_ahead(found: CardFit) -> bool:
 
 def lags_would_bring(search: Search) -> float:
     """Log evidence that lags of any lengths and shares would bring in a linearised campaign: a heat path of any form, to first order."""
-    plain = Hypothesis((), search.noise, 0.0)
-    seen = search.scan(plain, search.shapes_of([(any_lags(search.signatures.span), FREQUENCY)]))
-    return max((one.gain for one in seen), default=-np.inf)
+    return _best(search, search.shapes_of([(any_lags(search.signatures.span), FREQUENCY)]))
+
+
+def effects_would_bring(search: Search) -> float:
+    """The same of the best effect on the frequency."""
+    return _best(search, [own for own in search.bank if own.response == FREQUENCY])
+
+
+def _best(search: Search, bank: Sequence[Shapes]) -> float:
+    return max((one.gain for one in search.scan(Hypothesis((), search.noise, 0.0), bank)), default=-np.inf)
 
 
 def slow_share(found: CardFit, name: str = FREQUENCY) -> float:

@@ -8,16 +8,17 @@ from numpy.typing import NDArray
 from studies.calibration.fit import CardFit
 from studies.calibration.observed import HOUSING, RESPONSES
 from studies.calibration.problem import State
+from studies.inference.model import Background, Linear
 
 Array = NDArray[np.float64]
 
 
-def set_housing_apart(found: CardFit) -> tuple[CardFit, Array | None]:
-    """Return the calibration of the other responses, and what the housing's rows tell of its coordinates, (q, p + 1); None without a chamber."""
+def set_housing_apart(found: CardFit) -> CardFit:
+    """Return the calibration of the other responses with what the housing's rows tell of its coordinates."""
     whole = found.problem
     problem = replace(whole, runs=tuple(run.explaining(RESPONSES) for run in whole.runs))
     if HOUSING not in whole.responses:
-        return replace(found, problem=problem), None
+        return replace(found, problem=problem)
     count = len(whole.priors.values)
     at = {
         (whole.parts[k].run, name): count + i
@@ -43,5 +44,11 @@ def set_housing_apart(found: CardFit) -> tuple[CardFit, Array | None]:
         noise={n: found.noise[n] for n in names},
         rows={n: found.rows[n] for n in names},
         covariance=found.covariance[np.ix_(places, places)],
+        told=told,
     )
-    return kept, told
+    return replace(kept, apart=evidence_of(found) - evidence_of(kept))
+
+
+def evidence_of(found: CardFit) -> float:
+    """Log evidence of a calibrated card, no row taken for an outlier."""
+    return found.apart + Background(Linear.of(found).on_all_rows, (), found.noise).evidence

@@ -78,11 +78,11 @@ class Linear:
     told: Array | None = None
 
     @classmethod
-    def of(cls, fit: CardFit, told: Array | None = None) -> "Linear":
+    def of(cls, fit: CardFit) -> "Linear":
         """Linearise at the most probable point."""
         state = fit.state
         target = {n: state.residual[n] + state.slope[n] @ state.point for n in fit.problem.responses}
-        return cls(fit.problem, fit.rows, target, state.slope, told)
+        return cls(fit.problem, fit.rows, target, state.slope, fit.told)
 
     @property
     def responses(self) -> tuple[str, ...]:

@@ -31,11 +31,11 @@ SAME_PATH = 0.02
 class Pursuit:
     """A search with the values linearised at a start, and again where they are most probable beside the effects."""
 
-    def __init__(self, start: CardFit, told: Array | None, progress: Callable[[str], None] = lambda _: None) -> None:
+    def __init__(self, start: CardFit, progress: Callable[[str], None] = lambda _: None) -> None:
         progress("all effects in all shapes")
         self.start, self.progress, self.point = start, progress, start.point
         paths = Signatures.at(start.problem, start.point)
-        self.first = self.search = Search(Linear.of(start, told), paths, start.noise, progress=progress)
+        self.first = self.search = Search(Linear.of(start), paths, start.noise, progress=progress)
         self.least = -np.inf
 
     def outcome(self, least: float = -np.inf) -> tuple[Search, Outcome]:
@@ -88,9 +88,10 @@ class Pursuit:
         return Model(self.search.linear, self.search.signatures, final.terms, final.noise)
 
     def _near(self, final: Hypothesis) -> bool:
-        """Whether the values are not far from where the model is linear."""
+        """Whether the values are not far from where the model is linear, or the straight lines reach as far."""
         model = self._model(final)
-        return bool(np.abs(model.kept(model.mean()).point - self.point).max(initial=0.0) < STRAIGHT)
+        far = np.abs(model.kept(model.mean()).point - self.point).max(initial=0.0) >= STRAIGHT
+        return not far or self._holds(final)
 
     def _holds(self, final: Hypothesis) -> bool:
         """Whether the straight lines are those of the simulation where they end."""

@@ -41,10 +41,10 @@ def relinearise(
     X, r = linear.stacked(terms, noise)
     own = X[:, linear.count :]
     sizes = solve_posterior(own, r - X[:, : linear.count] @ point)[0] if terms else np.zeros(0)
-    beside = Beside(start, tuple(terms), linear.told)
+    beside = Beside(start, tuple(terms))
     rows, noise = dict(start.rows), dict(noise)
-    if linear.told is not None:
-        rows[TOLD] = NoiseRows.of([np.arange(len(linear.told), dtype=np.float64)], [np.ones(len(linear.told))])
+    if start.told is not None:
+        rows[TOLD] = NoiseRows.of([np.arange(len(start.told), dtype=np.float64)], [np.ones(len(start.told))])
         noise[TOLD] = Noise(1.0)
     found = descend(beside, beside.evaluate(np.append(point, sizes)), noise, rows)
     assert isinstance(found, Linearised)
@@ -71,12 +71,11 @@ class Beside:
 
     start: CardFit
     terms: tuple[Term, ...]
-    told: Array | None
 
     @property
     def responses(self) -> tuple[str, ...]:
         """Those of the calibration, and what else is told."""
-        return self.start.problem.responses + (() if self.told is None else (TOLD,))
+        return self.start.problem.responses + (() if self.start.told is None else (TOLD,))
 
     @property
     def count(self) -> int:
@@ -106,8 +105,8 @@ class Beside:
         predicted = list(problem.predictions(point[: problem.count], slopes))
         card = problem.compare(point[: problem.count], predicted, slopes)
         residual, terms = dict(card.residual), self.terms
-        if self.told is not None:
-            residual[TOLD] = self.told[:, -1] - self.told[:, :-1] @ card.point
+        if (told := self.start.told) is not None:
+            residual[TOLD] = told[:, -1] - told[:, :-1] @ card.point
         if not terms and not slopes:
             return State(point, residual)
         paths = Signatures.at(problem, card.point, (replace(one, derivatives={}) for one in predicted))
@@ -118,7 +117,7 @@ class Beside:
         if not slopes:
             return State(point, residual)
         terms = self._bent(paths, predicted, card.point, terms, sizes) if terms else ()
-        linear = Linear.of(replace(self.start, state=card), self.told)
+        linear = Linear.of(replace(self.start, state=card))
         bent = linear.bent(terms)
         slope = {name: bent.columns(terms, name) for name in problem.responses}
         if (told := linear.told_beside(terms)) is not None:

@@ -178,6 +178,11 @@ class Search:
         last, gain = beside.with_term(terms[-1])
         return Hypothesis((*terms[:-1], last), noise, beside.evidence + gain)
 
+    def beside(self, terms: tuple[Term, ...], plain: Hypothesis, noise: Mapping[str, Noise]) -> Hypothesis:
+        """Return the model with some of the terms; without any where their sizes are impossible alone."""
+        fewer = self.settle(terms, noise) if terms else plain
+        return fewer if np.isfinite(fewer.evidence) else plain
+
     def polish(self, beside: Background, term: Term, anew: bool = True) -> Term:
         """Return a term whose shape is where the evidence is largest; not `anew`, near the one that it has."""
         return polish(self.moved, self.signatures.span, beside, term, anew)
@@ -282,7 +287,7 @@ class Search:
         for k, term in enumerate(final.terms):
             self.progress(f"what could stand in the place of {term.effect.name}")
             others = (*final.terms[:k], *final.terms[k + 1 :])
-            base = self.settle(others, final.noise) if others else plain
+            base = self.beside(others, plain, final.noise)
             same = replace(final, terms=(*others, term))
             quiet = replace(base, noise=final.noise)  # a rival leaves as little
             known = [h for h in self.contenders(quiet, ()) if h.terms[-1].key != term.key and h.score > base.score]
@@ -329,7 +334,7 @@ class Search:
         """Leave out terms that do not pay beside the others."""
         for k in range(len(now.terms)):
             others = (*now.terms[:k], *now.terms[k + 1 :])
-            fewer = self.settle(others, now.noise) if others else plain
+            fewer = self.beside(others, plain, now.noise)
             if now.score - fewer.score < self.needed(now.terms[k], others):
                 return self._without_idle(fewer, plain)
         return now

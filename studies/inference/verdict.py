@@ -1,6 +1,6 @@
 """From an inference to the verdict of the contract: causes, values that moved, each response, and what to measure next."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -24,6 +24,7 @@ from studies.diagnosis.verdict import (
 )
 from studies.effects import find_effect
 from studies.inference.causes import candidates_of, causes_of
+from studies.inference.heat_path import MASS
 from studies.inference.inferred import Inferred
 from studies.inference.model import Background
 from studies.inference.records import Campaign
@@ -34,10 +35,12 @@ from studies.inference.sharp import longest_resolved
 def judge(found: Inferred) -> Verdict:
     """Return the verdict."""
     shifts = shifts_of(found.background) if found.card.polynomial is None else []
+    if found.path is not None:  # no card said anything of its mass
+        shifts = [one for one in shifts if one.parameter not in MASS]
     causes = tuple(sorted((*wrong_values(shifts), *causes_of(found)), key=lambda cause: -cause.evidence))
     results = {name: result_of(found, name, causes) for name in found.search.linear.responses}
     results |= skipped_results(found.campaign)
-    named = tuple(cause for cause in doubted(causes) if cause.probability >= CONSTANTS["member"])
+    named = tuple(cause for cause in _patching(doubted(causes), results) if cause.probability >= CONSTANTS["member"])
     told = {cause.response for cause in named}
     for name in found.search.linear.responses:
         if results[name].verdict == "not-identifiable" and name not in told:
@@ -53,6 +56,14 @@ def judge(found: Inferred) -> Verdict:
         found.campaign.notes,
         calibration=tuple(shifts),
     )
+
+
+def _patching(causes: Sequence[Cause], results: Mapping[str, ResponseResult]) -> Iterator[Cause]:
+    """Yield the causes, those of responses that stay unexplained as doubtful as such names were."""
+    for cause in causes:
+        own = results.get(cause.response)
+        patches = cause.kind == "physics" and own is not None and own.verdict == "unexplained"
+        yield replace(cause, probability=cause.probability * (1.0 - CONSTANTS["doubt_unexplained"] * patches))
 
 
 def skipped_results(campaign: Campaign) -> dict[str, ResponseResult]:

@@ -26,6 +26,8 @@ WHOLE = {
     "thermal.chamber_conductance_W_per_K": "conductance chamber to housing",
     "thermal.mount_conductance_W_per_K": "conductance housing to base",
     "thermal.mount_exchange_cm2": "radiative exchange housing to base",
+    "thermal.second_mass_J_per_K": "heat capacity of a part on the base",
+    "thermal.second_mass_conductance_W_per_K": "conductance base to that part",
     "thermal.conductivity_W_per_m_K": "thermal conductivity of the shell",
     "thermal.heat_capacity_J_per_kg_K": "specific heat of the shell",
     "loop.frequency_split_mHz": "frequency split",

@@ -46,6 +46,8 @@ def build_heat_path(
             mount_exchange=1e-4 * thermal.mount_exchange_cm2,
             chamber_conductance=thermal.chamber_conductance_W_per_K,
             drive_power=1e-3 * thermal.drive_power_mW,
+            second_mass=thermal.second_mass_J_per_K or 0.0,
+            second_mass_conductance=thermal.second_mass_conductance_W_per_K or 0.0,
         )
 
 

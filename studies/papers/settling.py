@@ -22,8 +22,8 @@ from studies.simulation.heat_path import build_network, build_shell_and_stem
 from studies.simulation.response import cell_weights
 from thermal.network import Network
 from thermal.profile import Profile
+from thermal.radiative import simulate, step_remaining
 from thermal.resonator import shell_weights
-from thermal.sweeping import simulate, step_remaining
 
 ROOM_degC = 20.0
 STEPS_degC = (-10.0, 40.0)

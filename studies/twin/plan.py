@@ -93,6 +93,8 @@ class Plan:
             "housing": "thermal.housing_heat_capacity_J_per_K",
             SENSOR: "thermal.housing_heat_capacity_J_per_K",
             "base": "thermal.base_heat_capacity_J_per_K",
+            "mass": "thermal.second_mass_J_per_K",
+            "base-mass": "thermal.second_mass_conductance_W_per_K",
             "chamber-housing": "thermal.chamber_conductance_W_per_K",
             "housing-base": "thermal.mount_conductance_W_per_K",
             "radiated housing-base": "thermal.mount_exchange_cm2",

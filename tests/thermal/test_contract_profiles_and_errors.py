@@ -7,8 +7,8 @@ from thermal.errors import ThermalError
 from thermal.lag import lag
 from thermal.network import Boundary, Conductor, Node, Radiator, Source, assemble, linearise
 from thermal.profile import Profile, constant, parse_profile
+from thermal.radiative import integrate
 from thermal.steady import find_steady_state
-from thermal.sweeping import sweep
 from thermal.transient import propagate
 
 ROOM = (Boundary("chamber"), Node("shell", 2.0))
@@ -41,7 +41,7 @@ def test_a_network_that_cannot_be_is_refused(parts, words):
 def test_capacity_that_becomes_negative_on_the_way_is_refused():
     network = assemble([Boundary("chamber"), Node("shell", lambda T: T - 270.0), LINK])
     with pytest.raises(ThermalError, match=r"heat capacity of node 'shell' must be positive, not .* K\)"):
-        sweep(network, {"chamber": parse_profile("step 20 -10 5h")})
+        integrate(network, {"chamber": parse_profile("step 20 -10 5h")})
 
 
 @pytest.mark.parametrize(
@@ -76,7 +76,7 @@ def test_transients_refuse_what_they_lack():
         propagate(network, {})
     with pytest.raises(ThermalError, match="no boundary 'room'; it has chamber"):
         propagate(network, {"chamber": hour, "room": hour})
-    with pytest.raises(ThermalError, match="linearise the network or sweep it"):
+    with pytest.raises(ThermalError, match="linearise the network or integrate it"):
         propagate(radiative, {"chamber": hour})
     with pytest.raises(ThermalError, match="reaches 0 K"):
         propagate(network, {"chamber": constant(-10.0, 3600.0)})

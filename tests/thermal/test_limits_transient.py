@@ -6,12 +6,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.constants import Stefan_Boltzmann
 
-from tests.thermal.radau import integrate
 from thermal import sweeping
 from thermal.lag import lag, scan
 from thermal.network import Boundary, Conductor, Node, Radiator, Source, assemble, linearise
 from thermal.profile import Profile, constant, parse_profile
-from thermal.sweeping import simulate, sweep
+from thermal.radiative import integrate, simulate
+from thermal.sweeping import sweep
 from thermal.transient import check_energy, propagate
 
 LINEAR = (

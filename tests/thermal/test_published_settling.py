@@ -9,9 +9,9 @@ from scipy.optimize import brentq
 from thermal.errors import ThermalError
 from thermal.meridian import cut_meridian, lump
 from thermal.network import Boundary, Node, Radiator, assemble, linearise
+from thermal.radiative import step_remaining
 from thermal.relaxation import find_relaxation
 from thermal.resonator import HeatPath, describe_resonator, describe_shell_and_stem, shell_weights
-from thermal.sweeping import step_remaining
 
 R, H, ROOT = 0.015, 0.86e-3, np.arcsin(2.5 / 15)
 PATH = HeatPath(

@@ -21,6 +21,8 @@ class Thermal(Keys, frozen=True, kw_only=True):
         number("base to housing; identified from the settling of the HRG paper's Figure 3", above=0.0, relative_sd=0.5),
     ] = IDENTIFIED_MOUNT
     mount_exchange_cm2: Annotated[float, number("base to housing, × emissivity", least=0.0, relative_sd=1.0)] = 10.0
+    second_mass_J_per_K: Annotated[float, number("of a part that hangs on the base, with its conductance", above=0.0, relative_sd=1.0, example=5.0)] | None = None  # fmt: skip
+    second_mass_conductance_W_per_K: Annotated[float, number("base to that part", above=0.0, relative_sd=1.0, example=0.002)] | None = None  # fmt: skip
     drive_power_mW: Annotated[float, number("heat of the vibration, spread over the shell", least=0.0)] = 0.0
     radiation: Annotated[bool, says("false: linearised at the reference temperature")] = True
     cells: Annotated[float, number("of the shell's meridian; 1 makes it a lump", least=1.0, most=400.0)] = 24
@@ -33,6 +35,10 @@ class Thermal(Keys, frozen=True, kw_only=True):
     def __post_init__(self) -> None:
         if self.cells != int(self.cells):
             raise ValueError(f"cells must be a whole number, not {self.cells:g}.")
+        if (self.second_mass_J_per_K is None) != (self.second_mass_conductance_W_per_K is None):
+            raise ValueError(
+                "second_mass_J_per_K and second_mass_conductance_W_per_K go together; give both or neither."
+            )
 
 
 TABLE = CardTable("thermal", Thermal)

@@ -15,10 +15,10 @@ from studies.simulation.drive import drive_by_profile, drive_by_record, rows_of
 from studies.simulation.virtual_gyro import simulate_run
 from studies.workbench import diagnose_records
 from tests.studies.diagnosis.bench import searched
-from tests.thermal.radau import integrate
 from thermal.lag import lag
 from thermal.network import Boundary, Conductor, Node, Radiator, assemble
 from thermal.profile import Profile, parse_profile
+from thermal.radiative import integrate
 
 STEP, RUN, PAUSE = 60.0, 9000.0, 2400.0  # s
 SLOW, SHARE, NOISE = 15000.0, 0.08, 1e-3  # s, –, Hz

@@ -9,13 +9,14 @@ import pytest
 from studies.calibration.apart import APART
 from studies.cli import main
 from studies.effects import find_effect
+from studies.inference.extension import extend
 from studies.instrument.card import load_card
 from studies.record import write_record
 from studies.simulation.chamber import load_profile
 from studies.simulation.drive import drive_by_profile, rows_of
 from studies.simulation.virtual_gyro import simulate_run
 from studies.workbench import diagnose_records
-from tests.studies.diagnosis.unseen import DEVIATIONS, PACKS, PROFILES, recover
+from tests.studies.diagnosis.unseen import DEVIATIONS, PACKS, PROFILES, UNSEEN, recover
 
 ROW = 0.05
 SLOPE = "material.deviation.shear_modulus.log_slope_per_K"
@@ -125,6 +126,23 @@ def test_hidden_effects_are_named_saved_and_predict_an_unseen_chamber_profile(ca
     assert all(found.before[response] > 5.0 for name, response, _ in cases if not find_effect(name).once)
     for response, left in found.after.items():
         assert left < 1.1 or found.errors[response] < DEVIATIONS, (response, found.after, found.stated)
+
+
+@pytest.mark.slow
+def test_a_second_mass_on_the_base_is_named_with_its_size_and_predicts_an_unseen_run(shipped, only):
+    """Four of a stranger's were named mounting-stress, with heat values out by a factor of two: no form of one lag more is exact behind a shell."""
+    only("second-lag", "mounting-stress", "hysteresis")
+    mass = {"second_mass_J_per_K": 5.0, "second_mass_conductance_W_per_K": 0.002}
+    heavier = shipped.with_table("thermal", {**shipped.content["thermal"], **mass})
+    found = diagnose_records(simulated(heavier, *PROFILES), shipped)
+    (cause,) = found.verdict.causes
+    assert (cause.effect, cause.equivalent, found.verdict.verdict) == ("second-lag", (), "explained")
+    for name, truth in {**mass, "second_time_constant_s": 2500.0}.items():
+        assert abs(cause.parameters[name].value - truth) < 3.0 * cause.parameters[name].sd, name
+    assert max(abs(shift.shift_sd) for shift in found.verdict.calibration) < 1.0
+    cards, noise = (heavier, extend(found).instrument), found.verdict.responses["frequency_Hz"].noise
+    truth, told = (simulate_run(card, load_profile(UNSEEN), ROW, noise=False).record["frequency_Hz"] for card in cards)
+    assert np.hypot(np.sqrt(np.mean((truth - told) ** 2)), noise) < 1.1 * noise
 
 
 @pytest.mark.slow

@@ -167,7 +167,7 @@ def test_a_search_whose_effects_fall_away_ends_where_the_values_are_likeliest_wi
     made = [simulate_run(load_card(CARD), load_profile(words), 1 / 60, k).record for k, words in enumerate(RUNS)]
     records = [replace(one, path=f"run{k}.csv") for k, one in enumerate(made)]
     found = fit(build_problem(polynomial_card(records), records))
-    pursuit, grow = Pursuit(found, None), Search.grow
+    pursuit, grow = Pursuit(found), Search.grow
 
     def first_one_then_none(self, before=(), *_, **more):
         plain, _ = grow(self, most=0)

@@ -1,4 +1,4 @@
-"""The reference of transients with radiation and C(T): Radau IIA of order 5."""
+"""Transients of a network with radiation, or with capacities that depend on temperature."""
 
 from collections.abc import Mapping
 from itertools import pairwise
@@ -8,12 +8,33 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike
 
+from thermal.errors import ThermalError
 from thermal.network import Array, Network
 from thermal.profile import Profile
 from thermal.steady import boundary_forcing, find_corners, initial_state
-from thermal.transient import Transient
+from thermal.sweeping import SweepError, sweep
+from thermal.transient import Transient, propagate
 
 MOST_RESTARTS = 200  # with more corners in its profiles than this, the integrator restarts at jumps only
+
+
+def simulate(network: Network, boundaries: Mapping[str, Profile], initial: ArrayLike | None = None) -> Transient:
+    """Propagate exactly where the network is linear, else sweep; integrate where radiation is too strong for it."""
+    if network.is_linear:
+        return propagate(network, boundaries, initial)
+    try:
+        return sweep(network, boundaries, initial)
+    except SweepError:
+        return integrate(network, boundaries, initial)
+
+
+def step_remaining(network: Network, before: float, after: float, weights: Array, time: ArrayLike) -> Array:
+    """Share of a step of all boundaries from `before` to `after` (K) that a mean over nodes lacks, `time` (s) after it."""
+    time = np.asarray(time, dtype=float)
+    profile = Profile(np.array([0.0, 0.0, time.max()]), np.array([before, after, after]))
+    transient = simulate(network, {boundary.name: profile for boundary in network.boundaries})
+    left: Array = (transient.observe(time, weights[None, :])[:, 0] - after) / (before - after)
+    return left
 
 
 def integrate(
@@ -53,7 +74,8 @@ def integrate(
             rate, (start, end), T, method="Radau", jac=jacobian, dense_output=True, rtol=relative_tolerance,
             atol=1e-3 * relative_tolerance, max_step=longest,
         )  # fmt: skip
-        assert solution.success, solution.message
+        if not solution.success:
+            raise ThermalError(f"the integration stopped at {solution.t[-1]:g} s: {solution.message}")
         T = solution.y[:, -1]
         dense: Any = solution.sol
         times.append(dense.ts[1:])
