@@ -233,7 +233,7 @@ def _with_heat_path(whole: CardFit, found: CardFit, progress: Report) -> tuple[H
     progress(f"effects beside a heat path with {path.lags} time constants")
     there, grown = Pursuit(path.fit, progress).outcome()
     score = on_all_rows(there, grown.final) + path.fit.apart + path.price
-    search, outcome = own.outcome(score - found.apart - BEATEN)
+    search, outcome = own.outcome(-np.inf if given else score - BEATEN)
     gain, lead = score - evidence_of(found), score - found.apart - on_all_rows(search, outcome.final)
     levels = with_levels(search, outcome.plain, FREQUENCY).score - outcome.plain.score
     needed = MARGIN + given * FURTHER * sum(term.brought for term in outcome.final.terms if term.response == FREQUENCY)
