@@ -191,8 +191,9 @@ def lags_would_bring(search: Search) -> float:
 
 
 def effects_would_bring(search: Search) -> float:
-    """The same of the best effect on the frequency."""
-    return _best(search, [own for own in search.bank if own.response == FREQUENCY])
+    """The same of the best effect on the frequency that is no lag itself."""
+    lag = f"law.{LAGS[1]}"
+    return _best(search, [own for own in search.bank if own.response == FREQUENCY and own.effect.card_key != lag])
 
 
 def _best(search: Search, bank: Sequence[Shapes]) -> float:
