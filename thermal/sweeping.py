@@ -16,6 +16,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
+from thermal.constants import Stefan_Boltzmann
 from thermal.errors import ThermalError
 from thermal.lag import scan
 from thermal.network import Array, Network, linearise
@@ -189,7 +190,8 @@ def _beyond(network: Network, linear: Network, T: Array, held: Array, power: Arr
     n = network.count
     everything = np.concatenate([T, held], axis=2)
     if not any(callable(node.capacity) for node in network.nodes):
-        return linear.outflow(everything)[..., :n] - network.outflow(everything)[..., :n]
+        stiffer = (linear.conduction - network.conduction)[:, :n]
+        return np.asarray(everything @ stiffer - (everything**2) ** 2 @ (Stefan_Boltzmann * network.radiation[:, :n]))
     flow = (power - network.outflow(everything)[..., :n]) * capacity_ratio(network, linear, everything)
     beyond: Array = flow - (power - linear.outflow(everything)[..., :n])
     return beyond
