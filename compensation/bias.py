@@ -2,7 +2,7 @@
 
 B = B₀ + k₁ f + k₂ f² + k₃ f³ + k₄ ḟ + k₅ ḟ² + k₆ ḟ³ + k₇ f ḟ + k₈ f² ḟ + k₉ f ḟ², f the *change* of frequency (Hz),
 ḟ its rate (Hz/s), B in the unit of the bias column. Without a frequency f is the change of a temperature (°C) behind a
-lag, and a tenth candidate the `play` p − T of a backlash p (`compensation.memory`).
+lag, and the `play` d = p − T of a backlash p (`compensation.memory`) brings d, f d and d²: a parabola of p has all three.
 """
 
 from collections.abc import Sequence
@@ -26,12 +26,19 @@ TERMS: dict[str, tuple[int, int]] = {
     "f": (1, 0), "f^2": (2, 0), "f^3": (3, 0), "fdot": (0, 1), "fdot^2": (0, 2), "fdot^3": (0, 3),
     "f*fdot": (1, 1), "f^2*fdot": (2, 1), "f*fdot^2": (1, 2),
 }  # fmt: skip
-PARENTS = {
-    name: [other for other, (c, d) in TERMS.items() if (c, d) in ((a - 1, b), (a, b - 1))]
-    for name, (a, b) in TERMS.items()
+# The same with the play's.
+POWERS = {name: (a, b, 0) for name, (a, b) in TERMS.items()} | {
+    "play": (0, 0, 1),
+    "f*play": (1, 0, 1),
+    "play^2": (0, 0, 2),
 }
+PARENTS = {
+    name: [other for other, q in POWERS.items() if sum(p) - sum(q) == 1 and all(np.subtract(p, q) >= 0)]
+    for name, p in POWERS.items()
+}
+MEMORY = ("lag", "play")
+NINETY = 1.645  # standard deviations to either end of a 90 % interval
 SELECTED_BY_THE_PAPER = ("f", "f^2", "f^3", "fdot", "fdot^2", "f*fdot")
-PLAY = "play"
 
 
 @dataclass(frozen=True)
@@ -91,11 +98,18 @@ class BiasFit:
     rate_range: tuple[float, float]
     variable: Variable
     memory: Memory
+    memory_errors: Memory = NO_MEMORY  # standard deviations of lag and play
 
     @property
     def standard_errors(self) -> Array:
         """Standard errors of ("constant", *terms) that respect the autocorrelation."""
         return np.sqrt(np.diag(self.covariance))
+
+    @property
+    def memory_intervals(self) -> dict[str, tuple[float, float, float]]:
+        """Value and ends of the 90 % interval of lag and play, whichever there are."""
+        found = ((name, getattr(self.memory, name), getattr(self.memory_errors, name)) for name in MEMORY)
+        return {name: (value, max(value - NINETY * sd, 0.0), value + NINETY * sd) for name, value, sd in found if value}
 
     def predict(self, state: ArrayLike, rate: ArrayLike, play: ArrayLike = 0.0) -> Array:
         """Return the bias that the model expects at a frequency (Hz) or temperature (°C), its rate (1/s) and play."""
@@ -133,10 +147,12 @@ def average_run(time: ArrayLike, state: ArrayLike, bias: ArrayLike, width: float
     return blocks
 
 
-def rate_run(blocks: Blocks, f: Array, window: float, *, causal: bool, variable: Variable, memory: Memory) -> BiasRun:
-    """Return an averaged run with its state f behind the lag of a memory, play, and the rate over `window` (s)."""
+def rate_run(
+    blocks: Blocks, f: Array, window: float, *, causal: bool, variable: Variable, memory: Memory, start: float = 0.0
+) -> BiasRun:
+    """Return an averaged run with its state f behind the lag of a memory, play from `start`, and the rate over `window` (s)."""
     _check_seconds("window of the rate", window)
-    play = follow_play(f, memory.play) - f
+    play = follow_play(f, memory.play, start) - f
     window = max(window, 3 * blocks.width, 2.05 * float(np.median(np.diff(blocks.time))))  # three rows, in bursts too
     derivative = differentiate(blocks.time, f, window, causal=causal)
     ok = derivative.complete
@@ -157,10 +173,10 @@ def _check_seconds(name: str, seconds: float) -> None:
 def term_columns(
     state: ArrayLike, rate: ArrayLike, reference: float, terms: Sequence[str], play: ArrayLike = 0.0
 ) -> Array:
-    """Return one column per term of HRG paper eq. (21), or the play, shape (m, len(terms))."""
+    """Return one column per term of HRG paper eq. (21), or of the play, shape (m, len(terms))."""
     f = np.asarray(state, dtype=np.float64) - reference
-    rate, play = np.asarray(rate, dtype=np.float64), np.broadcast_to(np.asarray(play, dtype=np.float64), f.shape)
-    columns = [play if name == PLAY else f ** TERMS[name][0] * rate ** TERMS[name][1] for name in terms]
+    rate, play = np.asarray(rate, dtype=np.float64), np.asarray(play, dtype=np.float64)
+    columns = [f**a * rate**b * play**c for a, b, c in map(POWERS.__getitem__, terms)]
     return np.column_stack(columns) if columns else np.empty((f.size, 0))
 
 
@@ -173,7 +189,7 @@ class BiasDesign:
         self.reference = reference
         self.rows = [slice(end - size, end) for end, size in zip(ends, sizes, strict=True)]
         self.variable, self.memory = runs[0].variable, runs[0].memory
-        self.names = (*TERMS, PLAY) if self.memory.play else tuple(TERMS)
+        self.names = tuple(POWERS if self.memory.play else TERMS)
         self.state = np.concatenate([run.state for run in runs])
         self.rate = np.concatenate([run.rate for run in runs])
         self.bias = np.concatenate([run.bias for run in runs])
@@ -195,15 +211,25 @@ class BiasDesign:
 
 def fit_terms(
     design: BiasDesign, terms: tuple[str, ...], theta: float | None = None,
-    selection: StepwiseSelection | None = None, scores: tuple[float, ...] = (),
+    selection: StepwiseSelection | None = None, scores: tuple[float, ...] = (), beside: Array | None = None,
 ) -> BiasFit:  # fmt: skip
-    """Fit the given terms by least squares, with errors for independent and for correlated rows, of noise `theta` or as estimated."""
+    """Fit the given terms by least squares, with errors for independent and for correlated rows, of noise `theta` or as estimated.
+
+    `beside` (m, 1 or 2): slopes of the bias over lag and play, whichever there are; the errors then are those beside a free memory.
+    """
     X = np.column_stack([design.constants, design.candidates[:, [design.names.index(name) for name in terms]]])
     count = design.constants.shape[1]
     names = [*(f"constant of run {k + 1}" for k in range(count)), *terms]
     fit = fit_linear(X, design.bias, names, constant=False)
-    noise = fit_coloured(X, design.bias, names, design.rows, theta)
-    coloured = coloured_covariance(fit, noise, design.rows)
+    free = [name for name in MEMORY if beside is not None and getattr(design.memory, name)]
+    wide = (
+        fit
+        if beside is None
+        else fit_linear(np.column_stack([X, beside]), design.bias, [*names, *free], constant=False)
+    )
+    noise = fit_coloured(wide.design, design.bias, wide.names, design.rows, theta)
+    errors = np.sqrt(np.diag(noise.regression.covariance))[len(names) :]
+    coloured = coloured_covariance(wide, noise, design.rows)[: len(names), : len(names)]
     # B₀ is the mean of the runs' constants.
     M = np.zeros((1 + len(terms), len(names)))
     M[0, :count] = 1.0 / count
@@ -221,4 +247,5 @@ def fit_terms(
         rate_range=(float(design.rate.min()), float(design.rate.max())),
         variable=design.variable,
         memory=design.memory,
+        memory_errors=Memory(**dict(zip(free, errors.tolist(), strict=True))),
     )

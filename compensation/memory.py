@@ -2,7 +2,7 @@
 
 Lag: τ ẏ + y = x, exact for an x that is linear between its samples. Play (backlash): y follows x at a distance of no more
 than w, yₖ = min(max(yₖ₋₁, xₖ − w), xₖ + w); the elementary hysteresis of Prandtl and Ishlinskii. Both have settled on the
-first value at the start.
+first value at the start, unless the play is told to start elsewhere within its width: what came before a record sets it.
 """
 
 import itertools
@@ -18,10 +18,11 @@ from compensation.transfer import recur
 
 @dataclass(frozen=True)
 class Memory:
-    """Lag τ (s) and half-width w of the play (in the unit of what is followed); 0 is none."""
+    """Lag τ (s), half-width w of the play (in the unit of what is followed), 0 is none; where in it each run starts, −1 … 1."""
 
     lag: float = 0.0
     play: float = 0.0
+    starts: tuple[float, ...] = ()
 
 
 NO_MEMORY = Memory()

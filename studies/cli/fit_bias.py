@@ -2,6 +2,7 @@
 
 from typing import Any, Literal
 
+from compensation.bias_selection import Method
 from studies.cli.arguments import Records, SaveModel
 from studies.cli.output import answers, keep_model, say
 from studies.errors import InputError
@@ -68,12 +69,21 @@ def fit_bias(
     )  # fmt: skip
 
 
-def _payload(study: BiasStudy, method: str, data: tuple[str, ...]) -> dict[str, Any]:
+def _payload(study: BiasStudy, method: Method, data: tuple[str, ...]) -> dict[str, Any]:
+    ends = {name: (low, high) for name, (_, low, high) in study.by(method).fit.memory_intervals.items()}
     allan = {"step_s": study.allan_step, "before": _spectrum(study.before), "after": _spectrum(study.after)}
     return {
         "data": data,
         **row_of(study, "output", over="column", opposite_sign="opposite"),
-        **row_of(study.runs[0], lag_s="memory.lag", play_half_width_degC="memory.play", rate_lag_s="lag"),
+        **row_of(
+            study.runs[0],
+            lag_s="memory.lag",
+            play_half_width_degC="memory.play",
+            play_starts="memory.starts",
+            rate_lag_s="lag",
+        ),
+        "lag_90_s": ends.get("lag"),
+        "play_half_width_90_degC": ends.get("play"),
         "method": method,
         "rows": [int(run.time.size) for run in study.runs],
         **{count: sum(getattr(run, count) for run in study.runs) for count in ("missing", "spikes")},

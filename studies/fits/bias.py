@@ -17,6 +17,7 @@ from compensation.bias_selection import (
     choose_memory,
     find_opposite,
     fit_bias,
+    free_memory,
     score_held_out,
     score_path,
 )
@@ -92,9 +93,12 @@ def study_bias(
 
     def prepare(memory: Memory) -> list[BiasRun]:
         runs = []
-        for record, blocks, state in zip(records, averaged, lagged(memory.lag), strict=True):
+        starts = memory.starts or (0.0,) * len(records)
+        for record, blocks, state, start in zip(records, averaged, lagged(memory.lag), starts, strict=True):
             with naming(record.path or "record"):
-                runs.append(rate_run(blocks, state, window, causal=causal, variable=variable, memory=memory))
+                runs.append(
+                    rate_run(blocks, state, window, causal=causal, variable=variable, memory=memory, start=start)
+                )
         return runs
 
     everywhere = ", ".join(record.path or "record" for record in records)
@@ -112,7 +116,7 @@ def study_bias(
     for name in METHODS:
         progress(f"selecting terms stepwise ({name})")
         with naming(everywhere):
-            fit = fit_bias(runs, name)
+            fit = free_memory(fit_bias(runs, name), prepare)
         try:
             held_out = score_held_out(runs, name)
         except NoHeldOut as error:

@@ -5,7 +5,7 @@ from typing import Literal
 
 import numpy as np
 
-from compensation.bias import SELECTED_BY_THE_PAPER, TERMS, Variable
+from compensation.bias import POWERS, SELECTED_BY_THE_PAPER, TERMS, Variable
 from compensation.bias_selection import AVERAGING
 from compensation.memory import Memory
 from compensation.noise import FLAT
@@ -13,7 +13,7 @@ from studies.fits.bias import BiasStudy, Judged
 from studies.models.file import widen
 from studies.models.kinds.bias import OUTPUTS
 from studies.reports import style
-from studies.reports.digits import plain, raised, to_error
+from studies.reports.digits import plain, raised, to_error, to_interval
 from studies.results import Column, Drawing, Facts, Figure, Head, Part, Sentence, Table, Where
 
 SOURCES = (
@@ -23,11 +23,13 @@ SOURCES = (
 )
 SYMBOLS = {
     "f": "f", "f^2": "f²", "f^3": "f³", "fdot": "ḟ", "fdot^2": "ḟ²", "fdot^3": "ḟ³", "f*fdot": "f·ḟ",
-    "f^2*fdot": "f²·ḟ", "f*fdot^2": "f·ḟ²", "play": "hysteresis",
+    "f^2*fdot": "f²·ḟ", "f*fdot^2": "f·ḟ²", "play": "hysteresis", "f*play": "f·hysteresis",
+    "play^2": "hysteresis²",
 }  # fmt: skip
 ORDER = list(SYMBOLS)
 MOST_RUNS = 12  # that are drawn
 FEW = 40  # averages: four to each of nine terms and a constant
+MEMORY = {"lag": ("Lag behind the thermometer", "s"), "play": ("Half-width of the hysteresis", "K")}
 METHOD = {"guarded": "guarded", "paper": "as in the paper"}
 Method = Literal["guarded", "paper"]
 PATH_NOTE = (
@@ -47,11 +49,17 @@ def facts(study: BiasStudy, method: Method) -> Facts:
     left_out = ("unknown", "needs two runs of a kind")
     if held is not None:
         left_out = _times(held.gain), f"{held.before:.3g} → {held.after:.3g} {unit}"
-    count = f"of {len(TERMS)} candidates; the HRG paper selects {len(SELECTED_BY_THE_PAPER)}"
+    count = f"of {len(POWERS if judged.fit.memory.play else TERMS)} candidates; the HRG paper selects {len(SELECTED_BY_THE_PAPER)}"
+    ends = {name: to_interval(*own) for name, own in judged.fit.memory_intervals.items()}
+    memory = [
+        (label, f"{ends[name][0]} {per}", f"90 %: {ends[name][1]} … {ends[name][2]} {per}")
+        for name, (label, per) in MEMORY.items()
+        if name in ends
+    ]
     return Facts([
         ("Improvement, fitted data", _times(judged.training_gain), f"{before:.3g} → {after:.3g} {unit}"),
         ("Improvement, held-out data", *left_out),
-        ("Terms", str(len(judged.fit.terms)), count),
+        ("Terms", str(len(judged.fit.terms)), count), *memory,
     ])  # fmt: skip
 
 
@@ -109,9 +117,17 @@ def how_rows_were_made(study: BiasStudy) -> str:
 
 def memory_sentence(memory: Memory) -> str:
     """Say what stands between the thermometer and the bias, if anything does."""
-    parts = [f"a lag of {memory.lag:g} s"] if memory.lag else []
-    parts += [f"a hysteresis of half-width {memory.play:.2g} K, as a tenth candidate"] if memory.play else []
-    return f" The temperature acts through {' and '.join(parts)}." if parts else ""
+    parts = [f"a lag of {memory.lag:.4g} s"] if memory.lag else []
+    parts += (
+        [f"a hysteresis of half-width {memory.play:.3g} K, with three candidates of its own"] if memory.play else []
+    )
+    starts = ", ".join(f"{start:+g}" if start else "0" for start in memory.starts)
+    after = (
+        f" The runs start at {starts} half-widths from its middle; a compensated record at 0, so it is not compensated for the hysteresis until its temperature has once changed by {2 * memory.play:.3g} K."
+        if memory.play
+        else ""
+    )
+    return f" The temperature acts through {' and '.join(parts)}.{after}" if parts else ""
 
 
 def path_table(judged: Judged, where: Where = "everywhere") -> Table:
@@ -275,7 +291,8 @@ def _measured(value: float, uncertainty: float) -> str:
 
 def _coefficient_unit(output: str, term: str, variable: Variable) -> tuple[float, str]:
     """Return the unit of a coefficient for people, and what its value is multiplied by: a rate of temperature is in K/min."""
-    state, rate = TERMS.get(term, (1, 0)) if term != "constant" else (0, 0)
+    state, rate, play = POWERS.get(term, (0, 0, 0))
+    state += play
     over = "K" if variable.unit == "°C" else variable.unit
     timed = ("K/min", 60.0) if over == "K" else (f"{over}/s", 1.0)
     powers = [over + raised(state) * (state > 1)] * (state > 0)

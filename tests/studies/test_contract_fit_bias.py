@@ -7,6 +7,7 @@ import shutil
 
 import numpy as np
 import pytest
+import scipy
 
 from studies.cli import main
 from studies.models import compensate, emit_c, read_model
@@ -140,6 +141,51 @@ def make_thermometer_gyro(seed, cooling, loop=0.0, lag=200.0):
     return Record(
         {"time_s": time, "housing_temperature_degC": T + 0.01 * rng.normal(size=T.size), "bias_deg_per_h": bias}
     )
+
+
+def make_cycled_gyro(seed, lag, width, start):
+    """Bias 5 + 0.3 x + 0.01 x², x = y − 10 °C, of a temperature y behind a lag and a backlash, which does not start in its middle."""
+    rng, time, own = np.random.default_rng(seed), np.arange(0.0, 18000.0, 10.0), 1 if seed % 2 else -1
+    knots = [0, 600, 3600, 5400, 8400, 10200, 13200, 15000, 18000]
+    chamber = 5 + 20 * own * np.array([1, 1, -1, -1, 1, 1, -1, -1, 1])
+    T = scipy.signal.lfilter([1 - 0.98], [1, -0.98], np.interp(time, knots, chamber), zi=[0.98 * chamber[0]])[0]
+    inner, back = T.copy(), T + start * own * width
+    for k in range(1, T.size):
+        if lag:
+            inner[k] = inner[k - 1] + (1 - np.exp(-10.0 / lag)) * (0.5 * (T[k] + T[k - 1]) - inner[k - 1])
+        back[k] = np.clip(back[k - 1], inner[k] - width, inner[k] + width)
+    bias = truth(back) + rng.normal(size=T.size)
+    return Record(
+        {"time_s": time, "housing_temperature_degC": T + 0.01 * rng.normal(size=T.size), "bias_deg_per_h": bias}
+    )
+
+
+def truth(inner):
+    return 5 + 0.3 * (inner - 10) + 0.01 * (inner - 10) ** 2
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("lag", "width", "start"), [(700.0, 0.0, 0.0), (0.0, 2.0, 1.0)])
+def test_a_lag_and_a_play_between_the_points_of_a_grid_leave_the_static_curve_alone(tmp_path, ask, lag, width, start):
+    """Both come back; soaks, which the lag of a grid misses by 1.7 °/h, are known as well as the noise lets them be."""
+    names = [str(tmp_path / f"r{k}.csv") for k in range(4)]
+    for k, name in enumerate(names):
+        write_record(make_cycled_gyro(k, lag, width, start), name)
+    answer = ask(["fit", "bias", *names, "--save", tmp_path / "m.toml"])
+    found = {"lag_s": ("lag_90_s", lag), "play_half_width_degC": ("play_half_width_90_degC", width)}
+    for key, (ends, planted) in found.items():
+        assert (answer[key] > 0) == (answer[ends] is not None) == (planted > 0)
+        if planted:
+            low, high = answer[ends]
+            assert low < answer[key] < high < low + 0.2 * planted
+            assert abs(answer[key] - planted) < 1.5 * (high - low)  # five standard deviations
+    time = np.arange(0.0, 36000.0, 10.0)
+    T = np.interp(time, [0, 9000, 10000, 18000, 19000, 27000, 28000, 36000], [25, 25, 15, 15, 5, 5, -5, -5])
+    rest = Record({"time_s": time, "housing_temperature_degC": T, "bias_deg_per_h": np.zeros_like(T)})
+    predicted = -compensate(read_model(tmp_path / "m.toml"), rest)["compensated_bias_deg_per_h"]
+    for soak in (17500.0, 26500.0, 35500.0):
+        row = int(soak / 10)
+        assert predicted[row] == pytest.approx(truth(T[row] + width), abs=0.2)
 
 
 @pytest.mark.slow

@@ -13,7 +13,7 @@ from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from compensation.arrays import Array
-from compensation.bias import FREQUENCY, PLAY, TEMPERATURE, TERMS, BiasFit, BiasRun, Variable, term_columns
+from compensation.bias import FREQUENCY, POWERS, TEMPERATURE, BiasFit, BiasRun, Variable, term_columns
 from compensation.decimation import average_blocks
 from compensation.derivative import differentiate
 from compensation.memory import NO_MEMORY, Memory, follow_lag, follow_play
@@ -91,10 +91,8 @@ STEP = """    static hrg_bias_state state;
 
 
 def _product(name: str) -> str:
-    if name == PLAY:
-        return " * play"
-    a, b = TERMS[name]
-    return " * f" * a + " * r" * b
+    a, b, c = POWERS[name]
+    return " * f" * a + " * r" * b + " * play" * c
 
 
 def _predict_centred(model: Model, time: Array, values: Array, extrapolate: bool) -> Array:
@@ -189,11 +187,11 @@ def read_terms(model: Model) -> tuple[tuple[str, ...], Array]:
     model.check_output(OUTPUTS)
     if part.names[0] != "constant":
         raise InputError(f"{where}: the first coefficient must be 'constant', not '{part.names[0]}'.")
-    known = {name_term(name, variable): name for name in (*TERMS, PLAY)}
+    known = {name_term(name, variable): name for name in POWERS}
     for name in part.names[1:]:
         if name not in known:
             raise InputError(f"{where}: unknown term '{name}'{nearest(name, known)}")
-    if PLAY in part.names and not memory_of(model).play:
+    if "play" in part.names and not memory_of(model).play:
         raise InputError(f"{where} [settings]: the term 'play' needs play_degC above 0; add it.")
     return tuple(known[name] for name in part.names[1:]), np.array(part.values)
 
@@ -208,8 +206,8 @@ def unit_of_term(output: str, name: str, variable: Variable) -> str:
     unit = variable.unit.replace("°", "deg")
     if name == "constant":
         return output
-    a, b = TERMS.get(name, (1, 0))
-    factors = [*[unit] * a, *[f"({unit}/s)"] * b]
+    a, b, c = POWERS[name]
+    factors = [*[unit] * (a + c), *[f"({unit}/s)"] * b]
     return f"{output}/{factors[0]}" if len(factors) == 1 else f"{output}/({'*'.join(factors)})"
 
 
