@@ -175,14 +175,20 @@ def measure_scale(record: Record) -> Found:
         "scale_factor_error_ppm": of_fit(fit, 1, source, 1e6, -1.0),
         "scale_factor_nonlinearity_ppm": within(departure, float(np.max(errors)) / full, source, least=0.0, scale=1e6),
     }
-    sides = rates > 0, rates < 0
-    if all(side.any() for side in sides):
-        bias = float(fit.coefficients[0])
-        squares = [float(np.sum(rates[s] ** 2)) for s in sides]
-        slopes = [float(np.sum((means[s] - bias) * rates[s])) / q for s, q in zip(sides, squares, strict=True)]
-        sd = [float(np.sqrt(np.sum((errors[s] * rates[s]) ** 2))) / q for s, q in zip(sides, squares, strict=True)]
-        found["scale_factor_asymmetry_ppm"] = within(slopes[0] - slopes[1], math.hypot(*sd), source, scale=1e6)
+    if rates.min() < 0 < rates.max():
+        found["scale_factor_asymmetry_ppm"] = _asymmetry(rates, means, errors, source)
     return found
+
+
+def _asymmetry(rates: Array, means: Array, errors: Array, sources: Sequence[str]) -> Measured:
+    """ΔK/K of the output b + K Ω + ½ ΔK |Ω|: the scale factor of positive rates less that of negative ones, over their mean (IEEE 528)."""
+    X = np.column_stack([np.ones_like(rates), rates, np.abs(rates) / 2])
+    solving = np.linalg.pinv(X)
+    _, K, difference = fitted = solving @ means
+    free = len(rates) - X.shape[1]
+    scatter = float(np.sum((means - X @ fitted) ** 2)) / max(free, 1)
+    variance = max(scatter, float(np.mean(errors**2))) * float(solving[2] @ solving[2])
+    return within(difference / K, math.sqrt(variance) / abs(K), sources, free or np.inf, scale=1e6)
 
 
 def measure_warm_up(record: Record, output: str, band: float | None) -> tuple[Found, float]:

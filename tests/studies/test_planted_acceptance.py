@@ -6,6 +6,7 @@ import json
 import numpy as np
 import pytest
 
+from studies.acceptance.measure import measure_scale
 from studies.cli import main
 from studies.record import Record, write_record
 
@@ -164,6 +165,27 @@ def test_bandwidth_and_delay_of_a_shaken_gyro(folder, capsys):
     assert lines["bandwidth_Hz"]["low"] < lines["bandwidth_Hz"]["value"] < lines["bandwidth_Hz"]["high"]
     f, H = signal.freqz([1 - lag], [1, -lag], np.linspace(0.05, 5.0, 100), fs=rate)
     assert lines["delay_ms"]["value"] == pytest.approx(-1e3 * np.polyfit(2 * np.pi * f, np.angle(H), 1)[0], rel=0.02)
+
+
+@pytest.mark.parametrize(
+    "levels",
+    [
+        [0, 10, 50, 100, 200, 300, -10, -50, -100, -200, -300],
+        [60, 120, 180, 240, 300, -60, -120, -180, -240, -300],
+        [300, 0, -300],
+        [20, 100, 300, -50, -80, -200],
+    ],
+)
+def test_scale_factor_asymmetry_does_not_depend_on_the_rates(levels):
+    """The slopes of the two sides differ by 1000 ppm of their mean, 1.02; the interval holds that in 90 of 100 records."""
+    g, rate, kept = np.random.default_rng(1), np.repeat(np.array(levels, dtype=float), 60), 0
+    for _ in range(100):
+        read = 0.02 + 1.02 * np.where(rate > 0, 1 + 5e-4, 1 - 5e-4) * rate + g.normal(0, 1e-3, rate.size)
+        columns = {"time_s": np.arange(rate.size) * 1.0, "rate_deg_per_s": rate, "measured_rate_deg_per_s": read}
+        found = measure_scale(Record(columns))["scale_factor_asymmetry_ppm"]
+        kept += found.low < 1000 < found.high
+        assert found.high - found.low < 20
+    assert 82 <= kept  # 90 less 2.7 standard deviations
 
 
 def test_the_angle_kept_without_power(folder, capsys):
