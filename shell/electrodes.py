@@ -204,6 +204,9 @@ class Electrodes:
         return position, area, w
 
 
+LIGHT = 1e-6  # weight of the voltages beside that of the split they null
+
+
 @dataclass(frozen=True)
 class Trim:
     """Voltages that null a split: of every electrode, V; `left` the wave of the split that stays; `shift` of ln f."""
@@ -214,18 +217,18 @@ class Trim:
 
 
 def trim_voltages(electrodes: Electrodes, wave: complex, limit: float) -> Trim:
-    """The voltages, of least Σ V² and none above `limit` (V), with which electrodes null the wave of a split."""
-    from scipy.optimize import linprog
+    """The voltages, of least Σ V⁴ and none above `limit` (V), with which electrodes null the wave of a split.
+
+    They are alike on electrodes that act alike, so that an even ring of one gap is not pulled sideways, Σ V² exp(iθ) = 0.
+    """
+    from scipy.optimize import lsq_linear
 
     means, waves = electrodes.per_square_volt
-    scale = float(abs(waves).max())
-    sought = linprog(
-        np.ones(len(waves)),
-        A_eq=np.array([waves.real, waves.imag]) / scale * limit**2,
-        b_eq=-np.array([wave.real, wave.imag]) / scale,
-        bounds=[(0.0, 1.0)] * len(waves),
-    )
-    if sought.status != 0:
+    scale, count = float(abs(waves).max()), len(waves)
+    effect, aim = np.array([waves.real, waves.imag]) / scale, -np.array([wave.real, wave.imag]) / (scale * limit**2)
+    sides = np.concatenate([aim, np.zeros(count)])
+    sought = lsq_linear(np.vstack([effect, LIGHT * np.eye(count)]), sides, (0.0, 1.0), "bvls", tol=1e-15)
+    if float(np.hypot(*(effect @ sought.x - aim))) > 1e-6 * float(np.hypot(*aim)):
         hertz = electrodes.pair.mode.frequency
         raise ShellError(
             f"{limit:g} V on these electrodes null a split of at most {hertz * reach(electrodes, limit):.3g} Hz in any direction, "

@@ -110,6 +110,20 @@ def test_trim_voltages_null_the_split_within_their_reach(pair):
     assert 0.1 < most * f < 1.0  # Hz
 
 
+def test_trim_voltages_do_not_pull_the_shell_sideways(pair):
+    """A quarter of a turn leaves what an electrode does to n = 2 alone: Σ V² exp(iθ) can be 0 at the same null and Σ V²."""
+    sixteen = Electrodes(pair, ring_of_electrodes(16, 1.0, 0.0), 100e-6)
+    turn, per_volt = np.exp(2j * pi * np.arange(16) / 16), abs(sixteen.per_square_volt[1][0])
+    wave = 40000 * per_volt * np.exp(1j * np.radians(220))  # nulled by Σ V² exp(4iθ) = 40 000 V² exp(220° i)
+    squares = np.array(trim_voltages(sixteen, wave, 100.0).voltages) ** 2
+    for side in range(0, 16, 4):
+        # the third and fourth of every quarter act along 180° and 270°
+        x, y = 10000 * np.cos(np.radians(40)), 10000 * np.sin(np.radians(40))
+        np.testing.assert_allclose(squares[side : side + 4], [0, 0, x, y], atol=1e-3)
+    assert abs(squares @ turn) < 1e-6 * squares.sum()
+    assert abs(squares @ turn**3) < 1e-6 * squares.sum()
+
+
 def test_coefficients_are_the_slopes_of_the_softening(pair):
     ring = Electrodes(pair, ring_of_electrodes(16, 0.8, 60.0), 80e-6)
     step = charged(ring, 60.01).soften().shift - charged(ring, 59.99).soften().shift
