@@ -10,9 +10,10 @@ Bao et al., J. Micromech. Microeng. 12 (2002) 341). In a viscous gas the layer o
 the wall and the potential flow that its waves drive, Z = √(ρ_g μ ω/2) on that slip (Stokes). Between the two regimes, where no
 closed form holds, the two are joined by Q² = Q_free² + Q_viscous², and the uncertainty is a half.
 
-A gap to electrodes is not counted. In a period molecules diffuse along a gap d by about √(d √(R T/M)/ω), 1 mm at 0.1 mm and 4 kHz:
-under longer electrodes they are compressed in place, as a spring, and the loss stays of the order of that of a free face. Plates
-that are smaller lose more (Bao et al.).
+A gap g to electrodes is not counted, only bounded. In a period molecules diffuse along it by about √(g √(R T/M)/ω), 1 mm at 0.1 mm
+and 4 kHz: farther than that from an end of the electrodes they are compressed in place, as a spring p/g, and nearer they escape and
+lose. A film that leaks at a rate r per time has Z = p/(g ω) ω r/(ω² + r²), at most half its spring (Blech, J. Lubr. Technol. 105
+(1983) 615; Bao et al. for plates so small that all molecules leave).
 """
 
 from dataclasses import dataclass
@@ -21,7 +22,7 @@ from math import pi, sqrt
 import numpy as np
 from numpy.typing import ArrayLike
 
-from shell.damping.faces import Vibration
+from shell.damping.faces import Kind, Vibration
 from shell.errors import ShellError
 from shell.quadrature import Array
 
@@ -98,6 +99,13 @@ def viscous_loss(vibration: Vibration, gas: Gas, pressure: float, temperature: f
         flow = (1.0 if face.kind == "outer" else -1.0) * (vibration.solution.system.n > 0) * face.moved[2]
         slip += face.integrate(face.moved[0] ** 2 + (face.moved[1] - flow) ** 2)
     return resistance * slip / (omega * vibration.kinetic)
+
+
+def most_squeezed(vibration: Vibration, face: Kind, gap: float, pressure: float, temperature: float) -> float:
+    """The largest 1/Q of gas in a gap (m) over the whole of a face, Z = p/(2 g ω) along the normal."""
+    omega = float(vibration.omega(temperature))
+    hit = sum(one.integrate(one.moved[2] ** 2) for one in vibration.faces if one.kind == face)
+    return pressure / (2 * gap * omega) * hit / (omega * vibration.kinetic)
 
 
 def mean_free_path(gas: Gas, pressure: float, temperature: float) -> float:

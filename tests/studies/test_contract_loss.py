@@ -40,6 +40,24 @@ def test_every_shipped_card_has_a_budget(capsys, card):
     assert all(part["source"] for part in found["parts"])
 
 
+def test_gas_in_the_gap_is_named_with_its_bound(capsys, tmp_path):
+    """A thin ring bends with u = w/n: half a spring p/g on its face is 1/Q = p/(2 g ρ h ω²) / (1 + 1/n²)."""
+    ring = {"shape": "cylinder", "radius_mm": 12.5, "thickness_mm": 0.3, "height_mm": 0.5}
+    gap = {"gap_um": 20.0, "count": 16, "face": "outer"}
+    path = tmp_path / "card.toml"
+    path.write_text(tomli_w.dumps(DOME | {"resonator": ring, "loss": {"pressure_Pa": 1e-2}, "electrodes": gap}))
+    status, out, _ = _run(capsys, str(path), "--json", "--from", "20", "--to", "20")
+    assert status == 0
+    found = json.loads(out)
+    (words,) = (words for words in found["left_out"] if words.startswith("gas squeezed in the gap"))
+    gas = next(part for part in found["parts"] if part["name"] == "gas")["inverse_q"][0]
+    density, omega = 2200.0, 2 * np.pi * found["frequency_Hz"]
+    most = 1e-2 / (2 * 20e-6 * density * 0.3e-3 * omega**2) / 1.25
+    bound, times = (float(words.split(at)[1].split()[0]) for at in ("1/Q = ", "µm, "))
+    assert bound == pytest.approx(most, rel=0.05)  # two digits are printed
+    assert times == pytest.approx(most / gas, rel=0.05)
+
+
 def test_every_key_of_the_card_makes_its_part(capsys, tmp_path):
     loss = {"pressure_Pa": {"value": 1e-2, "relative_sd": 0.1}, "gas": "nitrogen", "anchor_inverse_q": 2e-9}
     loss |= {
