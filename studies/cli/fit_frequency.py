@@ -97,7 +97,6 @@ def _read_points(
         T, f, step = settled_table(soaks, first, advise_hold(records, time_constant, left) if len(soaks) < 2 else "")
         sha256 = records[0].sha256
         shown = max(soak.time_constant for soak in soaks)
-        if shown > time_constant:
-            usual = f"{time_constant / 60:.0f} min"
-            say(f"the records show a time constant of {shown / 60:.0f} min, used instead of {usual}.")
+        if shown > 1.01 * time_constant:
+            say(f"the records show a time constant of {shown / 60:.3g} min, used instead of {time_constant / 60:.3g}.")
     return T, f, step, ModelSource(Path(first).name, sha256, len(f)), soaks

@@ -36,7 +36,8 @@ def draft_column(
     unit = stated or next(iter(units))
     remark = remark or ("" if stated else "    # CHECK: the name states no unit")
     middle = sorted(numbers)[len(numbers) // 2]
-    lines = [f"from = {spell_value(name)}", f'to = "{target}"']
+    doubt = f"    # CHECK: by its name {meaning.rather}, which another column fills" if meaning.rather else ""
+    lines = [f"from = {spell_value(name)}", f'to = "{target}"{doubt}']
     if target.endswith("_degC") and unit == "degC" and 200 < middle < 500:
         unit, remark = "K", "    # CHECK: the values look like kelvin"
     lines.append(f'unit = "{unit}"{remark}')

@@ -125,16 +125,28 @@ def _split(line: str, separator: str) -> list[str]:
 
 def _has_decimal_commas(rows: Sequence[Sequence[str]], separator: str) -> bool:
     """Tell whether commas are decimal ones; between commas (in quotes) only what parts no thousands is."""
-    decimal = r"[+-]?\d+,\d+([eE][+-]?\d+)?"
+    decimal = r"[+-]?\d+(\.\d{3})*,\d+([eE][+-]?\d+)?"
     found = [cell.strip() for row in rows for cell in row if re.fullmatch(decimal, cell.strip())]
     return (
         any(not re.fullmatch(r"[+-]?[1-9]\d{0,2},\d{3}", cell) for cell in found) if separator == "," else bool(found)
     )
 
 
+def other_sign(decimal: str) -> str:
+    """Return the sign that may part thousands."""
+    return "," if decimal == "." else "."
+
+
+def is_grouped(cell: str, decimal: str) -> bool:
+    """Tell whether a cell holds a number with signs between its thousands, such as 4.432,07."""
+    pattern = rf"[+-]?\d{{1,3}}(\{other_sign(decimal)}\d{{3}})+\{decimal}\d+"
+    return bool(re.fullmatch(pattern, cell.strip()))
+
+
 def as_number(cell: str, decimal: str) -> float | None:
     """Return the number that a cell holds, None where it holds something else."""
-    text = cell.strip().replace(decimal, ".")
+    text = cell.strip()
+    text = (text.replace(other_sign(decimal), "") if is_grouped(text, decimal) else text).replace(decimal, ".")
     return float(text) if re.fullmatch(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,2})?", text) else None
 
 

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 import msgspec
 
 from studies.errors import nearest
-from studies.importing.units import TARGETS, Unit, find_spelling, split_nominal, units_of
+from studies.importing.units import TARGETS, UNITS, Unit, find_spelling, split_nominal, units_of
 from studies.schema.keys import Keys, number, says
 from studies.schema.reader import read_file
 
@@ -30,7 +30,7 @@ class ColumnMap(Keys, frozen=True, kw_only=True):
     source: Annotated[str, says("name in the raw file", example="T Gehäuse [K]")] = msgspec.field(name="from")
     target: Annotated[str, says("column of the record", example="housing_temperature_degC")] = msgspec.field(name="to")
     stated_unit: Annotated[
-        str, says("of the scaled reading: K, °C, °/s, mdps, ppm of 4432.07 Hz, ...; see hrg import --help", example="K")
+        str, says(f"of the scaled reading, °C and mdps are spellings too: {UNITS}; ppm of 4432.07 Hz", example="K")
     ] = msgspec.field(name="unit")
     scale: Annotated[float, number("reading × scale + offset is in the unit")] = 1.0
     offset: Annotated[float, number("see scale")] = 0.0
@@ -103,6 +103,7 @@ class FileMap(Keys, frozen=True, kw_only=True):
 
     separator: Annotated[Literal[";", ",", "tab", "|", "space"], says("between cells")] = ","
     decimal: Annotated[Literal[".", ","], says("of numbers")] = "."
+    thousands: Annotated[Literal["", ".", ",", "'", " "], says("between groups of three digits")] = ""
     encoding: Annotated[Literal["utf-8", "utf-16", "cp1252", "latin-1"], says("of the file")] = "utf-8"
     header_line: Annotated[int, number("with column names; 0: 'column 1', 'column 2', ...", least=0, most=LAST)] = 1
     first_line: (
@@ -149,6 +150,8 @@ class FileMap(Keys, frozen=True, kw_only=True):
     def __post_init__(self) -> None:
         if self.sample_period is not None and (self.time or self.time_format):
             raise ValueError("sample_period_s is given; remove time and time_format.")
+        if self.decimal == self.thousands:
+            raise ValueError(f"decimal and thousands are both '{self.decimal}'.")
         if self.time_format and "%" not in self.time_format and self.time_format not in TIME_FORMATS:
             raise ValueError(
                 f"time_format = '{self.time_format}' is unknown{nearest(self.time_format, TIME_FORMATS)} A pattern needs %,"

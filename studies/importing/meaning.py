@@ -49,27 +49,28 @@ AXIS = re.compile(r"^(.*?)([xyz])((?:[^a-z].*)?)$", re.IGNORECASE)
 
 @dataclass(frozen=True)
 class Meaning:
-    """What a raw column becomes: a column of the record, and the axis ("" where there is only one)."""
+    """What a raw column becomes: a column of the record, the axis ("" where there is only one), and what it would be if that were free."""
 
     target: str
     axis: str = ""
+    rather: str = ""
 
 
 def find_meanings(hints: Mapping[str, str], taken: Sequence[str] = ()) -> dict[str, Meaning]:
     """Return the meaning of every column for which one is found, from `hints` of name and unit; `taken` are filled by other files."""
     axes = _find_axes(hints)
-    bids = [
+    bids = sorted(
         (-weight, place, name, target)
         for place, (name, hint) in enumerate(hints.items())
         if name not in axes
         for target, weight in _bids(hint).items()
-        if target not in taken
-    ]
+    )
+    first = {name: target for _, _, name, target in reversed(bids)}
     found = {name: Meaning("measured_rate_deg_per_s", axis) for name, axis in axes.items()}
-    filled = {meaning.target for meaning in found.values()}
-    for _, _, name, target in sorted(bids):
+    filled = {*taken, *(meaning.target for meaning in found.values())}
+    for _, _, name, target in bids:
         if name not in found and target not in filled:
-            found[name] = Meaning(target)
+            found[name] = Meaning(target, rather=first[name] if first[name] != target else "")
             filled.add(target)
     return {name: found[name] for name in hints if name in found}
 

@@ -38,6 +38,7 @@ class TextTable(RawTable):
 
     cells: "pd.DataFrame"
     decimal: str
+    thousands: str = ""
 
     def joined(self, columns: Sequence[str]) -> "pd.Series[str]":
         """Return several columns joined by a blank, such as a date and a time of day."""
@@ -61,13 +62,14 @@ class TextTable(RawTable):
 
         text = self.text(column)
         empty = self.is_empty(text)
-        plain = text.str.replace(self.decimal, ".", regex=False) if self.decimal != "." else text
+        plain = text.str.replace(self.thousands, "", regex=False) if self.thousands else text
+        plain = plain.str.replace(self.decimal, ".", regex=False) if self.decimal != "." else plain
         values = pd.to_numeric(plain.mask(empty, "nan"), errors="coerce").to_numpy(dtype=float, copy=True)
         bad = np.flatnonzero(np.isnan(values) & ~empty)
         if len(bad):
             raise InputError(
                 f"{self.place(bad[0])}: '{shorten(text.iloc[bad[0]])}' in column '{column}' is not a"
-                f" number (decimal = '{self.decimal}'); where it marks a missing value, add it to 'missing' in the map."
+                f" number (decimal = '{self.decimal}', thousands = '{self.thousands}'); where it marks a missing value, add it to 'missing' in the map."
             )
         return values
 
@@ -85,7 +87,7 @@ def read_text(paths: Sequence[str | Path], file: FileMap, plain: bool = True) ->
 
 def read_plain(path: str | Path, file: FileMap) -> Iterator[tuple[list[str], RawTable]]:
     """Yield the columns' names and the next rows of a text of plain numbers; NotPlain where cells must be looked at as text."""
-    simple = file.encoding == "utf-8" and file.separator != "space" and file.last_line is None
+    simple = file.encoding == "utf-8" and file.separator != "space" and file.last_line is None and not file.thousands
     if not simple or Path(path).suffix.lower() in EXCEL or (file.time and file.time_format not in NUMERIC_TIMES):
         raise NotPlain
     with opened(path, ANY_SIZE) as raw:
@@ -134,7 +136,10 @@ def read_raw(path: str | Path, file: FileMap) -> Iterator[tuple[list[str], RawTa
             if file.header_line and file.separator != "space" and not lines[-1][-1].strip():
                 body.padding = re.compile(f"{re.escape(SEPARATORS[file.separator])}+$", re.MULTILINE)
             for cells in _parse_text(path, body, file, names):
-                yield names, TextTable(part, file.missing, int(cells.index[0]), len(cells), cells, file.decimal)
+                yield (
+                    names,
+                    TextTable(part, file.missing, int(cells.index[0]), len(cells), cells, file.decimal, file.thousands),
+                )
         except UnicodeError:
             raise _wrong_encoding(path, file.encoding) from None
 

@@ -93,6 +93,7 @@ _BY_ENDING: Mapping[str, Mapping[str, Unit]] = {
     "_W": {"W": _SAME, "mW": _times(1e-3, "x / 1000"), "uW": _times(1e-6, "x / 1e6")},
     "inverse_q": {"1/Q": _SAME, "Q": _over(1.0, "1 / x"), "ppm": _times(1e-6, "x / 1e6")},
 }
+UNITS = "; ".join(", ".join(units) for units in _BY_ENDING.values())
 
 
 def units_of(column: str) -> Mapping[str, Unit]:

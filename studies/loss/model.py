@@ -223,11 +223,17 @@ def _squeezed(instrument: "Instrument", vibration: "Vibration", parts: "LossPart
     counted = gas_loss(vibration, GASES[parts.gas], pressure, T0, parts.accommodation)
     most = most_squeezed(vibration, keys.face, 1e-6 * keys.gap_um, pressure, T0)
     words = "gas squeezed in the gap of the electrodes, most of it near their ends: it adds at most"
-    return [f"{words} 1/Q = {most:.2g} at {keys.gap_um:g} µm, {most / counted:.2g} times the gas counted."] if most else []
+    return (
+        [f"{words} 1/Q = {most:.2g} at {keys.gap_um:g} µm, {most / counted:.2g} times the gas counted."] if most else []
+    )
 
 
 def _others(
-    instrument: "Instrument", vibration: "Vibration", parts: "LossParts", spread: Mapping[str, float], left_out: list[str]
+    instrument: "Instrument",
+    vibration: "Vibration",
+    parts: "LossParts",
+    spread: Mapping[str, float],
+    left_out: list[str],
 ) -> "list[LossCause]":
     """Gas, activated losses, and what leaves through the mount as the card gives it."""
     from shell.constants import zero_Celsius

@@ -73,10 +73,11 @@ def _separate(
 ) -> Advice:
     """Separate rivals by a run; those that no record separates need another measurement."""
     names = [h.terms[-1].effect.name for h in rivals]
-    sensors = sorted({find_effect(name).sensor for name in (*names, *exact)} - {""})
-    more = f" Alternatively, without a run: {'; or '.join(sensors)}." if sensors else ""
+    kin = (term.effect.name, *exact) if exact else names
+    sensors = "; or ".join(sorted({find_effect(name).sensor for name in kin} - {""}))
+    more = f" Alternatively, without a run: {sensors}." if sensors else ""
     if exact:
-        more = f" No run can distinguish {term.effect.name} from {spell(exact)}: {term.effect.isolate}."
+        more = f" No run can distinguish {term.effect.name} from {spell(exact)}; another sensor can: {sensors}."
     if len(rivals) > 1:
         scored = between(found, rivals, _candidates(found, chamber, [one for h in rivals for one in h.terms]))
         evidence, pair, best = max(scored, key=_worth)

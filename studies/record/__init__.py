@@ -56,6 +56,7 @@ ALIKE, AS_LARGE = (
     0.02,
 )  # correlation of the noise of two columns, and ln of its sizes: of another gyro it is scaled
 FEWEST_ALIKE, MOST_ALIKE = 50, 20_000  # rows that show it
+LOWEST = 20.0  # Hz, of a resonator's table
 FAR = 0.7  # of ln f from the median of a table: a factor of two
 COMPENSATED = "compensated_"
 COMMANDED = ("chamber_temperature_degC", "rate_deg_per_s", "drive_amplitude_V", "electrode_bias_V")  # may stand still
@@ -188,15 +189,16 @@ def read_frequency_table(path: str | Path) -> Columns:
     check_plausible(table.values, table.place)
     f = table.values["frequency_Hz"]
     usual = float(np.median(f))
+    table.refuse(f < LOWEST, lambda row: f"frequency_Hz = {f[row]:g} looks like kHz; multiply the column by 1000.")
     far = f"is far from the others (median {usual:.6g} Hz); correct or remove the line."
     table.refuse(np.abs(np.log(f / usual)) > FAR, lambda row: f"frequency_Hz = {f[row]:g} {far}")
     return table
 
 
 def reading_resolution(values: Array) -> float:
-    """Return the step of readings that were rounded to decimals: one unit of the last digit that any of them shows."""
+    """Return the step of readings that were rounded to decimals, one unit of the last digit that any shows, or to doubles."""
     decimals = max(len(repr(float(value)).partition(".")[2].rstrip("0")) for value in values)
-    return float(10.0**-decimals)
+    return max(float(10.0**-decimals), float(np.finfo(float).eps * np.max(np.abs(values))))
 
 
 def drop_repeats(records: Sequence[Record]) -> tuple[list[Record], list[str]]:

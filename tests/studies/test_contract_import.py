@@ -400,6 +400,28 @@ def test_rows_without_a_time_have_a_sample_period(tmp_path):
     assert record["time_s"] == pytest.approx(0.25 * np.arange(50))
 
 
+def test_points_between_thousands_are_drafted_and_read(tmp_path):
+    """4.432,07 is 4432.07; without a comma 4.432 is read by the map, as 4432."""
+    raw = tmp_path / "raw.csv"
+    rows = [f"{k};4.43{k % 10},{k:02d};{20 + k}" for k in range(30)]
+    raw.write_text("\n".join(["t [s];freq [Hz];temp [degC]", *rows, "30;4.439;50", ""]))
+    record = draft_and_import(raw, tmp_path)
+    assert record["frequency_Hz"] == pytest.approx([*(4430 + k % 10 + k / 100 for k in range(30)), 4439.0])
+    with pytest.raises(InputError, match=r"'4.430,00' in column 'freq \[Hz\]' is not a number .*thousands = ''"):
+        draft_and_import(raw, tmp_path, ('thousands = "."\n', ""))
+
+
+def test_a_draft_marks_a_second_temperature_and_rows_written_twice(tmp_path):
+    raw = tmp_path / "raw.csv"
+    rows = [f"{t},{25 - t / 100},{26 - t / 100},{4432 + t / 1000}" for t in range(40)]
+    raw.write_text("\n".join(["time,temp,temp,freq", ",°C,°C,Hz", *rows[:20], rows[19], *rows[20:], ""]))
+    lines = draft_map([str(raw)]).text.splitlines()
+    (line,) = (line for line in lines if "chamber_temperature_degC" in line)
+    assert "CHECK" in line
+    assert not any("CHECK" in line for line in lines if '"housing_temperature_degC"' in line)
+    assert 'repeated_times = "first"    # CHECK: some rows stand there twice' in lines
+
+
 @pytest.mark.parametrize(("form", "factor"), [("unix-s", 1), ("unix-ms", 1e3), ("unix-us", 1e6), ("unix-ns", 1e9)])
 def test_times_since_1970_are_told_by_their_size(tmp_path, form, factor):
     stamps = [int((1627342541 + 11 * k) * factor) for k in range(30)]

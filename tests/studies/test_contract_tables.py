@@ -48,6 +48,7 @@ BAD = [
     (read_frequency_table, b"temperature_degC,frequency_Hz\n1,\n", ["line 2", "frequency_Hz is empty"]),
     (read_frequency_table, b"temperature_degC,frequency_Hz\n293.15,4432\n", ["kelvin"]),
     (read_frequency_table, b"temperature_degC,frequency_Hz\n20,-4432\n", ["line 2", "possible"]),
+    (read_frequency_table, b"temperature_degC,frequency_Hz\n20,4.43207\n", ["line 2", "kHz", "1000"]),
     (read_profile, b"time_s,chamber_temperature_degC\n0,20\n0,30\n", ["line 3", "does not increase"]),
     (read_profile, b"time_s,temperature\n0,20\n", ["'temperature'"]),
 ]
@@ -126,6 +127,9 @@ def test_quick_and_careful_parsers_agree(tmp_path):
 def test_resolution_is_the_last_digit_that_any_reading_shows():
     assert reading_resolution(np.array([4416.97, 4421.05, 4424.9])) == 0.01
     assert reading_resolution(np.array([4416.0, 4421.0])) == 1.0
+    assert reading_resolution(np.array([4.41697, 4.4320699999999995])) == pytest.approx(
+        2.0**-52 * 4.43207
+    )  # of a double
 
 
 def test_a_file_that_fails_halfway_leaves_nothing(tmp_path):
