@@ -13,23 +13,49 @@ C = Δ(1/τ) (cos 2nθ_τ, sin 2nθ_τ) − (δ + δ_d, κ + κ_d)/τ as the dri
 gain ratio and skew of the pick-offs, which also make the amplitude uneven that a commanded turn c (1/s) acts on, ε the phase error of the whole path. A wave that turns at one rate only cannot tell
 κ, δ and leakage from damping: turn it both ways. The drives' own gains (index d) act as damping does, and only a run-down without drive
 tells them apart; they are taken as given.
+
+Frequency and quadrature both tell W, drive and turn both C, the turn as C − ε W: columns that disagree beyond their errors widen the intervals,
+and where they disagree by more than a tenth, none is believed. Rows that their neighbours contradict count as the line between these.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 import scipy
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from compensation.arrays import Array
 from compensation.errors import CompensationError
 from compensation.noise_regression import fit_coloured
 from compensation.ringdown.answer import Estimate
 from compensation.samples import read_columns, require_regular
+from compensation.spikes import find_spikes
 
 LEAST_TURN = 2 * np.pi  # least span of x (rad): one period of what is looked for
 LEAKS = ("leak", "leak cos", "leak sin")
 LEAST_CONTRAST = 0.05  # least spread of the turn rate over its largest: below it, turning both ways is missing
+FEW = 10  # rows without a rate whose turns are unknowns; beyond, they count as the line between their neighbours
+LEAST_SPIKE = 1e-3  # of a column's span, by which a spike stands out
+CHANCE, LARGE = (
+    1e-3,
+    0.1,
+)  # of a disagreement that is none, and its part of what columns tell, beyond which one is wrong
+UNEVEN = np.array([0.005, 1e-3])  # usual standard deviations of gain ratio and skew (rad) of pick-offs and drives
+Told = tuple[Array, Array]
+"""Both components of a split, and their covariance."""
+
+
+@dataclass(frozen=True)
+class Conflict:
+    """Two columns that disagree about a split, and the `factor` on the second with which they agree (NaN: there is none).
+
+    `widened`, where it is not 0: they disagree by little, and the intervals were widened so many times instead.
+    """
+
+    split: str  # "frequency" or "damping"
+    columns: tuple[str, str]
+    factor: float
+    widened: float
 
 
 @dataclass(frozen=True)
@@ -38,22 +64,36 @@ class WaveFit:
 
     Names: `decay` 1/τ (1/s), `damping_split` Δ(1/τ) (1/s), `damping_axis` (rad), `frequency_split` (rad/s),
     `frequency_axis` (rad), `gain_ratio` δ, `skew` κ (rad), `phase_error` ε (rad), `rate` (rad/s, what is left of the rate).
+    Columns are `frequency`, `quadrature`, `drive` and `turn`, whose damping takes ε from all (as 0 where they contradict each other), and the `angle`.
     """
 
     estimates: dict[str, Estimate]
     undetermined: tuple[str, ...]
     confidence: float
+    alone: dict[str, dict[str, Estimate]]  # what each column says by itself
+    conflicts: tuple[Conflict, ...]
+    spikes: dict[str, NDArray[np.intp]]  # rows of each column that their neighbours contradict
 
 
 def fit_whole_angle(
     time: ArrayLike, angle: ArrayLike, rate: ArrayLike, *, coupling: float, harmonic: int = 2,
     applied: ArrayLike = 0.0, decay: ArrayLike | None = None, frequency: ArrayLike | None = None,
     quadrature: ArrayLike | None = None, drive_gain_ratio: float = 0.0, drive_skew: float = 0.0,
-    confidence: float = 0.95,
+    pickoff_gain_ratio: float = 0.0, pickoff_skew: float = 0.0, late: float = 0.0, confidence: float = 0.95,
 ) -> WaveFit:  # fmt: skip
-    """Fit splits, axes, gain ratio, skew and phase error to a whole-angle run: measured `angle` (rad), `rate` less the command, n k."""
-    t, theta, indicated = read_columns(time=time, angle=angle, rate=rate)
+    """Fit splits, axes, gain ratio, skew and phase error to a whole-angle run: measured `angle` (rad), `rate` less the command, n k.
+
+    Columns are means over rows; the angle is read `late` rows after each begins. The pick-offs' gains count where the run does not tell them.
+    """
+    columns = {"angle": angle, "turn": rate}
+    more = {"frequency": frequency, "quadrature": quadrature, "drive": decay}
+    columns |= {name: column for name, column in more.items() if column is not None}
+    t, *read = read_columns(time=time, **columns)
     step = require_regular(t, "the fit of a whole-angle run")
+    # The angle turns by much of its span from row to row.
+    bad = {name: find_spikes(y, LEAST_SPIKE * (name != "angle")) for name, y in zip(columns, read, strict=True)}
+    y = {name: np.interp(t, t[~bad[name]], one[~bad[name]]) for name, one in zip(columns, read, strict=True)}
+    theta, indicated = _begin_rows(y["angle"], late), y["turn"]
     x = 2 * harmonic * theta
     if np.ptp(x) < LEAST_TURN:
         raise CompensationError(f"the wave precesses by only {np.degrees(np.ptp(theta)):.3g}°; the fit needs {180 / harmonic:g}° or more: precess it faster or record longer.")  # fmt: skip
@@ -61,61 +101,97 @@ def fit_whole_angle(
     both_ways = np.ptp(_smooth(turn_rate)) > LEAST_CONTRAST * np.max(np.abs(_smooth(turn_rate)))
     z = float(scipy.special.ndtri(0.5 + confidence / 2))
     undetermined: list[str] = []
-    estimates: dict[str, tuple[float, float]] = {}
     # Of the rows' means, all but the last: where the wave is at both ends of the row.
     seen = _Turn(x)
     command = harmonic * turn_rate / step - coupling * indicated[:-1]
     known = np.broadcast_to(np.asarray(applied, dtype=float), t.shape)[:-1]
     turns = [values for values in (command, known) if np.ptp(values) > LEAST_CONTRAST * np.max(np.abs(values))]
     leaks = [command, command * seen.cosine, command * seen.sine] if both_ways and turns and turns[0] is command else []
-    W = _detuned(seen, t, frequency, quadrature, leaks, undetermined)
+    # What a commanded turn leaks through uneven drives, in one direction, goes unseen with the splits.
+    leak = np.diag((0.0 if both_ways else np.mean(command)) ** 2 * np.full(2, UNEVEN.max() ** 2))
+    told = _detuned(seen, t, y, leaks, leak)
+    conflicts: list[Conflict] = []
+    W = _join("frequency", ("frequency", "quadrature"), told, conflicts)[0]
     phi = coupling * np.concatenate([[0.0], np.cumsum(indicated[:-1] - known)]) * step
-    delta, kappa = (0.0, 0.0), (0.0, 0.0)
+    card = np.array([pickoff_gain_ratio, pickoff_skew])
+    gains, spread = np.zeros(2) if both_ways else card, UNEVEN
+    drives, lost = np.array([drive_gain_ratio, drive_skew]), np.flatnonzero(bad["turn"][:-1])[:FEW]
     for _ in range(4):
-        behind = straighten(x / 2, delta[0], kappa[0])
-        own = delta[0] - drive_gain_ratio, kappa[0] - drive_skew
-        true = _Turn(x + 2 * behind)
-        mean, S, S_cov, more = _turned(t, x, true, phi + behind, command, own, turns, both_ways)
-        delta, kappa = (delta[0] + more[0][0], more[0][1]), (kappa[0] + more[1][0], more[1][1])
-    gains = delta, kappa
-    # Where the pick-offs' gains make the amplitude rise and fall, its drive does so too; of a commanded turn it is a leak.
-    swell = (delta[0] * seen.sine - kappa[0] * seen.cosine) * (harmonic * turn_rate / step - command)
-    driven = _driven(seen, decay, swell, leaks, undetermined)
-    if driven is not None:
-        estimates["decay"] = driven[2], driven[3]
-    C, C_cov, epsilon = _join(S, S_cov, driven, W)
+        behind = straighten(x / 2, *gains)
+        mean, told["turn"], missed, spread = _turned(
+            t, x, _Turn(x + 2 * behind), phi + behind, command, gains - drives, turns, both_ways, lost
+        )
+        gains = gains + missed
+    estimates = {"rate": (mean[0] / coupling, mean[1] / coupling)}
+    loss = 0.0
+    if "drive" in y:
+        # Where the pick-offs' gains make the amplitude rise and fall, its drive does so too; of a commanded turn it is a leak.
+        swell = (gains[0] * seen.sine - gains[1] * seen.cosine) * (harmonic * turn_rate / step - command)
+        told["drive"], estimates["decay"] = _driven(seen, y["drive"], swell, leaks, leak)
+        loss = estimates["decay"][0]
+    C, epsilon = _join("damping", ("drive", "turn"), told, conflicts, W)
+    wrong = {one.split for one in conflicts if not one.widened}
+    if "damping" in wrong:  # nor is what the turn says of the gains believed
+        gains, spread = card, UNEVEN
+    if epsilon is not None and not wrong:
+        estimates["phase_error"] = epsilon
+    if both_ways and "damping" not in wrong:
+        estimates |= {"gain_ratio": (gains[0], spread[0]), "skew": (gains[1], spread[1])}
+
+    def true(one: Told) -> Told:
+        """Damping as it is without the gains, which the driven wave has in it."""
+        return one[0] + loss * (gains + drives), one[1] + np.diag((loss * spread) ** 2)
+
+    if epsilon is not None and W is not None:
+        turn, spread_of_turn = told["turn"]
+        told["turn"] = turn + epsilon[0] * W[0], spread_of_turn + epsilon[1] ** 2 * np.outer(W[0], W[0])
+    alone = {
+        name: _polar("damping", *true(one), harmonic)
+        if name in ("drive", "turn")
+        else _polar("frequency", *one, harmonic)
+        for name, one in told.items()
+    }
+    if W is None:
+        undetermined.append("frequency split, because neither frequency nor quadrature is recorded")
+    splits = {"frequency": W, "damping": C and true(C)}
+    for name, one in [(name, one) for name, one in splits.items() if one]:
+        polar = _polar(name, *one, harmonic)
+        if not both_ways and polar[f"{name}_split"][0] < 2 * polar[f"{name}_split"][1]:
+            undetermined.append(
+                f"{name} split and axis: in one direction they are not told from what uneven gains make of a commanded turn"
+            )
+        elif name not in wrong:
+            estimates |= polar
+    if "decay" not in estimates:
+        undetermined.append("1/τ, because the drive effort (inverse_q) is not recorded")
     if not both_ways:
         undetermined.append("gain ratio and skew: the wave precesses at one rate only; precess it in both directions")
-    if epsilon is None:
+    if epsilon is None and not wrong:
         undetermined.append("phase error, which needs the drive effort (inverse_q) and the frequency or quadrature")
-    else:
-        estimates["phase_error"] = epsilon
-    estimates["rate"] = mean[0] / coupling, mean[1] / coupling
-    if both_ways:
-        estimates["gain_ratio"], estimates["skew"] = gains[0], gains[1]
-    if driven is not None:
-        given = np.array([gains[0][0] + drive_gain_ratio, gains[1][0] + drive_skew])
-        spread = np.array([gains[0][1], gains[1][1]])
-        C, C_cov = C + given * driven[2], C_cov + np.diag((spread * driven[2]) ** 2)
-    estimates |= _polar("damping", C, C_cov, harmonic)
-    if W is not None:
-        estimates |= _polar("frequency", *W, harmonic)
-    estimates = _widen(estimates, harmonic, coupling)
-    found = {name: Estimate.normal(value, sd, z) for name, (value, sd) in estimates.items()}
-    return WaveFit(found, tuple(undetermined), confidence)
+
+    def stated(values: dict[str, tuple[float, float]]) -> dict[str, Estimate]:
+        widened = _widen(estimates | values, harmonic, coupling)
+        return {name: Estimate.normal(*widened[name], z) for name in values}
+
+    return WaveFit(
+        stated(estimates), tuple(undetermined), confidence,
+        {name: stated(one) for name, one in alone.items()}, tuple(conflicts),
+        {name: np.flatnonzero(rows) for name, rows in bad.items() if rows.any()},
+    )  # fmt: skip
 
 
 def _widen(estimates: dict[str, tuple[float, float]], harmonic: int, coupling: float) -> dict[str, tuple[float, float]]:
     """Add what formulas of first order leave out: of the size of the squares of the errors found, over 1/τ where damping is."""
     squares = sum(estimates[name][0] ** 2 for name in ("gain_ratio", "skew", "phase_error") if name in estimates)
     scale = {name: estimates[name][0] for name in ("decay", "damping_split", "frequency_split") if name in estimates}
-    loss = scale.get("decay", scale["damping_split"])
-    widths = {"decay": loss, "damping_split": loss, "damping_axis": loss / scale["damping_split"] / (2 * harmonic)}
+    split = scale.get("damping_split", 0.0)
+    loss = scale.get("decay", split)
+    widths = {"decay": loss, "damping_split": loss, "damping_axis": loss / (split or np.inf) / (2 * harmonic)}
     if "frequency_split" in scale:
         widths |= {"frequency_split": scale["frequency_split"], "frequency_axis": 1 / (2 * harmonic)}
         widths["phase_error"] = loss / scale["frequency_split"]
     left_out = {name: squares * width for name, width in widths.items()}
-    left_out["rate"] = np.sqrt(squares) * scale["damping_split"] / (4 * coupling)
+    left_out["rate"] = np.sqrt(squares) * split / (4 * coupling)
     return {name: (value, float(np.hypot(sd, left_out.get(name, 0.0)))) for name, (value, sd) in estimates.items()}
 
 
@@ -124,6 +200,13 @@ def straighten(psi: Array, gain_ratio: float, skew: float) -> Array:
     stretch = np.eye(2) + np.array([[gain_ratio, skew], [skew, -gain_ratio]]) / 2
     x, y = np.linalg.solve(stretch, np.array([np.cos(psi), np.sin(psi)]))
     return np.asarray(np.arctan2(y * np.cos(psi) - x * np.sin(psi), x * np.cos(psi) + y * np.sin(psi)))
+
+
+def _begin_rows(angle: Array, late: float) -> Array:
+    """Return the angle at which rows begin, from readings `late` rows later: the lines through those before and after, as a reversal lies between."""
+    before, after = np.diff(angle, prepend=2 * angle[0] - angle[1]), np.diff(angle, append=2 * angle[-1] - angle[-2])
+    behind = angle - before + (1 - late) * np.append(before[:1], before[:-1])
+    return np.asarray((1 - late) * (angle - late * after) + late * behind)
 
 
 def _smooth(values: Array) -> Array:
@@ -145,89 +228,95 @@ class _Turn:
         self.cosine, self.sine = share * np.cos(middle), share * np.sin(middle)
 
 
-def _driven(
-    x: _Turn, decay: ArrayLike | None, swell: Array, leaks: list[Array], undetermined: list[str]
-) -> tuple[Array, Array, float, float] | None:
-    """Return C, its covariance, and 1/τ with its deviation, from the drive's effort."""
-    if decay is None:
-        undetermined.append("1/τ, because the drive effort (inverse_q) is not recorded")
-        return None
-    (column,) = read_columns(decay=decay)
+def _driven(x: _Turn, decay: Array, swell: Array, leaks: list[Array], leak: Array) -> tuple[Told, tuple[float, float]]:
+    """Return C with its covariance, and 1/τ with its deviation, from the drive's effort."""
     X = np.stack([np.ones_like(swell), x.cosine / 2, x.sine / 2, *leaks], axis=1)
-    b, covariance = _white(X, column[:-1] - swell, ["1/τ", "cos", "sin", *LEAKS[: len(leaks)]])
-    return b[1:3], covariance[1:3, 1:3], float(b[0]), float(np.sqrt(covariance[0, 0]))
+    b, covariance = _white(X, decay[:-1] - swell, ["1/τ", "cos", "sin", *LEAKS[: len(leaks)]])
+    return (b[1:3], covariance[1:3, 1:3] + leak), (float(b[0]), float(np.sqrt(covariance[0, 0])))
 
 
-def _detuned(
-    x: _Turn, t: Array, frequency: ArrayLike | None, quadrature: ArrayLike | None, leaks: list[Array],
-    undetermined: list[str],
-) -> tuple[Array, Array] | None:  # fmt: skip
-    """Return W and its covariance from frequency and quadrature, weighed by their precision."""
+def _detuned(x: _Turn, t: Array, columns: dict[str, Array], leaks: list[Array], leak: Array) -> dict[str, Told]:
+    """Return W and its covariance from frequency and from quadrature."""
     ones, slope = np.ones(len(t) - 1), (t[:-1] - t.mean()) / np.ptp(t)
-    names = [*LEAKS[: len(leaks)]]
-    found = []
-    if frequency is not None:
-        (column,) = read_columns(frequency=frequency)
-        X = np.stack([x.cosine / 2, x.sine / 2, ones, slope, *leaks], axis=1)
-        b, covariance = _white(X, (column - column.mean())[:-1], ["cos", "sin", "mean", "drift", *names])
-        found.append((b[:2], covariance[:2, :2]))
-    if quadrature is not None:
-        (column,) = read_columns(quadrature=quadrature)
-        X = np.stack([x.sine / 2, -x.cosine / 2, ones, *leaks], axis=1)
-        b, covariance = _white(X, column[:-1], ["sin", "cos", "mean", *names])
-        found.append((b[:2], covariance[:2, :2]))
-    if not found:
-        undetermined.append("frequency split, because neither frequency nor quadrature is recorded")
-        return None
-    return _combine(found)
+    terms = {"frequency": [x.cosine / 2, x.sine / 2, ones, slope], "quadrature": [x.sine / 2, -x.cosine / 2, ones]}
+    told = {}
+    for name in [name for name in terms if name in columns]:
+        X, y = np.stack([*terms[name], *leaks], axis=1), columns[name] - columns[name].mean()
+        names = [*("first", "second", "mean", "drift")[: len(terms[name])], *LEAKS[: len(leaks)]]
+        b, covariance = _white(X, y[:-1], names)
+        told[name] = b[:2], covariance[:2, :2] + leak
+    return told
 
 
 def _turned(
-    t: Array, x: Array, true: _Turn, phi: Array, command: Array, own: tuple[float, float], turns: list[Array],
+    t: Array,
+    x: Array,
+    true: _Turn,
+    phi: Array,
+    command: Array,
+    own: Array,
+    turns: list[Array],
     both_ways: bool,
-) -> tuple[tuple[float, float], Array, Array, tuple[tuple[float, float], tuple[float, float]]]:  # fmt: skip
-    """Return the mean turn, (S_sin, S_cos) of the damping with their covariance, and (δ, κ) with deviations."""
+    lost: NDArray[np.intp],
+) -> tuple[tuple[float, float], Told, Array, Array]:
+    """Return the mean turn, C − ε W with its covariance, and what is missing of (δ, κ) with deviations; `lost` rows turned by something unknown."""
     step = (t[-1] - t[0]) / (len(t) - 1)
 
     def integral(values: Array) -> Array:
         return np.asarray(np.concatenate([[0.0], np.cumsum(values)]) * step)
 
     along, across = integral(command * true.cosine) / 2, integral(command * true.sine) / 2
-    columns = [np.ones_like(t), t - t[0], integral(true.sine), integral(true.cosine)]
+    columns = [np.ones_like(t), t - t[0], integral(true.sine) / 2, -integral(true.cosine) / 2]
+    gains = [along - np.sin(x) / 2, across + np.cos(x) / 2]
     names = ["start", "rate", "sin", "cos"]
     if both_ways:
-        columns += [along - np.sin(x) / 2, across + np.cos(x) / 2, *(integral(turn) for turn in turns)]
+        columns += [*gains, *(integral(turn) for turn in turns)]
         names += ["gain ratio", "skew", *("scale", "second scale")[: len(turns)]]
-    b, covariance = _white(np.stack(columns, axis=1), phi - own[0] * along - own[1] * across, names)
-    sd = np.sqrt(np.diag(covariance))
-    gains = ((float(b[4]), float(sd[4])), (float(b[5]), float(sd[5]))) if both_ways else ((0.0, 0.0), (0.0, 0.0))
-    return (float(b[1]), float(sd[1])), b[2:4], covariance[2:4, 2:4], gains
+    columns += [np.where(np.arange(len(t)) > row, step, 0.0) for row in lost]
+    names += [f"row {row}" for row in lost]
+    X, runs = np.stack(columns, axis=1), [slice(0, len(t))]
+    fit = fit_coloured(X, phi - own[0] * along - own[1] * across, names, runs)
+    b, covariance = fit.regression.coefficients, fit.regression.covariance
+    missed, spread = b[4:6], np.sqrt(np.diag(covariance))[4:6]
+    if not both_ways:  # what they may have made of the rest
+        missed, spread = np.zeros(2), UNEVEN
+        for gain, sd in zip(gains, spread, strict=True):
+            moved = sd * fit_coloured(X, gain, names, runs, fit.theta).regression.coefficients
+            covariance = covariance + np.outer(moved, moved)
+    return (float(b[1]), float(np.sqrt(covariance[1, 1]))), (b[2:4], covariance[2:4, 2:4]), missed, spread
 
 
 def _join(
-    S: Array, S_cov: Array, driven: tuple[Array, Array, float, float] | None, W: tuple[Array, Array] | None
-) -> tuple[Array, Array, tuple[float, float] | None]:
-    """Return C, its covariance and ε by drive and turn together: 2 S_sin = C₁ − ε W₁ and −2 S_cos = C₂ − ε W₂."""
-    flip = np.array([2.0, -2.0])
-    turned, turned_cov = flip * S, np.outer(flip, flip) * S_cov
-    if driven is None or W is None:
-        return (*_combine([(turned, turned_cov), *([driven[:2]] if driven else [])]), None)
-    epsilon = 0.0
+    split: str, columns: tuple[str, str], told: dict[str, Told], conflicts: list[Conflict], W: Told | None = None
+) -> tuple[Told | None, tuple[float, float] | None]:
+    """Return what two columns tell together, the second less ε W, and ε; of one column what it tells; and note where they disagree."""
+    if len(found := [told[name] for name in columns if name in told]) < 2:
+        return (found[0] if found else None), None
+    (one, one_cov), (two, two_cov) = found
+    free, eye, epsilon = [] if W is None else [-W[0][:, None]], np.eye(2), 0.0
+    X = np.block([[eye, *(np.zeros((2, 1)) for _ in free)], [eye, *free]])
     for _ in range(3):  # the uncertainty of W counts with ε
-        X = np.block([[np.eye(2), np.zeros((2, 1))], [np.eye(2), -W[0][:, None]]])
-        V = np.block([[driven[1], np.zeros((2, 2))], [np.zeros((2, 2)), turned_cov + epsilon**2 * W[1]]])
+        V = scipy.linalg.block_diag(one_cov, two_cov + (0.0 if W is None else epsilon**2 * W[1]))
         weight = np.linalg.inv(V)
         covariance = np.linalg.inv(X.T @ weight @ X)
-        b = covariance @ X.T @ weight @ np.concatenate([driven[0], turned])
-        epsilon = float(b[2])
-    return b[:2], covariance[:2, :2], (epsilon, float(np.sqrt(covariance[2, 2])))
-
-
-def _combine(found: list[tuple[Array, Array]]) -> tuple[Array, Array]:
-    """Return the mean of vectors with their covariances, weighed by their precision, and its covariance."""
-    weights = [np.linalg.inv(covariance) for _, covariance in found]
-    covariance = np.linalg.inv(sum(weights, np.zeros((2, 2))))
-    return covariance @ sum((w @ b for w, (b, _) in zip(weights, found, strict=True)), np.zeros(2)), covariance
+        b = covariance @ X.T @ weight @ np.concatenate([one, two])
+        epsilon = float(b[2]) if free else 0.0
+    left = np.concatenate([one, two]) - X @ b
+    dof = 4 - X.shape[1]
+    misfit, most = float(left @ weight @ left) / dof, float(scipy.special.chdtri(dof, CHANCE)) / dof
+    if misfit > most:
+        A = np.column_stack([one, *free])
+        scale = np.linalg.lstsq(A, two, rcond=None)[0]
+        off = two - A @ scale
+        apart = float(off @ np.linalg.solve(two_cov + scale[0] ** 2 * one_cov, off))
+        little = np.hypot(*(left[:2] - left[2:])) < LARGE * max(np.hypot(*one), np.hypot(*two))
+        factor = 1 / scale[0] if apart < scipy.special.chdtri(1, CHANCE) else np.nan
+        conflicts.append(Conflict(split, columns, float(factor), float(np.sqrt(misfit)) if little else 0.0))
+        if not little:
+            return found[0], None
+        covariance = covariance * misfit
+    phase = (epsilon, float(np.sqrt(covariance[2, 2]))) if free else None
+    return (b[:2], covariance[:2, :2]), phase
 
 
 def _polar(name: str, vector: Array, covariance: Array, harmonic: int) -> dict[str, tuple[float, float]]:

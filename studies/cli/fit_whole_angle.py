@@ -1,9 +1,11 @@
 """`hrg fit whole-angle`: splits, axes, gain ratio and phase error from a whole-angle run."""
 
-from math import degrees, pi
+from math import degrees, isnan, pi
+from typing import Literal, get_args
 
 import numpy as np
 
+from compensation.ringdown.answer import Estimate
 from compensation.wave_fit import WaveFit
 from compensation.wave_fit import fit_whole_angle as fit
 from studies.cli.arguments import Confidence, Run
@@ -11,7 +13,7 @@ from studies.cli.output import answers, keep_card, say
 from studies.errors import InputError, naming
 from studies.instrument.card import Instrument, load_card
 from studies.instrument.tables.loop import Loop
-from studies.record import read_record
+from studies.record import Record, read_record
 from studies.resonator.law import law_of
 from studies.results import Result, Sentence, Table
 
@@ -29,6 +31,18 @@ KEYS = {
 }
 SPLIT_PER_S = "damping_split_per_s"  # where 1/τ is not known
 NAMES = {key: (name, unit) for key, _, name, unit in KEYS.values()} | {SPLIT_PER_S: ("Damping split Δ(1/τ)", "1/s")}
+COLUMNS = {
+    # columns of the record by what the fit calls them
+    "frequency": "frequency_Hz",
+    "quadrature": "quadrature_V",
+    "drive": "inverse_q",
+    "turn": "bias_deg_per_h",
+    "angle": "pattern_angle_deg",
+}
+AngleAt = Literal["start", "middle", "end"]
+LATE: dict[str, float] = dict(zip(get_args(AngleAt), (0.0, 0.5, 1.0), strict=True))
+RATE = "measured_rate_deg_per_s"
+OWN = ("loops", "simulated")  # sources of records that hrg wrote, angles at the start
 KEYS_OF_CARD = tuple(key for key, *_ in KEYS.values() if key != "bias.offset_deg_per_h")
 NO_SCALE = "note: quadrature_V is not used because its scale is unknown; give --quadrature-volts-per-hertz or a card with [loop]."
 
@@ -40,6 +54,7 @@ def fit_whole_angle(
     card: str | None = None,
     bryan_factor: float | None = None,
     quadrature_volts_per_hertz: float | None = None,
+    angle_at: AngleAt | None = None,
     confidence: Confidence = 0.9,
     save: str | None = None,
 ) -> Result:
@@ -47,19 +62,22 @@ def fit_whole_angle(
 
     The record needs time_s, pattern_angle_deg (unwrapped) and bias_deg_per_h or measured_rate_deg_per_s (the indicated rate
     less the commanded precession). It may have inverse_q (drive effort), frequency_Hz, quadrature_V, and rate_deg_per_s if a
-    rate was applied. Precess the wave in both directions: one direction does not determine the gain ratio. The phase error is
-    that of the whole path; the gain ratio of the drives is taken from the card.
+    rate was applied. Each row holds means over its duration. Precess the wave in both directions: one direction does not determine
+    the gain ratio. The phase error is that of the whole path; the gain ratio of the drives is taken from the card. Columns are
+    also fitted alone: where they contradict each other, what they share is not estimated, and no card is saved.
 
     Args:
         card: Its card: gives the Bryan factor, the scale of quadrature_V and the gains of the drives.
         bryan_factor: Bryan factor, used instead of the card's.
         quadrature_volts_per_hertz: Scale of quadrature_V; without it and without a card, that column is not used.
+        angle_at: When in its row the pattern angle is read: at the start (default, as hrg loop and hrg simulate write it), in the middle
+            (such as its mean, like the other columns), or at the end.
         save: Write the card with the estimates and their uncertainties.
     """
     instrument = load_card(card) if card else None
     if save is not None and instrument is None:
         raise InputError("--save writes a card with the estimates: name the card to start from with --card.")
-    loop = instrument.loop if instrument is not None else None
+    record, loop = read_record(run), instrument.loop if instrument is not None else None
     if bryan_factor is None:
         if instrument is None:
             raise InputError("the Bryan factor is not known: name the card with --card, or give --bryan-factor.")
@@ -67,42 +85,116 @@ def fit_whole_angle(
         bryan_factor = law_of(instrument, T - 5, T + 5).bryan_factor
     if quadrature_volts_per_hertz is None and loop is not None:
         quadrature_volts_per_hertz = loop.quadrature_V_per_Hz
-    found, frequency = _fit_record(run, bryan_factor, quadrature_volts_per_hertz, loop, confidence)
-    estimates = _in_card_units(found, frequency)
-    if save is not None and instrument is not None:
-        keep_card(_with_estimates(instrument, estimates), save)
-    payload = {"data": run, "confidence": confidence, "saved": save}
-    payload |= {"estimates": estimates, "undetermined": found.undetermined}
-    rows = [{"quantity": NAMES[key][0], "unit": NAMES[key][1], "key": key} | e for key, e in estimates.items()]
+    if "quadrature_V" in record and quadrature_volts_per_hertz is None:
+        say(NO_SCALE)
+    arguments = record, bryan_factor, quadrature_volts_per_hertz, instrument, confidence
+    found = _fit_record(*arguments, LATE[angle_at or "start"])
+    estimates = _in_card_units(found.estimates, found, record)
+    names = COLUMNS | ({"turn": RATE} if RATE in record else {})
+    wrong = [one for one in found.conflicts if not one.widened]
+    against = "" if not wrong else "its columns contradict each other"
+    saved = None if instrument is None else keep_card(_with_estimates(instrument, estimates), save, against)
+    alone = {names[name]: _in_card_units(one, found, record) for name, one in found.alone.items()}
+    left_out = {names[name]: record["time_s"][rows].tolist() for name, rows in found.spikes.items()}
+    said = _contradictions(found, names)
+    payload: dict[str, object] = {"data": run, "confidence": confidence, "saved": saved, "estimates": estimates}
+    payload |= {"undetermined": found.undetermined, "alone": alone, "contradictions": said}
+    payload |= {"left_out_s": left_out}
+    rows = [_row(key, e) for key, e in estimates.items()]
+    by_column = [_row(key, e) | {"column": name} for name, of in alone.items() for key, e in of.items()]
     columns = f"Quantity | value ± sd: Value | low … high ± sd: {100 * confidence:g} % interval | Unit | key: Key of the card"  # fmt: skip
+    moved = "" if angle_at or record.source.startswith(OWN) else _moved_by_the_middle(arguments, estimates)
     return Result(
         payload,
         "Errors of a whole-angle gyro",
         f"Damping, splits, gains and phase error found in {run}.",
         [
+            *(Sentence(sentence, "warning") for sentence in said),
             Table("Estimates", rows, columns, "±: one standard deviation."),
             *(Sentence(f"Not determined: {sentence}.", "warning") for sentence in found.undetermined),
+            *(
+                Sentence(f"{_times(times)} of {name}: contradicted by the rows beside, and left out.", "warning")
+                for name, times in left_out.items()
+            ),
+            moved and Sentence(moved, "warning"),
+            Table(
+                "Each column alone",
+                by_column,
+                f"column | {columns.rpartition(' | ')[0]}",
+                "The damping that the rate tells depends on the phase error: on that of the estimates, else on 0.",
+                "everywhere" if wrong else "page",
+            ),
         ],
+        status=2 * (saved != save),
     )
 
 
+def _row(key: str, estimate: dict[str, float]) -> dict[str, str | float]:
+    return {"quantity": NAMES[key][0], "unit": NAMES[key][1], "key": key} | estimate
+
+
+def _times(times: list[float]) -> str:
+    some = ", ".join(f"{time:g} s" for time in times[:3])
+    return f"Row at {some}" if len(times) == 1 else f"{len(times)} rows (at {some}{', …' * (len(times) > 3)})"
+
+
+def _contradictions(found: WaveFit, names: dict[str, str]) -> list[str]:
+    """Say which columns contradict each other, and which sign or scale of one mends it; of both splits by their signs, the angle's."""
+    flipped = [one.split for one in found.conflicts if not one.widened and abs(one.factor + 1) < 0.2]
+    said = []
+    for one in found.conflicts:
+        first, second = (names[name] for name in one.columns)
+        if one.widened:
+            said.append(
+                f"{first} and {second} differ by more than their errors about the {one.split} split; its intervals are {one.widened:.2g} times as wide for that."
+            )
+            continue
+        mend = f"multiply {second} by {one.factor:.4g}" + (
+            f", or {first} by {1 / one.factor:.4g}" if one.split == "damping" else ""
+        )
+        if isnan(one.factor):
+            mend = "no sign or scale of one of them makes them agree: check both, and pattern_angle_deg"
+        elif one.split in flipped:
+            mend = f"reverse the sign of {names['angle'] if len(flipped) > 1 else second}"
+        said.append(
+            f"{first} and {second} contradict each other about the {one.split} split, which is not estimated. They would agree: {mend}."
+        )
+    return said
+
+
+def _moved_by_the_middle(
+    arguments: tuple[Record, float, float | None, Instrument | None, float], estimates: dict[str, dict[str, float]]
+) -> str:
+    """Say what would move by more than its error if the angles were those of the middle of the rows."""
+    other = _in_card_units((found := _fit_record(*arguments, LATE["middle"])).estimates, found, arguments[0])
+    moved = []
+    for key in estimates.keys() & other.keys():
+        off = other[key]["value"] - estimates[key]["value"]
+        off = (off + 45) % 90 - 45 if key.endswith("axis_deg") else off
+        if abs(off) > estimates[key]["sd"]:
+            moved.append((abs(off) / estimates[key]["sd"], key, other[key]["value"]))
+    if not moved:
+        return ""
+    times, key, value = max(moved)
+    name, unit = NAMES[key]
+    return f"Pattern angles count as read at the start of their rows. If they are of the middle, as means are, give --angle-at middle: {name} is then {f'{value:.4g} {unit}'.strip()} ({times:.2g} standard deviations away)."
+
+
 def _fit_record(
-    path: str, bryan_factor: float, volts_per_hertz: float | None, loop: Loop | None, confidence: float
-) -> tuple[WaveFit, float | None]:
-    record = read_record(path)
-    rate = record["measured_rate_deg_per_s"] if "measured_rate_deg_per_s" in record else record["bias_deg_per_h"] / 3600
+    record: Record, bryan_factor: float, volts_per_hertz: float | None, card: Instrument | None, confidence: float, late: float,
+) -> WaveFit:  # fmt: skip
+    loop = Loop() if card is None or card.loop is None else card.loop
+    rate = record[RATE] if RATE in record else record["bias_deg_per_h"] / 3600
     frequency = record.columns.get("frequency_Hz")
     quadrature = decay = None
     if "quadrature_V" in record and volts_per_hertz is not None:
         quadrature = np.pi * record["quadrature_V"] / volts_per_hertz
-    elif "quadrature_V" in record:
-        say(NO_SCALE)
     if "inverse_q" in record:
         if frequency is None:
-            raise InputError(f"{path}: inverse_q gives the decay rate only with frequency_Hz beside it; add that column.")  # fmt: skip
-        decay = np.pi * frequency * record["inverse_q"]
-    with naming(path):
-        found = fit(
+            raise InputError(f"{record.path}: inverse_q gives the decay rate only with frequency_Hz beside it; add that column.")  # fmt: skip
+        decay = np.pi * float(np.median(frequency)) * record["inverse_q"]
+    with naming(record.path):
+        return fit(
             record["time_s"],
             np.radians(record["pattern_angle_deg"]),
             np.radians(rate),
@@ -111,11 +203,13 @@ def _fit_record(
             decay=decay,
             frequency=None if frequency is None else 2 * np.pi * frequency,
             quadrature=quadrature,
-            drive_gain_ratio=loop.drive_gain_ratio if loop else 0.0,
-            drive_skew=1e-3 * loop.drive_skew_mrad if loop else 0.0,
+            drive_gain_ratio=loop.drive_gain_ratio,
+            drive_skew=1e-3 * loop.drive_skew_mrad,
+            pickoff_gain_ratio=loop.pickoff_gain_ratio,
+            pickoff_skew=1e-3 * loop.pickoff_skew_mrad,
+            late=late,
             confidence=confidence,
         )
-    return found, None if frequency is None else float(np.mean(frequency))
 
 
 def _with_estimates(instrument: Instrument, estimates: dict[str, dict[str, float]]) -> Instrument:
@@ -130,17 +224,18 @@ def _with_estimates(instrument: Instrument, estimates: dict[str, dict[str, float
     return instrument.with_values(values)
 
 
-def _in_card_units(found: WaveFit, frequency: float | None) -> dict[str, dict[str, float]]:
-    """Return the estimates by the keys of a card; anisotropy over 1/τ, and 1/Q, where drive effort and frequency are known."""
+def _in_card_units(part: dict[str, Estimate], found: WaveFit, record: Record) -> dict[str, dict[str, float]]:
+    """Return estimates by the keys of a card; anisotropy over 1/τ, and 1/Q, where drive effort and frequency are known."""
     estimates = {}
-    for name, e in found.estimates.items():
-        key, factor, *_ = KEYS[name]
-        if name == "decay" and frequency is not None:
-            factor = 1 / (pi * frequency)
+    for name, (key, factor, *_) in KEYS.items():
+        if name not in part:
+            continue
+        e = part[name]
+        if name == "decay":
+            factor = 1 / (pi * float(np.median(record["frequency_Hz"])))
         elif name == "damping_split":
-            if "decay" not in found.estimates:
-                key, factor = SPLIT_PER_S, 1.0
-            else:
-                factor = 1 / found.estimates["decay"].value
-        estimates[key] = {part: getattr(e, part) * factor for part in ("value", "sd", "low", "high")}
+            key, factor = (
+                (key, 1 / found.estimates["decay"].value) if "decay" in found.estimates else (SPLIT_PER_S, 1.0)
+            )
+        estimates[key] = {end: getattr(e, end) * factor for end in ("value", "sd", "low", "high")}
     return estimates

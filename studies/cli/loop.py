@@ -42,7 +42,8 @@ def loop(
 
     The card's table [loop] describes the readout; damping and its anisotropy come from [loss] and [bias]. A card with an
     unstable loop is rejected, with the margin. The run contains only what the loops do: bias offset, bias polynomial and
-    [[effect]] tables are applied by hrg simulate, which treats the loops as settled.
+    [[effect]] tables are applied by hrg simulate, which treats the loops as settled. A row holds means from its time to the
+    next, beside the pattern angle and the temperatures at its time.
 
     Args:
         rate: Applied rate in °/s, within the range of the actuators.

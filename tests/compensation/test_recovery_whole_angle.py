@@ -1,5 +1,7 @@
 """Splits, axes, gain ratio and phase of a gyro are recovered from a whole-angle run of the twin, by formulas of first order."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -13,12 +15,15 @@ from compensation.whole_angle import simulate_whole_angle
 NOISE = LoopNoise(pickoff=1e-6, adc_step=1e-5, dac_step=5e-5, thermal=3e-9)
 
 
-def run_and_fit(wave, electronics, precession, seed, step=2.0, seconds=5400.0):
+def run_of(wave, electronics, precession, seed, step=2.0, seconds=5400.0):
     time = np.arange(0.0, seconds, step)
     command = np.broadcast_to(precession(time), time.shape)
-    run = simulate_whole_angle(
+    return simulate_whole_angle(
         wave, electronics, Loops(), time, rate=7e-5, precession=command, generator=np.random.default_rng(seed)
     )
+
+
+def fit_of(run, wave, **options):
     return fit_whole_angle(
         run.time,
         run.angle,
@@ -28,7 +33,19 @@ def run_and_fit(wave, electronics, precession, seed, step=2.0, seconds=5400.0):
         decay=run.decay,
         frequency=run.omega,
         quadrature=run.quadrature,
+        **options,
     )
+
+
+def run_and_fit(wave, electronics, precession, seed, step=2.0, seconds=5400.0):
+    return fit_of(run_of(wave, electronics, precession, seed, step, seconds), wave)
+
+
+@pytest.fixture(scope="module")
+def uneven():
+    """A wave with gains and phase of its pick-offs, and its run."""
+    wave = from_quality(4432.0, 1e6, damping_anisotropy=0.03, damping_axis=0.2, frequency_split=0.01)
+    return wave, run_of(wave, Electronics(Channels(0.01, 0.0, 2e-3), Channels(phase=0.01), NOISE), both_ways, 7, 5.0)
 
 
 def both_ways(time):
@@ -77,12 +94,70 @@ def test_quadrature_of_a_precessing_wave_resolves_a_split_of_a_third_of_a_millih
     assert found.low > 0.5 * found.value
 
 
-def test_one_way_leaves_gain_ratio_open_and_says_so():
+@pytest.mark.parametrize(
+    ("column", "factor", "found"),
+    [
+        ("quadrature", -1.0, {"frequency": ("quadrature", -1.0)}),
+        ("quadrature", 2.0, {"frequency": ("quadrature", 0.5)}),
+        ("rate", -1.0, {"damping": ("turn", -1.0)}),
+        ("angle", -1.0, {"frequency": ("quadrature", -1.0), "damping": ("turn", -1.0)}),
+    ],
+)
+def test_planted_sign_or_scale_of_a_column_is_named_with_its_mend(uneven, column, factor, found):
+    """What the columns share is not estimated, of those that stand each says its own."""
+    wave, run = uneven
+    fit = fit_of(replace(run, **{column: factor * getattr(run, column)}), wave)
+    said = {one.split: (one.columns[1], pytest.approx(one.factor, rel=0.1)) for one in fit.conflicts if not one.widened}
+    assert found == said
+    assert not {f"{split}_split" for split in found} & fit.estimates.keys()
+    assert "phase_error" not in fit.estimates
+    assert fit.alone["frequency"]["frequency_split"].value == pytest.approx(wave.frequency_split, rel=0.01)
+
+
+def test_columns_that_agree_are_not_contradicted(uneven):
+    wave, run = uneven
+    fit = fit_of(run, wave)
+    assert not fit.conflicts
+    for split, columns in (("frequency", ("frequency", "quadrature")), ("damping", ("drive", "turn"))):
+        for column in columns:
+            assert fit.alone[column][f"{split}_split"].value == pytest.approx(getattr(wave, f"{split}_split"), rel=0.02)
+
+
+def test_planted_rows_are_named_and_cost_nothing(uneven):
+    """One row of the rate 1300 °/h off, as a reversal may make, and one of the angle by 3°: the interval widened threefold."""
+    wave, run = uneven
+    clean, middle = fit_of(run, wave), len(run.time) // 2
+    rate, angle = run.rate.copy(), run.angle.copy()
+    rate[middle] += np.radians(1300 / 3600)
+    angle[200] += np.radians(3.0)
+    fit = fit_of(replace(run, rate=rate, angle=angle), wave)
+    assert {name: rows.tolist() for name, rows in fit.spikes.items()} == {"turn": [middle], "angle": [200]}
+    for name, one in clean.estimates.items():
+        assert abs(fit.estimates[name].value - one.value) < 0.3 * one.sd, name
+        assert fit.estimates[name].sd < 1.1 * one.sd, name
+
+
+def test_angles_of_the_middle_of_the_rows_are_those_of_their_starts(uneven):
+    wave, run = uneven
+    middle = run.angle + np.diff(run.angle, append=2 * run.angle[-1] - run.angle[-2]) / 2
+    right, wrong = (fit_of(replace(run, angle=middle), wave, late=late) for late in (0.5, 0.0))
+    for name, one in fit_of(run, wave).estimates.items():
+        assert abs(right.estimates[name].value - one.value) < one.sd, name  # the reversal takes a whole row
+    off = wrong.estimates["damping_split"].value / wave.damping_split - 1
+    assert abs(off) > 5 * abs(right.estimates["damping_split"].value / wave.damping_split - 1)
+
+
+@pytest.mark.parametrize("gain", [0.0, 0.005])
+def test_one_way_leaves_gain_ratio_open_and_says_so(gain):
+    """A commanded turn meets gains of 0.005 as it does damping, which then is known to their size alone."""
     wave = from_quality(4432.0, 1e6, damping_anisotropy=0.03, frequency_split=0.01)
-    fit = run_and_fit(wave, Electronics(noise=NOISE), lambda t: np.radians(0.5), 0, seconds=1800.0)
+    fit = run_and_fit(wave, Electronics(Channels(gain), noise=NOISE), lambda t: np.radians(0.5), 0, seconds=1800.0)
     assert "gain_ratio" not in fit.estimates
     assert any("precess it in both directions" in sentence for sentence in fit.undetermined)
-    assert fit.estimates["damping_split"].value == pytest.approx(wave.damping_split, rel=0.02)
+    assert fit.estimates["damping_split"].low < wave.damping_split < fit.estimates["damping_split"].high
+    slow = run_and_fit(wave, Electronics(Channels(gain), noise=NOISE), lambda t: np.radians(-3.0), 0, seconds=300.0)
+    assert "damping_split" not in slow.estimates
+    assert slow.undetermined[0].startswith("damping split and axis")
 
 
 def test_a_wave_that_hardly_turned_is_refused():
