@@ -128,8 +128,9 @@ class NoiseRows:
         return self._roots[noise]
 
     def _factor(self, noise: Noise) -> "Whitener":
-        """Factor the covariance of every distinct set of rows once."""
-        return Whitener(self.slices, tuple((cholesky(self.covariance(r[0], noise)), r) for _, _, r in self._groups))
+        """Factor the covariance of every distinct set of rows once; products with L⁻¹ cost less than solutions with L."""
+        roots = ((cholesky(self.covariance(runs[0], noise)), runs) for _, _, runs in self._groups)
+        return Whitener(self.slices, tuple((scipy.linalg.lapack.dtrtri(L, lower=1)[0], runs) for L, runs in roots))
 
     def kept(self, masks: Sequence[NDArray[np.bool_]]) -> "NoiseRows":
         """Return the rows that a mask of each run keeps; a run without any is left out."""
@@ -144,12 +145,8 @@ class NoiseRows:
 
         By ln θ of a level Σ_ij (Σ⁻¹ − U Uᵀ)_ij θ ∂Σ_ij/∂θ, U = Σ⁻¹ [X C, e], C Cᵀ = (Λ + XᵀΣ⁻¹X)⁻¹, e what is left.
         """
-        roots = [invert_lower(cholesky(self.covariance(runs[0], noise))) for _, _, runs in self._groups]
-        white, total = np.column_stack([columns, target]), 0.0
-        for K, (_, _, runs) in zip(roots, self._groups, strict=True):
-            total -= 2 * len(runs) * float(np.log(K.diagonal()).sum())
-            for run in runs:
-                white[self.slices[run]] = K @ white[self.slices[run]]
+        whitener = self._factor(noise)
+        white, total = whitener(np.column_stack([columns, target])), whitener.log_determinant
         X, r = white[:, :-1], white[:, -1]
         about = np.zeros(X.shape[1]) if mean is None else mean
         A = X.T @ X
@@ -160,7 +157,7 @@ class NoiseRows:
         total += float(rest @ rest + (found - about) @ (precision * (found - about)))
         total += 2 * float(np.log(np.diag(root)).sum())
         both, slopes = np.column_stack([beside, rest]), dict.fromkeys(KINDS, 0.0)
-        for K, (F, W, runs) in zip(roots, self._groups, strict=True):
+        for (K, runs), (F, W, _) in zip(whitener.roots, self._groups, strict=True):
             S = len(runs) * (K.T @ K)
             for run in runs:
                 U = K.T @ both[self.slices[run]]
@@ -187,11 +184,6 @@ def cholesky(matrix: Array) -> Array:
     return np.asarray(root)
 
 
-def invert_lower(root: Array) -> Array:
-    """Return L⁻¹, with which products cost less than solutions where both L⁻¹ and Σ⁻¹ = L⁻ᵀ L⁻¹ are wanted."""
-    return np.asarray(scipy.linalg.lapack.dtrtri(root, lower=1)[0])
-
-
 def solve_lower(root: Array, columns: Array, transposed: bool = False) -> Array:
     """Return L⁻¹ or L⁻ᵀ times columns, (N,) or (N, p)."""
     if not columns.size:
@@ -201,26 +193,23 @@ def solve_lower(root: Array, columns: Array, transposed: bool = False) -> Array:
 
 @dataclass(frozen=True)
 class Whitener:
-    """Roots L of the covariance of rows, with the runs that each is of."""
+    """L⁻¹ of the covariance L Lᵀ of rows, with the runs that each is of."""
 
     slices: tuple[slice, ...]
     roots: tuple[tuple[Array, tuple[int, ...]], ...]
 
     def __call__(self, columns: NDArray[np.floating]) -> Array:
         """Return stacked columns, (M,) or (M, p), whitened."""
-        matrix = columns.reshape(len(columns), -1).astype(float, copy=False)
-        white, p = np.empty_like(matrix), matrix.shape[1]
-        for L, runs in self.roots:
-            side_by_side = np.hstack([matrix[self.slices[run]] for run in runs])
-            solved = solve_lower(L, side_by_side)
-            for k, run in enumerate(runs):
-                white[self.slices[run]] = solved[:, k * p : (k + 1) * p]
-        return white.reshape(columns.shape)
+        white = columns.astype(float)
+        for K, runs in self.roots:
+            for run in runs:
+                white[self.slices[run]] = K @ white[self.slices[run]]
+        return white
 
     @property
     def log_determinant(self) -> float:
         """ln|Σ| of all rows."""
-        return sum(2 * len(runs) * float(np.log(np.diag(L)).sum()) for L, runs in self.roots)
+        return sum(-2 * len(runs) * float(np.log(K.diagonal()).sum()) for K, runs in self.roots)
 
 
 def estimate_noise(
