@@ -147,7 +147,7 @@ def _facts(study: ScaleStudy) -> Facts:
     facts = [("Rate error, held-out data", error, "rms, rough → compensated, before the filter")]
     if first.nonlinearity is not None and last.nonlinearity is not None:
         change = f"{100 * first.nonlinearity:.3f} → {100 * last.nonlinearity:.3f} %"
-        facts.append(("Nonlinearity", change, "largest deviation from a line, of full scale"))
+        facts.append(("Nonlinearity", change, "largest deviation of the means at each rate from a line, of full scale"))
     if first.at_rest is not None and last.at_rest is not None:
         rest = f"{first.at_rest:.4f} → {last.at_rest:.4f} °/s"
         facts.append(("Output at rest", rest, "standard deviation over temperature"))
