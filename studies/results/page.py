@@ -171,8 +171,8 @@ def _cell(text: str) -> "Markup":
 
 
 def _worded(text: str) -> bool:
-    """Return whether a cell is words, which may be divided, and not a number: 1/Q at some temperature is."""
-    return re.match(r"[^-−+.\d±<>]|\d+/[A-Z]", text) is not None
+    """Return whether a cell is words, which may be divided, and not a number: 1/Q at some temperature is, and the digits of a hash."""
+    return re.match(r"[^-−+.\d±<>]|\d+/[A-Z]|(?=\d*[a-f])[\da-f]{12}$", text) is not None
 
 
 def _stacked(table: Cells) -> bool:
