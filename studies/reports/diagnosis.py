@@ -21,6 +21,7 @@ WORDS = {
     "not-identifiable": "Not identifiable: these data cannot distinguish between the possible causes.",
     "unexplained": "Unexplained: no known effect explains the structure in the residual.",
 }
+PARTLY = "Not identifiable: beside what is named, these data do not decide every response."
 UNDECIDED = "Not decided: these data neither confirm the simulation nor name a cause."
 EVIDENCE = "Evidence: twice the logarithm of the Bayes factor against no effect."
 CAUSES = "cause | or: or equally | response | peak: peak to peak | probability: probability .2f | name: parameter | value in low … high: value | low … high: 90 % interval .0"
@@ -58,8 +59,8 @@ def headline(verdict: Verdict) -> str:
 
 def _sentence(verdict: Verdict) -> str:
     removes = "the named causes remove" if len(verdict.causes) > 1 else "the named cause removes"
-    if verdict.verdict == "not-identifiable" and not verdict.causes:
-        return UNDECIDED
+    if verdict.verdict == "not-identifiable" and not any(cause.equivalent for cause in verdict.causes):
+        return PARTLY if verdict.causes else UNDECIDED
     return WORDS[verdict.verdict].format(removes)
 
 
