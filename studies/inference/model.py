@@ -248,14 +248,15 @@ class Background:
         left = {name: white.get(name, 0.0) - base[name] @ taken for name in base}
         return left, np.maximum(energy, 0.0), np.asarray(scipy.linalg.solve_triangular(R, taken))
 
+    def by_scale(self, term: Term) -> Array:
+        """Log evidence that a term adds at each of `SCALES`."""
+        beside = replace(self, linear=self.linear.bent([term])) if term.bend else self
+        own = beside.gains({n: X[:, None, :] for n, X in term.columns.items()}, term.unit[None], term.effect)[:, 0]
+        return np.asarray(beside.evidence - self.evidence + own)
+
     def with_term(self, term: Term) -> tuple[Term, float]:
         """Return a term at its likeliest scale, and the log evidence that it adds, its scales averaged."""
-        beside = replace(self, linear=self.linear.bent([term])) if term.bend else self
-        gain = (
-            beside.evidence
-            - self.evidence
-            + beside.gains({n: X[:, None, :] for n, X in term.columns.items()}, term.unit[None], term.effect)[:, 0]
-        )
+        gain = self.by_scale(term)
         total = float(scipy.special.logsumexp(gain) - np.log(len(gain)))
         return replace(term, scale=float(SCALES[int(np.argmax(gain))])), total
 

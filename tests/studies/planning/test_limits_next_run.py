@@ -98,7 +98,7 @@ def test_rivals_are_separated_by_runs_and_not_from_themselves(found):
         found, [programmes[0], *(p for p in programmes if p.kind in ("fast cycles", "quiet"))][:3]
     )
     one, two = rival(found, "second-lag", 0.1), rival(found, "mounting-stress", 0.1)
-    assert max(evidence for evidence, _, _ in between(found, [one, one], runs)) < 1e-6
+    assert max(evidence for evidence, _, _ in between(found, [one, one], runs)) < 1e-4  # a difference of thousands
     told = {programme.kind: evidence for evidence, _, programme in between(found, [one, two], runs)}
     assert all(evidence >= 0.0 for evidence in told.values())
     known = Known(found, one)
