@@ -22,9 +22,14 @@ NAMES = {
     "offset": ("Frequency at the reference temperature", "Hz"),
     "slope": ("Slope of the frequency", "Hz/K"),
     "curvature": ("Second-order coefficient", "Hz/K²"),
+    "third_order": ("Third-order coefficient", "Hz/K³"),
 }
 DRIFTS = 5.0  # slow noise over that of a row, above which the chain of lags is in doubt
 OPEN = "The records cannot separate {}."
+NEGATIVE = (
+    "{} comes out below zero, which none is: the gyro is not a chain of lags with radiation, or its frequency bends over temperature"
+    " otherwise than a cubic. The constants are effective values and may lie outside their intervals."
+)
 MISFIT = (
     "Slow noise of the residual is {:.1f} times that of a row. Either the noise drifts or the gyro is not a chain of this many lags; in the"
     " second case the constants are effective values and may lie outside their intervals."
@@ -39,10 +44,10 @@ def fit_thermal(
 
     The records need time_s, frequency_Hz and housing_temperature_degC (or chamber_temperature_degC). The model is a series of
     lags with heat exchange by conduction and radiation; where these leave slow noise, of lumps that may also radiate past one another, behind a sensor that may be late. The initial temperatures of each run are fitted, and the noise may
-    drift. The intervals hold only for a gyro that fits this model; slow noise well above that of a row shows a misfit.
+    drift. The frequency is a cubic in temperature. The intervals hold only for a gyro that fits this model; slow noise well above that of a row shows a misfit.
 
     Args:
-        card: A card whose law gives the curvature of frequency over temperature; without it the curvature is fitted.
+        card: A card whose law gives second and third order of the frequency over temperature; without it both are fitted.
         lags: Number of lags, 1 to 3; by default as many as the records support.
     """
     if not data:
@@ -87,6 +92,7 @@ def fit_thermal(
                 f"Reference temperature {reference:.4g} °C; residual {found.residual_rms:.2g} Hz rms.",
             ),
             *(Sentence(OPEN.format(words), "warning") for words in groups),
+            *(Sentence(NEGATIVE.format(NAMES[name][0]), "warning") for name in found.negative),
             Sentence(MISFIT.format(found.slow), "warning") if found.slow > DRIFTS else None,
             Figure(lambda: _draw(found), "Residual of the frequency in each run."),
         ],

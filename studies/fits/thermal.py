@@ -1,6 +1,6 @@
 """Thermal time constants of a resonator from records of its frequency and the temperature of its housing.
 
-The calibration of a polynomial card: f = f₀ (1 + a₁ x + a₂ x²), x = T_r − T_ref, the resonator behind its housing through lags in series
+The calibration of a polynomial card: f = f₀ (1 + a₁ x + a₂ x² + a₃ x³), x = T_r − T_ref, the resonator behind its housing through lags in series
 with radiation along or past them (`studies.inference.heat_path`), each run with a start of its own, in noise that may drift.
 """
 
@@ -16,7 +16,7 @@ from studies.calibration.fit import fit
 from studies.calibration.priors import from_standard
 from studies.errors import InputError
 from studies.inference.diagnosis import build_problem
-from studies.inference.heat_path import LAGS, OF_LUMPS, SENSOR, HeatPath, find_heat_path, slow_share
+from studies.inference.heat_path import LAGS, OF_LUMPS, SENSOR, HeatPath, cubic_of, find_heat_path, slow_share
 from studies.inference.polynomial_card import polynomial_card
 from studies.inference.records import driving, make_ready
 from studies.inference.signatures import SHARE
@@ -25,8 +25,10 @@ from studies.record import Record
 from studies.resonator.law import law_of
 
 NAMES = {f"law.{key}": f"time_constant_{k}" for k, key in enumerate(LAGS, 1)} | {
-    SHARE: "radiated_share", **{f"law.{key}": key for key in OF_LUMPS}, SENSOR: "sensor_time_constant", "law.f0_Hz": "offset", "law.a1_per_K": "slope", "law.a2_per_K2": "curvature"
+    SHARE: "radiated_share", **{f"law.{key}": key for key in OF_LUMPS}, SENSOR: "sensor_time_constant", "law.f0_Hz": "offset", "law.a1_per_K": "slope", "law.a2_per_K2": "curvature", "law.a3_per_K3": "third_order"
 }  # fmt: skip
+
+SHARES = ("radiated_share", "base_radiated_share")
 
 RESTS = 1.0
 """Kelvin that a housing must cover before the records say anything of the slope: else it is what resonators usually have."""
@@ -63,6 +65,11 @@ class ThermalFit:
         return slow_share(self.path.fit)
 
     @property
+    def negative(self) -> list[str]:
+        """Radiated shares that the records make negative, which none is: the model is not that of this gyro."""
+        return [name for name in SHARES if name in self.estimates and self.estimates[name].high < 0.0]
+
+    @property
     def left(self) -> list[tuple[Array, Array]]:
         """Times (s) and residuals (Hz) of each run."""
         found = self.path.fit
@@ -91,6 +98,7 @@ def fit_thermal_constants(
         raise InputError(f"{records[0].path or 'record'}: nothing can be identified: {why}.")
     card = polynomial_card(campaign.records)
     law = card.content["law"] | {"delay_s": {"value": 0.0, "sd": 0.0}}
+    law |= cubic_of(law)
     if max(float(np.ptp(driving(record))) for record in campaign.records) < RESTS:
         law = {key: own for key, own in law.items() if not key.startswith("a")}
     if instrument is not None:
@@ -121,18 +129,21 @@ def curvature_of(instrument: Instrument, reference: float) -> dict[str, dict[str
 
 
 def _estimates(path: HeatPath, times: float) -> Iterator[tuple[str, ThermalEstimate]]:
-    """Yield the constants; one whose prior the records narrow by less than half is not determined."""
+    """Yield the constants; one whose prior the records narrow by less than half, or a share below 0, is not determined."""
     priors, point = path.fit.problem.priors, path.fit.point
     z, sd = priors.standard(point[: len(priors.values)]), np.sqrt(np.diag(priors.covariance(path.fit.covariance)))
     level = path.value("law.f0_Hz")[0]
     for name, told in NAMES.items():
         if name in priors.names:
             k = priors.names.index(name)
-            scale = level if told in ("slope", "curvature") else 1.0
+            scale = level if told in ("slope", "curvature", "third_order") else 1.0
             best, low, high = (
                 scale * from_standard(priors.values[k], float(z[k] + n * sd[k])) for n in (0.0, -times, times)
             )
-            yield told, ThermalEstimate(None if sd[k] > TOLD else best, low, high)
+            negative = told in SHARES and high < 0.0
+            if told in SHARES and not negative:  # a share is 0 at least
+                best, low = max(best, 0.0), max(low, 0.0)
+            yield told, ThermalEstimate(None if sd[k] > TOLD or negative else best, low, high)
 
 
 def _departures(path: HeatPath) -> Iterator[tuple[float, ...]]:
