@@ -1,5 +1,6 @@
 """A first map for raw files: notation, time, columns and units guessed from names and cells, and every guess marked."""
 
+import itertools
 import re
 import statistics
 import tomllib
@@ -11,17 +12,7 @@ from studies.errors import InputError
 from studies.files.stored import Stored
 from studies.importing.channels import is_container, open_channels, sort_groups
 from studies.importing.draft_columns import comment_of, draft_column, draft_unknown, find_markers, guess_meanings
-from studies.importing.look import (
-    Look,
-    as_number,
-    find_nominal,
-    find_period,
-    is_grouped,
-    is_stamp,
-    look_at,
-    look_at_group,
-    other_sign,
-)
+from studies.importing.look import Look, as_number, find_nominal, find_period, is_stamp, look_at, look_at_group, parting
 from studies.importing.mapping import NUMERIC_TIMES, SCHEMA, TABLE_TARGETS, FileMap, ImportMap
 from studies.importing.meaning import Meaning, find_meanings
 from studies.importing.offset import Offset, estimate_offset
@@ -205,8 +196,8 @@ def _describe_notation(path: str, look: Look) -> list[str]:
             f'decimal = "{look.decimal}"',
             f'encoding = "{look.encoding}"',
         ]
-        if any(is_grouped(cell, look.decimal) for row in look.rows[look.data :] for cell in row):
-            lines.append(f'thousands = "{other_sign(look.decimal)}"')
+        signs = (parting(cell, look.decimal) for row in look.rows[look.data :] for cell in row)
+        lines += [f'thousands = "{sign}"' for sign in itertools.islice(filter(None, signs), 1)]
     header = 0 if look.header is None else look.header + 1
     return [*lines, f"header_line = {header}", f"data_line = {look.data + 1}"]
 
@@ -257,13 +248,13 @@ def _draft_look(path: str, look: Look, taken: Sequence[str]) -> tuple[list[str],
                 f"{path}: each time stands there {len(joined) // len(set(joined))} times, and '{shorten(odd)}' jumps from row to row but hardly"
                 " changes from one time to the next: these are several gyros or channels. Write a file for each of them."
             )
-        copies = len(set(zip(*cells.values(), strict=True))) == len(set(joined))
-        kind, said = (
+        twice = len(set(zip(*cells.values(), strict=True))) == len(set(joined))
+        kept = (
             ("first", "some rows stand there twice")
-            if copies
-            else ("spread", "some times repeat; 'first' keeps one row of each")
+            if twice
+            else ("spread", "some times repeat; 'first' keeps one row")
         )
-        lines.append(f'repeated_times = "{kind}"    # CHECK: {said}')
+        lines.append('repeated_times = "{}"    # CHECK: {}'.format(*kept))
     lines.append("# clock_offset_s = 0.0    # added to this file's times: positive when its clock is behind")
     usable = {name: hints[name] for name in names if name not in time and numbers[name]}
     meanings = find_meanings(usable, taken) if look.header is not None else guess_meanings(usable, numbers)

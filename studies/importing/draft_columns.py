@@ -2,15 +2,11 @@
 
 import re
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
 
 from studies.importing.look import as_number
 from studies.importing.meaning import BRACKETED, Meaning, find_unit
 from studies.importing.units import split_nominal, units_of
 from studies.schema.keys import spell_value
-
-if TYPE_CHECKING:
-    pass
 
 
 def guess_meanings(hints: Mapping[str, str], numbers: Mapping[str, Sequence[float]]) -> dict[str, Meaning]:

@@ -132,21 +132,15 @@ def _has_decimal_commas(rows: Sequence[Sequence[str]], separator: str) -> bool:
     )
 
 
-def other_sign(decimal: str) -> str:
-    """Return the sign that may part thousands."""
-    return "," if decimal == "." else "."
-
-
-def is_grouped(cell: str, decimal: str) -> bool:
-    """Tell whether a cell holds a number with signs between its thousands, such as 4.432,07."""
-    pattern = rf"[+-]?\d{{1,3}}(\{other_sign(decimal)}\d{{3}})+\{decimal}\d+"
-    return bool(re.fullmatch(pattern, cell.strip()))
+def parting(cell: str, decimal: str) -> str:
+    """Return the sign between the thousands of a number such as 4.432,07, or ""."""
+    found = re.fullmatch(rf"[+-]?\d{{1,3}}([.,])\d{{3}}(\1\d{{3}})*\{decimal}\d+", cell.strip())
+    return found[1] if found and found[1] != decimal else ""
 
 
 def as_number(cell: str, decimal: str) -> float | None:
     """Return the number that a cell holds, None where it holds something else."""
-    text = cell.strip()
-    text = (text.replace(other_sign(decimal), "") if is_grouped(text, decimal) else text).replace(decimal, ".")
+    text = cell.strip().replace(parting(cell, decimal), "").replace(decimal, ".")
     return float(text) if re.fullmatch(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,2})?", text) else None
 
 

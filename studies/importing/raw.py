@@ -131,15 +131,12 @@ def read_raw(path: str | Path, file: FileMap) -> Iterator[tuple[list[str], RawTa
         try:
             body = _Body(path, text, list(itertools.islice(text, file.data_line)), file)
             lines = _split_lines(path, body.head, file)
-            names = _head(path, lines, file)
+            names, signs = _head(path, lines, file), (file.decimal, file.thousands)
             # a spreadsheet writes separators of empty columns behind the last one
             if file.header_line and file.separator != "space" and not lines[-1][-1].strip():
                 body.padding = re.compile(f"{re.escape(SEPARATORS[file.separator])}+$", re.MULTILINE)
             for cells in _parse_text(path, body, file, names):
-                yield (
-                    names,
-                    TextTable(part, file.missing, int(cells.index[0]), len(cells), cells, file.decimal, file.thousands),
-                )
+                yield names, TextTable(part, file.missing, int(cells.index[0]), len(cells), cells, *signs)
         except UnicodeError:
             raise _wrong_encoding(path, file.encoding) from None
 

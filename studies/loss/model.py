@@ -213,32 +213,14 @@ def _unbalance(mode: "Mode", elastic: "Elastic") -> "Unbalance":
     return unbalance_loss(mode, elastic)
 
 
-def _squeezed(instrument: "Instrument", vibration: "Vibration", parts: "LossParts", pressure: float) -> list[str]:
-    """Return what the gas may lose besides in the gap of a card's electrodes."""
-    from shell.damping.gas import GASES, gas_loss, most_squeezed
-
-    if "electrodes" not in instrument.content:
-        return []
-    keys, T0 = instrument.part("electrodes").keys, vibration.reference
-    counted = gas_loss(vibration, GASES[parts.gas], pressure, T0, parts.accommodation)
-    most = most_squeezed(vibration, keys.face, 1e-6 * keys.gap_um, pressure, T0)
-    words = "gas squeezed in the gap of the electrodes, most of it near their ends: it adds at most"
-    return (
-        [f"{words} 1/Q = {most:.2g} at {keys.gap_um:g} µm, {most / counted:.2g} times the gas counted."] if most else []
-    )
-
-
 def _others(
-    instrument: "Instrument",
-    vibration: "Vibration",
-    parts: "LossParts",
-    spread: Mapping[str, float],
+    instrument: "Instrument", vibration: "Vibration", parts: "LossParts", spread: Mapping[str, float],
     left_out: list[str],
-) -> "list[LossCause]":
+) -> "list[LossCause]":  # fmt: skip
     """Gas, activated losses, and what leaves through the mount as the card gives it."""
     from shell.constants import zero_Celsius
     from shell.damping.budget import activated_cause, constant_cause, gas_cause
-    from shell.damping.gas import GASES
+    from shell.damping.gas import GASES, gas_loss, most_squeezed
 
     causes = []
     if parts.pressure_Pa is None:
@@ -246,7 +228,12 @@ def _others(
     elif parts.pressure_Pa > 0:
         sd = spread.get("loss.pressure_Pa", 0.0)
         causes.append(gas_cause(vibration, GASES[parts.gas], parts.pressure_Pa, sd, parts.accommodation))
-        left_out += _squeezed(instrument, vibration, parts, parts.pressure_Pa)
+        if "electrodes" in instrument.content:
+            keys, p, T0 = instrument.part("electrodes").keys, parts.pressure_Pa, vibration.reference
+            most = most_squeezed(vibration, keys.face, 1e-6 * keys.gap_um, p, T0)
+            times = most / gas_loss(vibration, GASES[parts.gas], p, T0, parts.accommodation)
+            words = "gas squeezed in the gap of the electrodes, most of it near their ends: it adds at most"
+            left_out.append(f"{words} 1/Q = {most:.2g} at {keys.gap_um:g} µm, {times:.2g} times the gas counted.")
     for number, peak in enumerate(parts.activated):
         sd = spread.get(f"loss.activated.{number}.height", 0.0)
         found = activated_cause(peak.height, peak.energy_eV, peak.peak_degC + zero_Celsius, sd, "given in the card")
