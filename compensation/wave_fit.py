@@ -40,6 +40,7 @@ CHANCE, LARGE = (
     1e-3,
     0.1,
 )  # of a disagreement that is none, and its part of what columns tell, beyond which one is wrong
+FAR = 10.0  # standard deviations apart, from which one that a factor mends is wrong too
 UNEVEN = np.array([0.005, 1e-3])  # usual standard deviations of gain ratio and skew (rad) of pick-offs and drives
 Told = tuple[Array, Array]
 """Both components of a split, and their covariance."""
@@ -64,7 +65,7 @@ class WaveFit:
 
     Names: `decay` 1/τ (1/s), `damping_split` Δ(1/τ) (1/s), `damping_axis` (rad), `frequency_split` (rad/s),
     `frequency_axis` (rad), `gain_ratio` δ, `skew` κ (rad), `phase_error` ε (rad), `rate` (rad/s, what is left of the rate).
-    Columns are `frequency`, `quadrature`, `drive` and `turn`, whose damping takes ε from all (as 0 where they contradict each other), and the `angle`.
+    Columns are named as the arguments; the damping of `rate` takes ε from all (as 0 where they contradict each other).
     """
 
     estimates: dict[str, Estimate]
@@ -85,15 +86,15 @@ def fit_whole_angle(
 
     Columns are means over rows; the angle is read `late` rows after each begins. The pick-offs' gains count where the run does not tell them.
     """
-    columns = {"angle": angle, "turn": rate}
-    more = {"frequency": frequency, "quadrature": quadrature, "drive": decay}
+    columns = {"angle": angle, "rate": rate}
+    more = {"frequency": frequency, "quadrature": quadrature, "decay": decay}
     columns |= {name: column for name, column in more.items() if column is not None}
     t, *read = read_columns(time=time, **columns)
     step = require_regular(t, "the fit of a whole-angle run")
     # The angle turns by much of its span from row to row.
     bad = {name: find_spikes(y, LEAST_SPIKE * (name != "angle")) for name, y in zip(columns, read, strict=True)}
     y = {name: np.interp(t, t[~bad[name]], one[~bad[name]]) for name, one in zip(columns, read, strict=True)}
-    theta, indicated = _begin_rows(y["angle"], late), y["turn"]
+    theta, indicated = _begin_rows(y["angle"], late), y["rate"]
     x = 2 * harmonic * theta
     if np.ptp(x) < LEAST_TURN:
         raise CompensationError(f"the wave precesses by only {np.degrees(np.ptp(theta)):.3g}°; the fit needs {180 / harmonic:g}° or more: precess it faster or record longer.")  # fmt: skip
@@ -107,29 +108,30 @@ def fit_whole_angle(
     known = np.broadcast_to(np.asarray(applied, dtype=float), t.shape)[:-1]
     turns = [values for values in (command, known) if np.ptp(values) > LEAST_CONTRAST * np.max(np.abs(values))]
     leaks = [command, command * seen.cosine, command * seen.sine] if both_ways and turns and turns[0] is command else []
-    # What a commanded turn leaks through uneven drives, in one direction, goes unseen with the splits.
-    leak = np.diag((0.0 if both_ways else np.mean(command)) ** 2 * np.full(2, UNEVEN.max() ** 2))
-    told = _detuned(seen, t, y, leaks, leak)
+    # In one direction what a commanded turn leaks through uneven gains is not told from the splits.
+    leak = 0.0 if both_ways else float(np.mean(command))
+    told = _detuned(seen, t, y, leaks, (leak * UNEVEN.max()) ** 2)
     conflicts: list[Conflict] = []
     W = _join("frequency", ("frequency", "quadrature"), told, conflicts)[0]
     phi = coupling * np.concatenate([[0.0], np.cumsum(indicated[:-1] - known)]) * step
     card = np.array([pickoff_gain_ratio, pickoff_skew])
     gains, spread = np.zeros(2) if both_ways else card, UNEVEN
-    drives, lost = np.array([drive_gain_ratio, drive_skew]), np.flatnonzero(bad["turn"][:-1])[:FEW]
+    drives, lost = np.array([drive_gain_ratio, drive_skew]), np.flatnonzero(bad["rate"][:-1])[:FEW]
     for _ in range(4):
         behind = straighten(x / 2, *gains)
-        mean, told["turn"], missed, spread = _turned(
+        mean, told["rate"], missed, spread = _turned(
             t, x, _Turn(x + 2 * behind), phi + behind, command, gains - drives, turns, both_ways, lost
         )
         gains = gains + missed
     estimates = {"rate": (mean[0] / coupling, mean[1] / coupling)}
     loss = 0.0
-    if "drive" in y:
+    if "decay" in y:
         # Where the pick-offs' gains make the amplitude rise and fall, its drive does so too; of a commanded turn it is a leak.
         swell = (gains[0] * seen.sine - gains[1] * seen.cosine) * (harmonic * turn_rate / step - command)
-        told["drive"], estimates["decay"] = _driven(seen, y["drive"], swell, leaks, leak)
+        (C, C_cov), estimates["decay"] = _driven(seen, y["decay"], swell, leaks)
+        told["decay"] = C + leak * (gains + drives)[::-1] * [1, -1], C_cov
         loss = estimates["decay"][0]
-    C, epsilon = _join("damping", ("drive", "turn"), told, conflicts, W)
+    joined, epsilon = _join("damping", ("decay", "rate"), told, conflicts, W)
     wrong = {one.split for one in conflicts if not one.widened}
     if "damping" in wrong:  # nor is what the turn says of the gains believed
         gains, spread = card, UNEVEN
@@ -140,26 +142,20 @@ def fit_whole_angle(
 
     def true(one: Told) -> Told:
         """Damping as it is without the gains, which the driven wave has in it."""
-        return one[0] + loss * (gains + drives), one[1] + np.diag((loss * spread) ** 2)
+        return one[0] + loss * (gains + drives), one[1] + np.diag((loss * spread) ** 2 + 2 * (leak * UNEVEN[::-1]) ** 2)
 
     if epsilon is not None and W is not None:
-        turn, spread_of_turn = told["turn"]
-        told["turn"] = turn + epsilon[0] * W[0], spread_of_turn + epsilon[1] ** 2 * np.outer(W[0], W[0])
-    alone = {
-        name: _polar("damping", *true(one), harmonic)
-        if name in ("drive", "turn")
-        else _polar("frequency", *one, harmonic)
-        for name, one in told.items()
-    }
+        turn, spread_of_turn = told["rate"]
+        told["rate"] = turn + epsilon[0] * W[0], spread_of_turn + epsilon[1] ** 2 * np.outer(W[0], W[0])
+    told |= {name: true(told[name]) for name in ("decay", "rate") if name in told}
+    splits = {"rate": "damping", "decay": "damping"}
+    alone = {name: _polar(splits.get(name, "frequency"), *one, harmonic) for name, one in told.items()}
     if W is None:
         undetermined.append("frequency split, because neither frequency nor quadrature is recorded")
-    splits = {"frequency": W, "damping": C and true(C)}
-    for name, one in [(name, one) for name, one in splits.items() if one]:
-        polar = _polar(name, *one, harmonic)
-        if not both_ways and polar[f"{name}_split"][0] < 2 * polar[f"{name}_split"][1]:
-            undetermined.append(
-                f"{name} split and axis: in one direction they are not told from what uneven gains make of a commanded turn"
-            )
+    for name, one in {"frequency": W, "damping": joined and true(joined)}.items():
+        polar = _polar(name, *one, harmonic) if one else {}
+        if leak and one and np.divide(*polar[f"{name}_split"]) < 2:
+            undetermined.append(f"{name} split and axis: in one direction they are not told from what uneven gains make of a commanded turn")  # fmt: skip
         elif name not in wrong:
             estimates |= polar
     if "decay" not in estimates:
@@ -228,14 +224,14 @@ class _Turn:
         self.cosine, self.sine = share * np.cos(middle), share * np.sin(middle)
 
 
-def _driven(x: _Turn, decay: Array, swell: Array, leaks: list[Array], leak: Array) -> tuple[Told, tuple[float, float]]:
+def _driven(x: _Turn, decay: Array, swell: Array, leaks: list[Array]) -> tuple[Told, tuple[float, float]]:
     """Return C with its covariance, and 1/τ with its deviation, from the drive's effort."""
     X = np.stack([np.ones_like(swell), x.cosine / 2, x.sine / 2, *leaks], axis=1)
     b, covariance = _white(X, decay[:-1] - swell, ["1/τ", "cos", "sin", *LEAKS[: len(leaks)]])
-    return (b[1:3], covariance[1:3, 1:3] + leak), (float(b[0]), float(np.sqrt(covariance[0, 0])))
+    return (b[1:3], covariance[1:3, 1:3]), (float(b[0]), float(np.sqrt(covariance[0, 0])))
 
 
-def _detuned(x: _Turn, t: Array, columns: dict[str, Array], leaks: list[Array], leak: Array) -> dict[str, Told]:
+def _detuned(x: _Turn, t: Array, columns: dict[str, Array], leaks: list[Array], leaked: float) -> dict[str, Told]:
     """Return W and its covariance from frequency and from quadrature."""
     ones, slope = np.ones(len(t) - 1), (t[:-1] - t.mean()) / np.ptp(t)
     terms = {"frequency": [x.cosine / 2, x.sine / 2, ones, slope], "quadrature": [x.sine / 2, -x.cosine / 2, ones]}
@@ -244,7 +240,7 @@ def _detuned(x: _Turn, t: Array, columns: dict[str, Array], leaks: list[Array], 
         X, y = np.stack([*terms[name], *leaks], axis=1), columns[name] - columns[name].mean()
         names = [*("first", "second", "mean", "drift")[: len(terms[name])], *LEAKS[: len(leaks)]]
         b, covariance = _white(X, y[:-1], names)
-        told[name] = b[:2], covariance[:2, :2] + leak
+        told[name] = b[:2], covariance[:2, :2] + leaked * np.eye(2)
     return told
 
 
@@ -277,12 +273,7 @@ def _turned(
     X, runs = np.stack(columns, axis=1), [slice(0, len(t))]
     fit = fit_coloured(X, phi - own[0] * along - own[1] * across, names, runs)
     b, covariance = fit.regression.coefficients, fit.regression.covariance
-    missed, spread = b[4:6], np.sqrt(np.diag(covariance))[4:6]
-    if not both_ways:  # what they may have made of the rest
-        missed, spread = np.zeros(2), UNEVEN
-        for gain, sd in zip(gains, spread, strict=True):
-            moved = sd * fit_coloured(X, gain, names, runs, fit.theta).regression.coefficients
-            covariance = covariance + np.outer(moved, moved)
+    missed, spread = (b[4:6], np.sqrt(np.diag(covariance))[4:6]) if both_ways else (np.zeros(2), UNEVEN)
     return (float(b[1]), float(np.sqrt(covariance[1, 1]))), (b[2:4], covariance[2:4, 2:4]), missed, spread
 
 
@@ -309,8 +300,9 @@ def _join(
         scale = np.linalg.lstsq(A, two, rcond=None)[0]
         off = two - A @ scale
         apart = float(off @ np.linalg.solve(two_cov + scale[0] ** 2 * one_cov, off))
-        little = np.hypot(*(left[:2] - left[2:])) < LARGE * max(np.hypot(*one), np.hypot(*two))
         factor = 1 / scale[0] if apart < scipy.special.chdtri(1, CHANCE) else np.nan
+        little = np.hypot(*(left[:2] - left[2:])) < LARGE * max(np.hypot(*one), np.hypot(*two))
+        little &= not (misfit > FAR**2 and abs(factor - 1) > LARGE)
         conflicts.append(Conflict(split, columns, float(factor), float(np.sqrt(misfit)) if little else 0.0))
         if not little:
             return found[0], None

@@ -35,8 +35,8 @@ COLUMNS = {
     # columns of the record by what the fit calls them
     "frequency": "frequency_Hz",
     "quadrature": "quadrature_V",
-    "drive": "inverse_q",
-    "turn": "bias_deg_per_h",
+    "decay": "inverse_q",
+    "rate": "bias_deg_per_h",
     "angle": "pattern_angle_deg",
 }
 AngleAt = Literal["start", "middle", "end"]
@@ -90,16 +90,15 @@ def fit_whole_angle(
     arguments = record, bryan_factor, quadrature_volts_per_hertz, instrument, confidence
     found = _fit_record(*arguments, LATE[angle_at or "start"])
     estimates = _in_card_units(found.estimates, found, record)
-    names = COLUMNS | ({"turn": RATE} if RATE in record else {})
-    wrong = [one for one in found.conflicts if not one.widened]
-    against = "" if not wrong else "its columns contradict each other"
+    names = COLUMNS | ({"rate": RATE} if RATE in record else {})
+    wrong = any(not one.widened for one in found.conflicts)
+    against = "its columns contradict each other" if wrong else ""
     saved = None if instrument is None else keep_card(_with_estimates(instrument, estimates), save, against)
     alone = {names[name]: _in_card_units(one, found, record) for name, one in found.alone.items()}
     left_out = {names[name]: record["time_s"][rows].tolist() for name, rows in found.spikes.items()}
     said = _contradictions(found, names)
     payload: dict[str, object] = {"data": run, "confidence": confidence, "saved": saved, "estimates": estimates}
-    payload |= {"undetermined": found.undetermined, "alone": alone, "contradictions": said}
-    payload |= {"left_out_s": left_out}
+    payload |= {"undetermined": found.undetermined, "alone": alone, "contradictions": said, "left_out_s": left_out}
     rows = [_row(key, e) for key, e in estimates.items()]
     by_column = [_row(key, e) | {"column": name} for name, of in alone.items() for key, e in of.items()]
     columns = f"Quantity | value ± sd: Value | low … high ± sd: {100 * confidence:g} % interval | Unit | key: Key of the card"  # fmt: skip
@@ -112,10 +111,7 @@ def fit_whole_angle(
             *(Sentence(sentence, "warning") for sentence in said),
             Table("Estimates", rows, columns, "±: one standard deviation."),
             *(Sentence(f"Not determined: {sentence}.", "warning") for sentence in found.undetermined),
-            *(
-                Sentence(f"{_times(times)} of {name}: contradicted by the rows beside, and left out.", "warning")
-                for name, times in left_out.items()
-            ),
+            *(Sentence(_left_out(name, times), "warning") for name, times in left_out.items()),
             moved and Sentence(moved, "warning"),
             Table(
                 "Each column alone",
@@ -133,31 +129,31 @@ def _row(key: str, estimate: dict[str, float]) -> dict[str, str | float]:
     return {"quantity": NAMES[key][0], "unit": NAMES[key][1], "key": key} | estimate
 
 
-def _times(times: list[float]) -> str:
-    some = ", ".join(f"{time:g} s" for time in times[:3])
-    return f"Row at {some}" if len(times) == 1 else f"{len(times)} rows (at {some}{', …' * (len(times) > 3)})"
+def _left_out(name: str, times: list[float]) -> str:
+    some = ", ".join(f"{time:g}" for time in times[:3]) + ", …" * (len(times) > 3)
+    return (
+        f"{len(times)} row{'s' * (len(times) > 1)} of {name}, at {some} s: left out, contradicted by the rows beside."
+    )
 
 
 def _contradictions(found: WaveFit, names: dict[str, str]) -> list[str]:
     """Say which columns contradict each other, and which sign or scale of one mends it; of both splits by their signs, the angle's."""
-    flipped = [one.split for one in found.conflicts if not one.widened and abs(one.factor + 1) < 0.2]
+    signs = [one for one in found.conflicts if not one.widened and abs(one.factor + 1) < 0.2]
     said = []
     for one in found.conflicts:
         first, second = (names[name] for name in one.columns)
         if one.widened:
-            said.append(
-                f"{first} and {second} differ by more than their errors about the {one.split} split; its intervals are {one.widened:.2g} times as wide for that."
-            )
+            said.append(f"{first} and {second} differ by more than their errors about the {one.split} split; its intervals are {one.widened:.2g} times as wide for that.")  # fmt: skip
             continue
-        mend = f"multiply {second} by {one.factor:.4g}" + (
-            f", or {first} by {1 / one.factor:.4g}" if one.split == "damping" else ""
-        )
+        mend = f"They would agree: multiply {second} by {one.factor:.4g}, or {first} by {1 / one.factor:.4g}."
         if isnan(one.factor):
-            mend = "no sign or scale of one of them makes them agree: check both, and pattern_angle_deg"
-        elif one.split in flipped:
-            mend = f"reverse the sign of {names['angle'] if len(flipped) > 1 else second}"
+            mend = "No sign or scale of one of them makes them agree: check both, and pattern_angle_deg."
+        elif one in signs:
+            mend = f"They would agree: reverse the sign of {names['angle'] if len(signs) > 1 else second}."
+        elif first == "frequency_Hz":
+            mend = f"They would agree: multiply {second} by {one.factor:.4g}, or divide --quadrature-volts-per-hertz by it."
         said.append(
-            f"{first} and {second} contradict each other about the {one.split} split, which is not estimated. They would agree: {mend}."
+            f"{first} and {second} contradict each other about the {one.split} split, which is not estimated. {mend}"
         )
     return said
 
@@ -167,15 +163,14 @@ def _moved_by_the_middle(
 ) -> str:
     """Say what would move by more than its error if the angles were those of the middle of the rows."""
     other = _in_card_units((found := _fit_record(*arguments, LATE["middle"])).estimates, found, arguments[0])
-    moved = []
+    moved = [(0.0, "", 0.0)]
     for key in estimates.keys() & other.keys():
         off = other[key]["value"] - estimates[key]["value"]
         off = (off + 45) % 90 - 45 if key.endswith("axis_deg") else off
-        if abs(off) > estimates[key]["sd"]:
-            moved.append((abs(off) / estimates[key]["sd"], key, other[key]["value"]))
-    if not moved:
-        return ""
+        moved.append((abs(off) / estimates[key]["sd"], key, other[key]["value"]))
     times, key, value = max(moved)
+    if times < 1:
+        return ""
     name, unit = NAMES[key]
     return f"Pattern angles count as read at the start of their rows. If they are of the middle, as means are, give --angle-at middle: {name} is then {f'{value:.4g} {unit}'.strip()} ({times:.2g} standard deviations away)."
 

@@ -99,8 +99,8 @@ def test_quadrature_of_a_precessing_wave_resolves_a_split_of_a_third_of_a_millih
     [
         ("quadrature", -1.0, {"frequency": ("quadrature", -1.0)}),
         ("quadrature", 2.0, {"frequency": ("quadrature", 0.5)}),
-        ("rate", -1.0, {"damping": ("turn", -1.0)}),
-        ("angle", -1.0, {"frequency": ("quadrature", -1.0), "damping": ("turn", -1.0)}),
+        ("rate", -1.0, {"damping": ("rate", -1.0)}),
+        ("angle", -1.0, {"frequency": ("quadrature", -1.0), "damping": ("rate", -1.0)}),
     ],
 )
 def test_planted_sign_or_scale_of_a_column_is_named_with_its_mend(uneven, column, factor, found):
@@ -118,7 +118,7 @@ def test_columns_that_agree_are_not_contradicted(uneven):
     wave, run = uneven
     fit = fit_of(run, wave)
     assert not fit.conflicts
-    for split, columns in (("frequency", ("frequency", "quadrature")), ("damping", ("drive", "turn"))):
+    for split, columns in (("frequency", ("frequency", "quadrature")), ("damping", ("decay", "rate"))):
         for column in columns:
             assert fit.alone[column][f"{split}_split"].value == pytest.approx(getattr(wave, f"{split}_split"), rel=0.02)
 
@@ -131,7 +131,7 @@ def test_planted_rows_are_named_and_cost_nothing(uneven):
     rate[middle] += np.radians(1300 / 3600)
     angle[200] += np.radians(3.0)
     fit = fit_of(replace(run, rate=rate, angle=angle), wave)
-    assert {name: rows.tolist() for name, rows in fit.spikes.items()} == {"turn": [middle], "angle": [200]}
+    assert {name: rows.tolist() for name, rows in fit.spikes.items()} == {"rate": [middle], "angle": [200]}
     for name, one in clean.estimates.items():
         assert abs(fit.estimates[name].value - one.value) < 0.3 * one.sd, name
         assert fit.estimates[name].sd < 1.1 * one.sd, name
@@ -150,10 +150,11 @@ def test_angles_of_the_middle_of_the_rows_are_those_of_their_starts(uneven):
 @pytest.mark.parametrize("gain", [0.0, 0.005])
 def test_one_way_leaves_gain_ratio_open_and_says_so(gain):
     """A commanded turn meets gains of 0.005 as it does damping, which then is known to their size alone."""
-    wave = from_quality(4432.0, 1e6, damping_anisotropy=0.03, frequency_split=0.01)
+    wave = from_quality(4432.0, 1e6, damping_anisotropy=0.03, damping_axis=np.pi / 8, frequency_split=0.01)
     fit = run_and_fit(wave, Electronics(Channels(gain), noise=NOISE), lambda t: np.radians(0.5), 0, seconds=1800.0)
     assert "gain_ratio" not in fit.estimates
     assert any("precess it in both directions" in sentence for sentence in fit.undetermined)
+    assert fit.estimates["phase_error"].sd < 1e-4  # drive and rate meet the same
     assert fit.estimates["damping_split"].low < wave.damping_split < fit.estimates["damping_split"].high
     slow = run_and_fit(wave, Electronics(Channels(gain), noise=NOISE), lambda t: np.radians(-3.0), 0, seconds=300.0)
     assert "damping_split" not in slow.estimates
