@@ -84,6 +84,7 @@ def test_commands_of_the_first_hour_run_in_order(folder, monkeypatch, capsys):
             assert slope.split("│")[-2].strip() == "data"
 
 
+@pytest.mark.slow
 def test_the_python_blocks_run(capsys):
     found: dict[str, object] = {}
     for code in (text for kind, text in BLOCKS if kind == "python"):

@@ -121,6 +121,7 @@ def test_planted_correlation_of_changes_tells_a_cause_from_a_drift():
     assert pairs[frozenset(("quadrature_V", "bias_deg_per_h"))]["changes"] > 0.9
 
 
+@pytest.mark.slow
 def test_contract_what_is_named_possible_runs_and_what_is_missing_is_said(tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     shutil.copy(INPUTS / "cross.csv", tmp_path)
