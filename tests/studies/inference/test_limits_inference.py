@@ -181,3 +181,26 @@ def test_a_search_whose_effects_fall_away_ends_where_the_values_are_likeliest_wi
     assert outcome.final.terms == ()
     assert search is pursuit.first
     np.testing.assert_array_equal(pursuit.point, found.point)
+
+
+def test_a_term_whose_size_is_impossible_alone_leaves_the_model_without_terms(search):
+    """A negative radiated share, say; its log evidence is −∞, and rivals measured from there once lost their probability."""
+    effect, response = next(one for one in search.signatures.applicable() if one[0].name == "second-lag")
+    term = search.term(effect, response, (3e4,), members=(0,))
+    target = {name: own - term.columns[name][:, 0] for name, own in search.linear.target.items()}
+    against = Search(replace(search.linear, target=target), search.signatures, search.noise, bank=[])
+    plain = against.settle((), search.noise)
+    assert against.settle((term,), search.noise).evidence == -np.inf
+    assert against.beside((term,), plain, search.noise) is plain
+
+
+def test_a_search_goes_on_where_values_have_moved_far_and_the_lines_are_still_straight(search, monkeypatch):
+    """A knee of the frequency moved the card's values by more than a standard deviation, and the bias' ageing was never looked for."""
+    pursuit = object.__new__(Pursuit)
+    pursuit.search, pursuit.point = search, np.zeros(search.linear.count)
+    final, values = search.settle((), search.noise), np.full(search.linear.count, 2.0)
+    moved = SimpleNamespace(mean=lambda: values, kept=lambda mean: SimpleNamespace(point=mean))
+    monkeypatch.setattr(Pursuit, "_model", lambda self, final: moved)
+    for straight in (True, False):
+        monkeypatch.setattr(Pursuit, "_holds", lambda self, final, own=straight: own)
+        assert pursuit._near(final) is straight
