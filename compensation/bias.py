@@ -5,7 +5,7 @@ B = B₀ + k₁ f + k₂ f² + k₃ f³ + k₄ ḟ + k₅ ḟ² + k₆ ḟ³ + k
 lag, and the `play` d = p − T of a backlash p (`compensation.memory`) brings d, f d and d²: a parabola of p has all three.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -107,9 +107,9 @@ class BiasFit:
 
     @property
     def memory_intervals(self) -> dict[str, tuple[float, float, float]]:
-        """Value and ends of the 90 % interval of lag and play, whichever there are."""
+        """Value and ends of the 90 % interval of lag and play, whichever the records determine."""
         found = ((name, getattr(self.memory, name), getattr(self.memory_errors, name)) for name in MEMORY)
-        return {name: (value, max(value - NINETY * sd, 0.0), value + NINETY * sd) for name, value, sd in found if value}
+        return {name: (value, max(value - NINETY * sd, 0.0), value + NINETY * sd) for name, value, sd in found if sd}
 
     def predict(self, state: ArrayLike, rate: ArrayLike, play: ArrayLike = 0.0) -> Array:
         """Return the bias that the model expects at a frequency (Hz) or temperature (°C), its rate (1/s) and play."""
@@ -208,25 +208,26 @@ class BiasDesign:
         play = np.concatenate([run.play for run in runs])
         self.candidates = term_columns(self.state, self.rate, reference, self.names, play)
 
+    def columns(self, terms: Sequence[str]) -> Array:
+        """Return the constants of the runs and the columns of the terms, (m, runs + terms)."""
+        return np.column_stack([self.constants, self.candidates[:, [self.names.index(name) for name in terms]]])
+
 
 def fit_terms(
     design: BiasDesign, terms: tuple[str, ...], theta: float | None = None,
-    selection: StepwiseSelection | None = None, scores: tuple[float, ...] = (), beside: Array | None = None,
+    selection: StepwiseSelection | None = None, scores: tuple[float, ...] = (), beside: Mapping[str, Array] | None = None,
 ) -> BiasFit:  # fmt: skip
     """Fit the given terms by least squares, with errors for independent and for correlated rows, of noise `theta` or as estimated.
 
-    `beside` (m, 1 or 2): slopes of the bias over lag and play, whichever there are; the errors then are those beside a free memory.
+    `beside`: slopes (m,) of the bias over lag and play, whichever there are; the errors then are those beside a free memory.
     """
-    X = np.column_stack([design.constants, design.candidates[:, [design.names.index(name) for name in terms]]])
+    X = design.columns(terms)
     count = design.constants.shape[1]
     names = [*(f"constant of run {k + 1}" for k in range(count)), *terms]
     fit = fit_linear(X, design.bias, names, constant=False)
-    free = [name for name in MEMORY if beside is not None and getattr(design.memory, name)]
-    wide = (
-        fit
-        if beside is None
-        else fit_linear(np.column_stack([X, beside]), design.bias, [*names, *free], constant=False)
-    )
+    free = beside or {}
+    every = np.column_stack([X, *free.values()])
+    wide = fit_linear(every, design.bias, [*names, *free], constant=False) if free else fit
     noise = fit_coloured(wide.design, design.bias, wide.names, design.rows, theta)
     errors = np.sqrt(np.diag(noise.regression.covariance))[len(names) :]
     coloured = coloured_covariance(wide, noise, design.rows)[: len(names), : len(names)]

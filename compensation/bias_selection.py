@@ -87,11 +87,6 @@ def choose_memory(prepare: Prepare) -> Memory:
     def design_of(memory: Memory) -> BiasDesign:
         return BiasDesign(plain if memory == NO_MEMORY else prepare(memory), reference)
 
-    def theta_of(memory: Memory) -> float:
-        design = design_of(memory)
-        everything = np.column_stack([design.constants, design.candidates])
-        return estimate_theta(everything, design.bias, design.rows, CAUTION)
-
     def select(memory: Memory) -> tuple[float, tuple[str, ...]]:
         found = _tested(design_of(memory), theta)
         price = WORTH * ((memory.lag > 0) + (memory.play > 0))
@@ -100,11 +95,8 @@ def choose_memory(prepare: Prepare) -> Memory:
     def refine(memory: Memory, terms: tuple[str, ...]) -> Memory:
         def left(other: Memory) -> float:
             design = design_of(other)
-            X = np.column_stack([design.constants, design.candidates[:, [design.names.index(name) for name in terms]]])
-            white, bias = whiten(X, theta, design.rows), whiten(design.bias, theta, design.rows)
-            white /= np.maximum(np.linalg.norm(white, axis=0), 1e-300)
-            rest = bias - white @ np.linalg.lstsq(white, bias, rcond=1e-10)[0]
-            return rows * float(np.log(np.mean(rest**2)))
+            X, bias = (whiten(part, theta, design.rows) for part in (design.columns(terms), design.bias))
+            return float(np.linalg.norm(bias - _follow(X, bias)))
 
         def along(logarithm: float, name: str, others: Memory) -> float:
             return left(_moved(others, name, np.exp(logarithm)))
@@ -132,7 +124,7 @@ def choose_memory(prepare: Prepare) -> Memory:
                 break
         return memory
 
-    theta = theta_of(NO_MEMORY)
+    theta = _cautious_theta(design_of(NO_MEMORY))
     plays = PLAYS if rows > 2 * (len(plain) + len(POWERS)) else ()
     side = np.sign([run.state[0] - np.mean([one.state.mean() for one in plain]) for run in plain])
     loops = [Memory(0.0, part * span, tuple(side * way)) for part in plays for way in (0.0, -1.0, 1.0)]
@@ -144,7 +136,7 @@ def choose_memory(prepare: Prepare) -> Memory:
     kinds = [min(grid, key=lambda one: select(one)[0]) for grid in grids if grid]
     for _ in range(2):  # noise is what the better memory leaves
         kinds = [search(memory) for memory in kinds]
-        theta = theta_of(min(kinds, key=lambda one: select(one)[0]))
+        theta = _cautious_theta(design_of(min(kinds, key=lambda one: select(one)[0])))
     return min(kinds, key=lambda one: select(one)[0])
 
 
@@ -165,24 +157,27 @@ def free_memory(fit: BiasFit, prepare: Prepare) -> BiasFit:
         low, high = (np.concatenate([fit.predict(run.state, run.rate, run.play) for run in runs]) for runs in ends)
         return np.asarray((high - low) / (0.02 * value))
 
-    slopes = [slope(name) for name in MEMORY if getattr(fit.memory, name)]
-    if not slopes:
-        return fit
+    slopes = {name: slope(name) for name in MEMORY if getattr(fit.memory, name)}
+    slopes = {name: own for name, own in slopes.items() if own.any()}  # a play without a term of its own has none
     design = BiasDesign(prepare(fit.memory), fit.reference)
-    return fit_terms(design, fit.terms, selection=fit.selection, scores=fit.held_out, beside=np.stack(slopes, axis=1))
+    try:
+        return (
+            fit_terms(design, fit.terms, selection=fit.selection, scores=fit.held_out, beside=slopes) if slopes else fit
+        )
+    except CompensationError:  # the terms make up what the memory does: its interval has no end
+        return fit
 
 
 def find_opposite(runs: Sequence[BiasRun], reference: float) -> int | None:
     """Return the run whose bias has the opposite sign to the others', by B = ±(B₀ᵢ + X k) of half the residual, or None."""
     design = BiasDesign(runs, reference)
-    X = np.column_stack([design.constants, design.candidates])
-    X /= np.maximum(np.linalg.norm(X, axis=0), 1e-300)
+    X = design.columns(design.names)
 
     def left(run: int | None) -> float:
         bias = design.bias.copy()
         if run is not None:
             bias[design.rows[run]] *= -1.0
-        return float(np.linalg.norm(bias - X @ np.linalg.lstsq(X, bias, rcond=1e-10)[0]))
+        return float(np.linalg.norm(bias - _follow(X, bias)))
 
     if len(runs) < 2:
         return None
@@ -211,12 +206,10 @@ def _select(pieces: Sequence[BiasRun], method: Method, reference: float | None, 
     reference = float(pieces[0].state[0]) if reference is None else reference
     design = BiasDesign(pieces, reference)
     names = design.names
-    everything = np.column_stack([design.constants, design.candidates])
-    theta = estimate_theta(everything, design.bias, design.rows, CAUTION)
     if method == "paper":
         selection = select_stepwise(design.constants, design.candidates, design.bias, names, PARENTS)
         return fit_terms(design, selection.terms, selection=selection)
-    selection = _tested(design, theta)
+    selection = _tested(design, _cautious_theta(design))
     if not by_runs or not selection.steps:
         return fit_terms(design, selection.terms, selection=selection)
     try:
@@ -225,6 +218,16 @@ def _select(pieces: Sequence[BiasRun], method: Method, reference: float | None, 
         return fit_terms(design, selection.terms, selection=selection)
     best = (selection.start, *selection.steps)[int(np.argmin(scores))].terms
     return fit_terms(design, tuple(sorted(best, key=names.index)), selection=selection, scores=scores)
+
+
+def _cautious_theta(design: BiasDesign) -> float:
+    return estimate_theta(design.columns(design.names), design.bias, design.rows, CAUTION)
+
+
+def _follow(X: Array, y: Array) -> Array:
+    """Return what columns make of y, also where one is a combination of others."""
+    unit = X / np.maximum(np.linalg.norm(X, axis=0), 1e-300)
+    return np.asarray(unit @ np.linalg.lstsq(unit, y, rcond=1e-10)[0])
 
 
 def _tested(design: BiasDesign, theta: float) -> StepwiseSelection:

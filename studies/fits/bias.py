@@ -1,13 +1,12 @@
 """A bias calibration from record files: both ways of selecting terms, held-out scores, Allan deviations."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from functools import cache
+from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Literal
 
 import numpy as np
 
-from compensation.arrays import Array
 from compensation.bias import FREQUENCY, TEMPERATURE, BiasFit, BiasRun, average_run, rate_run
 from compensation.bias_selection import (
     HeldOutRows,
@@ -87,19 +86,19 @@ def study_bias(
     window = 3 * width if window is None else window
     variable = FREQUENCY if column == "frequency_Hz" else TEMPERATURE
 
-    @cache
-    def lagged(lag: float) -> list[Array]:
-        return [follow_lag(blocks.columns[variable.name], np.diff(blocks.time), lag) for blocks in averaged]
+    @lru_cache(maxsize=4096)
+    def run_of(k: int, lag: float, play: float, start: float) -> BiasRun:
+        blocks = averaged[k]
+        state = follow_lag(blocks.columns[variable.name], np.diff(blocks.time), lag)
+        with naming(records[k].path or "record"):
+            return rate_run(
+                blocks, state, window, causal=causal, variable=variable, memory=Memory(lag, play), start=start
+            )
 
     def prepare(memory: Memory) -> list[BiasRun]:
-        runs = []
         starts = memory.starts or (0.0,) * len(records)
-        for record, blocks, state, start in zip(records, averaged, lagged(memory.lag), starts, strict=True):
-            with naming(record.path or "record"):
-                runs.append(
-                    rate_run(blocks, state, window, causal=causal, variable=variable, memory=memory, start=start)
-                )
-        return runs
+        runs = [run_of(k, memory.lag, memory.play, float(start)) for k, start in enumerate(starts)]
+        return [replace(run, memory=memory) for run in runs]
 
     everywhere = ", ".join(record.path or "record" for record in records)
     progress(f"averaging {sum(map(len, records)):,} rows over {width:g} s")

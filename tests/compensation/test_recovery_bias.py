@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 
-from compensation.bias import TERMS, prepare_run, term_columns
-from compensation.bias_selection import NoHeldOut, bias_stability, fit_bias, score_held_out, score_runs
+from compensation.bias import TEMPERATURE, TERMS, BiasDesign, fit_terms, prepare_run, term_columns
+from compensation.bias_selection import NoHeldOut, bias_stability, fit_bias, free_memory, score_held_out, score_runs
 from compensation.decimation import average_blocks
 from compensation.derivative import differentiate
 from compensation.errors import CompensationError
+from compensation.memory import Memory
 from compensation.noise_regression import estimate_theta, fit_coloured
 from compensation.regression import fit_linear
 from compensation.spikes import find_spikes
@@ -246,3 +247,16 @@ def test_irregular_sampling_gives_the_same_coefficients():
     fit = fit_bias([prepare_run(t, 4433.0 + change + 0.003 * rng.normal(size=t.size), bias)], reference=4433.0)
     assert fit.terms == ("f", "fdot")
     assert np.all(np.abs(fit.coefficients - [1.0, 0.3, -500.0]) < 4 * fit.standard_errors)
+
+
+def test_a_hysteresis_that_no_term_uses_has_no_interval():
+    time = np.arange(0.0, 18000.0, 100.0)
+    T = 20.0 * np.cos(time / 2000.0)
+    bias = 0.3 * T + np.random.default_rng(1).normal(0.0, 0.1, time.size)
+
+    def prepare(memory):
+        return [prepare_run(time, T, bias, variable=TEMPERATURE, memory=memory)]
+
+    for terms, told in ((("f",), ()), (("f", "play"), ("play",))):
+        fit = fit_terms(BiasDesign(prepare(Memory(play=2.0)), 0.0), terms)
+        assert tuple(free_memory(fit, prepare).memory_intervals) == told
