@@ -13,7 +13,7 @@ from studies.reports import style
 from studies.reports.columns import draw_columns
 from studies.reports.digits import plain, to_error
 from studies.results import Chapter, Column, Drawing, Facts, Figure, Sentence, Table
-from studies.simulation.loop_study import BiasSlope, LoopStudy, answer_steps, bias_around, bias_slopes, noise_over
+from studies.simulation.loop_study import BiasSlope, LoopStudy, answer_steps, bias_around, noise_over
 
 LENGTHS = tuple(np.geomspace(0.01, 1e4, 25))
 COLUMNS = ("time_s", "bias_deg_per_h", "measured_rate_deg_per_s", "pattern_angle_deg", "quadrature_V", "frequency_Hz")
@@ -50,7 +50,7 @@ def loop_parts(study: LoopStudy, payload: dict[str, Any], run: Record | None) ->
         return [one | {"name": NAMES.get(one["source"], one["source"])} for one in payload[key]]
 
     shown = {name: run[name] for name in COLUMNS if name in run} if run is not None else {}
-    slopes = bias_slopes(study)
+    slopes = study.slopes
     moving = [asdict(s) | {"effect": s.effect} for s in slopes if s.effect > SMALLEST * slopes[0].effect]
     headroom, offset = study.instrument.loop.drive_headroom, study.instrument.loop.start_offset_Hz  # type: ignore[union-attr]
     start = f"Start from rest with {headroom:g} times the steady-state drive: phase locked after {study.start.locked:.3g} s, amplitude within 1 % after {study.start.ready:.4g} s."

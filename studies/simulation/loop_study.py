@@ -1,6 +1,6 @@
 """What the loops of a card are like at one temperature: margins, steps, bias by source and azimuth, noise by source, start-up."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -81,6 +81,7 @@ class LoopStudy:
     loops: Loops
     settled: dict[str, float]
     sources: tuple[BiasSource, ...]
+    slopes: tuple[BiasSlope, ...]
     noise: dict[str, tuple[float, float, float]]
     margins: tuple[Margin, ...]
     start: StartUp
@@ -119,6 +120,8 @@ def study_loops(
             name: (float(over[0]), walk / 60, float(np.sqrt(max((100 * over[1]) ** 2 - 100 * walk**2, 0.0) / 2)))
             for name, (walk, over) in _noise(instrument, wave, electronics, loops, (1.0, 100.0)).items()
         }
+    bias = _bias_of(instrument, frequency, inverse_q, bryan_factor)
+    slopes = _slopes(instrument, bias)
     settled = settled_columns(instrument, np.array([frequency]), np.array([inverse_q]), bryan_factor)
     return LoopStudy(
         instrument,
@@ -129,7 +132,8 @@ def study_loops(
         electronics,
         loops,
         {name: float(values[0]) for name, values in settled.items()},
-        _sources(instrument, frequency, inverse_q, bryan_factor),
+        _sources(bias, slopes),
+        slopes,
         noise,
         margins,
         start,
@@ -156,68 +160,50 @@ def answer_steps(study: LoopStudy, points: int = 300) -> dict[str, tuple[Array, 
 
 def bias_around(study: LoopStudy, azimuths: Array) -> dict[str, Array]:
     """Return the bias (deg/h) over the azimuth of the wave (rad): of each source that makes any, and of all."""
-
-    def bias(values: dict[str, float]) -> Array:
-        count = len(azimuths)
-        return settled_columns(
-            study.instrument.with_values(values),
-            np.full(count, study.frequency),
-            np.full(count, study.inverse_q),
-            study.bryan_factor,
-            azimuths,
-        )["bias_deg_per_h"]
-
+    bias = _bias_of(study.instrument, study.frequency, study.inverse_q, study.bryan_factor, azimuths)
     total = bias({})
     parts = {name: total - bias(dict.fromkeys(keys, 0.0)) for name, keys in ERRORS.items()}
     most = max(float(np.max(np.abs(total))), 1e-12)
     return {name: part for name, part in parts.items() if float(np.max(np.abs(part))) > 1e-6 * most} | {"all": total}
 
 
-def bias_slopes(study: LoopStudy) -> tuple[BiasSlope, ...]:
-    """Return what each uncertain value of loops and damping does to the bias, largest effect first."""
+def _bias_of(
+    instrument: Instrument, frequency: float, inverse_q: float, bryan_factor: float, azimuths: Array | None = None
+) -> Callable[[dict[str, float]], Array]:
+    """Bias (deg/h) of the settled loops, at the card's azimuth or at others (rad), as a function of values of the card."""
+    f, loss = (np.full(1 if azimuths is None else len(azimuths), x) for x in (frequency, inverse_q))
+
+    def bias(values: dict[str, float]) -> Array:
+        return settled_columns(instrument.with_values(values), f, loss, bryan_factor, azimuths)["bias_deg_per_h"]
+
+    return bias
+
+
+def _slopes(instrument: Instrument, bias: Callable[[dict[str, float]], Array]) -> tuple[BiasSlope, ...]:
+    """What each uncertain value of loops and damping does to the bias, largest effect first."""
     keys = {*(key for keys in ERRORS.values() for key in keys), *SHARED}
-    bias = _bias_of(study.instrument, study.frequency, study.inverse_q, study.bryan_factor)
     found = []
-    for one in study.instrument.uncertain:
+    for one in instrument.uncertain:
         if one.name in keys and one.sd > 0:
             low, high = _ends(one.value, one.sd, one.name)
-            slope = (bias({one.name: high}) - bias({one.name: low})) / (high - low)
+            slope = float((bias({one.name: high}) - bias({one.name: low}))[0]) / (high - low)
             found.append(BiasSlope(one.name, one.value, one.sd, slope))
     # equal effects, such as those of the two phase errors, stand in the card's order, not in that of rounding
     return tuple(sorted(found, key=lambda one: -float(f"{one.effect:.9g}")))
 
 
-def _bias_of(
-    instrument: Instrument, frequency: float, inverse_q: float, bryan_factor: float
-) -> Callable[[dict[str, float]], float]:
-    """Bias (deg/h) of the settled loops as a function of values of the card."""
+def _sources(bias: Callable[[dict[str, float]], Array], slopes: tuple[BiasSlope, ...]) -> tuple[BiasSource, ...]:
+    """Bias of each source: what goes when its keys are 0; its spread: that of the card's uncertain values."""
+    effects = {one.key: one.effect for one in slopes}
 
-    def bias(values: dict[str, float]) -> float:
-        moved = instrument.with_values(values)
-        column = settled_columns(moved, np.array([frequency]), np.array([inverse_q]), bryan_factor)
-        return float(column["bias_deg_per_h"][0])
-
-    return bias
-
-
-def _sources(instrument: Instrument, frequency: float, inverse_q: float, bryan_factor: float) -> tuple[BiasSource, ...]:
-    """Bias of each source: what goes when its keys are 0; its spread: the card's uncertain values, moved by their sd."""
-    bias = _bias_of(instrument, frequency, inverse_q, bryan_factor)
-    total = bias({})
-    spread = {value.name: value for value in instrument.uncertain}
-
-    def effect(key: str) -> float:
-        low, high = _ends(spread[key].value, spread[key].sd, key)
-        return abs(bias({key: high}) - bias({key: low})) / 2
-
-    sources = []
-    for name, keys in ERRORS.items():
-        effects = [effect(key) for key in keys if key in spread]
-        sources.append(
-            BiasSource(name, total - bias(dict.fromkeys(keys, 0.0)), float(np.hypot.reduce([0.0, *effects])))
+    def source(name: str, keys: Iterable[str], value: Array) -> BiasSource:
+        return BiasSource(
+            name, float(value[0]), float(np.hypot.reduce([0.0, *(effects.get(key, 0.0) for key in keys)]))
         )
-    everything = [*(source.sd for source in sources), *(effect(key) for key in SHARED if key in spread)]
-    return (*sources, BiasSource("all", total, float(np.hypot.reduce([0.0, *everything]))))
+
+    total = bias({})
+    parts = (source(name, keys, total - bias(dict.fromkeys(keys, 0.0))) for name, keys in ERRORS.items())
+    return (*parts, source("all", effects, total))
 
 
 def _ends(value: float, sd: float, key: str) -> tuple[float, float]:
