@@ -34,7 +34,7 @@ from compensation.spikes import find_spikes
 LEAST_TURN = 2 * np.pi  # least span of x (rad): one period of what is looked for
 LEAKS = ("leak", "leak cos", "leak sin")
 LEAST_CONTRAST = 0.05  # least spread of the turn rate over its largest: below it, turning both ways is missing
-FEW = 10  # rows without a rate whose turns are unknowns; beyond, they count as the line between their neighbours
+FEW, ODD = 30, 6.0  # rows whose turns may be unknowns, and robust standard deviations that make one so
 LEAST_SPIKE = 1e-3  # of a column's span, by which a spike stands out
 CHANCE, LARGE = (
     1e-3,
@@ -119,10 +119,11 @@ def fit_whole_angle(
     drives, lost = np.array([drive_gain_ratio, drive_skew]), np.flatnonzero(bad["rate"][:-1])[:FEW]
     for _ in range(4):
         behind = straighten(x / 2, *gains)
-        mean, told["rate"], missed, spread = _turned(
+        mean, told["rate"], missed, spread, odd = _turned(
             t, x, _Turn(x + 2 * behind), phi + behind, command, gains - drives, turns, both_ways, lost
         )
-        gains = gains + missed
+        gains, lost = gains + missed, np.union1d(lost, odd)[:FEW]
+    bad["rate"][lost] = True
     estimates = {"rate": (mean[0] / coupling, mean[1] / coupling)}
     loss = 0.0
     if "decay" in y:
@@ -254,8 +255,8 @@ def _turned(
     turns: list[Array],
     both_ways: bool,
     lost: NDArray[np.intp],
-) -> tuple[tuple[float, float], Told, Array, Array]:
-    """Return the mean turn, C − ε W with its covariance, and what is missing of (δ, κ) with deviations; `lost` rows turned by something unknown."""
+) -> tuple[tuple[float, float], Told, Array, Array, NDArray[np.intp]]:
+    """Return the mean turn, C − ε W, what is missing of (δ, κ), with errors, and rows that turn oddly; `lost` ones turn by something unknown."""
     step = (t[-1] - t[0]) / (len(t) - 1)
 
     def integral(values: Array) -> Array:
@@ -274,7 +275,9 @@ def _turned(
     fit = fit_coloured(X, phi - own[0] * along - own[1] * across, names, runs)
     b, covariance = fit.regression.coefficients, fit.regression.covariance
     missed, spread = (b[4:6], np.sqrt(np.diag(covariance))[4:6]) if both_ways else (np.zeros(2), UNEVEN)
-    return (float(b[1]), float(np.sqrt(covariance[1, 1]))), (b[2:4], covariance[2:4, 2:4]), missed, spread
+    new = np.abs(fit.regression.residuals[1:])  # what a row adds that the one before does not foretell
+    odd = np.flatnonzero(new > max(ODD * 1.4826 * float(np.median(new)), LEAST_SPIKE * float(np.ptp(np.diff(phi)))))
+    return (float(b[1]), float(np.sqrt(covariance[1, 1]))), (b[2:4], covariance[2:4, 2:4]), missed, spread, odd
 
 
 def _join(

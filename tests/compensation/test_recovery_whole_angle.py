@@ -123,17 +123,18 @@ def test_columns_that_agree_are_not_contradicted(uneven):
             assert fit.alone[column][f"{split}_split"].value == pytest.approx(getattr(wave, f"{split}_split"), rel=0.02)
 
 
-def test_planted_rows_are_named_and_cost_nothing(uneven):
-    """One row of the rate 1300 °/h off, as a reversal may make, and one of the angle by 3°: the interval widened threefold."""
+def test_planted_rows_are_named_and_cost_little(uneven):
+    """Seven rows of the rate off by 1300 °/h and less, as a reversal may make, and one of the angle by 3°: intervals were three times as wide."""
     wave, run = uneven
     clean, middle = fit_of(run, wave), len(run.time) // 2
     rate, angle = run.rate.copy(), run.angle.copy()
-    rate[middle] += np.radians(1300 / 3600)
+    rate[middle : middle + 7] += np.radians(1300 / 3600) * np.exp(-np.arange(7) / 2)
     angle[200] += np.radians(3.0)
     fit = fit_of(replace(run, rate=rate, angle=angle), wave)
-    assert {name: rows.tolist() for name, rows in fit.spikes.items()} == {"rate": [middle], "angle": [200]}
+    assert fit.spikes["rate"].tolist() == list(range(middle, middle + 7))
+    assert fit.spikes["angle"] == [200]
     for name, one in clean.estimates.items():
-        assert abs(fit.estimates[name].value - one.value) < 0.3 * one.sd, name
+        assert abs(fit.estimates[name].value - one.value) < 0.5 * one.sd, name
         assert fit.estimates[name].sd < 1.1 * one.sd, name
 
 
