@@ -108,10 +108,12 @@ class HeatPath:
 
 
 def with_second_mass(found: CardFit, progress: Callable[[str], None] = lambda _: None) -> HeatPath | None:
-    """Return a calibrated card with another part on its base, whose heat capacity and conductance are free, calibrated; None where it is no likelier."""
-    progress("a second mass on the base")
+    """Return a calibrated card with another part on its base, whose heat capacity and conductance are free, calibrated; None where it is no likelier, or where the card has one."""
     whole = found.problem
     card, thermal = whole.instrument, whole.instrument.thermal
+    if thermal.second_mass_J_per_K is not None:
+        return None
+    progress("a second mass on the base")
     capacity = MASS_SHARE * thermal.base_heat_capacity_J_per_K
     lag = slowest_lag(build_network(card), card.reference_temperature)
     numbers = (capacity, capacity / lag)
