@@ -26,7 +26,7 @@ def ladder(diagnosis: "Inference") -> Drawing:
             colours = {"as given": BLACK, "calibrated": VERMILION, "with causes": BLUE, "noise": ORANGE}
             axis.bar(range(len(steps)), values, color=[colours[word] for word, _ in steps], width=0.7)
             for k, (_, value) in enumerate(steps):
-                label = f"{plain(value * response.scale)} {response.shown}"
+                label = plain(value * response.scale)
                 kelvin = as_temperature(diagnosis, column, value)
                 words = label if kelvin is None else f"{label}\n{kelvin}"
                 axis.annotate(words, (k, values[k]), ha="center", va="bottom", fontsize=8)
