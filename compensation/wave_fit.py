@@ -110,28 +110,29 @@ def fit_whole_angle(
     leaks = [command, command * seen.cosine, command * seen.sine] if both_ways and turns and turns[0] is command else []
     # In one direction what a commanded turn leaks through uneven gains is not told from the splits.
     leak = 0.0 if both_ways else float(np.mean(command))
-    told = _detuned(seen, t, y, leaks, (leak * UNEVEN.max()) ** 2)
-    conflicts: list[Conflict] = []
-    W = _join("frequency", ("frequency", "quadrature"), told, conflicts)[0]
     phi = coupling * np.concatenate([[0.0], np.cumsum(indicated[:-1] - known)]) * step
     card = np.array([pickoff_gain_ratio, pickoff_skew])
     gains, spread = np.zeros(2) if both_ways else card, UNEVEN
     drives, lost = np.array([drive_gain_ratio, drive_skew]), np.flatnonzero(bad["rate"][:-1])[:FEW]
     for _ in range(4):
         behind = straighten(x / 2, *gains)
-        mean, told["rate"], missed, spread, odd = _turned(
+        mean, turned, missed, spread, odd = _turned(
             t, x, _Turn(x + 2 * behind), phi + behind, command, gains - drives, turns, both_ways, lost
         )
         gains, lost = gains + missed, np.union1d(lost, odd)[:FEW]
     bad["rate"][lost] = True
     estimates = {"rate": (mean[0] / coupling, mean[1] / coupling)}
-    loss = 0.0
+    loss, conflicts = 0.0, list[Conflict]()
     if "decay" in y:
         # Where the pick-offs' gains make the amplitude rise and fall, its drive does so too; of a commanded turn it is a leak.
-        swell = (gains[0] * seen.sine - gains[1] * seen.cosine) * (harmonic * turn_rate / step - command)
-        (C, C_cov), estimates["decay"] = _driven(seen, y["decay"], swell, leaks)
-        told["decay"] = C + leak * (gains + drives)[::-1] * [1, -1], C_cov
+        y["decay"][:-1] -= (gains[0] * seen.sine - gains[1] * seen.cosine) * (harmonic * turn_rate / step - command)
+    found = _modulated(seen, t, y, leaks, (leak * UNEVEN.max()) ** 2)
+    told = {name: one for name, (one, _) in found.items()} | {"rate": turned}
+    if "decay" in told:
+        told["decay"] = told["decay"][0] + leak * (gains + drives)[::-1] * [1, -1], told["decay"][1]
+        estimates["decay"] = found["decay"][1]
         loss = estimates["decay"][0]
+    W = _join("frequency", ("frequency", "quadrature"), told, conflicts)[0]
     joined, epsilon = _join("damping", ("decay", "rate"), told, conflicts, W)
     wrong = {one.split for one in conflicts if not one.widened}
     if "damping" in wrong:  # nor is what the turn says of the gains believed
@@ -211,12 +212,6 @@ def _smooth(values: Array) -> Array:
     return np.convolve(values, np.full(width, 1 / width), mode="valid")
 
 
-def _white(X: Array, y: Array, names: list[str]) -> tuple[Array, Array]:
-    """Return coefficients and covariance of a fit in white noise plus a random walk."""
-    fit = fit_coloured(X, y, names, [slice(0, len(y))])
-    return fit.regression.coefficients, fit.regression.covariance
-
-
 class _Turn:
     """Means of cos x and sin x over rows in which x (at their ends) grows evenly."""
 
@@ -225,24 +220,24 @@ class _Turn:
         self.cosine, self.sine = share * np.cos(middle), share * np.sin(middle)
 
 
-def _driven(x: _Turn, decay: Array, swell: Array, leaks: list[Array]) -> tuple[Told, tuple[float, float]]:
-    """Return C with its covariance, and 1/τ with its deviation, from the drive's effort."""
-    X = np.stack([np.ones_like(swell), x.cosine / 2, x.sine / 2, *leaks], axis=1)
-    b, covariance = _white(X, decay[:-1] - swell, ["1/τ", "cos", "sin", *LEAKS[: len(leaks)]])
-    return (b[1:3], covariance[1:3, 1:3]), (float(b[0]), float(np.sqrt(covariance[0, 0])))
-
-
-def _detuned(x: _Turn, t: Array, columns: dict[str, Array], leaks: list[Array], leaked: float) -> dict[str, Told]:
-    """Return W and its covariance from frequency and from quadrature."""
+def _modulated(
+    x: _Turn, t: Array, columns: dict[str, Array], leaks: list[Array], leaked: float
+) -> dict[str, tuple[Told, tuple[float, float]]]:
+    """Return W from frequency and from quadrature, C from the drive's effort, and the level of each with its deviation."""
     ones, slope = np.ones(len(t) - 1), (t[:-1] - t.mean()) / np.ptp(t)
-    terms = {"frequency": [x.cosine / 2, x.sine / 2, ones, slope], "quadrature": [x.sine / 2, -x.cosine / 2, ones]}
-    told = {}
+    terms = {
+        "frequency": [x.cosine / 2, x.sine / 2, ones, slope],
+        "quadrature": [x.sine / 2, -x.cosine / 2, ones],
+        "decay": [x.cosine / 2, x.sine / 2, ones],
+    }
+    found = {}
     for name in [name for name in terms if name in columns]:
-        X, y = np.stack([*terms[name], *leaks], axis=1), columns[name] - columns[name].mean()
+        X, mean = np.stack([*terms[name], *leaks], axis=1), columns[name].mean()
         names = [*("first", "second", "mean", "drift")[: len(terms[name])], *LEAKS[: len(leaks)]]
-        b, covariance = _white(X, y[:-1], names)
-        told[name] = b[:2], covariance[:2, :2] + leaked * np.eye(2)
-    return told
+        fit = fit_coloured(X, columns[name][:-1] - mean, names, [slice(0, len(X))]).regression
+        b, covariance = fit.coefficients, fit.covariance + (leaked if name != "decay" else 0.0) * np.eye(X.shape[1])
+        found[name] = (b[:2], covariance[:2, :2]), (float(mean + b[2]), float(np.sqrt(covariance[2, 2])))
+    return found
 
 
 def _turned(
