@@ -51,6 +51,9 @@ def _cause(found: Inferred, k: int) -> Cause:
         name = rival.terms[-1].effect.name
         best[name] = max(best.get(name, -np.inf), rival.score)
     members, probability = weigh(list(best), list(best.values()), outcome.without[k].score, found.unknown[k])
+    left = found.left[term.response]
+    if left.significant and 0.0 < left.share < CONSTANTS["believed"]:
+        probability *= left.share  # whatever made the larger rest may have made this too
     exact = term.effect.equivalents.get(term.response, ())
     names = list(dict.fromkeys([term.effect.name, *members, *exact]))
     for judge in (one for one in library().values() if one.judge == REFERENCE and term.response in one.sizes):

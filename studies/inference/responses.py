@@ -12,7 +12,7 @@ from studies.calibration.ladder import noise_rms
 from studies.diagnosis.constants import CONSTANTS
 from studies.diagnosis.response import RESPONSES
 from studies.diagnosis.verdict import Cause, ResponseResult
-from studies.inference.causes import SURE_DELAY, candidates_of, delay_of
+from studies.inference.causes import SURE_DELAY, delay_of
 from studies.inference.inferred import Inferred
 from studies.inference.lack_of_fit import doubt_of
 
@@ -96,9 +96,7 @@ def _judge(
         remark = f"the resonator's temperature changes by {np.ptp(resonator):.2g} K only: what follows it cannot show"
     else:
         remark = apart
-    if left.doubtful:  # where nothing known would look like it, it is said and not judged
-        return ("not-identifiable" if candidates_of(found, name) else "adequate"), doubt_of(left.input, left.evidence)
-    return "adequate", remark
+    return ("not-identifiable", doubt_of(left.input, left.evidence)) if left.doubtful else ("adequate", remark)
 
 
 def _delayed(found: Inferred, name: str) -> str:

@@ -59,10 +59,11 @@ def judge(found: Inferred) -> Verdict:
 
 
 def _patching(causes: Sequence[Cause], results: Mapping[str, ResponseResult]) -> Iterator[Cause]:
-    """Yield the causes, those of responses that stay unexplained as doubtful as such names were."""
+    """Yield the causes, those of responses that stay unexplained and are hardly predicted better as doubtful as such names were."""
     for cause in causes:
         own = results.get(cause.response)
-        patches = cause.kind == "physics" and own is not None and own.verdict == "unexplained"
+        patches = own is not None and own.verdict == "unexplained" and (own.gain or 0.0) < CONSTANTS["patching"]
+        patches &= cause.kind == "physics"
         yield replace(cause, probability=cause.probability * (1.0 - CONSTANTS["doubt_unexplained"] * patches))
 
 
