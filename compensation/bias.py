@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from compensation.arrays import Array
-from compensation.constants import zero_Celsius
+from compensation.constants import NINETY, zero_Celsius
 from compensation.decimation import Blocks, average_blocks
 from compensation.derivative import differentiate
 from compensation.errors import CompensationError
@@ -37,7 +37,6 @@ PARENTS = {
     for name, p in POWERS.items()
 }
 MEMORY = ("lag", "play")
-NINETY = 1.645  # standard deviations to either end of a 90 % interval
 SELECTED_BY_THE_PAPER = ("f", "f^2", "f^3", "fdot", "fdot^2", "f*fdot")
 
 

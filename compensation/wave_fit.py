@@ -36,10 +36,8 @@ LEAKS = ("leak", "leak cos", "leak sin")
 LEAST_CONTRAST = 0.05  # least spread of the turn rate over its largest: below it, turning both ways is missing
 FEW, ODD = 30, 6.0  # rows whose turns may be unknowns, and robust standard deviations that make one so
 LEAST_SPIKE = 1e-3  # of a column's span, by which a spike stands out
-CHANCE, LARGE = (
-    1e-3,
-    0.1,
-)  # of a disagreement that is none, and its part of what columns tell, beyond which one is wrong
+CHANCE = 1e-3  # of a disagreement that is none
+LARGE = 0.1  # part of what columns tell, by which they disagree, beyond which one is wrong
 FAR = 10.0  # standard deviations apart, from which one that a factor mends is wrong too
 UNEVEN = np.array([0.005, 1e-3])  # usual standard deviations of gain ratio and skew (rad) of pick-offs and drives
 Told = tuple[Array, Array]

@@ -85,9 +85,7 @@ class CardFit:
     outliers: Mapping[str, int]  # by response, how many blocks stand out
     steps: int  # how many were taken
     converged: bool  # whether the last one was small
-    # array (q, p + 1), further white rows on the coordinates, and the log evidence of what they came from beyond them
-    told: Array | None = None
-    apart: float = 0.0
+    told: Array | None = None  # array (q, p + 1), further white rows on the coordinates
 
     @property
     def point(self) -> Array:

@@ -2,11 +2,6 @@
 
 import re
 
-TYPE_CHECKING = False  # `typing` takes as long to load as all the rest here, and until `run` nobody heeds Ctrl-C
-if TYPE_CHECKING:
-    pass
-
-
 CHAPTERS: dict[str, dict[str, str]] = {
     # of the list of commands: name, one line of help
     "Design a resonator": {

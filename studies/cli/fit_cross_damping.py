@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from compensation.constants import NINETY
 from compensation.improvement import Change
 from studies.cli.arguments import Records, SaveModel
 from studies.cli.output import answers, keep_model, say
@@ -126,7 +127,7 @@ def _draw_curve(study: CrossDampingStudy) -> Drawing:
     T = np.linspace(model.lowest, model.highest, 200)
     powers = (T - model.calibration_temperature)[:, None] ** np.arange(len(model.coefficients))
     size = model.coefficients[0]
-    spread = 1.645 * np.sqrt(np.einsum("ni,ij,nj->n", powers, model.covariance, powers)) / abs(size)
+    spread = NINETY * np.sqrt(np.einsum("ni,ij,nj->n", powers, model.covariance, powers)) / abs(size)
     middle = powers @ model.coefficients / size
     with style.figure(height=3.0, x="temperature (°C)", y="ζ₁₂ / ζ₀") as (made, axes):
         axes.fill_between(T, middle - spread, middle + spread, color=style.SKY, alpha=0.4, label="90 % band")

@@ -6,6 +6,7 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 
+from compensation.constants import NINETY
 from shell.constants import zero_Celsius
 from shell.resonator import Resonator
 from shell.trimming import SplitWave, TrimPlan
@@ -15,7 +16,7 @@ from studies.cli.output import answers, say
 from studies.files.writing import write_csv
 from studies.reports.digits import plain, to_error
 from studies.reports.style import BLUE, GREEN, VERMILION, figure
-from studies.resonator.trim import SURE, CardPlan, Teeth, Tool, error_of_gain, other_cuts, plan_for_card
+from studies.resonator.trim import CardPlan, Teeth, Tool, error_of_gain, other_cuts, plan_for_card
 from studies.results import Chapter, Drawing, Facts, Figure, Result, Sentence, Table, row_of
 
 KINDS = {
@@ -160,7 +161,9 @@ def _parts(planned: CardPlan, payload: dict[str, Any]) -> list[Chapter]:
 
 def gains(planned: CardPlan) -> list[dict[str, float]]:
     """The change by each planned groove over that by the shape derivative, with its 90 % interval."""
-    found = [(x, n, g := cut.gain(n), SURE * cut.error * abs(g)) for x, cut in planned.cuts.items() for n in cut.splits]
+    found = [
+        (x, n, g := cut.gain(n), NINETY * cut.error * abs(g)) for x, cut in planned.cuts.items() for n in cut.splits
+    ]
     return [{"position": x, "harmonic": n, "value": v, "low": v - reach, "high": v + reach} for x, n, v, reach in found]
 
 

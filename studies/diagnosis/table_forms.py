@@ -6,11 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
+from compensation.constants import NINETY
 from compensation.noise import Noise
 from studies.calibration.observed import SETTLED, SettledTable
 from studies.calibration.problem import SOAK
 from studies.diagnosis.constants import CONSTANTS
-from studies.diagnosis.verdict import NINETY, Cause, Interval, weigh
+from studies.diagnosis.verdict import Cause, Interval, weigh
 from studies.effects import Effect, library
 from studies.effects.states import FloatArray
 from studies.inference.model import SCALES, Background, Linear, Term

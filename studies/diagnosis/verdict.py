@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import scipy
 
+from compensation.constants import NINETY
 from studies.diagnosis.constants import CONSTANTS
 from studies.effects import find_effect
 
@@ -17,9 +18,6 @@ if TYPE_CHECKING:
 
 VERDICTS = ("unexplained", "not-identifiable", "explained", "adequate")
 
-
-NINETY = 1.645
-"""Standard deviations on either side that hold 90 % of a normal distribution."""
 FAR = 2.0
 """Prior standard deviations beyond which a value of the card is wrong."""
 SHOWN_IN = {"bias": "bias_deg_per_h", "loss": "inverse_q"}

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 
 from compensation.arrays import Array
+from compensation.constants import NINETY
 from shell.constants import zero_Celsius
 from studies.calibration.observed import RESPONSES
-from studies.diagnosis.verdict import NINETY
 from studies.errors import InputError
 from studies.fleet.folder import Device
 from studies.inference.diagnosis import Inference

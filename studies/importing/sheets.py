@@ -2,14 +2,8 @@
 
 import importlib
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from studies.errors import InputError, MissingEnvironment, nearest
-
-if TYPE_CHECKING:
-    pass
-
-
 from studies.importing.tables import shorten
 
 EXCEL = (".xlsx", ".xlsm")

@@ -7,9 +7,10 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from compensation.constants import NINETY
 from studies.calibration.fit import LASTING
 from studies.diagnosis.constants import CONSTANTS
-from studies.diagnosis.verdict import NINETY, Cause, Interval, same_cause, weigh
+from studies.diagnosis.verdict import Cause, Interval, same_cause, weigh
 from studies.effects import library
 from studies.effects.effect import UNITS
 from studies.inference.generic_forms import offsets

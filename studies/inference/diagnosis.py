@@ -225,16 +225,16 @@ def _with_heat_path(whole: CardFit, found: CardFit, progress: Report) -> tuple[H
     own, given, path = Pursuit(found, progress), whole.problem.instrument.polynomial is None, None
     bring = lags_would_bring(own.search) if slow_share(found) > SUSPICIOUS else -np.inf
     if given and bring > WORTH and bring > effects_would_bring(own.search):
-        path = with_second_mass(whole, progress)
+        path = with_second_mass(whole, found, progress)
     elif not given and (bring > WORTH or is_ahead(found)):
         path = find_heat_path(found, None if bring > WORTH else 1, progress)
     if path is None or not path.departs:
         return (None, *own.outcome())
     progress(f"effects beside a heat path with {path.lags} time constants")
     there, grown = Pursuit(path.fit, progress).outcome()
-    score = on_all_rows(there, grown.final) + path.fit.apart + path.price
+    score = on_all_rows(there, grown.final) + path.housing + path.price
     search, outcome = own.outcome(-np.inf if given else score - BEATEN)
-    gain, lead = score - evidence_of(found), score - found.apart - on_all_rows(search, outcome.final)
+    gain, lead = score - evidence_of(found), score - on_all_rows(search, outcome.final)
     levels = with_levels(search, outcome.plain, FREQUENCY).score - outcome.plain.score
     needed = MARGIN + given * FURTHER * sum(term.brought for term in outcome.final.terms if term.response == FREQUENCY)
     if lead < needed or levels > gain + MARGIN:

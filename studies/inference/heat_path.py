@@ -63,6 +63,7 @@ class HeatPath:
     fit: CardFit
     evidence: float = 0.0
     lead: float = 0.0
+    housing: float = 0.0  # of the log evidence, what the rows of the housing add that stand apart
 
     @property
     def lags(self) -> int:
@@ -107,10 +108,11 @@ class HeatPath:
         return value, float(np.sqrt(own @ self.fit.covariance[:count, :count] @ own))
 
 
-def with_second_mass(found: CardFit, progress: Callable[[str], None] = lambda _: None) -> HeatPath | None:
-    """Return a calibrated card with another part on its base, whose heat capacity and conductance are free, calibrated; None where it is no likelier, or where the card has one."""
-    whole = found.problem
-    card, thermal = whole.instrument, whole.instrument.thermal
+def with_second_mass(
+    whole: CardFit, found: CardFit, progress: Callable[[str], None] = lambda _: None
+) -> HeatPath | None:
+    """Return a card, calibrated as a `whole` and as `found` with the housing apart, with another part on its base, calibrated; None where it is no likelier, or where the card has one."""
+    card, thermal = whole.problem.instrument, whole.problem.instrument.thermal
     if thermal.second_mass_J_per_K is not None:
         return None
     progress("a second mass on the base")
@@ -119,9 +121,10 @@ def with_second_mass(found: CardFit, progress: Callable[[str], None] = lambda _:
     numbers = (capacity, capacity / lag)
     added = {name.partition(".")[2]: {"value": one, "sd": one} for name, one in zip(MASS, numbers, strict=True)}
     own = card.with_table("thermal", {**card.content.get("thermal", {}), **added})
-    there = fit(replace(whole, instrument=own, priors=gather_priors(own)), progress=progress)
-    path = HeatPath(own, set_housing_apart(there))
-    return path if evidence_of(there) + path.price > evidence_of(found) else None
+    there = fit(replace(whole.problem, instrument=own, priors=gather_priors(own)), progress=progress)
+    kept, gain = set_housing_apart(there), evidence_of(there) - evidence_of(whole)
+    path = HeatPath(own, kept, housing=gain - evidence_of(kept) + evidence_of(found))
+    return path if gain + path.price > 0.0 else None
 
 
 def with_lags(card: Instrument, lags: Sequence[float], lumps: bool, late: bool = False) -> Instrument:

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from compensation.constants import NINETY
 from compensation.lines import Line
 from studies.calibration.estimates import SILENT, over_the_wave
 from studies.calibration.priors import from_standard, to_standard
@@ -12,7 +13,6 @@ from studies.diagnosis.constants import CONSTANTS
 from studies.diagnosis.response import RESPONSES
 from studies.diagnosis.verdict import (
     FAR,
-    NINETY,
     Cause,
     ResponseResult,
     Shift,

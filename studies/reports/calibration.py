@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from compensation.constants import NINETY
 from shell.constants import zero_Celsius
 from shell.material import spell
 from studies.calibration.calibrate import Calibration
@@ -151,8 +152,8 @@ def _draw_shifts(found: Calibration) -> Drawing:
     label = "shift from the card (prior standard deviations)"
     with style.figure(height=0.24 * len(told) + 0.9, x=label) as (made, axis):
         place = np.arange(len(told))[::-1]
-        axis.axvspan(-1.645, 1.645, color=style.SKY, alpha=0.18)
-        shifts, widths = [one.shift_sd for one in told], [1.645 * one.width for one in told]
+        axis.axvspan(-NINETY, NINETY, color=style.SKY, alpha=0.18)
+        shifts, widths = [one.shift_sd for one in told], [NINETY * one.width for one in told]
         axis.errorbar(shifts, place, xerr=widths, fmt="o", markersize=4, capsize=2, color=style.BLUE)
         axis.axvline(0.0, color=style.BLACK, linewidth=0.8)
         axis.set_yticks(place, [display_name(one.parameter) for one in told], fontsize=8)

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from compensation.constants import NINETY
 from studies.fleet.comparison import Share
 from studies.fleet.lot import Lot
 from studies.fleet.population import FEWEST, Quantity
@@ -166,7 +167,7 @@ def _draw_chart(axis: "Axes", lot: Lot, one: Quantity, by_date: bool) -> None:
     for x, serial in zip(at, serials, strict=True):
         own = one.of[serial]
         colour = VERMILION if serial in one.odd else ORANGE if serial in bad else BLUE
-        axis.errorbar([x], [own.value], yerr=[1.645 * own.sd], fmt="o", markersize=3, color=colour, elinewidth=0.8)
+        axis.errorbar([x], [own.value], yerr=[NINETY * own.sd], fmt="o", markersize=3, color=colour, elinewidth=0.8)
     lot_mean, error = one.population.mean, np.median([m.sd for m in one.of.values()])
     scatter = float(np.hypot(one.population.scatter, error))
     axis.axhline(lot_mean, color="0.5", linewidth=0.8)

@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 
 from compensation.arrays import Array
+from compensation.constants import NINETY
 from shell.elastic import Elastic
 from shell.errors import ShellError
 from shell.imperfection import CoupledHarmonics, Imperfection, Pair, Split, find_split
@@ -203,7 +204,7 @@ def _wave(faces: dict[str, Face], quantity: str, order: int, position: float) ->
         one, own = faces[name].at(position, order)
         c, covariance = c + factor * one, covariance + factor**2 * own
     if order == 0:
-        sd = 1.645 * float(np.sqrt(covariance[0, 0]))
+        sd = NINETY * float(np.sqrt(covariance[0, 0]))
         return FaceWave(quantity, 0, position, ScanInterval(c.real, c.real - sd, c.real + sd), 0.0)
     size, _ = polar_intervals(c, covariance, order)
     return FaceWave(quantity, order, position, size, float(np.angle(c) / order % (2 * pi / order)))

@@ -8,6 +8,7 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from compensation.arrays import Array
+from compensation.constants import NINETY
 from shell.elastic import Elastic
 from shell.errors import ShellError
 from shell.groove import Groove, GrooveSplit, solve_groove
@@ -70,10 +71,10 @@ class PlannedCut:
 
     def check(self) -> None:
         """Refuse a cut of which too little is known."""
-        if SURE * self.error > LEAST_KNOWN:
+        if NINETY * self.error > LEAST_KNOWN:
             raise ShellError(
                 f"a cut {1e3 * self.groove.width:.3g} mm wide and {1e6 * self.groove.depth:.3g} µm deep at this place changes the split by "
-                f"{self.gain(next(iter(self.splits))):.2f} ± {100 * SURE * self.error:.0f} % of the change by a shallow cut: mass removal and stress relief nearly cancel. {WIDER}"
+                f"{self.gain(next(iter(self.splits))):.2f} ± {100 * NINETY * self.error:.0f} % of the change by a shallow cut: mass removal and stress relief nearly cancel. {WIDER}"
             )
 
 
@@ -85,7 +86,6 @@ class CardPlan:
     cuts: Mapping[float, PlannedCut]
 
 
-SURE = 1.645  # standard errors of a 90 % interval
 LEAST_KNOWN = 0.5  # half-width of that of the gain, relative, with which a cut is still planned
 SAME_DEPTH = 0.03
 GROWTH = 0.8  # of the relief of a cut over its mass, a power of its depth: 0.8 off an edge, 1 off a face
