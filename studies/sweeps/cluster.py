@@ -71,15 +71,16 @@ class Cluster(Workers):
                 raise MissingEnvironment(f"{address}: this is no Dask scheduler: a server listens there but does not answer as one; correct --scheduler.") from error  # fmt: skip
             raise MissingEnvironment(f"{address}: no scheduler with a worker answers ({str(error) or 'no answer in time'}); start both, or correct --scheduler.") from error  # fmt: skip
         self._check_versions()
-        self.executor = self.client.get_executor(pure=False, retries=0)
         self.count = sum(self.client.nthreads().values())
         self.lost = (distributed.scheduler.KilledWorker,)
         self.gone = (CancelledError, distributed.client.FutureCancelledError, OSError)
 
     def submit(self, function: Callable[..., Any], *arguments: Any) -> "Future[Any]":
         """Queue a call on the cluster."""
-        future: Future[Any] = self.executor.submit(call_if_same, self.code, function, *arguments)
-        return future
+        done: Future[Any] = Future()
+        task = self.client.submit(call_if_same, self.code, function, *arguments, pure=False, retries=0)
+        self.client.loop.add_callback(pass_on, task, done)
+        return done
 
     def check(self) -> None:
         """Say when the last worker has ended; give up when no other comes."""
@@ -100,8 +101,6 @@ class Cluster(Workers):
 
     def close(self) -> None:
         """Take back what is queued and leave the cluster."""
-        with suppress(OSError, TimeoutError, RuntimeError, CancelledError):
-            self.executor.shutdown(wait=False)
         leave(self.client)
 
     def _check_versions(self) -> None:
@@ -112,6 +111,16 @@ class Cluster(Workers):
             address, text = next(iter(others.items()))
             leave(self.client)
             raise MissingEnvironment(f"worker {address} has {text}, here is {ours}; install the same versions.")
+
+
+async def pass_on(task: Any, done: "Future[Any]") -> None:
+    """Hand the end of a task on; Dask's own executor takes a result whose worker ends just then for an error and fails."""
+    try:
+        found = await task
+    except BaseException as error:  # cancelled is none of Exception
+        done.set_exception(error)
+    else:
+        done.set_result(found)
 
 
 async def greet(distributed: Any, address: str, security: Any) -> None:
