@@ -40,7 +40,7 @@ async function visit() {
   if (!seen.live) { document.title = JSON.stringify({...seen, reason: find(".reason").textContent}); return; }
   if (root.dataset.state === "paused") find(".pause").click();
   const before = +root.dataset.frames;
-  for (let k = 0; k < 40 && root.dataset.frames - before < 3; k++) await wait(0.1);
+  for (let k = 0; k < 100 && root.dataset.frames - before < 3; k++) await new Promise(requestAnimationFrame);  // by frames: virtual time runs ahead of a slow machine
   seen.swings = root.dataset.frames - before;
   find(".pause").click(); await wait(0.2);
   const stopped = root.dataset.frames; await wait(0.4); seen.pauses = root.dataset.frames === stopped; seen.label = find(".pause").textContent;
