@@ -1,4 +1,4 @@
-"""What holds for every test: one thread for linear algebra, a heap that is swept once, figures only sketched, diagnoses coarse; how commands are asked."""
+"""What holds for every test: one thread for linear algebra, a heap that is swept once, when all is loaded, figures only sketched, diagnoses coarse; how commands are asked."""
 
 import gc
 import json
@@ -9,6 +9,8 @@ from functools import cache, lru_cache
 import pytest
 
 from tests.sketches import coarsen, sketch_pages
+
+gc.disable()  # until all modules and tests are loaded: nothing of them is to be freed, and the sweeps take a third of the time
 
 for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
     os.environ.setdefault(name, "1")  # the solver's matrices are small
@@ -24,6 +26,7 @@ def pytest_collection_finish() -> None:
     """All modules and tests are loaded for good: later sweeps of the collector leave them out."""
     gc.collect()
     gc.freeze()
+    gc.enable()
 
 
 @pytest.fixture(scope="session", autouse=True)
