@@ -228,11 +228,11 @@ def _check_values(network: Network) -> None:
     for node in network.nodes:
         if not callable(node.capacity):
             node.capacity_at(math.nan)
-    conductances = [("conductance", one.name, one.conductance, "W/K") for one in network.conductors]
-    areas = [("exchange area", one.name, one.exchange_area, "m²") for one in network.radiators]
-    for kind, name, value, unit in conductances + areas:
+    conductances = [("conductance", one, one.conductance, "W/K") for one in network.conductors]
+    areas = [("exchange area", one, one.exchange_area, "m²") for one in network.radiators]
+    for kind, part, value, unit in (*conductances, *areas):
         if not (math.isfinite(value) and value > 0):
-            raise ThermalError(f"the {kind} '{name}' must be positive, not {value:g} {unit}.")
+            raise ThermalError(f"the {kind} '{part.name}' must be positive, not {value:g} {unit}.")
     for source in network.sources:
         if not isinstance(source.power, Profile) and not math.isfinite(source.power):
             raise ThermalError(f"the power put into '{source.node}' must be a number, not {source.power}.")
@@ -248,8 +248,8 @@ def _check_paths(network: Network) -> None:
     joined = (links != 0).astype(float)
     for _ in range(len(links).bit_length()):  # by paths of twice as many links
         joined = np.minimum(joined @ joined, 1.0)
-    lost = [node.name for node, ends in zip(network.nodes, joined[:, network.count :], strict=False) if not ends.any()]
-    if lost:
+    reached = joined[: network.count, network.count :].any(axis=1)
+    if lost := [node.name for node, ends in zip(network.nodes, reached, strict=True) if not ends]:
         raise ThermalError(f"no path leads from {', '.join(map(repr, lost))} to a boundary; add the missing link.")
 
 

@@ -16,9 +16,11 @@ from dataclasses import dataclass
 from functools import reduce
 from typing import TYPE_CHECKING, Annotated, Any
 
+import msgspec
 from msgspec import inspect
 
 from studies.errors import InputError
+from studies.files.given import is_sound
 from studies.instrument.units import unit_of
 from studies.schema.keys import Keys, Path, bounds, describe, number, priors
 from studies.schema.reader import read_keys
@@ -102,7 +104,7 @@ def read_uncertain(raw: Any, keys: Any, where: str, name: str) -> tuple[Any, lis
     def take(raw: Mapping[str, Any], path: Path, node: inspect.Type, place: str) -> Any:
         if not set(raw) & set(SPREAD_KEYS):
             return raw
-        spread = read_keys(raw, Spread, place)
+        spread = _read_spread(raw, place)
         if spread.value == 0 and spread.relative_sd:
             raise InputError(f"{place}: a relative uncertainty of 0 is 0; give sd instead of relative_sd.")
         low, high = bounds(node)
@@ -120,6 +122,15 @@ def read_uncertain(raw: Any, keys: Any, where: str, name: str) -> tuple[Any, lis
             documented.append(_make(name, path, Spread(value=value, **(node.extra or {})), *bounds(node)))
     uncertain = [one for one in (*stated.values(), *documented) if one.sd > 0]
     return table, uncertain, {one.name for one in stated.values()}
+
+
+def _read_spread(raw: Mapping[str, Any], place: str) -> Spread:
+    """Read a number with its uncertainty, of which a calibration reads thousands: by msgspec itself, and where it finds a fault by what has words for it."""
+    try:
+        spread = msgspec.convert(raw, Spread)
+    except msgspec.ValidationError:
+        return read_keys(raw, Spread, place)
+    return spread if all(map(is_sound, raw.values())) else read_keys(raw, Spread, place)
 
 
 def _make(table: str, path: Path, spread: Spread, low: float, high: float) -> UncertainValue:

@@ -41,10 +41,12 @@ def build_network(instrument: "Instrument", radiation: bool | None = None, bound
 
 def behind_housing(network: Network) -> Network:
     """Return the part of a whole heat path that the housing drives."""
-    parts: list[Part] = [Boundary("housing"), *network.sources]
-    parts += [node for node in network.nodes if node.name != "housing"]
-    parts += [link for link in network.conductors if "chamber" not in (link.one, link.other)]
-    return replace(assemble(parts), radiators=network.radiators)
+    return replace(
+        network,
+        nodes=tuple(node for node in network.nodes if node.name != "housing"),
+        boundaries=(Boundary("housing"),),
+        conductors=tuple(link for link in network.conductors if "chamber" not in (link.one, link.other)),
+    )
 
 
 def lags_in_series(law: "PolynomialLaw", radiation: bool = True) -> Network:
@@ -75,8 +77,7 @@ def with_sensor(network: Network, time_constant: float) -> Network:
     housing = next(node for node in network.nodes if node.name == "housing")
     capacity = SENSOR_SHARE * housing.capacity_at(0.0)
     joint = Conductor("housing", SENSOR, capacity / max(time_constant or UNREAD, LEAST_LAG))
-    parts: list[Part] = [*network.nodes, Node(SENSOR, capacity), *network.boundaries, *network.sources]
-    return replace(assemble([*parts, *network.conductors, joint]), radiators=network.radiators)
+    return replace(network, nodes=(*network.nodes, Node(SENSOR, capacity)), conductors=(*network.conductors, joint))
 
 
 def build_shell_and_stem(instrument: "Instrument") -> Network:
