@@ -1,6 +1,6 @@
 """Isotropic elastic constants at one temperature, constant or varying along the meridian, and at the stations of elements."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -104,8 +104,3 @@ def find_constants(position: Array, elastic: Elastic | VaryingElastic, plane_str
     else:
         E, nu, rho = (np.full(position.shape, value) for value in (elastic.E, elastic.nu, elastic.rho))
     return Constants(E, nu, rho, plane_stress)
-
-
-def are_uniform(constants: Sequence[Constants]) -> bool:
-    """Whether E, ν and ρ are the same everywhere."""
-    return all(np.ptp(field) == 0 for c in constants for field in (c.E, c.nu, c.rho))

@@ -6,8 +6,8 @@ from math import ceil, e, exp, hypot, log, pi
 import numpy as np
 
 from shell.assembly import build_system
-from shell.eigen import Factor, Mass, lowest_pairs, whole_pattern
-from shell.elastic import Constants, Elastic, VaryingElastic, find_constants
+from shell.eigen import Factor, lowest_pairs
+from shell.elastic import Elastic, VaryingElastic, find_constants
 from shell.errors import ShellError
 from shell.layout import FIRST, KINDS, LONGEST, ROUGH, Kind, Level, Theory, crowding
 from shell.quadrature import Array
@@ -155,23 +155,12 @@ def solve_level(
     # a small shift factors the rigid motions and leaves the elastic modes in order
     shift = 1e-2 * constants[0].wave_speed_squared / size**2 if system.rigid_motions else 0.0
     wanted = count + system.rigid_motions
-    factor, mass = _begin(system, elastic, constants, shift)
+    K, mass = system.operators(constants, shift, over=_density(elastic))
+    factor = Factor(system.pattern, K)
     vectors, undone = lowest_pairs(factor, mass, wanted, accuracy)
     found = [(Solution(system, constants, one), float(left) / 2) for one, left in zip(vectors.T, undone, strict=True)]
     elastic_ones = sorted(found, key=lambda one: one[0].eigenvalue)[system.rigid_motions :]
     return [one for one, _ in elastic_ones], [left for _, left in elastic_ones], factor
-
-
-def _begin(
-    system: System, elastic: Elastic | VaryingElastic, constants: tuple[Constants, ...], shift: float
-) -> tuple[Factor, Mass]:
-    """Factor K + shift M, and M; both over ρ where it is the same everywhere."""
-    uniform, rho = isinstance(elastic, Elastic), _density(elastic)
-    if uniform and system.plain:
-        (trace, shear, mass), (lam, G) = system.plain, (float(field[0, 0]) / rho for field in constants[0].lame)
-        return Factor(whole_pattern(len(mass)), [lam * trace + G * shear + shift * mass]), mass
-    K, M = system.operators(constants, shift, over=rho)
-    return Factor(system.pattern, K), M
 
 
 def _density(elastic: Elastic | VaryingElastic) -> float:

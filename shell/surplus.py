@@ -11,8 +11,8 @@ one degree more, and a force on an edge is divided among the cells there as thei
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache, cached_property, lru_cache
-from math import log, sqrt
+from functools import cache, lru_cache
+from math import sqrt
 from typing import TypeAlias
 
 import numpy as np
@@ -22,7 +22,7 @@ from shell.assembly import sections
 from shell.blocks import open_edges
 from shell.cells import CellTable, Reference, at_gauss_points, cell_stiffness, in_order, tabulate_cells
 from shell.eigen import Factor, Pattern, find_pattern
-from shell.elastic import Constants, Elastic, VaryingElastic, find_constants
+from shell.elastic import Elastic, VaryingElastic, find_constants
 from shell.kernel import StrainTable, pair_stiffness, shell_table, station_stiffness
 from shell.layout import Chain, Level
 from shell.quadrature import Array, at_gauss, gauss, hierarchic, values_to_hierarchic
@@ -39,8 +39,6 @@ NAGHDI = 1.45  # and more in shell theory, where only the degrees along the meri
 HIGHER = 0.05  # and by how much more for each mode below: its neighbours above are not known
 TIED = 1.2  # and more beside a corner, whose singularity reaches over
 SINGULAR = 1.4  # what the rule for corners still lacks, measured
-REFERENCE = 0.6  # λ/G of the material whose factor is kept
-ALGEBRA = 0.01  # to which a surplus is computed
 SLOPE = 1e-3  # a jump of dh/ds that is felt
 BLUNT = 2.0  # 4 λ of the blunt corner where the slope of the thickness jumps
 
@@ -104,7 +102,9 @@ class ShellExtension:
             r = self.table.loads(stress, force).reshape(len(q), -1)
             for members, own, places in zip(self.pattern.unknowns, r, self.places, strict=True):
                 loads[members, k] += own[places]
-        x = self._yield_to(loads, constants)
+        lam, G = (field.mean(axis=1) for field in constants.lame)
+        K = [a * trace + b * shear for a, b, (trace, shear) in zip(lam, G, self.units, strict=True)]
+        x = Factor(self.pattern, K).solve(loads)
         answers = []
         for column in x.T:
             spread = np.zeros((len(self.places), len(self.is_old) * self.table.along.shape[2]))
@@ -115,38 +115,6 @@ class ShellExtension:
         deep = energies[self.is_deep].sum(axis=0)
         shares = np.stack([energies.sum(axis=0) - deep, deep, 0 * deep])
         return _inner(x.T @ loads, shares, moved, answers, constants.rho[..., None] * self.table.volume, self.factor)
-
-    def _yield_to(self, loads: Array, constants: Constants) -> Array:
-        """K⁻¹ loads, by conjugate gradients from the factor of `REFERENCE`: another material differs by λ/G alone."""
-        lam, G = (field.mean(axis=1) for field in constants.lame)
-        ratio = float(lam[0] / G[0])
-        spread = max((3 * ratio + 2) / (3 * REFERENCE + 2), (3 * REFERENCE + 2) / (3 * ratio + 2))
-        if np.ptp(lam) or np.ptp(G) or spread > 3:
-            K = [a * trace + b * shear for a, b, (trace, shear) in zip(lam, G, self.units, strict=True)]
-            return Factor(self.pattern, K).solve(loads)
-        rate = (sqrt(spread) - 1) / (sqrt(spread) + 1) + 1e-9
-        r, x = loads / G[0], np.zeros_like(loads)
-        p = held = np.zeros_like(loads)
-        before = np.full(loads.shape[1], np.inf)
-        for _ in range(max(1, int(np.ceil(log(ALGEBRA / 4) / (2 * log(rate)))))):
-            z = self._reference.solve(r)
-            now = np.einsum("ik,ik->k", r, z)
-            p, held = z + now / before * p, r + now / before * held  # held is the reference's stiffness times p
-            Kp = held + (ratio - REFERENCE) * self._dilate(p)
-            step = now / (np.einsum("ik,ik->k", p, Kp) + 1e-300)
-            x, r, before = x + step * p, r - step * Kp, now + 1e-300
-        return x
-
-    @cached_property
-    def _reference(self) -> Factor:
-        return Factor(self.pattern, [REFERENCE * trace + shear for trace, shear in self.units])
-
-    def _dilate(self, x: Array) -> Array:
-        """The stiffness per unit λ times x."""
-        y = np.zeros_like(x)
-        for (trace, _), members in zip(self.units, self.pattern.unknowns, strict=True):
-            y[members] += trace @ x[members]
-        return y
 
 
 @dataclass(frozen=True, eq=False)

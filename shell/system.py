@@ -1,6 +1,6 @@
 """Elements and their matrices: groups of one kind, and the system of all of them on the free unknowns."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import islice
@@ -12,16 +12,13 @@ import scipy
 from shell.blocks import Mesh, Support
 from shell.cells import CellTable, cell_mass, cell_stiffness
 from shell.eigen import Pattern, find_pattern
-from shell.elastic import Constants, are_uniform
+from shell.elastic import Constants
 from shell.kernel import Section, StrainTable, integrate_mass, integrate_stiffness, station_mass, station_stiffness
 from shell.layout import Chain, Level
 from shell.quadrature import Array, gauss
 from shell.sparse import Index
 
 Pair: TypeAlias = tuple[Array, Array]
-PORTION = 16  # elements integrated at a time
-TINY = 160  # unknowns of a dense matrix
-KEPT = 8_000_000  # numbers that a system may keep for the next material (64 MB)
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,17 +31,16 @@ class ShellGroup:
     section: Section  # the middle surface at the stations
     anchors: tuple[tuple[int, int], ...] = ()
 
-    def matrices(self, integrate: Callable[[Array, Array], Array], stations: Array, first: int) -> Array:
-        """Integrals over the elements from `first` on of their station matrices, in the unknowns that are solved for.
+    def matrices(self, integrate: Callable[[Array, Array], Array], stations: Array) -> Array:
+        """Integrals over the elements of their station matrices, in the unknowns that are solved for.
 
         At a free edge (`anchors`) these are differences: else stiff shear would drown the bending as (R/h)³, not (R/h)².
         """
         found = integrate(stations, self.table.along)
         for element, node in self.anchors:
-            if first <= element < first + len(stations):
-                along = self.table.along.copy()
-                along[0, :, node], along[1, :, node] = 1.0, 0.0
-                found[element - first] = integrate(stations[[element - first]], along)[0]
+            along = self.table.along.copy()
+            along[0, :, node], along[1, :, node] = 1.0, 0.0
+            found[element] = integrate(stations[[element]], along)[0]
         return found
 
     def spread(self, raw: Array) -> Array:
@@ -76,28 +72,16 @@ class ShellGroup:
         return loads.reshape(self.unknowns.shape)
 
     @cached_property
-    def units(self) -> tuple[Array, Array, Array]:
-        """Element matrices per unit λ, G and ρ, the same material everywhere, (elements, size, size) each."""
-        dilation, shear = station_stiffness(self.table)
-        return (
-            self.matrices(integrate_stiffness, dilation, 0),
-            self.matrices(integrate_stiffness, shear, 0),
-            self.matrices(integrate_mass, station_mass(self.table), 0),
-        )
+    def stations(self) -> tuple[Array, Array, Array]:
+        """Station matrices per unit λ, G and ρ."""
+        return *station_stiffness(self.table), station_mass(self.table)
 
-    def vary(self, lam: Array, G: Array, rho: Array) -> Pair:
-        """Stiffness and mass of all elements with λ, G, ρ at their stations."""
-        found: list[Pair] = []
-        for first in range(0, len(self.unknowns), PORTION):
-            here = slice(first, first + PORTION)
-            part = self.table.part(here)
-            trace, shear = station_stiffness(part)
-            trace *= lam[here, :, None, None]
-            trace += G[here, :, None, None] * shear
-            mass = rho[here, :, None, None] * station_mass(part)
-            found.append((self.matrices(integrate_stiffness, trace, first), self.matrices(integrate_mass, mass, first)))
-        stiffness, inertia = (np.concatenate(kind) for kind in zip(*found, strict=True))
-        return stiffness, inertia
+    def integrals(self, lam: Array, G: Array, rho: Array, shift: float = 0.0) -> Pair:
+        """Stiffness plus `shift` times mass, and mass, of all elements with λ, G, ρ at their stations."""
+        dilation, shear, mass = self.stations
+        stiffness = lam[..., None, None] * dilation + G[..., None, None] * shear
+        M = self.matrices(integrate_mass, rho[..., None, None] * mass)
+        return self.matrices(integrate_stiffness, stiffness) + shift * M, M
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,16 +109,17 @@ class SolidGroup:
         """Loads (cells, functions, 3) of functions as they are in each cell, on the unknowns (cells, size)."""
         return (loads * self.signs[..., None]).reshape(self.unknowns.shape)
 
-    @cached_property
+    @property
     def products(self) -> Array:
         """See `CellTable.products`."""
         return self.table.products(self.signs)
 
-    def portions(self, keep: bool) -> Iterator[tuple[slice, Array]]:
-        """The products of a few cells at a time, kept or fresh."""
-        for first in range(0, len(self.unknowns), PORTION):
-            here = slice(first, first + PORTION)
-            yield here, self.products[here] if keep else self.table.part(here).products(self.signs[here])
+    def integrals(self, lam: Array, G: Array, rho: Array, shift: float = 0.0) -> Pair:
+        """Stiffness plus `shift` times mass of all cells with λ, G, ρ, (cells, 1) each, and the mass of one component."""
+        products, functions = self.products, self.table.gradients.shape[3]
+        K = cell_stiffness(products, lam[:, 0], G[:, 0], self.table.n)
+        K += shift * rho[..., None] * cell_mass(products) if shift else 0.0
+        return K, rho[..., None] * products[:, 9].reshape(-1, functions, functions)
 
 
 Group: TypeAlias = ShellGroup | SolidGroup
@@ -162,16 +147,6 @@ class System:
         return [list(islice(found, len(group.unknowns))) for group in self.groups]
 
     @cached_property
-    def _units(self) -> list[list[Array]]:
-        """Of every element of every chain: its matrices per unit λ, G and ρ on the free unknowns."""
-        return [
-            [np.stack([at.restrict(unit[k]) for unit in group.units]) for k, at in enumerate(own)]
-            if isinstance(group, ShellGroup)
-            else []
-            for group, own in zip(self.groups, self.maps, strict=True)
-        ]
-
-    @cached_property
     def to_free(self) -> list["ToFree"]:
         """From the unknowns of every element to its free ones, in their own order."""
         P = self._choice[0]
@@ -194,46 +169,21 @@ class System:
                 first += size
         return maps
 
-    @cached_property
-    def is_small(self) -> bool:
-        """Whether what costs geometry is worth keeping."""
-        numbers = 0
-        for group in self.groups:
-            size = group.unknowns.shape[1] ** 2
-            numbers += len(group.unknowns) * (3 * size if isinstance(group, ShellGroup) else 10 * size // 9)
-        return numbers < KEPT
-
     @property
     def memory(self) -> float:
         """Bytes of the element matrices while a system is solved: stiffness, mass, their factors."""
         return 32.0 * float(sum(group.unknowns.size * group.unknowns.shape[1] for group in self.groups))
 
     def operators(
-        self, constants: Sequence[Constants], shift: float = 0.0, once: bool = False, over: float = 1.0
+        self, constants: Sequence[Constants], shift: float = 0.0, over: float = 1.0
     ) -> tuple[list[Array], "Inertia"]:
-        """Stiffness, plus `shift` (1/s²) times mass, of every element, and the mass, `over` a divisor; geometry is kept unless wanted `once`."""
-        uniform = not once and self.is_small and are_uniform(constants)
+        """Stiffness, plus `shift` (1/s²) times mass, of every element, and the mass, `over` a divisor."""
         K: list[Array] = []
         M: list[Array] = []
-        for number, (group, maps, c) in enumerate(zip(self.groups, self.maps, constants, strict=True)):
-            dilation, shear, density = c.lame[0] / over, c.lame[1] / over, c.rho / over
-            if isinstance(group, SolidGroup):
-                blocks = np.empty((len(density), *(group.table.gradients.shape[3],) * 2))
-                for here, products in group.portions(self.is_small):
-                    stiffness = cell_stiffness(products, dilation[here, 0], shear[here, 0], self.n)
-                    if shift:
-                        stiffness += shift * density[here, :, None] * cell_mass(products)
-                    blocks[here] = density[here, :, None] * products[:, 9].reshape(-1, *blocks.shape[1:])
-                    K += [at.restrict(one) for at, one in zip(maps[here], stiffness, strict=True)]
-                M.append(blocks)
-            elif uniform:
-                weights = np.array([dilation[0, 0], shear[0, 0], shift * density[0, 0]])
-                K += [np.tensordot(weights, units, 1) for units in self._units[number]]
-                M.append(density[0, 0] * group.units[2])
-            else:
-                stiffness, mass = group.vary(dilation, shear, density)
-                K += [at.restrict(one) for at, one in zip(maps, stiffness + shift * mass, strict=True)]
-                M.append(mass)
+        for group, maps, c in zip(self.groups, self.maps, constants, strict=True):
+            stiffness, mass = group.integrals(c.lame[0] / over, c.lame[1] / over, c.rho / over, shift)
+            K += [at.restrict(one) for at, one in zip(maps, stiffness, strict=True)]
+            M.append(mass)
         starts = np.cumsum([group.unknowns.size for group in self.groups[:-1]], dtype=np.intp)
         return K, Inertia(*self._choice, starts, tuple(M))
 
@@ -242,16 +192,6 @@ class System:
         """From the free unknowns to those of all elements, and its transpose."""
         choice = self.constraint[np.concatenate([group.unknowns.ravel() for group in self.groups])]
         return choice, scipy.sparse.csr_matrix(choice.T)
-
-    @cached_property
-    def plain(self) -> tuple[Array, Array, Array] | None:
-        """Of a tiny chain: matrices per unit λ, G and ρ of all free unknowns at once, which cost less than elements one by one."""
-        group, size = self.groups[0], self.constraint.shape[1]
-        if len(self.groups) > 1 or not isinstance(group, ShellGroup) or size > TINY:
-            return None
-        P = np.asarray(self._choice[0].toarray()).reshape(*group.unknowns.shape, -1)
-        trace, shear, mass = (np.sum(np.swapaxes(P, 1, 2) @ unit @ P, axis=0) for unit in group.units)
-        return trace, shear, mass
 
     def spread(self, free: Array) -> list[Array]:
         """Element unknowns (elements, size) of every group from the free unknowns of one vector."""

@@ -135,11 +135,12 @@ def _matrices(
     if isinstance(group, ShellGroup):
         body = materials[0]
         lam, G = lame(np.array(body.E), np.array(body.nu), group.table.plane_stress)
-        trace, sheared, mass = group.units
-        return (lam * trace + G * sheared).astype(complex), (body.rho * mass).astype(complex)
+        stiffness, mass = group.integrals(lam, G, np.array(body.rho))
+        return stiffness.astype(complex), mass.astype(complex)
     E, nu, rho = (np.where(base, getattr(materials[1], x), getattr(materials[0], x)) for x in ("E", "nu", "rho"))
     lam, G = lame(E, nu, False)
-    K, M = (one.astype(complex) for one in (cell_stiffness(group.products, lam, G, n), cell_mass(group.products)))
+    own = group.products
+    K, M = (one.astype(complex) for one in (cell_stiffness(own, lam, G, n), cell_mass(own)))
     absorbs, products = _absorbing(group, base, layer)
     parts = [(1, np.ascontiguousarray(products.real)), (1j, np.ascontiguousarray(products.imag))]
     K[absorbs] = sum(unit * cell_stiffness(part, lam[absorbs], G[absorbs], n) for unit, part in parts)

@@ -84,7 +84,7 @@ class Block:
 
 def condense(system: System, constants: tuple[Constants, ...], value: float, pair: Array | None = None) -> Block:
     """One harmonic with its solid parts condensed at λ = value; `pair` is the pair's vector in its own."""
-    matrices, mass = system.operators(constants, -value, once=True)
+    matrices, mass = system.operators(constants, -value)
     numbers = system.pattern.unknowns
     around = pi * (2 if system.n == 0 else 1)
     are_shell = [isinstance(group, ShellGroup) for group in system.groups]
