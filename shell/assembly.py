@@ -9,8 +9,8 @@ from shell.blocks import Mesh, Solid, Tie, constrain, find_boundary, mesh_solid,
 from shell.cells import CellTable, at_gauss_points, tabulate_cells
 from shell.corner import find_kinks, lay_clamped_edge, lay_clamped_face, lay_corner
 from shell.errors import ShellError, mm
-from shell.kernel import Section, StrainTable, shell_table
-from shell.layout import OTHERS, Chain, End, Level, crowding, lay_chain
+from shell.kernel import Section, shell_table
+from shell.layout import OTHERS, Chain, End, Level, lay_chain
 from shell.quadrature import Array, at_gauss, gauss, nodal
 from shell.resonator import Resonator
 from shell.root import lay_root
@@ -26,29 +26,14 @@ class Layout:
     solids: tuple[tuple[Solid, tuple[tuple[int, int], ...]], ...]
 
 
-def lay_system(resonator: Resonator, n: int, level: Level, alongside: tuple[int, ...] = ()) -> System:
-    """Lay out, number and tabulate a resonator, in elements that suit the harmonics `alongside` too and are the same for all of them."""
+@lru_cache(maxsize=16)
+def build_system(resonator: Resonator, n: int, level: Level, alongside: tuple[int, ...] = ()) -> System:
+    """Lay out, number and tabulate a resonator, in elements that suit the harmonics `alongside` too and are the same for all of them.
+
+    It is kept for the next material or temperature, since only the material changes with them.
+    """
     rigid = 0 if resonator.support != "free" or n > 1 else 2
     return assemble(resonator, lay_resonator(resonator, n, level, alongside), n, level, rigid)
-
-
-@lru_cache(maxsize=12)
-def build_system(resonator: Resonator, n: int, level: Level) -> System:
-    """The system of a resonator, kept for the next material or temperature, since only the material changes with them.
-
-    Harmonics above 1 have the same elements, unknowns and constraints; their strains alone differ.
-    """
-    if n <= 2 or crowding(n) < 1:
-        return lay_system(resonator, n, level)
-    alike = build_system(resonator, 2, level)
-    return replace(alike, n=n, groups=tuple(_with_waves(group, n, level) for group in alike.groups))
-
-
-def _with_waves(group: Group, n: int, level: Level) -> Group:
-    """The same elements for another harmonic."""
-    if isinstance(group, SolidGroup):
-        return replace(group, table=replace(group.table, n=n))
-    return replace(group, table=_strains(group.section, n, level))
 
 
 def assemble(resonator: Resonator, layout: Layout, n: int, level: Level, rigid_motions: int = 0) -> System:
@@ -147,19 +132,13 @@ def _stations(resonator: Resonator, chain: Chain, degree: int) -> Section:
 def _shell_group(resonator: Resonator, chain: Chain, n: int, level: Level, start: int) -> tuple[ShellGroup, Rows, int]:
     """Tabulate one chain and number its unknowns, (node, amplitude) from `start`; see `_anchor` for the rows."""
     p, section = level.along, _stations(resonator, chain, level.along)
-    table = _strains(section, n, level)
+    table = shell_table(section, n, level.through, gauss(max(level.through) + 2), at_gauss(nodal, p, p + 2))
     elements, m = len(chain.segments), sum(level.through) + 3
     nodes = p * np.arange(elements)[:, None] + np.arange(p + 1)
     unknowns = start + (nodes[:, :, None] * m + np.arange(m)).reshape(elements, -1)
     anchors, rows, fresh = _anchor(chain, unknowns, m, start + (elements * p + 1) * m)
     group = ShellGroup(table, unknowns, chain, section, anchors)
     return group, rows, fresh
-
-
-def _strains(section: Section, n: int, level: Level) -> StrainTable:
-    """The strains of a chain at its stations."""
-    orders, p = level.through, level.along
-    return shell_table(section, n, orders, gauss(max(orders) + 2), at_gauss(nodal, p, p + 2))
 
 
 def _anchor(chain: Chain, unknowns: Index, m: int, fresh: int) -> tuple[tuple[tuple[int, int], ...], Rows, int]:

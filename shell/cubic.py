@@ -18,7 +18,7 @@ from math import isfinite, pi, sqrt
 
 import numpy as np
 
-from shell.assembly import lay_system
+from shell.assembly import build_system
 from shell.crystal import Crystal, hill
 from shell.eigen import Factor, lowest_pairs, whole_pattern
 from shell.elastic import Elastic, find_constants
@@ -90,7 +90,7 @@ def solve_cubic(resonator: Resonator, crystal: Cubic, harmonic: int = 2, toleran
     first = harmonic % 4 if harmonic % 2 == 0 else 1
     harmonics = list(range(first, harmonic + REACH + 1, 4 if harmonic % 2 == 0 else 2))
     level = mode.solution.system.level
-    systems = [lay_system(mode.resonator, k, level, (0, harmonics[-1])) for k in harmonics]
+    systems = [build_system(mode.resonator, k, level, (0, harmonics[-1])) for k in harmonics]
     if len(systems[0].groups) > 1:
         raise ShellError("a cubic crystal is computed only for plain shells, without stem, clamp or kink.")
     if sum(system.constraint.shape[1] for system in systems) > LARGEST:

@@ -5,7 +5,7 @@ and the shell feels A_II + A_Ii W. What an imperfection does inside a solid part
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from math import pi
 
@@ -17,7 +17,7 @@ from shell.elastic import Constants
 from shell.quadrature import Array
 from shell.resonator import Resonator
 from shell.sparse import Index, assemble_elements, factor_symmetric
-from shell.system import ShellGroup, System
+from shell.system import Inertia, ShellGroup, System
 
 PIVOTING = 0.01  # of matrices that are not definite
 
@@ -33,7 +33,7 @@ class Block:
     lifted: Array
     elements: tuple[tuple[Index, Array], ...]  # (unknowns, matrix) of K - λ M, the condensed solid parts as one element
     around: float  # ∫ cos² kθ dθ
-    heavy: Array  # mass of the solid parts, (shared, shared)
+    mass: Inertia  # of all free unknowns, over `around`
     kept: Array | None  # M times the pair's vector in the pair's own block
 
     @property
@@ -76,10 +76,24 @@ class Block:
             A = scipy.sparse.bmat([[A, beside], [below, None]])
         return factor_symmetric(A, PIVOTING)
 
+    def weigh(self, X: Array) -> Array:
+        """M times vectors (size, columns), the solid parts moved along."""
+        y = self.mass @ self._moved(X)
+        found = y[self.shell]
+        found[self.shared] += self.lifted.T @ y[self.inside]
+        return np.asarray(self.around * found)
+
     def inner(self, number: int) -> Array:
         """What a unit of each shared unknown moves in a solid part: (shared, cells, size) in the plain basis."""
-        raw = self.system.constraint @ _lift(self.system, self.shell[self.shared], self.inside, self.lifted)
+        raw = self.system.constraint @ self._moved(np.eye(self.size)[:, self.shared])
         return np.array([self.system.groups[number].spread(column) for column in raw.T])
+
+    def _moved(self, X: Array) -> Array:
+        """All free unknowns of vectors."""
+        free = np.zeros((self.system.constraint.shape[1], X.shape[1]))
+        free[self.shell] = X
+        free[self.inside] = self.lifted @ X[self.shared]
+        return free
 
 
 def condense(system: System, constants: tuple[Constants, ...], value: float, pair: Array | None = None) -> Block:
@@ -96,7 +110,7 @@ def condense(system: System, constants: tuple[Constants, ...], value: float, pai
         if mine
     ]
     shared = inside = np.zeros(0, dtype=np.intp)
-    lifted = heavy = np.zeros((0, 0))
+    lifted = np.zeros((0, 0))
     if not all(of_shell):
         solid = np.unique(np.concatenate([one for one, mine in zip(numbers, of_shell, strict=True) if not mine]))
         inside, edge = np.setdiff1d(solid, shell), np.intersect1d(solid, shell)
@@ -108,23 +122,12 @@ def condense(system: System, constants: tuple[Constants, ...], value: float, pai
         lifted = -factor_symmetric(core[inside][:, inside], PIVOTING)(coupling)
         felt = core[edge][:, edge].toarray() + coupling.T @ lifted
         elements.append((shared, around * (felt + felt.T) / 2))
-        moved = _lift(system, edge, inside, lifted)
-        blocks = tuple(0 * one if mine else one for one, mine in zip(mass.blocks, are_shell, strict=True))
-        heavy = around * moved.T @ (replace(mass, blocks=blocks) @ moved)
     kept = None
     if pair is not None:
         pull = np.asarray(mass @ pair[:, None])[:, 0]
         kept = pull[shell]
         kept[shared] += lifted.T @ pull[inside]
-    return Block(system, shell, shared, inside, lifted, tuple(elements), around, heavy, kept)
-
-
-def _lift(system: System, edge: Index, inside: Index, lifted: Array) -> Array:
-    """All free unknowns per unit of those that the solid parts share with the shell."""
-    free = np.zeros((system.constraint.shape[1], len(edge)))
-    free[edge, np.arange(len(edge))] = 1.0
-    free[inside] = lifted
-    return free
+    return Block(system, shell, shared, inside, lifted, tuple(elements), around, mass, kept)
 
 
 def _plain(group: ShellGroup, constraint: "scipy.sparse.csr_matrix") -> "scipy.sparse.csr_matrix":

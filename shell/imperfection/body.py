@@ -41,11 +41,10 @@ class Body:
     def respond(self, X: Array, value: float) -> tuple[Array, Array]:
         """δK - λ δM, of what is there more, and M, of all, times vectors (unknowns, vectors, 2); λ = value."""
         together, vectors = self.together, X.shape[1]
-        change, mass = np.zeros_like(X), together.weigh_cores(X)
+        change, mass = np.zeros_like(X), together.weigh(X)
         for number, walls in self.walls.items():
             plain = together.plain(number, X)
             loads = np.zeros((*plain.shape[:3], 2 * vectors, *plain.shape[4:]))
-            loads[:, :, :, vectors:] = together.weigh(number, plain)
             for wall in walls:
                 stiff, heavy = wall.respond(plain[:, wall.elements], self.around)
                 loads[:, wall.elements] += np.concatenate([stiff - value * heavy, heavy], axis=3)

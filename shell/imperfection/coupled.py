@@ -20,7 +20,7 @@ from math import pi, sqrt
 
 import numpy as np
 
-from shell.assembly import lay_system
+from shell.assembly import build_system
 from shell.elastic import Constants, Elastic, VaryingElastic, find_constants
 from shell.errors import ShellError
 from shell.imperfection.block import Block, condense
@@ -55,15 +55,12 @@ class CoupledHarmonics:
         self.elastic = elastic
         self.level: Level = mode.solution.system.level
         self.resonator: Resonator = mode.resonator
-        self._systems: dict[int, System] = {}
         self._blocks: dict[int, Block] = {}
         self._together: dict[tuple[int, ...], Together] = {}
 
     def system(self, k: int) -> System:
         """The elements of the perfect resonator at one harmonic, the same for all."""
-        if k not in self._systems:
-            self._systems[k] = lay_system(self.resonator, k, self.level, (0, max(self.highest, self.n)))
-        return self._systems[k]
+        return build_system(self.resonator, k, self.level, (0, max(self.highest, self.n)))
 
     @cached_property
     def constants(self) -> tuple[Constants, ...]:

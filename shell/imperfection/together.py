@@ -9,7 +9,6 @@ import scipy
 
 from shell.elastic import Constants
 from shell.imperfection.block import Block
-from shell.kernel import station_mass
 from shell.quadrature import Array
 from shell.resonator import Resonator
 from shell.system import ShellGroup
@@ -68,26 +67,10 @@ class Together:
         parts = [one.answer(loads[at].reshape(one.size, -1)) for one, at in zip(self.blocks, self.rows, strict=True)]
         return -np.concatenate(parts).reshape(loads.shape)
 
-    def weigh(self, number: int, plain: Array) -> Array:
-        """The mass of a perfect chain times unknowns of its elements as in `plain`."""
-        around = np.repeat([block.around for block in self.blocks], 2)
-        along = self._chain(number).table.along[0]
-        at = along @ plain.reshape(*plain.shape[:3], -1)  # amplitudes, elements, stations, columns
-        heavy = np.moveaxis(self._masses[number] @ np.moveaxis(at, 0, 2), 2, 0)
-        return np.asarray((along.T @ heavy).reshape(plain.shape) * around.reshape(-1, 2))
-
-    def weigh_cores(self, X: Array) -> Array:
-        """The mass of the solid parts times vectors."""
-        found = np.zeros_like(X)
-        for block, rows in zip(self.blocks, self.rows, strict=True):
-            if len(block.shared):
-                found[rows][block.shared] = np.tensordot(block.heavy, X[rows][block.shared], 1)
-        return found
-
-    @cached_property
-    def _masses(self) -> dict[int, Array]:
-        """Of the amplitudes at every station of the chains, (elements, stations, amplitudes, amplitudes)."""
-        return {k: station_mass(self._chain(k).table) * self.constants[k].rho[..., None, None] for k in self.spreads}
+    def weigh(self, X: Array) -> Array:
+        """M of every harmonic times vectors."""
+        parts = [one.weigh(X[at].reshape(one.size, -1)) for one, at in zip(self.blocks, self.rows, strict=True)]
+        return np.concatenate(parts).reshape(X.shape)
 
     def _chain(self, number: int) -> ShellGroup:
         group = self.groups[number]

@@ -5,7 +5,7 @@ from math import pi, sqrt
 import numpy as np
 import pytest
 
-from shell.assembly import lay_system
+from shell.assembly import build_system
 from shell.elastic import Elastic
 from shell.fitted import fit_profile
 from shell.layout import LEVELS
@@ -26,7 +26,7 @@ def measured(points: int, noise: float, h: float = 0.9e-3) -> Resonator:
 
 def point_by_point(resonator: Resonator, n: int) -> float:
     """The frequency (Hz) with elements that break at every point of the profile."""
-    (solution,), *_ = solve_level(lay_system(resonator, n, LEVELS["solid"][0]), R, SILICA, 1, 1e-11)
+    (solution,), *_ = solve_level(build_system(resonator, n, LEVELS["solid"][0]), R, SILICA, 1, 1e-11)
     return sqrt(solution.eigenvalue) / (2 * pi)
 
 
