@@ -12,9 +12,8 @@ from numpy.typing import ArrayLike
 
 from compensation.arrays import Array
 from compensation.errors import CompensationError
-from compensation.motion import propagate_envelope
+from compensation.motion import SensitiveElement, propagate_envelope, tune
 from compensation.samples import read_columns
-from compensation.sensitive_element import SensitiveElement, tune
 from compensation.transfer import TransferFunction
 
 

@@ -1,9 +1,8 @@
 from .averaging import amplitude_rates, ellipse_rates
 from .chain import steps
-from .demodulated import amplitude_equations, measured_rate
+from .demodulated import amplitude_equations, measured_rate, poles, responses
 from .design_code import emit_code
 from .filters import derive_wiener_filter
-from .transfer_functions import poles, responses
 
 __all__ = [
     "amplitude_equations",

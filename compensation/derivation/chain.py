@@ -4,7 +4,7 @@ from typing import Any, TypeAlias
 
 import sympy as sp
 
-from compensation.derivation import averaging, demodulated, filters, oscillator, transfer_functions
+from compensation.derivation import averaging, demodulated, filters, oscillator
 
 Row: TypeAlias = tuple[str, str, Any, Any]
 
@@ -41,7 +41,7 @@ def steps() -> list[Row]:
 
 def _demodulated() -> list[Row]:
     """Return eqs. (8)–(24): the settled primary, and what a rate does to the secondary."""
-    found = transfer_functions
+    found = demodulated
     secondary, slow = found.rate_to_secondary(), found.rate_to_secondary(slow=True)
     response, *polar = found.responses()
     real = "Secondary with real coefficients: A_2R = (A_1R M_RR + A_1I M_RI) W/P, A_2I = (A_1R M_IR + A_1I M_II) W/P, W the rate"

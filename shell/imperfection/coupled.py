@@ -23,12 +23,10 @@ import numpy as np
 from shell.assembly import build_system
 from shell.elastic import Constants, Elastic, VaryingElastic, find_constants
 from shell.errors import ShellError
-from shell.imperfection.block import Block, condense
-from shell.imperfection.body import Body
-from shell.imperfection.core import Core
+from shell.imperfection.block import Block, Together, condense
+from shell.imperfection.body import Body, Core
 from shell.imperfection.imperfect import FIELDS, Imperfection
 from shell.imperfection.split import Split
-from shell.imperfection.together import Together
 from shell.layout import Level
 from shell.modes import Mode
 from shell.quadrature import Array

@@ -8,8 +8,7 @@ from cyclopts import Parameter
 from shell.constants import zero_Celsius
 from shell.imperfection.surface import depart_points
 from shell.inertia import weigh
-from shell.volume import build_volume
-from shell.volume_files import VolumeKind, encode_volume
+from shell.volume import VolumeKind, build_volume, encode_volume
 from studies.cli.arguments import Card, Out, Temperature, ending_of, open_resonator
 from studies.cli.output import answers
 from studies.errors import InputError, naming

@@ -18,7 +18,7 @@ from compensation.demodulated import (
     respond_to_oscillating_rate,
 )
 from compensation.kalman import LinearModel, expect_mean_nis, model_gyro, noise_of_estimate, run_filter
-from compensation.sensitive_element import SensitiveElement, tune
+from compensation.motion import SensitiveElement, tune
 from compensation.spectral import high_pass_spectrum, rate_spectrum, white_spectrum
 from compensation.wiener import WienerFilter, design_wiener_filter, judge_filter, renormalise
 from studies.reports import style

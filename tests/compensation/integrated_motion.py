@@ -4,8 +4,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.integrate import solve_ivp
 
-from compensation.motion import Motion, write_dynamics
-from compensation.sensitive_element import SensitiveElement
+from compensation.motion import Motion, SensitiveElement, write_dynamics
 
 Real = NDArray[np.float64]
 

@@ -13,8 +13,7 @@ from compensation.demodulated import (
     respond_to_oscillating_rate,
 )
 from compensation.errors import CompensationError
-from compensation.motion import demodulate, propagate_envelope
-from compensation.sensitive_element import SensitiveElement, tune
+from compensation.motion import SensitiveElement, demodulate, propagate_envelope, tune
 from compensation.transfer import TransferFunction
 from tests.compensation.integrated_motion import integrate_motion
 
@@ -135,14 +134,13 @@ def test_derived_transfer_functions_are_those_of_the_numbers():
     """Eqs. (8)–(24) as SymPy derives them from (7), at the numbers of a mistuned element."""
     import sympy
 
-    from compensation.derivation import demodulated as names
-    from compensation.derivation import transfer_functions as derived
+    from compensation.derivation import demodulated as derived
     from compensation.derivation.oscillator import omega
 
     e, s = MISTUNED, 3.0 + 40j
     values = {
-        names.k_1: e.k1, names.k_2: e.k2, names.zeta_1: e.zeta1, names.zeta_2: e.zeta2, names.g_2: e.g2, names.q_10: e.q10,
-        omega: e.omega, names.s: s, derived.lam: 41.0, derived.A_1: e.primary_amplitude,
+        derived.k_1: e.k1, derived.k_2: e.k2, derived.zeta_1: e.zeta1, derived.zeta_2: e.zeta2, derived.g_2: e.g2, derived.q_10: e.q10,
+        omega: e.omega, derived.s: s, derived.lam: 41.0, derived.A_1: e.primary_amplitude,
     }  # fmt: skip
 
     def number(expression):

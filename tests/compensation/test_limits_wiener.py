@@ -8,7 +8,7 @@ from scipy.integrate import quad
 
 from compensation.demodulated import relate_rate_to_measured_rate
 from compensation.errors import CompensationError
-from compensation.sensitive_element import translate
+from compensation.motion import translate
 from compensation.spectral import CrossSpectrum, Spectrum, rate_spectrum, white_spectrum
 from compensation.transfer import TransferFunction
 from compensation.wiener import UNITY, WienerFilter, design_wiener_filter, judge_filter

@@ -15,8 +15,7 @@ from compensation.cross_damping import (
 from compensation.demodulated import expand_secondary, relate_rate_to_secondary
 from compensation.derivation import filters
 from compensation.errors import CompensationError
-from compensation.motion import demodulate, propagate_envelope
-from compensation.sensitive_element import tune
+from compensation.motion import demodulate, propagate_envelope, tune
 from compensation.transfer import TransferFunction
 from tests.compensation.integrated_motion import integrate_motion
 

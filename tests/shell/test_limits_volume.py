@@ -13,8 +13,7 @@ from shell.inertia import weigh
 from shell.meridian import bell, cylinder, hemisphere
 from shell.modes import solve_modes
 from shell.resonator import Stem
-from shell.volume import build_volume
-from shell.volume_files import encode_volume
+from shell.volume import build_volume, encode_volume
 
 R, H = 15e-3, 0.9e-3
 SILICA = Elastic(72.7e9, 0.17, 2203.0)
