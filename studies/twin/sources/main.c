@@ -2,8 +2,12 @@
  *
  * The profile has the columns time_s and chamber_temperature_degC (housing_temperature_degC where the card was carried for
  * it), linear between its rows, and any of drive_amplitude_V, electrode_bias_V, quadrature_V, pattern_angle_deg and
- * rate_deg_per_s. `full` writes 17 digits. Exit status: 0 done, 2 unusable input.
+ * rate_deg_per_s. `full` writes 17 digits. Exit status: 0 done, 2 unusable input. The record appears whole or not at all.
  */
+#if defined __unix__ || defined __APPLE__
+#define _XOPEN_SOURCE 700
+#include <sys/stat.h>
+#endif
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -11,13 +15,14 @@
 
 #include "twin.h"
 
-enum { OFFERED = IN_PRECESSION, TIME = 0, BOUNDARY, FIRST_COMMAND, COLUMNS = FIRST_COMMAND + OFFERED, LONGEST_LINE = 4096 };
+enum { OFFERED = IN_PRECESSION, TIME = 0, BOUNDARY, FIRST_COMMAND, COLUMNS = FIRST_COMMAND + OFFERED, LONGEST_LINE = 4096, MOST_ROWS = 1000000000 };
 static const char *const names[COLUMNS] = {"time_s", TWIN_BOUNDARY, "rate_deg_per_s", "drive_amplitude_V", "electrode_bias_V", "quadrature_V", "pattern_angle_deg"};
 
 typedef struct { double (*rows)[COLUMNS]; long count, place; int has[COLUMNS]; } Profile;
 
 static int complain(const char *file, long line, const char *what) {
-    fprintf(stderr, "%s, line %ld: %s\n", file, line, what);
+    fprintf(stderr, line ? "%s, line %ld: " : "%s: ", file, line);
+    fprintf(stderr, "%s\n", what);
     return 2;
 }
 
@@ -168,27 +173,65 @@ static int write_rows(Twin *twin, Profile *profile, FILE *out, double row, int f
     return fault ? (fprintf(stderr, "at %g s: %s\n", now, fault), 2) : 0;
 }
 
+static int is_file(const char *path) {
+#ifdef _XOPEN_SOURCE
+    struct stat about;
+    return stat(path, &about) || S_ISREG(about.st_mode); /* one that is not there will be */
+#else
+    return path != NULL;
+#endif
+}
+
+static int are_one(const char *path, const char *other) {
+#ifdef _XOPEN_SOURCE
+    struct stat one, two;
+    if (!stat(path, &one) && !stat(other, &two)) return one.st_dev == two.st_dev && one.st_ino == two.st_ino;
+#endif
+    return !strcmp(path, other);
+}
+
+/* Write a record beside its place and rename it when it is whole; what is no file, such as /dev/stdout, is written as it is. */
+static int write_record(Twin *twin, Profile *profile, const char *from, const char *to, double row, int full) {
+    char part[LONGEST_LINE];
+    char *real = NULL; /* behind links */
+#ifdef _XOPEN_SOURCE
+    real = realpath(to, NULL);
+#endif
+    const char *place = real ? real : to;
+    const int moves = is_file(place);
+    int status = snprintf(part, sizeof part, moves ? "%s.part" : "%s", place) < LONGEST_LINE ? 0 : 2;
+    if (moves && (are_one(from, place) || are_one(from, part))) return free(real), complain(to, 0, "is read as the profile; give the record another name.");
+    FILE *out = status ? NULL : fopen(part, "w");
+    if (!out) return free(real), complain(to, 0, "cannot be written.");
+    status = write_rows(twin, profile, out, row, full);
+    const int failed = ferror(out);
+    if ((fclose(out) || failed) && !status) status = complain(to, 0, "cannot be written.");
+    if (moves && !status && rename(part, place) && (remove(place), rename(part, place))) status = complain(to, 0, "cannot be written.");
+    if (moves && status) remove(part);
+    free(real);
+    return status;
+}
+
 int main(int argc, char **argv) {
     Profile profile = {0};
-    double row = argc > 3 ? atof(argv[3]) : 1.0;
-    const int full = argc > 5 && !strcmp(argv[5], "full");
-    if (argc < 3 || !(row > 0)) return fprintf(stderr, "usage: twin PROFILE.csv RECORD.csv [row=1] [seed=0 | noiseless] [full]\n"), 2;
+    char *end = NULL;
+    const double row = argc > 3 ? strtod(argv[3], &end) : 1.0;
+    const int noise = !(argc > 4 && !strcmp(argv[4], "noiseless")), full = argc > 5;
+    const size_t digits = noise && argc > 4 ? strspn(argv[4], "0123456789") : 1;
+    const int said = argc < 3 || argc > 6 || (end && (end == argv[3] || *end)) || !(row > 0) || !isfinite(row) || digits < 1 || digits > 15
+                     || (noise && argc > 4 && argv[4][digits]) || (full && strcmp(argv[5], "full"));
+    if (said) return fprintf(stderr, "usage: twin PROFILE.csv RECORD.csv [row=1] [seed=0 | noiseless] [full]; row: seconds, seed: a whole number\n"), 2;
     Twin *twin = malloc(sizeof *twin);
-    FILE *out = NULL;
     int status = twin ? load(argv[1], &profile) : 2;
     if (!status && TWIN_FREE && profile.has[FIRST_COMMAND + IN_ANGLE])
         status = complain(argv[1], 1, "the wave of this card turns freely; leave out the column pattern_angle_deg.");
-    if (!status) {
-        out = fopen(argv[2], "w");
-        if (!out) status = complain(argv[2], 0, "cannot be written.");
-    }
+    if (!status && (profile.rows[profile.count - 1][TIME] - profile.rows[0][TIME]) / row > MOST_ROWS) status = complain(argv[1], 0, "too many rows; raise row.");
     if (!status) {
         twin_defaults(twin);
-        twin->noise = !(argc > 4 && !strcmp(argv[4], "noiseless"));
-        twin_seed(twin, argc > 4 ? strtoull(argv[4], NULL, 10) : 0);
-        status = write_rows(twin, &profile, out, row, full);
+        twin->noise = noise;
+        twin_seed(twin, noise && argc > 4 ? strtoull(argv[4], NULL, 10) : 0);
+        status = write_record(twin, &profile, argv[1], argv[2], row, full);
     }
-    if (out && fclose(out) && !status) status = complain(argv[2], 0, "cannot be written.");
     free(profile.rows);
     free(twin);
     return status;

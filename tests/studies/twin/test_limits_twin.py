@@ -281,6 +281,34 @@ def test_contract_record_of_the_program(mode, folder, capsys):
         )
 
 
+@pytest.mark.slow
+def test_contract_words_and_files_of_the_program(folder):
+    """A word that is not understood is refused; the record never takes the profile's place, and stands whole or not at all."""
+    program = compile_twin(load_card("free-dome"), folder / "words")
+    profile = write_profile(folder / "words.csv", {"time_s": [0.0, 600.0], "chamber_temperature_degC": [20.0, 25.0]})
+    hot = write_profile(folder / "hot.csv", {"time_s": [0.0, 6000.0], "chamber_temperature_degC": [20.0, 900.0]})
+    out, link, hard = folder / "kept.csv", folder / "link.csv", folder / "hard.csv"
+    out.write_text("kept")
+    link.symlink_to(profile)
+    hard.hardlink_to(profile)
+    before = profile.read_text()
+
+    def run(*words):
+        return subprocess.run([program, *map(str, words)], capture_output=True, text=True, check=False)
+
+    for words in ("10 Noiseless", "10 nois", "10 1.5", "10 -1", "10 1e3", "10 noiseless ful", "10 1 full 1", "1x", "inf"):
+        done = run(profile, out, *words.split())
+        assert (done.returncode, done.stderr.split()[0]) == (2, "usage:"), words
+    for place in (profile, link, hard, folder / "words" / ".." / "words.csv", folder):
+        done = run(profile, place, 10)
+        assert (done.returncode, str(place) in done.stderr) == (2, True)
+    assert run(hot, out, 10).returncode == 2
+    assert (out.read_text(), profile.read_text(), list(folder.glob("*.part"))) == ("kept", before, [])
+    assert run(profile, out, 10, 3, "full").returncode == 0
+    assert len(read_record(out)) == 61
+    assert run(profile, "/dev/stdout", 10, 3, "full").stdout == out.read_text()
+
+
 @pytest.fixture(scope="module")
 def draw(folder):
     """Draws of the C code, 64 runs of 4096 rows."""
