@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from compensation.arrays import Array
 from compensation.bias import MEMORY, PARENTS, POWERS, TERMS, BiasDesign, BiasFit, BiasRun, fit_terms
-from compensation.errors import CompensationError
+from compensation.errors import CompensationError, require_runs
 from compensation.improvement import FEWEST
 from compensation.memory import NO_MEMORY, Memory
 from compensation.noise_regression import estimate_theta, whiten
@@ -71,6 +71,7 @@ class _Fold:
 
 def fit_bias(runs: Sequence[BiasRun], method: Method = "guarded", reference: float | None = None) -> BiasFit:
     """Select and fit the bias model, HRG paper eqs. (21), (22), about a reference; every run has its own constant, B₀ is their mean."""
+    require_runs(runs, BiasRun, "prepare_run makes one")
     return _select(runs, method, reference, by_runs=len(runs) > 1)
 
 

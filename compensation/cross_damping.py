@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from compensation.arrays import Array
-from compensation.errors import CompensationError
+from compensation.errors import CompensationError, require_runs
 from compensation.noise_regression import correlated_covariance
 from compensation.regression import fit_linear, refuse_constant_columns
 from compensation.samples import check_time, own_columns, read_columns
@@ -97,6 +97,7 @@ def fit_cross_damping(
     order: int = 3,
 ) -> CrossDampingModel:  # fmt: skip
     """Fit ζ₁₂(T) to a gyro at rest, eq. (10) through eq. (9): columns Tⁱ after the filter, errors that wander (see `correlated`)."""
+    require_runs(runs, RestRun, "RestRun")
     if order < 1:
         raise CompensationError(f"the polynomial of eq. (10) needs an order of 1 or more, not {order}.")
     if not runs:

@@ -2,6 +2,8 @@
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
+from math import inf
+from numbers import Integral, Real
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,8 +12,8 @@ import numpy as np
 from shell.constants import zero_Celsius
 from studies.errors import InputError
 from studies.files.columns import read_header
-from studies.instrument.card import Instrument, load_card
-from studies.record import Record, read_record
+from studies.instrument.card import Card, Instrument, load_card
+from studies.record import Record, Run, read_record
 
 if TYPE_CHECKING:
     from studies.calibration.calibrate import Calibration
@@ -20,18 +22,16 @@ if TYPE_CHECKING:
     from studies.planning.chamber import Chamber
     from studies.resonator.comparison import Comparison
 
-Card = Instrument | str | Path
-Run = Record | str | Path
 Progress = Callable[[str], None]
 
 
-def simulate(card: Card, profile: str, *, row: float = 1.0, seed: int = 0, noise: bool = True) -> Record:
+def simulate(card: Card, profile: Run, *, row: float = 1.0, seed: int = 0, noise: bool = True) -> Record:
     """Return the record of a virtual run: `hrg simulate`.
 
     Args:
         card: Instrument, path, or name of a card that ships
-        profile: A chamber profile in words ("step 20 -10 5h"), a profile file, or a record whose housing column drives
-            the run.
+        profile: A chamber profile in words ("step 20 -10 5h"), a profile file, or a record, or its path, whose housing
+            column drives the run.
         row: Time between rows (s).
         seed: Of the noise.
         noise: False records what is true.
@@ -39,14 +39,19 @@ def simulate(card: Card, profile: str, *, row: float = 1.0, seed: int = 0, noise
     from studies.simulation.chamber import load_drive
     from studies.simulation.virtual_gyro import simulate_run
 
-    return simulate_run(open_card(card), load_drive(profile, None, 1 / row), 1 / row, seed, noise).record
+    if not isinstance(row, Real) or not 0 < row < inf:
+        raise InputError(f"row = {row!r}: give the time between rows, a number of seconds above 0.")
+    if not isinstance(seed, Integral) or seed < 0:
+        raise InputError(f"seed = {seed!r}: give a whole number, 0 or above.")
+    driven = load_drive(str(profile) if isinstance(profile, str | Path) else read_record(profile), None, 1 / row)
+    return simulate_run(load_card(card), driven, 1 / row, int(seed), noise).record
 
 
 def compare(*cards: Card) -> "Comparison":
     """Return designs side by side: `hrg compare`."""
     from studies.resonator.comparison import compare as compare_designs
 
-    return compare_designs([open_card(card) for card in _flat(cards)])
+    return compare_designs([load_card(card) for card in _flat(cards)])
 
 
 def calibrate(
@@ -67,14 +72,14 @@ def calibrate(
 
     data = tuple(_flat(data))
     tables = [one for one in data if is_table(one)]
-    records = open_records([one for one in data if not is_table(one)])
+    records = [read_record(one) for one in data if not is_table(one)]
     if not data:
         raise InputError("give at least one record or steady-state table to calibrate with.")
     if hold_out is not None and not 1 <= hold_out <= len(records):
         raise InputError(f"hold_out = {hold_out}: there are {len(records)} records, numbered from 1.")
     left = (hold_out or len(records)) - 1 if len(records) > 1 else None
     settled = [read_settled(str(one)) for one in tables]
-    return find_values(open_card(card), records, settled, left, exact, progress=progress or (lambda _: None))
+    return find_values(load_card(card), records, settled, left, exact, progress=progress or (lambda _: None))
 
 
 def diagnose(*runs: Run, card: Card | None = None) -> "Inference | TableDiagnosis":
@@ -89,12 +94,12 @@ def diagnose(*runs: Run, card: Card | None = None) -> "Inference | TableDiagnosi
     runs = tuple(_flat(runs))
     if not runs:
         raise InputError("give the records of one gyro, or a steady-state table.")
-    instrument = None if card is None else open_card(card)
+    instrument = None if card is None else load_card(card)
     if any(is_table(one) for one in runs):
         if len(runs) > 1:
             raise InputError("a steady-state table is diagnosed alone; leave the other files out.")
         return diagnose_table(str(runs[0]), instrument)
-    return diagnose_records(open_records(runs), instrument)
+    return diagnose_records([read_record(one) for one in runs], instrument)
 
 
 def diagnose_records(
@@ -138,18 +143,5 @@ def _flat(given: Iterable[Any]) -> Iterator[Any]:
 
 def is_table(run: Run) -> bool:
     """Return whether a path is that of a steady-state table (temperature_degC, no time_s)."""
-    if isinstance(run, Record):
-        return False
-    names = read_header(str(run))
+    names = read_header(run) if isinstance(run, str | Path) else ["time_s"]
     return "time_s" not in names and "temperature_degC" in names
-
-
-def open_card(card: Card) -> Instrument:
-    """Return the instrument that a card, its path or its name stands for."""
-    return card if isinstance(card, Instrument) else load_card(card)
-
-
-def open_records(runs: Run | Sequence[Run]) -> list[Record]:
-    """Return the records that records or their paths stand for."""
-    several = [runs] if isinstance(runs, Record | str | Path) else list(runs)
-    return [run if isinstance(run, Record) else read_record(run) for run in several]

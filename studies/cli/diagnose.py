@@ -11,6 +11,7 @@ from studies.errors import InputError
 from studies.instrument.card import load_card
 from studies.planning.chamber import Chamber, parse_chamber
 from studies.progress import Told
+from studies.record import read_record
 from studies.reports.diagnosis import diagnosis_parts, headline
 from studies.results import Result
 
@@ -84,7 +85,7 @@ def _campaign(runs: tuple[str, ...], card: str | None, limits: Chamber | None, s
     from studies.inference.diagnosis import Inference
     from studies.inference.extension import extend
 
-    instrument, records = None if card is None else load_card(card), workbench.open_records(runs)
+    instrument, records = None if card is None else load_card(card), [read_record(run) for run in runs]
     with Told("diagnosis", STAGES) as told:
         ask = workbench.diagnose_records
         found = ask(records, instrument, limits, told)

@@ -19,6 +19,7 @@ from studies.progress import tell
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
+    from pandas import DataFrame
 
     Table: TypeAlias = dict[str, NDArray[np.float64]]
 
@@ -68,9 +69,17 @@ class Columns:
 
 
 def read_columns(
-    path: str | Path, known: Collection[str], required: Collection[str] = (), prefixes: Collection[str] = ()
+    path: "str | Path | DataFrame",
+    known: Collection[str],
+    required: Collection[str] = (),
+    prefixes: Collection[str] = (),
 ) -> Columns:
     """Read a table of numbers whose columns are `known` or begin with one of the prefixes, and have the required ones."""
+    if not isinstance(path, str | Path):
+        columns = _take_frame(path)
+        _check_names(columns.path, list(columns.values), 0, known, required, prefixes)
+        _check_size(columns)
+        return columns
     if is_parquet(path):
         comments, header = read_comments_and_names(path)
         _check_names(path, header, 0, known, required, prefixes)
@@ -86,8 +95,23 @@ def read_columns(
     return columns
 
 
-def read_header(path: str | Path) -> list[str]:
+def _take_frame(frame: "DataFrame") -> Columns:
+    """Return the columns of a table of pandas, with the comment lines in its `attrs`."""
+    if not hasattr(frame, "to_numpy") or not hasattr(frame, "attrs"):
+        raise InputError(f"{frame!r:.60}: give a path, a record or a table of pandas, not {type(frame).__name__}.")
+    path = str(frame.attrs.get("path") or "table")
+    try:
+        numbers = frame.to_numpy(float, na_value=float("nan")).T
+    except (TypeError, ValueError) as error:
+        raise InputError(f"{path}: the table has cells that are no numbers ({error}).") from None
+    named = dict(zip(map(str, frame.columns), numbers, strict=True))
+    return Columns(path, named, tuple(frame.attrs.get("comments", ())), first_line=1)
+
+
+def read_header(path: "str | Path | DataFrame") -> list[str]:
     """Return the column names of a table without reading its numbers."""
+    if not isinstance(path, str | Path):
+        return list(_take_frame(path).values)
     if is_parquet(path):
         return read_comments_and_names(path)[1]
     _, header, _, _ = _read_head(path)

@@ -18,6 +18,13 @@ ANY_SIZE = 1 << 62  # bytes of a file that is never held as a whole
 PORTION = 1 << 23  # bytes that are looked through at once
 
 
+def as_path(given: object) -> Path:
+    """Return what names a file as a path."""
+    if not isinstance(given, str | Path):
+        raise InputError(f"{given!r:.60}: give a path or a name, not {type(given).__name__}.")
+    return Path(given)
+
+
 def read_bytes(path: str | Path, most: int = MOST_BYTES, first: int = -1) -> bytes:
     """Return the content, or its first bytes, of a file; raise as `opened`."""
     with opened(path, most) as file:
@@ -43,7 +50,7 @@ def digest(path: str | Path, most: int = MOST_BYTES) -> str:
 def check_file(path: str | Path, most: int = MOST_BYTES) -> Path:
     """Return the path of a regular file of at most so many bytes; raise as `opened` for anything else."""
     try:
-        about = Path(path).stat()
+        about = as_path(path).stat()
         if stat.S_ISDIR(about.st_mode):
             raise InputError(f"{path}: is a folder; give the name of a file.")
         if not stat.S_ISREG(about.st_mode):
@@ -80,7 +87,7 @@ def list_shipped(folder: Path) -> dict[str, Path]:
 
 def find_shipped(name: str | Path, shipped: dict[str, Path], kind: str) -> Path:
     """Return the path of a TOML file that is given by path, or by the bare name of one that ships."""
-    path = Path(name)
+    path = as_path(name)
     if path.suffix == ".toml" or path.exists() or len(path.parts) > 1:
         return path
     if str(name) not in shipped:

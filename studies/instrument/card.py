@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from importlib.resources import files
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Generic, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Generic, TypeAlias, TypeVar
 
 from shell.constants import zero_Celsius
 from studies.errors import InputError, nearest
@@ -173,8 +173,13 @@ class Instrument:
         return {k: v for k, v in self.__dict__.items() if k not in ("heat_path", "uncertain", "correlation")}
 
 
-def load_card(card: str | Path) -> Instrument:
-    """Load a card by path, or by the bare name of one that ships with the package."""
+Card: TypeAlias = Instrument | str | Path
+
+
+def load_card(card: Card) -> Instrument:
+    """Load a card by path, or by the bare name of one that ships with the package; an instrument is what it is."""
+    if isinstance(card, Instrument):
+        return card
     path = find_shipped(card, shipped_cards(), "card")
     return build_instrument(read_toml(path, SCHEMA), str(path))
 

@@ -16,6 +16,7 @@ extrapolate, `model.part(name)` and `model.number(key)` take what the formula ne
 """
 
 from importlib import import_module
+from pathlib import Path
 from pkgutil import iter_modules
 from typing import Any
 
@@ -25,7 +26,7 @@ from compensation.errors import CompensationError
 from studies.errors import InputError, nearest
 from studies.models import kinds
 from studies.models.file import Model, ModelPart, ModelSource, format_model, make_part, read_model, write_model
-from studies.record import COMPENSATED, RESONATOR, Record
+from studies.record import COMPENSATED, RESONATOR, Record, Run, read_record
 
 __all__ = [
     "Model", "ModelPart", "ModelSource", "compensate", "emit_c", "format_model", "make_part", "model_kinds", "read_model",
@@ -40,13 +41,12 @@ def model_kinds() -> list[str]:
 
 def source_of(record: Record) -> ModelSource:
     """Return what a model keeps of a record that it was fitted to: file name, hash of its bytes, rows."""
-    from pathlib import Path
-
     return ModelSource(Path(record.path).name, record.sha256, len(record))
 
 
-def compensate(model: Model, record: Record, *, extrapolate: bool = False) -> Record:
-    """Return the record with the model's `compensated_…` columns added."""
+def compensate(model: Model | str | Path, record: Run, *, extrapolate: bool = False) -> Record:
+    """Return the record with the model's `compensated_…` columns added; `model`, `record`: or their paths."""
+    model, record = read_model(model), read_record(record)
     try:
         columns = _module(model).compensate(model, record, extrapolate=extrapolate)
     except (InputError, CompensationError) as error:
@@ -63,8 +63,9 @@ def compensate(model: Model, record: Record, *, extrapolate: bool = False) -> Re
     return record.with_columns(columns)
 
 
-def emit_c(model: Model) -> str:
-    """Return the model as C99 source for firmware, with its origin in the head comment."""
+def emit_c(model: Model | str | Path) -> str:
+    """Return the model, or that of a path, as C99 source for firmware, with its origin in the head comment."""
+    model = read_model(model)
     return str(_module(model).emit_c(model))
 
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from compensation.arrays import Array
 from studies.errors import InputError
+from studies.files.reading import as_path
 from studies.files.writing import write_text
 from studies.instrument.units import unit_of
 from studies.record import Record
@@ -213,10 +214,12 @@ def format_model(model: Model) -> str:
     return "\n".join(lines) + "\n"
 
 
-def read_model(path: str | Path) -> Model:
-    """Read a model's file."""
+def read_model(path: Model | str | Path) -> Model:
+    """Read a model's file; a model is what it is."""
+    if isinstance(path, Model):
+        return path
     from studies.instrument.card import shipped_cards
 
-    if not Path(path).exists() and str(path) in shipped_cards():
+    if not as_path(path).exists() and str(path) in shipped_cards():
         raise InputError(f"{path}: this is a card, not a model; give the file that 'hrg fit … --save' wrote.")
     return Model(**msgspec.structs.asdict(read_file(path, ModelKeys, SCHEMA)), path=str(path))

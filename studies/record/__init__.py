@@ -4,7 +4,7 @@ import datetime
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
@@ -125,7 +125,7 @@ class Record:
         import pandas as pd
 
         frame = pd.DataFrame(dict(self.columns))
-        frame.attrs = {"instrument": self.instrument, "source": self.source, "path": self.path}
+        frame.attrs = {"instrument": self.instrument, "source": self.source, "path": self.path, "comments": self.notes}
         return frame
 
     def plot(self) -> Drawing:
@@ -142,6 +142,9 @@ class Record:
     def with_columns(self, more: Mapping[str, Array]) -> "Record":
         """Return a new record with further (or replaced) columns."""
         return replace(self, columns={**self.columns, **more})
+
+
+Run: TypeAlias = "Record | str | Path | DataFrame"
 
 
 def with_bias(record: Record) -> Record:
@@ -164,16 +167,20 @@ def place_in_time(records: Sequence[Record]) -> tuple[list[float], bool]:
     return offsets, False
 
 
-def read_record(path: str | Path) -> Record:
-    """Read one run."""
+def read_record(path: "Run") -> Record:
+    """Read one run: from a file, or from a table as `to_frame` gives it; a record is what it is."""
+    if isinstance(path, Record):
+        return path
     if "time_s" not in (names := read_header(path)) and "temperature_degC" in names:
-        raise InputError(f"{path}: this is a steady-state table (no time_s), but a record in time is needed.")
+        raise InputError(
+            f"{path if isinstance(path, str | Path) else 'table'}: this is a steady-state table (no time_s), but a record in time is needed."
+        )
     table = read_columns(path, COLUMNS, required=("time_s",), prefixes=(COMPENSATED,))
     table.refuse(np.isnan(table.values["time_s"]), "time_s is empty; every row needs its time.")
     table.check_order("time_s", "time_s does not increase; sort the rows and remove repeated ones.")
     check_plausible(table.values, table.place)
-    notes = _read_notes(path, table)
-    return Record(table.values, str(path), table.sha256, **notes)  # type: ignore[arg-type]
+    notes = _read_notes(table.path, table)
+    return Record(table.values, table.path, table.sha256, **notes)  # type: ignore[arg-type]
 
 
 def place_of_largest(path: str, name: str) -> str:
@@ -253,7 +260,7 @@ def _rows_of(columns: Mapping[str, Array], names: Sequence[str]) -> set[tuple[fl
     return set(zip(*(np.nan_to_num(columns[name], nan=np.inf).tolist() for name in names), strict=True))
 
 
-def read_profile(path: str | Path) -> Columns:
+def read_profile(path: "str | Path | DataFrame") -> Columns:
     """Read a chamber profile `time_s,chamber_temperature_degC`, linear between its rows."""
     table = read_columns(path, PROFILE_COLUMNS, required=PROFILE_COLUMNS)
     table.require(PROFILE_COLUMNS, "a profile")

@@ -15,33 +15,33 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from studies.instrument.card import Instrument
+    from studies.record import Record
     from studies.simulation.drive import Boundary, Drive
     from thermal.profile import Profile
 
 
-def load_profile(text: str) -> "Profile":
-    """Read a profile from a CSV file, when there is one of that name, else from words; kelvin in the result."""
+def load_profile(text: "str | Record") -> "Profile":
+    """Read a profile from a record, or a CSV file, when there is one of that name, else from words; kelvin in the result."""
     from studies.record import read_profile
     from thermal.profile import Profile, parse_profile
 
-    if Path(text).suffix != ".csv" and not os.path.isfile(text):
+    if isinstance(text, str) and Path(text).suffix != ".csv" and not os.path.isfile(text):
         return parse_profile(text)
-    table = read_profile(text)
+    table = read_profile(text if isinstance(text, str) else text.to_frame())
     if len(table.values["time_s"]) < 2:
         raise InputError(f"{text}: a profile needs at least two rows.")
     return Profile(table.values["time_s"], table.values["chamber_temperature_degC"] + zero_Celsius)
 
 
-def load_schedule(text: str) -> "tuple[Profile, Mapping[str, NDArray[np.float64]]]":
+def load_schedule(text: "str | Record") -> "tuple[Profile, Mapping[str, NDArray[np.float64]]]":
     """Read a chamber profile (K) and the commands beside it, by the names of a record's columns; words have none."""
     import numpy as np
 
-    from studies.files.columns import read_header
     from studies.record import PROFILE_COLUMNS, read_record
     from studies.simulation.drive import COMMAND_COLUMNS
     from thermal.profile import Profile
 
-    columns = read_header(text) if os.path.isfile(text) else []
+    columns = _columns_of(text)
     commands = [name for name in columns if name in COMMAND_COLUMNS]
     if not commands or not set(PROFILE_COLUMNS) <= set(columns):
         return load_profile(text), {}
@@ -55,21 +55,29 @@ def load_schedule(text: str) -> "tuple[Profile, Mapping[str, NDArray[np.float64]
     return chamber, {name: record[name] for name in commands}
 
 
-def load_drive(text: str, boundary: "Boundary | None" = None, rate: float = 1.0) -> "Profile | Drive":
+def load_drive(text: "str | Record", boundary: "Boundary | None" = None, rate: float = 1.0) -> "Profile | Drive":
     """Read what drives a run: a profile, its commands at `rate` rows per second, or a record's measured column, the
     housing's if it has one.
     """
-    from studies.files.columns import read_header
     from studies.record import PROFILE_COLUMNS, read_record
     from studies.simulation.drive import COMMAND_COLUMNS, drive_by_record, drive_by_schedule
 
-    columns = set(read_header(text)) if os.path.isfile(text) else set()
+    columns = set(_columns_of(text))
     if columns - {*PROFILE_COLUMNS, *COMMAND_COLUMNS} or (columns and not set(PROFILE_COLUMNS) <= columns):
         return drive_by_record(read_record(text), boundary)
     if boundary == "housing":
         raise InputError(f"{text}: only a record has a housing column to impose; leave out --boundary housing.")
     chamber, commands = load_schedule(text)
-    return replace(drive_by_schedule(chamber, commands, rate), source=text) if commands else chamber
+    return replace(drive_by_schedule(chamber, commands, rate), source=str(text)) if commands else chamber
+
+
+def _columns_of(text: "str | Record") -> list[str]:
+    """Return the columns of a record or a file; words have none."""
+    from studies.files.columns import read_header
+
+    if not isinstance(text, str):
+        return [*text.columns]
+    return read_header(text) if os.path.isfile(text) else []
 
 
 def check_profile(profile: "Profile", instrument: "Instrument") -> None:

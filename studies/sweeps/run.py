@@ -12,6 +12,7 @@ import numpy as np
 
 from compensation.arrays import Array
 from studies.errors import InputError
+from studies.instrument.card import Card
 from studies.progress import Progress
 from studies.sweeps.block import Batch
 from studies.sweeps.child import check_function
@@ -34,7 +35,7 @@ STORE_SECONDS = 3e-5  # for one case to be hashed, committed and counted
 
 
 def run_study(
-    source: str | Path | Mapping[str, Any], out: str | Path | None = None, *, card: str | None = None,
+    source: str | Path | Mapping[str, Any], out: str | Path | None = None, *, card: Card | None = None,
     workers: int | None = None, scheduler: str | None = None, allow_python: bool = False, retry_failed: bool = False,
     show_progress: bool = False,
 ) -> Results:  # fmt: skip

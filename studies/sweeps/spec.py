@@ -8,7 +8,7 @@ from msgspec.structs import replace
 
 from studies.errors import InputError, nearest
 from studies.files.reading import find_shipped, list_shipped
-from studies.instrument.card import Instrument, load_card
+from studies.instrument.card import Card, Instrument, load_card
 from studies.schema.reader import read_keys, read_text, read_toml
 from studies.sweeps.definition import Study, StudyParameter
 from studies.sweeps.keys import SCHEMA, ParameterKeys, Search, StudyKeys, ToleranceSearch, WorstCase
@@ -17,7 +17,7 @@ from studies.sweeps.quantity import Quantity
 from studies.sweeps.validity import check_nominal, check_sample
 
 
-def read_study(source: str | Path | Mapping[str, Any], card: str | None = None, text: str | None = None) -> Study:
+def read_study(source: str | Path | Mapping[str, Any], card: Card | None = None, text: str | None = None) -> Study:
     """Read a study from a TOML file (of that `text`), by a shipped one's name, or a mapping; `card` stands in place of its own."""
     if isinstance(source, Mapping):
         content, where, folder, text = {"schema": SCHEMA, **source}, "study", Path(), ""
@@ -27,11 +27,10 @@ def read_study(source: str | Path | Mapping[str, Any], card: str | None = None, 
         content, folder = read_toml(path, SCHEMA, text), path.parent
         where = f"the shipped study '{source}'" if path in shipped_specs().values() else str(path)
     if card is not None:
-        content["card"] = card
-        text = f"# computed with --card {card} instead of the card below\n{text}"
+        content["card"] = (card.path or card.name) if isinstance(card, Instrument) else str(card)
+        text = f"# computed with --card {content['card']} instead of the card below\n{text}"
     named = read_keys(content, StudyKeys, where).card
-    beside = folder / named
-    instrument = load_card(beside if card is None and named.endswith(".toml") else named)
+    instrument = load_card(card or (folder / named if named.endswith(".toml") else named))
     return check_study(content, instrument, where, str(folder.resolve()), text)
 
 

@@ -1,8 +1,10 @@
 """The names that packages offer from Python: each is there, imported only when used, and does what the command does."""
 
+import datetime
 import importlib
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -53,6 +55,81 @@ def test_simulate_is_the_command(tmp_path):
         assert np.array_equal(values, record[name])
 
 
+@pytest.fixture(scope="module")
+def given(tmp_path_factory):
+    """A record as people have it: an object, a path of two kinds, a table of pandas; and a model of its frequency."""
+    folder = tmp_path_factory.mktemp("given")
+    record = studies.simulate("free-dome", "step 20 -10 1h", row=10, seed=3)
+    studies.write_record(record, path := folder / "r.csv")
+    table = str(Path(studies.papers.__file__).parent / "hrg_table1.csv")
+    assert main(["fit", "frequency", table, "--save", str(folder / "model.toml")]) == 0
+    return (record, path, str(path), record.to_frame()), folder / "model.toml"
+
+
+def commands(model, monkeypatch):
+    """What every command from Python takes of a record."""
+    importlib.import_module("studies.diagnosis.table")  # which takes the true one
+    monkeypatch.setattr("studies.calibration.calibrate.calibrate", lambda card, records, *_, **__: records[0])
+    monkeypatch.setattr("studies.workbench.diagnose_records", lambda records, card: records[0])
+    return {
+        "read_record": studies.read_record,
+        "simulate": lambda run: studies.simulate("free-dome", run, noise=False),
+        "calibrate": lambda run: studies.calibrate(studies.load_card("free-dome"), run),
+        "diagnose": lambda run: studies.diagnose(run, card="free-dome"),
+        "compensate": lambda run: studies.compensate(model, run, extrapolate=True),
+    }
+
+
+@pytest.mark.parametrize("name", ["read_record", "simulate", "calibrate", "diagnose", "compensate"])
+def test_contract_every_command_takes_a_record_by_path_and_object(name, given, monkeypatch):
+    runs, model = given
+    command = commands(model, monkeypatch)[name]
+    first, *others = [command(run) for run in runs]
+    for other in others:
+        assert list(other.columns) == list(first.columns)
+        assert all(np.array_equal(other[column], first[column]) for column in first.columns)
+    for wrong in (
+        3,
+        None,
+        {"time_s": [0.0]},
+        runs[3].assign(bias_deg_per_h="x"),
+        runs[3].assign(own=1.0),
+        runs[3][::-1],
+    ):
+        with pytest.raises(studies.InputError):
+            command(wrong)
+
+
+def test_contract_records_come_back_from_a_table_with_all_that_they_say(given):
+    (record, path, _, _), _ = given
+    moment = datetime.datetime(2026, 1, 31, tzinfo=datetime.UTC)
+    dated = replace(record, start=moment, resolution={"frequency_Hz": 1e-3}, comments=("kept",))
+    assert studies.read_record(dated.to_frame()).notes == dated.notes
+    assert studies.read_record(studies.read_record(path).to_frame()).path == str(path)
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"row": 0}, {"row": -1.0}, {"row": np.nan}, {"row": "10"}, {"seed": -1}, {"seed": 1.5}]
+)
+def test_contract_numbers_of_a_run_are_refused_by_name(wrong):
+    (name,) = wrong
+    with pytest.raises(studies.InputError, match=f"^{name} = "):
+        studies.simulate("free-dome", "soak 20 1h", **wrong)
+
+
+def test_contract_what_is_no_file_card_or_run_is_refused_with_words(given):
+    for command in (studies.load_card, studies.compare, studies.read_model, studies.emit_c, studies.run_study):
+        with pytest.raises(studies.InputError, match="3: give a path or a name, not int"):
+            command(3)
+    for fit in (compensation.fit_bias, lambda runs: compensation.fit_cross_damping(runs, k=1.0, zeta=1.0)):
+        with pytest.raises(compensation.CompensationError, match="hrg fit"):
+            fit("cooling.csv")
+    card = studies.load_card("free-dome")
+    assert studies.load_card(card) is card
+    model = studies.read_model(given[1])
+    assert studies.emit_c(model) == studies.emit_c(str(given[1]))
+
+
 def test_records_show_themselves_shortly_and_as_tables_and_pictures():
     record = studies.simulate(studies.load_card("free-dome"), "step 20 -10 1h", row=10)
     assert repr(record) == (
@@ -77,6 +154,8 @@ def test_results_show_themselves_shortly_and_as_tables(tmp_path):
         "quantity": [{"name": "frequency", "theory": "shell"}],
     }
     study = studies.run_study(spec, out=tmp_path / "s", workers=1)
+    again = studies.run_study(spec, card=studies.load_card("free-dome"))
+    assert again.table().equals(study.table())
     shown = (
         (comparison, "Comparison(free-dome, hrg-30mm:"),
         (calibration, "Calibration(hrg-30mm: "),

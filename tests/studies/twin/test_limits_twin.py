@@ -296,7 +296,17 @@ def test_contract_words_and_files_of_the_program(folder):
     def run(*words):
         return subprocess.run([program, *map(str, words)], capture_output=True, text=True, check=False)
 
-    for words in ("10 Noiseless", "10 nois", "10 1.5", "10 -1", "10 1e3", "10 noiseless ful", "10 1 full 1", "1x", "inf"):
+    for words in (
+        "10 Noiseless",
+        "10 nois",
+        "10 1.5",
+        "10 -1",
+        "10 1e3",
+        "10 noiseless ful",
+        "10 1 full 1",
+        "1x",
+        "inf",
+    ):
         done = run(profile, out, *words.split())
         assert (done.returncode, done.stderr.split()[0]) == (2, "usage:"), words
     for place in (profile, link, hard, folder / "words" / ".." / "words.csv", folder):
