@@ -2,6 +2,9 @@
 
 import difflib
 from collections.abc import Iterable
+from itertools import accumulate
+
+MOST_TOLD = 160  # characters of known words in a message
 
 
 class ShellError(ValueError):
@@ -18,7 +21,11 @@ def mm(length: float) -> str:
 
 
 def nearest(word: str, known: Iterable[str]) -> str:
-    """Return "; did you mean 'x'?" for the known word nearest to `word`, or the list of known words, those with `word` in them first."""
+    """Return "; did you mean 'x'?" for the known word nearest to `word`, or else with `word` in it; else the first known words."""
     known = sorted(known, key=lambda one: (word.lower() not in one.lower(), one))
-    close = difflib.get_close_matches(word, known, n=1, cutoff=0.5)
-    return f"; did you mean '{close[0]}'?" if close else f"; known: {', '.join(known)}."
+    inside = [one for one in sorted(known, key=len) if len(word) > 2 and word.lower() in one.lower()]
+    if close := difflib.get_close_matches(word, known, n=1, cutoff=0.5) or inside:
+        return f"; did you mean '{close[0]}'?"
+    told = sum(length <= MOST_TOLD for length in accumulate(len(one) + 2 for one in known))
+    more = f" and {len(known) - told} more" if told < len(known) else ""
+    return f"; known: {', '.join(known[:told])}{more}."

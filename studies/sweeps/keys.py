@@ -105,7 +105,7 @@ class Requirement(Keys, frozen=True, kw_only=True):
     """Limits of a column, asked of the yield; a `within` alone is about the nominal design's value."""
 
     column: Annotated[str, says("of the results", example="frequency_n2_Hz")]
-    within: Annotated[float, number("of target", example=0.5)] | None = None
+    within: Annotated[float, number("of target", above=0.0, example=0.5)] | None = None
     target: Annotated[float, number("the nominal design's value unless given", example=4432.07)] | None = None
     low: Annotated[float, number("instead of within", example=4431.0)] | None = None
     high: Annotated[float, number("instead of within", example=4433.0)] | None = None
@@ -116,6 +116,8 @@ class Requirement(Keys, frozen=True, kw_only=True):
             raise ValueError("give within (and target), or low and/or high.")
         if (self.within is None and self.target is not None) or (self.within is not None and ends):
             raise ValueError("give either target and within, or low and/or high.")
+        if self.low is not None and self.high is not None and not self.low < self.high:
+            raise ValueError(f"low must be below high for '{self.column}', not {self.low:g} and {self.high:g}.")
 
     def limits(self, nominal: float) -> tuple[float, float]:
         """Return the lowest and the highest value, infinite where an end is open; `nominal`: the nominal design's value."""

@@ -72,7 +72,7 @@ def judge(keys, raw):
     except InputError as error:
         said = str(error)
     assert said.startswith("file.toml")
-    assert len(said) < 1500
+    assert len(said) < 400
     return said
 
 

@@ -26,7 +26,17 @@ sampling = { method = "grid" }
 parameter = [{ name = "resonator.radius_mm", values = [15.0] }]
 quantity = [{ name = "frequency", theory = "shell" }]
 """
+DESIGN = """schema = "hrg.design/1"
+card = "free-dome"
+parameter = [{{ name = "resonator.thickness_mm", low = 0.8, high = 1.0 }}]
+objective = [{{ column = "{column}" }}]
+constraint = [{{ column = "frequency_n2_Hz", low = {low}, high = 5000.0 }}]
+"""
+DESIGNS = {"near": {"column": "sep"}, "far": {"column": "qqqqqq"}, "crossed": {"low": 6000.0}}
 REFUSED = {
+    "optimise NEAR --out out": "[[objective]] number 1: column = 'sep' is unknown; did you mean 'separation_n0_Hz'?",
+    "optimise FAR --out out": " more.",
+    "optimise CROSSED --out out": "[[constraint]] number 1: low must be below high for 'frequency_n2_Hz', not 6000 and 5000.",
     **dict.fromkeys(WITH_A_CARD, "[loss]: unknown key 'invers_q'; did you mean 'inverse_q'"),
     "nonsense": "nonsense",
     "cards none.toml --debug": "Traceback",  # only where it is asked for
@@ -147,6 +157,8 @@ def given(tmp_path_factory, pytestconfig):
     card = shipped_cards()["hrg-30mm"].read_text(encoding="utf-8").split("[loss]")
     (folder / "typo.toml").write_text(f"{card[0]}[loss]\ninvers_q = 1e-7\n", encoding="utf-8")
     (folder / "study.toml").write_text(STUDY, encoding="utf-8")
+    for name, of in DESIGNS.items():
+        (folder / f"{name}.toml").write_text(DESIGN.format(**{"column": "frequency_n2_Hz", "low": 4000.0} | of))
     rows = "".join(f"{t},20.0,{4432 + 0.01 * math.sin(t):.4f}\n" for t in range(0, 4000, 100))
     for place in (folder, folder / "lot" / "a", folder / "lot" / "b"):
         place.mkdir(parents=True, exist_ok=True)
@@ -154,6 +166,7 @@ def given(tmp_path_factory, pytestconfig):
     (folder / "row.csv").write_text("time_s,housing_temperature_degC,frequency_Hz\n0,20.0,4432.0\n", encoding="utf-8")
     files = {
         "TYPO": folder / "typo.toml",
+        **{name.upper(): folder / f"{name}.toml" for name in DESIGNS},
         "STUDY": folder / "study.toml",
         "RUN": folder / "run.csv",
         "LOT": folder / "lot",
@@ -171,6 +184,7 @@ def test_it_is_refused_in_one_message(words, given, tmp_path, monkeypatch, capsy
     assert main([given.get(word, word) for word in shlex.split(words)]) == 2
     out, err = capsys.readouterr()
     assert REFUSED[words] in err
+    assert len(err) < 400 + 2 * len(str(tmp_path)) or "--debug" in words or "9" * 400 in words
     assert ("Traceback" in err) == ("--debug" in words)
     assert out == ""
     assert [path.name for path in tmp_path.iterdir()] == ["file"]
