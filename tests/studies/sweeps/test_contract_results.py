@@ -288,16 +288,12 @@ def test_missing_dask_is_said(monkeypatch):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("protocol", ["tcp", "tls"])
-def test_no_scheduler_is_said(protocol):
+def test_no_scheduler_is_said(protocol, monkeypatch):
     pytest.importorskip("distributed", reason="the extra 'cluster' (dask[distributed]) is not installed")
-    from studies.sweeps import cluster as module
-
-    patience, module.PATIENCE = module.PATIENCE, 1.0
-    try:
-        with pytest.raises(MissingEnvironment, match="certificates" if protocol == "tls" else "no scheduler"):
-            run_study(SPEC, scheduler=f"{protocol}://127.0.0.1:{free_port()}")
-    finally:
-        module.PATIENCE = patience
+    for wait in ("GREETING", "PATIENCE"):
+        monkeypatch.setattr(f"studies.sweeps.cluster.{wait}", 1.0)
+    with pytest.raises(MissingEnvironment, match="certificates" if protocol == "tls" else "no scheduler"):
+        run_study(SPEC, scheduler=f"{protocol}://127.0.0.1:{free_port()}")
     distributed = sys.modules["distributed"]
     left = [one.status for one in gc.get_objects() if issubclass(type(one), distributed.Client)]
     assert set(left) <= {"closed"}, "collected while another client starts, it would wait for that one's lock"
