@@ -9,7 +9,6 @@ from shell.rayleigh import rayleigh_integrals
 from studies.cli.output import answers
 from studies.errors import InputError
 from studies.files.writing import write_text
-from studies.papers.bvg_theory import compare_bell_theory
 from studies.progress import tell
 from studies.results import Blocks, Chapter, Result, Sentence, Table
 
@@ -129,6 +128,7 @@ def _derive_dynamics(latex: bool, code: Literal["python", "c"] | None) -> Result
 def _derive_bell(latex: bool) -> Result:
     from shell.derivation.bell_chain import bell_steps, shorten
     from studies.derivation import read_chain
+    from studies.papers.bvg_theory import compare_bell_theory
 
     payload: dict[str, Any] = {"schema": "hrg.derive-bell/1", "numbers": None}
     lead = "BVG paper, equations (1) to (22), beside what is printed."

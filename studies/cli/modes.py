@@ -22,7 +22,6 @@ from studies.cli.arguments import COUNT, FRACTION, MANY, WHOLE, AnyTheory, Card,
 from studies.cli.output import answers
 from studies.errors import naming
 from studies.instrument.card import Instrument
-from studies.loss.films import film_shifts
 from studies.reports.digits import to_numerical_error
 from studies.reports.scenes import THEORIES, live_chapter, show_mode, view_blocks
 from studies.resonator.law import law_of
@@ -187,6 +186,8 @@ def _films(m: Mode, instrument: Instrument) -> list[Entry] | None:
     """Every film and its shift in ppm, null where its numbers are not known."""
     if m.theory == "rayleigh":
         return None
+    from studies.loss.films import film_shifts
+
     shifts = film_shifts(instrument, m)
     return [row_of(one, "missing", film="material", shift_ppm=("relative", 1e6)) for one in shifts] or None
 

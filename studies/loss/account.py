@@ -1,7 +1,6 @@
 """What a loss budget says beside its sum: what varies around the axis, what a stated Q leaves open, what each part is worth."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -9,10 +8,8 @@ from compensation.arrays import Array
 from compensation.wave import StandingWave
 from shell.damping.anisotropy import describe_wave
 from shell.damping.budget import Budget
-
-if TYPE_CHECKING:
-    from studies.instrument.card import Instrument
-    from studies.loss.model import LossModel
+from studies.instrument.card import Instrument
+from studies.loss.model import LossModel
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,7 +21,7 @@ class DampingAround:
     drift: Array
 
 
-def damping_around(model: "LossModel", budget: Budget) -> DampingAround | None:
+def damping_around(model: LossModel, budget: Budget) -> DampingAround | None:
     """Return what varies around; None where nothing does."""
     if not model.ripples:
         return None
@@ -57,7 +54,7 @@ class StatedLoss:
         return ""
 
 
-def stated_loss(instrument: "Instrument", model: "LossModel") -> StatedLoss | None:
+def stated_loss(instrument: Instrument, model: LossModel) -> StatedLoss | None:
     """Return what the card states beside what the parts explain; None where it states nothing of this mode."""
     if "inverse_q" not in instrument.content.get("loss", {}) or model.harmonic != 2:
         return None

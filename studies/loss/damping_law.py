@@ -3,16 +3,11 @@
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
-from studies.loss.model import loss_model
+import numpy as np
+from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
-    from shell.damping.anisotropy import Complex
-    from studies.instrument.card import Instrument
+from studies.instrument.card import Instrument
 
 NODE_STEP = 4.0  # K, for the narrowest activated peaks
 
@@ -21,14 +16,15 @@ NODE_STEP = 4.0  # K, for the narrowest activated peaks
 class DampingLaw:
     """1/Q and, where the card states it, `wave` Δ(1/Q) exp(2 i n θ_τ) over temperature: between nodes as cubic splines."""
 
-    inverse_q: "Callable[[NDArray[np.float64]], NDArray[np.float64]]"
-    wave: "Callable[[NDArray[np.float64]], Complex] | None"
+    inverse_q: Callable[[NDArray[np.float64]], NDArray[np.float64]]
+    wave: Callable[[NDArray[np.float64]], NDArray[np.complex128]] | None
 
 
-def damping_law(instrument: "Instrument", lowest: float, highest: float) -> DampingLaw | None:
+def damping_law(instrument: Instrument, lowest: float, highest: float) -> DampingLaw | None:
     """1/Q of the drive mode (n = 2) between two temperatures (K) from the parts in the card; None where it has none."""
-    import numpy as np
     from scipy.interpolate import CubicSpline
+
+    from studies.loss.model import loss_model
 
     if not instrument.part("loss", "loss_parts").given:
         return None
@@ -42,10 +38,8 @@ def damping_law(instrument: "Instrument", lowest: float, highest: float) -> Damp
     return DampingLaw(lambda T: np.asarray(np.exp(logarithm(T))), wave)
 
 
-def settled_loss(instrument: "Instrument", temperature: float) -> "tuple[float, Instrument]":
+def settled_loss(instrument: Instrument, temperature: float) -> tuple[float, Instrument]:
     """Return 1/Q at a temperature (K), and the instrument whose `[bias]` has the anisotropy of its parts there."""
-    import numpy as np
-
     law = damping_law(instrument, temperature - 1.0, temperature + 1.0)
     at = np.array([temperature])
     if law is None:

@@ -3,19 +3,18 @@
 import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from shell.damping.anisotropy import Ripple, film_weight
+from shell.damping.budget import LossCause, film_causes
+from shell.damping.faces import Vibration
+from shell.damping.film import Film, check_film, film_shift, thickness_power
+from shell.damping.heat import Heat
+from shell.damping.sources import film_names, known_film
+from shell.modes import Mode
 from studies.errors import InputError, naming
-
-if TYPE_CHECKING:
-    from shell.damping.anisotropy import Ripple
-    from shell.damping.budget import LossCause
-    from shell.damping.faces import Vibration
-    from shell.damping.film import Film
-    from shell.damping.heat import Heat
-    from shell.modes import Mode
-    from studies.instrument.card import Instrument
-    from studies.instrument.tables.loss_parts import FilmKeys
+from studies.instrument.card import Instrument
+from studies.instrument.tables.loss_parts import FilmKeys
 
 ELASTIC = ("youngs_modulus_GPa", "poisson_ratio", "density_kg_m3")
 LOSSY = ("youngs_modulus_GPa", "poisson_ratio", "loss")
@@ -33,19 +32,15 @@ class FilmShift:
     missing: tuple[str, ...] = ()
 
 
-def film_numbers(keys: "FilmKeys", names: Iterable[str]) -> dict[str, Any]:
+def film_numbers(keys: FilmKeys, names: Iterable[str]) -> dict[str, Any]:
     """Return the named numbers of a film, from the card or else from the table of films; None where neither has them."""
-    from shell.damping.sources import known_film
-
     known = known_film(keys.material)
     given = {name: getattr(keys, name) for name in names}
     return {name: known.get(name) if value is None else value for name, value in given.items()}
 
 
-def film_shifts(instrument: "Instrument", mode: "Mode") -> tuple[FilmShift, ...]:
+def film_shifts(instrument: Instrument, mode: Mode) -> tuple[FilmShift, ...]:
     """Return what every film of the card does to a mode, to first order in its thickness."""
-    from shell.damping.film import film_shift
-
     found = []
     for keys in instrument.part("loss", "loss_parts").film:
         numbers = film_numbers(keys, ALL)
@@ -56,15 +51,10 @@ def film_shifts(instrument: "Instrument", mode: "Mode") -> tuple[FilmShift, ...]
 
 
 def film_losses(
-    keys: "FilmKeys", vibration: "Vibration", heat: "Callable[[float], Heat] | None", where: str, name: str,
+    keys: FilmKeys, vibration: Vibration, heat: Callable[[float], Heat] | None, where: str, name: str,
     spread: Mapping[str, float],
-) -> "tuple[list[LossCause], list[Ripple]]":  # fmt: skip
+) -> tuple[list[LossCause], list[Ripple]]:  # fmt: skip
     """Return a film's causes of loss, and how they vary around."""
-    from shell.damping.anisotropy import Ripple, film_weight
-    from shell.damping.budget import film_causes
-    from shell.damping.film import check_film, thickness_power
-    from shell.damping.sources import film_names, known_film
-
     known = known_film(keys.material)
     numbers = film_numbers(keys, ALL)
     missing = [key for key in LOSSY if numbers[key] is None]
@@ -87,12 +77,8 @@ def film_losses(
         return causes, waves
 
 
-def _build_film(keys: "FilmKeys", numbers: Mapping[str, Any]) -> "Film":
+def _build_film(keys: FilmKeys, numbers: Mapping[str, Any]) -> Film:
     """The film; its capacity per volume (J/(m³ K)) in the table counts where there is none per mass."""
-    from shell.damping.film import Film
-    from shell.damping.heat import Heat
-    from shell.damping.sources import known_film
-
     heat, capacity = None, known_film(keys.material).get("heat_capacity_J_per_m3_K")
     if all(numbers[key] is not None for key in CAPACITY):
         capacity = numbers["density_kg_m3"] * numbers["heat_capacity_J_per_kg_K"]

@@ -5,35 +5,47 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from numpy.typing import ArrayLike
+
+from shell.constants import zero_Celsius
+from shell.damping.anchor import Unbalance, anchor_loss, unbalance_loss
+from shell.damping.anisotropy import Complex, Ripple, damping_wave, surface_weight
+from shell.damping.budget import (
+    Budget,
+    LossCause,
+    activated_cause,
+    bulk_cause,
+    constant_cause,
+    gas_cause,
+    loss_budget,
+    surface_cause,
+    thermoelastic_cause,
+)
+from shell.damping.faces import Vibration
+from shell.damping.gas import GASES, gas_loss, most_squeezed
+from shell.damping.heat import Heat
+from shell.damping.sources import known_losses
+from shell.elastic import Elastic
+from shell.imperfection import Pair
+from shell.layout import Theory
+from shell.modes import Mode, solve_modes
+from shell.resonator import Resonator
 from studies.errors import InputError, naming, nearest
+from studies.instrument.card import Instrument
+from studies.instrument.tables.loss_parts import LossParts
 from studies.loss.films import film_losses
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
-
-    from shell.damping.anchor import Unbalance
-    from shell.damping.anisotropy import Complex, Ripple
-    from shell.damping.budget import Budget, LossCause
-    from shell.damping.faces import Vibration
-    from shell.damping.heat import Heat
-    from shell.elastic import Elastic
-    from shell.layout import Theory
-    from shell.modes import Mode
-    from shell.resonator import Resonator
-    from studies.instrument.card import Instrument
-    from studies.instrument.tables.loss_parts import LossParts
 
 
 @dataclass(frozen=True)
 class LossModel:
     """The causes of loss of one mode of an instrument."""
 
-    vibration: "Vibration"  # the solved mode
-    causes: "tuple[LossCause, ...]"  # what loses energy, with uncertainty and source
+    vibration: Vibration  # the solved mode
+    causes: tuple[LossCause, ...]  # what loses energy, with uncertainty and source
     left_out: tuple[str, ...]  # sentences on what the budget does not have, and what would bring it in
-    ripples: "tuple[Ripple, ...]"  # how parts vary around the axis
+    ripples: tuple[Ripple, ...]  # how parts vary around the axis
     # bryan_factor, frequency: of the mode, Hz at the reference temperature.
     bryan_factor: float
     frequency: float
@@ -43,28 +55,22 @@ class LossModel:
         """N of the mode."""
         return self.vibration.solution.system.n
 
-    def wave(self, budget: "Budget") -> "Complex":
+    def wave(self, budget: Budget) -> Complex:
         """Δ(1/Q) exp(2 i n θ_τ) over the budget's temperatures; 0 where nothing varies around."""
-        from shell.damping.anisotropy import damping_wave
-
         return damping_wave(budget, self.ripples, self.harmonic)
 
-    def budget(self, temperatures: "ArrayLike") -> "Budget":
+    def budget(self, temperatures: ArrayLike) -> Budget:
         """The budget at temperatures (K)."""
-        from shell.damping.budget import loss_budget
-
         return loss_budget(self.vibration, self.causes, temperatures)
 
 
 def loss_model(
-    instrument: "Instrument", harmonic: int = 2, theory: "Theory" = "solid", anchor: bool = False,
-    mode: "Mode | None" = None,
+    instrument: Instrument, harmonic: int = 2, theory: Theory = "solid", anchor: bool = False,
+    mode: Mode | None = None,
 ) -> LossModel:  # fmt: skip
     """Solve the lowest mode of a harmonic and gather its causes of loss; the `anchor`, what a stem sends into its base,
     takes a second or two. `mode`: where it is known, at the reference temperature.
     """
-    from shell.damping.faces import Vibration
-
     T0, material = instrument.reference_temperature, instrument.material
     mode = mode or solve_lowest(instrument.resonator, material.elastic(T0), harmonic, theory)
     vibration = Vibration.of(mode, material, T0)
@@ -103,8 +109,7 @@ def loss_model(
     return LossModel(vibration, tuple(causes), tuple(left_out), tuple(ripples), mode.bryan_factor, mode.frequency)
 
 
-def _thermoelastic(instrument: "Instrument", vibration: "Vibration", heat: "Callable[[float], Heat]") -> "LossCause":
-    from shell.damping.budget import thermoelastic_cause
+def _thermoelastic(instrument: Instrument, vibration: Vibration, heat: Callable[[float], Heat]) -> LossCause:
 
     T0, material = instrument.reference_temperature, instrument.material
     prior = dict(zip(material.prior.names, material.prior.sd, strict=True))
@@ -117,8 +122,7 @@ def _thermoelastic(instrument: "Instrument", vibration: "Vibration", heat: "Call
     )
 
 
-def _heat_law(instrument: "Instrument") -> "tuple[Callable[[float], Heat] | None, str]":
-    from shell.damping.heat import Heat
+def _heat_law(instrument: Instrument) -> tuple[Callable[[float], Heat] | None, str]:
 
     material, thermal = instrument.material, instrument.thermal
     given = {"conductivity": thermal.conductivity_W_per_m_K, "heat_capacity": thermal.heat_capacity_J_per_kg_K}
@@ -139,10 +143,8 @@ def _heat_law(instrument: "Instrument") -> "tuple[Callable[[float], Heat] | None
 
 
 def _of_material(
-    instrument: "Instrument", parts: "LossParts", spread: Mapping[str, float], left_out: list[str]
-) -> "list[LossCause]":
-    from shell.damping.budget import bulk_cause, surface_cause
-    from shell.damping.sources import known_losses
+    instrument: Instrument, parts: LossParts, spread: Mapping[str, float], left_out: list[str]
+) -> list[LossCause]:
 
     known, causes = known_losses(instrument.material.name), []
     bulk: Mapping[str, Any] = known.get("bulk", {})
@@ -175,11 +177,8 @@ def _of_material(
     return causes
 
 
-def _ohmic(instrument: "Instrument", mode: "Mode") -> "list[LossCause]":
+def _ohmic(instrument: Instrument, mode: Mode) -> list[LossCause]:
     """What the bias currents of charged electrodes lose in the resistances of [electrodes]."""
-    from shell.damping.budget import constant_cause
-    from shell.imperfection import Pair
-
     card = instrument.part("electrodes")
     if not (card.are_charged and card.keys.resistance_ohm and mode.harmonic):
         return []
@@ -188,8 +187,7 @@ def _ohmic(instrument: "Instrument", mode: "Mode") -> "list[LossCause]":
     return [constant_cause("electrodes", value, GAP_SD, source, "less bias, a wider gap or a smaller resistance")]
 
 
-def _surface_ripple(parts: "LossParts", vibration: "Vibration", causes: "Sequence[LossCause]") -> "list[Ripple]":
-    from shell.damping.anisotropy import Ripple, surface_weight
+def _surface_ripple(parts: LossParts, vibration: Vibration, causes: Sequence[LossCause]) -> list[Ripple]:
 
     if parts.surface_anisotropy is None or not any(cause.name == "surface" for cause in causes):
         return []
@@ -198,30 +196,22 @@ def _surface_ripple(parts: "LossParts", vibration: "Vibration", causes: "Sequenc
 
 
 @lru_cache(maxsize=8)
-def solve_lowest(resonator: "Resonator", elastic: "Elastic", harmonic: int, theory: "Theory") -> "Mode":
+def solve_lowest(resonator: Resonator, elastic: Elastic, harmonic: int, theory: Theory) -> Mode:
     """The lowest mode; kept, since many values of a card leave it as it is."""
-    from shell.modes import solve_modes
-
     return solve_modes(resonator, elastic, harmonic, theory=theory)[0]
 
 
 @lru_cache(maxsize=8)
-def _unbalance(mode: "Mode", elastic: "Elastic") -> "Unbalance":
+def _unbalance(mode: Mode, elastic: Elastic) -> Unbalance:
     """What an unbalanced rim costs the mode n = 2; kept, since many values of a card leave it as it is."""
-    from shell.damping.anchor import unbalance_loss
-
     return unbalance_loss(mode, elastic)
 
 
 def _others(
-    instrument: "Instrument", vibration: "Vibration", parts: "LossParts", spread: Mapping[str, float],
+    instrument: Instrument, vibration: Vibration, parts: LossParts, spread: Mapping[str, float],
     left_out: list[str],
-) -> "list[LossCause]":  # fmt: skip
+) -> list[LossCause]:  # fmt: skip
     """Gas, activated losses, and what leaves through the mount as the card gives it."""
-    from shell.constants import zero_Celsius
-    from shell.damping.budget import activated_cause, constant_cause, gas_cause
-    from shell.damping.gas import GASES, gas_loss, most_squeezed
-
     causes = []
     if parts.pressure_Pa is None:
         left_out.append("gas: give pressure_Pa of the sealed housing.")
@@ -249,13 +239,9 @@ MOUNT_ADVICE = "a longer or thinner stem, a stiffer joint, balance of the rim's 
 
 
 def _anchor(
-    instrument: "Instrument", mode: "Mode", rim: tuple[complex, complex], spread: Mapping[str, float], balanced: bool
-) -> "tuple[list[LossCause], list[Ripple]]":
+    instrument: Instrument, mode: Mode, rim: tuple[complex, complex], spread: Mapping[str, float], balanced: bool
+) -> tuple[list[LossCause], list[Ripple]]:
     """What the stem sends into a half-space of the resonator's own material: of the balanced mode, and of its imbalance."""
-    from shell.damping.anchor import anchor_loss
-    from shell.damping.anisotropy import Ripple
-    from shell.damping.budget import constant_cause
-
     elastic, causes, ripples = instrument.material.elastic(instrument.reference_temperature), [], []
     source = "waves in a half-space of the same material, with an absorbing layer"
     if balanced:
@@ -272,7 +258,7 @@ def _anchor(
     return causes, ripples
 
 
-def _rim_harmonics(instrument: "Instrument", parts: "LossParts") -> tuple[complex, complex]:
+def _rim_harmonics(instrument: Instrument, parts: LossParts) -> tuple[complex, complex]:
     """Σ m exp(iθ) and Σ m exp(3iθ) of the rim (kg): as the card gives them, and of its small masses there."""
     given = (
         (parts.unbalance_mg, parts.unbalance_azimuth_deg, 1),
@@ -291,6 +277,6 @@ def _rim_harmonics(instrument: "Instrument", parts: "LossParts") -> tuple[comple
 ON_RIM = 0.95  # position beyond which a small mass moves as the rim does
 
 
-def _relative_sds(instrument: "Instrument") -> dict[str, float]:
+def _relative_sds(instrument: Instrument) -> dict[str, float]:
     """Return the relative standard deviation of every uncertain number of `[loss]` by its dotted key."""
     return {v.name: v.sd / abs(v.value) for v in instrument.uncertain if v.name.startswith("loss.") and v.value}

@@ -1,16 +1,23 @@
 """The BVG paper's theory of the bell, (16)–(22), in numbers beside the shell solver, and its reading of the rate, (23)–(30)."""
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from compensation.loop import BellResonator, read_rate_from_drive, read_rate_from_loop, scale_of_rebalance
+from compensation.motion import demodulate
 from compensation.piezo import COUNT, DRIVE_Q, PiezoRing
+from shell.bell_theory import (
+    inextensional_functions,
+    rayleigh_functions,
+    rayleigh_functions_without_factor,
+    two_pattern_model,
+)
+from shell.curves import Arc
+from shell.damping.faces import shell_faces
+from shell.modes import solve_modes
 from studies.instrument.card import load_card
 from studies.results import Chapter, Column, Table
-
-if TYPE_CHECKING:
-    from compensation.loop import BellResonator
 
 CARD = "bvg-bell"
 D31_PZT5A = -1.71e-10  # C/N, of PZT-5A (data sheets of makers); the paper names the ceramic and no constant
@@ -40,14 +47,6 @@ class BellTheory:
 
 def compare_bell_theory() -> BellTheory:
     """Hold the pattern (19), the same without its factor cos(5πφ/φ_b), and one that does not stretch against the solver."""
-    from shell.bell_theory import (
-        inextensional_functions,
-        rayleigh_functions,
-        rayleigh_functions_without_factor,
-        two_pattern_model,
-    )
-    from shell.modes import solve_modes
-
     instrument = load_card(CARD)
     resonator = instrument.resonator
     elastic = instrument.material.elastic(instrument.reference_temperature)
@@ -88,9 +87,6 @@ class LoopReading:
 def read_planted_rate(planted: float = 2.0) -> LoopReading:
     """Integrate (23) with a coupling c₁ and read a rate (rad/s) back by (24)–(26) for amplitudes, by (27)–(29) and by (30)."""
     from scipy.integrate import solve_ivp
-
-    from compensation.loop import read_rate_from_drive, read_rate_from_loop, scale_of_rebalance
-    from compensation.motion import demodulate
 
     bell, ring, share = _bell_with_elements()
     omega = bell.omega
@@ -134,13 +130,8 @@ def read_planted_rate(planted: float = 2.0) -> LoopReading:
     )  # fmt: skip
 
 
-def _bell_with_elements() -> "tuple[BellResonator, PiezoRing, float]":
+def _bell_with_elements() -> tuple[BellResonator, PiezoRing, float]:
     """The card's bell as (23) with a coupling c₁, the elements on its cylinder, and σ_φφ over the sum of the stresses there."""
-    from compensation.loop import BellResonator
-    from shell.curves import Arc
-    from shell.damping.faces import shell_faces
-    from shell.modes import solve_modes
-
     instrument = load_card(CARD)
     body = instrument.resonator
     (mode,) = solve_modes(body, instrument.material.elastic(instrument.reference_temperature))

@@ -5,11 +5,11 @@ point.
 """
 
 from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from compensation.arrays import Array
+from compensation.frequency import FrequencyFit, find_turn, invert
 from studies.errors import InputError, naming
 from studies.models.c_source import head, polynomial, self_test, write_c
 from studies.models.file import Model, ModelSource, make_part, widen
@@ -17,13 +17,10 @@ from studies.record import COMPENSATED, RESONATOR, Record
 from studies.record.plausible import check_model_frequency
 from studies.record.rest import TEMPERATURES
 
-if TYPE_CHECKING:
-    from compensation.frequency import FrequencyFit
-
 VARIABLE = "temperature_degC"
 
 
-def save_frequency(fit: "FrequencyFit", sources: tuple[ModelSource, ...], made_by: str) -> Model:
+def save_frequency(fit: FrequencyFit, sources: tuple[ModelSource, ...], made_by: str) -> Model:
     """Return a fitted curve as a model."""
     names = ["f0", *(f"a{k}" for k in range(1, fit.order + 1))]
     units = ["Hz", "Hz/degC", *(f"Hz/degC^{k}" for k in range(2, fit.order + 1))]
@@ -67,8 +64,6 @@ def evaluate(model: Model, temperature_degC: Array) -> Array:
 
 def find_temperature(model: Model, frequency: Array, path: str = "record", *, spare: bool = False) -> Array:
     """Return the temperature (°C) of a frequency, HRG paper Table 2; NaN without one or, to `spare` it, outside the model's range."""
-    from compensation.frequency import invert
-
     if not np.isfinite(frequency).any():
         raise InputError(f"{path}: the column 'frequency_Hz' has no value.")
     low, high = np.sort(evaluate(model, np.array(model.range_of(VARIABLE))))
@@ -117,15 +112,12 @@ def _test_rows(model: Model) -> list[tuple[float, ...]]:
 
 
 def _is_monotonic(model: Model) -> bool:
-    from compensation.frequency import find_turn
 
     return find_turn(partial(evaluate, model), model.range_of(VARIABLE)) is None
 
 
-def _widen(fit: "FrequencyFit") -> tuple[float, float]:
+def _widen(fit: FrequencyFit) -> tuple[float, float]:
     """Return the fitted range, wider by a twentieth on each side, but not beyond where the curve turns round."""
-    from compensation.frequency import find_turn
-
     low, high = fit.temperature_range_degC
     lowest, highest = widen(low, high)
     below, above = (find_turn(fit.polynomial.value, span) for span in ((lowest, low), (high, highest)))

@@ -10,19 +10,17 @@ length, because readings scatter; outliers, which the fit leaves out, are not ju
 
 from collections.abc import Sequence
 from dataclasses import astuple
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from compensation.arrays import Array
+from compensation.bell import BellChain, PolynomialCurve, Warming, apply_chain
+from compensation.rate_law import FORMS, RateCurve
 from studies.errors import InputError
 from studies.models.c_source import head, polynomial, write_c
 from studies.models.file import Model, ModelPart, ModelSource, Setting, make_part, widen
 from studies.record import COMPENSATED, Record
 from studies.record.rest import drop_spikes
-
-if TYPE_CHECKING:
-    from compensation.bell import BellChain, PolynomialCurve
 
 RAW = ("output_counts", "measured_rate_deg_per_s")
 """Columns that can be the raw output; the first needs the rough scale, the second is a rate already."""
@@ -37,11 +35,9 @@ C_FORMS = {  # a rate law's own coefficient: its unit; and Ω over u = (y − a)
 
 
 def save_scale(
-    chain: "BellChain", output: str, temperature_column: str, sources: tuple[ModelSource, ...], made_by: str
+    chain: BellChain, output: str, temperature_column: str, sources: tuple[ModelSource, ...], made_by: str
 ) -> Model:
     """Return a fitted chain as a model that compensates the column `output`."""
-    from compensation.rate_law import RateCurve
-
     raw = "counts" if output == "output_counts" else "deg/s"
     units = raw, f"deg/s per {raw}"
     rough = make_part("rough", ("null", "scale"), (chain.null, chain.scale), units, chain.rough_covariance)
@@ -76,10 +72,8 @@ def save_scale(
     )
 
 
-def load_scale(model: Model) -> "BellChain":
+def load_scale(model: Model) -> BellChain:
     """Return the chain that a model file holds."""
-    from compensation.bell import BellChain, Warming
-
     rough, column = model.part("rough"), model.temperature_column
     for name in ("null", "scale"):
         if name not in rough.names:
@@ -110,8 +104,6 @@ def load_scale(model: Model) -> "BellChain":
 
 def compensate(model: Model, record: Record, *, extrapolate: bool) -> dict[str, Array]:
     """Return the compensated rate; without a filter, rows that lack an input stay empty."""
-    from compensation.bell import apply_chain
-
     output, column = model.compensates, model.temperature_column
     model.check_inputs(record, column, outputs=RAW)
     complete = np.isfinite(record[output]) & np.isfinite(record[column])
@@ -161,8 +153,7 @@ def emit_c(model: Model) -> str:
     return f"{head(model)}\n{code}"
 
 
-def _save_curve(name: str, curve: "PolynomialCurve", units: Sequence[str]) -> ModelPart:
-    from compensation.rate_law import FORMS, RateCurve
+def _save_curve(name: str, curve: PolynomialCurve, units: Sequence[str]) -> ModelPart:
 
     names = [f"c{i}" for i in range(len(curve.coefficients))]
     if isinstance(curve, RateCurve):
@@ -171,9 +162,7 @@ def _save_curve(name: str, curve: "PolynomialCurve", units: Sequence[str]) -> Mo
     return make_part(name, names, curve.coefficients, [*units, *more][: len(names)], curve.covariance)
 
 
-def _load_curve(model: Model, name: str, limits: tuple[float, float]) -> "PolynomialCurve":
-    from compensation.bell import PolynomialCurve
-    from compensation.rate_law import FORMS, RateCurve
+def _load_curve(model: Model, name: str, limits: tuple[float, float]) -> PolynomialCurve:
 
     part, form = model.part(name), str(model.settings.get(FORM, "")) if name == "scale_over_rate" else ""
     if not form:
