@@ -1,9 +1,9 @@
 """Readings that a raw file should not have: spikes, stuck sensors, dropouts (counted; `drop` clears them)."""
 
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from compensation.arrays import Array
 from compensation.spikes import find_dropouts, find_spikes, find_stuck
@@ -12,10 +12,7 @@ from studies.importing.mapping import ColumnMap
 from studies.record import COMMANDED
 from studies.record.rest import LEAST_SPIKE
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-FINDERS: "Mapping[str, tuple[str, Callable[[Array], NDArray[np.bool_]]]]" = {
+FINDERS: Mapping[str, tuple[str, Callable[[Array], NDArray[np.bool_]]]] = {
     "spikes": ("spikes", lambda values: find_spikes(values, LEAST_SPIKE)),
     "stuck": ("readings of a sensor that is stuck", find_stuck),
     "zeros": ("dropouts to 0", find_dropouts),
@@ -40,7 +37,7 @@ def drop_doubtful(column: ColumnMap, values: Stored, folder: str | None) -> tupl
     return kept, notes
 
 
-def _drop(values: Stored, find: "Callable[[Array], NDArray[np.bool_]]", folder: str | None) -> tuple[Stored, int]:
+def _drop(values: Stored, find: Callable[[Array], NDArray[np.bool_]], folder: str | None) -> tuple[Stored, int]:
     """Make the marked readings missing; a long column is judged a portion at a time, with the rows beside it."""
     kept, count = Stored(folder), 0
     for begin in range(0, len(values), LOOKED_AT):

@@ -1,18 +1,15 @@
 """Rows in the order of their times: those without a time, and those that repeat others, are left out, spread or refused."""
 
 import itertools
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from compensation.arrays import Array
 from studies.errors import InputError
 from studies.files.stored import Stored, portions
 from studies.importing.mapping import SECONDS, FileMap
 from studies.importing.tables import Rows
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 
 def rises(time: Stored) -> bool:
@@ -59,8 +56,8 @@ class Order:
         return kept
 
     def _repeats(
-        self, kept: list[Stored], part: list[Array], at: "NDArray[np.intp]", begin: int, last: float, previous: int
-    ) -> "NDArray[np.bool_]":
+        self, kept: list[Stored], part: list[Array], at: NDArray[np.intp], begin: int, last: float, previous: int
+    ) -> NDArray[np.bool_]:
         """Mark rows that repeat rows of the files before theirs; rows of the same times that differ are refused."""
         t = part[0]
         again = t <= last
@@ -80,7 +77,7 @@ class Order:
         self.repeated[begin] = self.repeated.get(begin, 0) + int(again.sum())
         return np.asarray(again)
 
-    def _add(self, kept: list[Stored], part: list[Array], at: "NDArray[np.intp]") -> None:
+    def _add(self, kept: list[Stored], part: list[Array], at: NDArray[np.intp]) -> None:
         if not at.size:
             return
         before = self._held[0][-1] if self._held else kept[0].at(-1) if len(kept[0]) else -np.inf

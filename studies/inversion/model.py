@@ -7,16 +7,13 @@ another solve; by each dimension it is a central difference of two solves.
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from compensation.arrays import Array
+from shell.modes import Mode, TheoryRangeWarning, solve_modes
 from studies.calibration.priors import Priors
-
-if TYPE_CHECKING:
-    from shell.modes import Mode
-    from studies.instrument.card import Instrument
+from studies.instrument.card import Instrument
 
 STEP = 0.1  # prior standard deviations, of differences by a dimension
 
@@ -35,10 +32,10 @@ class ModeModel:
     """Predictions of modes of one card."""
 
     # instrument, priors: the card, and what is uncertain of it.
-    instrument: "Instrument"
+    instrument: Instrument
     priors: Priors
     tolerance: float  # relative error that a solve may have
-    _solved: dict[tuple[float, ...], "tuple[Mode, ...]"] = field(default_factory=dict)
+    _solved: dict[tuple[float, ...], tuple[Mode, ...]] = field(default_factory=dict)
 
     def predict(self, modes: Sequence[Which], u: Array) -> tuple[Array, Array]:
         """Return ln f of modes at a point, and the solver's relative errors."""
@@ -80,14 +77,13 @@ class ModeModel:
             change.append(np.log(b.E / a.E) / 2 + s.nu * (b.nu - a.nu) - np.log(b.rho / a.rho) / 2 - size)
         return np.array(change)
 
-    def _mode(self, which: Which, u: Array) -> "Mode":
+    def _mode(self, which: Which, u: Array) -> Mode:
         return self._at(which, self.priors.at(u))
 
-    def _at(self, which: Which, values: dict[str, float]) -> "Mode":
+    def _at(self, which: Which, values: dict[str, float]) -> Mode:
         return self._lowest(which.harmonic, which.temperature, values, which.index + 1)[which.index]
 
-    def _lowest(self, n: int, temperature: float, values: dict[str, float], count: int) -> "tuple[Mode, ...]":
-        from shell.modes import TheoryRangeWarning, solve_modes
+    def _lowest(self, n: int, temperature: float, values: dict[str, float], count: int) -> tuple[Mode, ...]:
 
         key = (n, temperature, *values.values())
         if len(self._solved.get(key, ())) < count:

@@ -16,12 +16,10 @@ from contextlib import suppress
 from hashlib import blake2b
 from multiprocessing.connection import Connection, Pipe
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import Any, NoReturn
 
 from studies.errors import InputError
-
-if TYPE_CHECKING:
-    from studies.sweeps.case import Case
+from studies.sweeps.case import Case
 
 MOST_MEMORY = 8 * 1024**3  # bytes of address space of the process
 IMPORT_LIMIT = 120.0  # s for the process to start and import the user's module
@@ -109,7 +107,7 @@ def _end_children() -> None:
     _children.clear()
 
 
-def ask(function: str, limit: float, case: "Case") -> float:
+def ask(function: str, limit: float, case: Case) -> float:
     """Return what a user's function says of a case."""
     instrument = case.instrument
     request = {"content": instrument.content, "path": instrument.path, "parameters": dict(case.parameters)}

@@ -1,21 +1,19 @@
 """The designs of a study: grids, lists, Latin hypercubes, Sobol sequences, Saltelli's and one-at-a-time designs."""
 
 from hashlib import blake2b
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from compensation.arrays import Array
 from studies.errors import InputError
+from studies.sweeps.definition import Study, StudyParameter
 from studies.sweeps.keys import MOST_CASES
-
-if TYPE_CHECKING:
-    from studies.sweeps.definition import Study, StudyParameter
 
 LEVELS = (-1.0, -0.5, 0.5, 1.0)  # of one parameter at a time, in half ranges about the nominal value
 
 
-def draw(study: "Study") -> Array:
+def draw(study: Study) -> Array:
     """Return the designs that a study asks for, (cases, parameters); texts as their place in the parameter's `values`."""
     if not study.parameters:
         return np.empty((1, 0))
@@ -27,7 +25,7 @@ def hash_designs(designs: Array) -> str:
     return blake2b(designs.astype("<f8").tobytes(), digest_size=16).hexdigest()
 
 
-def count_cases(study: "Study") -> int:
+def count_cases(study: Study) -> int:
     """Return how many designs a study has, without drawing them."""
     method, d = study.sampling.method, len(study.parameters)
     if not d:
@@ -41,41 +39,41 @@ def count_cases(study: "Study") -> int:
     return study.sampling.cases * (d + 2 if method == "sensitivity" else 1)
 
 
-def coding(study: "Study") -> tuple[tuple[str, tuple[str, ...]], ...]:
+def coding(study: Study) -> tuple[tuple[str, tuple[str, ...]], ...]:
     """Return the names of the parameters, each with its texts, the nominal one last (`studies.sweeps.block.decode`)."""
     return tuple((p.name, (*p.values, p.nominal) if isinstance(p.nominal, str) else ()) for p in study.parameters)
 
 
-def nominal_row(study: "Study") -> Array:
+def nominal_row(study: Study) -> Array:
     """Return the nominal design as a row of a design, array (parameters,)."""
     return np.array([-1.0 if isinstance(p.nominal, str) else float(p.nominal) for p in study.parameters])
 
 
-def nominal_design(study: "Study") -> dict[str, Any]:
+def nominal_design(study: Study) -> dict[str, Any]:
     """Return the parameters of the nominal design by name."""
     return {p.name: p.nominal for p in study.parameters}
 
 
-def _grid(study: "Study") -> Array:
+def _grid(study: Study) -> Array:
     if count_cases(study) > MOST_CASES:
         raise InputError(f"the grid has {count_cases(study)} cases, above {MOST_CASES}; take fewer or a sample.")
     axes = [_axis(p) if p.values else _spread(p) for p in study.parameters]
     return np.stack([x.ravel() for x in np.meshgrid(*axes, indexing="ij")], axis=1)
 
 
-def _axis(parameter: "StudyParameter") -> Array:
+def _axis(parameter: StudyParameter) -> Array:
     if isinstance(parameter.nominal, str):
         return np.arange(len(parameter.values), dtype=float)
     return np.array(parameter.values, dtype=float)
 
 
-def _spread(parameter: "StudyParameter") -> Array:
+def _spread(parameter: StudyParameter) -> Array:
     if parameter.distribution == "log-uniform":
         return np.geomspace(parameter.low, parameter.high, parameter.count or 2)
     return np.linspace(parameter.low, parameter.high, parameter.count or 2)
 
 
-def _listed(study: "Study") -> Array:
+def _listed(study: Study) -> Array:
     lengths = {p.name: len(p.values) for p in study.parameters}
     if len(set(lengths.values())) > 1:
         words = ", ".join(f"{name}: {length}" for name, length in lengths.items())
@@ -83,18 +81,18 @@ def _listed(study: "Study") -> Array:
     return np.stack([_axis(p) for p in study.parameters], axis=1)
 
 
-def _hypercube(study: "Study") -> Array:
+def _hypercube(study: Study) -> Array:
     from scipy.stats import qmc
 
     rng = np.random.default_rng(study.sampling.seed)
     return _scale(study, qmc.LatinHypercube(len(study.parameters), rng=rng).random(study.sampling.cases))
 
 
-def _sobol(study: "Study") -> Array:
+def _sobol(study: Study) -> Array:
     return _scale(study, _sobol_points(len(study.parameters), study))
 
 
-def _saltelli(study: "Study") -> Array:
+def _saltelli(study: Study) -> Array:
     """Rows of A, then B, then for each parameter A with that parameter's column from B (Saltelli 2010)."""
     d = len(study.parameters)
     points = _scale(study, _sobol_points(2 * d, study).reshape(-1, 2, d).reshape(-1, d)).reshape(-1, 2, d)
@@ -103,14 +101,14 @@ def _saltelli(study: "Study") -> Array:
     return np.concatenate([A, B, *mixed])
 
 
-def _sobol_points(dimensions: int, study: "Study") -> Array:
+def _sobol_points(dimensions: int, study: Study) -> Array:
     from scipy.stats import qmc
 
     engine = qmc.Sobol(dimensions, rng=np.random.default_rng(study.sampling.seed))
     return np.asarray(engine.random_base2(study.sampling.cases.bit_length() - 1))
 
 
-def _one_at_a_time(study: "Study") -> Array:
+def _one_at_a_time(study: Study) -> Array:
     middle = np.array([float(p.nominal) for p in study.parameters])
     rows = [middle]
     for k, parameter in enumerate(study.parameters):
@@ -122,12 +120,12 @@ def _one_at_a_time(study: "Study") -> Array:
     return np.array(rows)
 
 
-def _scale(study: "Study", unit: Array) -> Array:
+def _scale(study: Study, unit: Array) -> Array:
     """Map points of the unit cube, row by row, through the inverse distribution of every parameter."""
     return np.stack([_quantile(p, unit[:, k]) for k, p in enumerate(study.parameters)], axis=1)
 
 
-def _quantile(parameter: "StudyParameter", p: Array) -> Array:
+def _quantile(parameter: StudyParameter, p: Array) -> Array:
     from scipy import stats
 
     low, high, middle = parameter.low, parameter.high, float(parameter.nominal)

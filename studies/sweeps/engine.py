@@ -9,20 +9,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from math import ceil
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from compensation.arrays import Array
+from studies.progress import Progress
 from studies.sweeps.block import Batch, Cases, join
+from studies.sweeps.definition import Study
 from studies.sweeps.evaluate import WorkPlan, evaluate_task, failed_cases
+from studies.sweeps.store import Store
 from studies.sweeps.workers import Here, Pool, Workers, cores, run_tasks
-
-if TYPE_CHECKING:
-    from studies.progress import Progress
-    from studies.sweeps.definition import Study
-    from studies.sweeps.store import Store
 
 TASK_SECONDS = 1.0  # a task should last so long: long against its cost, short against what kill -9 may lose
 BATCH, BATCH_VECTORISED = 8, 16384  # cases, where the spec says nothing
@@ -46,7 +43,7 @@ class Batches:
         return Batch(places, self.designs[places])
 
 
-def missing_batches(study: "Study", designs: Array, store: "Store", vectorised: bool) -> Batches:
+def missing_batches(study: Study, designs: Array, store: Store, vectorised: bool) -> Batches:
     """Return, in order, the cases that the store lacks, in the batches that the spec fixes."""
     count, done = len(designs), store.done
     lacking = np.ones(count, dtype=bool)
@@ -56,7 +53,7 @@ def missing_batches(study: "Study", designs: Array, store: "Store", vectorised: 
     return Batches(designs, deque(part for part in parts if len(part)))
 
 
-def batch_size(study: "Study", vectorised: bool) -> int:
+def batch_size(study: Study, vectorised: bool) -> int:
     """Return the number of cases that are computed and kept together."""
     return study.sampling.batch or (BATCH_VECTORISED if vectorised else BATCH)
 
@@ -72,7 +69,7 @@ def hire(workers: int | None, scheduler: str | None = None) -> Workers:
 
 
 def compute(
-    plan: WorkPlan, batches: Batches | deque[Batch], workers: Workers, store: "Store", progress: "Progress"
+    plan: WorkPlan, batches: Batches | deque[Batch], workers: Workers, store: Store, progress: Progress
 ) -> None:
     """Evaluate all batches and keep their rows; returns when every case is in the store."""
     size = 1
@@ -89,7 +86,7 @@ def compute(
         size = max(1, min(int(TASK_SECONDS / max(each, 1e-9)), ceil(len(batches) / (8 * workers.count))))
 
 
-def _keep(found: Sequence[Cases], store: "Store", progress: "Progress") -> None:
+def _keep(found: Sequence[Cases], store: Store, progress: Progress) -> None:
     together = max(1, BLOCK // max(len(cases.batch) for cases in found))
     for first in range(0, len(found), together):
         cases = join(found[first : first + together])

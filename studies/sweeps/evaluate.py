@@ -6,7 +6,7 @@ import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -15,14 +15,12 @@ from studies.instrument.card import Instrument
 from studies.sweeps.block import Batch, Cases, Remark, Row, decode, each_design, join
 from studies.sweeps.case import Case
 from studies.sweeps.child import FunctionFailed, FunctionLost
+from studies.sweeps.definition import Study
 from studies.sweeps.design import coding
 from studies.sweeps.expressions import Derived
+from studies.sweeps.families import Families
 from studies.sweeps.parameters import set_parameters
 from studies.sweeps.quantity import HarmonicQuantity, Number, Quantity
-
-if TYPE_CHECKING:
-    from studies.sweeps.definition import Study
-    from studies.sweeps.families import Families
 
 
 @dataclass(frozen=True)
@@ -32,12 +30,12 @@ class WorkPlan:
     instrument: Instrument
     coding: tuple[tuple[str, tuple[str, ...]], ...]
     asked: tuple[Quantity, ...]
-    families: "Families | None" = None
+    families: Families | None = None
     derived: tuple[Derived, ...] = ()
     start: Mapping[str, Any] | None = None
 
     @classmethod
-    def of(cls, study: "Study", families: "Families | None" = None) -> "WorkPlan":
+    def of(cls, study: Study, families: Families | None = None) -> "WorkPlan":
         """Return the plan of a study."""
         return cls(study.instrument, coding(study), study.asked, families, study.derived)
 

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,12 +16,10 @@ from shell.material import Material
 from shell.resonator import Resonator
 from studies.errors import UNUSABLE_INPUT, InputError
 from studies.instrument.card import Instrument
+from studies.sweeps.definition import Study
 from studies.sweeps.parameters import TEMPERATURE, set_parameters
 from studies.sweeps.quantities.tcf import PARTS, STEEPEST
 from studies.sweeps.quantity import ModeQuantity, Quantity
-
-if TYPE_CHECKING:
-    from studies.sweeps.definition import Study
 
 Designs = Mapping[str, NDArray[Any]]  # columns of parameters by name
 FEWEST = 64  # cases from which a family may cost less than solving each design
@@ -103,7 +101,7 @@ def _choices(count: int) -> Iterator[tuple[int, ...]]:
     return product(range(len(NODES)), repeat=count)
 
 
-def _build_nodes(study: "Study", design: Array) -> _Nodes | None:
+def _build_nodes(study: Study, design: Array) -> _Nodes | None:
     """Return materials at nodes where many designs have one of their own; None where these are few, or not followed."""
     places = [k for k, p in enumerate(study.parameters) if p.name.startswith(MATERIAL)]
     if not 0 < len(places) <= MOST_AXES or any(isinstance(study.parameters[k].nominal, str) for k in places):
@@ -126,7 +124,7 @@ def _build_nodes(study: "Study", design: Array) -> _Nodes | None:
     return nodes if all(close) else None
 
 
-def why_not(study: "Study") -> str:
+def why_not(study: Study) -> str:
     """Return why a study cannot be computed through families, or nothing when it can."""
     if study.instrument.part("mount") is not None:
         return "families do not cover a [mount] that stresses the resonator"
@@ -145,7 +143,7 @@ def why_not(study: "Study") -> str:
     return ""
 
 
-def build_families(study: "Study", design: Array, most: int = MOST_SOLVES) -> Families | str:
+def build_families(study: Study, design: Array, most: int = MOST_SOLVES) -> Families | str:
     """Build the families that a study asks for, or say why it must be computed design by design."""
     reason = why_not(study)
     if reason:
@@ -176,7 +174,7 @@ def build_families(study: "Study", design: Array, most: int = MOST_SOLVES) -> Fa
     return Families(study.instrument, study.asked, members, _build_nodes(study, design))
 
 
-def choose_solver(study: "Study", design: Array) -> Families | None:
+def choose_solver(study: Study, design: Array) -> Families | None:
     """Return the families where the spec asks for them or lets them be, None where every design is solved in full."""
     wanted, count = study.sampling.solver, len(design)
     if wanted == "full" or (wanted == "auto" and count < FEWEST):
@@ -256,12 +254,12 @@ def _describe(
     return _Bodies(T, growth, E, nu, rho, materials)
 
 
-def _range(study: "Study", design: Array, k: int) -> tuple[float, float]:
+def _range(study: Study, design: Array, k: int) -> tuple[float, float]:
     p, values = study.parameters[k], design[:, k]
     return min(float(values.min()), p.low, float(p.nominal)), max(float(values.max()), p.high, float(p.nominal))
 
 
-def _ends(study: "Study", design: Array) -> dict[str, NDArray[Any]]:
+def _ends(study: Study, design: Array) -> dict[str, NDArray[Any]]:
     """Return designs at the ends of temperature and every material parameter, which bound ν of all designs."""
     fixed = [T for T in (one.options["temperature_degC"] for one in study.asked) if T is not None]
     choices: dict[str, Sequence[Any]] = {}

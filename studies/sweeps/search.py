@@ -3,23 +3,21 @@
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from itertools import product
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from compensation.arrays import Array
 from studies.progress import Progress
 from studies.sweeps.block import Batch, Row, decode, each_design
+from studies.sweeps.definition import Study, StudyParameter
 from studies.sweeps.design import draw, nominal_row
 from studies.sweeps.engine import BATCH_VECTORISED, compute
 from studies.sweeps.evaluate import WorkPlan
 from studies.sweeps.keys import Search, ToleranceSearch, WorstCase
+from studies.sweeps.store import Store
 from studies.sweeps.tolerance import place_limits
 from studies.sweeps.workers import Workers
-
-if TYPE_CHECKING:
-    from studies.sweeps.definition import Study, StudyParameter
-    from studies.sweeps.store import Store
 
 STEP = 1e-2  # of a range, for differences: large against the solver's noise
 MOST_FACTORS = 20  # factors of the tolerances that are tried
@@ -35,10 +33,10 @@ class Explorer:
 
     def __init__(
         self,
-        study: "Study",
+        study: Study,
         plan: WorkPlan,
         workers: Workers,
-        store: "Store",
+        store: Store,
         progress: Progress = Progress(),  # noqa: B008 that shows nothing
     ) -> None:
         self.study, self.plan, self.workers, self.store, self.progress = study, plan, workers, store, progress
@@ -69,7 +67,7 @@ class Explorer:
         return each_design(decode(self.plan.coding, design[None]), 1)[0]
 
 
-def run_searches(study: "Study", plan: WorkPlan, workers: Workers, store: "Store") -> None:
+def run_searches(study: Study, plan: WorkPlan, workers: Workers, store: Store) -> None:
     """Compute the nominal design and every search of a study, and keep what they find."""
     explorer = Explorer(study, plan, workers, store)
     explorer.cases(nominal_row(study)[None])
@@ -165,7 +163,7 @@ def find_tolerance(explorer: Explorer, search: ToleranceSearch) -> dict[str, Any
     }
 
 
-def _tolerance(parameter: "StudyParameter", factor: float) -> dict[str, Any]:
+def _tolerance(parameter: StudyParameter, factor: float) -> dict[str, Any]:
     middle = float(parameter.nominal)
     if parameter.standard_deviation is not None:
         return {"name": parameter.name, "standard_deviation": factor * parameter.standard_deviation}
@@ -176,7 +174,7 @@ def _tolerance(parameter: "StudyParameter", factor: float) -> dict[str, Any]:
 SEARCHES: Mapping[str, Callable[..., dict[str, Any]]] = {"worst-case": find_worst_case, "tolerance": find_tolerance}
 
 
-def _starts(free: "Sequence[StudyParameter]") -> Array:
+def _starts(free: Sequence[StudyParameter]) -> Array:
     """Return the middle and the corners of the unit box; with many parameters the middles of its faces instead."""
     d = len(free)
     middle = np.array([_share(p, float(p.nominal)) for p in free])
@@ -186,7 +184,7 @@ def _starts(free: "Sequence[StudyParameter]") -> Array:
     return np.array([middle, *faces])
 
 
-def _place(study: "Study", free: "Sequence[StudyParameter]", shares: Array) -> Array:
+def _place(study: Study, free: Sequence[StudyParameter], shares: Array) -> Array:
     """Return designs at shares 0 ... 1 of the free parameters' ranges, array (m, free); the others are nominal."""
     designs = np.tile(nominal_row(study), (len(shares), 1))
     for p, share in zip(free, shares.T, strict=True):
@@ -194,5 +192,5 @@ def _place(study: "Study", free: "Sequence[StudyParameter]", shares: Array) -> A
     return designs
 
 
-def _share(parameter: "StudyParameter", value: float) -> float:
+def _share(parameter: StudyParameter, value: float) -> float:
     return (value - parameter.low) / (parameter.high - parameter.low)

@@ -1,17 +1,13 @@
 """Which parameter matters: Sobol indices, local slopes, linear shares; each with an interval, none where cases lack."""
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from compensation.arrays import Array
 from studies.errors import InputError
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
-
-    from studies.sweeps.results import Results
+from studies.sweeps.results import Results
 
 RESAMPLES = 1000
 SHOWN = 10
@@ -59,7 +55,7 @@ class LinearShares:
     r_squared: float
 
 
-def sobol_indices(results: "Results", column: str) -> SobolIndices:
+def sobol_indices(results: Results, column: str) -> SobolIndices:
     """Return the Sobol indices of a column from a study with method = "sensitivity" (Saltelli 2010, table 2 b and f)."""
     study = results.study
     if study.sampling.method != "sensitivity":
@@ -89,7 +85,7 @@ def _indices(A: Array, B: Array, AB: Array) -> tuple[Array, Array]:
     return first, total
 
 
-def local_slopes(results: "Results", column: str) -> list[LocalSlope]:
+def local_slopes(results: Results, column: str) -> list[LocalSlope]:
     """Return the slopes at the nominal design of polynomials through each parameter's levels; ±: to that of inner levels, and error."""
     study = results.study
     if study.sampling.method != "one-at-a-time":
@@ -113,7 +109,7 @@ def _derivative(x: Array, y: Array) -> float:
     return float(polynomial.deriv()(x[0]))
 
 
-def linear_shares(results: "Results", column: str) -> LinearShares | None:
+def linear_shares(results: Results, column: str) -> LinearShares | None:
     """Return the linear influence of every numeric parameter over a sample; None of too few cases or a constant column."""
     from scipy.special import stdtrit
 
@@ -150,7 +146,7 @@ def linear_shares(results: "Results", column: str) -> LinearShares | None:
     return LinearShares(tuple(numeric), slopes * scale, half * scale, share, 1 - squares / float(scatter[d, d]))
 
 
-def _numbers(results: "Results", numeric: "Sequence[str]", column: str) -> "Iterator[Array]":
+def _numbers(results: Results, numeric: Sequence[str], column: str) -> Iterator[Array]:
     """Give the numeric parameters and a column of the designs that have it, some thousand at a time."""
     for z in results.pieces(numeric, [column]):
         kept = z[:, np.isfinite(z[-1])]
@@ -158,7 +154,7 @@ def _numbers(results: "Results", numeric: "Sequence[str]", column: str) -> "Iter
             yield kept
 
 
-def _complete(results: "Results", column: str) -> Array:
+def _complete(results: Results, column: str) -> Array:
     """Return a column of which every case is there, or refuse with the list."""
     if results.done < results.total:
         raise InputError(f"{results.total - results.done} cases are not computed yet; resume the study.")

@@ -1,16 +1,14 @@
 """How many designs meet their requirements, with an interval, and how far values lie on the way to their limits."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from compensation.arrays import Array
 from studies.errors import InputError
 from studies.sweeps.keys import DRAWN, Requirement
-
-if TYPE_CHECKING:
-    from studies.sweeps.results import Results
+from studies.sweeps.results import Results
 
 
 class RequirementLimits(NamedTuple):
@@ -39,7 +37,7 @@ class Yield:
         return self.passed / max(self.cases - self.unknown, 1)
 
 
-def resolve_limits(results: "Results", requirement: Requirement) -> RequirementLimits:
+def resolve_limits(results: Results, requirement: Requirement) -> RequirementLimits:
     """Return the limits of a requirement; without a target they lie about the nominal design's value."""
     place = [column.name for column in results.study.columns].index(requirement.column)
     low, high = requirement.limits(float(results.nominal.values[place]) if results.nominal is not None else np.nan)
@@ -48,7 +46,7 @@ def resolve_limits(results: "Results", requirement: Requirement) -> RequirementL
     return RequirementLimits(requirement.column, low, high)
 
 
-def find_yield(results: "Results", requirements: tuple[Requirement, ...]) -> Yield:
+def find_yield(results: Results, requirements: tuple[Requirement, ...]) -> Yield:
     """Return the share of sampled designs that meet all the requirements; unknown is where no known value fails, but one lacks."""
     from scipy.special import ndtri
 

@@ -2,21 +2,19 @@
 
 from collections.abc import Iterator, Mapping
 from itertools import chain, product
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from shell.constants import zero_Celsius
 from studies.errors import UNUSABLE_INPUT, InputError
+from studies.sweeps.definition import Study
 from studies.sweeps.design import nominal_design
 from studies.sweeps.parameters import TEMPERATURE, set_parameters
-
-if TYPE_CHECKING:
-    from studies.sweeps.definition import Study
 
 MOST_CORNERS = 6  # parameters up to which all corners of the box are looked at
 SAMPLES = ("latin-hypercube", "sobol")
 
 
-def check_nominal(study: "Study", where: str) -> None:
+def check_nominal(study: Study, where: str) -> None:
     """Build the nominal design, and hold its thickness against the theory; temperatures must lie in the law's range."""
     problem = _problem(study, nominal_design(study))
     if problem:
@@ -30,7 +28,7 @@ def check_nominal(study: "Study", where: str) -> None:
         raise InputError(f"{where}: {error}") from error
 
 
-def find_invalid(study: "Study") -> list[str]:
+def find_invalid(study: Study) -> list[str]:
     """Return what is wrong with designs at the ends of each parameter and at the corners of the box; they fail as cases."""
     nominal = nominal_design(study)
     reach = {p.name: p.values if isinstance(p.nominal, str) else (p.low, p.high) for p in study.parameters}
@@ -39,7 +37,7 @@ def find_invalid(study: "Study") -> list[str]:
     return list(dict.fromkeys(problem for problem in problems if problem))
 
 
-def _problem(study: "Study", values: Mapping[str, Any]) -> str:
+def _problem(study: Study, values: Mapping[str, Any]) -> str:
     """Return what makes a design impossible, or nothing."""
     from shell.modes import THICKEST_SHELL
 
@@ -57,7 +55,7 @@ def _problem(study: "Study", values: Mapping[str, Any]) -> str:
     return ""
 
 
-def _corners(study: "Study") -> Iterator[Mapping[str, Any]]:
+def _corners(study: Study) -> Iterator[Mapping[str, Any]]:
     geometry = [p for p in study.parameters if p.name.startswith("resonator.") and not isinstance(p.nominal, str)]
     if len(geometry) > MOST_CORNERS:
         yield from ({p.name: value} for p in geometry for value in (p.low, p.high))
@@ -67,7 +65,7 @@ def _corners(study: "Study") -> Iterator[Mapping[str, Any]]:
         yield dict(zip(names, ends, strict=True))
 
 
-def check_sample(study: "Study", where: str) -> None:
+def check_sample(study: Study, where: str) -> None:
     """Raise when a study gives a search for tolerances no sample or nothing to keep."""
     if study.sampling.method not in SAMPLES:
         raise InputError(f"{where}: a search for tolerances needs designs that are drawn: method = 'latin-hypercube' or 'sobol', not '{study.sampling.method}'.")  # fmt: skip
