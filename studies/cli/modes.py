@@ -184,12 +184,12 @@ def _mount(m: Mode, instrument: Instrument, T: float) -> Entry | None:
 
 def _films(m: Mode, instrument: Instrument) -> list[Entry] | None:
     """Every film and its shift in ppm, null where its numbers are not known."""
-    if m.theory == "rayleigh":
+    if m.theory == "rayleigh" or not instrument.part("loss", "loss_parts").film:
         return None
     from studies.loss.films import film_shifts
 
     shifts = film_shifts(instrument, m)
-    return [row_of(one, "missing", film="material", shift_ppm=("relative", 1e6)) for one in shifts] or None
+    return [row_of(one, "missing", film="material", shift_ppm=("relative", 1e6)) for one in shifts]
 
 
 def _crystal(m: Mode, instrument: Instrument, T: float, tolerance: float) -> Entry | None:

@@ -1,17 +1,15 @@
 """Measured points of a surface: x y z text, PLY or STL, or a table of deviations over position and azimuth."""
 
+import logging
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
+import numpy as np
+
+from compensation.arrays import Array
 from studies.errors import InputError
 from studies.files.reading import check_file
-
-if TYPE_CHECKING:
-    from numpy import float64
-    from numpy.typing import NDArray
-
-    Array = NDArray[float64]
 
 UNITS = {"m": 1.0, "mm": 1e-3, "um": 1e-6}
 Unit = Literal["m", "mm", "um"]
@@ -24,12 +22,12 @@ GRID = "position"  # the first cell of a table
 class FaceGrid:
     """How far a face stands out of the material, m, (positions, azimuths); NaN where nothing was measured."""
 
-    position: "Array"
-    azimuth: "Array"
-    values: "Array"
+    position: Array
+    azimuth: Array
+    values: Array
 
 
-def read_cloud(path: str | Path, unit: Unit = "mm") -> "Array | FaceGrid":
+def read_cloud(path: str | Path, unit: Unit = "mm") -> Array | FaceGrid:
     """Points (count, 3) in m from text with x, y, z, or a table: `position,0,5,10,…` (°), then a position 0 … 1 and departures in µm."""
     file = check_file(path)
     if file.suffix.lower() in MESHES:
@@ -51,8 +49,7 @@ def _first_line(path: Path) -> tuple[str, int]:
     raise InputError(f"{path}: has no points.")
 
 
-def _read_text(path: Path, first: str) -> "Array":
-    import numpy as np
+def _read_text(path: Path, first: str) -> Array:
     import pandas as pd
 
     separator = next((mark for mark in (";", ",") if mark in first), r"\s+")
@@ -71,10 +68,8 @@ def _read_text(path: Path, first: str) -> "Array":
     return np.asarray(points)
 
 
-def _read_mesh(path: Path) -> "Array":
-    import logging
+def _read_mesh(path: Path) -> Array:
 
-    import numpy as np
     import trimesh
 
     logging.getLogger("trimesh").setLevel(logging.CRITICAL)  # what it cannot read is said below, in one sentence
@@ -95,7 +90,6 @@ FEWEST = 8  # azimuths of a table
 
 
 def _read_grid(path: Path, skipped: int) -> FaceGrid:
-    import numpy as np
     import pandas as pd
 
     try:

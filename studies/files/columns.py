@@ -11,17 +11,18 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, TypeAlias
 
+import numpy as np
+from numpy.typing import NDArray
+
 from studies.errors import InputError, nearest
 from studies.files.parquet import is_parquet, read_comments_and_names, read_table
 from studies.files.reading import MOST_BYTES, PORTION, opened, read_bytes
 from studies.progress import tell
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
     from pandas import DataFrame
 
-    Table: TypeAlias = dict[str, NDArray[np.float64]]
+Table: TypeAlias = dict[str, NDArray[np.float64]]
 
 LARGEST = 1e20  # no reading of an instrument, time or count is larger; what is larger would overflow in its powers
 _SOMETHING = re.compile(rb"\S")
@@ -36,7 +37,7 @@ class Columns:
     """The columns of one file under the names of its header, its comments, and the hash of its bytes."""
 
     path: str
-    values: "Mapping[str, NDArray[np.float64]]"
+    values: Mapping[str, NDArray[np.float64]]
     comments: tuple[str, ...] = ()
     sha256: str = ""
     first_line: int = field(default=2, repr=False)
@@ -49,7 +50,7 @@ class Columns:
         """Return file and line of a row, for a message."""
         return f"{self.path}, line {self.line(row)}"
 
-    def refuse(self, wrong: "NDArray[np.bool_]", words: str | Callable[[int], str]) -> None:
+    def refuse(self, wrong: NDArray[np.bool_], words: str | Callable[[int], str]) -> None:
         """Refuse the first row that is wrong, by its line, and say why."""
         if wrong.any():
             row = int(wrong.argmax())
@@ -195,10 +196,8 @@ def _check_names(
     return names
 
 
-def parse_fast(path: str | Path, start: int, names: Sequence[str]) -> "tuple[Table, str] | None":
+def parse_fast(path: str | Path, start: int, names: Sequence[str]) -> tuple[Table, str] | None:
     """Parse a clean table quickly, never all of its text in memory; None when the careful way must decide."""
-    import numpy as np
-
     table, done, sha256 = np.empty((len(names), 0)), 0, ""
     try:
         for rows, sha256, part in parse_portions(path, start, names):  # noqa: B007
@@ -212,10 +211,8 @@ def parse_fast(path: str | Path, start: int, names: Sequence[str]) -> "tuple[Tab
 
 def parse_portions(
     path: str | Path, start: int, names: Sequence[str], separator: str = ",", decimal: str = ".", most: int = MOST_BYTES
-) -> "Iterator[tuple[int, str, NDArray[np.float64]]]":
+) -> Iterator[tuple[int, str, NDArray[np.float64]]]:
     """Yield the number of all rows, the hash and the next rows (columns, rows) of a clean table; ValueError when the careful way must decide."""
-    import numpy as np
-
     with opened(path, most) as file:
         if (found := _scan(file, start, len(names), separator, decimal)) is None:
             raise ValueError("not plain numbers")
@@ -270,15 +267,14 @@ def _scan(file: IO[bytes], start: int, columns: int, separator: str, decimal: st
     return None if is_empty or between != rows * (columns - 1) else (rows, body, sum_.hexdigest())
 
 
-def _parse_with_care(path: str | Path, start: int, names: list[str], first_line: int) -> "tuple[Table, str]":
+def _parse_with_care(path: str | Path, start: int, names: list[str], first_line: int) -> tuple[Table, str]:
     data = _check_text(path, read_bytes(path))
     if not _SOMETHING.search(data, start):
         raise InputError(f"{path}: the table has a header but no rows; add one line per measurement.")
     return _parse_by_line(path, data[start:].decode(), names, first_line), hashlib.sha256(data).hexdigest()
 
 
-def _parse_by_line(path: str | Path, body: str, names: list[str], first_line: int) -> "Table":
-    import numpy as np
+def _parse_by_line(path: str | Path, body: str, names: list[str], first_line: int) -> Table:
 
     rows: list[list[float]] = []
     reader = csv.reader(io.StringIO(body, newline=""))
@@ -301,7 +297,6 @@ def _parse_by_line(path: str | Path, body: str, names: list[str], first_line: in
 
 
 def _check_size(columns: Columns) -> None:
-    import numpy as np
 
     for name, values in columns.values.items():
         large = np.abs(values) > LARGEST

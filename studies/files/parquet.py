@@ -3,17 +3,16 @@
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any
+from typing import IO, Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from studies.errors import InputError
 from studies.files.reading import digest, load_library, opened
 from studies.progress import tell
 
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
-    Table = Mapping[str, NDArray[np.float64]]
+Table = Mapping[str, NDArray[np.float64]]
 
 COMMENTS = b"hrg.comments"
 ROWS = 1 << 20  # of a row group
@@ -35,10 +34,8 @@ def read_comments_and_names(path: str | Path) -> tuple[tuple[str, ...], list[str
         raise InputError(f"{path}: its comments are not a list of texts; write the file again.") from None
 
 
-def read_table(path: str | Path) -> "tuple[dict[str, NDArray[np.float64]], str]":
+def read_table(path: str | Path) -> tuple[dict[str, NDArray[np.float64]], str]:
     """Return the columns as numbers, missing ones NaN, and the hash of the file."""
-    import numpy as np
-
     parquet, values = _open(path), {}
     for field in parquet.schema_arrow:
         if not str(field.type).startswith(("double", "float", "halffloat", "int", "uint")):
@@ -52,7 +49,7 @@ def read_table(path: str | Path) -> "tuple[dict[str, NDArray[np.float64]], str]"
     return values, digest(path)
 
 
-def write_table(file: IO[bytes], columns: "Table", comments: Sequence[str], path: str | Path) -> None:
+def write_table(file: IO[bytes], columns: Table, comments: Sequence[str], path: str | Path) -> None:
     """Write columns of numbers and comment lines."""
     arrow, parquet = load_library("pyarrow", path, "Parquet"), load_library("pyarrow.parquet", path, "Parquet")
     fields = [(name, arrow.float64()) for name in columns]

@@ -6,23 +6,21 @@ import statistics
 import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from studies.errors import InputError
 from studies.files.stored import Stored
 from studies.importing.channels import is_container, open_channels, sort_groups
 from studies.importing.draft_columns import comment_of, draft_column, draft_unknown, find_markers, guess_meanings
+from studies.importing.join import read_series, shift_between
 from studies.importing.look import Look, as_number, find_nominal, find_period, is_stamp, look_at, look_at_group, parting
 from studies.importing.mapping import NUMERIC_TIMES, SCHEMA, TABLE_TARGETS, FileMap, ImportMap
 from studies.importing.meaning import Meaning, find_meanings
 from studies.importing.offset import Offset, estimate_offset
+from studies.importing.resampling import ClockedFile
 from studies.importing.tables import shorten
 from studies.importing.timing import TIME_WORDS, find_time
 from studies.schema.keys import spell_value
 from studies.schema.reader import read_keys
-
-if TYPE_CHECKING:
-    from studies.importing.resampling import ClockedFile
 
 JUMPS = 20.0  # times that rows of one time lie farther apart than those of neighbouring times
 MOST_DEVICES = 50  # that one file may hold
@@ -96,8 +94,6 @@ def _group(paths: Sequence[str]) -> list[list[str]]:
 
 def _continues(paths: Sequence[str]) -> bool:
     """Tell whether the times of one file go on in the other; what the draft leaves to be filled matters to no time."""
-    from studies.importing.join import read_series
-
     draft = [line.replace("= 0.0    # CHECK", "= 1.0    # CHECK") for line in _draft_file(paths[0], ())[0]]
     try:
         file = _load_text(draft)
@@ -113,8 +109,6 @@ def _load_text(lines: Sequence[str]) -> FileMap:
 
 def _find_offsets(paths: Sequence[str], files: list[list[str]]) -> list[str]:
     """Offer the offset between the first file's clock and each other's, where their columns share enough."""
-    from studies.importing.join import read_series, shift_between
-
     try:
         series = [read_series([path], _load_text(_draft_file(path, ())[0])) for path in paths]
         shifts = [shift_between(series[0], other) for other in series]
@@ -152,7 +146,7 @@ def _offset(t1: Stored, y1: Stored, t2: Stored, y2: Stored, shift: float, alike:
     return estimate_offset(t1.thin(SEEN), y1.thin(SEEN), t2.thin(SEEN) + shift, y2.thin(SEEN), alike)
 
 
-def _source_of(series: "ClockedFile", target: str) -> str:
+def _source_of(series: ClockedFile, target: str) -> str:
     return next(f"'{column.source}'" for column in series.file.columns if column.target == target)
 
 
