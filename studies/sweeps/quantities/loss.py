@@ -2,7 +2,6 @@
 
 from typing import TYPE_CHECKING, Annotated
 
-from studies.loss.model import loss_model
 from studies.schema.keys import says
 from studies.sweeps.case import Case
 from studies.sweeps.quantity import Column, ModeQuantity, Number
@@ -37,6 +36,8 @@ class Loss(ModeQuantity, frozen=True, kw_only=True, tag="loss"):
 
 def find_budget(case: Case, asked: ModeQuantity, anchor: bool) -> "Budget":
     """Return the loss budget of a design; the anchor of a stem is computed where the card states none."""
+    from studies.loss.model import loss_model
+
     T, instrument = case.temperature(asked.temperature_degC), case.instrument
     followed = case.require_lowest(asked.harmonic, asked.theory, T)
     stem, stated = instrument.resonator.stem, instrument.part("loss", "loss_parts").anchor_inverse_q
