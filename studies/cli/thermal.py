@@ -22,6 +22,11 @@ from thermal.relaxation import find_relaxation, time_constant_sensitivities
 from thermal.resonator import shell_weights
 from thermal.transient import Transient, check_energy
 
+ONE_LUMP = (
+    "The stem is one lump, however many cells the shell has: the slowest constants are within about 1 %; of shell and stem alone the"
+    " shorter ones would be too long by half and more and are left out, and the first minutes after a jump are coarse."
+)
+
 
 @answers("hrg.thermal/1")
 def thermal(
@@ -64,8 +69,8 @@ def thermal(
         "temperature_degC": temperatures,
     }
     constants = [
-        {"network": words, "tau": modes.time_constants[:3].tolist() + [None] * 3}
-        for words, modes in (("whole heat path", whole), ("shell and stem alone", alone))
+        {"network": words, "tau": modes.time_constants[:count].tolist() + [None] * 3}
+        for words, modes, count in (("whole heat path", whole, 3), ("shell and stem alone", alone, 1))
     ]
     decisive = [{"constant": name, "effect": value} for name, value in list(influence.items())[:6]]
     return Result(
@@ -74,7 +79,7 @@ def thermal(
         f"Time constants and temperatures of the heat path for the chamber profile {profile}.",
         [
             Table(f"{instrument.name}: time constants at {T0 - zero_Celsius:g} °C", constants,
-                "network | tau.0: slowest (s) .0f | tau.1: second (s) .0f | tau.2: third (s) .0f"),
+                "network | tau.0: slowest (s) .0f | tau.1: second (s) .0f | tau.2: third (s) .0f", ONE_LUMP),
             Table("Sensitivity of the slowest time constant τ to each constant p", decisive,
                 [Column("constant", "constant", spell=name_constant), "effect: d ln τ / d ln p +.3f"]),
             Figure(lambda: _curves(transient, chamber, weights, names), "Temperatures in time."),

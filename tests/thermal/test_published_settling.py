@@ -1,14 +1,15 @@
 """The heat path of the gyro: settling of the HRG paper's Figure 3 and the emissivities of the field notes."""
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
 from scipy.optimize import brentq
 
 from thermal.errors import ThermalError
-from thermal.meridian import cut_meridian, lump
-from thermal.network import Boundary, Node, Radiator, assemble, linearise
+from thermal.meridian import cut_meridian, describe_meridian, lump
+from thermal.network import Boundary, Conductor, Node, Radiator, assemble, linearise
 from thermal.radiative import step_remaining
 from thermal.relaxation import find_relaxation
 from thermal.resonator import HeatPath, describe_resonator, describe_shell_and_stem, shell_weights
@@ -52,6 +53,25 @@ def test_shell_and_stem_alone_settle_in_the_range_of_the_theory_sheet():
     alone = replace(PATH, emissivity=0.0, stem_length=0.01)
     network = assemble([Boundary("base"), *describe_shell_and_stem(alone)])
     assert 700.0 < find_relaxation(network, 293.15).time_constants[0] < 1500.0
+
+
+def test_limits_one_lump_moves_the_slowest_constants_by_a_hundredth_and_the_next_by_more_than_half():
+    """The stem in 40 cells beside the one lump of the heat path; what `hrg thermal` says of it."""
+    count, path = 40, replace(PATH, emissivity=0.0, mount_exchange=0.0)
+    section = np.pi * path.stem_radius**2
+    half = path.stem_length / count / 2 / (path.conductivity * section)
+    capacity = path.volumetric_capacity * section * path.stem_length / count
+    names = ["base", *(f"stem-{k}" for k in range(count))]
+    fine = [Node(name, capacity) for name in names[1:]]
+    fine += [Conductor(*pair, 1 / (2 * half)) for pair in pairwise(names[1:])] + [Conductor("base", "stem-0", 1 / half)]
+    fine += describe_meridian(path.cells, names[-1], path.volumetric_capacity, path.conductivity, root_resistance=half)
+    lumped = describe_shell_and_stem(path)
+    around = [part for part in describe_resonator(path) if part not in lumped]
+    for others in ([Boundary("base")], around):
+        one, exact = (find_relaxation(assemble([*others, *of]), 293.15).time_constants for of in (lumped, fine))
+        assert one[0] == pytest.approx(exact[0], rel=0.015)
+    alone, exact = (find_relaxation(assemble([Boundary("base"), *of]), 293.15).time_constants for of in (lumped, fine))
+    assert 1.5 < alone[1] / exact[1] < 2.0
 
 
 def test_one_conductance_identified_from_95_percent_at_9000_s_leaves_under_1_percent_at_15000_s():
