@@ -73,7 +73,7 @@ def _read_material(where: str, name: str, entry: Any) -> Mapping[str, Material]:
     if not isinstance(default, str) or default not in laws:
         raise ShellError(f"{where}: default = '{default}' is not one of its laws{nearest(str(default), laws)}")
     ordered = [default, *(law for law in laws if law != default)]
-    return {law: _read_law(f"{where} law '{law}'", name, law, laws[law]) for law in ordered}
+    return {law: _read_law(_inside(where, f"laws.{law}"), name, law, laws[law]) for law in ordered}
 
 
 def _read_law(where: str, name: str, law: str, entry: Any) -> Material:
@@ -85,8 +85,8 @@ def _read_law(where: str, name: str, law: str, entry: Any) -> Material:
     low, high = (x + zero_Celsius for x in span)
     if low < 0:
         raise ShellError(f"{where}: range_degC begins below absolute zero.")
-    found = {p: _read_property(f"{where}: {p}", p, entry[p], span) for p in PROPERTIES if p in entry}
-    crystal = _read_crystal(f"{where}: crystal", entry["crystal"]) if "crystal" in entry else None
+    found = {p: _read_property(_inside(where, p), p, entry[p], span) for p in PROPERTIES if p in entry}
+    crystal = _read_crystal(_inside(where, "crystal"), entry["crystal"]) if "crystal" in entry else None
     if crystal is not None:
         if any(p in found for p in ELASTIC):
             raise ShellError(f"{where}: give a crystal or {', '.join(ELASTIC)}, not both.")
@@ -116,7 +116,7 @@ def _read_crystal(where: str, entry: Any) -> Crystal:
     _check_keys(where, entry, ("system", "axis", "at_degC", *SYSTEMS[system], *maps), required=SYSTEMS[system])
     tables = [entry.get(key, {}) for key in maps]
     for key, table in zip(maps, tables, strict=True):
-        _check_keys(f"{where} {key}", table, SYSTEMS[system])
+        _check_keys(_inside(where, key), table, SYSTEMS[system])
     constants = {key: entry[key] for key in SYSTEMS[system]}
     if not all(_is_number(x) for table in (constants, *tables) for x in (*table.values(), entry["at_degC"])):
         raise ShellError(f"{where}: constants, slopes, curvatures, uncertainties and at_degC must be numbers.")
@@ -152,14 +152,19 @@ def _read_property(where: str, name: str, entry: Any, span: list[float]) -> Prop
         raise ShellError(f"{where}: maximum_degC must differ from at_degC, between which the property rises.")
     coefficients = coefficient_names(name)
     uncertainty, unsettled = entry.get("uncertainty", {}), entry.get("unsettled", {})
-    _check_keys(f"{where} uncertainty", uncertainty, tuple(key for key in needed if key not in LISTS))
-    _check_keys(f"{where} unsettled", unsettled, coefficients)
+    _check_keys(_inside(where, "uncertainty"), uncertainty, tuple(key for key in needed if key not in LISTS))
+    _check_keys(_inside(where, "unsettled"), unsettled, coefficients)
     if not all(_is_number(x) and x >= 0 for x in (*uncertainty.values(), *unsettled.values())):
         raise ShellError(f"{where}: uncertainties must be numbers, zero or more.")
     a, b, c = (float(unsettled.get(one, 0.0)) for one in coefficients)
     result = Property(entry["form"], numbers, uncertainty, str(entry.get("source", "")), name not in SIGNED, (a, b, c))
     check_sign(where, name, result, span)
     return result
+
+
+def _inside(where: str, name: str) -> str:
+    """Return the place of a table in another: "file [x.laws.a]"."""
+    return f"{where[:-1]}.{name}]"
 
 
 def _check_keys(where: str, entry: Any, known: tuple[str, ...] | None, required: tuple[str, ...] = ()) -> None:

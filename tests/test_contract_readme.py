@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from studies.cli import main
+from studies.instrument.card import load_card
 from tests.compensation.two_oscillators import Gyro, noisy
 from tests.golden.answers import CASES
 
@@ -40,12 +41,20 @@ def _decay():
 def folder(tmp_path_factory):
     """A working folder as the README's reader has it: the card saved, a logger's file at hand."""
     made = tmp_path_factory.mktemp("first-hour")
-    (card,) = (text for kind, text in BLOCKS if kind == "toml")
+    card, steel = (text for kind, text in BLOCKS if kind == "toml")
     (made / "my-gyro.toml").write_text(card, encoding="utf-8")
+    (made / "steel.toml").write_text(steel, encoding="utf-8")
     (made / "logger.csv").write_text(LOGGER, encoding="utf-8")
     (made / "decay.csv").write_text(_decay(), encoding="utf-8")
     shutil.copytree(ROOT / "studies" / "papers", made / "studies" / "papers")
     return made
+
+
+def test_the_material_of_the_readme_is_one_for_a_card(folder):
+    named = ('name = "fused-silica"', 'name = "my-steel"\nfile = "steel.toml"')
+    (folder / "steel-gyro.toml").write_text((folder / "my-gyro.toml").read_text(encoding="utf-8").replace(*named))
+    material = load_card(folder / "steel-gyro.toml").material
+    assert material.value("youngs_modulus", 303.15) == pytest.approx(1.9e11 * (1 - 2.5e-3))
 
 
 def test_the_first_block_holds_the_two_commands():

@@ -18,7 +18,7 @@ def keys(kind: str = "card", *, table: str = "") -> Result:
     """List the keys of a file with their units, defaults, bounds and meaning.
 
     Args:
-        kind: card, study, design (hrg optimise), map (hrg import), model (hrg fit) or limits (hrg acceptance).
+        kind: card, study, design (hrg optimise), map (hrg import), model (hrg fit), limits (hrg acceptance) or material (a table for a card's [material] file).
         table: Only the keys of this table and the tables in it, such as thermal or loss.film.
     """
     if kind not in KINDS:
@@ -47,6 +47,7 @@ KINDS = {
     "map": "studies.importing.mapping:ImportMap",
     "model": "studies.models.file:ModelKeys",
     "limits": "studies.acceptance.limits:Limits",
+    "material": "studies.instrument.material_file:MaterialFile",
 }
 
 

@@ -17,12 +17,17 @@ class Keys(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
 def number(
     meaning: str = "", *, above: float | None = None, least: float | None = None, below: float | None = None,
     most: float | None = None, sd: float | None = None, relative_sd: float | None = None, example: Any = None,
+    unit: str | None = None,
 ) -> msgspec.Meta:  # fmt: skip
-    """Annotate a number with its meaning, its bounds in the unit of the key, and its uncertainty where a card states none (else exact)."""
+    """Annotate a number with its meaning, its bounds in the unit of the key, its uncertainty where a card states none (else exact), and its unit if the name has none."""
     prior = {key: value for key, value in (("sd", sd), ("relative_sd", relative_sd)) if value is not None}
     ends: Any = {"gt": above, "ge": least, "lt": below, "le": most}
     return msgspec.Meta(
-        **ends, description=meaning or None, examples=None if example is None else [example], extra=prior or None
+        **ends,
+        description=meaning or None,
+        examples=None if example is None else [example],
+        extra=prior or None,
+        extra_json_schema=None if unit is None else {"unit": unit},
     )
 
 

@@ -91,7 +91,7 @@ def _describe(field: inspect.Field) -> dict[str, Any]:
     ends = [(words, getattr(number, end, None)) for end, words in BOUNDS.items()]
     given = field.default is not NODEFAULT and field.default is not None and field.default != ()
     return {
-        "unit": None if number is None else unit_of(field.encode_name),
+        "unit": None if number is None else said.get("unit") or unit_of(field.encode_name),
         "type": " | ".join(_words(field)) or spell_wanted(options(field.type)).replace("a finite number", "a number"),
         "required": field.required,
         "default": field.default if given else None,

@@ -90,14 +90,14 @@ BROKEN = [
     (f"{SCHEMA}[x", ["TOML"]),
     (f"{OPENED}range_degC=[10, 0]", ["range_degC"]),
     (f"{OPENED}range_degC=[-300, 0]", ["absolute zero"]),
-    (LAW + 'young={form="constant",value=1}', ["'young'"]),
+    (LAW + 'young={form="constant",value=1}', ["[x.laws.a]", "'young'"]),
     (LAW + 'poisson_ratio={form="constant",value=0.6}', ["poisson_ratio"]),
     (LAW + 'crystal={system="cubic",axis="[001]",at_degC=20,C11=1e11,C12=2e11,C44=1e11}', ["stable"]),
     (LAW + 'crystal={system="cubic",axis="c",at_degC=20,C11=1e11,C12=2e10,C44=1e11}', ["axis", "[111]"]),
     (LAW + 'crystal={system="cubic",axis="[001]",at_degC=20,C11=1e11,C12=2e10}', ["C44", "missing"]),
     (LAW + 'crystal={system="cube",axis="[001]",at_degC=20}', ["cube", "cubic"]),
     (LAW + 'youngs_modulus={form="cubic"}', ["'cubic'"]),
-    (LAW + 'youngs_modulus={form="linear",value=1}', ["at_degC"]),
+    (LAW + 'youngs_modulus={form="linear",value=1}', ["[x.laws.a.youngs_modulus]", "at_degC"]),
     (LAW + 'youngs_modulus={form="table",temperature_degC=[0,5],values=[1,2]}', ["covers"]),
     (LAW + 'youngs_modulus={form="table",temperature_degC=[0,9],values=3}', ["values", "list"]),
     (LAW + 'youngs_modulus={form="table",temperature_degC=3,values=[1,2]}', ["temperature_degC", "list"]),
@@ -105,7 +105,7 @@ BROKEN = [
     (LAW + 'youngs_modulus={form=["constant"],value=1}', ["form"]),
     (LAW + 'youngs_modulus={form="constant",value=1e300}', ["positive"]),
     (LAW + 'youngs_modulus={form="parabola",value=1,at_degC=5,rise=0.1,maximum_degC=5}', ["maximum_degC", "differ"]),
-    (LAW + 'youngs_modulus={form="table",temperature_degC=[0,9],values=[1,2],uncertainty={values=1}}', ["uncertainty", "values"]),
+    (LAW + 'youngs_modulus={form="table",temperature_degC=[0,9],values=[1,2],uncertainty={values=1}}', ["[x.laws.a.youngs_modulus.uncertainty]", "values"]),
 ]  # fmt: skip
 
 

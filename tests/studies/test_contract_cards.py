@@ -6,6 +6,7 @@ import tomllib
 import pytest
 
 from shell.materials import read_materials
+from studies.cli import main
 from studies.errors import InputError
 from studies.instrument.card import load_card, save_card, shipped_cards
 
@@ -113,6 +114,25 @@ def test_saved_card_loads_equal_even_from_another_folder(tmp_path):
     (effect,) = again.effects
     assert (effect.name, effect.parameters) == ("second-lag", {"weight": 0.1, "second_time_constant_s": 2000.0})
     assert tomllib.loads(moved.read_text())["schema"] == "hrg.card/1"
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ('[glass.laws.a]\nrange_degC = [0, 50]\n', "[glass.laws.a]: the key 'source' is missing; add it. ({}:2)"),
+        ('[glass.steel]\n', "[glass]: unknown key 'steel'; known: default, description, laws. ({}:2)"),
+        (
+            '[glass.laws.a]\nsource = "s"\nrange_degC = [0, 50]\ndensity = {form = "constant", valu = 2300}\n',
+            "[glass.laws.a.density]: unknown key 'valu'; did you mean 'value'? ({}:5)",
+        ),
+    ],
+)  # fmt: skip
+def test_contract_faults_of_a_material_file_are_named_with_its_line(tmp_path, capsys, text, said):
+    own, card = tmp_path / "mine.toml", tmp_path / "card.toml"
+    own.write_text('schema = "hrg.materials/1"\n' + text)
+    card.write_text(HRG.replace('name = "fused-silica"', 'name = "glass"\nfile = "mine.toml"'), encoding="utf-8")
+    assert main(["cards", str(card)]) == 2
+    assert capsys.readouterr().err == f"hrg: {own} {said.format(own)}\n"
 
 
 @pytest.mark.parametrize("stem", ["", 'support = "stem"\n[resonator.stem]\nradius_mm = 2.5\nend_mm = 2.0\n'])

@@ -4,16 +4,21 @@ The strategies are made from the declarations themselves, for every file that ha
 """
 
 import string
+import tomllib
+from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from msgspec import inspect
 
+import shell
+from shell.property import FORMS, PROPERTIES
 from studies.acceptance.limits import Limits
 from studies.design.keys import DesignKeys
 from studies.errors import InputError
 from studies.importing.mapping import ImportMap
+from studies.instrument.material_file import MaterialFile, PropertyKeys
 from studies.instrument.registry import card_tables
 from studies.models.file import ModelKeys
 from studies.schema.keys import describe, number_in, options, structs
@@ -21,7 +26,15 @@ from studies.schema.reader import read_keys
 from studies.sweeps.keys import StudyKeys
 
 CARD = {f"{entry.table}.{entry.name}": entry.keys for es in card_tables().values() for entry in es if entry.keys}
-KINDS = {"limits": Limits, "study": StudyKeys, "design": DesignKeys, "map": ImportMap, "model": ModelKeys, **CARD}
+KINDS = {
+    "limits": Limits,
+    "study": StudyKeys,
+    "design": DesignKeys,
+    "map": ImportMap,
+    "model": ModelKeys,
+    "material": MaterialFile,
+    **CARD,
+}
 JUNK = st.one_of(
     st.none(), st.booleans(), st.integers(-(10**20), 10**20), st.floats(), st.text(max_size=5),
     st.lists(st.integers(), max_size=3), st.dictionaries(st.text(max_size=3), st.integers(), max_size=2),
@@ -117,13 +130,15 @@ def test_a_wrong_value_and_a_typo_name_the_key(kind):
     run()
 
 
-@pytest.mark.parametrize("kind", ["card", "study", "map", "model", "limits"])
+@pytest.mark.parametrize("kind", ["card", "study", "map", "model", "limits", "material"])
 def test_the_reference_has_every_key_with_its_unit_and_default(kind, ask):
     rows = ask(["keys", kind])["keys"]
     assert len({(row["table"], row["key"], row.get("only")) for row in rows}) == len(rows)
     assert all(row["meaning"] for row in rows)
+    found = {(row["table"], row["key"]): row for row in rows}
+    if kind == "material":
+        assert found["[NAME.laws.LAW.crystal]", "C11"]["unit"] == "Pa"
     if kind == "card":
-        found = {(row["table"], row["key"]): row for row in rows}
         assert found["[thermal]", "base_heat_capacity_J_per_K"]["unit"] == "J/K"
         assert found["[thermal]", "film_emissivity"]["bounds"] == "at least 0, at most 1"
         assert found["[[loss.film]]", "thickness_nm"]["required"]
@@ -155,3 +170,17 @@ def test_every_number_is_finite_and_keeps_its_bounds(kind):
                 assert isinstance(said, str), (field.encode_name, one)
                 assert field.encode_name in said
                 assert "must be" in said
+
+
+def test_every_material_that_ships_has_the_keys_that_are_told_and_no_others():
+    """`shell` reads the table by itself; what is told of its keys here is what stands in it, and what its forms need."""
+    content = tomllib.loads(Path(shell.__file__).with_name("materials.toml").read_text(encoding="utf-8"))
+    schema = content.pop("schema")
+    for name, entry in content.items():
+        for law in entry["laws"].values():
+            plain = {key: value for key, value in law.items() if key not in PROPERTIES}
+            for one in [law[key] for key in PROPERTIES if key in law]:
+                laws = {"LAW": plain | {"PROPERTY": one}}
+                read_keys({"schema": schema, "NAME": entry | {"laws": laws}}, MaterialFile, name)
+    numbers = {"at_degC", *(key for _, needed in FORMS.values() for key in needed)}
+    assert set(PropertyKeys.__struct_fields__) == numbers | {"form", "uncertainty", "unsettled", "source"}

@@ -4,6 +4,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import msgspec
 
+from shell.errors import ShellError
 from studies.errors import InputError, naming
 from studies.instrument.registry import CardPlace, CardTable
 from studies.schema.keys import Keys, Note, number, says
@@ -76,7 +77,10 @@ class MaterialKeys(Keys, frozen=True, kw_only=True):
 
     name: Annotated[str, says("of the material table, or of one's own with given values", example="fused-silica")]
     law: Annotated[str, says("which published temperature law")] = "default"
-    file: Annotated[str, says("a user's own material table, beside the card", example="mine.toml")] | None = None
+    file: (
+        Annotated[str, says("a user's own material table, beside the card (hrg keys material)", example="mine.toml")]
+        | None
+    ) = None
     youngs_modulus_GPa: Annotated[float, number("at the reference temperature; rescales the law of a table's name", above=0.0, example=72.6)] | None = None  # fmt: skip
     poisson_ratio: Annotated[float, number("likewise", above=-1.0, below=0.5, example=0.17)] | None = None
     density_kg_m3: Annotated[float, number("likewise", above=0.0, example=2200.0)] | None = None
@@ -124,6 +128,11 @@ def build_material(keys: MaterialKeys, place: CardPlace) -> "Material":
     from shell.materials import find_material, read_materials
 
     own = None if keys.file is None else place.folder / keys.file
+    if own is not None:
+        try:
+            read_materials(own)
+        except ShellError as error:  # it names the place in its own file
+            raise InputError(str(error)) from None
     with naming(place.where):
         given = keys.given
         if own is None and given and keys.name not in read_materials():
