@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shell.quadrature import Array
-from shell.scene import Scene
+from shell.scene import AZIMUTHS, Scene
 
 ROOM = 0.68  # share of the picture's height for the resonator; the rest is for title and legend
 NODE, ANTINODE, SLOW, FAST = "#d81b60", "#1b1f24", "#0072b2", "#e69f00"
@@ -32,7 +32,7 @@ def draw_job(folder: str) -> None:
     half_height = 0.0  # of the picture, m, in which every swinging resonator fits above the legend
     for scene in scenes:
         _, up, right = look(scene, view)
-        corners = np.concatenate([scene.points + sign * scene.displacement for sign in (-1, 1)])
+        corners = scene.reach
         high, wide = float(np.ptp(corners @ up)), float(np.ptp(corners @ right))
         half_height = max(half_height, high / (2 * ROOM), 1.08 * wide / (2 * window[0] / window[1]))
     limits = scale(np.concatenate([scene.values for scene in scenes]))
@@ -101,6 +101,11 @@ def _fill(plotter: Any, scene: Scene, limits: tuple[float, float], first: bool) 
     for k, line in enumerate(scene.axes):
         colour = SLOW if 2 * k < len(scene.axes) else FAST
         plotter.add_mesh(pv.lines_from_points(line), color=colour, line_width=4.0, render_lines_as_tubes=True)
+    if len(scene.azimuths):
+        plotter.add_point_labels(
+            scene.azimuths, list(AZIMUTHS), font_size=15, shape=None, show_points=False, always_visible=True,
+            text_color="black", justification_horizontal="center", justification_vertical="center",
+        )  # fmt: skip
     title, _, remark = scene.title.partition("\n")
     if title:
         plotter.add_text(title, position="upper_edge", font_size=10, color="black")
@@ -138,7 +143,7 @@ def look(scene: Scene, view: str) -> tuple[Array, Array, Array]:
 def _aim(plotter: Any, scene: Scene, view: str, half_height: float) -> None:
     """Look at the resonator from the view's direction, without perspective; it stands in the upper part of the picture."""
     away, up, right = look(scene, view)
-    corners = np.concatenate([scene.points + sign * scene.displacement for sign in (-1, 1)])
+    corners = scene.reach
     middle = sum((corners @ axis).max() / 2 * axis + (corners @ axis).min() / 2 * axis for axis in (away, up, right))
     target = middle - (1 - ROOM - 0.12) * half_height * up
     plotter.enable_parallel_projection()

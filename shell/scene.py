@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from shell.quadrature import Array
 from shell.surface import Surface
 
+AZIMUTHS = ("0°", "90°")
 EXAGGERATION = 0.12  # largest displacement in a picture over the size of the resonator
 
 
@@ -27,6 +28,20 @@ class Scene:
     opens_up: bool  # whether the open end is at the larger z, from where it is then seen
     # (A, 2, 3) array, m, lines across the rim: axes of the slower mode of a split pair, then as many of the faster
     axes: Array = field(default_factory=lambda: np.zeros((0, 2, 3)))
+
+    @property
+    def azimuths(self) -> Array:
+        """Where the azimuths 0° (x) and 90° (y) lie, beyond the ends of the axes, (2, 3) in m; none where there are no axes."""
+        if not len(self.axes):
+            return np.zeros((0, 3))
+        x, y, z = self.axes[0, 0]
+        return np.array([[1.08 * np.hypot(x, y), 0.0, z], [0.0, 1.08 * np.hypot(x, y), z]])
+
+    @property
+    def reach(self) -> Array:
+        """All that must be seen, (M, 3) in m: the swinging resonator, the axes and the marks."""
+        swinging = [self.points + sign * self.displacement for sign in (-1, 1)]
+        return np.concatenate([*swinging, self.axes.reshape(-1, 3), self.azimuths])
 
 
 def compose_scene(surface: Surface, values: Array, legend: str, title: str = "", axes: Array | None = None) -> Scene:

@@ -6,7 +6,7 @@ import numpy as np
 
 from shell.drawing import ANTINODE, FAST, NODE, SLOW, look, scale
 from shell.quadrature import Array
-from shell.scene import Scene
+from shell.scene import AZIMUTHS, Scene
 
 LIGHT = (0.25, 0.45, 0.86)  # to the right, upwards, towards the eye
 GHOST = "#e9ebee"
@@ -55,6 +55,8 @@ def draw_still(scene: Scene, view: str = "oblique", width: int = 900, height: in
     axes = figure.add_axes((0.03, 0.17, 0.94, 0.74), aspect="equal", xlim=(x.min(), x.max()), ylim=(y.min(), y.max()))
     axes.set_axis_off()
     axes.add_collection(mesh, autolim=False)
+    for (across, high, _), name in zip(scene.azimuths @ seen, AZIMUTHS, strict=False):  # or no marks
+        axes.text(across, high, name, ha="center", va="center", size=10)
     title, _, remark = scene.title.partition("\n")
     figure.text(0.5, 0.95, title, ha="center", size=13, parse_math=False)
     figure.text(0.02, 0.92, remark.replace(", ", "\n"), va="top", size=9, color="#5b6470", parse_math=False)

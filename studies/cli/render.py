@@ -1,7 +1,12 @@
-"""`hrg render`: a mode shape as picture, animation, interactive page or mesh."""
+"""`hrg render`: a mode shape as picture, animation, interactive page or mesh.
+
+`frequency_Hz` in the JSON is that of the mode that is shown. Of an imperfect card that is the slower one of the pair, and `split` has `slow_Hz`, `fast_Hz`,
+`split_Hz` and `slow_axis_deg`, the azimuth of an antinode, from the card's x axis (0°) towards its y axis (90°); all to first order.
+"""
 
 from collections.abc import Sequence
 from functools import partial
+from math import degrees
 from typing import Annotated, Any, Literal
 
 from cyclopts import Parameter
@@ -23,7 +28,7 @@ KINDS = (".png", ".webp", ".gif", ".html", ".glb", ".stl", ".ply")
 View = Literal["oblique", "axis", "side"]
 HIDDEN = Parameter(show_default=False)
 MOST = 4  # resonators in one picture
-MODE = "harmonic: n | index | frequency_Hz: f (Hz) .4f"
+MODE = "harmonic: n | index | frequency_Hz: f (Hz) .4f | split.fast_Hz: faster (Hz) .4f | split.slow_axis_deg: slow axis (°) .2f"
 
 
 @answers("hrg.render/1")
@@ -44,7 +49,8 @@ def render(
     The extension of --out selects the format: .png a picture, .webp or .gif a looping animation, .html an interactive page that works
     offline, .glb an animated mesh, .stl or .ply the solid for slicers, in mm.
     A card with an imperfection shows the slower mode of the split pair on its axis, its imperfections exaggerated in
-    pictures and to scale in .stl and .ply; lines across the rim are the axes of the slower (blue) and the faster mode (orange).
+    pictures and to scale in .stl and .ply; lines across the rim are the axes of the slower (blue) and the faster mode (orange), and the azimuths 0° (x axis) and 90° (y axis) of
+    the card are marked: seen into a shell that opens downwards, as --view axis does, azimuths run clockwise.
     Several cards, or one card at several temperatures, stand side by side in pictures and animations on one scale.
     A PNG, WebP or GIF needs OpenGL; without it the exit status is 3 and the message says what to install.
 
@@ -127,9 +133,13 @@ def _page(shown: Sequence[ModeScene]) -> bytes:
 
 
 def _row(one: ModeScene) -> dict[str, Any]:
-    named = {"card": "instrument.name", "frequency_Hz": "mode.frequency"}
-    row = row_of(one, harmonic="mode.harmonic", index="mode.index", **named)
-    return row | {"temperature_degC": one.temperature - zero_Celsius}
+    row = row_of(one, harmonic="mode.harmonic", index="mode.index", card="instrument.name", frequency_Hz="frequency")
+    row |= {"temperature_degC": one.temperature - zero_Celsius}
+    if one.split is None:
+        return row
+    slow, fast = one.split.frequencies
+    angle = {"split_Hz": one.split.hertz, "slow_axis_deg": degrees(one.split.slow_axis)}
+    return row | {"split": {"slow_Hz": slow, "fast_Hz": fast, **angle}}
 
 
 def _mesh(one: ModeScene, kind: str, colour: Colour, field: ShellTemperature | None, swing_mm: float | None) -> bytes:

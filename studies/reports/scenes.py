@@ -57,15 +57,20 @@ class ModeScene:
         return None if fields is None else fields.faded(Pair(self.mode).fade)
 
     @property
+    def frequency(self) -> float:
+        """Of the mode that is shown, Hz: of a split pair the slower one's, to first order."""
+        return self.mode.frequency if self.split is None else self.split.frequencies[0]
+
+    @property
     def title(self) -> str:
         """Name, harmonic, frequency and temperature in one line; of a split pair the split, and how its shape is exaggerated."""
         kind = f" ({self.mode.label})" if self.mode.label else ""
         celsius = self.temperature - zero_Celsius
-        line = f"{self.instrument.name}, n = {self.mode.harmonic}{kind}, {self.mode.frequency:.2f} Hz at {celsius:g} °C"
+        line = f"{self.instrument.name}, n = {self.mode.harmonic}{kind}, {self.frequency:.2f} Hz at {celsius:g} °C"
         if self.split is None:
             return line
         departures = f", departures x {self.exaggeration:.0f}" if self.exaggeration > 1 else ""
-        return f"{line}\nslower mode, split {1e3 * self.split.hertz:.4g} mHz{departures}"
+        return f"{line}\nslower mode of a pair, the faster {self.split.frequencies[1]:.2f} Hz, split {1e3 * self.split.hertz:.4g} mHz{departures}"
 
     def values(self, colour: Colour, field: "ShellTemperature | None" = None) -> Array:
         """Return the coloured quantity on every vertex, in the unit of its legend."""
@@ -79,12 +84,12 @@ class ModeScene:
 
     def scene(self, colour: Colour = "displacement", field: "ShellTemperature | None" = None) -> Scene:
         """Return the scene for `shell.render`."""
-        axes = None
+        axes, marks = None, ""
         if self.split is not None:
             from shell.imperfection.surface import draw_axes
 
-            axes = draw_axes(self.surface, self.split.slow_axis)
-        return compose_scene(self.surface, self.values(colour, field), LEGENDS[colour], self.title, axes)
+            axes, marks = draw_axes(self.surface, self.split.slow_axis), ", 0° and 90°: azimuth"
+        return compose_scene(self.surface, self.values(colour, field), LEGENDS[colour], self.title + marks, axes)
 
     def colours(self, colour: Colour = "displacement", field: "ShellTemperature | None" = None) -> NDArray[np.uint8]:
         """Return the colour of every vertex (N, 4) as bytes, cividis between the smallest and the largest value."""
@@ -194,7 +199,7 @@ def view_blocks(shown: Sequence[ModeScene], remark: str = "") -> "list[Block]":
         if one.split is not None:
             times = f"{one.exaggeration:.0f} times as large"
             larger = f"; the departures of the shape are drawn {times}" if one.exaggeration else ""
-            caption += f" n = {one.mode.harmonic}: the slower mode of the pair, which is split by {1e3 * one.split.hertz:.4g} mHz, on its axis at {degrees(one.split.slow_axis):.4g}°{larger}."
+            caption += f" n = {one.mode.harmonic}: the slower mode of the pair, which is split by {1e3 * one.split.hertz:.4g} mHz, on its axis at an azimuth of {degrees(one.split.slow_axis):.4g}° (from the x axis towards y){larger}."
     lobes = 2 * first.mode.harmonic
     alt = f"The resonator with its rim bent into {lobes} lobes, nodes between them."
     splits = [None if one.split is None else Drawn(one.split, one.imperfection, one.exaggeration) for one in shown]

@@ -72,7 +72,7 @@ def _describe(resonator: Resonator, mode: Mode, size: float, drawn: Drawn | None
     energy = np.concatenate([line.energy.max(axis=0) for line in outlines])
     most = float(np.percentile(energy, 98))
     return {
-        "label": f"n = {mode.harmonic}{f', {mode.label}' if mode.label else ''}: {mode.frequency:.2f} Hz",
+        "label": f"n = {mode.harmonic}{f', {mode.label}' if mode.label else ''}: {drawn.split.frequencies[0] if drawn else mode.frequency:.2f} Hz",
         "harmonic": mode.harmonic,
         "runs": [len(members) for _, members in runs],
         "points": base64.b64encode(points.astype("<f4").tobytes()).decode(),

@@ -1,11 +1,13 @@
 """`hrg render`: every kind of file, side by side, colours with units, and the exits that a user can mend."""
 
+import json
 import subprocess
 import sys
 
 import numpy as np
 import pytest
 
+from shell.drawing import look
 from studies.cli import main
 from studies.errors import InputError
 from studies.instrument.card import load_card
@@ -48,6 +50,37 @@ def test_a_temperature_field_colours_the_meridian(tmp_path):
     path.write_text("position,temperature_degC\n0.5,20\n0.2,30\n")
     with pytest.raises(InputError, match="must rise"):
         read_field(path)
+
+
+WAVE = """schema = "hrg.card/1"
+name = "wavy"
+resonator = {shape = "hemisphere", radius_mm = 15.0, thickness_mm = 0.9}
+material = {name = "fused-silica"}
+imperfection = {wave = [{of = "inner", order = 4, amplitude_um = 2.0, azimuth_deg = 20}]}
+"""
+
+
+def test_contract_a_split_pair_is_told_by_the_mode_that_is_shown_and_its_azimuth(tmp_path, capsys):
+    """The frequency is the slower mode's, as `hrg modes` has it; in the picture the azimuths 0° and 90° lie along x and y, beyond the axes."""
+    card = tmp_path / "wave.toml"
+    card.write_text(WAVE)
+    assert hrg_render(card, "--out", tmp_path / "mode.stl", "--json") == 0
+    (told,) = json.loads(capsys.readouterr().out)["modes"]
+    assert main(["modes", str(card), "--json"]) == 0
+    split = json.loads(capsys.readouterr().out)["modes"][0]["split"]
+    assert told["split"] == pytest.approx({key: split[key] for key in told["split"]}, rel=1e-9)
+    assert told["frequency_Hz"] == told["split"]["slow_Hz"] < told["split"]["fast_Hz"]
+    shown = show_mode(load_card(card))
+    assert f"{split['slow_Hz']:.2f} Hz" in shown.title
+    scene = shown.scene()
+    along, up, _ = scene.azimuths.T
+    assert along == pytest.approx([np.hypot(*scene.axes[0, 0, :2]) * 1.08, 0.0])
+    assert up == pytest.approx(along[::-1])
+    _, upwards, right = look(scene, "axis")
+    (x0, y0), (x1, y1) = scene.azimuths @ np.array([right, upwards]).T
+    assert not scene.opens_up
+    assert x0 * y1 - y0 * x1 < 0  # clockwise, seen into a dome
+    assert not len(show_mode(load_card("free-dome"), theory="shell").scene().azimuths)
 
 
 def test_the_strain_energy_of_the_picture_is_that_of_the_solver():
