@@ -21,7 +21,7 @@ from studies.record import read_record
 from studies.simulation.drive import Drive
 from studies.simulation.heat_path import slowest_lag
 from studies.simulation.prediction import predict
-from studies.simulation.variations import HEATED, Variations
+from studies.simulation.variations import Variations, heats
 from studies.workbench import diagnose_records
 from thermal.profile import Profile
 
@@ -141,7 +141,7 @@ def _slowest(varied: Variations, T: float, slopes: Array) -> tuple[float, Array]
     """Return the slowest time constant of the resonator behind its housing, and its derivatives: differences."""
     by_value = []
     for name in varied.names:
-        below, above = varied.sides(name) if name.startswith(HEATED) else (None, None)
+        below, above = varied.sides(name) if heats(name) else (None, None)
         moved = [slowest_lag(side.network("housing"), T) for side in (below, above) if side is not None]
         by_value.append((moved[1] - moved[0]) / (above.distance - below.distance) if above and below else 0.0)
     return slowest_lag(varied.here.network("housing"), T), np.array(by_value) @ slopes

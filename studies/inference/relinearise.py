@@ -21,7 +21,7 @@ from studies.inference.signatures import Signatures
 from studies.simulation.drive import COLUMN, Boundary
 from studies.simulation.heat_path import build_network, slowest_lag
 from studies.simulation.prediction import Prediction
-from studies.simulation.variations import HEATED
+from studies.simulation.variations import heats
 
 Array = NDArray[np.float64]
 Along = Mapping[str, tuple[Array, list[int]]]
@@ -151,7 +151,7 @@ class Beside:
             value = names[places[0]] if places[0] < len(names) else ""
             anew = thermal and value.startswith(OF_SLOPE)
             there = Signatures.at(problem, aside) if anew else paths
-            moved = [] if anew else self._moved(paths, along, aside, places, value.partition(".")[0] in HEATED)
+            moved = [] if anew else self._moved(paths, along, aside, places, heats(value))
             for term, size, plain, bend in zip(terms, sizes, own, bends, strict=True):
                 for response, columns in there.columns_of(term, moved).items():
                     change = (columns @ size - plain[response]) / STEP

@@ -29,7 +29,15 @@ OF_WALL = ("thermal.conductivity_W_per_m_K", "thermal.heat_capacity_J_per_kg_K")
 """Values of the heat path that the loss of a wall takes as well."""
 HEATED = ("thermal", "material", "resonator", "law")
 """Tables whose values the temperatures may depend on."""
+OF_HEAT = ("density", "conductivity", "heat_capacity")
+"""What of a material they depend on."""
 LAG = "noise.housing_lag_s"
+
+
+def heats(name: str) -> bool:
+    """Return whether the temperatures may depend on a value of the card."""
+    table = name.partition(".")[0]
+    return table in HEATED and (table != "material" or any(word in name for word in OF_HEAT))
 
 
 @dataclass(frozen=True)
@@ -111,7 +119,7 @@ class Variations:
             return no_change(network, {drive.boundary: drive.kink_shape(int(name.removeprefix(KINK)))})
         if name == LAG and drive.boundary == "housing":
             return no_change(network, {"housing": Profile(drive.imposed.time, slope_of_reading(drive.imposed))})
-        if name.partition(".")[0] not in HEATED:
+        if not heats(name):
             return None
         if (name, drive.boundary) not in self._changes:
             below, above = (side.driven(drive.boundary) for side in self.sides(name))
@@ -136,8 +144,7 @@ class Variations:
             damping = here.damping
             if damping is not None and (table in ("loss", "material", "resonator") or name in OF_WALL):
                 damping = damping_law(moved, law.lowest, law.highest)
-            same = table not in HEATED
-            known = (here.networks, here.lags) if same else ({}, {})
+            known = ({}, {}) if heats(name) else (here.networks, here.lags)
             sides.append(Side(distance, moved, law, damping, *known))
         return sides[0], sides[1]
 
