@@ -181,29 +181,19 @@ def station_mass(table: StrainTable) -> Array:
 
 def integrate_stiffness(stations: Array, along: Array) -> Array:
     """Sum the stations of each element into its stiffness: (elements, size, size), unknowns ordered (function, amplitude)."""
-    return _unravel(pair_stiffness(stations, along), along.shape[2])
-
-
-def integrate_mass(stations: Array, along: Array) -> Array:
-    """Sum the stations of each element into its mass: (elements, size, size)."""
-    return _unravel(pair_mass(stations, along), along.shape[2])
-
-
-def pair_stiffness(stations: Array, along: Array) -> Array:
-    """The stiffness with pairs of functions as rows and pairs of amplitudes as columns, (elements, functions², m²)."""
     elements, count, double, _ = stations.shape
     m, functions = double // 2, along.shape[2]
     pairs = np.einsum("dia,eib->abide", along, along).reshape(functions**2, -1)
     inner = stations.reshape(elements, count, 2, m, 2, m).transpose(0, 1, 2, 4, 3, 5).reshape(elements, -1, m * m)
-    return np.asarray(pairs @ inner)
+    return _unravel(pairs @ inner, functions)
 
 
-def pair_mass(stations: Array, along: Array) -> Array:
-    """The mass in the same form."""
+def integrate_mass(stations: Array, along: Array) -> Array:
+    """Sum the stations of each element into its mass: (elements, size, size)."""
     elements, count, m, _ = stations.shape
     functions = along.shape[2]
     pairs = np.einsum("ia,ib->abi", along[0], along[0]).reshape(functions**2, -1)
-    return np.asarray(pairs @ stations.reshape(elements, count, m * m))
+    return _unravel(pairs @ stations.reshape(elements, count, m * m), functions)
 
 
 def _tall(per_station: Array) -> NDArray[np.float64]:
@@ -236,6 +226,7 @@ def _jets(section: Section, through: Orders, points: Array) -> tuple[list[Array]
 
 
 def _unravel(integrals: Array, functions: int) -> Array:
+    """From pairs of functions and pairs of amplitudes, (elements, functions², m²), to matrices."""
     elements, m = len(integrals), round(np.sqrt(integrals.shape[2]))
     blocks = integrals.reshape(elements, functions, functions, m, m).transpose(0, 1, 3, 2, 4)
     return blocks.reshape(elements, functions * m, functions * m)

@@ -23,7 +23,7 @@ from shell.blocks import open_edges
 from shell.cells import CellTable, Reference, at_gauss_points, cell_stiffness, in_order, tabulate_cells
 from shell.eigen import Factor, Pattern, find_pattern
 from shell.elastic import Elastic, VaryingElastic, find_constants
-from shell.kernel import StrainTable, pair_stiffness, shell_table, station_stiffness
+from shell.kernel import StrainTable, integrate_stiffness, shell_table, station_stiffness
 from shell.layout import Chain, Level
 from shell.quadrature import Array, at_gauss, gauss, hierarchic, values_to_hierarchic
 from shell.resonator import Resonator
@@ -85,7 +85,7 @@ class ShellExtension:
     # thin shell
     pattern: Pattern
     places: tuple[Index, ...]  # where these are among the functions and amplitudes of every element
-    units: tuple[tuple[Array, ...], ...]  # their stiffness per unit λ and G
+    stations: tuple[Array, Array]  # stiffness of the stations per unit λ and G
     factor: float  # error over surplus
 
     def answer(self, solutions: Sequence[Solution], part: int, elastic: Elastic | VaryingElastic) -> Answer:
@@ -102,8 +102,9 @@ class ShellExtension:
             r = self.table.loads(stress, force).reshape(len(q), -1)
             for members, own, places in zip(self.pattern.unknowns, r, self.places, strict=True):
                 loads[members, k] += own[places]
-        lam, G = (field.mean(axis=1) for field in constants.lame)
-        K = [a * trace + b * shear for a, b, (trace, shear) in zip(lam, G, self.units, strict=True)]
+        lam, G = (field[..., None, None] for field in constants.lame)
+        whole = integrate_stiffness(lam * self.stations[0] + G * self.stations[1], self.table.along)
+        K = [one[np.ix_(here, here)] for one, here in zip(whole, self.places, strict=True)]
         x = Factor(self.pattern, K).solve(loads)
         answers = []
         for column in x.T:
@@ -207,16 +208,9 @@ def _extend_shell(resonator: Resonator, group: ShellGroup, n: int, level: Level)
     members = [np.searchsorted(used, one[here]) for one, here in zip(number.reshape(elements, -1), places, strict=True)]
     pattern = find_pattern(members, len(used), in_order=True)
     places = [here[order] for here, order in zip(places, pattern.order, strict=True)]
-    kinds = [pair_stiffness(kind, table.along).reshape(elements, -1) for kind in station_stiffness(table)]
-    units = []
-    for e, here in enumerate(places):
-        node, amplitude = np.divmod(here, width)
-        rows, columns = (node * functions * width + amplitude) * width, node * width**2 + amplitude
-        where = rows[:, None] + columns
-        units.append(tuple(kind[e].take(where, mode="clip") for kind in kinds))
     is_deep = ~is_old[used % width]
     return ShellExtension(
-        table, is_old, is_deep, values_to_hierarchic(p), pattern, tuple(places), tuple(units),
+        table, is_old, is_deep, values_to_hierarchic(p), pattern, tuple(places), station_stiffness(table),
         _count(resonator, chain, level),
     )  # fmt: skip
 
