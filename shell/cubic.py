@@ -20,7 +20,7 @@ import numpy as np
 
 from shell.assembly import build_system
 from shell.crystal import Crystal, hill
-from shell.eigen import Factor, lowest_pairs, whole_pattern
+from shell.eigen import Factor, find_pattern, lowest_pairs
 from shell.elastic import Elastic, find_constants
 from shell.errors import ShellError
 from shell.modes import solve_modes
@@ -125,7 +125,7 @@ def _lowest(systems: list[System], harmonics: list[int], crystal: Cubic, n: int,
             whole[:, a:b] += (sign if m < 0 else 1) * wave
     for m, wave in waves.items():
         K += crystal.excess / 2 * (1.0 if m else 1.0 + sign) * (wave.T @ wave)
-    factor = Factor(whole_pattern(len(K)), [(K + shift * M) / crystal.rho])
+    factor = Factor(find_pattern([np.arange(len(K))], len(K)), [(K + shift * M) / crystal.rho])
     vectors, _ = lowest_pairs(factor, M / crystal.rho, LOWEST, 1e-11)
     at = harmonics.index(n)
     own = vectors[ends[at] : ends[at + 1]]

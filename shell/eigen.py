@@ -63,11 +63,6 @@ def _find_pattern(numbers: tuple[bytes, ...], size: int, in_order: bool) -> Patt
     return Pattern(tuple(unknowns), order, own, tuple(where), tuple(entries), shared, size, band)
 
 
-def whole_pattern(size: int) -> Pattern:
-    """The pattern of one element with all unknowns."""
-    return find_pattern([np.arange(size)], size)
-
-
 def _in_a_narrow_band(elements: list[Index], size: int) -> Index:
     """Places of unknowns in which those of one element lie near one another: elements by reverse Cuthill-McKee, unknowns by their first and last."""
     owner, members = np.repeat(np.arange(len(elements)), [len(one) for one in elements]), np.concatenate(elements)

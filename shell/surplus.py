@@ -57,8 +57,6 @@ def estimate_errors(resonator: Resonator, elastic: Elastic | VaryingElastic, sol
 
 def _correction(k: int, values: Array, mass: Array, S: Array, C: Array, T: Array) -> float:
     """What the answers x and the other modes u take off λ_k ∫ ρ u² dV: bᵀ A⁻¹ b, A of K - λ_k M, b of (K - λ_k M) u_k."""
-    if len(values) == 1:
-        return max(abs(float(S[0, 0] ** 2 / (S[0, 0] - values[0] * T[0, 0]))), float(S[0, 0]))
     others = np.delete(np.arange(len(values)), k)
     apart = (values - values[k])[others]
     held = S[others] + apart[:, None] * C[others]
