@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from shell.assembly import build_system
 from shell.blocks import Mesh, Support
-from shell.errors import ShellError
+from shell.errors import ShellError, mm
 from shell.layout import Level
 from shell.quadrature import Array, nodal
 from shell.resonator import Resonator
@@ -61,6 +61,9 @@ class Volume:
         )  # fmt: skip
 
 
+LAYERS, AROUND, MOST_ALONG = (1, 16), (8, 720), 2000  # fewest and most elements of a mesh
+
+
 @dataclass(frozen=True, eq=False)
 class Pieces:
     """The section in quadrilaterals of 3 x 3 nodes: points (2, N), numbers (Q, 3, 3), and whether a node's side is held."""
@@ -72,11 +75,13 @@ class Pieces:
 
 def build_volume(resonator: Resonator, layers: int = 2, around: int = 48, spacing: float | None = None) -> Volume:
     """Mesh a resonator with complete quadratic elements, at most `spacing` (m), or R/6, long along the meridian."""
-    if not (1 <= layers <= 16 and 8 <= around <= 720):
-        raise ShellError("a mesh has 1 to 16 elements through the thickness and 8 to 720 around.")
+    if not (LAYERS[0] <= layers <= LAYERS[1] and AROUND[0] <= around <= AROUND[1]):
+        raise ShellError(
+            "a mesh has {} to {} elements through the thickness and {} to {} around.".format(*LAYERS, *AROUND)
+        )
     spacing = resonator.size / 6 if spacing is None else spacing
-    if not 0 < spacing < np.inf or resonator.length / spacing > 2000:
-        raise ShellError("the spacing along the meridian must be positive, and at least 1/2000 of its length.")
+    if not resonator.length / MOST_ALONG <= spacing < np.inf:
+        raise ShellError(f"the spacing along the meridian must be at least {mm(resonator.length / MOST_ALONG)}.")
     return _turn(_cut_section(resonator, layers, spacing), around, resonator.size)
 
 

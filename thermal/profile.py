@@ -118,7 +118,11 @@ def parse_profile(words: str) -> Profile:
             durations = " (durations without a space: 5h, 30min, 90s)" if {"DURATION", "HOLD"} & set(names) else ""
             raise ThermalError(f"'{' '.join(sentence)}' has {len(arguments)} values after '{kind}', not {len(names)}; write '{kind} {' '.join(names)}'{durations}.")  # fmt: skip
         given = " ".join(sentence)
-        piece = build(*[_read(name, text, given) for name, text in zip(names, arguments, strict=True)])
+        values = [_read(name, text, given) for name, text in zip(names, arguments, strict=True)]
+        try:
+            piece = build(*values)
+        except ThermalError as error:
+            raise ThermalError(f"'{given}': {error}") from None
         offset = points[-1][0] if points else 0.0
         for time, temperature in piece:
             _append(points, offset + time, temperature)
@@ -150,9 +154,13 @@ def _ramp(before: float, after: float, rate: float) -> Points:
 
 
 def _staircase(before: float, after: float, step: float, hold: float) -> Points:
-    count = round(min(abs(after - before) / step, 1e9))
-    if count == 0 or not math.isclose(count * step, abs(after - before), rel_tol=1e-9):
-        raise ThermalError(f"steps of {step:g} K do not lead from {before:g} to {after:g} °C.")
+    span = abs(after - before)
+    count = round(min(span / step, 1e9))
+    if count == 0 or not math.isclose(count * step, span, rel_tol=1e-9):
+        below = int(min(span / step, 1e9))
+        near = sorted({span / max(part, 1) for part in (below, below + 1)})
+        mend = f"take steps of {' or '.join(f'{one:.6g}' for one in near)} K" if span else "use 'soak'"
+        raise ThermalError(f"steps of {step:g} K do not lead from {before:g} to {after:g} °C; {mend}.")
     _check_repeats(count, "steps")
     levels = np.linspace(before, after, count + 1)
     return [(hold * (k + end), float(level)) for k, level in enumerate(levels) for end in (0, 1)]

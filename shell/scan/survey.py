@@ -138,6 +138,11 @@ def most_waves(count: int) -> int:
     return min((COLUMNS - 1) // 2, max(count // (DEGREE + 1) - 1, 0) // 2)
 
 
+def fewest_points(highest: int) -> int:
+    """How many points tell waves around up to the highest."""
+    return (2 * highest + 1) * (DEGREE + 1)
+
+
 def survey(
     points: Array, side: int, motion: RigidMotion, projector: Projector, name: str, highest: int = 12,
     degree: int = DEGREE,

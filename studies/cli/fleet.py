@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Annotated
 
 from studies.cli.arguments import COUNT, Quiet
-from studies.cli.output import answers, dump_json, say
+from studies.cli.output import answers, dump_json, resumable, say
 from studies.errors import InputError
 from studies.files.writing import write_text
 from studies.fleet.folder import read_lot
@@ -49,7 +49,7 @@ def fleet(
     if scheduler is not None:  # its workers have other working directories
         folder, out = str(Path(folder).resolve()), str(Path(out).resolve())
     devices = read_lot(folder, card)
-    with Progress(len(devices), shown=not quiet) as progress:
+    with resumable(out, "devices"), Progress(len(devices), shown=not quiet) as progress:
         lot = run_lot(devices, out, hire(workers, scheduler), progress)
     for why in lot.failed.values():
         say(f"hrg: {why}")

@@ -8,8 +8,8 @@ from cyclopts import Parameter
 from shell.constants import zero_Celsius
 from shell.imperfection.surface import depart_points
 from shell.inertia import weigh
-from shell.volume import VolumeKind, build_volume, encode_volume
-from studies.cli.arguments import Card, Out, Temperature, ending_of, open_resonator
+from shell.volume import AROUND, LAYERS, MOST_ALONG, VolumeKind, build_volume, encode_volume
+from studies.cli.arguments import POSITIVE, Card, Out, Temperature, ending_of, numbers, open_resonator
 from studies.cli.output import answers
 from studies.errors import InputError, naming
 from studies.files.writing import written_whole
@@ -19,14 +19,18 @@ from studies.results import Result, row_of
 KINDS = (".vtu", ".msh", ".inp")
 
 
+def _between(low: int, high: int) -> Parameter:
+    return numbers(lambda one: low <= one <= high, f"{low} to {high}")
+
+
 @answers("hrg.mesh/1")
 def mesh(
     card: Card,
     *,
     out: Out,
-    layers: int = 2,
-    around: int = 48,
-    spacing_mm: Annotated[float | None, Parameter(show_default=False)] = None,
+    layers: Annotated[int, _between(*LAYERS)] = 2,
+    around: Annotated[int, _between(*AROUND)] = 48,
+    spacing_mm: Annotated[float | None, POSITIVE, Parameter(show_default=False)] = None,
     complete: bool = False,
     temperature: Temperature = None,
 ) -> Result:
@@ -48,6 +52,8 @@ def mesh(
     if complete and kind == ".inp":
         raise InputError("--complete: an .inp file has elements of 20 and 15 nodes only; leave it out, or take .msh.")
     instrument, T, resonator, elastic = open_resonator(card, temperature)
+    if spacing_mm is not None and 1e-3 * spacing_mm < (least := resonator.length / MOST_ALONG):
+        raise InputError(f"--spacing-mm {spacing_mm:g}: must be at least {1e3 * least:.4g}, of this meridian a {MOST_ALONG}th.")  # fmt: skip
     with naming(instrument.path):
         found = build_volume(resonator, layers, around, None if spacing_mm is None else 1e-3 * spacing_mm)
     found = found if complete else found.serendipity()

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from studies.cli.arguments import Quiet, Workers
-from studies.cli.output import answers
+from studies.cli.output import answers, resumable
 from studies.design.answer import Answer
 from studies.design.run import CARD, TABLE, best_instrument
 from studies.design.run import optimise as find_best
@@ -32,10 +32,8 @@ def optimise(design: str, *, out: str, workers: Workers = None, quiet: Quiet = F
             robust-dome. hrg design new FILE writes one to start from; hrg keys design lists its keys.
         out: Folder for the best design as a card (best.toml), all designs (evaluations.csv) and the store.
     """
-    try:
+    with resumable(out, "designs"):
         found = find_best(design, out, workers=workers, show_progress=not quiet)
-    except KeyboardInterrupt:
-        raise KeyboardInterrupt(f"interrupted; {out} keeps the designs; run the same command again to resume.") from None  # fmt: skip
     payload: dict[str, Any] = {
         **row_of(found, "evaluations", design="task.name", card="task.study.instrument.name"),
         "failed": len(found.failures),

@@ -5,8 +5,8 @@ import inspect
 import re
 import sys
 import tomllib
-from collections.abc import Callable, Iterable, Mapping
-from contextlib import suppress
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -78,6 +78,15 @@ def answers(
         return run
 
     return give
+
+
+@contextmanager
+def resumable(out: str, kept: str) -> Iterator[None]:
+    """Say of an interruption that a folder keeps what is done, and how to go on."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        raise KeyboardInterrupt(f"interrupted; {out} keeps the finished {kept}; run the same command again to resume.") from None  # fmt: skip
 
 
 def check_ending(option: str, path: str, what: str, *endings: str) -> None:

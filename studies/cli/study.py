@@ -7,7 +7,7 @@ from typing import Annotated, Any
 from cyclopts import Parameter
 
 from studies.cli.arguments import COUNT, Folder, Quiet, Workers
-from studies.cli.output import answers, check_ending, say
+from studies.cli.output import answers, check_ending, resumable, say
 from studies.errors import InputError
 from studies.files.writing import write_text
 from studies.reports.sweep_analysis import tolerance_table
@@ -75,13 +75,11 @@ def run(
         estimate = estimate_study(study, workers)
         payload = {"schema": "hrg.study-estimate/1", **vars(estimate)}
         return Result(payload, f"Estimate of {study.name}", "", [_estimate_words(estimate)])
-    try:
+    with resumable(out, "cases"):
         results = run_study(
             spec, out, card=card, workers=workers, scheduler=scheduler, allow_python=allow_python,
             retry_failed=retry_failed, show_progress=not quiet,
         )  # fmt: skip
-    except KeyboardInterrupt:
-        raise KeyboardInterrupt(f"interrupted; {out} keeps the finished cases; run the same command again to resume.") from None  # fmt: skip
     found = _status(results, out, running=False)
     failed = found["failed"]
     done = f"{results.total} cases computed, {failed} failed. Next: hrg study report {out}, hrg study export {out}."

@@ -37,11 +37,10 @@ class Device:
 def read_lot(folder: str, card: str | None = None) -> list[Device]:
     """Return the devices of a folder, a subfolder each, in the order of their serials; a card in a subfolder counts before the common one."""
     root = Path(folder)
-    inside = (
-        sorted(path for path in root.iterdir() if path.is_dir() and not path.name.startswith("."))
-        if root.is_dir()
-        else []
-    )
+    if not root.is_dir():
+        wrong = "is a file; give the folder of the lot." if root.exists() else "there is no such folder."
+        raise InputError(f"{folder}: {wrong}")
+    inside = sorted(path for path in root.iterdir() if path.is_dir() and not path.name.startswith("."))
     if not inside:
         raise InputError(f"{folder}: no folders of devices, each named by its serial number, with its records.")
     said = _read_table(root / LOT, {path.name for path in inside}) if (root / LOT).is_file() else {}

@@ -17,7 +17,7 @@ from shell.modes import solve_modes
 from shell.resonator import Resonator
 from shell.scan.alignment import RigidMotion, align
 from shell.scan.projection import Projector, check_unit
-from shell.scan.survey import Face, most_waves, rigid_shapes, survey, survey_map
+from shell.scan.survey import Face, fewest_points, most_waves, rigid_shapes, survey, survey_map
 from studies.errors import InputError
 from studies.files.clouds import FaceGrid, Unit, read_cloud
 
@@ -112,6 +112,8 @@ def scan_faces(
     faces: dict[str, Face] = {}
     for name, points in clouds.items():
         check_unit(points, resonator, files[name])
+        if len(points) < (fewest := fewest_points(2 * max(harmonics))):
+            raise InputError(f"{files[name]}: {len(points)} points are too few for the split of n = {max(harmonics)}; {fewest} are needed.")  # fmt: skip
         if highest > (most := most_waves(len(points))):
             raise InputError(f"--highest {highest}: {len(points)} points of {files[name]} allow up to {most}; lower it.")  # fmt: skip
     if clouds and projector is not None:

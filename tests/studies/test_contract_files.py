@@ -124,6 +124,25 @@ def test_a_request_to_end_counts_as_ctrl_c(tmp_path):
     assert "Traceback" not in said
 
 
+@pytest.mark.parametrize(
+    ("work", "words"),
+    [
+        ("studies.cli.study.run_study", "study run dimension-tolerance"),
+        ("studies.cli.optimise.find_best", "optimise dome-8khz"),
+        ("studies.fleet.run.run_lot", "fleet {lot}"),
+    ],
+)
+def test_every_command_that_can_be_resumed_says_so_when_it_is_interrupted(tmp_path, monkeypatch, capsys, work, words):
+    def interrupt(*_, **__):
+        raise KeyboardInterrupt
+
+    (tmp_path / "lot" / "A").mkdir(parents=True)
+    monkeypatch.setattr(work, interrupt)
+    assert main([*words.format(lot=tmp_path / "lot").split(), "--out", str(tmp_path / "out"), "--quiet"]) == 130
+    assert f"interrupted; {tmp_path / 'out'} keeps the finished " in (said := capsys.readouterr().err)
+    assert "run the same command again to resume" in said
+
+
 def test_a_request_to_end_that_falls_into_a_callback_is_not_lost():
     """What is raised in a weak reference's callback, as imports have them, is dropped by the interpreter."""
     script = (

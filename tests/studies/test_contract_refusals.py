@@ -81,7 +81,15 @@ REFUSED = {
     "loss free-dome --from 30 --to 20": "hrg: ",
     "materials fused-silca": "fused-silica",
     "mesh hrg-30mm --out solid.inp --complete": "--complete",
-    "mesh hrg-30mm --out solid.msh --layers 99": "16 elements",
+    "mesh hrg-30mm --out solid.msh --layers 99": "--layers 99: must be 1 to 16",
+    "mesh hrg-30mm --out solid.msh --around 3": "--around 3: must be 8 to 720",
+    "mesh hrg-30mm --out solid.msh --spacing-mm -1": "--spacing-mm -1: must be positive",
+    "mesh free-dome --out solid.msh --spacing-mm 1e-4": "--spacing-mm 0.0001: must be at least 0.01178, of this",
+    "fleet nowhere --out out": "nowhere: there is no such folder",
+    "fleet file --out out": "file: is a file; give the folder",
+    "scan free-dome none FEW": "20 points are too few for the split of n = 4; ",
+    "scan free-dome none FEW --highest 2 --harmonic 1": "20 points are too few for the split of n = 1; ",
+    "simulate free-dome 'staircase 20 -10 7 30min' --out run.csv": "'staircase 20 -10 7 30min': steps of 7 K do not lead from 20 to -10 °C; take steps of 6 or 7.5 K.",
     "mesh hrg-30mm --out solid.stl": ".msh",
     "modes free-dome 3": "too many arguments",
     "modes hrg-30mm --count 0": "count",
@@ -160,6 +168,8 @@ def given(tmp_path_factory, pytestconfig):
     for name, of in DESIGNS.items():
         (folder / f"{name}.toml").write_text(DESIGN.format(**{"column": "frequency_n2_Hz", "low": 4000.0} | of))
     rows = "".join(f"{t},20.0,{4432 + 0.01 * math.sin(t):.4f}\n" for t in range(0, 4000, 100))
+    round_ = "".join(f"{15.45 * math.sin(a)} {15.45 * math.cos(a)} 0.5\n" for a in range(20))
+    (folder / "few.asc").write_text(round_)
     for place in (folder, folder / "lot" / "a", folder / "lot" / "b"):
         place.mkdir(parents=True, exist_ok=True)
         (place / "run.csv").write_text("time_s,housing_temperature_degC,frequency_Hz\n" + rows, encoding="utf-8")
@@ -171,6 +181,7 @@ def given(tmp_path_factory, pytestconfig):
         "RUN": folder / "run.csv",
         "LOT": folder / "lot",
         "ROW": folder / "row.csv",
+        "FEW": folder / "few.asc",
     }
     return {name: str(path) for name, path in files.items()} | {
         "HRG": str(pytestconfig.rootpath / "studies/papers/hrg_table1.csv")
