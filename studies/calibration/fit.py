@@ -114,7 +114,7 @@ def fit(problem: CardProblem, start: Array | None = None, progress: Progress = l
             noise = found if waited <= PATIENCE else {name: _larger(noise[name], found[name]) for name in found}
         if straight:
             for name in problem.responses:
-                rows[name], outliers[name] = _spare_outliers(problem.rows[name], state, name, noise[name])
+                rows[name], outliers[name] = spare_outliers(problem.rows[name], state.residual[name], noise[name])
         linear = _Linear.of(problem, state, noise, rows)
         size = linear.fall(linear.step(np.inf)[0])
         progress(f"step {step}: −2 ln L decreases by about {size:.2g}")
@@ -128,6 +128,16 @@ def fit(problem: CardProblem, start: Array | None = None, progress: Progress = l
         state, straight = reached, straight or whole
     covariance = covariance_at(problem, state, noise, rows)
     return CardFit(problem, state, noise, rows, covariance, outliers, step, converged)
+
+
+def at_point(found: CardFit, point: Array) -> CardFit:
+    """A fit as it would begin at another point, its outliers being what stands out there."""
+    problem, state = found.problem, found.problem.evaluate(point)
+    rows = dict(problem.rows)
+    for _ in range(2):  # outliers hide others as long as they are noise
+        noise = residual_noise(problem, rows, state)
+        rows = {n: spare_outliers(problem.rows[n], state.residual[n], noise[n])[0] for n in problem.responses}
+    return replace(found, state=state, noise=residual_noise(problem, rows, state), rows=rows)
 
 
 def covariance_at(problem: Problem, state: State, noise: Mapping[str, Noise], rows: Mapping[str, NoiseRows]) -> Array:
@@ -249,9 +259,9 @@ def stated_noise(noise: "NoiseKeys", response: str) -> Noise | None:
     return replace(stated[response](noise), white=0.0) if response in stated else None
 
 
-def _spare_outliers(rows: NoiseRows, state: State, name: str, noise: Noise) -> tuple[NoiseRows, int]:
+def spare_outliers(rows: NoiseRows, residual: Array, noise: Noise) -> tuple[NoiseRows, int]:
     """Rows with larger variances where one innovation stands out: its square over 5², times its own white variance."""
-    white = rows.whiten(state.residual[name], noise)
+    white = rows.whiten(residual, noise)
     spread = 1.4826 * float(np.median(np.abs(white)))
     ratio = np.maximum((np.abs(white) / (OUTLIER * max(spread, 1.0))) ** 2, 1.0)
     beyond = int(np.count_nonzero(ratio > 1))

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from compensation.noise import white_rms
 from shell.constants import zero_Celsius
 from studies.calibration.apart import fit_explained
-from studies.calibration.fit import IMPOSSIBLE, CardFit, residual_noise
+from studies.calibration.fit import IMPOSSIBLE, CardFit, at_point
 from studies.calibration.observed import HOUSING, RESPONSES, observe
 from studies.calibration.priors import gather_priors
 from studies.calibration.problem import CardProblem, wide_law
@@ -38,7 +38,7 @@ from studies.inference.housing import evidence_of, set_housing_apart
 from studies.inference.inferred import Inferred
 from studies.inference.lack_of_fit import generic_bank, is_rounding, look
 from studies.inference.model import Background, Linear
-from studies.inference.pursuit import Pursuit, on_all_rows
+from studies.inference.pursuit import Pursuit, fair_score
 from studies.inference.records import Campaign
 from studies.inference.search import FURTHER, MARGIN, SUSPICIOUS, Outcome, Search
 from studies.inference.sharp import RESOLVED, fast_line, longest_resolved
@@ -189,11 +189,9 @@ def infer(card: "Instrument", campaign: Campaign, progress: Report = lambda _: N
     ):
         # values may have gone far to do what an effect does: look from the card as shipped too
         progress("again from the card's own values")
-        state = problem.evaluate(np.zeros(problem.count))
-        noise = residual_noise(problem, problem.rows, state)
-        pursuit = Pursuit(replace(found, state=state, noise=noise, rows=problem.rows), progress)
-        there = pursuit.outcome(on_all_rows(search, outcome.final) - BEATEN)
-        search, outcome = max((there, (search, outcome)), key=lambda found: on_all_rows(found[0], found[1].final))
+        pursuit = Pursuit(at_point(found, np.zeros(problem.count)), progress)
+        there = pursuit.outcome(fair_score(search, outcome.final) - BEATEN)
+        search, outcome = max((there, (search, outcome)), key=lambda found: fair_score(found[0], found[1].final))
     # one lag in its own noise: in that of a longer path its straight lines lead out of the world
     alone = outcome.plain.noise if path is None else found.noise
     paths = search.signatures.there(found.point) if path is None else Signatures.at(problem, found.point)
@@ -232,9 +230,9 @@ def _with_heat_path(whole: CardFit, found: CardFit, progress: Report) -> tuple[H
         return (None, *own.outcome())
     progress(f"effects beside a heat path with {path.lags} time constants")
     there, grown = Pursuit(path.fit, progress).outcome()
-    score = on_all_rows(there, grown.final) + path.housing + path.price
+    score = fair_score(there, grown.final) + path.housing + path.price
     search, outcome = own.outcome(-np.inf if given else score - BEATEN)
-    gain, lead = score - evidence_of(found), score - on_all_rows(search, outcome.final)
+    gain, lead = score - evidence_of(found), score - fair_score(search, outcome.final)
     levels = with_levels(search, outcome.plain, FREQUENCY).score - outcome.plain.score
     needed = MARGIN + given * FURTHER * sum(term.brought for term in outcome.final.terms if term.response == FREQUENCY)
     if lead < needed or levels > gain + MARGIN:

@@ -49,5 +49,5 @@ def set_housing_apart(found: CardFit) -> CardFit:
 
 
 def evidence_of(found: CardFit) -> float:
-    """Log evidence of a calibrated card, no row taken for an outlier."""
-    return Background(Linear.of(found).on_all_rows, (), found.noise).evidence
+    """Log evidence of a calibrated card, its outliers being what stands out of it."""
+    return Background(Linear.of(found), (), found.noise).fair

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from compensation.noise import Noise
 from compensation.noise_rows import NoiseRows, Whitener, log_prior
-from studies.calibration.fit import CardFit, estimate_levels, stated_noise
+from studies.calibration.fit import CardFit, estimate_levels, spare_outliers, stated_noise
 from studies.calibration.problem import CardProblem
 from studies.effects import Effect
 
@@ -103,11 +103,6 @@ class Linear:
         slope = {name: own + more[name][:, :-1] if name in more else own for name, own in self.slope.items()}
         target = {name: own + more[name][:, -1] if name in more else own for name, own in self.target.items()}
         return replace(self, slope=slope, target=target)
-
-    @property
-    def on_all_rows(self) -> "Linear":
-        """It, with no row taken for an outlier."""
-        return replace(self, rows=self.problem.rows)
 
     def stated(self, name: str) -> Noise | None:
         """Return what the card states of the slow noise of a response."""
@@ -197,6 +192,13 @@ class Background:
         return self._solved[2] + sum(
             log_prior(self.linear.rows[name], level, self.linear.stated(name)) for name, level in self.noise.items()
         )
+
+    @property
+    def fair(self) -> float:
+        """Evidence with what stands out of this model for outliers, whatever was taken for them before: as any other model may be judged."""
+        whole = self.linear.problem.rows
+        rows = {n: spare_outliers(whole[n], self.residual(n), level)[0] for n, level in self.noise.items()}
+        return replace(self, linear=replace(self.linear, rows=rows)).evidence
 
     def gains(self, columns: Mapping[str, NDArray[np.floating]], units: Array, effect: Effect) -> Array:
         """Return what effects of columns (M, H, k) and units (H, k) add to the evidence at SCALES, (S, H); −∞ against the first column."""

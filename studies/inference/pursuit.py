@@ -1,6 +1,7 @@
 """A search that follows what it finds: the model is linearised anew where values are most probable beside the effects, and searched again."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,8 +25,20 @@ STRAIGHT = 1.0
 """The same, up to which further effects are looked for beside one before the model is linearised anew."""
 PATIENCE = 2
 """Linearisations in a row that bring no more, after which none is made."""
+FOLLOWED = 2
+"""Causes that may come first, followed to values of their own: what leads in straight lines is often not what leads there."""
 SAME_PATH = 0.02
 """Part of its range by which the resonator's temperature may move before the columns of all effects are computed anew."""
+
+
+@dataclass(frozen=True)
+class _Place:
+    """A model where its values are likeliest."""
+
+    score: float
+    search: Search
+    point: Array
+    grown: Hypothesis
 
 
 class Pursuit:
@@ -41,12 +54,21 @@ class Pursuit:
     def outcome(self, least: float = -np.inf) -> tuple[Search, Outcome]:
         """Return the last search and what it found; given up below a `least` score."""
         self.least = least
-        plain, final = self._straightened(*self.search.grow(near=self._near))
+        plain, final = self._begun()
         if self._beaten(final):
             return self.search, Outcome(plain, final, (), ())
         if self.start.problem.instrument.polynomial is not None:
             plain, final = self._elsewhere(plain, final)
         return self.search, self.search.compare(plain, final)
+
+    def _begun(self) -> tuple[Hypothesis, Hypothesis]:
+        """Grow from nothing; where straight lines do not reach what comes first beside a card, the likeliest that may come first are followed to values of their own."""
+        plain, final = self.search.grow(near=self._near)
+        if self.start.problem.instrument.polynomial is None and final.terms and not self._near(final):
+            best = self._best_of((one.terms, one.noise) for one in self.search.contenders(plain)[:FOLLOWED])
+            if best is not None:
+                plain, final = self._going_on(best)
+        return self._straightened(plain, final)
 
     def _straightened(self, plain: Hypothesis, final: Hypothesis) -> tuple[Hypothesis, Hypothesis]:
         best, waited = -np.inf, 0
@@ -60,7 +82,7 @@ class Pursuit:
                 plain, final = self.search.grow(terms, self._near if left > SETTLING + 1 else lambda _: True)
             else:
                 plain, final = self.search.grow(terms, most=0)
-            score = on_all_rows(self.search, final)
+            score = fair_score(self.search, final)
             best, waited = max(best, score), 0 if score > best else waited + 1
             if waited == PATIENCE or np.abs(self.point - before).max(initial=0.0) < STILL:
                 break
@@ -71,18 +93,27 @@ class Pursuit:
 
     def _elsewhere(self, plain: Hypothesis, final: Hypothesis) -> tuple[Hypothesis, Hypothesis]:
         """Go on where less noise, or an effect in the place of slow noise, is likelier with values of its own."""
-        tried = []
-        for terms, noise in self.search.suspects(final):
-            there, at, own = self._linearise(terms, noise, [])
-            grown = there.grow(own, noise=noise, most=0)[1]
-            tried.append((on_all_rows(there, grown), there, at, grown))
-        best = max(tried, key=lambda one: one[0], default=None)
-        if best is None or best[0] <= on_all_rows(self.search, final) + STRAYED:
+        best = self._best_of(self.search.suspects(final))
+        if best is None or best.score <= fair_score(self.search, final) + STRAYED:
             return plain, final
         self.progress("a better minimum found elsewhere; continuing there")
-        _, there, self.point, grown = best
-        self.search = Search(there.linear, there.signatures, grown.noise, None, self.progress)
-        return self._straightened(*self.search.grow(grown.terms, self._near, grown.noise))
+        return self._straightened(*self._going_on(best))
+
+    def _best_of(self, tried: Iterable[tuple[Sequence[Term], Mapping[str, Noise]]]) -> "_Place | None":
+        """The likeliest of some models, each with values of its own."""
+        found = []
+        for terms, noise in tried:
+            there, point, own = self._linearise(terms, noise, [])
+            grown = there.grow(own, noise=noise, most=0)[1]
+            found.append(_Place(fair_score(there, grown), there, point, grown))
+        return max(found, key=lambda one: one.score, default=None)
+
+    def _going_on(self, place: "_Place") -> tuple[Hypothesis, Hypothesis]:
+        """Search on from a model."""
+        there, self.point, grown = place.search, place.point, place.grown
+        bank = self._bank_at(there.signatures)
+        self.search = Search(there.linear, there.signatures, grown.noise, bank, self.progress)
+        return self.search.grow(grown.terms, self._near, grown.noise)
 
     def _model(self, final: Hypothesis) -> Model:
         return Model(self.search.linear, self.search.signatures, final.terms, final.noise)
@@ -105,18 +136,20 @@ class Pursuit:
         return STRAYED > sum(np.sum(linear.rows[n].whiten(own, final.noise[n]) ** 2) for n, own in apart.items())
 
     def _beaten(self, final: Hypothesis) -> bool:
-        return self.least > -np.inf and on_all_rows(self.search, final) < self.least
+        return self.least > -np.inf and fair_score(self.search, final) < self.least
 
     def _linearise(
         self, terms: Sequence[Term], noise: Mapping[str, Noise], bank: Sequence[Shapes] | None = None
     ) -> tuple[Search, Array, tuple[Term, ...]]:
         there = relinearise(self.start, self.search.linear, self.point, terms, noise)
-        if bank is None and there.signatures.away(self.search.signatures) < SAME_PATH:
-            bank = self.search.bank
+        bank = self._bank_at(there.signatures) if bank is None else bank
         return Search(there.linear, there.signatures, noise, bank, self.progress), there.values, there.terms
 
+    def _bank_at(self, paths: Signatures) -> Sequence[Shapes] | None:
+        """The columns of all effects where they are the same along other paths; None where they are to be computed."""
+        return self.search.bank if paths.away(self.search.signatures) < SAME_PATH else None
 
-def on_all_rows(search: Search, final: Hypothesis) -> float:
-    """Log posterior of a model, no row taken for an outlier."""
-    alone = Background(search.linear.on_all_rows, final.terms, final.noise).evidence
-    return alone + sum(term.price for term in final.terms)
+
+def fair_score(search: Search, final: Hypothesis) -> float:
+    """Log posterior of a model, its outliers being what stands out of it."""
+    return Background(search.linear, final.terms, final.noise).fair + sum(term.price for term in final.terms)

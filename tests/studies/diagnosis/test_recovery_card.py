@@ -83,6 +83,23 @@ def test_an_effect_is_not_taken_for_values_far_from_the_card(only):
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("coarser")
+def test_what_leads_in_straight_lines_is_not_taken_before_its_rivals_are_followed(only):
+    """A gradient's dT/dt of a device far from its card, its housing not measured: two values of the card were named, and the rest was unexplained."""
+    card = load_card("cvg-25mm")
+    own = {"mount_conductance_W_per_K": 0.2, "film_emissivity": 0.34, "chamber_conductance_W_per_K": 0.055}
+    slope = {"name": "rate-frequency", "response": "frequency_Hz", "coefficient_Hz_per_K_per_s": -100.0}
+    only("rate-frequency", "mounting-stress", "second-lag", "thermometer-scale")
+    device = card.with_table("thermal", card.content["thermal"] | own).with_table("effect", [slope])
+    runs = simulated(device, "cycle 22 -12 38 2 40min 1", seed=3)
+    chamber = [
+        replace(run, columns={k: v for k, v in run.columns.items() if k != "housing_temperature_degC"}) for run in runs
+    ]
+    causes = diagnose_records(chamber, card).verdict.causes
+    assert [(cause.kind, cause.effect) for cause in causes] == [("physics", "rate-frequency")]
+
+
+@pytest.mark.slow
 def test_a_strong_effect_leaves_the_values_alone(only):
     """Beside an amplitude-frequency effect of a hundred times the noise, priors of the first fit's scale let three values go far."""
     card, runs = load_card("bvg-bell"), []
