@@ -69,7 +69,6 @@ def _read_text(path: Path, first: str) -> Array:
 
 
 def _read_mesh(path: Path) -> Array:
-
     import trimesh
 
     logging.getLogger("trimesh").setLevel(logging.CRITICAL)  # what it cannot read is said below, in one sentence

@@ -275,7 +275,6 @@ def _parse_with_care(path: str | Path, start: int, names: list[str], first_line:
 
 
 def _parse_by_line(path: str | Path, body: str, names: list[str], first_line: int) -> Table:
-
     rows: list[list[float]] = []
     reader = csv.reader(io.StringIO(body, newline=""))
     try:
@@ -297,7 +296,6 @@ def _parse_by_line(path: str | Path, body: str, names: list[str], first_line: in
 
 
 def _check_size(columns: Columns) -> None:
-
     for name, values in columns.values.items():
         large = np.abs(values) > LARGEST
         columns.refuse(large, lambda row: f"{name} = {values[row]:g} is not a possible reading; correct it.")  # noqa: B023

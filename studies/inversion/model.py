@@ -84,7 +84,6 @@ class ModeModel:
         return self._lowest(which.harmonic, which.temperature, values, which.index + 1)[which.index]
 
     def _lowest(self, n: int, temperature: float, values: dict[str, float], count: int) -> tuple[Mode, ...]:
-
         key = (n, temperature, *values.values())
         if len(self._solved.get(key, ())) < count:
             body, elastic = self.instrument.with_values(values).at(temperature)

@@ -110,7 +110,6 @@ def loss_model(
 
 
 def _thermoelastic(instrument: Instrument, vibration: Vibration, heat: Callable[[float], Heat]) -> LossCause:
-
     T0, material = instrument.reference_temperature, instrument.material
     prior = dict(zip(material.prior.names, material.prior.sd, strict=True))
     thermal = {one.name: one.sd / one.value for one in instrument.uncertain if one.name.startswith("thermal.")}
@@ -123,7 +122,6 @@ def _thermoelastic(instrument: Instrument, vibration: Vibration, heat: Callable[
 
 
 def _heat_law(instrument: Instrument) -> tuple[Callable[[float], Heat] | None, str]:
-
     material, thermal = instrument.material, instrument.thermal
     given = {"conductivity": thermal.conductivity_W_per_m_K, "heat_capacity": thermal.heat_capacity_J_per_kg_K}
     lacking = [name for name in ("expansion", "density") if name not in material.properties]
@@ -188,7 +186,6 @@ def _ohmic(instrument: Instrument, mode: Mode) -> list[LossCause]:
 
 
 def _surface_ripple(parts: LossParts, vibration: Vibration, causes: Sequence[LossCause]) -> list[Ripple]:
-
     if parts.surface_anisotropy is None or not any(cause.name == "surface" for cause in causes):
         return []
     angle = math.radians(parts.surface_anisotropy_angle_deg)

@@ -112,7 +112,6 @@ def _test_rows(model: Model) -> list[tuple[float, ...]]:
 
 
 def _is_monotonic(model: Model) -> bool:
-
     return find_turn(partial(evaluate, model), model.range_of(VARIABLE)) is None
 
 

@@ -154,7 +154,6 @@ def emit_c(model: Model) -> str:
 
 
 def _save_curve(name: str, curve: PolynomialCurve, units: Sequence[str]) -> ModelPart:
-
     names = [f"c{i}" for i in range(len(curve.coefficients))]
     if isinstance(curve, RateCurve):
         names, units = ["a", "k", *FORMS[curve.form].own], ("deg/s", "1", C_FORMS[curve.form][0])
@@ -163,7 +162,6 @@ def _save_curve(name: str, curve: PolynomialCurve, units: Sequence[str]) -> Mode
 
 
 def _load_curve(model: Model, name: str, limits: tuple[float, float]) -> PolynomialCurve:
-
     part, form = model.part(name), str(model.settings.get(FORM, "")) if name == "scale_over_rate" else ""
     if not form:
         model.check_names(part, "c")
