@@ -25,8 +25,8 @@ STRAIGHT = 1.0
 """The same, up to which further effects are looked for beside one before the model is linearised anew."""
 PATIENCE = 2
 """Linearisations in a row that bring no more, after which none is made."""
-FOLLOWED = 2
-"""Causes that may come first, followed to values of their own: what leads in straight lines is often not what leads there."""
+FOLLOWED, CLOSE = 2, 0.5
+"""Causes that may come first, followed to values of their own, and part of the leader's gain that the others must have: what leads in straight lines is often not what leads there."""
 SAME_PATH = 0.02
 """Part of its range by which the resonator's temperature may move before the columns of all effects are computed anew."""
 
@@ -64,9 +64,10 @@ class Pursuit:
     def _begun(self) -> tuple[Hypothesis, Hypothesis]:
         """Grow from nothing; where straight lines do not reach what comes first beside a card, the likeliest that may come first are followed to values of their own."""
         plain, final = self.search.grow(near=self._near)
-        if self.start.problem.instrument.polynomial is None and final.terms and not self._near(final):
-            best = self._best_of((one.terms, one.noise) for one in self.search.contenders(plain)[:FOLLOWED])
-            if best is not None:
+        if self.start.problem.instrument.polynomial is None and len(final.terms) == 1 and not self._near(final):
+            first = self.search.contenders(plain)[:FOLLOWED]
+            close = [one for one in first if one.score - plain.score > CLOSE * (first[0].score - plain.score)]
+            if len(close) > 1 and (best := self._best_of((one.terms, one.noise) for one in close)):
                 plain, final = self._going_on(best)
         return self._straightened(plain, final)
 
