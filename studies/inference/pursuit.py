@@ -65,7 +65,7 @@ class Pursuit:
         """Grow from nothing; where straight lines do not reach what comes first beside a card, the likeliest that may come first are followed to values of their own."""
         plain, final = self.search.grow(near=self._near)
         if self.start.problem.instrument.polynomial is None and len(final.terms) == 1 and not self._near(final):
-            first = self.search.contenders(plain)[:FOLLOWED]
+            first = self.search.first[:FOLLOWED]
             close = [one for one in first if one.score - plain.score > CLOSE * (first[0].score - plain.score)]
             if len(close) > 1 and (best := self._best_of((one.terms, one.noise) for one in close)):
                 plain, final = self._going_on(best)

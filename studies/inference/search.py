@@ -93,6 +93,7 @@ class Search:
     ) -> None:
         self.linear, self.signatures, self.noise, self.progress = linear, signatures, noise, progress
         self.bank = self.shapes_of(signatures.applicable()) if bank is None else bank
+        self.first: list[Hypothesis] = []  # what may come first, as `grow` weighed it
 
     def shapes_of(self, effects: Iterable[tuple[Effect, str]]) -> list[Shapes]:
         """Return the columns of all shapes of some effects, in seven digits: whatever leads is computed anew."""
@@ -229,6 +230,7 @@ class Search:
             if len(now.terms) == MOST_TERMS or not self.bank or (now.terms and not near(now)):
                 break
             tried = self.contenders(now)
+            self.first = self.first if now.terms else tried
             if not tried or tried[0].score - now.score < self.needed(tried[0].terms[-1], now.terms):
                 break
             self.progress(
