@@ -96,23 +96,29 @@ def read_columns(
     return columns
 
 
-def _take_frame(frame: "DataFrame") -> Columns:
-    """Return the columns of a table of pandas, with the comment lines in its `attrs`."""
+def _names_of(frame: "DataFrame") -> list[str]:
+    """Return the column names of a table of pandas; refuse what is none."""
     if not hasattr(frame, "to_numpy") or not hasattr(frame, "attrs"):
         raise InputError(f"{frame!r:.60}: give a path, a record or a table of pandas, not {type(frame).__name__}.")
+    return [str(name) for name in frame.columns]
+
+
+def _take_frame(frame: "DataFrame") -> Columns:
+    """Return the columns of a table of pandas, with the comment lines in its `attrs`."""
+    names = _names_of(frame)
     path = str(frame.attrs.get("path") or "table")
     try:
         numbers = frame.to_numpy(float, na_value=float("nan")).T
     except (TypeError, ValueError) as error:
         raise InputError(f"{path}: the table has cells that are no numbers ({error}).") from None
-    named = dict(zip(map(str, frame.columns), numbers, strict=True))
+    named = dict(zip(names, numbers, strict=True))
     return Columns(path, named, tuple(frame.attrs.get("comments", ())), first_line=1)
 
 
 def read_header(path: "str | Path | DataFrame") -> list[str]:
     """Return the column names of a table without reading its numbers."""
     if not isinstance(path, str | Path):
-        return list(_take_frame(path).values)
+        return _names_of(path)
     if is_parquet(path):
         return read_comments_and_names(path)[1]
     _, header, _, _ = _read_head(path)
