@@ -71,6 +71,7 @@ def test_what_a_loss_peak_does_to_the_bias_is_no_second_cause(only):
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("fine")
 def test_an_effect_is_not_taken_for_values_far_from_the_card(only):
     """A gradient's dT/dt was once fitted as eleven standard deviations of the housing's lag, with other causes to mend it."""
     card = load_card("bvg-bell")
