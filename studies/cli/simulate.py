@@ -37,7 +37,7 @@ def simulate(
     With [loop] in mode whole-angle, the wave precesses with the applied rate, the self-precession, and the drift by damping and
     electronics; a column pattern_angle_deg of the record or profile prescribes its azimuth instead.
 
-    A record's '# start' places the run in time: a saved ageing goes on from its date (since), else it begins with the run.
+    The '# start' of a record or a profile's file places the run in time: a saved ageing goes on from its date (since), else it begins with the run.
     The gyro is described by the card's optional tables [thermal], [loss], [bias], [loop], [noise] and [[effect]]; all keys have
     defaults (hrg keys card).
 

@@ -68,7 +68,10 @@ def load_drive(text: "str | Record", boundary: "Boundary | None" = None, rate: f
     if boundary == "housing":
         raise InputError(f"{text}: only a record has a housing column to impose; leave out --boundary housing.")
     chamber, commands = load_schedule(text)
-    return replace(drive_by_schedule(chamber, commands, rate), source=str(text)) if commands else chamber
+    moment = read_record(text).moment if columns else None
+    if not commands and moment is None:
+        return chamber
+    return replace(drive_by_schedule(chamber, commands, rate), moment=moment, source=str(text))
 
 
 def _columns_of(text: "str | Record") -> list[str]:

@@ -38,6 +38,8 @@ OF_LOOPS = ("gain", "phase_d", "phase_deg", "skew", "misalignment", "split", "ax
 """Parts of the names of those keys of [loop] that act on settled loops."""
 PRECESSION = "loop.self_precession_deg_per_s"
 ONE = ".one"
+START = "start_s"
+"""When a run begins, s since 1970 (UTC), from which effects with a date count on; before all dates, as 0 is, they begin with the run."""
 REACH = 150.0  # K on both sides of its reference, within which a polynomial law is carried
 MEMORY = 16  # numbers that one effect may remember
 PAST = 256  # moments at which the temperature of a resonator that is late is kept, over twice its delay
@@ -46,12 +48,13 @@ CAPACITY_STEP = 0.25  # K, of the knots of a heat capacity that varies
 
 @dataclass(frozen=True)
 class EffectRow:
-    """One effect: its name, target ("temperature" or a response) and the places of its shape and weights among the parameters."""
+    """One effect: its name, target ("temperature" or a response), the places of its shape and weights among the parameters, and its date (s)."""
 
     name: str
     target: str
     shape: int
     weights: int
+    since: float | None
 
 
 @dataclass(frozen=True)
@@ -119,6 +122,7 @@ def plan_twin(instrument: "Instrument", boundary: "Boundary" = "chamber", theory
     splines |= _splines(instrument, law)
     network = behind_housing(network) if boundary == "housing" else with_sensor(network, 1.0)
     effects = tuple(_place_effects(instrument, parameters))
+    parameters[START] = 0.0
     rows = observed_rows(instrument, law, tuple(node.name for node in network.nodes))[1:6]
     uneven = law.uneven
     return Plan(
@@ -234,7 +238,7 @@ def _place_effects(instrument: "Instrument", parameters: dict[str, float]) -> It
         for name, value in zip(names, [*shape, *weights], strict=True):
             parameters[name] = float(value)
         target = "temperature" if effect.thermal else one.response
-        yield EffectRow(one.name, target, first, first + len(shape))
+        yield EffectRow(one.name, target, first, first + len(shape), one.since)
 
 
 def _constants(instrument: "Instrument", law: "FrequencyLaw", boundary: "Boundary") -> dict[str, float]:

@@ -12,7 +12,7 @@ from studies.effects.effect import AROUND
 from studies.models.c_source import one_line
 from studies.simulation.heat_path import LEAST_LAG, SENSOR, SENSOR_SHARE
 from studies.simulation.virtual_gyro import COMMAND_DIGITS, DIGITS
-from studies.twin.plan import EFFECTS, MEMORY, PAST, PRECESSION, Plan, input_starts
+from studies.twin.plan import EFFECTS, MEMORY, PAST, PRECESSION, START, Plan, input_starts
 from thermal.constants import Stefan_Boltzmann
 from thermal.network import Conductor, Radiator
 
@@ -27,6 +27,7 @@ TARGETS = ("temperature", "frequency_Hz", "bias_deg_per_h", "inverse_q")
 OUTPUTS = ("housing_temperature_degC", "resonator_temperature_degC", "frequency_Hz", "bias_deg_per_h", "inverse_q")
 LOOP_OUTPUTS = ("quadrature_V", "pattern_angle_deg")
 RATE_OUTPUT = "measured_rate_deg_per_s"
+UNDATED = 1e300  # s: no run begins after it
 
 
 def outputs_of(plan: Plan) -> tuple[str, ...]:
@@ -107,7 +108,7 @@ def card_body(plan: Plan) -> str:
 
     power = network.power(0.0)
     effects = [
-        f"{{E_{one.name.replace('-', '_')}, {TARGETS.index(one.target)}, {MEMORY * k}, {one.shape}, {one.weights}}}"
+        f"{{E_{one.name.replace('-', '_')}, {TARGETS.index(one.target)}, {MEMORY * k}, {one.shape}, {one.weights}, {_number(UNDATED if one.since is None else one.since)}}}"
         for k, one in enumerate(plan.effects)
     ]
     nowhere = "{0, 0, 0, 0}"
@@ -138,7 +139,7 @@ def card_body(plan: Plan) -> str:
         _table("double", "twin_power_shares", "TWIN_NODES", [_number(v) for v in power]),
         _table("double", "twin_rows", "5][TWIN_NODES", [_braced([_number(v) for v in row]) for row in plan.rows]),
         _table("double", "twin_uneven", "4", [_number(v) for v in plan.uneven]),
-        _table("TwinEffect", "twin_effects", "TWIN_EFFECTS", effects or ["{E_none, 0, 0, 0, 0}"]),
+        _table("TwinEffect", "twin_effects", "TWIN_EFFECTS", effects or ["{E_none, 0, 0, 0, 0, 0}"]),
         _table("char *const", "twin_columns", "TWIN_OUTPUTS", [_text(name) for name in outputs]),
         _table("int", "twin_digits", "TWIN_OUTPUTS", [str(n) for n in digits]),
         *(_coefficients(name, one) for name, one in splines.items() if one is not None),
@@ -153,7 +154,8 @@ def exposed(plan: Plan, key: str) -> str:
     """Return the name of a parameter that may be changed; "" of one that is no key of the card, or does not act."""
     value = plan.parameters[key]
     fixed = ("loss.",) * ("loss" in plan.splines) + ("thermal.",) * (plan.instrument.polynomial is not None)
-    idle = key.startswith(fixed) or key == PRECESSION  # a command
+    undated = all(one.since is None for one in plan.effects)
+    idle = key.startswith(fixed) or key == PRECESSION or (key == START and undated)  # a command; no date to count from
     return "" if key.startswith(".") or value != value or idle else key
 
 

@@ -52,9 +52,10 @@ static double power_series(const double *weights, int count, double x, int first
 }
 
 double twin_effect(Twin *w, const TwinEffect *e, const TwinInput *in, double h, double housing, double resonator, double rate) {
-    const double *s = w->p + e->shape, *a = w->p + e->weights, t = w->time, x = (resonator - TWIN_REFERENCE) / 10;
+    const double *s = w->p + e->shape, *a = w->p + e->weights, x = (resonator - TWIN_REFERENCE) / 10;
     const double angle = (in->given[IN_ANGLE] ? in->value[IN_ANGLE] : w->p[P_bias_pattern_angle_deg]) * PI / 180;
     const double amplitude = in->value[IN_AMPLITUDE] * in->value[IN_AMPLITUDE], volts = in->value[IN_VOLTAGE] * in->value[IN_VOLTAGE];
+    const double t = w->time + fmax(w->p[P_start_s] - e->since, 0.0); /* since its date */
     const double tau = TWIN_LAG, quadrature = in->value[IN_QUADRATURE];
     const int f = e->target == TARGET_FREQUENCY;
     double *m = w->memory + e->memory, y = 0.0;

@@ -2,7 +2,8 @@
  *
  * The profile has the columns time_s and chamber_temperature_degC (housing_temperature_degC where the card was carried for
  * it), linear between its rows, and any of drive_amplitude_V, electrode_bias_V, quadrature_V, pattern_angle_deg and
- * rate_deg_per_s. `full` writes 17 digits. Exit status: 0 done, 2 unusable input. The record appears whole or not at all.
+ * rate_deg_per_s; a comment "# start: 2026-01-31T12:00:00+00:00" places the run in time (local without an offset).
+ * `full` writes 17 digits. Exit status: 0 done, 2 unusable input. The record appears whole or not at all.
  */
 #if defined __unix__ || defined __APPLE__
 #define _XOPEN_SOURCE 700
@@ -12,18 +13,44 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <time.h>
 
 #include "twin.h"
 
 enum { OFFERED = IN_PRECESSION, TIME = 0, BOUNDARY, FIRST_COMMAND, COLUMNS = FIRST_COMMAND + OFFERED, LONGEST_LINE = 4096, MOST_ROWS = 1000000000 };
 static const char *const names[COLUMNS] = {"time_s", TWIN_BOUNDARY, "rate_deg_per_s", "drive_amplitude_V", "electrode_bias_V", "quadrature_V", "pattern_angle_deg"};
 
-typedef struct { double (*rows)[COLUMNS]; long count, place; int has[COLUMNS]; } Profile;
+typedef struct { double (*rows)[COLUMNS]; long count, place; int has[COLUMNS]; double moment; char start[64]; } Profile;
 
 static int complain(const char *file, long line, const char *what) {
     fprintf(stderr, line ? "%s, line %ld: " : "%s: ", file, line);
     fprintf(stderr, "%s\n", what);
     return 2;
+}
+
+/* Seconds since 1970 of an ISO 8601 time, local without an offset; 0 where it is none. */
+static int read_moment(const char *text, double *moment) {
+    struct tm at = {.tm_isdst = -1};
+    int used = 0, minutes = 0, zone[2] = {0};
+    char *end = NULL, sign = 0;
+    double seconds = 0.0;
+    if (sscanf(text, "%4d-%2d-%2d%n", &at.tm_year, &at.tm_mon, &at.tm_mday, &used) != 3) return 0;
+    text += used;
+    if (*text == 'T' || *text == ' ') {
+        if (sscanf(++text, "%2d:%2d%n", &at.tm_hour, &at.tm_min, &used) != 2) return 0;
+        text += used;
+        if (*text == ':') seconds = strtod(text + 1, &end), text = end;
+    }
+    minutes = 60 * at.tm_hour + at.tm_min;
+    if (at.tm_mon < 1 || at.tm_mon > 12 || at.tm_mday < 1 || at.tm_mday > 31 || minutes >= 1440 || at.tm_min > 59 || !(seconds >= 0 && seconds < 60)) return 0;
+    if (!*text) { /* of the zone of this computer */
+        at.tm_year -= 1900, at.tm_mon -= 1;
+        return *moment = (double)mktime(&at) + seconds, 1;
+    }
+    if (strcmp(text, "Z") && (sscanf(text, "%c%2d:%2d%n", &sign, &zone[0], &zone[1], &used) != 3 || text[used] || (sign != '+' && sign != '-'))) return 0;
+    const int y = at.tm_year - (at.tm_mon < 3), days = 365 * y + y / 4 - y / 100 + y / 400 + (153 * ((at.tm_mon + 9) % 12) + 2) / 5 + at.tm_mday - 719469;
+    minutes -= (sign == '-' ? -1 : 1) * (60 * zone[0] + zone[1]);
+    return *moment = 86400.0 * days + 60.0 * minutes + seconds, 1;
 }
 
 static int load(const char *file, Profile *profile) {
@@ -37,6 +64,10 @@ static int load(const char *file, Profile *profile) {
         double row[COLUMNS] = {0};
         ++number;
         line[strcspn(line, "\r\n")] = 0;
+        if (sscanf(line, "# start : %63[^\n]", profile->start) == 1) {
+            for (size_t n = strlen(profile->start); n && profile->start[n - 1] == ' '; --n) profile->start[n - 1] = 0;
+            if (!read_moment(profile->start, &profile->moment)) return fclose(in), complain(file, number, "'# start' is no ISO 8601 time such as 2026-01-31T12:00:00.");
+        }
         if (!*line || *line == '#') continue;
         for (char *cell = line, *next = line; next && k < 64; cell = next, ++k) {
             next = strchr(cell, ',');
@@ -136,7 +167,9 @@ static int write_rows(Twin *twin, Profile *profile, FILE *out, double row, int f
     twin->step = row;
     twin->onward = onward;
     twin->way = profile;
-    fprintf(out, "# instrument: %s\n# source: simulated\ntime_s%s", TWIN_NAME, TWIN_SENSOR >= 0 ? "," TWIN_BOUNDARY : "");
+    fprintf(out, "# instrument: %s\n# source: simulated\n", TWIN_NAME);
+    if (*profile->start) fprintf(out, "# start: %s\n", profile->start);
+    fprintf(out, "time_s%s", TWIN_SENSOR >= 0 ? "," TWIN_BOUNDARY : "");
     for (int k = 0; k < TWIN_OUTPUTS - 1; ++k)
         fprintf(out, ",%s", twin_columns[k]);
     for (int c = FIRST_COMMAND + 1; c < COLUMNS; ++c)
@@ -229,6 +262,7 @@ int main(int argc, char **argv) {
     if (!status) {
         twin_defaults(twin);
         twin->noise = noise;
+        twin->p[P_start_s] = profile.moment;
         twin_seed(twin, noise && argc > 4 ? strtoull(argv[4], NULL, 10) : 0);
         status = write_record(twin, &profile, argv[1], argv[2], row, full);
     }

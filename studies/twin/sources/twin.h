@@ -3,7 +3,8 @@
  * card.h and card.c hold the numbers of one card; everything else is the same for all. Temperatures are in kelvin inside,
  * in degC at inputs and outputs. A function that can fail returns NULL, or a sentence that says why.
  *
- *     twin_defaults(&twin);            the card's parameters; change twin.p[P_...] here
+ *     twin_defaults(&twin);            the card's parameters; change twin.p[P_...] here, P_start_s among them: when the
+ *                                      run begins, s since 1970 (UTC), from which effects with a date count on
  *     twin_settle(&twin, 293.15);      the steady state at this temperature of the boundary
  *     twin_row(&twin, &in);            the outputs twin.out[OUT_...] at this moment
  *     twin_heat(&twin, h, T0, T1);     h seconds on; the boundary goes from T0 to T1 (K) in a straight line
@@ -21,7 +22,7 @@ enum { FLICKER_TIMES = 18, TWIN_TERMS = 5, TWIN_SAID = 4 };
 
 typedef struct { int one, other, parameter; double factor; } TwinLink; /* conductance or exchange area = p * factor */
 typedef struct { int parameter; double factor; } TwinCapacity;         /* p * factor; of shell and stem over T besides */
-typedef struct { int kind, target, memory, shape, weights; } TwinEffect; /* places in the memory and, of shape and weights, in p */
+typedef struct { int kind, target, memory, shape, weights; double since; } TwinEffect; /* places in the memory and, of shape and weights, in p; its date, s since 1970 */
 typedef struct { double first, step; int count; const double *coefficients; } TwinSpline; /* 4 rows, highest power first */
 
 /* deg/s, V, V, V, deg, deg/s; a command that is not given does not act; the azimuth, and the precession of a free wave, are the card's. */

@@ -153,6 +153,28 @@ def test_limits_turning_wave_in_fmpy(tmp_path):
 
 @pytest.mark.slow
 @needs_compiler
+def test_limits_fmu_of_a_card_that_ages(tmp_path):
+    """An effect with a date goes on from it where `start_s` says when the run begins; a card without dates has no such parameter."""
+    path, since, moment = tmp_path / "twin.fmu", "2026-03-01T12:00:00+00:00", 1772712000.0  # four days later
+    drift = {"name": "clock-drift", "drift_Hz_per_day": 0.5, "since": since}
+    instrument = load_card("free-dome").with_table("effect", [drift])
+    fmus.write_fmu(plan_twin(instrument), path, "3.0")
+    profile = Profile(TIME, LEVEL + 273.15)
+    drive = drive_by_profile(profile, rows_of(profile, 1.0))
+    for start, moved in (({}, 0.0), ({"start_s": moment}, 2.0)):
+        found, text = simulate_fmpy(path, {"noise": False, **start})
+        run = simulate_run(instrument, replace(drive, moment=start.get("start_s")), noise=False)
+        expected = run.prediction.columns["frequency_Hz"]
+        assert np.abs(found["frequency_Hz"] - expected).max() < 1e-9 * expected.max()
+        assert expected[-1] - 0.5 * TIME[-1] / 86400 - moved == pytest.approx(
+            simulate_run(instrument.with_table("effect", []), drive, noise=False).prediction.columns["frequency_Hz"][-1]
+        )
+    assert '"start_s"' in text
+    assert "start_s" not in fmus.describe(plan_twin(load_card("free-dome")), "3.0", "name", "token")
+
+
+@pytest.mark.slow
+@needs_compiler
 def test_contract_strange_names(tmp_path):
     """A card's name can hold what would end a text of C, a comment or an attribute; the FMU compiles and its description is XML."""
     path = tmp_path / "twin.fmu"

@@ -12,6 +12,7 @@ from studies.cli import main
 from studies.effects import library
 from studies.instrument.card import load_card, save_card
 from studies.record import read_record
+from studies.simulation.chamber import load_drive
 from studies.twin.plan import plan_twin
 from studies.twin.source import exposed
 from tests.studies.twin.building import (
@@ -89,6 +90,39 @@ def programs():
         [(name, r) for name, effect in effects if not effect.thermal and r in effect.responses] for r in responses
     ]
     return [*thermal, *([one for one in row if one] for row in zip_longest(*columns))]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", [name for name, effect in sorted(library().items()) if effect.dated])
+def test_limits_effect_with_a_date(name, bare, folder):
+    """A profile's '# start' places the run in time: what has a date goes on from it; without a start, or before the date, it begins."""
+    effect = library()[name]
+    entry = one_effect(name, effect.responses[0]) | {"since": "2026-03-01T12:00:00"}
+    if name == "periodic":
+        entry["restarts_each_run"] = 0.0
+    instrument = load_card("free-dome").with_table("effect", [entry])
+    program = compile_twin(instrument, folder / "dated", (*STRICT, "-O0"))
+    profile, column = folder / "dated.csv", effect.responses[0]
+    first = None
+    for start in (
+        "",
+        "2026-02-01T12:00:00",
+        "2026-03-05T18:00:07.25",
+        "2026-03-04 23:30+05:45",
+        "2026-04-01T00:00:00Z",
+        "2028-02-29",
+    ):
+        write_profile(profile, RAMPS)
+        profile.write_text((f"# start: {start}\n" if start else "") + profile.read_text())
+        found, expected = run_twin(program, profile, 2.0), simulated(instrument, profile, 2.0)
+        first = expected if first is None else first
+        moved = np.abs(expected[column] - first[column]).max() / np.abs(bare[column]).max()
+        assert (moved > 1e-8) == (start > "2026-03"), start
+        assert worst(found, expected)[column] < 1e-9, start
+        assert read_record(program.parent / "record.csv").moment == load_drive(str(profile), rate=0.5).moment
+    profile.write_text("# start: yesterday\n" + profile.read_text())
+    done = subprocess.run([program, profile, folder / "no.csv"], capture_output=True, text=True, check=False)
+    assert (done.returncode, "'# start' is no ISO 8601 time" in done.stderr) == (2, True)
 
 
 BY_DIFFERENCES = {"thermometer-lag": 3e-6, "clock-offset": 1e-7, "rate-frequency": 1e-9, "rate-bias": 1e-9}
