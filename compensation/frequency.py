@@ -148,7 +148,11 @@ def fit_frequency(
     resolution: float | None = None,
 ) -> FrequencyFit:  # fmt: skip
     """Fit f(T) by least squares, HRG paper eqs. (16)–(18); rounding to `resolution` (Hz) has the variance resolution²/12."""
-    T, f = np.asarray(temperature_degC, dtype=np.float64), np.asarray(frequency, dtype=np.float64)
+    try:
+        T, f = np.asarray(temperature_degC, dtype=np.float64), np.asarray(frequency, dtype=np.float64)
+    except (TypeError, ValueError):
+        words = "a frequency law is fitted to numbers, temperatures (°C) and frequencies (Hz); 'hrg fit frequency' reads files."
+        raise CompensationError(words) from None
     if resolution is not None and not (np.isfinite(resolution) and resolution > 0):
         raise CompensationError(f"the resolution of the readings must be positive, not {resolution:g} Hz.")
     if not abs(reference_temperature_degC) <= FARTHEST_REFERENCE:

@@ -157,7 +157,8 @@ def _staircase(before: float, after: float, step: float, hold: float) -> Points:
     span = abs(after - before)
     count = round(min(span / step, 1e9))
     if count == 0 or not math.isclose(count * step, span, rel_tol=1e-9):
-        below = int(min(span / step, 1e9))
+        _check_repeats(count, "steps")
+        below = int(span / step)
         near = sorted({span / max(part, 1) for part in (below, below + 1)})
         mend = f"take steps of {' or '.join(f'{one:.6g}' for one in near)} K" if span else "use 'soak'"
         raise ThermalError(f"steps of {step:g} K do not lead from {before:g} to {after:g} °C; {mend}.")

@@ -5,8 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from compensation.constants import NINETY
 from compensation.errors import CompensationError
-from compensation.ringdown.answer import NINETY, Curve, Estimate, RingDown
+from compensation.ringdown.answer import Curve, Estimate, RingDown
 from compensation.ringdown.envelope import LEAST, Envelope
 from compensation.ringdown.fit import DecayFit, drift_shapes
 from compensation.ringdown.model import Decay

@@ -5,8 +5,7 @@ from dataclasses import dataclass
 from math import exp
 
 from compensation.arrays import Array
-
-NINETY = 1.6449  # standard deviations of the ends of a 90 % interval
+from compensation.constants import NINETY
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ import numpy as np
 from studies.calibration.fit import CardFit, fit
 from studies.calibration.observed import HOUSING
 from studies.calibration.problem import CardProblem
-from studies.calibration.remarks import FAR
+from studies.diagnosis.verdict import FAR
 from studies.simulation.variations import LAG
 
 APART = (

@@ -12,13 +12,13 @@ from studies.calibration.fit import CardFit, stated_noise
 from studies.calibration.ladder import Rung, noise_rms, usual_mean
 from studies.calibration.observed import NEIGHBOURS, SETTLED, UNITS, WORDS
 from studies.calibration.problem import CardProblem
+from studies.diagnosis.verdict import FAR
 from studies.instrument.display import display_name
 from studies.simulation.virtual_gyro import idle_effects
 
 TURNED_ON = 2.0  # runs whose offsets are so much larger than the card states
 CONTRADICTION = 5.0  # runs whose offsets are so much larger than what else the noise makes of a run's mean
 MISFIT = 2.0  # residuals that are so much larger than their rows' white noise and what the card states of slow noise
-FAR = 2.0  # prior standard deviations beyond which a value of the card is wrong
 UNSETTLED, UNSETTLED_SD = 0.5, 4.0  # K and standard deviations by which a gyro had not settled at the start
 
 

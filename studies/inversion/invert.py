@@ -14,7 +14,8 @@ import numpy as np
 import scipy
 
 from compensation.arrays import Array
-from studies.calibration.estimates import NINETY, Estimate, find_groups, posterior_card
+from compensation.constants import NINETY
+from studies.calibration.estimates import Estimate, find_groups, posterior_card
 from studies.calibration.priors import Priors, check_exact, from_standard, gather_priors
 from studies.errors import InputError
 from studies.instrument.card import Instrument

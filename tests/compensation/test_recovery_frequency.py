@@ -85,6 +85,7 @@ def test_rounding_alone_passes_its_own_test():
         (np.arange(6.0), np.arange(6.0) + 4400, {"reference_temperature_degC": float("nan")}, "reference temperature"),
         (np.arange(6.0), np.arange(6.0) + 4400, {"reference_temperature_degC": 1e300}, "reference temperature"),
         (np.arange(6.0), np.arange(5.0) + 4400, {}, "equally long"),
+        ("law.csv", "more.csv", {}, "reads files"),
     ],
 )
 def test_unusable_tables_are_refused(temperature, frequency, options, message):

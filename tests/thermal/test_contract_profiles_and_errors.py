@@ -159,6 +159,7 @@ def test_the_value_at_a_jump_is_the_one_after_it():
         ("cycle 20 0 40 1 1h 1.5", "whole number of times"),
         ("cycle 20 0 40 1 1h 1e12", "at most 10000 cycles"),
         ("staircase 0 40 0.001 1h", "at most 10000 steps"),
+        ("staircase 0 30 1e-8 1h", "at most 10000 steps"),
         ("soak -300 1h", "below absolute zero"),
         ("soak 20 1h then", "empty part"),
         ("soak 20 1h, soak 30 1h", "has 5 values after 'soak', not 2"),
