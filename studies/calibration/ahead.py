@@ -20,7 +20,7 @@ BIAS = "bias_deg_per_h"
 def spread_of_prediction(
     instrument: "Instrument", drive: "Drive", law: "FrequencyLaw | None" = None
 ) -> dict[str, Array]:
-    """Return √diag(J C Jᵀ) of every column of a predicted run, C of the card's uncertain values, turn-on included, without noise."""
+    """Return √diag(J C Jᵀ) of every column of a predicted run, C of the card's uncertain values, levels of runs included, without noise."""
     priors = gather_priors(instrument)
     found = predict(instrument, drive, priors.names, law)
     scale = priors.slopes(np.zeros(len(priors.values)))
@@ -30,5 +30,8 @@ def spread_of_prediction(
         for k, name in enumerate(priors.names):
             J[:, k] = found.derivatives[name][column]
         spread[column] = np.asarray(np.linalg.norm(J @ scale, axis=1))
-    spread[BIAS] = np.hypot(spread[BIAS], instrument.noise.bias_turn_on_deg_per_h)
+    told = instrument.part("posterior")
+    turn_on = max(instrument.noise.bias_turn_on_deg_per_h, told.bias_level_deg_per_h)
+    for column, level in (("frequency_Hz", told.frequency_level_Hz), (BIAS, turn_on)):
+        spread[column] = np.hypot(spread[column], level)
     return spread

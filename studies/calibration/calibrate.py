@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from shell.errors import ShellError
 from studies.calibration.agreement import keep_agreeing, put_back
-from studies.calibration.ahead import BIAS
 from studies.calibration.apart import fit_explained
 from studies.calibration.estimates import Estimate, estimate, find_groups, over_the_wave, posterior_card
 from studies.calibration.fit import CardFit, fit, whitened
-from studies.calibration.ladder import Rung, build_ladder, noise_rms, spread_of, usual_mean
+from studies.calibration.ladder import Rung, build_ladder, noise_rms, spread_of
+from studies.calibration.levels import LEVELS, turn_on, with_level_spread, without_idle_levels
 from studies.calibration.misreading import check_readings
 from studies.calibration.observed import HOUSING, QUADRATURE, RESPONSES, SETTLED, ObservedRun, SettledTable, observe
 from studies.calibration.priors import Priors, check_exact, gather_priors
@@ -155,8 +155,9 @@ def calibrate(
         raise
     check_readings(instrument, records, problem.law)
     settled = compare_settled(problem)
-    found, apart = fit_explained(problem, progress)
-    held_out = None
+    likeliest, apart = fit_explained(problem, progress)
+    likeliest = without_idle_levels(likeliest)
+    found, held_out = with_level_spread(likeliest), None
     if hold_out is not None and len(records) > 1:
         progress("held-out run")
         held_out = predict_held_out(instrument, found.problem.runs, tables, hold_out, exact, found)
@@ -167,10 +168,12 @@ def calibrate(
         _, point, _, covariance = over_the_wave(problem.priors, found.point, found.covariance)
     else:
         estimates, found, point, covariance = put_back(estimates, kept), kept, kept.point, kept.covariance
+    levels = {key: found.noise[name].offset for name, key in LEVELS.items() if name in found.noise}
+    found = replace(found, noise=likeliest.noise)
     ladder = build_ladder(found)
     return Calibration(
         instrument,
-        posterior_card(instrument, problem.priors, point, covariance, estimates, _turn_on(found)),
+        posterior_card(instrument, problem.priors, point, covariance, estimates, turn_on(found), levels),
         found,
         estimates,
         find_groups(problem.priors, found.covariance),
@@ -198,16 +201,9 @@ def _pose(
 ) -> CardProblem:
     check_exact(instrument, exact)
     priors = gather_priors(instrument, exact)
-    return CardProblem(instrument, priors, runs, wide_law(instrument, runs, tables), tables)
-
-
-def _turn_on(found: CardFit) -> dict[str, float]:
-    """What the runs show of the bias from turn-on to turn-on, where that is more than the noise within them makes of a mean."""
-    if BIAS not in found.noise or len(found.problem.rows[BIAS].times) < 2:
-        return {}
-    offset = found.noise[BIAS].offset
-    stated = found.problem.instrument.noise.bias_turn_on_deg_per_h > 0
-    return {"noise.bias_turn_on_deg_per_h": offset} if stated or offset > usual_mean(found, BIAS) else {}
+    return CardProblem(
+        instrument, priors, runs, wide_law(instrument, runs, tables), tables, instrument.polynomial is None
+    )
 
 
 def predict_held_out(
@@ -224,7 +220,7 @@ def predict_held_out(
     count = len(whole.problem.priors.values)
     problem = replace(whole.problem, runs=seen)
     start = np.concatenate([whole.point[:count], np.zeros(problem.count - count)])
-    without = fit(problem, start)
+    without = with_level_spread(without_idle_levels(fit(problem, start)))
     values = keep_agreeing(without).point[:count]
     inner = replace(whole.problem, runs=(replace(run, outer=None),), tables=())
     responses = [name for name in inner.responses if name not in (HOUSING, SETTLED)]
@@ -243,7 +239,7 @@ def predict_held_out(
         before, after = outer.evaluate(as_shipped, slopes=False), outer.evaluate(calibrated)
         C = scipy.linalg.block_diag(without.covariance[:count, :count], _usual_starts(whole, outer))
         spread = {name: np.mean(np.sum(J @ C * J, axis=1)) for name, J in after.slope.items()}
-        stated = {name: float(np.sqrt(spread[name] + whole.noise[name].offset ** 2)) for name in responses}
+        stated = {name: float(np.sqrt(spread[name] + without.noise[name].offset ** 2)) for name in responses}
         by_chamber = {name: (_rms(before.residual[name]), _rms(after.residual[name])) for name in responses}
     noise = {name: noise_rms(whole, name) for name in responses}
     return HeldOutRun(run.record.path, by_chamber, by_housing, stated, noise)

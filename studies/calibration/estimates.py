@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from compensation.constants import NINETY
 from studies.calibration.fit import CardFit, whitened
 from studies.calibration.priors import Priors, from_standard, to_standard
 from studies.calibration.valley import find_bend, follow
@@ -17,7 +18,6 @@ if TYPE_CHECKING:
     from studies.instrument.card import Instrument
 
 Array = NDArray[np.float64]
-NINETY = 1.6448536269514722
 NONLINEAR = ("thermal.", "noise.", "effect.", "resonator.")
 """Values whose intervals are looked at beyond the straight line."""
 BENT = 0.25  # relative departure of the objective at the ends of an interval from its parabola, beyond which it is profiled
@@ -187,8 +187,9 @@ def posterior_card(
     covariance: Array,
     estimates: Sequence[Estimate],
     more: dict[str, float] | None = None,
+    levels: dict[str, float] | None = None,
 ) -> "Instrument":
-    """Return the card with posterior values, widths, correlations and intervals; `more` are further values of it."""
+    """Return the card with posterior values, widths, correlations and intervals; `more` are further values of it, `levels` of its runs."""
     count, pair = len(priors.values), priors.pair
     moves = priors.slopes(point[:count])
     if priors.wave is not None:
@@ -207,6 +208,7 @@ def posterior_card(
         "names": [one.parameter for one in estimates],
         "correlation": R.round(DIGITS).tolist(),
         "interval": [[one.low, one.high] for one in estimates],
+        **(levels or {}),
     }
     if priors.wave is not None:
         posterior["anisotropy_sd"] = sd[pair].tolist()

@@ -216,19 +216,33 @@ def estimate_levels(
     """
     found = dict(noise)
     for name in names:
-        count = slopes[name].shape[1]
-        told = [other for other in problem.responses if other != name and other in found]
-        white = [rows[n].whiten(np.column_stack([slopes[n], target[n]]), found[n]) for n in told]
-        white += [] if known is None else [known]
-        triangle = np.linalg.qr(np.vstack([np.eye(count, count + 1), *white])).R[:count]
-        R, move = triangle[:, :-1], scipy.linalg.solve_triangular(triangle[:, :-1], triangle[:, -1])
-        J, left = rows[name].means(slopes[name]), rows[name].means(target[name])
-        # Rotated coordinates of unit prior are of unit prior again; those that the rows do not see are left out.
-        U, S, _ = np.linalg.svd(scipy.linalg.solve_triangular(R, J.T, trans="T").T, full_matrices=False)
-        left = left - J @ move
-        seen = S > UNSEEN * float(np.median(np.abs(np.diff(left - U @ (U.T @ left)))))
-        found[name] = _levels(problem, rows[name].coarse, name, left, U[:, seen] * S[seen], found.get(name))
+        left, columns = beside_others(problem, rows, target, slopes, found, name, known)
+        found[name] = _levels(problem, rows[name].coarse, name, left, columns, found.get(name))
     return found
+
+
+def beside_others(
+    problem: CardProblem,
+    rows: Mapping[str, NoiseRows],
+    target: Mapping[str, Array],
+    slopes: Mapping[str, Array],
+    noise: Mapping[str, Noise],
+    name: str,
+    known: Array | None = None,
+) -> tuple[Array, Array]:
+    """Coarse rows of a response and columns of unit prior, of all that the other responses leave unknown."""
+    count = slopes[name].shape[1]
+    told = [other for other in problem.responses if other != name and other in noise]
+    white = [rows[n].whiten(np.column_stack([slopes[n], target[n]]), noise[n]) for n in told]
+    white += [] if known is None else [known]
+    triangle = np.linalg.qr(np.vstack([np.eye(count, count + 1), *white])).R[:count]
+    R, move = triangle[:, :-1], scipy.linalg.solve_triangular(triangle[:, :-1], triangle[:, -1])
+    J, left = rows[name].means(slopes[name]), rows[name].means(target[name])
+    # Rotated coordinates of unit prior are of unit prior again; those that the rows do not see are left out.
+    U, S, _ = np.linalg.svd(scipy.linalg.solve_triangular(R, J.T, trans="T").T, full_matrices=False)
+    left = left - J @ move
+    seen = S > UNSEEN * float(np.median(np.abs(np.diff(left - U @ (U.T @ left)))))
+    return left, U[:, seen] * S[seen]
 
 
 def _levels(
@@ -239,7 +253,7 @@ def _levels(
     columns: Array | None = None,
     near: Noise | None = None,
 ) -> Noise:
-    kinds = ("white",) if name == SETTLED else KINDS[:-1] if name in LASTING else KINDS
+    kinds = ("white",) if name == SETTLED else KINDS if has_levels(problem, name) else KINDS[:-1]
     precision = None if columns is None else np.ones(columns.shape[1])
     stated = None if columns is None else stated_noise(problem.instrument.noise, name)
     noise = estimate_noise(rows, target, columns, precision, kinds, near, stated)
@@ -251,6 +265,11 @@ def _levels(
 
 def _larger(one: Noise, other: Noise) -> Noise:
     return Noise(*(max(pair) for pair in zip(astuple(one), astuple(other), strict=True)))
+
+
+def has_levels(problem: CardProblem, name: str) -> bool:
+    """Whether each run may have a level of its own of a response."""
+    return name not in LASTING or (problem.levels and name == "frequency_Hz")
 
 
 def stated_noise(noise: "NoiseKeys", response: str) -> Noise | None:

@@ -64,6 +64,9 @@ class CardProblem:
     runs: tuple[ObservedRun, ...]
     law: "FrequencyLaw"
     tables: tuple[SettledTable, ...] = ()
+    levels: bool = (
+        False  # whether the frequency, too, may have a level of each run; of a law of records alone that is misfit
+    )
 
     @cached_property
     def parts(self) -> tuple[Part, ...]:

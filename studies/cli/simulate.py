@@ -45,7 +45,7 @@ def simulate(
         row: Time between rows in s; a record keeps its rows.
         noiseless: Leave out noise, sensor lag and rounding.
         boundary: Column of a record that is imposed: chamber or housing.
-        spread: Show the standard deviation of every column due to the uncertainties of the card, without noise.
+        spread: Show the standard deviation of every column due to the uncertainties of the card and, as a calibration found it, the level of a run, without noise.
     """
     instrument = load_card(card)
     run = simulate_run(instrument, load_drive(profile, boundary, 1 / row), 1 / row, seed, not noiseless, theory)

@@ -3,7 +3,7 @@
 from typing import Annotated
 
 from studies.instrument.registry import CardTable
-from studies.schema.keys import Keys, Note, says
+from studies.schema.keys import Keys, Note, number, says
 
 
 class Correlations(Keys, frozen=True, kw_only=True):
@@ -18,6 +18,8 @@ class Correlations(Keys, frozen=True, kw_only=True):
             "of the components of bias.damping_anisotropy along its axis and across it, which the correlations of length and axis then mean"
         ),
     ] = None
+    frequency_level_Hz: Annotated[float, number("sd of how far the level of a further run may lie from the card's, as the runs tell it", least=0.0)] = 0.0  # fmt: skip
+    bias_level_deg_per_h: Annotated[float, number("likewise", least=0.0)] = 0.0
     note: Note = ""
 
     def __post_init__(self) -> None:

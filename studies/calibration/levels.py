@@ -1,0 +1,69 @@
+"""How far the level of a further run may lie from what the card says: runs of one device differ from turn-on to turn-on.
+
+A few runs tell the spread of their levels poorly. With the weights that their likelihood gives to a spread s, every decade of which is as
+likely beforehand unless the card states it, the level of a further run is a mixture of normal laws; stated is the standard deviation
+of one normal law that holds as much of it in 1.96 of them, as Student's t is that of a few equal runs.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import scipy
+
+from compensation.noise import Noise
+from compensation.noise_rows import LEAST, MOST, STATED_SPREAD
+from studies.calibration.ahead import BIAS
+from studies.calibration.fit import CardFit, beside_others, covariance_at, fit, has_levels, stated_noise
+from studies.calibration.ladder import usual_mean
+
+STEPS = 31  # of ln s
+NINETY_FIVE = 1.959963984540054
+LEVELS = {"frequency_Hz": "frequency_level_Hz", "bias_deg_per_h": "bias_level_deg_per_h"}
+"""The key of `[posterior]` for the level of a further run."""
+
+
+def without_idle_levels(found: CardFit) -> CardFit:
+    """Return a fit whose runs have levels of their own of the frequency only where these stand out of what else the noise makes of a mean."""
+    own = found.noise.get("frequency_Hz", Noise())
+    if not own.offset or own.offset > usual_mean(found, "frequency_Hz"):
+        return found
+    return replace(fit(replace(found.problem, levels=False), found.point), problem=found.problem)
+
+
+def with_level_spread(found: CardFit) -> CardFit:
+    """Return a fit whose levels of runs have that spread, with what is then known of the values."""
+    noise = {name: replace(own, offset=_level_spread(found, name)) for name, own in found.noise.items()}
+    return replace(found, noise=noise, covariance=covariance_at(found.problem, found.state, noise, found.rows))
+
+
+def _level_spread(found: CardFit, name: str) -> float:
+    """Return the standard deviation that a prediction of a response should have for the level of its run; 0 where one run shows none."""
+    rows = found.rows[name].coarse
+    if len(rows.times) < 2 or not has_levels(found.problem, name):
+        return 0.0
+    noise, problem = found.noise, found.problem
+    target = {one: found.state.residual[one] + found.state.slope[one] @ found.point for one in problem.responses}
+    left, columns = beside_others(problem, found.rows, target, found.state.slope, noise, name)
+    white, stated = noise[name].white / rows.span**0.5, stated_noise(problem.instrument.noise, name)
+    levels = white * np.exp(np.linspace(LEAST, MOST, STEPS))
+    logs = np.zeros(STEPS)
+    if stated is not None and stated.offset:
+        logs = -0.5 * (np.log(levels / stated.offset) / STATED_SPREAD) ** 2
+    for k, level in enumerate(levels):
+        own = replace(noise[name], offset=float(level))
+        logs[k] -= 0.5 * rows.deviance(left, columns, np.ones(columns.shape[1]), own)[0]
+    weights = np.exp(logs - scipy.special.logsumexp(logs))
+
+    def beyond(sd: float) -> float:
+        return float(weights @ scipy.special.erf(NINETY_FIVE * sd / levels / 2**0.5)) - 0.95
+
+    return float(scipy.optimize.brentq(beyond, levels[0] / 2, levels[-1]))
+
+
+def turn_on(found: CardFit) -> dict[str, float]:
+    """What the runs show of the bias from turn-on to turn-on, where that is more than the noise within them makes of a mean."""
+    if BIAS not in found.noise or len(found.problem.rows[BIAS].times) < 2:
+        return {}
+    offset = found.noise[BIAS].offset
+    stated = found.problem.instrument.noise.bias_turn_on_deg_per_h > 0
+    return {"noise.bias_turn_on_deg_per_h": offset} if stated or offset > usual_mean(found, BIAS) else {}
