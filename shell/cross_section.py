@@ -35,7 +35,7 @@ class CrossSection:
 
 
 def cut(resonator: Resonator, system: System, position: float, heights: Array) -> CrossSection:
-    """The cross-section at a position of the meridian, at heights η (-1 inner face, 1 outer face)."""
+    """The cross-section at a position of the meridian, at heights η, -1 ... 1 along the normal."""
     if not 0 <= position <= 1:
         raise ShellError(f"a position on the meridian lies in 0 (start) ... 1 (rim), not at {position:g}.")
     s, margin = position * resonator.length, 1e-9 * resonator.length

@@ -14,7 +14,6 @@ from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 from math import pi
-from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -25,6 +24,7 @@ from shell.imperfection.field import NOTHING, Complex, Field, values_around
 from shell.imperfection.pair import Pair
 from shell.imperfection.split import Split
 from shell.quadrature import Array, gauss
+from shell.resonator import FaceName
 from shell.system import ShellGroup
 
 VACUUM = 8.8541878188e-12  # ε₀, F/m (CODATA 2022)
@@ -63,7 +63,7 @@ class Electrodes:
     gap: float  # mean gap, m
     # relative departure of the gap over the shell, g = gap (1 + departure); its waves 1, 2, ... are the gap harmonics
     departure: Field = NOTHING
-    face: Literal["inner", "outer"] = "inner"  # "inner" or "outer", the face that they look at
+    face: FaceName = "inner"  # the face that they look at
 
     def __post_init__(self) -> None:
         if not self.gap > 0:
@@ -182,7 +182,7 @@ class Electrodes:
 
     def _lay_band(self, first: float, last: float) -> tuple[Array, Array, Array]:
         solution, resonator = self.pair.solution, self.pair.resonator
-        side = 1.0 if self.face == "outer" else -1.0
+        side = float(resonator.height_of(self.face))
         x, weights = gauss(12)
         rows: list[tuple[float, float, float]] = []
         for group in solution.system.groups:

@@ -104,6 +104,7 @@ def _lay_grid(resonator: Resonator, groove: Groove, n: int) -> _Grid:
     else:
         two = min(groove.position * end + groove.length / 2, end)
         one, deep = two - groove.length, 2 * groove.depth / h
+        upper = resonator.height_of(groove.face) > 0
         if not 0 < deep < 2:
             raise ShellError(f"a cut of {mm(groove.depth)} goes through the wall of {mm(h)}.")
     if one <= 0 or not groove.depth > 0:
@@ -135,12 +136,12 @@ def _lay_grid(resonator: Resonator, groove: Groove, n: int) -> _Grid:
         eta = np.array(
             [*(bottom - _graded(2 - deep, fine * 2 / h, 0))[::-1], *(bottom + _graded(deep, fine * 2 / h, 0))[1:]]
         )
-        eta = eta if groove.face == "outer" else -eta[::-1]
+        eta = eta if upper else -eta[::-1]
     S, middle = np.array(s), [np.convolve(x, [0.5, 0.5], "valid") for x in (np.array(s), theta, eta)]
     along, around = (middle[0] > one) & (middle[0] < two), middle[1] < side / r
     through = np.ones(len(eta) - 1, dtype=bool)
     if deep < 2:
-        through = middle[2] > 1 - deep if groove.face == "outer" else middle[2] < deep - 1
+        through = middle[2] > 1 - deep if upper else middle[2] < deep - 1
     gone = along[:, None, None] & around[:, None] & through
     return _Grid(S, theta, eta, gone, is_rim or at_rim)
 

@@ -151,7 +151,7 @@ class Loads:
         return Sag(axial, lateral, tilt)
 
     def gap(self, kind: Kind, first: float, last: float) -> float:
-        """Mean displacement of the wall along its normal between two positions, m per unit, at azimuth 0."""
+        """Mean displacement of the wall outwards between two positions, m per unit, at azimuth 0."""
         solution, sums = self.answers[kind], np.zeros(2)
         for group, d in zip(solution.system.groups, solution.displacement, strict=True):
             if isinstance(group, ShellGroup):
@@ -160,7 +160,8 @@ class Loads:
                 sums += np.sum(weight * d[:, :, 2]), np.sum(weight)
         if not sums[1]:
             raise ShellError(f"no part of the wall lies between the positions {first:g} and {last:g}.")
-        return float(sums[0] / sums[1])
+        assert self.mode.resonator is not None
+        return self.mode.resonator.outward * float(sums[0] / sums[1])
 
     def away(self, position: Array) -> Array:
         """0 at the base and in the solid part that it holds, 1 at the free end, even along the meridian between."""

@@ -1,7 +1,8 @@
 """The resonator: its middle surface as a chain of smooth curves in the (r, z) plane, thickness, support, stem.
 
-The pole of a dome is at z = +R. Along the chain the tangent is t = (t_r, t_z) and the normal n = (-t_z, t_r), which
-points outwards on a dome; the curvature κ of the meridian is positive where n points away from its centre.
+The pole of a dome is at z = +R. Along the chain the tangent is t = (t_r, t_z) and the normal n = (-t_z, t_r); the curvature κ
+of the meridian is positive where n points away from its centre. Heights η run from -1 to 1 along n. Which of these two faces
+is the outer one depends on the direction in which the meridian is drawn: `Resonator.outward` says it.
 """
 
 from collections.abc import Callable
@@ -16,9 +17,11 @@ from numpy.typing import ArrayLike
 
 from shell.curves import Curve, scaled
 from shell.errors import ShellError, mm
-from shell.quadrature import Array
+from shell.quadrature import Array, gauss
 
 Support: TypeAlias = Literal["free", "clamped-pole", "clamped-rim", "stem", "clamped-face"]
+FaceName: TypeAlias = Literal["inner", "outer"]
+FLAT = 1e-9  # |∫ r dz| over length and radius below which a meridian is that of a flat disc
 LONGEST_STEM = 100.0  # stem lengths over its radius that are meshed as a solid
 
 
@@ -43,7 +46,7 @@ class Stem:
 
     @property
     def roots(self) -> tuple[tuple[Literal[-1, 1], float], ...]:
-        """The face it stands on (-1 inner, +1 outer) and the height of the clamped end, for each root."""
+        """The face η of the dome that it stands on (-1 inner, +1 outer) and the height of the clamped end, for each root."""
         if isinstance(self.ends, tuple):
             return (-1, self.ends[0]), (1, self.ends[1])
         return (((1 if self.side == "outer" else -1), self.ends),)
@@ -79,7 +82,7 @@ class MeridianPoints:
         return stretch * self.tangent_r + rise * self.normal_r, stretch * self.tangent_z + rise * self.normal_z
 
     def at_heights(self, eta: ArrayLike) -> tuple[Array, Array]:
-        """R and z at heights η (-1 inner face, 1 outer face), (points, heights)."""
+        """R and z at heights η, (points, heights)."""
         zeta = np.multiply.outer(self.thickness / 2, np.asarray(eta))
         return self.r[:, None] + zeta * self.normal_r[:, None], self.z[:, None] + zeta * self.normal_z[:, None]
 
@@ -117,6 +120,23 @@ class Resonator:
         """Largest distance from the axis, m: the radius that h/R refers to."""
         return max(float(np.max(segment.jet(np.linspace(0.0, 1.0, 201)).r)) for segment in self.segments)
 
+    @cached_property
+    def outward(self) -> Literal[-1, 1]:
+        """The height η of the outer face: ±1 of ∫ n_r dA, n away from the axis on the mean over the shell; of a flat disc up, ∫ n_z dA.
+
+        With n = (-t_z, t_r) these are 2π times -∫ r dz and ∫ r dr: the inner face is the one towards the axis, of a dome, cup
+        or arch the concave one, of a flat disc the lower one.
+        """
+        x, weight = gauss(48)
+        jets = [segment.jet((x + 1) / 2) for segment in self.segments]
+        away = -sum(float(weight @ (jet.r * jet.dz)) for jet in jets) / 2
+        up = sum(float(weight @ (jet.r * jet.dr)) for jet in jets) / 2
+        return -1 if (up if abs(away) < FLAT * self.length * self.size else away) < 0 else 1
+
+    def height_of(self, face: FaceName) -> int:
+        """The height η of a face."""
+        return self.outward if face == "outer" else -self.outward
+
     @property
     def joints(self) -> tuple[float, ...]:
         """Arc lengths where one segment ends and the next begins."""
@@ -146,7 +166,7 @@ class Resonator:
         return MeridianPoints(**joined)
 
     def surface(self, eta: float, segment: int | None = None) -> Callable[[Array], tuple[Array, Array]]:
-        """R and z of the surface at a height η (-1 inner face, 1 outer face) as functions of the arc length (m)."""
+        """R and z of the surface at a height η as functions of the arc length (m)."""
 
         def at(s: Array) -> tuple[Array, Array]:
             r, z = self.at(np.ravel(s), segment).at_heights([eta])

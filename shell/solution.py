@@ -214,7 +214,7 @@ def plane_energies(E: Array, nu: Array, s: Array, theta: Array, twist: Array) ->
 def surface_energies(solution: Solution, number: int) -> tuple[Array, Array]:
     """Change of (elastic - ω² kinetic) as the faces of one shell group move outwards by h/2, (elements, stations, 2) each.
 
-    The energies at the faces (Hadamard's formula), inner and outer: first of what varies as cos nθ, then as sin nθ. Of a
+    The energies at the faces (Hadamard's formula), η = -1 and 1: first of what varies as cos nθ, then as sin nθ. Of a
     solid the faces are free of traction, so their strain energy is that of plane stress; Naghdi's transverse shear does
     not vanish there and counts.
     """
@@ -230,7 +230,7 @@ def surface_energies(solution: Solution, number: int) -> tuple[Array, Array]:
 
 
 def face_table(solution: Solution, number: int) -> StrainTable:
-    """Strains of one shell group at its inner and its outer face, at the stations; the volumes are h/2 times the areas."""
+    """Strains of one shell group at its faces η = -1 and 1, at the stations; the volumes are h/2 times the areas."""
     system, group = solution.system, solution.system.groups[number]
     assert isinstance(group, ShellGroup)
     faces = np.array([-1.0, 1.0]), np.ones(2)

@@ -75,7 +75,7 @@ class Vibration:
     @cached_property
     def faces(self) -> tuple[FreeFaces, FreeFaces]:
         """Inner and outer face."""
-        return shell_faces(self.solution)
+        return shell_faces(self.solution, self.resonator)
 
     @cached_property
     def surfaces(self) -> tuple[FreeFaces, ...]:
@@ -106,7 +106,7 @@ class Vibration:
         return np.asarray(np.sqrt(self.solution.eigenvalue * now / then))
 
 
-def shell_faces(solution: Solution) -> tuple[FreeFaces, FreeFaces]:
+def shell_faces(solution: Solution, resonator: Resonator) -> tuple[FreeFaces, FreeFaces]:
     """The inner and the outer face of the shell, without roots and corners; free of traction, so in plane stress."""
     found: tuple[list[tuple[Array, ...]], list[tuple[Array, ...]]] = ([], [])
     for number, group in enumerate(solution.system.groups):
@@ -121,13 +121,13 @@ def shell_faces(solution: Solution) -> tuple[FreeFaces, FreeFaces]:
             places = section.position.ravel(), area[..., k].ravel()
             energy, fields = (cosine + sine).ravel(), (_points(strain[..., k]), _points(moved[..., k]))
             found[k].append((*places, fields[0], energy, fields[1], c.E.ravel(), c.nu.ravel()))
-    inner, outer = ([np.concatenate(column, axis=-1) for column in zip(*one, strict=True)] for one in found)
+    inner, outer = ([np.concatenate(c, axis=-1) for c in zip(*one, strict=True)] for one in found[:: resonator.outward])
     return FreeFaces("inner", *inner), FreeFaces("outer", *outer)
 
 
 def free_surfaces(solution: Solution, resonator: Resonator) -> tuple[FreeFaces, ...]:
     """Every free surface: both faces, free edges, and the open sides of roots, corners and stem."""
-    found: list[FreeFaces] = [*shell_faces(solution)]
+    found: list[FreeFaces] = [*shell_faces(solution, resonator)]
     for group, c, q in zip(solution.system.groups, solution.constants, solution.unknowns, strict=True):
         if isinstance(group, ShellGroup):
             found += [_edge(solution, resonator, group, c, q, end) for end in (0, 1) if group.chain.ends[end] == "free"]

@@ -80,7 +80,7 @@ def film_shift(mode: Mode, film: Film) -> float:
         raise ShellError("Rayleigh's closed form carries no energies: use theory solid or shell.")
     check_film(film, min(value for _, value in mode.resonator.thickness))
     eigenvalue, changed = mode.solution.eigenvalue, 0.0
-    for face in shell_faces(mode.solution):
+    for face in shell_faces(mode.solution, mode.resonator):
         heavy = eigenvalue * film.rho * np.sum(face.moved**2, axis=0)
         changed += face.integrate(film.carries(face) * (sum(film_energies(film, face)) - heavy))
     return film.thickness * changed / (2 * eigenvalue * total(mode.solution.kinetic))

@@ -96,7 +96,8 @@ def viscous_loss(vibration: Vibration, gas: Gas, pressure: float, temperature: f
     resistance = sqrt(density * gas.viscosity_at(temperature) * omega / 2)
     slip = 0.0
     for face in vibration.faces:
-        flow = (1.0 if face.kind == "outer" else -1.0) * (vibration.solution.system.n > 0) * face.moved[2]
+        out = vibration.resonator.outward * (1 if face.kind == "outer" else -1)
+        flow = out * (vibration.solution.system.n > 0) * face.moved[2]
         slip += face.integrate(face.moved[0] ** 2 + (face.moved[1] - flow) ** 2)
     return resistance * slip / (omega * vibration.kinetic)
 

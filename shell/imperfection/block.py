@@ -52,8 +52,8 @@ class Block:
         }
 
     def moves(self, resonator: Resonator, position: float, height: float) -> Array:
-        """Displacements u, v, w of a place per unit of every unknown, (3, size)."""
-        here = cut(resonator, self.system, position, np.array([height]))
+        """Displacements u, v, w of a place, at a height -1 (inner) ... 1 (outer face), per unit of every unknown, (3, size)."""
+        here = cut(resonator, self.system, position, np.array([resonator.outward * height]))
         table = here.table.displacement[0, 0, :, 0]
         spread = self.spreads[here.group]
         size = spread.shape[0] // len(self.system.groups[here.group].unknowns)

@@ -143,7 +143,7 @@ def _walls(together: Together, flaw: Imperfection, waves: tuple[int, ...], theta
     """What is there more on every chain."""
     system = together.blocks[0].system
     orders, resonator = system.level.through, together.resonator
-    faces = flaw.faces(fade(resonator, system))
+    faces = flaw.faces(fade(resonator, system))[:: resonator.outward]
     found: dict[int, list[Wall]] = {number: [] for number in together.spreads}
     for number, walls in found.items():
         group, c = system.groups[number], together.constants[number]

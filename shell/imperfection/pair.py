@@ -23,7 +23,7 @@ from shell.imperfection.field import Field
 from shell.imperfection.imperfect import fade
 from shell.modes import Mode
 from shell.quadrature import Array
-from shell.resonator import Resonator
+from shell.resonator import FaceName, Resonator
 from shell.solution import Solution, squares_of, surface_energies, total
 from shell.system import ShellGroup
 
@@ -88,7 +88,10 @@ class Pair:
                 c.append((cosine / half).reshape(-1, 2))
                 s.append((sine / half).reshape(-1, 2))
         position, cosine, sine = np.concatenate(x), np.concatenate(c) / self.scale, np.concatenate(s) / self.scale
-        inner, outer = (Density(position, (cosine + sine)[:, k], (cosine - sine)[:, k] / 2) for k in (0, 1))
+        inner, outer = (
+            Density(position, (cosine + sine)[:, k], (cosine - sine)[:, k] / 2)
+            for k in (0, 1)[:: self.resonator.outward]
+        )
         return inner, outer
 
     @cached_property
@@ -117,15 +120,15 @@ class Pair:
         return Density(np.ones(1), np.array([mean]), np.array([wave]) / 2)
 
     def mass(self, position: float = 1.0, height: float = 0.0) -> tuple[float, float]:
-        """Per kilogram of a point mass: the mean shift, and z for the azimuth 0, exp(2 i n θ) at θ: -ω² m (u_c² cos² + u_s² sin²)."""
-        here = cut(self.resonator, self.solution.system, position, np.array([height]))
+        """Per kilogram of a point mass at a height -1 (inner) ... 1 (outer face): the mean shift, and z for the azimuth 0, exp(2 i n θ) at θ: -ω² m (u_c² cos² + u_s² sin²)."""
+        here = cut(self.resonator, self.solution.system, position, np.array([self.resonator.outward * height]))
         u, v, w = here.displacements(self.solution.unknowns)[:, 0]
         norm = -self.solution.eigenvalue / (np.pi * self.scale)
         return float(norm * (u**2 + w**2 + v**2) / 2), float(norm * (u**2 + w**2 - v**2) / 2)
 
-    def shaving(self, position: float, face: int) -> tuple[float, float]:
-        """Like `mass` for a kilogram of material on a face (-1 inner, 1 outer) with its strain energy: a shallow cut."""
-        here = cut(self.resonator, self.solution.system, position, np.array([float(face)]))
+    def shaving(self, position: float, face: FaceName) -> tuple[float, float]:
+        """Like `mass` for a kilogram of material on a face with its strain energy: a shallow cut."""
+        here = cut(self.resonator, self.solution.system, position, np.array([float(self.resonator.height_of(face))]))
         return self._of_material(here, np.ones(1))
 
     def edging(self) -> tuple[float, float]:

@@ -30,9 +30,10 @@ def find_departures(
     """How far points of the section (position x, r, z) depart outwards and upwards by shapes: waves m to (2, points), m."""
     inner, outer = imperfection.faces()
     place = resonator.at(np.clip(x, 0.0, 1.0) * resonator.length)
-    height = (r - place.r) * place.normal_r + (z - place.z) * place.normal_z
+    normal = resonator.outward * np.array((place.normal_r, place.normal_z))
+    height = (r - place.r) * normal[0] + (z - place.z) * normal[1]
     through = np.clip(2 * height / place.thickness, -1.0, 1.0)
-    normal, tangent = (np.array(way) for way in ((place.normal_r, place.normal_z), (place.tangent_r, place.tangent_z)))
+    tangent = np.array((place.tangent_r, place.tangent_z))
     found: dict[int, Complex] = {}
     edge = np.where(x > 1 - 1e-6, 1.0, 0.0)
     for field, way in (

@@ -153,7 +153,7 @@ class Stretch:
     theta: Array
 
     def layers(self, faces: tuple[Field, Field], waves: tuple[int, ...], stiff: Array, heavy: Array) -> list[Wall]:
-        """What the faces stand out of the perfect wall, m; stiff, heavy : 1 + changes of E and of ρ, (stations, 1, θ)."""
+        """What the faces at η = -1 and 1 stand out of the perfect wall, m; stiff, heavy : 1 + changes of E and of ρ, (stations, 1, θ)."""
         eta, volumes = [], []
         for sign, face in ((-1, faces[0]), (1, faces[1])):
             out = self.values(face, waves)

@@ -47,7 +47,7 @@ class RigidMotion:
 
 
 def align(clouds: Sequence[tuple[Array, int]], projector: Projector, names: Sequence[str]) -> RigidMotion:
-    """One motion for clouds that share a frame: points (count, 3) in m with their side, -1 inner and 1 outer face."""
+    """One motion for clouds that share a frame: points (count, 3) in m with the height η = -1 or 1 of their face."""
     resonator = projector.resonator
     samples = [(points[:: max(1, len(points) // SAMPLE)], side) for points, side in clouds]
     best: tuple[float, RigidMotion] | None = None
@@ -136,7 +136,7 @@ def _check(samples: list[tuple[Array, int]], projector: Projector, motion: Rigid
         h, middle = float(np.median(projector.line.thickness)), float(np.median(off))
         spread = float(scipy.stats.median_abs_deviation(off, scale="normal"))
         if abs(middle + side * h) < 0.3 * h and spread < LOOSE * h:
-            here, there = ("outer", "inner") if side > 0 else ("inner", "outer")
+            here, there = ("outer", "inner") if side == projector.resonator.outward else ("inner", "outer")
             raise ShellError(f"{name}: the points of the {here} face lie on the {there} face; exchange the files.")
         if abs(middle) > 0.5 * h or spread > LOOSE * h:
             frames = "; perhaps the faces do not share one frame (hrg scan --frames own)" if len(names) > 1 else ""

@@ -35,7 +35,6 @@ Points: TypeAlias = tuple[Array, Array, Array]  # position, azimuth and how far 
 class Face:
     """One face: its deviation away from the material, as harmonics with their covariance."""
 
-    side: int  # -1 inner, 1 outer
     waves: WaveBasis  # the basis, over the positions that the points cover
     coefficients: Complex  # (waves, polynomials), complex a + i b
     covariance: Array  # of all a and b, m²
@@ -147,7 +146,7 @@ def survey(
     points: Array, side: int, motion: RigidMotion, projector: Projector, name: str, highest: int = 12,
     degree: int = DEGREE,
 ) -> Face:  # fmt: skip
-    """The waves of a face from its points (count, 3), m, in their own frame."""
+    """The waves of the face at the height η = `side` from its points (count, 3), m, in their own frame."""
 
     def place(some: Array) -> Points:
         at = projector.place(motion.apply(some))
@@ -164,11 +163,11 @@ def survey(
     dome = projector.resonator.segments[0]
     alone = len(projector.resonator.segments) == 1 and isinstance(dome, Arc) and not (motion.told[3] and motion.told[4])
     turning = (dome.first_angle, dome.last_angle) if alone and isinstance(dome, Arc) else None
-    return _fit(waves, (x, theta, off), points, place, side, motion, name, turning)
+    return _fit(waves, (x, theta, off), points, place, motion, name, turning)
 
 
 def survey_map(
-    position: Array, azimuth: Array, values: Array, side: int, name: str, highest: int = 12, degree: int = DEGREE
+    position: Array, azimuth: Array, values: Array, name: str, highest: int = 12, degree: int = DEGREE
 ) -> Face:
     """The waves of a face from a table (positions, azimuths) of how far it stands out of the material, m; NaN for gaps."""
     low, high = float(position.min()), float(position.max())
@@ -180,7 +179,7 @@ def survey_map(
         return position[cells // len(azimuth)], azimuth[cells % len(azimuth)], values.ravel()[cells]
 
     there = np.flatnonzero(np.isfinite(values.ravel()))
-    return _fit(waves, place(there[:: max(1, len(there) // SAMPLE)]), there, place, side, None, name)
+    return _fit(waves, place(there[:: max(1, len(there) // SAMPLE)]), there, place, None, name)
 
 
 def rigid_shapes(waves: WaveBasis, projector: Projector) -> Array:
@@ -213,8 +212,8 @@ def _sum_cells(waves: WaveBasis, rough: Array, limit: float, portions: Iterable[
 
 
 def _fit(
-    waves: WaveBasis, sample: Points, points: NDArray[Any], place: Callable[[Any], Points], side: int,
-    motion: RigidMotion | None, name: str, turning: tuple[float, float] | None = None,
+    waves: WaveBasis, sample: Points, points: NDArray[Any], place: Callable[[Any], Points], motion: RigidMotion | None,
+    name: str, turning: tuple[float, float] | None = None,
 ) -> Face:  # fmt: skip
     rough, limit = waves.fit_roughly(*sample)
     portions = (place(points[k : k + CHUNK]) for k in range(0, len(points), CHUNK))
@@ -242,7 +241,7 @@ def _fit(
     variance = max(between, within if used > 2 * len(count) else 0.0)
     cells = (x, theta, left + design @ rough, count)
     return Face(
-        side, waves, waves.complex(rough + change), inverse * variance, float(np.sqrt(variance)), len(points),
+        waves, waves.complex(rough + change), inverse * variance, float(np.sqrt(variance)), len(points),
         len(points) - used, cells, motion, turning,
     )  # fmt: skip
 

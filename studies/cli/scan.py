@@ -1,12 +1,13 @@
 """`hrg scan`: wall maps, circumferential harmonics and frequency splits from measured faces of a shell."""
 
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_args
 
 import numpy as np
 from cyclopts import Parameter
 
 from shell.constants import zero_Celsius
+from shell.resonator import FaceName
 from studies.cli.arguments import COUNT, MANY, Card, Temperature, Theory, open_resonator
 from studies.cli.output import answers, say
 from studies.errors import InputError
@@ -15,7 +16,7 @@ from studies.files.writing import write_csv
 from studies.instrument.card import Instrument, save_card
 from studies.reports.digits import plain, to_interval
 from studies.reports.style import BLUE, ORANGE, figure
-from studies.resonator.scan import SIDES, Scan, scan_faces
+from studies.resonator.scan import Scan, scan_faces
 from studies.results import Chapter, Drawing, Facts, Figure, Result, Sentence, Table, row_of
 
 NONE = "none"
@@ -36,7 +37,7 @@ FACES = (
 ROUNDNESS = "face | position: position .3f | peak_to_valley_um: peak to valley (µm) .3f | rms_um: rms (µm) .3f"
 
 
-@answers("hrg.scan/1", save=tuple(TABLE.format(face) for face in SIDES))
+@answers("hrg.scan/1", save=tuple(TABLE.format(face) for face in get_args(FaceName)))
 def scan(
     card: Card,
     inner: str,
@@ -68,7 +69,7 @@ def scan(
         map_file: Write a CSV file: position, azimuth, and deviations of faces, wall and middle surface.
         save: Write a card with the fitted faces as its imperfection; the tables are written beside it.
     """
-    files = {name: path for name, path in (("inner", inner), ("outer", outer)) if path != NONE}
+    files = {name: path for name, path in zip(get_args(FaceName), (inner, outer), strict=True) if path != NONE}
     if not files:
         raise InputError("no face given: name the file of the inner face, of the outer face, or of both.")
     instrument, T, resonator, elastic = open_resonator(card, temperature)

@@ -139,7 +139,7 @@ def _bell_with_elements() -> tuple[BellResonator, PiezoRing, float]:
     top, height = lengths[0] / sum(lengths), ELEMENT_mm[0] * 1e-3 / sum(lengths)
     assert mode.solution is not None
     along, around = (
-        one / mode.largest_displacement for one in shell_faces(mode.solution)[1].mean_stress(top, top + height)
+        one / mode.largest_displacement for one in shell_faces(mode.solution, body)[1].mean_stress(top, top + height)
     )
     width, dome = ELEMENT_mm[1] * 1e-3, body.segments[0]
     assert isinstance(dome, Arc)

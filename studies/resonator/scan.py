@@ -14,14 +14,13 @@ from shell.errors import ShellError
 from shell.imperfection import CoupledHarmonics, Imperfection, Pair, Split, find_split
 from shell.imperfection.field import NOTHING
 from shell.modes import solve_modes
-from shell.resonator import Resonator
+from shell.resonator import FaceName, Resonator
 from shell.scan.alignment import RigidMotion, align
 from shell.scan.projection import Projector, check_unit
 from shell.scan.survey import Face, fewest_points, most_waves, rigid_shapes, survey, survey_map
 from studies.errors import InputError
 from studies.files.clouds import FaceGrid, Unit, read_cloud
 
-SIDES = {"inner": -1, "outer": 1}
 COVERAGE = 0.9
 DRAWS = 4000
 
@@ -98,7 +97,7 @@ def parts_of(quantity: str) -> list[tuple[str, float]]:
 
 
 def scan_faces(
-    resonator: Resonator, elastic: Elastic, files: dict[str, str], *, unit: Unit = "mm",
+    resonator: Resonator, elastic: Elastic, files: dict[FaceName, str], *, unit: Unit = "mm",
     frames: Literal["own", "common"] = "own", harmonics: tuple[int, ...] = (1, 2, 3, 4), highest: int = 12,
     theory: Literal["solid", "shell"] = "solid", say: Callable[[str], None] = lambda _: None,
 ) -> Scan:  # fmt: skip
@@ -121,16 +120,20 @@ def scan_faces(
         together = [list(clouds)] if frames == "common" else [[name] for name in clouds]
         motions: dict[str, RigidMotion] = {}
         for names in together:
-            motion = align([(clouds[name], SIDES[name]) for name in names], projector, [files[name] for name in names])
+            motion = align(
+                [(clouds[name], resonator.height_of(name)) for name in names],
+                projector,
+                [files[name] for name in names],
+            )
             motions |= dict.fromkeys(names, motion)
         for name, points in clouds.items():
             say(f"fitting the {name} face: {len(points)} points")
-            face = survey(points, SIDES[name], motions[name], projector, files[name], highest)
+            face = survey(points, resonator.height_of(name), motions[name], projector, files[name], highest)
             alone = frames == "own" or len(clouds) == 1
             faces[name] = face.centred(rigid_shapes(face.waves, projector)) if alone else face
     for name, cloud in read.items():
         if isinstance(cloud, FaceGrid):
-            faces[name] = survey_map(cloud.position, cloud.azimuth, cloud.values, SIDES[name], files[name], highest)
+            faces[name] = survey_map(cloud.position, cloud.azimuth, cloud.values, files[name], highest)
     faces = {name: faces[name] for name in ("inner", "outer") if name in faces}
     _check_wall(faces, resonator)
     inner, outer = (faces[name].field if name in faces else NOTHING for name in ("inner", "outer"))

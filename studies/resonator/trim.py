@@ -141,7 +141,7 @@ def _effect(pair: Pair, position: float, kind: CutKind) -> float:
         if position != 1.0:
             raise InputError("an edge cut lies at position 1; use inner or outer for cuts into a face.")
         return pair.edging()[1]
-    return pair.shaving(position, 1 if kind == "outer" else -1)[1]
+    return pair.shaving(position, kind)[1]
 
 
 def _gains(pairs: Mapping[int, Pair], position: Array, kind: CutKind = "mass") -> dict[int, Array]:

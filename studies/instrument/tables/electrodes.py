@@ -24,7 +24,9 @@ class GapWave(Keys, frozen=True, kw_only=True):
 class ElectrodeKeys(Keys, frozen=True, kw_only=True):
     """Equal electrodes around a face."""
 
-    face: Annotated[Literal["inner", "outer"], says("of the shell")] = "inner"
+    face: Annotated[
+        Literal["inner", "outer"], says("of the shell; inner: towards the axis, of a flat disc the lower one")
+    ] = "inner"
     gap_um: Annotated[float, number("at the reference temperature", above=0.0, relative_sd=0.05)] = 100.0
     count: Annotated[int, number("equal electrodes around", least=1, most=256)] = 16
     coverage: Annotated[float, number("share of the circle", above=0.0, most=1.0)] = 0.8

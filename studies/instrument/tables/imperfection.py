@@ -162,7 +162,7 @@ def _map(keys: MapKeys, place: CardPlace) -> "Field":
     grid = read_cloud(path)
     if not isinstance(grid, FaceGrid):
         raise InputError(f"{path}: {place.where} asks for a table over position and azimuth (hrg scan).")
-    return survey_map(grid.position, grid.azimuth, grid.values, 1, str(path)).field
+    return survey_map(grid.position, grid.azimuth, grid.values, str(path)).field
 
 
 TABLE = CardTable("imperfection", ImperfectionKeys, build=build, optional=True)

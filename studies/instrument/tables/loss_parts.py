@@ -17,7 +17,9 @@ class FilmKeys(Keys, frozen=True, kw_only=True):
     material: Annotated[str, says("of the table (gold, chromium, …), or with its own numbers", example="gold")]
     thickness_nm: Annotated[float, number("of the film", above=0.0, relative_sd=0.1, example=100.0)]
     loss: Annotated[float, number("its own loss angle; no source states that of an evaporated metal", least=0.0, relative_sd=1.0, example=0.0001)] | None = None  # fmt: skip
-    face: Annotated[Literal["inner", "outer", "both"], says("of the shell")] = "both"
+    face: Annotated[
+        Literal["inner", "outer", "both"], says("of the shell; inner: towards the axis, of a flat disc the lower one")
+    ] = "both"
     from_position: Annotated[Share, says("of the meridian, 0 … 1")] = 0.0
     to_position: Annotated[Share, says("likewise")] = 1.0
     coverage: Annotated[Share, says("covered share, of a pattern")] = 1.0
