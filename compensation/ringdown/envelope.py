@@ -1,8 +1,8 @@
 """Complex amplitudes of a decay, from raw samples of the carrier or from a lock-in amplifier.
 
-Raw samples x(t) = Re{z e^{2πi f_c t}} are mixed with e^{−2πi f_c t} and averaged over blocks of whole carrier periods; the
-average of an exponential over a block is corrected where it is fitted. Blocks with lost samples count what they have. What a block
-that holds no whole number of periods leaves of the image z* e^{−4πi f_c t} is taken out: left in, it looks like a second mode.
+Raw samples x(t) = level + Re{z e^{2πi f_c t}} are fitted over blocks of whole carrier periods by least squares, at their own times where these are on no
+even grid; the average of an exponential over a block is corrected where it is fitted. Samples that are lost leave the rest as it is, and
+neither they nor a part of a period lets the level or the image z* e^{−4πi f_c t} into z, where it would look like a second mode.
 """
 
 from dataclasses import dataclass, replace
@@ -17,7 +17,15 @@ LEAST = 16  # amplitudes of a decay
 MOST_BLOCKS = 4096
 CHUNK = 1 << 18
 PASSES = 3  # each takes the image out with the amplitudes of the one before, straight between the blocks
-WRITTEN = 0.5  # part of a step by which the times of an even grid may be off for their few digits
+WRITTEN = 0.75  # of the last digit by which the times of an even grid may be off: half of it, and the error of the line of all times
+FEWEST, APART = 12, 20  # samples of a block; steps from which a distance between samples is a gap
+ALONE = 0.7  # part of a block's samples above which what is left of the image e^{−2iωt} cannot be told from the wave
+SHORTEST = (
+    0.01,
+    0.1,
+    0.5,
+)  # parts of the distances between rows, of which the shortest that is a step of a grid is taken
+GRID = 0.2  # standard deviation of the distances (steps) on a grid; that of distances of any length is 0.29
 
 
 @dataclass(frozen=True)
@@ -41,14 +49,17 @@ class Envelope:
         return replace(self, time=self.time[keep], values=self.values[:, keep])
 
 
-def find_carrier(samples: ArrayLike, rate: float) -> float:
-    """Return the frequency (Hz) of the largest line of evenly sampled raw data: strongest 2¹⁸ rows, Hann window, parabola of the log."""
+def find_carrier(samples: ArrayLike, rows: NDArray[np.int64], rate: float) -> float:
+    """Return the frequency (Hz) of the largest line of raw samples that stand at, or near, the `rows` of an even grid.
+
+    Strongest 2¹⁸ rows, Hann window, parabola of the log; a lost row counts as zero.
+    """
     x = np.asarray(samples, dtype=np.float64)
-    length = min(x.size, CHUNK)
-    starts = range(0, x.size - length + 1, max(length, 1))
-    at = max(starts, key=lambda k: float(np.var(x[k : k + length])))
-    stretch = x[at : at + length]
-    stretch = np.nan_to_num(stretch - np.nanmean(stretch))
+    x = x - np.mean(x)
+    length = min(int(rows[-1]) + 1, CHUNK)
+    at = int(np.argmax(np.bincount(rows // length, x**2)))
+    here = rows // length == at
+    stretch = np.bincount(rows[here] - at * length, x[here], length)
     spectrum = np.abs(np.fft.rfft(stretch * np.hanning(length)))
     peak = int(np.argmax(spectrum[1:-1])) + 1
     left, middle, right = np.log(spectrum[peak - 1 : peak + 2] + 1e-300)
@@ -63,74 +74,111 @@ def mix_down(time: ArrayLike, channels: ArrayLike, carrier: float | None = None)
     if t.size < 64:
         raise CompensationError(f"a decay of raw samples needs 64 rows or more, not {t.size}.")
     step, rows = even_rows(t)
-    t = t[0] + step * rows if np.max(np.abs(t - t[0] - step * rows)) < WRITTEN * step else t
-    rate = 1 / step
+    clock = step * (rows - np.mean(rows)) + np.mean(t)
+    away = float(np.max(np.abs(t - clock)))
+    t = clock - clock[0] if away < WRITTEN * _digit(t) else t - t[0]
+    rate, span, known = 1 / step, int(rows[-1]) + 1, np.all(np.isfinite(x), axis=0)
     if carrier is None:
-        carrier = find_carrier(x[int(np.argmax(np.nanvar(x, axis=1)))], rate)
+        carrier = find_carrier(x[int(np.argmax(np.nanvar(x, axis=1))), known], rows[known], rate)
     if not 0 < carrier < rate / 2:
         raise CompensationError(f"the frequency {carrier:.6g} Hz is not below half the sampling rate {rate:.6g} Hz.")
     if not np.nanvar(x, axis=1).any():
         raise CompensationError("the samples are all 0 or alike: nothing was recorded; check the pick-off.")
-    period = rate / carrier  # in samples
+    period = rate / carrier  # in rows of the grid
+    clipped, after = _clipped(x)
+    overload = float(t[max(after, 1) - 1])
+    fine = known & ~_stuck(x, period)
+    if np.count_nonzero(fine) < 64:
+        raise CompensationError("fewer than 64 samples differ from those before them; check the pick-off.")
+    true = fine & (np.arange(t.size) >= after)
+    x = x - np.mean(x[:, true if true.any() else fine], axis=1, keepdims=True)
+    t, x, rows = t[fine], x[:, fine], rows[fine]
+    between = np.diff(t)
+    sparse = max(float(np.mean(between[between < APART * np.median(between)])) / step, 1.0)  # rows for each sample
     # the block holds a whole number of half periods as nearly as may be
-    least = max(t.size / MOST_BLOCKS, 8 * period)
+    least = max(sparse * t.size / MOST_BLOCKS, 8 * period, FEWEST * sparse)
     sizes = np.arange(int(np.ceil(least)), int(np.ceil(1.3 * least + 2 * period)) + 1)
     size = int(sizes[int(np.argmin(np.abs(np.sin(2 * np.pi * sizes / period)) / sizes))])
     if 2 * min(carrier, rate / 2 - carrier) * size < 0.5 * rate:
         raise CompensationError(
             f"the line at {carrier:.6g} Hz and its image in samples at {rate:.6g} Hz fall together; sample at another rate."
         )
-    block = rows // size
-    count = int(block[-1]) + 1
-    fine = np.all(np.isfinite(x), axis=0) & ~_stuck(x, period)
-    clipped, after = _clipped(x)
-    true = fine & (np.arange(t.size) >= after)
-    level = np.mean(x[:, true if true.any() else fine], axis=1, keepdims=True)
-    weight = np.bincount(block, fine, count)
-    middle = np.bincount(block, fine * (t - t[0]), count) / np.maximum(weight, 1)
-    keep = weight >= 0.5 * size
-    keep[-1] &= (int(rows[-1]) + 1) % size == 0  # a part of a block is no row like the others
+    block, count = rows // size, (span - 1) // size + 1
+
+    parts = [slice(k, k + CHUNK) for k in range(0, t.size, CHUNK)]
+
+    def add(terms: Complex, part: slice) -> Complex:
+        return np.asarray(
+            np.bincount(block[part], terms.real, count) + 1j * np.bincount(block[part], terms.imag, count)
+        )
+
+    def turn(part: slice) -> Complex:
+        return np.asarray(np.exp(-2j * np.pi * carrier * t[part]))
+
+    # x = level + Re{z e^{iωt}} in a block of N samples: Σ 2x e^{−iωt} = 2p level + N z + q z*, Σ x = N level + Re{p* z}
+    weight = np.bincount(block, minlength=count)
+    middle = np.bincount(block, t, count) / np.maximum(weight, 1)
+    p, q = (sum((add(turn(part) ** power, part) for part in parts), np.zeros(count, complex)) for power in (1, 2))
+    of_level = p / np.maximum(weight, 1)
+    own, image = weight - np.abs(p) * np.abs(of_level), q - p * of_level
+    keep = (weight >= 0.5 * size / sparse) & (np.abs(image) < ALONE * own)
+    keep[-1] &= span % size == 0  # a part of a block is no row like the others
     if np.count_nonzero(keep) < 2:
         raise CompensationError("fewer than two blocks of eight periods have half of their samples; record longer.")
-    ends = middle[keep][[0, -1]] + size * step * np.array([-1, 1])
-    knots = np.concatenate([ends[:1], middle[keep], ends[1:]])
-    values = np.zeros((x.shape[0], np.count_nonzero(keep)), dtype=complex)
+    knots = np.concatenate([middle[keep][:1] - size * step, middle[keep], middle[keep][-1:] + size * step])
+    values = np.zeros((x.shape[0], count), dtype=complex)
     for _ in range(PASSES):
-        around = np.concatenate(
-            [2 * values[:, :1] - values[:, 1:2], values, 2 * values[:, -1:] - values[:, -2:-1]], axis=1
-        )
-        total = np.zeros((x.shape[0], count), dtype=complex)
-        for k in range(0, t.size, CHUNK):
-            part = slice(k, k + CHUNK)
-            turn = np.exp(-2j * np.pi * carrier * (t[part] - t[0]))
-            first = int(block[part][0])
-            index = block[part] - first
-            places = slice(first, first + int(index[-1]) + 1)
-            for c in range(x.shape[0]):
-                # x = Re{z e^{iωt}}, so 2 x e^{−iωt} is z + z* e^{−2iωt}
-                image = np.interp(t[part] - t[0], knots, around[c]).conj() * turn**2
-                terms = np.where(fine[part], 2 * (x[c, part] - level[c]) * turn - image, 0.0)
-                total[c, places] += np.bincount(index, terms.real) + 1j * np.bincount(index, terms.imag)
-        values = total[:, keep] / weight[keep]
+        z = values[:, keep]
+        around = np.concatenate([2 * z[:, :1] - z[:, 1:2], z, 2 * z[:, -1:] - z[:, -2:-1]], axis=1)
+        for c, own_values in enumerate(values.copy()):
+            total = np.zeros(count, complex)
+            for part in parts:
+                e = turn(part)
+                slope = np.interp(t[part], knots, around[c]) - own_values[block[part]]
+                flat = x[c, part] - (slope * e.conj()).real
+                total += add(2 * x[c, part] * e - slope.conj() * e**2 - 2 * of_level[block[part]] * flat, part)
+            values[c] = (own * total - image * total.conj()) / np.where(keep, own**2 - np.abs(image) ** 2, 1.0)
+    lost = 1 - float(np.sum(weight)) * (sparse if away > GRID * step else 1.0) / span
     return Envelope(
-        middle[keep], values, carrier, size * step, clipped, float(t[max(after, 1) - 1] - t[0]),
-        1 - float(np.sum(weight)) / int(rows[-1] + 1), (size * step) ** 2 / 12,
+        middle[keep], values[:, keep], carrier, size * step, clipped, overload, max(lost, 0.0),
+        (size * step) ** 2 / 12,
     )  # fmt: skip
 
 
 def even_rows(time: Array) -> "tuple[float, NDArray[np.int64]]":
-    """Return the step of evenly sampled rows (s), however few digits their times are written with, and the place of each row."""
+    """Return the step of evenly sampled rows (s), however few digits their times are written with, and the place of each row.
+
+    Rows that stand on no even grid, or on several, get the nearest places of one.
+    """
     step = float(time[-1] - time[0]) / (time.size - 1)
     whole = np.arange(time.size)
-    if (
-        np.max(np.abs(time - time[0] - step * whole)) < 0.5 * step
-    ):  # no row is lost: the line of all times, free of their digits
-        middle = whole - whole.mean()
-        return float(middle @ (time - time[0]) / (middle @ middle)), whole
-    between = np.diff(time)
-    rows = np.concatenate([[0.0], np.cumsum(np.rint(between / np.median(between)))])
-    step = float((time[-1] - time[0]) / rows[-1])
-    return step, np.rint((time - time[0]) / step).astype(np.int64)
+    if np.max(np.abs(time - time[0] - step * whole)) < 0.5 * step:  # no row is lost
+        rows = whole
+    else:
+        between = np.diff(time)
+        for share in SHORTEST:
+            step = float(np.quantile(between, share))
+            for _ in range(4):
+                count = np.rint(between / step)
+                near = (count > 0) & (count < APART)
+                step = float(np.sum(between[near]) / np.sum(count[near]))
+            if np.std((between / step - count)[near]) < GRID:
+                break
+        rows = np.cumsum(np.r_[0.0, np.rint(between / step)])
+        step = float((time[-1] - time[0]) / rows[-1])
+        rows = np.rint((time - time[0]) / step).astype(np.int64)
+    middle = rows - rows.mean()  # the line of all times is free of their digits
+    return float(middle @ (time - time[0]) / (middle @ middle)), rows
+
+
+def _digit(time: Array) -> float:
+    """Return the step (s) in which the last times are written: a power of ten, or that of single or double precision."""
+    last = time[-(time.size // 10 + 1) :]
+    least = float(np.spacing(np.max(np.abs(time))))
+    if np.array_equal(last, last.astype(np.float32)):
+        return float(np.spacing(np.float32(last[-1])))
+    decimal = (10.0**-k for k in range(16) if np.all(np.abs(last - np.round(last, k)) <= 2 * least))
+    return max(next(decimal, 0.0), 4 * least)
 
 
 def from_lock_in(time: ArrayLike, amplitudes: ArrayLike, carrier: float = 0.0) -> Envelope:
