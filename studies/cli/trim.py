@@ -1,6 +1,6 @@
 """`hrg trim`: a plan of trimming cuts from measured frequency splits."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from math import degrees
 from typing import Annotated, Any, Literal
 
@@ -29,6 +29,7 @@ CUTS = "number: cut | azimuth_deg: azimuth (°) .2f | height_mm: height z (mm) .
 STATES = "state | harmonic: n | split_Hz: split (mHz) ×1e3 .3f | error_Hz: standard error (mHz) ×1e3 .3f | most_Hz: 95 % upper limit (mHz) ×1e3 .3f | slow_axis_deg: slow axis (°) .2f"
 
 CELLS = {"azimuth_deg": ".4f", "position": ".6f", "height_mm": ".4f", "mass_ug": ".5f", "depth_um": ".4f"}  # of --out
+BALANCED = 1e-4  # of a known imbalance: what is left of it below counts as none
 UNLIKELY = 5.0  # standard errors of the prediction, by which a measured gain is doubted
 LIMIT = "Upper limit: the split is the length of a vector with this standard error in each component; the limit is exceeded with 5 % probability."
 
@@ -80,7 +81,8 @@ def trim(
         teeth: Number of teeth at the rim; cuts are then made on teeth only.
         tooth_azimuth: Azimuth of the first tooth in degrees.
         tooth_limit_ug: Largest mass to remove from a tooth.
-        unbalance: Known mass imbalance to correct, by harmonic: 1:120@35 (k = 1, 120 µg at 35°); others are kept.
+        unbalance: Known mass imbalance to correct by the same cuts, as far as they may be deep, by harmonic: 1:120@35 (k = 1, 120 µg at 35°).
+            It takes about twice its mass besides. Others are kept.
         removal_error: Relative standard error of the mass of each cut.
         gain_error: Relative standard error common to all cuts.
         gain: Measured over predicted change of the split in the last round; negative if in the opposite direction.
@@ -92,10 +94,11 @@ def trim(
     else:
         measured = pair_splits(split, axis, harmonic, reading_error, instrument)
     tool = Tool(1e-3 * width_mm, 1e-3 * length_mm, depth_limit)
+    known = read_unbalance(unbalance)
     planned = plan_for_card(
         resonator, elastic, measured, goal=goal, heights=position, tool=tool, kind=cut,
         teeth=Teeth(teeth, np.deg2rad(tooth_azimuth), 1e-9 * tooth_limit_ug) if teeth else None,
-        removal_error=removal_error, gain_error=gain_error, gain=gain, unbalance=read_unbalance(unbalance),
+        removal_error=removal_error, gain_error=gain_error, gain=gain, unbalance=known,
     )  # fmt: skip
     plan = planned.plan
     others = other_cuts(resonator, elastic, measured[0][0], cut)
@@ -122,11 +125,11 @@ def trim(
         payload,
         f"Trimming plan for {instrument.name}",
         "The cuts of this round, what to measure after them, and the split expected. The next round is planned from that measurement.",
-        _parts(planned, payload),
+        _parts(planned, payload, known),
     )
 
 
-def _parts(planned: CardPlan, payload: dict[str, Any]) -> list[Chapter]:
+def _parts(planned: CardPlan, payload: dict[str, Any], known: Mapping[int, complex]) -> list[Chapter]:
     first, plan = payload["rounds"][0], planned.plan
     in_order = sorted(first["cuts"], key=lambda one: (one["azimuth_deg"], one["position"]))
     cuts = [{"number": k, "done": "☐"} | one for k, one in enumerate(in_order, 1)]
@@ -149,6 +152,7 @@ def _parts(planned: CardPlan, payload: dict[str, Any]) -> list[Chapter]:
             ]),
             "The measured split is within the goal: no cut is needed; these would lower it further." if met else None,
             Table("Cuts of this round", cuts, CUTS, f"Total {first['mass_ug']:.4g} µg."),
+            _balance(known, plan),
             *payload["measure"],
             Sentence(f"Type of cut in this plan: {KINDS[payload['cut']]}. Effect of the same mass at the rim by type of cut, relative to this one: {kinds}."
                 " Negative: the split changes in the opposite direction.", "note", "page"),
@@ -178,8 +182,20 @@ def _round(planned: CardPlan, resonator: Resonator) -> dict[str, Any]:
             for c in one.cuts
         ],
         "after": [_state(s) for s in one.after],
-        "unbalance": {str(k): [1e9 * abs(u), float(np.rad2deg(np.angle(u)))] for k, u in one.unbalance.items()},
+        "unbalance": {str(k): [1e9 * abs(u), degrees(float(np.angle(u)) / k)] for k, u in one.unbalance.items()},
     }
+
+
+def _balance(known: Mapping[int, complex], plan: TrimPlan) -> str | None:
+    """Return how much of the known imbalance the cuts leave."""
+    left = {k: abs(plan.unbalance[k]) if abs(plan.unbalance[k]) > BALANCED * abs(u) else 0.0 for k, u in known.items()}
+    parts = [f"k = {k}: {plain(1e9 * abs(u))} → {plain(1e9 * left[k])} µg" for k, u in known.items()]
+    more = " These cuts can take no more: longer, wider or more cuts (teeth with a higher limit) correct the rest."
+    return (
+        f"Mass imbalance before → after the cuts: {', '.join(parts)}.{more if any(left.values()) else ''}"
+        if known
+        else None
+    )
 
 
 def doubt_gain(planned: CardPlan, gain: float, error: float) -> list[str]:

@@ -130,6 +130,19 @@ def test_the_depth_of_a_cut_of_the_edge_removes_its_mass_through_the_wall(capsys
     assert 0.8 < gain["low"] < gain["value"] < gain["high"] < 1
 
 
+def test_a_known_imbalance_is_said_before_and_after_the_cuts(capsys):
+    words = ["trim", "free-dome", "--split", "0.12", "--axis", "31", "--unbalance", "1:120@35", "2:50@10"]
+    assert main(words) == 0
+    assert "k = 1: 120 → 0 µg, k = 2: 50 → 0 µg." in " ".join(capsys.readouterr().out.split())
+    assert main([*words[:-1], "2:50000@10", "--json"]) == 0
+    (only,) = json.loads(capsys.readouterr().out)["rounds"]
+    left, azimuth = only["unbalance"]["2"]
+    assert 20000 < left < 50000
+    assert azimuth == pytest.approx(10, abs=1)
+    assert main([*words[:-1], "2:50000@10"]) == 0
+    assert "These cuts can take no more" in " ".join(capsys.readouterr().out.split())
+
+
 def test_trim_refuses_what_is_no_scan(tmp_path, refuse):
     (tmp_path / "no.json").write_text("{}")
     assert "hrg scan --json" in refuse(["trim", "free-dome", "--scan", tmp_path / "no.json"])
