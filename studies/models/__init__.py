@@ -1,7 +1,7 @@
 """Fitted compensation models as files: saved, read, applied to a record, emitted as C for firmware.
 
 A kind of model is one module in `studies.models.kinds`, found by its name (`cross-damping` is
-`cross_damping.py`), with two functions:
+`cross_damping.py`), with three functions:
 
     def compensate(model: Model, record: Record, *, extrapolate: bool) -> dict[str, NDArray[np.float64]]:
         "Return the `compensated_…` columns; a row that lacks an input stays NaN, never silently wrong.
@@ -9,6 +9,9 @@ A kind of model is one module in `studies.models.kinds`, found by its name (`cro
 
     def emit_c(model: Model) -> str:
         "Return a C99 translation unit without dependencies beyond math.h."
+
+    def known(model: Model) -> Known:
+        "Return what a file of this kind may hold; anything else is refused when it is read."
 
 A fit makes its `Model` with a function beside those (`kinds.frequency.save_frequency(fit, …)`), writes it
 with `write_model`, and needs nothing else to be applied by `hrg compensate`. `model.check_range` refuses to
@@ -25,7 +28,7 @@ from numpy import isinf
 from compensation.errors import CompensationError
 from studies.errors import InputError, nearest
 from studies.models import kinds
-from studies.models.file import Model, ModelPart, ModelSource, format_model, make_part, read_model, write_model
+from studies.models.file import Model, ModelPart, ModelSource, format_model, make_part, read_any_model, write_model
 from studies.record import COMPENSATED, RESONATOR, Record, Run, read_record
 
 __all__ = [
@@ -37,6 +40,15 @@ __all__ = [
 def model_kinds() -> list[str]:
     """Return the kinds of model that can be applied."""
     return sorted(m.name.replace("_", "-") for m in iter_modules(kinds.__path__))
+
+
+def read_model(path: Model | str | Path) -> Model:
+    """Read a model's file; a model is what it is."""
+    if isinstance(path, Model):
+        return path
+    model = read_any_model(path)
+    _module(model).known(model).check(model)
+    return model
 
 
 def source_of(record: Record) -> ModelSource:

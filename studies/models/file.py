@@ -1,7 +1,8 @@
 """The model file `hrg.model/1`: a fitted compensation as a small TOML with all digits, and comments how well each number is known."""
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -9,7 +10,7 @@ import msgspec
 import numpy as np
 
 from compensation.arrays import Array
-from studies.errors import InputError
+from studies.errors import InputError, nearest
 from studies.files.reading import as_path
 from studies.files.writing import write_text
 from studies.instrument.units import unit_of
@@ -214,10 +215,32 @@ def format_model(model: Model) -> str:
     return "\n".join(lines) + "\n"
 
 
-def read_model(path: Model | str | Path) -> Model:
-    """Read a model's file; a model is what it is."""
-    if isinstance(path, Model):
-        return path
+@dataclass(frozen=True)
+class Known:
+    """What the file of a kind of model may hold: settings, ranges, and the parts with the units of their coefficients."""
+
+    settings: Collection[str]
+    validity: Collection[str]
+    units: Mapping[str, Sequence[str]]
+
+    def check(self, model: Model) -> None:
+        """Refuse anything else, which would be ignored or misread."""
+        for title, given, known in (
+            ("settings", model.settings, self.settings),
+            ("validity", model.validity, self.validity),
+        ):
+            if unknown := next((key for key in given if key not in known), None):
+                raise InputError(f"{model.where} [{title}]: unknown key '{unknown}'{nearest(unknown, known)}")
+        for part in model.parts:
+            if part.name not in self.units:
+                raise InputError(f"{model.where} [[part]]: unknown name '{part.name}'{nearest(part.name, self.units)}")
+            for one, unit in zip(part.coefficients, self.units[part.name], strict=True):
+                if one.unit != unit:
+                    raise InputError(f"{model.where} [[part]] {part.name}: the coefficient '{one.name}' must be in {unit}, not {one.unit}; convert its value.")  # fmt: skip
+
+
+def read_any_model(path: str | Path) -> Model:
+    """Read a model's file, whatever its kind."""
     from studies.instrument.card import shipped_cards
 
     if not as_path(path).exists() and str(path) in shipped_cards():

@@ -11,7 +11,7 @@ from msgspec.structs import replace
 from compensation.frequency import fit_frequency
 from studies.cli import main
 from studies.errors import InputError
-from studies.models import ModelSource, compensate, emit_c, format_model, read_model, write_model
+from studies.models import Model, ModelSource, compensate, emit_c, format_model, make_part, read_model, write_model
 from studies.models.kinds.frequency import evaluate, find_temperature, save_frequency
 from studies.record import Record, read_record, write_record
 from tests.compiled import compile_c
@@ -124,6 +124,18 @@ def test_a_short_record_is_judged_by_averages_of_a_tenth_of_it(model, tmp_path, 
         ("rows = 7", f"rows = {'7' * 5000}", "not valid TOML: Exceeds the limit"),
         ("temperature_degC = [-23.0, 43.0]", "temperature_degC = [43.0, -23.0]", "must be below"),
         ("reference_temperature_degC = 0.0", "reference_temperature_degC = nan", "finite number"),
+        ("[settings]", "[settings]\nfoo = 3", "settings.: unknown key 'foo'"),
+        (
+            "temperature_degC = [",
+            "temperature_dgC = [0.0, 1.0]\ntemperature_degC = [",
+            "did you mean 'temperature_degC'",
+        ),
+        ('unit = "Hz/degC"', 'unit = "mHz/degC"', "'a1' must be in Hz/degC, not mHz/degC"),
+        (
+            "[[source]]",
+            '[[part]]\nname = "bias"\ncoefficients = [{name = "x", value = 1, unit = "1"}]\n[[source]]',
+            "unknown name 'bias'",
+        ),
     ],
 )
 def test_a_broken_file_is_refused_by_key(model, tmp_path, old, new, message):
@@ -133,6 +145,41 @@ def test_a_broken_file_is_refused_by_key(model, tmp_path, old, new, message):
     (tmp_path / "m.toml").write_text(text, encoding="utf-8")
     with pytest.raises(InputError, match=message):
         read_model(tmp_path / "m.toml")
+
+
+ROUGH = make_part("rough", ("null", "scale"), (0.0, 1.0), ("deg/s", "deg/s per deg/s"))
+CURVES = [make_part(name, ("c0",), (1.0,), (unit,)) for name, unit in (("bias", "deg/s"), ("scale_over_rate", "deg/s"), ("scale_over_temperature", "1"))]  # fmt: skip
+CROSS = {"calibration_temperature_degC": 20.0, "frequency_Hz": 5e3, "relative_damping": 1e-6, "g2": 1.0, "temperature_column": "housing_temperature_degC"}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("kind", "settings", "parts", "ranges", "misspelled"),
+    [
+        ("bias", {"variable": "frequency_Hz", "reference_frequency_Hz": 4e3, "rate_window_s": 300.0, "rate_lag_s": 0.0},
+         [make_part("bias", ("constant", "f", "fdot"), (1.0, 2.0, 3.0), ("deg/h", "deg/h/Hz", "deg/h/(Hz/s)"))],
+         ("frequency_Hz", "frequency_rate_Hz_per_s"), "variable"),
+        ("cross-damping", CROSS, [make_part("cross-damping", ("zeta_0", "zeta_1"), (1.0, 2.0), ("1", "1/degC"))],
+         ("housing_temperature_degC",), "g2"),
+        ("scale", {"temperature_column": "housing_temperature_degC", "sampling_s": 0.0}, [ROUGH, *CURVES],
+         ("housing_temperature_degC", "measured_rate_deg_per_s"), "sampling_s"),
+    ],
+)  # fmt: skip
+def test_every_kind_knows_its_settings_and_units(tmp_path, kind, settings, parts, ranges, misspelled):
+    output = "measured_rate_deg_per_s" if kind == "scale" else "bias_deg_per_h"
+    whole = Model(
+        kind=kind, compensates=output, settings=settings, parts=tuple(parts), validity=dict.fromkeys(ranges, (0.0, 1.0))
+    )
+    path = tmp_path / "m.toml"
+    write_model(whole, path)
+    text = path.read_text(encoding="utf-8")
+    assert read_model(path).parts == whole.parts
+    path.write_text(text.replace("[settings]", f"[settings]\n{misspelled}x = 3"), encoding="utf-8")
+    with pytest.raises(InputError, match=f"unknown key '{misspelled}x'; did you mean '{misspelled}'"):
+        read_model(path)
+    last = parts[-1].coefficients[-1]
+    path.write_text(text.replace(f'unit = "{last.unit}"', 'unit = "ft"'), encoding="utf-8")
+    with pytest.raises(InputError, match=r"must be in .*, not ft; convert its value"):
+        read_model(path)
 
 
 def test_an_unknown_kind_and_a_wrong_covariance_are_refused(model, tmp_path):

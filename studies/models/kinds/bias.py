@@ -20,7 +20,7 @@ from compensation.memory import NO_MEMORY, Memory, follow_lag, follow_play
 from compensation.samples import check_time
 from studies.errors import InputError, nearest
 from studies.models.c_source import head, self_test, write_c
-from studies.models.file import Model, ModelSource, Setting, make_part, widen
+from studies.models.file import Known, Model, ModelSource, Setting, make_part, widen
 from studies.record import COMPENSATED, Record
 
 OUTPUTS = {"bias_deg_per_h": "deg/h", "measured_rate_deg_per_s": "deg/s"}
@@ -33,7 +33,7 @@ def save_bias(
     fit: BiasFit, run: BiasRun, output: str, column: str, sources: tuple[ModelSource, ...], made_by: str
 ) -> Model:
     """Return a fitted bias model; `run` tells how the rate was taken, `output` the column fitted, `column` over which."""
-    units = [OUTPUTS[output], *(unit_of_term(OUTPUTS[output], name, fit.variable) for name in fit.terms)]
+    units = [unit_of_term(OUTPUTS[output], name, fit.variable) for name in ("constant", *fit.terms)]
     names = [name_term(name, fit.variable) for name in fit.terms]
     settings: dict[str, Setting] = {
         "variable": column,
@@ -52,6 +52,14 @@ def save_bias(
         sources=sources,
         made_by=made_by,
     )
+
+
+def known(model: Model) -> Known:
+    """Return the keys of a model of the bias, and the units of its terms."""
+    column, (terms, _) = variable_column(model), read_terms(model)
+    units = [unit_of_term(OUTPUTS[model.compensates], name, _variable(model)) for name in ("constant", *terms)]
+    settings = ("variable", _reference_key(column), "rate_window_s", "rate_lag_s", "memory_lag_s", "play_degC")
+    return Known(settings, (column, rate_name(column)), {"bias": units})
 
 
 def compensate(model: Model, record: Record, *, extrapolate: bool) -> dict[str, Array]:
@@ -164,7 +172,7 @@ def variable_column(model: Model) -> str:
 
 def rate_name(column: str) -> str:
     """Return the name of a column's rate in `[validity]`: frequency_rate_Hz_per_s for frequency_Hz."""
-    name, unit = column.rsplit("_", 1)
+    name, _, unit = column.rpartition("_")
     return f"{name}_rate_{unit}_per_s"
 
 
@@ -182,7 +190,7 @@ def memory_of(model: Model) -> Memory:
 
 def read_terms(model: Model) -> tuple[tuple[str, ...], Array]:
     """Return the terms in the names of `compensation.bias`, and all coefficients, the constant first."""
-    part, variable = model.part("bias"), (FREQUENCY if variable_column(model) == "frequency_Hz" else TEMPERATURE)
+    part, variable = model.part("bias"), _variable(model)
     where = model.where
     model.check_output(OUTPUTS)
     if part.names[0] != "constant":
@@ -229,6 +237,10 @@ def _test_rows(model: Model) -> list[tuple[float, ...]]:
 
 def _made_causal(model: Model) -> Model:
     return replace(model, settings={**model.settings, "rate_lag_s": model.number("rate_window_s") / 2})
+
+
+def _variable(model: Model) -> Variable:
+    return FREQUENCY if variable_column(model) == "frequency_Hz" else TEMPERATURE
 
 
 def _reference_key(column: str) -> str:

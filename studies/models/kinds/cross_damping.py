@@ -12,7 +12,7 @@ from compensation.arrays import Array
 from compensation.cross_damping import CrossDampingModel
 from studies.errors import InputError
 from studies.models.c_source import head, polynomial, self_test, write_c
-from studies.models.file import Model, ModelPart, ModelSource, make_part, widen
+from studies.models.file import Known, Model, ModelPart, ModelSource, make_part, widen
 from studies.record import COMPENSATED, Record
 
 OUTPUTS = {"bias_deg_per_h": math.radians(1 / 3600), "measured_rate_deg_per_s": math.radians(1.0)}
@@ -23,13 +23,11 @@ def save_cross_damping(
     fit: CrossDampingModel, output: str, temperature_column: str, sources: tuple[ModelSource, ...], made_by: str
 ) -> Model:
     """Return a fitted ζ₁₂(T) as a model that compensates the column `output`."""
-    order = len(fit.coefficients) - 1
-    names = [f"zeta_{i}" for i in range(order + 1)]
-    units = ["1", "1/degC", *(f"1/degC^{i}" for i in range(2, order + 1))][: order + 1]
+    names = [f"zeta_{i}" for i in range(len(fit.coefficients))]
     return Model(
         kind="cross-damping",
         compensates=output,
-        parts=(make_part("cross-damping", names, fit.coefficients, units, fit.covariance),),
+        parts=(make_part("cross-damping", names, fit.coefficients, _units(len(names)), fit.covariance),),
         settings={
             "calibration_temperature_degC": fit.calibration_temperature,
             "frequency_Hz": fit.k / (2 * math.pi),
@@ -41,6 +39,16 @@ def save_cross_damping(
         sources=sources,
         made_by=made_by,
     )
+
+
+def known(model: Model) -> Known:
+    """Return the keys of a model of ζ₁₂(T), and the units of its polynomial."""
+    settings = ("calibration_temperature_degC", "frequency_Hz", "relative_damping", "g2", "temperature_column")
+    return Known(settings, (model.temperature_column,), {"cross-damping": _units(len(_part(model).values))})
+
+
+def _units(count: int) -> list[str]:
+    return ["1", "1/degC", *(f"1/degC^{i}" for i in range(2, count))][:count]
 
 
 def load_cross_damping(model: Model) -> CrossDampingModel:

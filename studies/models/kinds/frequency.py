@@ -12,27 +12,35 @@ from compensation.arrays import Array
 from compensation.frequency import FrequencyFit, find_turn, invert
 from studies.errors import InputError, naming
 from studies.models.c_source import head, polynomial, self_test, write_c
-from studies.models.file import Model, ModelSource, make_part, widen
+from studies.models.file import Known, Model, ModelSource, make_part, widen
 from studies.record import COMPENSATED, RESONATOR, Record
 from studies.record.plausible import check_model_frequency
 from studies.record.rest import TEMPERATURES
 
-VARIABLE = "temperature_degC"
+VARIABLE, REFERENCE = "temperature_degC", "reference_temperature_degC"
 
 
 def save_frequency(fit: FrequencyFit, sources: tuple[ModelSource, ...], made_by: str) -> Model:
     """Return a fitted curve as a model."""
     names = ["f0", *(f"a{k}" for k in range(1, fit.order + 1))]
-    units = ["Hz", "Hz/degC", *(f"Hz/degC^{k}" for k in range(2, fit.order + 1))]
     return Model(
         kind="frequency",
         compensates="frequency_Hz",
-        parts=(make_part("frequency", names, fit.coefficients, units, fit.covariance),),
-        settings={"reference_temperature_degC": fit.reference_temperature_degC},
+        parts=(make_part("frequency", names, fit.coefficients, _units(len(names)), fit.covariance),),
+        settings={REFERENCE: fit.reference_temperature_degC},
         validity={VARIABLE: _widen(fit)},
         sources=sources,
         made_by=made_by,
     )
+
+
+def known(model: Model) -> Known:
+    """Return the keys of a model of the frequency, and the units of its polynomial."""
+    return Known((REFERENCE,), (VARIABLE,), {"frequency": _units(len(model.part("frequency").values))})
+
+
+def _units(count: int) -> list[str]:
+    return ["Hz", "Hz/degC", *(f"Hz/degC^{k}" for k in range(2, count))][:count]
 
 
 def compensate(model: Model, record: Record, *, extrapolate: bool) -> dict[str, Array]:
@@ -58,7 +66,7 @@ def compensate(model: Model, record: Record, *, extrapolate: bool) -> dict[str, 
 
 def evaluate(model: Model, temperature_degC: Array) -> Array:
     """Return f(T) in Hz."""
-    shift = temperature_degC - model.number("reference_temperature_degC")
+    shift = temperature_degC - model.number(REFERENCE)
     return np.asarray(np.polynomial.polynomial.polyval(shift, model.part("frequency").values))
 
 
@@ -76,7 +84,7 @@ def find_temperature(model: Model, frequency: Array, path: str = "record", *, sp
 
 def temperature_error(model: Model, temperature_degC: float) -> float:
     """Return the standard uncertainty (°C) that the fitted curve itself leaves at one temperature; NaN where unknown."""
-    part, shift = model.part("frequency"), temperature_degC - model.number("reference_temperature_degC")
+    part, shift = model.part("frequency"), temperature_degC - model.number(REFERENCE)
     if not part.covariance:
         return float("nan")
     powers = shift ** np.arange(len(part.values))
@@ -87,7 +95,7 @@ def temperature_error(model: Model, temperature_degC: float) -> float:
 def emit_c(model: Model) -> str:
     """Return `hrg_frequency(T)` and `hrg_temperature(f, &ok)`, the inverse by bracketed bisection, in C99."""
     low, high = model.range_of(VARIABLE)
-    reference = model.number("reference_temperature_degC")
+    reference = model.number(REFERENCE)
     none = "\n   The curve has a turning point in this range: there is no inverse, *ok is always 0."
     turns = "" if _is_monotonic(model) else none
     code = write_c(

@@ -8,7 +8,6 @@ output is first rid of what differs while the temperature rises and falls. Range
 length, because readings scatter; outliers, which the fit leaves out, are not judged.
 """
 
-from collections.abc import Sequence
 from dataclasses import astuple
 
 import numpy as np
@@ -18,7 +17,7 @@ from compensation.bell import BellChain, PolynomialCurve, Warming, apply_chain
 from compensation.rate_law import FORMS, RateCurve
 from studies.errors import InputError
 from studies.models.c_source import head, polynomial, write_c
-from studies.models.file import Model, ModelPart, ModelSource, Setting, make_part, widen
+from studies.models.file import Known, Model, ModelPart, ModelSource, Setting, make_part, widen
 from studies.record import COMPENSATED, Record
 from studies.record.rest import drop_spikes
 
@@ -26,6 +25,11 @@ RAW = ("output_counts", "measured_rate_deg_per_s")
 """Columns that can be the raw output; the first needs the rough scale, the second is a rate already."""
 RATE = "measured_rate_deg_per_s"
 FORM, BLIND, WARMING = "rate_form", "blind_deg_per_s", "warming"
+STEPS = {
+    "bias": ("deg/s", "deg/s/degC", "deg/s/degC^2"),
+    "scale_over_rate": ("deg/s", "1", "s/deg"),
+    "scale_over_temperature": ("1", "1/degC", "1/degC^2"),
+}
 C_FORMS = {  # a rate law's own coefficient: its unit; and Ω over u = (y − a)/k in C
     "directions": ("1", "u / (u < 0.0 ? 1.0 : 1.0 + {s} / {k})"),
     "cubic": ("s^2/deg^2", "2.0 * {t} * ({s} > 0.0 ? sinh(asinh({w}) / 3.0) : sin(asin(fmax(-1.0, fmin(1.0, {w}))) / 3.0))"),
@@ -38,10 +42,8 @@ def save_scale(
     chain: BellChain, output: str, temperature_column: str, sources: tuple[ModelSource, ...], made_by: str
 ) -> Model:
     """Return a fitted chain as a model that compensates the column `output`."""
-    raw = "counts" if output == "output_counts" else "deg/s"
-    units = raw, f"deg/s per {raw}"
-    rough = make_part("rough", ("null", "scale"), (chain.null, chain.scale), units, chain.rough_covariance)
-    over_temperature = ("1/degC", "1/degC^2")
+    values, covariance = (chain.null, chain.scale), chain.rough_covariance
+    rough = make_part("rough", ("null", "scale"), values, _units("rough", 2, output), covariance)
     curve = chain.scale_over_rate
     law: dict[str, Setting] = {FORM: curve.form, BLIND: curve.blind} if isinstance(curve, RateCurve) else {}
     law |= {WARMING: astuple(chain.warming)} if chain.warming else {}
@@ -50,9 +52,9 @@ def save_scale(
         compensates=output,
         parts=(
             rough,
-            _save_curve("bias", chain.bias, ("deg/s", "deg/s/degC", "deg/s/degC^2")),
-            _save_curve("scale_over_rate", curve, ("deg/s", "1", "s/deg")),
-            _save_curve("scale_over_temperature", chain.scale_over_temperature, ("1", *over_temperature)),
+            _save_curve("bias", chain.bias),
+            _save_curve("scale_over_rate", curve),
+            _save_curve("scale_over_temperature", chain.scale_over_temperature),
         ),
         settings={
             "temperature_column": temperature_column,
@@ -70,6 +72,24 @@ def save_scale(
         sources=sources,
         made_by=made_by,
     )
+
+
+def known(model: Model) -> Known:
+    """Return the keys of a chain, and the units of its steps."""
+    load_scale(model)
+    form = str(model.settings.get(FORM, ""))
+    units = {name: _units(name, len(model.part(name).values), model.compensates, form) for name in ("rough", *STEPS)}
+    settings = ("temperature_column", "sampling_s", "fir_taps", FORM, BLIND, WARMING)
+    return Known(settings, (model.temperature_column, RATE), units)
+
+
+def _units(step: str, count: int, output: str = "", form: str = "") -> list[str]:
+    """Units of the coefficients of one step of the chain."""
+    raw = "counts" if output == "output_counts" else "deg/s"
+    units = [raw, f"deg/s per {raw}"] if step == "rough" else list(STEPS[step])
+    if form and step == "scale_over_rate":
+        units = ["deg/s", "1", C_FORMS[form][0]]
+    return [*units, *([f"{units[-1]} per power"] * (count - len(units)))][:count]
 
 
 def load_scale(model: Model) -> BellChain:
@@ -153,12 +173,10 @@ def emit_c(model: Model) -> str:
     return f"{head(model)}\n{code}"
 
 
-def _save_curve(name: str, curve: PolynomialCurve, units: Sequence[str]) -> ModelPart:
-    names = [f"c{i}" for i in range(len(curve.coefficients))]
-    if isinstance(curve, RateCurve):
-        names, units = ["a", "k", *FORMS[curve.form].own], ("deg/s", "1", C_FORMS[curve.form][0])
-    more = [f"{units[-1]} per power" for _ in names[3:]]
-    return make_part(name, names, curve.coefficients, [*units, *more][: len(names)], curve.covariance)
+def _save_curve(name: str, curve: PolynomialCurve) -> ModelPart:
+    form = curve.form if isinstance(curve, RateCurve) else ""
+    names = ["a", "k", *FORMS[form].own] if form else [f"c{i}" for i in range(len(curve.coefficients))]
+    return make_part(name, names, curve.coefficients, _units(name, len(names), form=form), curve.covariance)
 
 
 def _load_curve(model: Model, name: str, limits: tuple[float, float]) -> PolynomialCurve:
