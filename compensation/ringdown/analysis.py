@@ -54,15 +54,24 @@ def analyse_decay(envelope: Envelope, *, harmonic: int = 2) -> RingDown:
     _check_decays(fit)
     fit = replace(fit, covariance=fit.covariance * left.widening**2, widening=left.widening)
     estimates = _estimate(fit, harmonic)
-    remarks = (*_remark(given, fit, left, jump), *_undetermined(fit, estimates))
-    time, carrier = fit.envelope.time, fit.envelope.carrier
+    lines = _sources(fit)
+    remarks = (*_remark(given, fit, left, jump, lines), *_undetermined(fit, estimates))
+    time = fit.envelope.time
     curves = tuple(
         Curve(time, 20 * np.log10(np.abs(z)), 20 * np.log10(np.abs(z - r)), np.real(r))
         for z, r in zip(fit.envelope.values, fit.residual, strict=True)
     )
-    lines = tuple(carrier + tone / (2 * np.pi) for tone in fit.found.tones)
     window = (float(time[0]), float(time[-1]))
     return RingDown(estimates, remarks, tuple(fit.noise.tolist()), fit.widening, curves, window, lines)
+
+
+def _sources(fit: DecayFit) -> tuple[float, ...]:
+    """Return the frequencies (Hz) of the interference; two lines may be one source and its image."""
+    found: list[float] = []
+    for one in (fit.envelope.source_of(tone / (2 * np.pi)) for tone in fit.found.tones):
+        if all(abs(one - other) > 2 * fit.envelope.bin for other in found):
+            found.append(one)
+    return tuple(found)
 
 
 def _check_decays(fit: DecayFit) -> None:
@@ -129,7 +138,9 @@ def _estimate(fit: DecayFit, harmonic: int) -> dict[str, Estimate]:
     return found
 
 
-def _remark(envelope: Envelope, fit: DecayFit, left: Leftover, jump: float | None) -> list[str]:
+def _remark(
+    envelope: Envelope, fit: DecayFit, left: Leftover, jump: float | None, lines: tuple[float, ...]
+) -> list[str]:
     said = []
     first, start = float(envelope.time[0]), float(fit.envelope.time[0])
     if jump is not None:
@@ -145,8 +156,8 @@ def _remark(envelope: Envelope, fit: DecayFit, left: Leftover, jump: float | Non
         said.append(
             f"The frequency drifts with time, by {np.ptp(course) / (2 * np.pi):.2g} Hz: the frequencies are means, weighted with the power of the decay."
         )
-    if fit.found.tones:
-        at = ", ".join(f"{envelope.carrier + tone / (2 * np.pi):.8g}" for tone in fit.found.tones)
+    if lines:
+        at = ", ".join(f"{line:.8g}" for line in lines)
         said.append(f"Interference at {at} Hz is removed; find its source.")
     if envelope.clipped:
         said.append(

@@ -42,11 +42,27 @@ class Envelope:
     overload: float = 0.0  # s, of the last sample that is clipped
     lost: float = 0.0  # part of the time without samples
     spread: float = 0.0  # s², variance of the times that a row averages; 0 of a lock-in's own rows
+    bin: float = 0.0  # Hz, step of `power`
+    power: Array | None = None  # spectrum of the last raw samples, where the decay is weakest
 
     def within(self, start: float, end: float) -> "Envelope":
         """The rows between two times (s)."""
         keep = (self.time >= start) & (self.time <= end)
         return replace(self, time=self.time[keep], values=self.values[:, keep])
+
+    def source_of(self, line: float) -> float:
+        """Return the frequency (Hz) of the interference that a line (Hz from the carrier) in the blocks is, folded or not.
+
+        Of all that fold onto it, f_c + line + m/width, it is the one whose raw power, less what a block averages out, is largest.
+        """
+        if self.power is None:
+            return self.carrier + line
+        reach = int((self.bin * self.power.size + self.carrier) * self.width)
+        found = self.carrier + line + np.arange(-reach, reach + 1) / self.width
+        place = np.rint(np.abs(found) / self.bin).astype(int)
+        found, place = found[place < self.power.size - 1], place[place < self.power.size - 1]
+        near = np.max([self.power[np.abs(place + k)] for k in (-1, 0, 1)], axis=0)
+        return float(np.abs(found[np.argmax(near * np.sinc((found - self.carrier) * self.width) ** 2)]))
 
 
 def find_carrier(samples: ArrayLike, rows: NDArray[np.int64], rate: float) -> float:
@@ -58,13 +74,18 @@ def find_carrier(samples: ArrayLike, rows: NDArray[np.int64], rate: float) -> fl
     x = x - np.mean(x)
     length = min(int(rows[-1]) + 1, CHUNK)
     at = int(np.argmax(np.bincount(rows // length, x**2)))
-    here = rows // length == at
-    stretch = np.bincount(rows[here] - at * length, x[here], length)
-    spectrum = np.abs(np.fft.rfft(stretch * np.hanning(length)))
+    spectrum = np.sqrt(_spectrum(x, rows, at * length, length))
     peak = int(np.argmax(spectrum[1:-1])) + 1
     left, middle, right = np.log(spectrum[peak - 1 : peak + 2] + 1e-300)
     curve = left - 2 * middle + right
     return float((peak + (0.5 * (left - right) / curve if curve else 0.0)) * rate / length)
+
+
+def _spectrum(x: Array, rows: NDArray[np.int64], first: int, length: int) -> Array:
+    """Return the power of the samples in `length` rows of an even grid from the `first`, by a Hann window."""
+    here = (rows >= first) & (rows < first + length)
+    stretch = np.bincount(rows[here] - first, x[here], length)
+    return np.asarray(np.abs(np.fft.rfft(stretch * np.hanning(length))) ** 2)
 
 
 def mix_down(time: ArrayLike, channels: ArrayLike, carrier: float | None = None) -> Envelope:
@@ -139,9 +160,11 @@ def mix_down(time: ArrayLike, channels: ArrayLike, carrier: float | None = None)
                 total += add(2 * x[c, part] * e - slope.conj() * e**2 - 2 * of_level[block[part]] * flat, part)
             values[c] = (own * total - image * total.conj()) / np.where(keep, own**2 - np.abs(image) ** 2, 1.0)
     lost = 1 - float(np.sum(weight)) * (sparse if away > GRID * step else 1.0) / span
+    length = min(span, CHUNK)
+    power = np.sum([_spectrum(one, rows, span - length, length) for one in x], axis=0)
     return Envelope(
         middle[keep], values[:, keep], carrier, size * step, clipped, overload, max(lost, 0.0),
-        (size * step) ** 2 / 12,
+        (size * step) ** 2 / 12, rate / length, power,
     )  # fmt: skip
 
 

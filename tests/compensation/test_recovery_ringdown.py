@@ -407,3 +407,14 @@ def test_recovery_of_a_frequency_that_goes_with_the_amplitude(hardening, sd, rat
     assert max(map(abs, z.values())) < 4
     assert "split_Hz" not in found.estimates
     assert not any("drifts" in one for one in found.remarks)
+
+
+@pytest.mark.parametrize("line", [50.0, 1234.5, 4617.3, 7321.0])
+def test_interference_is_named_at_its_own_frequency(line):
+    """Blocks of eight periods fold it beside the carrier, where 50 Hz was named as 4650 Hz."""
+    random = np.random.default_rng(int(line))
+    x = CLIPPED.samples(CLIPPED_TIME, [1.0, 1.0]) + 0.002 * random.standard_normal((2, 40_000))
+    x += 0.1 * np.sin(2 * np.pi * line * CLIPPED_TIME + np.array([[0.0], [1.0]]))
+    found = analyse_decay(mix_down(CLIPPED_TIME, x))
+    assert found.interference == pytest.approx([line], abs=0.02)
+    assert any(one.startswith("Interference at") for one in found.remarks)
