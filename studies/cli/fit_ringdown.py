@@ -2,12 +2,12 @@
 
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
 from compensation.ringdown.laws import Law
-from studies.cli.arguments import Harmonic
+from studies.cli.arguments import COUNT, POSITIVE, Harmonic
 from studies.cli.output import answers, keep_card, say
 from studies.errors import InputError
 from studies.fits.ringdown import Decay, read_decay, with_decay
@@ -43,8 +43,8 @@ DECAY = "file | frequency_Hz: f (Hz) .9 | q: Q .6 | q_low … q_high: 90 % inter
 def fit_ringdown(
     *data: str,
     card: str | None = None,
-    frequency: float | None = None,
-    harmonic: Harmonic = 2,
+    frequency: Annotated[float | None, POSITIVE] = None,
+    harmonic: Annotated[Harmonic, COUNT] = 2,
     save: str | None = None,
     out: str | None = None,
 ) -> Result:

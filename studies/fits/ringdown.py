@@ -24,13 +24,15 @@ from compensation.ringdown.spectrum import fit_spectrum
 from compensation.ringdown.trace import analyse_trace
 from studies.errors import InputError, naming
 from studies.files.columns import Columns, read_columns, read_header
+from studies.files.given import LARGEST
 from studies.files.reading import read_bytes
 from studies.instrument.card import Instrument
 from studies.record import CARTESIAN, DECAYS, PARTS, POLAR, POWERS, RAW
 
 KNOWN = ("time_s", "frequency_Hz", *DECAYS)
-NOTES = ("reference_frequency_Hz", "pressure_Pa", "temperature_degC")
-NOTE = re.compile(r"^\W*(\w+):\s*([-+.\deE]+)\s*$")
+# comments that hold a number, and the least that it may be
+NOTES = {"reference_frequency_Hz": 1e-3, "pressure_Pa": 0.0, "temperature_degC": -273.15}
+NOTE = re.compile(rf"^\W*({'|'.join(NOTES)})\s*:\s*(.*?)\s*$")
 START = re.compile(r"^\W*(?:start|Date and time):\s*(\d{4}-\d\d-\d\d\S*(?: \d\d:\S+)?)\s*$")
 FOREIGN = {
     "Frequency [Hz]": ("reference_frequency_Hz", 1.0, 0.0),
@@ -123,10 +125,19 @@ def _read(path: str | Path) -> tuple[Columns, dict[str, float]]:
         raise InputError(f"{path}: only time_s; a decay needs {needs}.")
     notes = _read_start(path, table.comments)
     for comment in table.comments:
-        match = NOTE.match(comment)
-        if match and match[1] in NOTES:
-            notes[match[1]] = float(match[2])
+        if match := NOTE.match(comment):
+            notes[match[1]] = _number(path, comment, match[1], match[2])
     return table, notes
+
+
+def _number(path: str | Path, comment: str, key: str, text: str, factor: float = 1.0, shift: float = 0.0) -> float:
+    try:
+        value = factor * float(text) + shift
+    except ValueError:
+        raise InputError(f"{path}: the comment '{comment}' holds no number.") from None
+    if not NOTES[key] <= value < LARGEST:
+        raise InputError(f"{path}: the comment '{comment}': {key} must be a number from {NOTES[key]:g} up.")
+    return value
 
 
 def _read_start(path: str | Path, comments: Iterable[str]) -> dict[str, float]:
@@ -152,10 +163,7 @@ def _read_trace(path: str | Path) -> tuple[Columns, dict[str, float]]:
         name, _, text = comment.partition(":")
         if name in FOREIGN:
             key, factor, shift = FOREIGN[name]
-            try:
-                notes[key] = factor * float(text) + shift
-            except ValueError:
-                raise InputError(f"{path}: the comment '{name}' holds no number: {text.strip()!r}.") from None
+            notes[key] = _number(path, comment, key, text, factor, shift)
     try:
         written = (line.split(",") for line in lines if line and not line.startswith("%"))
         rows = np.array([[float(cell) for cell in cells] for cells in written])

@@ -150,6 +150,25 @@ def test_what_is_no_ring_down_is_refused_with_its_file(tmp_path, refuse, columns
     assert "x.csv" in err
 
 
+@pytest.mark.parametrize(
+    ("comment", "more", "said"),
+    [
+        ("reference_frequency_Hz: banana", [], "'reference_frequency_Hz: banana' holds no number"),
+        ("reference_frequency_Hz: -4432", [], "reference_frequency_Hz must be a number from 0.001 up"),
+        ("reference_frequency_Hz: nan", [], "reference_frequency_Hz must be a number from 0.001 up"),
+        ("pressure_Pa: -1", [], "pressure_Pa must be a number from 0 up"),
+        ("temperature_degC: 22 C", [], "'temperature_degC: 22 C' holds no number"),
+        ("source: a lock-in", ["--frequency", "-5"], "--frequency"),
+        ("source: a lock-in", ["--harmonic", "-2"], "--harmonic"),
+    ],
+)
+def test_a_number_that_a_decay_cannot_have_is_refused_by_its_comment_or_option(tmp_path, refuse, comment, more, said):
+    """A negative reference gave a decay of −4431.93 Hz, a word was taken for none, a negative harmonic turned the axes round."""
+    z = LOCK + 1e-3 * np.random.default_rng(1).standard_normal(TIME.size)
+    path = write(tmp_path / "x.csv", lock(z), [comment])
+    assert said in refuse(["fit", "ringdown", path, *more])
+
+
 FINE = np.arange(16_000) / 16_000
 TONE = np.exp(-FINE / 0.4) * np.cos(2 * np.pi * 4600 * FINE)
 LOCK = 0.3 * np.exp(-TIME / 40 + 0.2j * TIME)
