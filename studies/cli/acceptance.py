@@ -9,10 +9,11 @@ from studies.acceptance.limits import SCHEMA, Limits
 from studies.acceptance.measure import CONFIDENCE
 from studies.cli.arguments import Card, Records
 from studies.cli.output import answers, say
-from studies.errors import InputError
+from studies.errors import InputError, nearest
 from studies.fits.ringdown import is_decay, read_decay
 from studies.instrument.card import load_card
 from studies.record import read_record
+from studies.record.uses import OUTPUT
 from studies.reports import style
 from studies.reports.digits import plain
 from studies.results import Chapter, Column, Drawing, Facts, Figure, Part, Result, Sentence, Table, row_of
@@ -28,7 +29,7 @@ RECORDS = (
 
 
 @answers("hrg.acceptance/1")
-def acceptance(card: Card, *runs: Records, limits: str | None = None, output: str = "bias_deg_per_h") -> Result:
+def acceptance(card: Card, *runs: Records, limits: str | None = None, output: str = OUTPUT) -> Result:
     """Judge a gyro by its records: warm-up, temperature, scale factor, drift with Allan deviation, run-down, transfer function.
 
     Each record serves the test that its columns show: rest over temperature, rest for an hour or more, several applied rates, a swept
@@ -45,6 +46,9 @@ def acceptance(card: Card, *runs: Records, limits: str | None = None, output: st
         raise InputError("no record given; name at least one record (CSV) of the gyro.")
     free = [path for path in runs if is_decay(path)]
     records = [read_record(path) for path in runs if path not in free]
+    if output != OUTPUT and not any(output in record for record in records):
+        known = {name for record in records for name in record.columns}
+        raise InputError(f"--output {output}: no record has this column{nearest(output, known)}")
     decays = [read_decay(path) for path in free]
     allowed = None if limits is None else read_file(limits, Limits, SCHEMA)
     found = judge(records, allowed, output, decays)

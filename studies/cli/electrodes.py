@@ -22,7 +22,7 @@ def electrodes(
     card: Card,
     *,
     harmonic: Annotated[Harmonic, COUNT] = 2,
-    split: float | None = None,
+    split: Annotated[float | None, POSITIVE] = None,
     axis: float | None = None,
     limit: Annotated[float, POSITIVE] = 100.0,
     temperature: Temperature = None,

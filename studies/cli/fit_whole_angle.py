@@ -1,14 +1,14 @@
 """`hrg fit whole-angle`: splits, axes, gain ratio and phase error from a whole-angle run."""
 
 from math import degrees, isnan, pi
-from typing import Literal, get_args
+from typing import Annotated, Literal, get_args
 
 import numpy as np
 
 from compensation.ringdown.answer import Estimate
 from compensation.wave_fit import WaveFit
 from compensation.wave_fit import fit_whole_angle as fit
-from studies.cli.arguments import Confidence, Run
+from studies.cli.arguments import FRACTION, Confidence, Run
 from studies.cli.output import answers, keep_card, say
 from studies.errors import InputError, naming
 from studies.instrument.card import Instrument, load_card
@@ -52,7 +52,7 @@ def fit_whole_angle(
     run: Run,
     *,
     card: str | None = None,
-    bryan_factor: float | None = None,
+    bryan_factor: Annotated[float | None, FRACTION] = None,
     quadrature_volts_per_hertz: float | None = None,
     angle_at: AngleAt | None = None,
     confidence: Confidence = 0.9,

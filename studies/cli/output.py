@@ -51,7 +51,10 @@ def answers(
             report = options.pop("report", None) if page else None
             if report is not None:
                 check_ending("--report", report, "a report is an HTML page", ".html", ".htm")
-            with guarded({"report": report, **own.bind(*arguments, **options).arguments}, endings) as read:
+            given = own.bind(*arguments, **options).arguments
+            with guarded({"report": report, **given}, endings) as read:
+                if given.get("save") is not None:
+                    check_ending("--save", given["save"], "a card or a model is a TOML file", ".toml")
                 with Stages(name):
                     result = command(*arguments, **options)
                 result = replace(result, payload=usual | result.payload)
