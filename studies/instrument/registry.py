@@ -103,6 +103,11 @@ def _read_given(name: str, raw: Any, place: CardPlace) -> ReadTable:
     given = raw or {}
     own = [known_keys(describe(entry.keys), given) for entry in entries]
     for key in given:
+        if not any(key in keys for keys in own) and any(key in known_keys(describe(entry.keys)) for entry in entries):
+            tag = structs(describe(entries[0].keys))[0].tag_field
+            raise InputError(
+                f"{place.where}: unknown key '{key}'; {tag} = '{given.get(tag or '')}' has none{nearest(key, [k for keys in own for k in keys])}"
+            )
         if not any(key in keys for keys in own) and (home := find_home(key)):
             raise InputError(f"{place.where}: unknown key '{key}'{home}")
         if not any(key in keys for keys in own) and len(entries) > 1:

@@ -135,6 +135,15 @@ def test_contract_faults_of_a_material_file_are_named_with_its_line(tmp_path, ca
     assert capsys.readouterr().err == f"hrg: {own} {said.format(own)}\n"
 
 
+@pytest.mark.parametrize(("key", "mend"), [("support", "known: bottom_thickness_mm"), ("cylinder_height_mm", "did you mean 'height_mm'")])  # fmt: skip
+def test_a_key_of_another_shape_is_not_sent_to_the_table_in_which_it_stands(tmp_path, key, mend):
+    card = tmp_path / "card.toml"
+    shape = f'shape = "cylinder"\nradius_mm = 12.5\nthickness_mm = 0.3\nheight_mm = 3.0\n{key} = "free"\n'
+    card.write_text(f'schema = "hrg.card/1"\nname = "x"\n[resonator]\n{shape}[material]\nname = "fused-silica"\n')
+    with pytest.raises(InputError, match=rf"unknown key '{key}'; shape = 'cylinder' has none; {mend}"):
+        load_card(card)
+
+
 @pytest.mark.parametrize("stem", ["", 'support = "stem"\n[resonator.stem]\nradius_mm = 2.5\nend_mm = 2.0\n'])
 def test_lengths_a_thousand_times_too_large_are_named(tmp_path, stem):
     card = tmp_path / "card.toml"
