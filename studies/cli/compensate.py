@@ -17,6 +17,7 @@ from studies.record import COMPENSATED, RESONATOR, Record, read_record
 from studies.reports import style
 from studies.results import Drawing, Figure, Part, Result, Sentence, Table
 
+RATE, APPLIED = "measured_rate_deg_per_s", "rate_deg_per_s"
 WANTED = 10  # averages of a record that is too short for as many of 100 s
 NOISE = 0.02  # relative: what the noise of a model's inputs may add to a record that has nothing to compensate
 WORSE = "{} is worse than the record: the standard deviation of {:.3g} s averages increases from {:.4g} to {:.4g}. Use it only if the model is of this gyro."
@@ -87,8 +88,8 @@ def _judge(record: Record, result: Record, name: str) -> dict[str, Any]:
     missing = np.isnan(after) if before is None else np.isnan(after) & ~np.isnan(before)
     return {
         "averaging_s": _width(record),
-        "stability_before": None if before is None else _stability(record, before),
-        "stability_after": _stability(record, after),
+        "stability_before": None if before is None else _stability(record, name, before),
+        "stability_after": _stability(record, name, after),
         "rows_not_compensated": int(np.count_nonzero(missing)),
     }
 
@@ -101,7 +102,7 @@ def _find_worse(record: Record, result: Record, columns: dict[str, dict[str, Any
         if was is None or now is None or now <= was * (1 + NOISE):
             continue
         output = name.removeprefix(COMPENSATED)
-        turned = _stability(record, 2 * record[output] - result[name])
+        turned = _stability(record, name, 2 * record[output] - result[name])
         if turned is not None and turned < OPPOSITE * was:
             raise InputError(SIGN.format(record.path, output, _width(record), was, now, turned))
         found.append(WORSE.format(name, _width(record), was, now))
@@ -111,7 +112,12 @@ def _find_worse(record: Record, result: Record, columns: dict[str, dict[str, Any
 def _show(record: Record, result: Record, columns: dict[str, dict[str, Any]], worse: list[str]) -> list[Part]:
     rows = [{"name": name, "unit": unit_of(name).removeprefix("1") or ""} | one for name, one in columns.items()]
     which = "Before, after" if any(one["stability_before"] is not None for one in rows) else "After"
-    note = f"{which}: standard deviation of {_width(record):.3g} s averages."
+    error = (
+        " of the difference from the applied rate, delays at its steps included"
+        if APPLIED in record and any(name.endswith(RATE) for name in columns)
+        else ""
+    )
+    note = f"{which}: standard deviation of {_width(record):.3g} s averages{error}."
     if any(one["rows_not_compensated"] for one in rows):
         note += " Empty rows: an input is missing, too few samples come before, or the output is within a dead band."
     for words in worse:
@@ -140,7 +146,10 @@ def _width(record: Record) -> float:
     return min(AVERAGING, float(np.ptp(record["time_s"])) / WANTED)
 
 
-def _stability(record: Record, values: Array) -> float | None:
+def _stability(record: Record, name: str, values: Array) -> float | None:
+    """Standard deviation of averages; of a measured rate the error, where the record has the applied one."""
+    if name.endswith(RATE) and APPLIED in record:
+        values = values - record[APPLIED]
     try:
         means = average_blocks(record["time_s"], {"output": values}, _width(record)).columns["output"]
     except CompensationError:

@@ -16,6 +16,8 @@ from studies.instrument.tables.electrodes import ElectrodeKeys
 from studies.resonator.splitting import SplitPair
 from studies.results import Part, Result, Sentence, Table, row_of
 
+DUST = 1e-4  # of the largest voltage: what is below does less than 1e-8 of the trim, rounding of the least squares
+
 
 @answers("hrg.electrodes/1")
 def electrodes(
@@ -100,9 +102,9 @@ def _parts(payload: dict[str, Any], split: float, resolved: bool, keys: Electrod
     voltages = [
         {"electrode": k, "azimuth": keys.azimuth_deg + step * k, "voltage": v}
         for k, v in enumerate(trim["voltages_V"])
-        if v > 0
+        if v > DUST * max(trim["voltages_V"])
     ]
     title = f"Trim voltages for a split of {1e3 * split:.4g} mHz, in addition to the card's own voltages"
     note = f"They lower the frequency of the pair by {abs(trim['shift_ppm']):.3g} ppm. Squares of voltages add; in a card these are trim_V."
-    columns = "electrode | azimuth: azimuth (°) .2f | voltage: voltage (V) .3f"
+    columns = "electrode | azimuth: azimuth (°) .2f | voltage: voltage (V) .4"
     return [head, Table(title, voltages, columns, note)]

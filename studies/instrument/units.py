@@ -3,9 +3,9 @@
 import re
 from functools import lru_cache
 
-SYMBOLS = {"um": "µm", "deg": "°", "degC": "°C", "day": "d", "rt": "√"}
+SYMBOLS = {"um": "µm", "deg": "°", "degC": "°C", "day": "d", "rt": "√", "ohm": "Ω", "percent": "%"}
 UNIT = re.compile(
-    r"(10)?(per|rt|degC|deg|mrad|ppm|day|counts|[GMkmun]?(?:Pa|Hz|W|J|V|eV|N|g|K|s)|[cmunp]?m|pF|h|1)([2-9])?"
+    r"(10)?(per|rt|degC|deg|mrad|ppm|day|counts|[GMkmun]?(?:Pa|Hz|W|J|V|eV|N|g|K|s)|[cmunp]?m|pF|ohm|percent|h|1)([2-9])?"
 )
 RATES = {
     # words of a key: one unit, so that what follows belongs to it as a whole
@@ -39,7 +39,7 @@ def split_unit(key: str) -> tuple[str, str]:
     unit = " ".join(words[first:])
     for spelled, symbol in RATES.items():
         unit = re.sub(rf"\b{spelled}\b", symbol, unit)
-    over, *under = (_spell(part) for part in unit.split("per"))
+    over, *under = (_spell(part) for part in re.split(r"per(?!cent)", unit))
     under = [f"({part})" if " " in part and not part.startswith("(") else part for part in under]
     return "_".join(words[:first]), "/".join([over or "1", *under])
 

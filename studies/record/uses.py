@@ -18,6 +18,10 @@ from studies.record import Record
 from studies.record.rest import TEMPERATURES, choose_column, gather_rest
 from studies.record.settled import advise_hold, find_soaks, settled_table
 
+GIVEN = {
+    "frequency_Hz": "--frequency HZ",
+    "inverse_q": "--quality Q",
+}  # that `fit cross-damping` takes where no record has it
 OUTPUT = "bias_deg_per_h"  # that an acceptance test judges unless another is named
 LEAST_SPAN = 1.0  # K, of a temperature that changes
 STEP_SPAN = 10.0  # K, of a step or ramp that shows a time constant
@@ -41,9 +45,10 @@ class Use:
 def find_uses(records: Sequence[Record]) -> tuple[Use, ...]:
     """Return what can be done with these records of one gyro, and what the others lack."""
     runs = " ".join(shlex.quote(record.path or "RUN.csv") for record in records)
+    given = "".join(f" {words}" for name, words in GIVEN.items() if not any(name in record for record in records))
     missing = {check: _missing(check, records) for check in dict.fromkeys(check for *_, check in USES)}
     return tuple(
-        Use(command, gives, f"hrg {command} " + words.replace("{runs}", runs), missing[check])
+        Use(command, gives, f"hrg {command} " + words.replace("{runs}", runs).replace("{given}", given), missing[check])
         for command, gives, words, check in USES
     )
 
@@ -75,7 +80,6 @@ def _thermal(records: Sequence[Record]) -> None:
 
 def _cross_damping(records: Sequence[Record]) -> None:
     gather_rest(records, dict.fromkeys(OUTPUTS, 1.0))
-    _require(records, "the cross-damping", ("frequency_Hz",), ("inverse_q",))
     _check_span(records, LEAST_SPAN, "a cross-damping over temperature")
 
 
@@ -115,7 +119,12 @@ USES: tuple[tuple[str, str, str, Callable[[Sequence[Record]], object]], ...] = (
     ("fit frequency", "f(T) and its inverse", "{runs} --save frequency.toml", _frequency),
     ("fit bias", "bias over frequency or temperature and their rates", "{runs} --save bias.toml", _bias),
     ("fit thermal", "thermal time constants", "{runs}", _thermal),
-    ("fit cross-damping", "cross-damping bias over temperature", "{runs} --save cross-damping.toml", _cross_damping),
+    (
+        "fit cross-damping",
+        "cross-damping bias over temperature",
+        "{runs}{given} --save cross-damping.toml",
+        _cross_damping,
+    ),
     ("fit scale", "bias and scale factor over rate and temperature", "{runs} --save scale.toml", _scale),
     ("fit whole-angle", "splits, axes and gains", "{runs} --card CARD.toml", _whole_angle),
     ("calibrate", "values of a card", "CARD.toml {runs} --save CALIBRATED.toml", make_ready),

@@ -202,6 +202,8 @@ def test_priors_are_drawn_as_they_are_stated():
         ("imperfection.wall.cosine_1_um", "µm"),
         ("effect.0.drift_1", "1"),
         ("effect.0.loop_1_per_K", "1/K"),
+        ("electrodes.resistance_ohm", "Ω"),
+        ("electrodes.gap_wave.0.amplitude_percent", "%"),
     ],
 )
 def test_a_key_carries_its_unit(key, unit):

@@ -114,6 +114,24 @@ def test_a_short_record_is_judged_by_averages_of_a_tenth_of_it(model, tmp_path, 
     assert column["stability_after"] < 1e-6 * column["stability_before"]
 
 
+def test_a_measured_rate_is_judged_by_its_error(tmp_path, ask):
+    """Steps of 100 °/s are no error: before, 0.1 °/s times the sine of the planted bias, after none of it."""
+    time = np.arange(2000.0)
+    shift, applied = 2 * np.sin(2 * np.pi * time / 2000), 100.0 * (time // 500 % 2)
+    rate = applied + 0.05 * shift
+    columns = {"time_s": time, "frequency_Hz": 4e3 + shift, "rate_deg_per_s": applied, "measured_rate_deg_per_s": rate}
+    settings = {"variable": "frequency_Hz", "reference_frequency_Hz": 4e3, "rate_window_s": 20.0, "rate_lag_s": 0.0}
+    part = make_part("bias", ("constant", "f"), (0.0, 0.05), ("deg/s", "deg/s/Hz"))
+    ranges = {"frequency_Hz": (3990.0, 4010.0), "frequency_rate_Hz_per_s": (-1.0, 1.0)}
+    model = Model(kind="bias", compensates="measured_rate_deg_per_s", settings=settings, parts=(part,), validity=ranges)
+    write_model(model, tmp_path / "m.toml")
+    write_record(Record(columns), tmp_path / "run.csv")
+    words = ["compensate", str(tmp_path / "m.toml"), str(tmp_path / "run.csv"), "--out", str(tmp_path / "out.csv")]
+    found = ask(words)["columns"]["compensated_measured_rate_deg_per_s"]
+    assert found["stability_before"] == pytest.approx(0.1 / np.sqrt(2), rel=0.01)
+    assert found["stability_after"] < 1e-3 * found["stability_before"]
+
+
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [

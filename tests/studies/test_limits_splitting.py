@@ -70,6 +70,19 @@ azimuth_deg = 5.0
 """
 
 
+def test_voltages_that_are_rounding_alone_are_not_listed(tmp_path, capsys):
+    """A split by 60 V on one of 16 electrodes is nulled by 30 V on the four at 45° to it; the others have less than a millivolt."""
+    path = tmp_path / "card.toml"
+    ring = 'shape = "cylinder"\nradius_mm = 12.5\nthickness_mm = 0.3\nheight_mm = 1.0\n'
+    gap = "gap_um = 100.0\nfirst = 0.0\nvoltage_V = 50.0\nazimuth_deg = 3.0\ntrim_V = [0.0, 60.0]\n"
+    path.write_text(
+        f'schema = "hrg.card/1"\nname = "x"\n[resonator]\n{ring}[material]\nname = "fused-silica"\n[electrodes]\n{gap}'
+    )
+    assert main(["electrodes", str(path)]) == 0
+    rows = re.findall(r"│ +(\d+) │ +([\d.]+) │ +([\d.]+) │", capsys.readouterr().out)
+    assert rows == [("3", "70.50", "30"), ("7", "160.50", "30"), ("11", "250.50", "30"), ("15", "340.50", "30")]
+
+
 def loaded(tmp_path, *tables):
     path = tmp_path / "card.toml"
     path.write_text(CARD + "".join(tables), encoding="utf-8")

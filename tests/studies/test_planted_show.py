@@ -127,7 +127,10 @@ def test_contract_what_is_named_possible_runs_and_what_is_missing_is_said(tmp_pa
     shutil.copy(INPUTS / "cross.csv", tmp_path)
     assert main(["show", "cross.csv", "--json"]) == 0
     uses = {use["command"]: use for use in json.loads(capsys.readouterr().out)["uses"]}
-    assert uses["fit cross-damping"]["ready"] or uses["fit cross-damping"]["missing"]
+    cross = uses["fit cross-damping"]  # the record has no frequency_Hz and no inverse_q
+    assert "cross.csv --frequency HZ --quality Q --save" in cross["line"]
+    assert main(shlex.split(cross["line"].replace("HZ", "5000").replace(" Q ", " 2e4 "))[1:]) == 0
+    assert cross["ready"]
     assert "pattern_angle_deg" in uses["fit whole-angle"]["missing"]
     assert "rate_deg_per_s" in uses["fit scale"]["missing"]
     assert uses["fit bias"]["ready"]
