@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from compensation.arrays import Complex
 from compensation.constants import NINETY
 from compensation.errors import CompensationError
 from compensation.ringdown.answer import Curve, Estimate, RingDown
@@ -15,6 +16,7 @@ from compensation.ringdown.whiteness import Leftover
 from compensation.ringdown.window import find_end, find_free, find_jump
 
 RESOLVED = 3.0  # standard deviations above zero from which a split has an axis
+CIRCULAR = -0.5  # product of the senses of two waves (1 and −1 of circles) below which they are a pattern that turns
 LENGTHS = ("split_Hz", "damping_split_per_s")
 DRAWS = 2000
 ALIKE = 1e-6  # relative: two pick-offs differ by more, files of nine digits round to less
@@ -54,8 +56,9 @@ def analyse_decay(envelope: Envelope, *, harmonic: int = 2) -> RingDown:
     _check_decays(fit)
     fit = replace(fit, covariance=fit.covariance * left.widening**2, widening=left.widening)
     estimates = _estimate(fit, harmonic)
-    lines = _sources(fit)
-    remarks = (*_remark(given, fit, left, jump, lines), *_undetermined(fit, estimates))
+    turning = _turning(fit, harmonic)
+    lines = () if turning else _sources(fit)
+    remarks = (*turning, *_remark(given, fit, left, jump, lines), *_undetermined(fit, estimates))
     time = fit.envelope.time
     curves = tuple(
         Curve(time, 20 * np.log10(np.abs(z)), 20 * np.log10(np.abs(z - r)), np.real(r))
@@ -65,11 +68,31 @@ def analyse_decay(envelope: Envelope, *, harmonic: int = 2) -> RingDown:
     return RingDown(estimates, remarks, tuple(fit.noise.tolist()), fit.widening, curves, window, lines)
 
 
+def _turning(fit: DecayFit, harmonic: int) -> tuple[str, ...]:
+    """Say that the pattern turns where the wave and what is taken for a line are circular, in opposite senses."""
+
+    def sense(z: Complex) -> float:
+        return float(2 * np.imag(np.conj(z[0]) * z[1]) / np.sum(np.abs(z) ** 2)) if z.size == 2 else 0.0
+
+    sizes = np.array(fit.found.sizes)
+    if not fit.one_mode or not sizes.size:
+        return ()
+    largest = int(np.argmax(np.sum(np.abs(sizes) ** 2, axis=1)))
+    if sense(fit.start) * sense(sizes[largest]) > CIRCULAR:
+        return ()
+    apart = abs(fit.found.tones[largest] - fit.decay.detuning)
+    turn = np.degrees(apart / 2 / harmonic)
+    return (
+        f"Two circular waves in opposite senses are {apart / (2 * np.pi):.3g} Hz apart: the pattern turns by {turn:.3g} °/s, as a rotation of the gyro"
+        f" by that over its Bryan factor makes it. Record it at rest, or the table's rate is in every value.",
+    )
+
+
 def _sources(fit: DecayFit) -> tuple[float, ...]:
     """Return the frequencies (Hz) of the interference; two lines may be one source and its image."""
     found: list[float] = []
     for one in (fit.envelope.source_of(tone / (2 * np.pi)) for tone in fit.found.tones):
-        if all(abs(one - other) > 2 * fit.envelope.bin for other in found):
+        if all(abs(one - other) > 2 / float(np.ptp(fit.envelope.time)) for other in found):
             found.append(one)
     return tuple(found)
 

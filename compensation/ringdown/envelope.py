@@ -8,6 +8,7 @@ neither they nor a part of a period lets the level or the image z* e^{−4πi f_
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
 
 from compensation.arrays import Array, Complex
@@ -16,7 +17,7 @@ from compensation.errors import CompensationError
 LEAST = 16  # amplitudes of a decay
 MOST_BLOCKS = 4096
 CHUNK = 1 << 18
-PASSES = 3  # each takes the image out with the amplitudes of the one before, straight between the blocks
+PASSES = 3  # each takes the image out as the amplitudes of the one before change within the blocks
 WRITTEN = 0.75  # of the last digit by which the times of an even grid may be off: half of it, and the error of the line of all times
 FEWEST, APART = 12, 20  # samples of a block; steps from which a distance between samples is a gap
 ALONE = 0.7  # part of a block's samples above which what is left of the image e^{−2iωt} cannot be told from the wave
@@ -89,7 +90,10 @@ def _spectrum(x: Array, rows: NDArray[np.int64], first: int, length: int) -> Arr
 
 
 def mix_down(time: ArrayLike, channels: ArrayLike, carrier: float | None = None) -> Envelope:
-    """Return the complex amplitudes of raw samples (channels, N); the carrier (Hz) is the largest line unless given."""
+    """Return the complex amplitudes of raw samples (channels, N); the carrier (Hz) is the largest line unless given.
+
+    One above half of the sampling rate is found in its alias.
+    """
     t = np.asarray(time, dtype=np.float64)
     x = np.atleast_2d(np.asarray(channels, dtype=np.float64))
     if t.size < 64:
@@ -101,11 +105,10 @@ def mix_down(time: ArrayLike, channels: ArrayLike, carrier: float | None = None)
     rate, span, known = 1 / step, int(rows[-1]) + 1, np.all(np.isfinite(x), axis=0)
     if carrier is None:
         carrier = find_carrier(x[int(np.argmax(np.nanvar(x, axis=1))), known], rows[known], rate)
-    if not 0 < carrier < rate / 2:
-        raise CompensationError(f"the frequency {carrier:.6g} Hz is not below half the sampling rate {rate:.6g} Hz.")
     if not np.nanvar(x, axis=1).any():
         raise CompensationError("the samples are all 0 or alike: nothing was recorded; check the pick-off.")
-    period = rate / carrier  # in rows of the grid
+    seen = alias_of(carrier, rate)  # Hz, where these rows hold it
+    period = rate / max(seen, rate / t.size)  # in rows of the grid
     clipped, after = _clipped(x)
     overload = float(t[max(after, 1) - 1])
     fine = known & ~_stuck(x, period)
@@ -120,7 +123,7 @@ def mix_down(time: ArrayLike, channels: ArrayLike, carrier: float | None = None)
     least = max(sparse * t.size / MOST_BLOCKS, 8 * period, FEWEST * sparse)
     sizes = np.arange(int(np.ceil(least)), int(np.ceil(1.3 * least + 2 * period)) + 1)
     size = int(sizes[int(np.argmin(np.abs(np.sin(2 * np.pi * sizes / period)) / sizes))])
-    if 2 * min(carrier, rate / 2 - carrier) * size < 0.5 * rate:
+    if seen * t.size < rate or (rate - 2 * seen) * size < 0.5 * rate:
         raise CompensationError(
             f"the line at {carrier:.6g} Hz and its image in samples at {rate:.6g} Hz fall together; sample at another rate."
         )
@@ -144,21 +147,18 @@ def mix_down(time: ArrayLike, channels: ArrayLike, carrier: float | None = None)
     own, image = weight - np.abs(p) * np.abs(of_level), q - p * of_level
     keep = (weight >= 0.5 * size / sparse) & (np.abs(image) < ALONE * own)
     keep[-1] &= span % size == 0  # a part of a block is no row like the others
-    if np.count_nonzero(keep) < 2:
-        raise CompensationError("fewer than two blocks of eight periods have half of their samples; record longer.")
-    knots = np.concatenate([middle[keep][:1] - size * step, middle[keep], middle[keep][-1:] + size * step])
+    if np.count_nonzero(keep) < 4:
+        raise CompensationError("fewer than four blocks of eight periods have half of their samples; record longer.")
     values = np.zeros((x.shape[0], count), dtype=complex)
-    for _ in range(PASSES):
-        z = values[:, keep]
-        around = np.concatenate([2 * z[:, :1] - z[:, 1:2], z, 2 * z[:, -1:] - z[:, -2:-1]], axis=1)
-        for c, own_values in enumerate(values.copy()):
-            total = np.zeros(count, complex)
-            for part in parts:
-                e = turn(part)
-                slope = np.interp(t[part], knots, around[c]) - own_values[block[part]]
-                flat = x[c, part] - (slope * e.conj()).real
-                total += add(2 * x[c, part] * e - slope.conj() * e**2 - 2 * of_level[block[part]] * flat, part)
-            values[c] = (own * total - image * total.conj()) / np.where(keep, own**2 - np.abs(image) ** 2, 1.0)
+    for c, _ in np.ndindex(x.shape[0], PASSES):
+        course = scipy.interpolate.CubicSpline(middle[keep], values[c, keep])
+        total = np.zeros(count, complex)
+        for part in parts:
+            e = turn(part)
+            slope = course(t[part]) - values[c, block[part]]
+            flat = x[c, part] - (slope * e.conj()).real
+            total += add(2 * x[c, part] * e - slope.conj() * e**2 - 2 * of_level[block[part]] * flat, part)
+        values[c] = (own * total - image * total.conj()) / np.where(keep, own**2 - np.abs(image) ** 2, 1.0)
     lost = 1 - float(np.sum(weight)) * (sparse if away > GRID * step else 1.0) / span
     length = min(span, CHUNK)
     power = np.sum([_spectrum(one, rows, span - length, length) for one in x], axis=0)
@@ -166,6 +166,11 @@ def mix_down(time: ArrayLike, channels: ArrayLike, carrier: float | None = None)
         middle[keep], values[:, keep], carrier, size * step, clipped, overload, max(lost, 0.0),
         (size * step) ** 2 / 12, rate / length, power,
     )  # fmt: skip
+
+
+def alias_of(frequency: float, rate: float) -> float:
+    """Return the frequency (Hz) below half of the sampling rate at which samples hold one."""
+    return abs((frequency + rate / 2) % rate - rate / 2)
 
 
 def even_rows(time: Array) -> "tuple[float, NDArray[np.int64]]":
@@ -208,11 +213,19 @@ def from_lock_in(time: ArrayLike, amplitudes: ArrayLike, carrier: float = 0.0) -
     """Return the complex amplitudes of a lock-in's rows, averaged to a few thousand blocks where there are more."""
     t = np.asarray(time, dtype=np.float64)
     z = np.atleast_2d(np.asarray(amplitudes, dtype=np.complex128))
-    keep = np.isfinite(t) & np.all(np.isfinite(z), axis=0) & ~_stuck(z, 1.0)
+    held = _stuck(z, 1.0)
+    keep = np.isfinite(t) & np.all(np.isfinite(z), axis=0) & ~held
     lost = 1 - float(np.mean(keep))
     t, z = t[keep], z[:, keep]
     if t.size < LEAST:
-        raise CompensationError(f"a decay needs {LEAST} rows or more with a value in every channel, not {t.size}.")
+        raise CompensationError(
+            f"a decay needs {LEAST} rows or more with a value in every channel, not {t.size}"
+            + (
+                f"; {np.count_nonzero(held)} rows repeat the one before or are 0: nothing was measured."
+                if held.any()
+                else "."
+            )
+        )
     step = float(np.median(np.diff(t)))
     between = np.diff(t) / step
     if np.median(np.abs(between - 1)) < 0.01:  # an even clock: rows may be absent

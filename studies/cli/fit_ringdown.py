@@ -134,13 +134,16 @@ def _row(decay: Decay) -> dict[str, Any]:
 
 
 def _draw(decay: Decay) -> Drawing:
-    x, y = "frequency (Hz)" if decay.window is None else "time (s)", ("level (dB)", "residual")
+    unit = "dB" if decay.window is None or "decay_per_s" in decay.estimates else "V"
+    x, y = "frequency (Hz)" if decay.window is None else "time (s)", ("level (dB)", f"residual ({unit})")
     with style.figure(2, 1, height=4.6, sharex=True, x=x, y=y) as (drawn, (top, bottom)):
-        for one in decay.curves:
+        for one, color, name in zip(decay.curves, (style.BLUE, style.VERMILION), ("cos", "sin"), strict=False):
             rows = style.few_rows(one.x.size)
-            top.plot(one.x[rows], one.level[rows], ".", markersize=1.5)
+            top.plot(one.x[rows], one.level[rows], ".", markersize=1.5, color=color)
             top.plot(one.x[rows], one.fitted[rows], color=style.ORANGE, linewidth=1)
-            bottom.plot(one.x[rows], one.residual[rows], ".", markersize=1.5)
+            bottom.plot(one.x[rows], one.residual[rows], ".", markersize=1.5, color=color, label=f"pick-off {name}")
+        if len(decay.curves) > 1:
+            bottom.legend(markerscale=6, loc="upper right")
     return drawn
 
 

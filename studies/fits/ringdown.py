@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from compensation.arrays import Array
 from compensation.ringdown.analysis import analyse_decay
 from compensation.ringdown.answer import Estimate, RingDown
-from compensation.ringdown.envelope import even_rows, from_lock_in, mix_down
+from compensation.ringdown.envelope import alias_of, even_rows, from_lock_in, mix_down
 from compensation.ringdown.spectrum import fit_spectrum
 from compensation.ringdown.trace import analyse_trace
 from studies.errors import InputError, naming
@@ -80,19 +80,26 @@ def read_decay(
     time = columns["time_s"]
     table.check_order("time_s", "time_s does not increase; a decay is one record in order of time.")
     reference = notes.get("reference_frequency_Hz")
+    aliased: tuple[str, ...] = ()
     with naming(path):
         if power is not None:
             return _told(path, notes, analyse_trace(time, np.sqrt(power), reference))
         raw = [columns[name] for name in RAW if name in columns]
         if raw:
-            envelope = mix_down(time, np.array(raw), reference)
+            envelope, rate = mix_down(time, np.array(raw), reference), 1 / even_rows(time)[0]
             if expected is not None:
-                _refuse_alias(path, envelope.carrier, 1 / even_rows(time)[0], expected)
+                _refuse_alias(path, envelope.carrier, rate, expected)
+            if reference is not None and reference > rate / 2:
+                aliased = (
+                    f"Samples at {rate:.6g} Hz hold {reference:.6g} Hz as its alias at {alias_of(reference, rate):.6g} Hz: which it is of the"
+                    " frequencies that fold there is as given, not measured.",
+                )
         else:
             envelope = from_lock_in(time, np.array(_pairs(path, columns)), reference or 0.0)
         if expected is not None and envelope.carrier:
             _refuse_other(path, envelope.carrier, expected)
-        return _told(path, notes, analyse_decay(envelope, harmonic=harmonic))
+        found = analyse_decay(envelope, harmonic=harmonic)
+        return _told(path, notes, replace(found, remarks=(*aliased, *found.remarks)))
 
 
 def _told(path: str | Path, notes: Mapping[str, float], found: RingDown) -> Decay:
@@ -190,11 +197,10 @@ def _pairs(path: str | Path, columns: Mapping[str, Array]) -> list[NDArray[np.co
 
 def _refuse_alias(path: str | Path, found: float, rate: float, expected: float) -> None:
     """Refuse samples in which the expected frequency appears folded about half of the sampling rate."""
-    folded = abs((expected + rate / 2) % rate - rate / 2)
-    if expected > rate / 2 and abs(found - folded) < 0.02 * rate:
+    if expected > rate / 2 and abs(found - alias_of(expected, rate)) < 0.02 * rate:
         raise InputError(
             f"{path}: the card's {expected:.6g} Hz cannot be in samples at {rate:.6g} Hz; the line at {found:.6g} Hz is its alias. "
-            f"Sample above {2 * expected:.4g} Hz, or give --frequency {expected:.6g} to a lock-in's record."
+            f"Sample above {2 * expected:.4g} Hz, or give --frequency {expected:.6g}."
         )
 
 

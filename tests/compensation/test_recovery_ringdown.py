@@ -211,8 +211,10 @@ def test_refused():
     driven = noisy(np.ones((2, TIME.size), dtype=complex) * np.array([[1.0], [0.5j]]), 0.02, random)
     with pytest.raises(CompensationError, match="nothing decays"):
         analyse_decay(from_lock_in(TIME, driven, CARRIER))
-    with pytest.raises(CompensationError, match="half the sampling rate"):
-        mix_down(np.arange(1000) / 1000, np.ones((1, 1000)), 7000.0)
+    with pytest.raises(CompensationError, match="fall together"):
+        mix_down(np.arange(1000) / 1000, random.standard_normal((1, 1000)), 7000.0)
+    with pytest.raises(CompensationError, match="299 rows repeat the one before or are 0"):
+        from_lock_in(np.arange(300.0), np.ones((2, 300)), CARRIER)
     t, quiet = np.arange(500) / 500, 3e-6 * np.random.default_rng(0).standard_normal(500)
     with pytest.raises(CompensationError, match="nothing decays"):  # what one decay foretells of it overflows
         analyse_trace(t, np.abs(np.exp(-28 * t) + quiet), None)
@@ -418,3 +420,31 @@ def test_interference_is_named_at_its_own_frequency(line):
     found = analyse_decay(mix_down(CLIPPED_TIME, x))
     assert found.interference == pytest.approx([line], abs=0.02)
     assert any(one.startswith("Interference at") for one in found.remarks)
+
+
+@pytest.mark.parametrize("rate", [25.0, -12.0])
+def test_a_pattern_that_turns_is_no_interference(rate):
+    """A table turns (°/s of pattern azimuth) a shell without split: its two circular waves were a decay and a line to be found."""
+    turn = 2 * np.radians(rate) * TIME
+    still = np.exp(-TIME / 130.0) * np.array([[1.0], [0.2j]])
+    z = np.array([np.cos(turn) * still[0] - np.sin(turn) * still[1], np.sin(turn) * still[0] + np.cos(turn) * still[1]])
+    found = analyse_decay(from_lock_in(TIME, noisy(z, 1e-3, np.random.default_rng(1)), CARRIER))
+    assert found.remarks[0].endswith("is in every value.")
+    assert f"the pattern turns by {abs(rate):.0f} °/s" in found.remarks[0]
+    assert not found.interference
+
+
+def test_an_alias_whose_frequency_is_given_gives_the_resonator():
+    """1013 Hz samples of 3000 Hz hold it at 39 Hz, where blocks of eight periods are a part of the beat; above half of the sampling rate it was refused."""
+    scores, held = [], []
+    for seed in range(8):
+        random = np.random.default_rng(seed)
+        gyro = Gyro(3000.4, 2999.6, 4.9e4, 5.1e4, random.uniform(0, 1.5), random.uniform(0, 1.5))
+        time = np.arange(16_000) / 1013
+        x = gyro.samples(time, random.uniform(0.3, 1, 2) * np.exp(2j * np.pi * random.uniform(size=2)))
+        found = analyse_decay(mix_down(time, x + 4e-3 * random.standard_normal(x.shape), 3000.0))
+        z, inside = misses(found, truth_of(gyro))
+        scores += z.values()
+        held += inside.values()
+    assert np.sqrt(np.mean(np.square(scores))) < 1.35
+    assert np.mean(held) >= 0.78

@@ -115,6 +115,9 @@ def test_raw_samples_and_their_alias(tmp_path, ask, refuse):
     said = refuse(["fit", "ringdown", slow, "--card", "free-dome"])
     assert "alias" in said
     assert "slow.csv" in said
+    (decay,) = ask(["fit", "ringdown", slow, "--card", "free-dome", "--frequency", "4600"])["decays"]
+    assert decay["frequency_Hz"] == pytest.approx(4599, abs=1.1)
+    assert "hold 4600 Hz as its alias at 600 Hz" in decay["remarks"][0]
 
 
 @pytest.mark.parametrize("name", ["power_dBm", "power_W"])
