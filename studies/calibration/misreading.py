@@ -13,7 +13,7 @@ from studies.calibration.priors import gather_priors
 from studies.calibration.problem import FARTHEST
 from studies.calibration.settled import READ_AS
 from studies.errors import InputError
-from studies.resonator.law import law_of
+from studies.resonator.law import law_of, moved_law
 from studies.simulation.drive import COLUMN, drive_by_record
 from studies.simulation.heat_path import slowest_lag
 from studies.simulation.noise import bias_noise
@@ -73,7 +73,7 @@ def _check_temperatures(instrument: "Instrument", record: "Record", as_read: "Le
         columns = {name: read(record[name] + zero_Celsius) - zero_Celsius for name in names}
         other = _left(instrument, record.with_columns(columns), whole)[FREQUENCY][0]
         agrees = other < min((AGAINST if left > changes else FOLLOWED) * changes, left / 3)
-        if agrees and not _could_be(instrument, record, changes):
+        if agrees and not _could_be(instrument, record, changes, whole):
             right = columns[COLUMN["housing"] if COLUMN["housing"] in names else names[0]]
             wrong = [one for one in names if _apart(columns[one], right) <= _apart(record[one], right)]
             raise InputError(
@@ -82,7 +82,7 @@ def _check_temperatures(instrument: "Instrument", record: "Record", as_read: "Le
             )
 
 
-def _could_be(instrument: "Instrument", record: "Record", changes: float) -> bool:
+def _could_be(instrument: "Instrument", record: "Record", changes: float, law: "FrequencyLaw") -> bool:
     """Whether the frequency follows the temperatures as read with values of the card where their priors have them, and another start."""
     priors, places = gather_priors(instrument), _places(record)
     drive = drive_by_record(record, time=record["time_s"][places])
@@ -91,7 +91,7 @@ def _could_be(instrument: "Instrument", record: "Record", changes: float) -> boo
     for _ in range(STEPS):
         own = instrument.with_values(priors.at(u))
         try:
-            found = predict(own, drive, priors.names, law_of(own), FARTHEST)
+            found = predict(own, drive, priors.names, moved_law(law, own), FARTHEST)
         except (ShellError, ThermalError):
             return False
         slopes = np.column_stack([found.derivatives[name][FREQUENCY] for name in priors.names]) @ priors.slopes(u)
