@@ -38,7 +38,7 @@ FOLLOWED, REFUSED = 0.3, 0.4
 AGAINST = 0.5
 """The same of a reading that agrees, where the other one leaves more than there was: a sign is told by less."""
 LIKELY, STARTED, STEPS = 3.0, 2.0, 4
-"""Standard deviations up to which a value of the card is likely; changes by which a frequency may start elsewhere; steps to the likeliest values."""
+"""Standard deviations up to which a departure is likely; changes by which a frequency may start elsewhere; steps to the likeliest values."""
 CLEAR = 20.0
 """Times its own noise by which a frequency must change before it says how a temperature is to be read."""
 SECONDS = 3600.0
@@ -71,9 +71,11 @@ def _check_temperatures(instrument: "Instrument", record: "Record", as_read: "Le
     whole = law_of(instrument)
     for words, read in READ_AS.items():
         columns = {name: read(record[name] + zero_Celsius) - zero_Celsius for name in names}
-        other = _left(instrument, record.with_columns(columns), whole)[FREQUENCY][0]
+        read_so = record.with_columns(columns)
+        other = _left(instrument, read_so, whole)[FREQUENCY][0]
         agrees = other < min((AGAINST if left > changes else FOLLOWED) * changes, left / 3)
-        if agrees and not _could_be(instrument, record, changes, whole):
+        needed = _needed(instrument, read_so, changes, whole) if agrees else np.inf
+        if needed < LIKELY**2 < _needed(instrument, record, changes, whole) - needed:
             right = columns[COLUMN["housing"] if COLUMN["housing"] in names else names[0]]
             wrong = [one for one in names if _apart(columns[one], right) <= _apart(record[one], right)]
             raise InputError(
@@ -82,8 +84,8 @@ def _check_temperatures(instrument: "Instrument", record: "Record", as_read: "Le
             )
 
 
-def _could_be(instrument: "Instrument", record: "Record", changes: float, law: "FrequencyLaw") -> bool:
-    """Whether the frequency follows the temperatures as read with values of the card where their priors have them, and another start."""
+def _needed(instrument: "Instrument", record: "Record", changes: float, law: "FrequencyLaw") -> float:
+    """Sum of squares of the prior standard deviations by which values and the start must depart for the frequency to follow the temperatures; infinite where they cannot."""
     priors, places = gather_priors(instrument), _places(record)
     drive = drive_by_record(record, time=record["time_s"][places])
     known = np.isfinite(record[FREQUENCY][places])
@@ -93,7 +95,7 @@ def _could_be(instrument: "Instrument", record: "Record", changes: float, law: "
         try:
             found = predict(own, drive, priors.names, moved_law(law, own), FARTHEST)
         except (ShellError, ThermalError):
-            return False
+            return np.inf
         slopes = np.column_stack([found.derivatives[name][FREQUENCY] for name in priors.names]) @ priors.slopes(u)
         fades = (drive.time[0] - drive.time) / slowest_lag(found.network, instrument.reference_temperature)
         starts = STARTED * changes * np.exp(np.outer(fades, [1.0, 2.0, 4.0]))
@@ -103,8 +105,8 @@ def _could_be(instrument: "Instrument", record: "Record", changes: float, law: "
         z = np.linalg.lstsq(
             np.vstack([J * len(J) ** 0.5, np.eye(J.shape[1])]), np.append(rest * len(J) ** 0.5, np.zeros(J.shape[1]))
         )[0]
-        u = priors.inside(z[: len(u)])
-    return bool(np.abs(z).max() < LIKELY and np.std(rest - J @ z) < 1.0)
+        u = priors.inside(np.clip(z[: len(u)], -LIKELY, LIKELY))
+    return float(z @ z) if np.std(rest - J @ z) < 1.0 else np.inf
 
 
 def _apart(one: Array, two: Array) -> float:

@@ -193,12 +193,22 @@ class Background:
             log_prior(self.linear.rows[name], level, self.linear.stated(name)) for name, level in self.noise.items()
         )
 
+    @cached_property
+    def spared(self) -> dict[str, NoiseRows]:
+        """Rows with what stands out of this model for outliers, whatever was taken for them before."""
+        whole = self.linear.problem.rows
+        return {n: spare_outliers(whole[n], self.residual(n), level)[0] for n, level in self.noise.items()}
+
     @property
     def fair(self) -> float:
-        """Evidence with what stands out of this model for outliers, whatever was taken for them before: as any other model may be judged."""
-        whole = self.linear.problem.rows
-        rows = {n: spare_outliers(whole[n], self.residual(n), level)[0] for n, level in self.noise.items()}
-        return replace(self, linear=replace(self.linear, rows=rows)).evidence
+        """Evidence in those rows: as any other model may be judged."""
+        return replace(self, linear=replace(self.linear, rows=self.spared)).evidence
+
+    @property
+    def hides_outliers(self) -> bool:
+        """Whether rows stand out of this model that are not spared, and may have made one of its effects."""
+        pairs = ((own.stretch, self.linear.rows[n].stretch) for n, own in self.spared.items())
+        return any(bool(np.any((a > 1) & (b == 1))) for new, old in pairs for a, b in zip(new, old, strict=True))
 
     def gains(self, columns: Mapping[str, NDArray[np.floating]], units: Array, effect: Effect) -> Array:
         """Return what effects of columns (M, H, k) and units (H, k) add to the evidence at SCALES, (S, H); −∞ against the first column."""

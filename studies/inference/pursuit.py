@@ -1,7 +1,7 @@
 """A search that follows what it finds: the model is linearised anew where values are most probable beside the effects, and searched again."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -74,10 +74,14 @@ class Pursuit:
     def _straightened(self, plain: Hypothesis, final: Hypothesis) -> tuple[Hypothesis, Hypothesis]:
         best, waited = -np.inf, 0
         for left in range(AGAIN, 0, -1):
-            if self._holds(final) or not (final.terms or left == AGAIN) or self._beaten(final):
+            here = Background(self.search.linear, final.terms, final.noise)
+            hidden = bool(final.terms) and here.hides_outliers
+            if (self._holds(final) and not hidden) or not (final.terms or left == AGAIN) or self._beaten(final):
                 break
             self.progress("linearising the model again with the effects found")
             before = self.point
+            if hidden:
+                self.start = replace(self.start, rows=here.spared)
             self.search, self.point, terms = self._linearise(final.terms, final.noise)
             if left > SETTLING:
                 plain, final = self.search.grow(terms, self._near if left > SETTLING + 1 else lambda _: True)
