@@ -132,6 +132,15 @@ class NoiseRows:
         roots = ((cholesky(self.covariance(runs[0], noise)), runs) for _, _, runs in self._groups)
         return Whitener(self.slices, tuple((scipy.linalg.lapack.dtrtri(L, lower=1)[0], runs) for L, runs in roots))
 
+    def left_out(self, residual: Array, noise: Noise) -> tuple[Array, Array]:
+        """Return by how much each row, left out, is missed by what the others say of it, and the variance of that: y = Σ⁻¹r and 1 by (Σ⁻¹)_ii."""
+        whitener, precision, weighted = self.whitener(noise), np.empty(self.count), np.empty(self.count)
+        for K, runs in whitener.roots:
+            for run in runs:
+                own = self.slices[run]
+                precision[own], weighted[own] = np.sum(K**2, axis=0), K.T @ (K @ residual[own])
+        return weighted / precision, 1 / precision
+
     def kept(self, masks: Sequence[NDArray[np.bool_]]) -> "NoiseRows":
         """Return the rows that a mask of each run keeps; a run without any is left out."""
         parts = [k for k, mask in enumerate(masks) if mask.any()]

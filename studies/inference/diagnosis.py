@@ -38,7 +38,7 @@ from studies.inference.housing import evidence_of, set_housing_apart
 from studies.inference.inferred import Inferred
 from studies.inference.lack_of_fit import generic_bank, is_rounding, look
 from studies.inference.model import Background, Linear
-from studies.inference.pursuit import Pursuit, fair_score
+from studies.inference.pursuit import Pursuit
 from studies.inference.records import Campaign
 from studies.inference.search import FURTHER, MARGIN, SUSPICIOUS, Outcome, Search
 from studies.inference.sharp import RESOLVED, fast_line, longest_resolved
@@ -190,8 +190,8 @@ def infer(card: "Instrument", campaign: Campaign, progress: Report = lambda _: N
         # values may have gone far to do what an effect does: look from the card as shipped too
         progress("again from the card's own values")
         pursuit = Pursuit(at_point(found, np.zeros(problem.count)), progress)
-        there = pursuit.outcome(fair_score(search, outcome.final) - BEATEN)
-        search, outcome = max((there, (search, outcome)), key=lambda found: fair_score(found[0], found[1].final))
+        there = pursuit.outcome(search.fair(outcome.final) - BEATEN)
+        search, outcome = max((there, (search, outcome)), key=lambda found: found[0].fair(found[1].final))
     # one lag in its own noise: in that of a longer path its straight lines lead out of the world
     alone = outcome.plain.noise if path is None else found.noise
     paths = search.signatures.there(found.point) if path is None else Signatures.at(problem, found.point)
@@ -230,9 +230,9 @@ def _with_heat_path(whole: CardFit, found: CardFit, progress: Report) -> tuple[H
         return (None, *own.outcome())
     progress(f"effects beside a heat path with {path.lags} time constants")
     there, grown = Pursuit(path.fit, progress).outcome()
-    score = fair_score(there, grown.final) + path.housing + path.price
+    score = there.fair(grown.final) + path.housing + path.price
     search, outcome = own.outcome(-np.inf if given else score - BEATEN)
-    gain, lead = score - evidence_of(found), score - fair_score(search, outcome.final)
+    gain, lead = score - evidence_of(found), score - search.fair(outcome.final)
     levels = with_levels(search, outcome.plain, FREQUENCY).score - outcome.plain.score
     needed = MARGIN + given * FURTHER * sum(term.brought for term in outcome.final.terms if term.response == FREQUENCY)
     if lead < needed or levels > gain + MARGIN:

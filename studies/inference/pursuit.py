@@ -66,7 +66,7 @@ class Pursuit:
         plain, final = self.search.grow(near=self._near)
         if self.start.problem.instrument.polynomial is None and len(final.terms) == 1 and not self._near(final):
             first = self.search.first[:FOLLOWED]
-            close = [one for one in first if one.score - plain.score > CLOSE * (first[0].score - plain.score)]
+            close = [one for gain, one in first if gain > CLOSE * first[0][0]]
             if len(close) > 1 and (best := self._best_of((one.terms, one.noise) for one in close)):
                 plain, final = self._going_on(best)
         return self._straightened(plain, final)
@@ -74,20 +74,16 @@ class Pursuit:
     def _straightened(self, plain: Hypothesis, final: Hypothesis) -> tuple[Hypothesis, Hypothesis]:
         best, waited = -np.inf, 0
         for left in range(AGAIN, 0, -1):
-            here = Background(self.search.linear, final.terms, final.noise)
-            hidden = bool(final.terms) and here.hides_outliers
-            if (self._holds(final) and not hidden) or not (final.terms or left == AGAIN) or self._beaten(final):
+            if self._holds(final) or not (final.terms or left == AGAIN) or self._beaten(final):
                 break
             self.progress("linearising the model again with the effects found")
             before = self.point
-            if hidden:
-                self.start = replace(self.start, rows=here.spared)
             self.search, self.point, terms = self._linearise(final.terms, final.noise)
             if left > SETTLING:
                 plain, final = self.search.grow(terms, self._near if left > SETTLING + 1 else lambda _: True)
             else:
                 plain, final = self.search.grow(terms, most=0)
-            score = fair_score(self.search, final)
+            score = self.search.fair(final)
             best, waited = max(best, score), 0 if score > best else waited + 1
             if waited == PATIENCE or np.abs(self.point - before).max(initial=0.0) < STILL:
                 break
@@ -99,7 +95,7 @@ class Pursuit:
     def _elsewhere(self, plain: Hypothesis, final: Hypothesis) -> tuple[Hypothesis, Hypothesis]:
         """Go on where less noise, or an effect in the place of slow noise, is likelier with values of its own."""
         best = self._best_of(self.search.suspects(final))
-        if best is None or best.score <= fair_score(self.search, final) + STRAYED:
+        if best is None or best.score <= self.search.fair(final) + STRAYED:
             return plain, final
         self.progress("a better minimum found elsewhere; continuing there")
         return self._straightened(*self._going_on(best))
@@ -110,7 +106,7 @@ class Pursuit:
         for terms, noise in tried:
             there, point, own = self._linearise(terms, noise, [])
             grown = there.grow(own, noise=noise, most=0)[1]
-            found.append(_Place(fair_score(there, grown), there, point, grown))
+            found.append(_Place(there.fair(grown), there, point, grown))
         return max(found, key=lambda one: one.score, default=None)
 
     def _going_on(self, place: "_Place") -> tuple[Hypothesis, Hypothesis]:
@@ -141,20 +137,16 @@ class Pursuit:
         return STRAYED > sum(np.sum(linear.rows[n].whiten(own, final.noise[n]) ** 2) for n, own in apart.items())
 
     def _beaten(self, final: Hypothesis) -> bool:
-        return self.least > -np.inf and fair_score(self.search, final) < self.least
+        return self.least > -np.inf and self.search.fair(final) < self.least
 
     def _linearise(
         self, terms: Sequence[Term], noise: Mapping[str, Noise], bank: Sequence[Shapes] | None = None
     ) -> tuple[Search, Array, tuple[Term, ...]]:
-        there = relinearise(self.start, self.search.linear, self.point, terms, noise)
+        start = replace(self.start, rows=self.search.linear.rows)
+        there = relinearise(start, self.search.linear, self.point, terms, noise)
         bank = self._bank_at(there.signatures) if bank is None else bank
         return Search(there.linear, there.signatures, noise, bank, self.progress), there.values, there.terms
 
     def _bank_at(self, paths: Signatures) -> Sequence[Shapes] | None:
         """The columns of all effects where they are the same along other paths; None where they are to be computed."""
         return self.search.bank if paths.away(self.search.signatures) < SAME_PATH else None
-
-
-def fair_score(search: Search, final: Hypothesis) -> float:
-    """Log posterior of a model, its outliers being what stands out of it."""
-    return Background(search.linear, final.terms, final.noise).fair + sum(term.price for term in final.terms)

@@ -93,7 +93,7 @@ class Search:
     ) -> None:
         self.linear, self.signatures, self.noise, self.progress = linear, signatures, noise, progress
         self.bank = self.shapes_of(signatures.applicable()) if bank is None else bank
-        self.first: list[Hypothesis] = []  # what may come first, as `grow` weighed it
+        self.first: list[tuple[float, Hypothesis]] = []  # what may come first, with its gain, as `grow` weighed it
 
     def shapes_of(self, effects: Iterable[tuple[Effect, str]]) -> list[Shapes]:
         """Return the columns of all shapes of some effects, in seven digits: whatever leads is computed anew."""
@@ -229,8 +229,9 @@ class Search:
         for _ in range(most):  # a term may leave when another one comes
             if len(now.terms) == MOST_TERMS or not self.bank or (now.terms and not near(now)):
                 break
+            plain, now = self._spared(plain, now)
             tried = self.contenders(now)
-            self.first = self.first if now.terms else tried
+            self.first = self.first if now.terms else [(one.score - now.score, one) for one in tried]
             if not tried or tried[0].score - now.score < self.needed(tried[0].terms[-1], now.terms):
                 break
             self.progress(
@@ -238,6 +239,15 @@ class Search:
             )
             now = self._without_idle(_credited(self.settle(tried[0].terms, tried[0].noise), now), plain)
         return plain, self._definite(self._tuned(now))
+
+    def _spared(self, plain: Hypothesis, now: Hypothesis) -> tuple[Hypothesis, Hypothesis]:
+        """Take for outliers what stands out of the model so far, before it can make an effect; return both models in these rows."""
+        beside = Background(self.linear, now.terms, now.noise)
+        if not beside.hides_outliers:
+            return plain, now
+        self.linear = replace(self.linear, rows=beside.spared)
+        plain = self.settle((), plain.noise)
+        return plain, self.settle(now.terms, now.noise) if now.terms else plain
 
     def _definite(self, now: Hypothesis) -> Hypothesis:
         """Cut families down to their definite curves, wherever of their shapes these are, where that is likelier by `SURE`."""
@@ -332,12 +342,16 @@ class Search:
                 found.append((name, {**now.noise, name: less}))
         return found
 
+    def fair(self, one: Hypothesis) -> float:
+        """Log posterior of a model, its outliers being what stands out of it."""
+        return Background(self.linear, one.terms, one.noise).fair + sum(term.price for term in one.terms)
+
     def _without_idle(self, now: Hypothesis, plain: Hypothesis) -> Hypothesis:
-        """Leave out terms that do not pay beside the others."""
+        """Leave out terms that do not pay beside the others, or only for rows that else were outliers."""
         for k in range(len(now.terms)):
             others = (*now.terms[:k], *now.terms[k + 1 :])
             fewer = self.beside(others, plain, now.noise)
-            if now.score - fewer.score < self.needed(now.terms[k], others):
+            if self.fair(now) - self.fair(fewer) < self.needed(now.terms[k], others):
                 return self._without_idle(fewer, plain)
         return now
 
