@@ -225,11 +225,10 @@ class Search:
             beside = Background(self.linear, now.terms, noise or now.noise)
             here = self.polish(beside, self.moved(term, term.shape), anew=False)
             now = _credited(self.settle((*now.terms, here), noise or now.noise), now)
-        now = self._without_idle(now, plain)
+        plain, now = self._without_idle(plain, now)
         for _ in range(most):  # a term may leave when another one comes
             if len(now.terms) == MOST_TERMS or not self.bank or (now.terms and not near(now)):
                 break
-            plain, now = self._spared(plain, now)
             tried = self.contenders(now)
             self.first = self.first if now.terms else [(one.score - now.score, one) for one in tried]
             if not tried or tried[0].score - now.score < self.needed(tried[0].terms[-1], now.terms):
@@ -237,17 +236,8 @@ class Search:
             self.progress(
                 f"{tried[0].terms[-1].effect.name} improves the log evidence by {tried[0].score - now.score:.0f}"
             )
-            now = self._without_idle(_credited(self.settle(tried[0].terms, tried[0].noise), now), plain)
+            plain, now = self._without_idle(plain, _credited(self.settle(tried[0].terms, tried[0].noise), now))
         return plain, self._definite(self._tuned(now))
-
-    def _spared(self, plain: Hypothesis, now: Hypothesis) -> tuple[Hypothesis, Hypothesis]:
-        """Take for outliers what stands out of the model so far, before it can make an effect; return both models in these rows."""
-        beside = Background(self.linear, now.terms, now.noise)
-        if not beside.hides_outliers:
-            return plain, now
-        self.linear = replace(self.linear, rows=beside.spared)
-        plain = self.settle((), plain.noise)
-        return plain, self.settle(now.terms, now.noise) if now.terms else plain
 
     def _definite(self, now: Hypothesis) -> Hypothesis:
         """Cut families down to their definite curves, wherever of their shapes these are, where that is likelier by `SURE`."""
@@ -346,14 +336,19 @@ class Search:
         """Log posterior of a model, its outliers being what stands out of it."""
         return Background(self.linear, one.terms, one.noise).fair + sum(term.price for term in one.terms)
 
-    def _without_idle(self, now: Hypothesis, plain: Hypothesis) -> Hypothesis:
-        """Leave out terms that do not pay beside the others, or only for rows that else were outliers."""
+    def _without_idle(self, plain: Hypothesis, now: Hypothesis) -> tuple[Hypothesis, Hypothesis]:
+        """Leave out terms that do not pay beside the others, or only for rows that else are outliers, which are spared from then on."""
         for k in range(len(now.terms)):
             others = (*now.terms[:k], *now.terms[k + 1 :])
             fewer = self.beside(others, plain, now.noise)
             if self.fair(now) - self.fair(fewer) < self.needed(now.terms[k], others):
-                return self._without_idle(fewer, plain)
-        return now
+                beside = Background(self.linear, fewer.terms, fewer.noise)
+                if beside.hides_outliers:
+                    self.linear = replace(self.linear, rows=beside.spared)
+                    plain = self.settle((), plain.noise)
+                    fewer = self.beside(others, plain, fewer.noise)
+                return self._without_idle(plain, fewer)
+        return plain, now
 
 
 def _near(gain: float, best: float) -> bool:
