@@ -32,7 +32,7 @@ MOST_STEPS = 30
 CLOSE = 0.05  # fall of the objective that a step still promises: a move of 0.2 standard deviations in any direction
 NEAR = 1.0  # the same, where no step makes the fit better: what differences and rounding leave
 SETTLED_NOISE = 1.0  # the same, below which the noise is not estimated anew
-OUTLIER = 5.0
+OUTLIER, LOOKS = 5.0, 2  # standard deviations; looks, for one outlier hides another
 PATIENCE = 5  # steps that leave no less, after which the noise only rises: promises are not kept
 LESS = 0.2  # of the logarithm of what is left, all responses together: a step that leaves less
 TRIALS = 6
@@ -280,16 +280,16 @@ def stated_noise(noise: "NoiseKeys", response: str) -> Noise | None:
 
 def spare_outliers(rows: NoiseRows, residual: Array, noise: Noise) -> tuple[NoiseRows, int]:
     """Rows with larger variances where one stands out of its neighbours: its square over 5², times its own white variance."""
-    error, variance = rows.left_out(residual, noise)
-    z = np.abs(error) / np.sqrt(variance)
-    ratio = np.maximum((z / (OUTLIER * max(1.4826 * float(np.median(z)), 1.0))) ** 2, 1.0)
-    beyond = int(np.count_nonzero(ratio > 1))
-    if not beyond:
-        return rows, 0
-    stretched = tuple(
-        v * np.where(ratio[s] > 1, 25.0 * ratio[s], 1.0) for v, s in zip(rows.stretch, rows.slices, strict=True)
-    )
-    return replace(rows, stretch=stretched), beyond
+    spared, ratio = rows, np.ones(rows.count)
+    for _ in range(LOOKS):
+        error, variance = spared.left_out(residual, noise)
+        white = np.concatenate([noise.white**2 / own for own in rows.spans])
+        more = np.concatenate(spared.stretch) - np.concatenate(rows.stretch)
+        z = np.abs(error) / np.sqrt(variance - more * white)
+        ratio = np.maximum((z / (OUTLIER * max(1.4826 * float(np.median(z)), 1.0))) ** 2, 1.0)
+        stretch = np.concatenate(rows.stretch) * np.where(ratio > 1, 25.0 * ratio, 1.0)
+        spared = replace(rows, stretch=tuple(stretch[s] for s in rows.slices))
+    return spared, int(np.count_nonzero(ratio > 1))
 
 
 def whitened(

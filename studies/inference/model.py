@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from compensation.noise import Noise
 from compensation.noise_rows import NoiseRows, Whitener, log_prior
-from studies.calibration.fit import CardFit, estimate_levels, spare_outliers, stated_noise
+from studies.calibration.fit import OUTLIER, CardFit, estimate_levels, spare_outliers, stated_noise
 from studies.calibration.problem import CardProblem
 from studies.effects import Effect
 
@@ -309,8 +309,8 @@ class Background:
         return np.asarray(root.T @ left[name] / own)
 
     def size(self, name: str, left: Mapping[str, Array]) -> float:
-        """Return the square of what is left of a response in this noise."""
-        return float(np.sum(self._whiteners[name](left[name]) ** 2))
+        """Return the square of what is left of a response in this noise, of which no row decides alone."""
+        return float(np.sum(np.minimum(self._whiteners[name](left[name]) ** 2, OUTLIER**2)))
 
     def residual(self, name: str) -> Array:
         """Return what the most probable model leaves of a response."""

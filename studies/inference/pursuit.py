@@ -11,7 +11,7 @@ from studies.calibration.fit import IMPOSSIBLE, CardFit
 from studies.inference.held_out import Model
 from studies.inference.model import Background, Linear, Term
 from studies.inference.relinearise import relinearise
-from studies.inference.search import Hypothesis, Outcome, Search, Shapes
+from studies.inference.search import MOST_TERMS, Hypothesis, Outcome, Search, Shapes
 from studies.inference.signatures import Signatures
 
 Array = NDArray[np.float64]
@@ -59,6 +59,7 @@ class Pursuit:
             return self.search, Outcome(plain, final, (), ())
         if self.start.problem.instrument.polynomial is not None:
             plain, final = self._elsewhere(plain, final)
+        plain, final = self._without_needless(plain, final)
         return self.search, self.search.compare(plain, final)
 
     def _begun(self) -> tuple[Hypothesis, Hypothesis]:
@@ -100,6 +101,17 @@ class Pursuit:
         self.progress("a better minimum found elsewhere; continuing there")
         return self._straightened(*self._going_on(best))
 
+    def _without_needless(self, plain: Hypothesis, final: Hypothesis) -> tuple[Hypothesis, Hypothesis]:
+        """Leave out what pays beside another effect only along straight lines, the least first: without it, values of their own do as much."""
+        for term in sorted(final.terms, key=lambda one: one.brought) if len(final.terms) > 1 else ():
+            others = tuple(one for one in final.terms if one is not term)
+            if self._near(self.search.beside(others, plain, final.noise)):
+                continue
+            fewer = self._best_of([(others, final.noise)])
+            if fewer and self.search.fair(final) - fewer.score < self.search.needed(term, others):
+                return self._without_needless(*self._going_on(fewer, most=0))
+        return plain, final
+
     def _best_of(self, tried: Iterable[tuple[Sequence[Term], Mapping[str, Noise]]]) -> "_Place | None":
         """The likeliest of some models, each with values of its own."""
         found = []
@@ -109,12 +121,12 @@ class Pursuit:
             found.append(_Place(there.fair(grown), there, point, grown))
         return max(found, key=lambda one: one.score, default=None)
 
-    def _going_on(self, place: "_Place") -> tuple[Hypothesis, Hypothesis]:
+    def _going_on(self, place: "_Place", most: int = MOST_TERMS) -> tuple[Hypothesis, Hypothesis]:
         """Search on from a model."""
         there, self.point, grown = place.search, place.point, place.grown
         bank = self._bank_at(there.signatures)
         self.search = Search(there.linear, there.signatures, grown.noise, bank, self.progress)
-        return self.search.grow(grown.terms, self._near, grown.noise)
+        return self.search.grow(grown.terms, self._near, grown.noise, most)
 
     def _model(self, final: Hypothesis) -> Model:
         return Model(self.search.linear, self.search.signatures, final.terms, final.noise)

@@ -336,17 +336,20 @@ class Search:
         """Log posterior of a model, its outliers being what stands out of it."""
         return Background(self.linear, one.terms, one.noise).fair + sum(term.price for term in one.terms)
 
+    def _spared(self, plain: Hypothesis, now: Hypothesis) -> tuple[Hypothesis, Hypothesis]:
+        """Take for outliers what stands out of a model; return it and the one without effects in these rows."""
+        self.linear = replace(self.linear, rows=Background(self.linear, now.terms, now.noise).spared)
+        plain = self.settle((), plain.noise)
+        return plain, self.settle(now.terms, now.noise) if now.terms else plain
+
     def _without_idle(self, plain: Hypothesis, now: Hypothesis) -> tuple[Hypothesis, Hypothesis]:
         """Leave out terms that do not pay beside the others, or only for rows that else are outliers, which are spared from then on."""
         for k in range(len(now.terms)):
             others = (*now.terms[:k], *now.terms[k + 1 :])
             fewer = self.beside(others, plain, now.noise)
             if self.fair(now) - self.fair(fewer) < self.needed(now.terms[k], others):
-                beside = Background(self.linear, fewer.terms, fewer.noise)
-                if beside.hides_outliers:
-                    self.linear = replace(self.linear, rows=beside.spared)
-                    plain = self.settle((), plain.noise)
-                    fewer = self.beside(others, plain, fewer.noise)
+                if Background(self.linear, fewer.terms, fewer.noise).hides_outliers:
+                    plain, fewer = self._spared(plain, fewer)
                 return self._without_idle(plain, fewer)
         return plain, now
 
