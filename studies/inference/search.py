@@ -1,6 +1,7 @@
 """Search over effects: the model of all responses grows by the effect that adds most evidence, as long as that pays its price."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -336,20 +337,27 @@ class Search:
         """Log posterior of a model, its outliers being what stands out of it."""
         return Background(self.linear, one.terms, one.noise).fair + sum(term.price for term in one.terms)
 
-    def _spared(self, plain: Hypothesis, now: Hypothesis) -> tuple[Hypothesis, Hypothesis]:
-        """Take for outliers what stands out of a model; return it and the one without effects in these rows."""
-        self.linear = replace(self.linear, rows=Background(self.linear, now.terms, now.noise).spared)
-        plain = self.settle((), plain.noise)
-        return plain, self.settle(now.terms, now.noise) if now.terms else plain
+    def _spared(self, one: Hypothesis) -> tuple["Search", Hypothesis]:
+        """Take for outliers what stands out of a model: the search in such rows, and the model with the noise of the rest."""
+        there = self
+        for _ in range(FORMS):  # an outlier hides in the noise that others make
+            beside = Background(there.linear, one.terms, one.noise)
+            if not beside.hides_outliers:
+                break
+            there = copy(there)
+            there.linear = replace(there.linear, rows=beside.spared)
+            one = there.settle(one.terms, one.noise)
+        return there, one
 
     def _without_idle(self, plain: Hypothesis, now: Hypothesis) -> tuple[Hypothesis, Hypothesis]:
         """Leave out terms that do not pay beside the others, or only for rows that else are outliers, which are spared from then on."""
         for k in range(len(now.terms)):
             others = (*now.terms[:k], *now.terms[k + 1 :])
-            fewer = self.beside(others, plain, now.noise)
-            if self.fair(now) - self.fair(fewer) < self.needed(now.terms[k], others):
-                if Background(self.linear, fewer.terms, fewer.noise).hides_outliers:
-                    plain, fewer = self._spared(plain, fewer)
+            there, fewer = self._spared(self.beside(others, plain, now.noise))
+            if self.fair(now) - there.fair(fewer) < self.needed(now.terms[k], others):
+                if there is not self:
+                    self.linear = there.linear
+                    plain = self.settle((), plain.noise)
                 return self._without_idle(plain, fewer)
         return plain, now
 
