@@ -85,6 +85,15 @@ def test_a_metal_of_a_likely_slope_and_a_start_that_is_not_settled_are_not_read_
     check_readings(card, [run])
 
 
+@pytest.mark.parametrize("scale", [0.7, 1.0, 1.4])
+def test_a_thermometer_with_a_bent_scale_is_not_read_in_fahrenheit(scale, card):
+    """In the cold its slope is far from 1, and degrees Fahrenheit explained more than the card as it is."""
+    made = simulate_run(card, load_profile("cycle 0 -10 8 0.3 40min 1"), 1 / 60, 1).record
+    check_readings(
+        card, [with_temperatures(made, lambda T: T + scale * (0.41 * (T / 10 - 2) ** 3 - 0.86 * (T / 10 - 2) ** 2))]
+    )
+
+
 def test_a_bias_in_degrees_per_second_is_refused_before_the_fit(card, record):
     """The fit once left the range of the law and said only that."""
     with pytest.raises(InputError, match=r"run\.csv: bias_deg_per_h scatters .* probably in °/s\. Multiply it by 3600"):
