@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from compensation.noise import Noise
 from studies.calibration.fit import IMPOSSIBLE, CardFit
 from studies.inference.held_out import Model
-from studies.inference.model import Background, Linear, Term
+from studies.inference.model import Linear, Term
 from studies.inference.relinearise import relinearise
 from studies.inference.search import MOST_TERMS, Hypothesis, Outcome, Search, Shapes
 from studies.inference.signatures import Signatures
