@@ -1,8 +1,9 @@
 """How far the level of a further run may lie from what the card says: runs of one device differ from turn-on to turn-on.
 
-A few runs tell the spread of their levels poorly. With the weights that their likelihood gives to a spread s, every decade of which is as
-likely beforehand unless the card states it, the level of a further run is a mixture of normal laws; stated is the standard deviation
-of one normal law that holds as much of it in 1.96 of them, as Student's t is that of a few equal runs.
+A few runs tell the spread s of their levels poorly, and not at all where it is below the noise σ of such a level. With the weights that
+their likelihood and ds/√(s² + σ²) give it, unless the card states it, the level of a further run is a mixture of normal laws; stated is the
+standard deviation of one normal law that holds as much of it in 1.96 of them, as Student's t is that of a few equal runs. That every decade
+is as likely beforehand, also below σ, once denied levels of σ to 3 σ whenever a few runs agree by chance: of stated 95 %, 77 to 90 came.
 """
 
 from dataclasses import replace
@@ -46,7 +47,8 @@ def _level_spread(found: CardFit, name: str) -> float:
     left, columns = beside_others(problem, found.rows, target, found.state.slope, noise, name)
     white, stated = noise[name].white / rows.span**0.5, stated_noise(problem.instrument.noise, name)
     levels = white * np.exp(np.linspace(LEAST, MOST, STEPS))
-    logs = np.zeros(STEPS)
+    seen = np.linalg.norm(rows.whiten(np.ones(rows.count), replace(noise[name], offset=0.0)))  # √(runs)/σ
+    logs = -0.5 * np.log1p(len(rows.times) / (seen * levels) ** 2)
     if stated is not None and stated.offset:
         logs = -0.5 * (np.log(levels / stated.offset) / STATED_SPREAD) ** 2
     for k, level in enumerate(levels):
