@@ -11,8 +11,9 @@ from dataclasses import replace
 import numpy as np
 import scipy
 
+from compensation.arrays import Array
 from compensation.noise import Noise
-from compensation.noise_rows import LEAST, MOST, STATED_SPREAD
+from compensation.noise_rows import LEAST, MOST, STATED_SPREAD, NoiseRows
 from studies.calibration.ahead import BIAS
 from studies.calibration.fit import CardFit, beside_others, covariance_at, fit, has_levels, stated_noise
 from studies.calibration.ladder import usual_mean
@@ -45,15 +46,20 @@ def _level_spread(found: CardFit, name: str) -> float:
     noise, problem = found.noise, found.problem
     target = {one: found.state.residual[one] + found.state.slope[one] @ found.point for one in problem.responses}
     left, columns = beside_others(problem, found.rows, target, found.state.slope, noise, name)
-    white, stated = noise[name].white / rows.span**0.5, stated_noise(problem.instrument.noise, name)
-    levels = white * np.exp(np.linspace(LEAST, MOST, STEPS))
-    seen = np.linalg.norm(rows.whiten(np.ones(rows.count), replace(noise[name], offset=0.0)))  # √(runs)/σ
+    stated = stated_noise(problem.instrument.noise, name)
+    return level_of_further_run(rows, left, columns, noise[name], 0.0 if stated is None else stated.offset)
+
+
+def level_of_further_run(rows: NoiseRows, target: Array, columns: Array, noise: Noise, stated: float = 0.0) -> float:
+    """Return the standard deviation to state of a further run's level, from residuals (M,) of runs beside columns (M, p) of unit prior."""
+    levels = noise.white / rows.span**0.5 * np.exp(np.linspace(LEAST, MOST, STEPS))
+    seen = np.linalg.norm(rows.whiten(np.ones(rows.count), replace(noise, offset=0.0)))  # √(runs)/σ
     logs = -0.5 * np.log1p(len(rows.times) / (seen * levels) ** 2)
-    if stated is not None and stated.offset:
-        logs = -0.5 * (np.log(levels / stated.offset) / STATED_SPREAD) ** 2
+    if stated:
+        logs = -0.5 * (np.log(levels / stated) / STATED_SPREAD) ** 2
     for k, level in enumerate(levels):
-        own = replace(noise[name], offset=float(level))
-        logs[k] -= 0.5 * rows.deviance(left, columns, np.ones(columns.shape[1]), own)[0]
+        own = replace(noise, offset=float(level))
+        logs[k] -= 0.5 * rows.deviance(target, columns, np.ones(columns.shape[1]), own)[0]
     weights = np.exp(logs - scipy.special.logsumexp(logs))
 
     def beyond(sd: float) -> float:
