@@ -83,8 +83,8 @@ def _turning(fit: DecayFit, harmonic: int) -> tuple[str, ...]:
     apart = abs(fit.found.tones[largest] - fit.decay.detuning)
     turn = np.degrees(apart / 2 / harmonic)
     return (
-        f"Two circular waves in opposite senses are {apart / (2 * np.pi):.3g} Hz apart: the pattern turns by {turn:.3g} °/s, as a rotation of the gyro"
-        f" by that over its Bryan factor makes it. Record it at rest, or the table's rate is in every value.",
+        f"Two circular waves in opposite senses are {apart / (2 * np.pi):.3g} Hz apart: the pattern turns by {turn:.3g} °/s, so the gyro turns"
+        " at that rate over its Bryan factor. Record it at rest: as it is, the rate changes every value.",
     )
 
 

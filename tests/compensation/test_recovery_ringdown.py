@@ -429,7 +429,7 @@ def test_a_pattern_that_turns_is_no_interference(rate):
     still = np.exp(-TIME / 130.0) * np.array([[1.0], [0.2j]])
     z = np.array([np.cos(turn) * still[0] - np.sin(turn) * still[1], np.sin(turn) * still[0] + np.cos(turn) * still[1]])
     found = analyse_decay(from_lock_in(TIME, noisy(z, 1e-3, np.random.default_rng(1)), CARRIER))
-    assert found.remarks[0].endswith("is in every value.")
+    assert found.remarks[0].endswith("changes every value.")
     assert f"the pattern turns by {abs(rate):.0f} °/s" in found.remarks[0]
     assert not found.interference
 
