@@ -136,9 +136,10 @@ class NoiseRows:
         """Return by how much each row, left out, is missed by what the others say of it, and the variance of that: y = Σ⁻¹r and 1 by (Σ⁻¹)_ii."""
         whitener, precision, weighted = self.whitener(noise), np.empty(self.count), np.empty(self.count)
         for K, runs in whitener.roots:
+            told = np.sum(K**2, axis=0)
             for run in runs:
                 own = self.slices[run]
-                precision[own], weighted[own] = np.sum(K**2, axis=0), K.T @ (K @ residual[own])
+                precision[own], weighted[own] = told, K.T @ (K @ residual[own])
         return weighted / precision, 1 / precision
 
     def kept(self, masks: Sequence[NDArray[np.bool_]]) -> "NoiseRows":

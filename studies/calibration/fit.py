@@ -6,9 +6,9 @@ u, damped until the step keeps its promise, then bent as the valley bends. Block
 variance that they show.
 """
 
-from collections.abc import Mapping, Sequence
-from dataclasses import astuple, dataclass, replace
-from typing import TYPE_CHECKING, Protocol
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
 import scipy
@@ -16,23 +16,18 @@ from numpy.typing import NDArray
 
 from compensation.errors import CompensationError
 from compensation.noise import Noise
-from compensation.noise_rows import KINDS, NoiseRows, estimate_noise
+from compensation.noise_rows import NoiseRows
 from shell.errors import ShellError
-from studies.calibration.observed import SETTLED
+from studies.calibration.noise_levels import larger_noise, marginal_noise, residual_noise, spare_outliers
 from studies.calibration.problem import CardProblem, Progress, State
 from studies.errors import InputError
-from studies.simulation.noise import bias_noise, frequency_noise
 from thermal.errors import ThermalError
-
-if TYPE_CHECKING:
-    from studies.instrument.tables.noise import NoiseKeys
 
 Array = NDArray[np.float64]
 MOST_STEPS = 30
 CLOSE = 0.05  # fall of the objective that a step still promises: a move of 0.2 standard deviations in any direction
 NEAR = 1.0  # the same, where no step makes the fit better: what differences and rounding leave
 SETTLED_NOISE = 1.0  # the same, below which the noise is not estimated anew
-OUTLIER, LOOKS = 5.0, 2  # standard deviations; looks, for one outlier hides another
 PATIENCE = 5  # steps that leave no less, after which the noise only rises: promises are not kept
 LESS = 0.2  # of the logarithm of what is left, all responses together: a step that leaves less
 TRIALS = 6
@@ -40,8 +35,6 @@ CORRECTIONS = 5  # of a step, towards the floor of a valley that bends
 KEPT = 0.75  # of its promise, beyond which a step may be longer
 LEAST_DAMPING, MOST_DAMPING, HALVINGS = -12.0, 24.0, 14  # ln of what is added to the prior's precision
 LEAST_FALL = 0.1  # of the objective, over what the step promises
-UNSEEN = 0.1  # of the noise of one row: a column whose whole length is less tells nothing
-LASTING = ("frequency_Hz", "inverse_q")  # responses without an offset of turn-on
 LONGEST_STEP = 3.0  # prior standard deviations, of any coordinate in one step
 IMPOSSIBLE = (InputError, ShellError, ThermalError, CompensationError)  # what a point says that has no prediction
 
@@ -107,11 +100,11 @@ def fit(problem: CardProblem, start: Array | None = None, progress: Progress = l
         least = min(least, left)
         if size > SETTLED_NOISE:
             found = (
-                _estimate(problem, rows, state, noise, waited > PATIENCE)
+                marginal_noise(problem, rows, state, noise, waited > PATIENCE)
                 if straight
                 else residual_noise(problem, rows, state)
             )
-            noise = found if waited <= PATIENCE else {name: _larger(noise[name], found[name]) for name in found}
+            noise = found if waited <= PATIENCE else {name: larger_noise(noise[name], found[name]) for name in found}
         if straight:
             for name in problem.responses:
                 rows[name], outliers[name] = spare_outliers(problem.rows[name], state.residual[name], noise[name])
@@ -180,116 +173,6 @@ def objective(problem: Problem, state: State, noise: Mapping[str, Noise], rows: 
     """−2 ln of likelihood and prior, up to a constant."""
     total = float(state.point @ state.point)
     return total + sum(float(np.sum(rows[n].whiten(state.residual[n], noise[n]) ** 2)) for n in problem.responses)
-
-
-def residual_noise(problem: CardProblem, rows: Mapping[str, NoiseRows], state: State) -> dict[str, Noise]:
-    """Noise that the residuals would be as they are: far from the values, a straight line promises what no step keeps."""
-    return {n: _levels(problem, rows[n].coarse, n, rows[n].means(state.residual[n])) for n in problem.responses}
-
-
-def _estimate(
-    problem: CardProblem, rows: Mapping[str, NoiseRows], state: State, noise: Mapping[str, Noise], given: bool
-) -> dict[str, Noise]:
-    """Noise of highest marginal likelihood, each response's by itself or `given` the others'."""
-    target = {name: state.residual[name] + state.slope[name] @ state.point for name in problem.responses}
-    if given:
-        return estimate_levels(problem, rows, target, state.slope, noise, problem.responses)
-    alone = (
-        estimate_levels(problem, rows, target, state.slope, {name: noise[name]}, [name]) for name in problem.responses
-    )
-    return {name: level for one in alone for name, level in one.items()}
-
-
-def estimate_levels(
-    problem: CardProblem,
-    rows: Mapping[str, NoiseRows],
-    target: Mapping[str, Array],
-    slopes: Mapping[str, Array],
-    noise: Mapping[str, Noise],
-    names: Sequence[str],
-    known: Array | None = None,
-) -> dict[str, Noise]:
-    """Return the noise of highest marginal likelihood of some responses, each given the others'.
-
-    `target`, `slopes` (response -> (M,), (M, p)) are about the prior mean; `known`, (q, p + 1), is what else says
-    something of the unknowns. What the model cannot follow is left to the slow noise (Kennedy & O'Hagan 2001, J. R. Stat. Soc. B 63, 425).
-    """
-    found = dict(noise)
-    for name in names:
-        left, columns = beside_others(problem, rows, target, slopes, found, name, known)
-        found[name] = _levels(problem, rows[name].coarse, name, left, columns, found.get(name))
-    return found
-
-
-def beside_others(
-    problem: CardProblem,
-    rows: Mapping[str, NoiseRows],
-    target: Mapping[str, Array],
-    slopes: Mapping[str, Array],
-    noise: Mapping[str, Noise],
-    name: str,
-    known: Array | None = None,
-) -> tuple[Array, Array]:
-    """Coarse rows of a response and columns of unit prior, of all that the other responses leave unknown."""
-    count = slopes[name].shape[1]
-    told = [other for other in problem.responses if other != name and other in noise]
-    white = [rows[n].whiten(np.column_stack([slopes[n], target[n]]), noise[n]) for n in told]
-    white += [] if known is None else [known]
-    triangle = np.linalg.qr(np.vstack([np.eye(count, count + 1), *white])).R[:count]
-    R, move = triangle[:, :-1], scipy.linalg.solve_triangular(triangle[:, :-1], triangle[:, -1])
-    J, left = rows[name].means(slopes[name]), rows[name].means(target[name])
-    # Rotated coordinates of unit prior are of unit prior again; those that the rows do not see are left out.
-    U, S, _ = np.linalg.svd(scipy.linalg.solve_triangular(R, J.T, trans="T").T, full_matrices=False)
-    left = left - J @ move
-    seen = S > UNSEEN * float(np.median(np.abs(np.diff(left - U @ (U.T @ left)))))
-    return left, U[:, seen] * S[seen]
-
-
-def _levels(
-    problem: CardProblem,
-    rows: NoiseRows,
-    name: str,
-    target: Array,
-    columns: Array | None = None,
-    near: Noise | None = None,
-) -> Noise:
-    kinds = ("white",) if name == SETTLED else KINDS if has_levels(problem, name) else KINDS[:-1]
-    precision = None if columns is None else np.ones(columns.shape[1])
-    stated = None if columns is None else stated_noise(problem.instrument.noise, name)
-    noise = estimate_noise(rows, target, columns, precision, kinds, near, stated)
-    if name == SETTLED:  # a reading is not better than its last digit, and a level or a slope is no noise
-        least, most = (max(getattr(table, end) for table in problem.tables) for end in ("rounding", "scatter"))
-        return replace(noise, white=float(np.clip(noise.white, least, most)))
-    return noise
-
-
-def _larger(one: Noise, other: Noise) -> Noise:
-    return Noise(*(max(pair) for pair in zip(astuple(one), astuple(other), strict=True)))
-
-
-def has_levels(problem: CardProblem, name: str) -> bool:
-    """Whether each run may have a level of its own of a response."""
-    return name not in LASTING or (problem.levels and name == "frequency_Hz")
-
-
-def stated_noise(noise: "NoiseKeys", response: str) -> Noise | None:
-    """Slow levels and offset of a response as a card's `[noise]` states them; None where it says nothing of them."""
-    stated = {"frequency_Hz": frequency_noise, "bias_deg_per_h": bias_noise}
-    return replace(stated[response](noise), white=0.0) if response in stated else None
-
-
-def spare_outliers(rows: NoiseRows, residual: Array, noise: Noise) -> tuple[NoiseRows, int]:
-    """Rows with larger variances where one stands out of its neighbours: its square over 5², times its own white variance."""
-    spared, ratio = rows, np.ones(rows.count)
-    for _ in range(LOOKS):
-        error, variance = spared.left_out(residual, noise)
-        white = np.concatenate([noise.white**2 / own for own in rows.spans])
-        more = np.concatenate(spared.stretch) - np.concatenate(rows.stretch)
-        z = np.abs(error) / np.sqrt(variance - more * white)
-        ratio = np.maximum((z / (OUTLIER * max(1.4826 * float(np.median(z)), 1.0))) ** 2, 1.0)
-        stretch = np.concatenate(rows.stretch) * np.where(ratio > 1, 25.0 * ratio, 1.0)
-        spared = replace(rows, stretch=tuple(stretch[s] for s in rows.slices))
-    return spared, int(np.count_nonzero(ratio > 1))
 
 
 def whitened(

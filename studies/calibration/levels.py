@@ -3,7 +3,7 @@
 A few runs tell the spread s of their levels poorly, and not at all where it is below the noise σ of such a level. With the weights that
 their likelihood and ds/√(s² + σ²) give it, unless the card states it, the level of a further run is a mixture of normal laws; stated is the
 standard deviation of one normal law that holds as much of it in 1.96 of them, as Student's t is that of a few equal runs. That every decade
-is as likely beforehand, also below σ, once denied levels of σ to 3 σ whenever a few runs agree by chance: of stated 95 %, 77 to 90 came.
+is as likely beforehand, also below σ, once denied levels of σ to 3 σ whenever a few runs agree by chance: of stated 95 %, 77 to 88 came.
 """
 
 from dataclasses import replace
@@ -15,8 +15,9 @@ from compensation.arrays import Array
 from compensation.noise import Noise
 from compensation.noise_rows import LEAST, MOST, STATED_SPREAD, NoiseRows
 from studies.calibration.ahead import BIAS
-from studies.calibration.fit import CardFit, beside_others, covariance_at, fit, has_levels, stated_noise
+from studies.calibration.fit import CardFit, covariance_at, fit
 from studies.calibration.ladder import usual_mean
+from studies.calibration.noise_levels import beside_others, has_levels, stated_noise
 
 STEPS = 31  # of ln s
 NINETY_FIVE = 1.959963984540054

@@ -64,9 +64,8 @@ class CardProblem:
     runs: tuple[ObservedRun, ...]
     law: "FrequencyLaw"
     tables: tuple[SettledTable, ...] = ()
-    levels: bool = (
-        False  # whether the frequency, too, may have a level of each run; of a law of records alone that is misfit
-    )
+    levels: bool = False
+    """Whether the frequency, too, may have a level of each run; of a law made from the records alone that is misfit."""
 
     @cached_property
     def parts(self) -> tuple[Part, ...]:

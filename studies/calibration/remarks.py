@@ -8,8 +8,9 @@ import numpy as np
 from compensation.noise import Noise
 from studies.calibration.ahead import BIAS
 from studies.calibration.estimates import TOLD, Estimate
-from studies.calibration.fit import CardFit, stated_noise
+from studies.calibration.fit import CardFit
 from studies.calibration.ladder import Rung, noise_rms, usual_mean
+from studies.calibration.noise_levels import stated_noise
 from studies.calibration.observed import NEIGHBOURS, SETTLED, UNITS, WORDS
 from studies.calibration.problem import CardProblem
 from studies.diagnosis.verdict import FAR

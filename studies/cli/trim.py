@@ -29,7 +29,7 @@ CUTS = "number: cut | azimuth_deg: azimuth (°) .2f | height_mm: height z (mm) .
 STATES = "state | harmonic: n | split_Hz: split (mHz) ×1e3 .3f | error_Hz: standard error (mHz) ×1e3 .3f | most_Hz: 95 % upper limit (mHz) ×1e3 .3f | slow_axis_deg: slow axis (°) .2f"
 
 CELLS = {"azimuth_deg": ".4f", "position": ".6f", "height_mm": ".4f", "mass_ug": ".5f", "depth_um": ".4f"}  # of --out
-BALANCED = 1e-4  # of a known imbalance: what is left of it below counts as none
+NEGLIGIBLE = 1e-4  # of a known imbalance: what is left of it below counts as none
 UNLIKELY = 5.0  # standard errors of the prediction, by which a measured gain is doubted
 LIMIT = "Upper limit: the split is the length of a vector with this standard error in each component; the limit is exceeded with 5 % probability."
 
@@ -188,7 +188,9 @@ def _round(planned: CardPlan, resonator: Resonator) -> dict[str, Any]:
 
 def _balance(known: Mapping[int, complex], plan: TrimPlan) -> str | None:
     """Return how much of the known imbalance the cuts leave."""
-    left = {k: abs(plan.unbalance[k]) if abs(plan.unbalance[k]) > BALANCED * abs(u) else 0.0 for k, u in known.items()}
+    left = {
+        k: abs(plan.unbalance[k]) if abs(plan.unbalance[k]) > NEGLIGIBLE * abs(u) else 0.0 for k, u in known.items()
+    }
     parts = [f"k = {k}: {plain(1e9 * abs(u))} → {plain(1e9 * left[k])} µg" for k, u in known.items()]
     more = " These cuts can take no more: longer, wider or more cuts (teeth with a higher limit) correct the rest."
     return (

@@ -8,7 +8,7 @@ import scipy
 from numpy.typing import NDArray
 
 from compensation.constants import NINETY
-from studies.calibration.fit import LASTING
+from studies.calibration.noise_levels import LASTING
 from studies.diagnosis.constants import CONSTANTS
 from studies.diagnosis.verdict import Cause, Interval, same_cause, weigh
 from studies.effects import library

@@ -8,7 +8,7 @@ import scipy
 from numpy.typing import NDArray
 
 from compensation.noise import Noise
-from studies.calibration.fit import LASTING
+from studies.calibration.noise_levels import LASTING
 from studies.inference.model import Linear, Term, solve_posterior, split
 from studies.inference.signatures import Path, Signatures
 

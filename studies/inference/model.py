@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 
 from compensation.noise import Noise
 from compensation.noise_rows import NoiseRows, Whitener, log_prior
-from studies.calibration.fit import OUTLIER, CardFit, estimate_levels, spare_outliers, stated_noise
+from studies.calibration.fit import CardFit
+from studies.calibration.noise_levels import OUTLIER, estimate_levels, spare_outliers, stated_noise
 from studies.calibration.problem import CardProblem
 from studies.effects import Effect
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from compensation.noise import white_rms
 from shell.constants import zero_Celsius
-from studies.calibration.fit import LASTING
+from studies.calibration.noise_levels import LASTING
 from studies.calibration.observed import ObservedRun, SettledTable, observe
 from studies.instrument.card import SCHEMA, Instrument, build_instrument
 from studies.record import Record

@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from compensation.noise import Noise, white_rms
-from studies.calibration.fit import LASTING, stated_noise
 from studies.calibration.ladder import noise_rms
+from studies.calibration.noise_levels import LASTING, stated_noise
 from studies.diagnosis.constants import CONSTANTS
 from studies.diagnosis.response import RESPONSES
 from studies.diagnosis.verdict import Cause, ResponseResult

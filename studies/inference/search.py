@@ -351,10 +351,11 @@ class Search:
 
     def _without_idle(self, plain: Hypothesis, now: Hypothesis) -> tuple[Hypothesis, Hypothesis]:
         """Leave out terms that do not pay beside the others, or only for rows that else are outliers, which are spared from then on."""
+        score = self.fair(now) if now.terms else 0.0
         for k in range(len(now.terms)):
             others = (*now.terms[:k], *now.terms[k + 1 :])
             there, fewer = self._spared(self.beside(others, plain, now.noise))
-            if self.fair(now) - there.fair(fewer) < self.needed(now.terms[k], others):
+            if score - there.fair(fewer) < self.needed(now.terms[k], others):
                 if there is not self:
                     self.linear = there.linear
                     plain = self.settle((), plain.noise)

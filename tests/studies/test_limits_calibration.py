@@ -10,7 +10,8 @@ from compensation.noise_rows import NoiseRows
 from studies.calibration.ahead import spread_of_prediction
 from studies.calibration.calibrate import calibrate
 from studies.calibration.estimates import NINETY, estimate
-from studies.calibration.fit import CardFit, stated_noise, whitened
+from studies.calibration.fit import CardFit, whitened
+from studies.calibration.noise_levels import stated_noise
 from studies.calibration.observed import HOUSING, observe
 from studies.calibration.priors import Priors
 from studies.calibration.problem import MOST_SPREAD, CardProblem, State, start_spread

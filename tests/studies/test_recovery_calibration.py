@@ -264,7 +264,7 @@ def test_of_unseen_frequencies_no_fewer_than_stated_lie_in_their_spread_whether_
 
 @pytest.mark.parametrize("spread", [1.0, 1.7, 3.0])
 def test_of_further_levels_as_many_as_stated_lie_within_what_three_runs_tell(spread):
-    """Levels of runs, in standard deviations of the noise of a run's mean; of stated 95 % once 80 to 89 came."""
+    """Levels of runs, in standard deviations of the noise of a run's mean; of stated 95 % once 80 to 89 came on these draws."""
     random, inside, runs = np.random.default_rng(100), 0, 3
     rows = NoiseRows.of([np.arange(20.0)] * runs)
     for _ in range(200):
