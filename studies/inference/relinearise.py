@@ -146,11 +146,14 @@ class Beside:
             for term, size in zip(terms, sizes, strict=True)
         ]
         bends = [{name: np.zeros((len(change), count + 1)) for name, change in changes.items()} for changes in own]
+        every = [one for ways in along for one in ways.values()]
         for places in self._directions():
             aside = point + STEP * np.isin(np.arange(count), places)
             value = names[places[0]] if places[0] < len(names) else ""
             anew = thermal and value.startswith(OF_SLOPE)
-            there = Signatures.at(problem, aside) if anew else paths
+            if not (anew or heats(value) or any(own[:, np.isin(to, places)].any() for own, to in every)):
+                continue
+            there = paths.read_by(aside, heats(value)) if anew else paths
             moved = [] if anew else self._moved(paths, along, aside, places, heats(value))
             for term, size, plain, bend in zip(terms, sizes, own, bends, strict=True):
                 for response, columns in there.columns_of(term, moved).items():

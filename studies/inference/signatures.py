@@ -16,6 +16,7 @@ from shell.constants import zero_Celsius
 from studies.calibration.problem import CardProblem, Part
 from studies.effects import Effect, Span, library
 from studies.effects.states import States, remembered
+from studies.loss.damping_law import damping_law
 from studies.simulation.heat_path import slowest_lag
 from studies.simulation.prediction import Prediction
 from studies.simulation.response import Temperatures, read_out
@@ -186,6 +187,16 @@ class Signatures:
     def there(self, point: Array) -> "Signatures":
         """Paths at another point, these where it is the same."""
         return self if np.array_equal(point, self.point) else Signatures.at(self.problem, point)
+
+    def read_by(self, point: Array, warms: bool) -> "Signatures":
+        """Paths at another point whose values move the law, and the temperatures only if it `warms`."""
+        if warms and self.problem.instrument.polynomial is None:
+            return Signatures.at(self.problem, point)
+        card = self.problem.instrument_at(point)
+        law = self.problem.law_at(card)
+        damping = damping_law(card, law.lowest, law.highest)
+        read = ((path, replace(path.prediction, law=law, damping=damping)) for path in self.paths)
+        return Signatures(self.problem, point, tuple(replace(path, instrument=card, prediction=one) for path, one in read))
 
     def left(self) -> dict[str, Array]:
         """What the card alone leaves of the blocks of every response."""
