@@ -196,7 +196,9 @@ class Signatures:
         law = self.problem.law_at(card)
         damping = damping_law(card, law.lowest, law.highest)
         read = ((path, replace(path.prediction, law=law, damping=damping)) for path in self.paths)
-        return Signatures(self.problem, point, tuple(replace(path, instrument=card, prediction=one) for path, one in read))
+        return Signatures(
+            self.problem, point, tuple(replace(path, instrument=card, prediction=one) for path, one in read)
+        )
 
     def left(self) -> dict[str, Array]:
         """What the card alone leaves of the blocks of every response."""
