@@ -98,7 +98,7 @@ def fit_thermal_constants(
         raise InputError(f"{records[0].path or 'record'}: nothing can be identified: {why}.")
     card = polynomial_card(campaign.records)
     law = card.content["law"] | {"delay_s": {"value": 0.0, "sd": 0.0}}
-    law |= cubic_of(law)
+    law |= cubic_of(card)
     if max(float(np.ptp(driving(record))) for record in campaign.records) < RESTS:
         law = {key: own for key, own in law.items() if not key.startswith("a")}
     if instrument is not None:

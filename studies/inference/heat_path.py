@@ -1,6 +1,6 @@
 """A heat path longer than one lag, as a card of its own: without one, lumps in series with radiation along and past them; of a card, its own with a second mass on the base."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -132,16 +132,17 @@ def with_lags(card: Instrument, lags: Sequence[float], lumps: bool, late: bool =
     law = dict(card.content["law"])
     law |= {key: {"value": lag, "sd": LAG_WIDTH * lag} for key, lag in zip(LAGS, lags, strict=False)}
     law |= {"radiated_share": dict(RADIATED)} | (OF_LUMPS if lumps else {})
-    law |= cubic_of(law) if lumps else {}
+    law |= cubic_of(card) if lumps else {}
     if late:
-        card = card.with_table("noise", card.content["noise"] | {"housing_lag_s": dict(LATENESS)})
+        card = card.with_table("noise", {**card.content.get("noise", {}), "housing_lag_s": dict(LATENESS)})
     return card.with_table("law", law)
 
 
-def cubic_of(law: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the cubic term of a law as wide as its slope and bend make likely, where both are free."""
-    slope, bend = (law.get(key, {}).get("sd", 0.0) for key in ("a1_per_K", "a2_per_K2"))
-    return {"a3_per_K3": {"value": 0.0, "sd": bend**2 / slope}} if slope and bend else {}
+def cubic_of(card: Instrument) -> dict[str, Any]:
+    """Return the cubic term of a card's law as wide as its slope and bend make likely, where both are free and it is not."""
+    width = {one.name: one.sd for one in card.uncertain}
+    slope, bend, free = (width.get(f"law.{key}", 0.0) for key in ("a1_per_K", "a2_per_K2", "a3_per_K3"))
+    return {"a3_per_K3": {"value": 0.0, "sd": bend**2 / slope}} if slope and bend and not free else {}
 
 
 def find_heat_path(
