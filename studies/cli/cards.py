@@ -7,7 +7,7 @@ from typing import Any
 from studies.cli.output import answers
 from studies.instrument.card import SCHEMA, load_card, shipped_cards
 from studies.instrument.display import display_name
-from studies.reports.digits import plain
+from studies.reports.digits import plain, to_error
 from studies.results import Column, Facts, Result, Table
 from studies.schema.reader import read_toml
 
@@ -53,7 +53,9 @@ def _show_values(card: str) -> Result:
     # A value that was changed since the calibration is not described by its interval any more.
     saved, held = instrument.part("posterior").intervals, {one.name: one.value for one in values}
     intervals = {name: (low, high) for name, (low, high) in saved.items() if low <= held.get(name, low) <= high}
-    mass = weigh(instrument.resonator, instrument.material.elastic(instrument.reference_temperature).rho)
+    mass = None
+    if instrument.polynomial is None:
+        mass = weigh(instrument.resonator, instrument.material.elastic(instrument.reference_temperature).rho)
     entries = [
         {**asdict(one), "stated": one.name in stated}
         | ({"interval": intervals[one.name]} if one.name in intervals else {})
@@ -68,13 +70,15 @@ def _show_values(card: str) -> Result:
     }
     idle = idle_values(instrument)
     rows = [
-        row | {"from": "card" if row["stated"] else "default", "spread": _spread(row)}
+        row
+        | {"from": "card" if row["stated"] else "default", "spread": _spread(row)}
+        | {"shown": to_error(row["value"], row["sd"])[0]}
         for row in entries
         if row["name"] not in idle
     ]
     columns = (
         Column("name", "quantity", spell=display_name, where="page"),
-        "key | value: value .4g | spread: ± | from | interval.0 … interval.1: 90 % interval",
+        "key | shown: value | spread: ± | from | interval.0 … interval.1 ± sd: 90 % interval",
     )
     tables: dict[str, list[dict[str, Any]]] = {}
     for row in rows:
@@ -85,7 +89,7 @@ def _show_values(card: str) -> Result:
         f"Card {instrument.name}",
         "Mass properties, and every value that is uncertain (± one standard deviation); all others are exact.",
         [
-            Facts([
+            mass and Facts([
                 ("Mass", f"{1e3 * mass.mass:.5g} g", f"{1e9 * mass.volume:.5g} mm³"),
                 ("Centre of mass", f"z = {1e3 * mass.center:.5g} mm", ""),
                 ("Moments of inertia", f"{1e9 * mass.axial:.5g} g mm² about the axis", f"{1e9 * mass.transverse:.5g} g mm² about a diameter"),

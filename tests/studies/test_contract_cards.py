@@ -178,3 +178,15 @@ def test_contract_every_value_of_a_material_has_a_source_or_says_that_it_was_not
             assert not law.crystal.slope or "temperature_coefficients" in law.unchecked
         assert row["unchecked"] == list(law.unchecked)
         assert bool(law.unchecked) == any("not checked against a source" in text for text in row["caveats"])
+
+
+def test_the_values_of_a_card_without_geometry_stand_to_the_digits_of_their_errors(tmp_path, ask, capsys):
+    card = tmp_path / "law.toml"
+    card.write_text(
+        'schema = "hrg.card/1"\nname = "law"\n[law]\nf0_Hz = {value = 7312.39998, sd = 4.3e-4}\n', encoding="utf-8"
+    )
+    assert ask(["cards", card])["mass_properties"] is None
+    assert main(["cards", str(card)]) == 0
+    said = capsys.readouterr().out
+    assert "7312.39998" in said
+    assert "Mass" not in said
