@@ -89,7 +89,7 @@ def _show_values(card: str) -> Result:
         f"Card {instrument.name}",
         "Mass properties, and every value that is uncertain (± one standard deviation); all others are exact.",
         [
-            mass and Facts([
+            None if mass is None else Facts([
                 ("Mass", f"{1e3 * mass.mass:.5g} g", f"{1e9 * mass.volume:.5g} mm³"),
                 ("Centre of mass", f"z = {1e3 * mass.center:.5g} mm", ""),
                 ("Moments of inertia", f"{1e9 * mass.axial:.5g} g mm² about the axis", f"{1e9 * mass.transverse:.5g} g mm² about a diameter"),
