@@ -143,7 +143,7 @@ class Clock:
         if len(bad):
             raise InputError(
                 f"{table.place(bad[0])}: '{shorten(text.iloc[bad[0]])}' in column '{name}' is not a time"
-                f" of the form '{self.form}'; correct time_format in the map."
+                f" of the form '{self.form}'; correct time_format in the map, or end the table above with last_line."
             )
         known = stamps.dropna()
         if self._first is None and len(known):

@@ -61,6 +61,7 @@ def draft_map(paths: Sequence[str]) -> Draft:
             if begun:
                 written.insert(2, "same_file = true")
             elif len(group) > 1:
+                written = [line for line in written if not line.startswith("last_line")]
                 written.insert(
                     2, f"parts = {len(group)}    # CHECK: consecutive files: {', '.join(map(comment_of, group))}"
                 )
@@ -193,7 +194,8 @@ def _describe_notation(path: str, look: Look) -> list[str]:
         signs = (parting(cell, look.decimal) for row in look.rows[look.data :] for cell in row)
         lines += [f'thousands = "{sign}"' for sign in itertools.islice(filter(None, signs), 1)]
     header = 0 if look.header is None else look.header + 1
-    return [*lines, f"header_line = {header}", f"data_line = {look.data + 1}"]
+    end = [f"last_line = {look.last}    # CHECK: below it stands no reading"] if look.last else []
+    return [*lines, f"header_line = {header}", f"data_line = {look.data + 1}", *end]
 
 
 def _lines_above(look: Look) -> list[str]:
@@ -212,8 +214,8 @@ def _draft_look(path: str, look: Look, taken: Sequence[str]) -> tuple[list[str],
     hints = {name: f"{name} {unit}".strip() for name, unit in zip(names, look.units, strict=True)}
     numbers = {name: [n for c in cells[name] if (n := as_number(c, look.decimal)) is not None] for name in names}
     period = find_period([*above, *names])
-    own = look.group is not None and look.group.clock is not None
-    known = ([], "", "") if own else find_time(names, cells, hints, numbers, look.decimal, evenly=period is not None)
+    own = look.group.clock if look.group is not None else None
+    known = ([], "", "") if own is not None else find_time(names, cells, hints, numbers, look.decimal, evenly=period is not None)
     time, form, unsure = known
     lines = _describe_notation(path, look)
     markers = find_markers(names, cells, time, look.decimal)
@@ -222,13 +224,14 @@ def _draft_look(path: str, look: Look, taken: Sequence[str]) -> tuple[list[str],
     if time:
         lines.append(f"time = {spell_value(time[0] if len(time) == 1 else time)}")
         lines.append(f"time_format = {spell_value(form)}{f'    # CHECK: {unsure}' if unsure else ''}")
-        if form not in NUMERIC_TIMES and "%z" not in form:
-            lines.append('# timezone = "Europe/Berlin"    # of local times that change between summer and winter')
-    elif own:
+    elif own is not None:
         lines.append('time_format = "own"    # the clock of the file itself')
     else:
         stated = "the lines above the table say so" if period else unsure
         lines.append(f"sample_period_s = {period or 0.0!r}    # CHECK: {stated}")
+    stamped = time and form not in NUMERIC_TIMES and "%z" not in form
+    if stamped or (own is not None and own.start is not None and own.start.tzinfo is None):
+        lines.append('# timezone = "Europe/Berlin"    # of local times that change between summer and winter')
     joined = [" ".join(stamp) for stamp in zip(*(cells[name] for name in time), strict=True)]
     if len(set(joined)) < len(joined):
         several = next((name for name in names if name not in time and _tells_devices(name, joined, cells[name])), None)
@@ -242,13 +245,13 @@ def _draft_look(path: str, look: Look, taken: Sequence[str]) -> tuple[list[str],
                 f"{path}: each time stands there {len(joined) // len(set(joined))} times, and '{shorten(odd)}' jumps from row to row but hardly"
                 " changes from one time to the next: these are several gyros or channels. Write a file for each of them."
             )
-        twice = len(set(zip(*cells.values(), strict=True))) == len(set(joined))
-        kept = (
-            ("first", "some rows stand there twice")
-            if twice
-            else ("spread", "some times repeat; 'first' keeps one row")
-        )
-        lines.append('repeated_times = "{}"    # CHECK: {}'.format(*kept))
+        rows = zip(joined, zip(*cells.values(), strict=True), strict=True)
+        copies = [one[1] == two[1] for one, two in itertools.pairwise(rows) if one[0] == two[0]]
+        if copies:
+            kept = "first", "some rows stand there twice"
+            if not all(copies):
+                kept = "spread", "some times repeat; 'first' keeps one row"
+            lines.append('repeated_times = "{}"    # CHECK: {}'.format(*kept))
     lines.append("# clock_offset_s = 0.0    # added to this file's times: positive when its clock is behind")
     usable = {name: hints[name] for name in names if name not in time and numbers[name]}
     meanings = find_meanings(usable, taken) if look.header is not None else guess_meanings(usable, numbers)

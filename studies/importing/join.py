@@ -43,7 +43,7 @@ def import_records(paths: Sequence[str], import_map: LoadedMap, folder: str | No
     for number, (one, shift) in enumerate(zip(series, shifts, strict=True), 1):
         notes += [f"file {number}, {note}" for note in one.notes]
         if number > 1:
-            notes.append(f"file {number}, its time 0 is at {shift - begin:.6g} s of the record")
+            notes.append(f"file {number}, its first row is at {one.span[0] + shift - begin:.6g} s of the record")
         notes += [f"file {number}, {note}" for note in _report_gaps(one)]
         moved = one is not base or import_map.step is not None
         for column in one.file.columns:
@@ -181,7 +181,8 @@ def read_series(paths: Sequence[str], file: FileMap, folder: str | None = None) 
     for (name, _), values in columns.items():
         if all(np.isnan(values[k]).all() for k in portions(len(values))):
             raise InputError(f"{path}: the column for {name} holds no value in any of the {len(time)} rows.")
-    first = f"{_name_files(read.rows)}, {len(time)} rows {_name_clock(file)}"
+    end = "" if file.last_line is None else f" down to line {file.last_line}"
+    first = f"{_name_files(read.rows)}, {len(time)} rows{end} {_name_clock(file)}"
     notes = (first, *read.clock.notes, *order.notes, *read.empty, *told)
     return ClockedFile(file, path, time, read.clock.origin, columns, notes)
 

@@ -14,6 +14,7 @@ from studies.importing.sheets import EXCEL, read_sheet
 
 SEEN = 2000  # lines that are looked at
 HEAD = 1 << 24  # bytes
+FOOT = 50  # last lines
 
 
 @dataclass(frozen=True)
@@ -28,6 +29,7 @@ class Look:
     decimal: str
     kind: str
     group: Group | None = None
+    last: int | None = None  # line of the data, where others stand below it
 
     @property
     def names(self) -> list[str]:
@@ -50,13 +52,15 @@ def look_at(path: str) -> Look:
             return look_at_group(sort_groups(channels)[0])
     excel = Path(path).suffix.lower() in EXCEL
     if excel:
-        rows, encoding, separator = read_sheet(path, None)[:SEEN], "utf-8", ","
+        whole, encoding, separator = read_sheet(path, None), "utf-8", ","
+        rows, end, total = whole[:SEEN], whole[-FOOT:], len(whole)
     else:
         data = read_filled(path, HEAD)
         encoding = _find_encoding(path, data)
-        lines = decode(path, data, encoding).split("\n", SEEN)[:SEEN]
-        separator = _find_separator(lines)
-        rows = [_split(line, separator) for line in lines]
+        lines = decode(path, data, encoding).split("\n")
+        separator = _find_separator(lines[:SEEN])
+        rows, end = ([_split(line, separator) for line in part] for part in (lines[:SEEN], lines[-FOOT:]))
+        total = len(lines) if len(data) < HEAD else 0
     filled = max((k + 1 for row in rows for k, cell in enumerate(row) if cell.strip()), default=0)
     rows = [row[:filled] for row in rows]  # a spreadsheet writes separators of empty columns behind the last one
     decimal = "," if not excel and _has_decimal_commas(rows, separator) else "."
@@ -72,7 +76,21 @@ def look_at(path: str) -> Look:
         header = named[-2] if len(named) > 1 and _is_unit_line(rows[named[-1]]) else named[-1] if named else None
     if first is None or width < 2:
         raise InputError(f"{path}: no table with rows of two numbers or more was found; write the map by hand.")
-    return Look(encoding, separator, rows, header, first, decimal, "excel" if excel else "text")
+    last = _last_line(rows[first], end, total, decimal)
+    kind = "excel" if excel else "text"
+    return Look(encoding, separator, rows[:last], header, first, decimal, kind, last=last)
+
+
+def _last_line(first: Sequence[str], end: Sequence[Sequence[str]], total: int, decimal: str) -> int | None:
+    """Return the line after which a file has words where its first row has a reading; None where it ends with readings."""
+
+    def is_reading(cell: str) -> bool:
+        return as_number(cell, decimal) is not None or is_stamp(cell)
+
+    place = next(k for k, cell in enumerate(first) if is_reading(cell))
+    below = [row[place].strip() if place < len(row) else "" for row in end]
+    kept = max((k + 1 for k, cell in enumerate(below) if is_reading(cell)), default=0)
+    return total - len(end) + kept if total and kept and any(below[kept:]) else None
 
 
 def look_at_group(group: Group) -> Look:

@@ -69,7 +69,7 @@ class TextTable(RawTable):
         if len(bad):
             raise InputError(
                 f"{self.place(bad[0])}: '{shorten(text.iloc[bad[0]])}' in column '{column}' is not a"
-                f" number (decimal = '{self.decimal}', thousands = '{self.thousands}'); where it marks a missing value, add it to 'missing' in the map."
+                f" number (decimal = '{self.decimal}', thousands = '{self.thousands}'); where it marks a missing value, add it to 'missing' in the map; lines below the table are left out with last_line."
             )
         return values
 

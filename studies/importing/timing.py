@@ -7,13 +7,14 @@ from collections.abc import Mapping, Sequence
 
 from studies.importing.look import is_stamp
 from studies.importing.mapping import SECONDS
-from studies.importing.meaning import find_meanings
+from studies.importing.meaning import find_meanings, find_unit
 
 DATES = ("%Y-%m-%d", "%Y/%m/%d", "%d.%m.%Y", "%d/%m/%Y", "%m/%d/%Y", "%d.%m.%y", "%d/%m/%y", "%m/%d/%y")
 CLOCKS = ("%H:%M:%S", "%H:%M:%S.%f", "%H:%M")
 STAMPS = (*map(" ".join, itertools.product(DATES, CLOCKS)), "%m/%d/%Y %I:%M:%S %p", *CLOCKS[:2])
 TIME_WORDS = r"time|elapsed|zeit|date|datum|clock|stamp|uhr|^t$|^t\s*[ _/\[(]\s*[mµun]?s\b"
 UNIX_BY_SIZE = ((1e9, "unix-s"), (1e12, "unix-ms"), (1e15, "unix-us"), (1e18, "unix-ns"))
+HOUSING = "housing_temperature_degC"  # whose units no time has
 LONGEST_RUN = 1000.0  # days of a file whose times look like Excel's
 USUAL_STEP = (1e-3, 3600.0)  # s between rows
 
@@ -27,7 +28,7 @@ def find_time(
     evenly: bool = False,
 ) -> tuple[list[str], str, str]:
     """Return the time columns, their format and doubts; `evenly`: the file states its step, and a column that merely rises is no time."""
-    named = [name for name in names if re.search(TIME_WORDS, name.lower())]
+    named = [name for name in names if re.search(TIME_WORDS, name.lower()) and not find_unit(HOUSING, hints[name])]
     stamps = [name for name in names if cells[name] and all(is_stamp(cell) for cell in cells[name] if cell)]
     stamped = [name for name in (named or stamps) if name in stamps][:2]
     if stamped:
@@ -40,7 +41,7 @@ def find_time(
     rising = [name for name in names if _rises(numbers[name]) and name not in meant]
     if not named and (evenly or not rising):
         return [], "", "no column is a time; by how many seconds do the rows lie apart?"
-    time = named[0] if named else rising[0]
+    time = next((name for name in named if name in rising or _rises(numbers[name])), (named or rising)[0])
     unsure = "" if named else "no column is named time; the first increasing one was taken"
     values = numbers[time]
     first = values[0] if values else 0.0

@@ -103,8 +103,8 @@ def units_of(column: str) -> Mapping[str, Unit]:
 
 _SPELLINGS = (
     (r"degrees?|°|º", "deg"),
-    (r"℃|(deg)?celsius", "degC"),
-    (r"℉|(deg)?fahrenheit", "degF"),
+    (r"℃|(deg)?celsius|(?-i:^C$)", "degC"),
+    (r"℉|(deg)?fahrenheit|(?-i:^F$)", "degF"),
     (r"kelvin", "K"),
     (r"µ|μ|micro", "u"),
     (r"milli", "m"),

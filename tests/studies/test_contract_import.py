@@ -307,7 +307,7 @@ def test_a_regular_grid(tmp_path):
         (('encoding = "cp1252"', 'encoding = "utf-8"'), "cp1252 is common"),
         (('missing = ["---"]', "missing = []"), "line 10: '---'"),
         (('unit = "degC"', 'unit = "K"'), "check its unit"),
-        (('unit = "degC"', 'unit = "C"'), "known: degC, mdegC, K, degF"),
+        (('unit = "degC"', 'unit = "warm"'), "known: degC, mdegC, K, degF"),
         (("housing_temperature_degC", "housing_temp_degC"), "did you mean 'housing_temperature_degC'"),
         (("%d.%m.%Y", "%m.%d.%Y"), "is not a time"),
         (("data_line = 5", "data_line = 3"), "must follow"),
@@ -818,3 +818,41 @@ def test_portions_change_nothing(tmp_path, monkeypatch):
         assert whole.comments == parts.comments
         for name in whole.columns:
             np.testing.assert_allclose(parts[name], whole[name], rtol=1e-14, atol=0)
+
+
+@pytest.mark.parametrize("rows", [300, 2500])
+def test_lines_below_the_table_and_a_row_written_twice_in_a_repeated_hour(tmp_path, rows):
+    """A day on which clocks went back: the times of an hour stand twice in the file, and one row really does."""
+    begin = datetime.datetime(2025, 10, 26, 2, 50, tzinfo=ZoneInfo("Europe/Berlin")).timestamp()
+    stamps = [datetime.datetime.fromtimestamp(begin + 10 * k, ZoneInfo("Europe/Berlin")) for k in range(rows)]
+    body = [f"{s:%d.%m.%Y %H:%M:%S};{4430 + k % 30},5;{68 + k % 9},5" for k, s in enumerate(stamps)]
+    body.insert(5, body[4])
+    below = ["Ende der Messung;;", "Mittelwert;4444,5;71,2", ""]
+    raw = tmp_path / "raw.csv"
+    raw.write_text("\n".join(["Zeit;Frequenz [Hz];Gehäuse (F)", *body, *below]), encoding="utf-8")
+    record = draft_and_import(raw, tmp_path, ("# timezone", "timezone"))
+    assert record["time_s"].tolist() == [10.0 * k for k in range(rows)]
+    assert record["housing_temperature_degC"] == pytest.approx([(36.5 + k % 9) / 1.8 for k in range(rows)])
+
+
+def test_a_temperature_that_rises_is_no_time_and_local_stamps_of_the_file_may_have_a_zone(tmp_path):
+    h5py, pandas = pytest.importorskip("h5py"), pytest.importorskip("pandas")
+    with h5py.File(tmp_path / "lab.h5", "w") as file:
+        file["T"], file["time"], file["f"] = 293.15 + np.arange(50.0), 60.0 * np.arange(50), 4432.0 + np.arange(50)
+        file["T"].attrs["unit"], file["f"].attrs["unit"] = "K", "Hz"
+    record = draft_and_import(tmp_path / "lab.h5", tmp_path)
+    assert record["time_s"].tolist() == [60.0 * k for k in range(50)]
+    assert record["housing_temperature_degC"] == pytest.approx(20.0 + np.arange(50))
+    pytest.importorskip("pyarrow")
+    local = pandas.date_range("2026-03-29 00:30", periods=50, freq="10min", tz="Europe/Berlin").tz_localize(None)
+    pandas.DataFrame({"when": local, "frequency_Hz": 4432.0 + np.arange(50), "T_housing_F": 32.0 + 1.8 * np.arange(50)}).to_parquet(tmp_path / "lab.parquet")  # fmt: skip
+    record = draft_and_import(tmp_path / "lab.parquet", tmp_path, ("# timezone", "timezone"))
+    assert record["time_s"].tolist() == pytest.approx(600.0 * np.arange(50))
+    assert record["housing_temperature_degC"] == pytest.approx(np.arange(50.0))
+
+
+def test_lines_below_the_table_of_one_of_several_files_end_no_other(tmp_path):
+    for name, begin, below in (("a.csv", 0, "end;;\n"), ("b.csv", 300, "")):
+        lines = [f"{begin + k};{4432 + k % 7};{20 + k % 5}" for k in range(300)]
+        (tmp_path / name).write_text("\n".join(["time_s;frequency_Hz;T (C)", *lines, below]))
+    assert "last_line" not in draft_map([str(tmp_path / name) for name in ("a.csv", "b.csv")]).text
