@@ -307,7 +307,7 @@ def test_a_regular_grid(tmp_path):
         (('encoding = "cp1252"', 'encoding = "utf-8"'), "cp1252 is common"),
         (('missing = ["---"]', "missing = []"), "line 10: '---'"),
         (('unit = "degC"', 'unit = "K"'), "check its unit"),
-        (('unit = "degC"', 'unit = "warm"'), "known: degC, mdegC, K, degF"),
+        (('unit = "degC"', 'unit = "warm"'), "known: K, degC, degF, mK, mdegC"),
         (("housing_temperature_degC", "housing_temp_degC"), "did you mean 'housing_temperature_degC'"),
         (("%d.%m.%Y", "%m.%d.%Y"), "is not a time"),
         (("data_line = 5", "data_line = 3"), "must follow"),
