@@ -215,7 +215,11 @@ def _draft_look(path: str, look: Look, taken: Sequence[str]) -> tuple[list[str],
     numbers = {name: [n for c in cells[name] if (n := as_number(c, look.decimal)) is not None] for name in names}
     period = find_period([*above, *names])
     own = look.group.clock if look.group is not None else None
-    known = ([], "", "") if own is not None else find_time(names, cells, hints, numbers, look.decimal, evenly=period is not None)
+    known = (
+        ([], "", "")
+        if own is not None
+        else find_time(names, cells, hints, numbers, look.decimal, evenly=period is not None)
+    )
     time, form, unsure = known
     lines = _describe_notation(path, look)
     markers = find_markers(names, cells, time, look.decimal)
