@@ -178,7 +178,9 @@ def _observe(record: Record, start: float, named: Sequence[str], turning: bool, 
     most_blocks = int(np.clip(BLOCKS_PER_PERIOD * periods, most, 3 * most))
     time, width, columns = _fine_rows(record, (*named, HOUSING), most_rows)
     if len(time) < LEAST_ROWS:
-        raise InputError(f"{record.path}: {len(time)} rows are too few; a run needs at least {LEAST_ROWS}.")
+        raise InputError(
+            f"{record.path}: has {len(time)} of the {LEAST_ROWS} rows that a run needs at least; give a longer record."
+        )
     centre = time + 0.5 * float(np.median(np.diff(record["time_s"]))) if turning else time
     inner = replace(drive_by_record(record, time=np.minimum(centre, record["time_s"][-1])), start=start)
     holes: dict[int, float] = {}

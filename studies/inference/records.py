@@ -83,11 +83,15 @@ def make_ready(given: Sequence[Record]) -> Campaign:
 
 
 def _temperature_source(records: Sequence[Record]) -> str:
-    for name in (HOUSING, CHAMBER, RESONATOR):
-        if all(name in record and np.isfinite(record[name]).sum() > 1 for record in records):
+    names = (HOUSING, CHAMBER, RESONATOR)
+    told = [{name for name in names if name in own and np.isfinite(own[name]).sum() > 1} for own in records]
+    for name in names:
+        if all(name in own for own in told):
             return name
-    lacking = next((r for r in records if not any(n in r for n in (HOUSING, CHAMBER, RESONATOR))), records[0])
-    raise InputError(f"{lacking.path or 'record'}: {HOUSING} or {CHAMBER} is needed, the same in every record.")
+    lacking = next((record for record, own in zip(records, told, strict=True) if not own), records[0])
+    raise InputError(
+        f"{lacking.path or 'record'}: {HOUSING} or {CHAMBER} is needed, with two values or more, the same in every record."
+    )
 
 
 def _columns(record: Record, source: str) -> dict[str, Array]:

@@ -12,7 +12,7 @@ WHOLE = {
     "law.a3_per_K3": "cubic term of the frequency",
     "law.lag_s": "lag of the resonator behind its housing",
     "law.chamber_lag_s": "lag of the housing behind its chamber",
-    "law.delay_s": "delay of the resonator behind the housing sensor",
+    "law.delay_s": "delay of the resonator beside its lag",
     "law.bias_bend": "part of the bend of the frequency that the bias follows",
     "loss.inverse_q": "1/Q at the reference temperature",
     "loss.slope_per_K": "relative temperature slope of 1/Q",

@@ -37,7 +37,7 @@ def parse_chamber(words: str) -> Chamber:
             raise ValueError
     except ValueError:
         raise InputError(
-            f'--chamber "{words}": state the rate (K/min) and the temperature range (°C), as in "rate 3 range -40 85".'
+            f'--chamber "{words}": state the rate (K/min) and the temperature range (°C), as in "rate 3 range -40 85", the lower one first.'
         ) from None
     return Chamber(rate, low, high)
 

@@ -45,7 +45,12 @@ class LawKeys(Keys, frozen=True, kw_only=True):
     capacity_ratio: Annotated[float, number("heat capacity of the resonator over that of the lump before it", above=0.0, most=10.0, sd=0.3)] | None = None  # fmt: skip
     capacity_slope_per_K: Annotated[float, number("relative, of the resonator's heat capacity; about 2e-3 of fused silica", least=-5e-3, most=5e-3, sd=1e-3)] | None = None  # fmt: skip
     chamber_lag_s: Annotated[float, number("of the housing behind its chamber", above=0.0, relative_sd=1.0)] = 600.0
-    delay_s: Annotated[float, number("beside the resonator's lag, less that of the housing's sensor", sd=10.0)] = 0.0
+    delay_s: Annotated[
+        float,
+        number(
+            "beside the resonator's lag; where noise.housing_lag_s is 0, less the lag of the housing's sensor", sd=10.0
+        ),
+    ] = 0.0
     bias_bend: Annotated[float, number("part of the bend of f that the bias follows: 1 f, eq. 21; 0 T", sd=0.5)] = 1.0
     note: Note = ""
 
