@@ -27,11 +27,12 @@ REPEATED, ROUNDING = 0.5, 1.3
 
 @dataclass(frozen=True)
 class Leftover:
-    """What is left of one response: in which input, with how much log evidence, and the part of the structure that is explained."""
+    """What is left of one response: in which input, with how much log evidence, the part of the structure that is explained, and the forms looked for."""
 
     input: str
     evidence: float
     share: float
+    forms: int
     line: Line | None = None
 
     @property
@@ -41,8 +42,8 @@ class Leftover:
 
     @property
     def doubtful(self) -> bool:
-        """Whether it is more than noise leaves, though perhaps too little to be called structure."""
-        return self.evidence > CONSTANTS["margin"]
+        """Whether it is more than noise leaves, the likeliest of so many forms, though perhaps too little to be called structure."""
+        return self.evidence > CONSTANTS["margin"] + np.log(self.forms)
 
 
 def doubt_of(input_: str, evidence: float) -> str:
@@ -71,7 +72,8 @@ def look(
     before = Background(plain.linear if isinstance(plain, Model) else search.linear, plain.terms, final.noise)
     found = {}
     for name in search.linear.responses:
-        best = max((one for one in seen if one.term.response == name), key=lambda one: one.gain)
+        mine = [one for one in seen if one.term.response == name]
+        best = max(mine, key=lambda one: one.gain)
         word, smooth = best.term.effect.name, best.gain
         if search.linear.rows[name].slow_share(final.noise[name]) > SUSPICIOUS:
             instead = _instead_of_noise(search, bank, final, name)
@@ -97,7 +99,7 @@ def look(
             share = min(share, gained / max(gained + evidence, 1e-9))
         if name in rows and is_rounding(search.linear.problem, name, rows[name]):
             word, evidence, line = "the last digit of the readings", min(evidence, 0.0), None
-        found[name] = Leftover(word, float(evidence), share, line)
+        found[name] = Leftover(word, float(evidence), share, len(mine), line)
     return found
 
 

@@ -75,7 +75,7 @@ def _judge(
         return "not-identifiable", apart
     if slow > CONSTANTS["wander_usual"]:
         return "not-identifiable", (
-            f"the slow part of the residual is {slow:.2g} times {SLOW_THAN[found.card.polynomial is None]}: these records cannot"
+            f"the slow part of the residual is {slow:.2g} times {SLOW_THAN[_stated(found, name) is not None]}: these records cannot"
             " distinguish slow noise from a cause that acts slowly"
         )
     if terms or mine:
@@ -152,8 +152,8 @@ def _apart(found: Inferred, name: str) -> str:
 
 def _slow(found: Inferred, name: str) -> float:
     """What is left of a response over the scatter of neighbouring rows and what the card states of slow noise."""
-    rows = found.rows[name]
-    if found.card.polynomial is not None:  # nothing is stated: over the changes within minutes
+    rows, stated = found.rows[name], _stated(found, name)
+    if stated is None:  # over the changes within minutes
         level = found.search.linear.rows[name]
         rest = found.background.residual(name)
         apart = max(1, round(BRIEF / level.span))
@@ -161,9 +161,13 @@ def _slow(found: Inferred, name: str) -> float:
         change = float(np.mean(changes**2)) if len(changes) else 0.0
         brief = float(np.hypot(white_rms(*rows.residual), np.sqrt(change / 2.0)))
         return rows.rms / max(MINUTES * brief, 1e-300)
-    stated = stated_noise(found.card.noise, name) or Noise(0.0)
-    slow = noise_rms(found.fit, name, replace(stated, white=0.0, offset=0.0))
+    slow = noise_rms(found.fit, name, replace(stated, offset=0.0))
     return rows.rms / max(float(np.hypot(white_rms(*rows.residual), slow)), 1e-300)
+
+
+def _stated(found: Inferred, name: str) -> Noise | None:
+    """Slow noise of a response that a card states."""
+    return stated_noise(found.card.noise, name) if found.card.polynomial is None else None
 
 
 def is_slow(found: Inferred, name: str) -> bool:

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from compensation.noise import Noise
 from studies.calibration.apart import APART
 from studies.cli import main
 from studies.effects import find_effect
@@ -198,3 +199,25 @@ def test_what_has_not_converged_is_no_card(shipped, tmp_path, capsys, monkeypatc
     assert json.loads(out)["extended_model"] is None
     assert "not saved" in err
     assert not (tmp_path / "out.toml").exists()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [1, 2])
+def test_slow_noise_of_a_loss_of_which_the_card_states_none_is_noise(seed):
+    """A card has no key for it: a walk of 1/Q of three times its white noise left a healthy gyro unexplained."""
+    card, random = load_card("hrg-30mm"), np.random.default_rng(seed)
+    records = []
+    for k, words in enumerate(("staircase 20 -10 15 75min", "soak 20 12h")):
+        record = simulate_run(card, load_profile(words), 1 / 60, 10 * seed + k).record
+        wander = 1.0 + Noise(walk=1e-4).draw(len(record), 1 / 60, random)
+        records.append(replace(record.with_columns({"inverse_q": record["inverse_q"] * wander}), path=f"{k}.csv"))
+    found = diagnose_records(records, card).verdict
+    assert found.responses["inverse_q"].verdict == "adequate"
+    assert not [cause for cause in found.causes if cause.response == "inverse_q"]
+
+
+def test_the_likeliest_of_many_forms_is_no_doubt():
+    """Of 40 healthy gyros this one left the most, an evidence of 9.8: the likeliest of ten forms in noise alone."""
+    card = load_card("bvg-bell")
+    record = simulate_run(card, load_profile("staircase 20 -10 15 75min"), ROW, 12600).record
+    assert diagnose_records([record], card).verdict.verdict == "adequate"
