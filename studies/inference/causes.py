@@ -114,6 +114,10 @@ def parameters_of(background: Background, signatures: Signatures, k: int) -> dic
             half = min(NINETY * sd, float(np.log(parameter.high / max(parameter.low, 1e-9 * parameter.high))))
             ends = np.clip(value * np.exp([-half, half]), parameter.low, parameter.high)
             out[parameter.name] = Interval(value, float(min(ends[0], value)), float(max(ends[1], value)))
+        elif parameter.name == "time_s":  # between two rows nothing tells the moment
+            times, _ = background.linear.problem.runs[int(term.shape[0])].own_rows[term.response]
+            half = NINETY * sd + 0.5 * float(np.median(np.diff(times)))
+            out[parameter.name] = Interval(value, value - half, value + half)
         else:
             out[parameter.name] = Interval.about(value, sd)
     begin = 0

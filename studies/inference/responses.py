@@ -7,7 +7,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from compensation.noise import Noise, white_rms
-from studies.calibration.ladder import noise_rms
 from studies.calibration.noise_levels import LASTING, stated_noise
 from studies.diagnosis.constants import CONSTANTS
 from studies.diagnosis.response import RESPONSES
@@ -152,17 +151,18 @@ def _apart(found: Inferred, name: str) -> str:
 
 def _slow(found: Inferred, name: str) -> float:
     """What is left of a response over the scatter of neighbouring rows and what the card states of slow noise."""
-    rows, stated = found.rows[name], _stated(found, name)
+    rows, stated, level = found.rows[name], _stated(found, name), found.search.linear.rows[name]
     if stated is None:  # over the changes within minutes
-        level = found.search.linear.rows[name]
         rest = found.background.residual(name)
         apart = max(1, round(BRIEF / level.span))
         changes = np.concatenate([rest[own][apart:] - rest[own][:-apart] for own in level.slices])
         change = float(np.mean(changes**2)) if len(changes) else 0.0
         brief = float(np.hypot(white_rms(*rows.residual), np.sqrt(change / 2.0)))
         return rows.rms / max(MINUTES * brief, 1e-300)
-    slow = noise_rms(found.fit, name, replace(stated, offset=0.0))
-    return rows.rms / max(float(np.hypot(white_rms(*rows.residual), slow)), 1e-300)
+    quiet = replace(stated, offset=0.0)  # a walk moves the level of a run too
+    slow = np.concatenate([np.diag(level.covariance(run, quiet)) for run in range(len(level.times))])
+    usual = np.average(slow, weights=np.concatenate(level.spans)) + white_rms(*rows.residual) ** 2
+    return rows.rms / max(float(np.sqrt(usual)), 1e-300)
 
 
 def _stated(found: Inferred, name: str) -> Noise | None:
