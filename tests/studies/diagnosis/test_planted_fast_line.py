@@ -47,8 +47,8 @@ def test_without_a_line_the_blocks_are_the_usual_ones_and_what_is_left_decides()
     doubt = 4.0 + np.log(left.forms)  # the best of so many Bayes factors is above it in one of fifty
     states = [
         replace(found, left={"frequency_Hz": replace(left, evidence=evidence)}).verdict.verdict
-        for evidence in (doubt - 0.1, doubt + 0.1, 11.9, 12.1)  # nothing is said to be adequate beside more than noise leaves
-    ]
+        for evidence in (doubt - 0.1, doubt + 0.1, 11.9, 12.1)
+    ]  # nothing is said to be adequate beside more than noise leaves
     assert states == ["adequate", "not-identifiable", "not-identifiable", "unexplained"]
 
 
