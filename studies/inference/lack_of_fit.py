@@ -43,7 +43,7 @@ class Leftover:
     @property
     def doubtful(self) -> bool:
         """Whether it is more than noise leaves, the likeliest of so many forms, though perhaps too little to be called structure."""
-        return self.evidence > CONSTANTS["margin"] + np.log(self.forms)
+        return self.evidence > CONSTANTS["margin"] + float(np.log(self.forms))
 
 
 def doubt_of(input_: str, evidence: float) -> str:
