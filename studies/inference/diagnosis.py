@@ -33,7 +33,7 @@ from studies.inference.heat_path import (
     slow_share,
     with_second_mass,
 )
-from studies.inference.held_out import Kept, Model, Rows
+from studies.inference.held_out import Kept, Model, Rows, Unseen
 from studies.inference.housing import evidence_of, set_housing_apart
 from studies.inference.inferred import Inferred
 from studies.inference.lack_of_fit import generic_bank, is_rounding, look
@@ -201,7 +201,12 @@ def infer(card: "Instrument", campaign: Campaign, progress: Report = lambda _: N
     if path is not None:
         card, found = path.card, path.fit
     progress("held-out rows")
+    named = bool(outcome.final.terms)
     outcome, held, rows = _confirmed(search, outcome, plain, (calibrated, blocks), path is not None)
+    if named and not outcome.final.terms and path is None:  # the values are those of the card alone again
+        search = Search(plain.linear, paths, alone, progress=progress)
+        none, _ = search.grow(most=0)
+        outcome = Outcome(none, none, (), ())
     progress("lack of fit")
     without, levelled = outcome.plain, outcome.final
     for name in search.linear.responses:
@@ -247,7 +252,7 @@ def _confirmed(
     events = any(term.effect.event for term in outcome.final.terms)
     by_record = len(search.linear.problem.runs) > 1 and not events
     alone = calibrated if longer else _left_by(plain) or calibrated
-    before = plain.held_out(by_record, alone[0])
+    before = {by_record: plain.held_out(by_record, alone[0])}
     given_up: set[tuple[str, str]] = set()
     while True:
         final = outcome.final
@@ -256,22 +261,40 @@ def _confirmed(
         more = bool(final.terms) or longer
         told = _left_by(model) if more else alone
         rows, blocks = told or alone
-        after = model.held_out(by_record, rows) if more else before
+        held = _held_out(plain, alone[0], model if more else plain, rows, by_record, before)
         weak = [
             k
             for k, name in enumerate(term.response for term in final.terms)
             if told is None
-            or _worse(*before[name].beside(after[name]))
+            or _worse(*held[name])
             or beside.size(name, blocks) > beside.size(name, alone[1])
             or (final.score - outcome.without[k].score < FAINT and not beside.sized(k))
             or is_rounding(search.linear.problem, name, alone[0][name])
             or only_apart(search, outcome, k)
         ]
         if not weak:
-            return outcome, {name: before[name].beside(after[name]) for name in before}, rows
+            return outcome, held, rows
         gone = min(weak, key=lambda k: final.score - outcome.without[k].score)
         given_up.add(final.terms[gone].key)
         outcome = _in_place(search, outcome, gone, given_up) or _left_out(search, outcome, gone)
+
+
+def _held_out(
+    plain: Model,
+    alone: Mapping[str, Rows],
+    model: Model,
+    rows: Mapping[str, Rows],
+    by_record: bool,
+    before: dict[bool, dict[str, Unseen]],
+) -> dict[str, tuple[float | None, float | None]]:
+    """Return the rms of rows that were held out, of both models: of runs; of blocks in time where the other runs tell too few of its rows."""
+    if by_record not in before:
+        before[by_record] = plain.held_out(by_record, alone)
+    after = before[by_record] if model is plain else model.held_out(by_record, rows)
+    found = {name: own.beside(after[name]) for name, own in before[by_record].items()}
+    few = [name for name, own in found.items() if by_record and own[0] is None]
+    blocks = _held_out(plain, alone, model, rows, False, before) if few else {}
+    return found | {name: blocks[name] for name in few}
 
 
 def _left_by(model: Model) -> Left | None:

@@ -21,7 +21,7 @@ KNOWN = 1.0
 """Standard deviation of a prediction, in parts of the noise, up to which the rest of the records predict a row."""
 CARRIED_OFF = 2.0
 """Standard deviations by which slow noise carries a whole run off at most."""
-FEWEST = 0.5
+FEWEST = 2 / 3
 """Part of the rows from which on they speak for the records."""
 
 
