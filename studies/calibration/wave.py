@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 ANISOTROPY, AXIS = "bias.damping_anisotropy", "bias.damping_axis_deg"
 PER_DEGREE = np.radians(4.0)
+PERIOD = 90.0  # of an axis, °
 POINTS = 601  # of the plane, along each principal axis
 REACH = 6.0  # standard deviations, to each side
 FIVE, NINETY_FIVE = 0.05, 0.95
@@ -103,7 +104,8 @@ class WavePrior:
         log = np.log(A / self.length.value)
         likely = pull[0] * x + pull[1] * y - (strength[0] * p**2 + strength[1] * q**2) / 2
         if self.sd is None:
-            polar = likely - (log * self.length.value / self.length.sd) ** 2 / 2 - (angle / self.axis.sd) ** 2 / 2
+            turned = [-(((angle + turn) / self.axis.sd) ** 2) / 2 for turn in (-PERIOD, 0.0, PERIOD)]
+            polar = likely - (log * self.length.value / self.length.sd) ** 2 / 2 + np.logaddexp.reduce(turned)
         else:
             polar = likely - (prior[0, 0] * x**2 + prior[1, 1] * y**2) / 2 - prior[0, 1] * x * y + 2 * log
         inside = (A >= self.length.low) & (A <= self.length.high)

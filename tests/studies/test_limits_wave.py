@@ -24,7 +24,7 @@ def test_length_and_axis_are_what_draws_that_agree_with_the_data_say(priors, x, 
     wave, rng = priors.wave, np.random.default_rng(3)
     mean, spread_a, _ = wave.moments
     A = wave.length.value * np.exp(rng.standard_normal(1_000_000) * wave.length.sd / wave.length.value)
-    axis = wave.axis.sd * rng.standard_normal(A.size)
+    axis = (wave.axis.sd * rng.standard_normal(A.size) + 45.0) % 90.0 - 45.0
     seen = (A * np.cos(axis * PER_DEGREE) - mean) / spread_a
     weight = np.exp(-(((seen - x) / sd) ** 2) / 2)
     information = np.diag([1 / sd**2, 0.0])

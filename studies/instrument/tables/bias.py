@@ -30,7 +30,9 @@ class Bias(Keys, frozen=True, kw_only=True):
 
     offset_deg_per_h: Annotated[float, number("at the reference temperature", sd=10.0)] = 0.0
     damping_anisotropy: Annotated[float, number("Δ(1/τ) over the mean 1/τ = π f/Q", least=0.0, relative_sd=1.0)] = 0.01
-    damping_axis_deg: Annotated[float, number("θ_τ; ± 13 means unknown (its period is 45°)", sd=13.0)] = 0.0
+    damping_axis_deg: Annotated[
+        float, number("θ_τ, of most damping; ± 26 means unknown (its period is 90°)", sd=26.0)
+    ] = 0.0
     pattern_angle_deg: Annotated[float, number("θ of the standing wave, as commanded")] = 22.5
     k1_deg_per_h_per_Hz: Annotated[float, number("of f, the change of frequency from the reference", sd=1.0)] = 0.0
     k2_deg_per_h_per_Hz2: Annotated[float, number("of f²", sd=0.1)] = 0.0
