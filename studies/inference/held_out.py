@@ -21,7 +21,7 @@ KNOWN = 1.0
 """Standard deviation of a prediction, in parts of the noise, up to which the rest of the records predict a row."""
 CARRIED_OFF = 2.0
 """Standard deviations by which slow noise carries a whole run off at most."""
-FEWEST = 2 / 3
+FEWEST = 0.5
 """Part of the rows from which on they speak for the records."""
 
 
@@ -55,6 +55,10 @@ class Unseen:
         """Join parts."""
         residuals, masks = zip(*parts, strict=True) if parts else ((np.empty(0),), (np.empty(0, dtype=bool),))
         return cls(np.concatenate(residuals), np.concatenate(masks))
+
+    def beyond(self, told: Mask, other: "Unseen") -> "Unseen":
+        """The same, with the rows that are not `told` as held out in another way."""
+        return Unseen(np.where(told, self.residual, other.residual), told | other.known)
 
     def beside(self, other: "Unseen") -> tuple[float | None, float | None]:
         """Return the rms of both on the rows that both can predict; None where these are too few."""
@@ -219,7 +223,7 @@ class Model:
 
     def _by_block(self, whole: Array, rows: Mapping[str, Rows]) -> "dict[str, Unseen]":
         tau, every = self.signatures.span.tau, np.arange(len(whole))
-        parts: dict[str, list[tuple[Array, Mask]]] = {name: [] for name in rows}
+        found = {name: [(own.copy(), np.zeros(len(own), dtype=bool)) for own in rows[name].residual] for name in rows}
         for block in range(BLOCKS):
             keep = {
                 name: [_outside(self.problem.runs[part.run].responses[name].time, block, tau) for part in self.problem.members(name)]
@@ -232,8 +236,9 @@ class Model:
                 known = self._known(name, C, every) if trained else blocks
                 for k, (t, rest) in enumerate(zip(rows[name].time, self._moved(rows, name, mean - whole), strict=True)):
                     inside = ~_outside(t, block, 0.0)
-                    parts[name].append((rest[inside], self._near(name, k, t, known)[inside]))
-        return {name: Unseen.of(own) for name, own in parts.items()}
+                    for own, block_of in zip(found[name][k], (rest, self._near(name, k, t, known)), strict=True):
+                        own[inside] = block_of[inside]
+        return {name: Unseen.of(own) for name, own in found.items()}
 
 
 def on_rows(rows: Array, time: Array, values: Array) -> Array:
