@@ -71,23 +71,28 @@ class Grid:
         near[0], far[0] = near[0] + far[0] / 2, far[0] / 2  # over a half: to the middle of the straight line
         return decay, near[:, None] * MEAN_LINE[0] + far[:, None] * MEAN_LINE[1]
 
-    def answer(self, power: Array, start: Array) -> Array:
-        """Temperatures at all moments, (3, K, p, n), for power (W) at all moments, from `start` (p, n)."""
-        return np.asarray(self._states(power @ self.modes.shapes, start) @ self.modes.shapes.T)
+    def answer(self, power: Array, start: Array) -> tuple[Array, Array]:
+        """Temperatures at all moments, (3, K, p, n), for power (W) at all moments, from `start` (p, n), and the amplitudes of the modes."""
+        states = self._states(power @ self.modes.shapes, self._modal(start))
+        return np.asarray(states @ self.modes.shapes.T), states
 
-    def rates(self, power: Array, start: Array) -> Array:
+    def rates(self, power: Array, states: Array) -> Array:
         """Rates (K/s) of the same temperatures."""
-        u = power @ self.modes.shapes
-        return np.asarray((u - self._states(u, start) / self.modes.time_constants) @ self.modes.shapes.T)
+        return np.asarray((power @ self.modes.shapes - states / self.modes.time_constants) @ self.modes.shapes.T)
 
-    def _forced(self, u: Array) -> Array:
-        """What power in the modes, (3, K, p, n), makes over a half and over a whole interval, (2, K, p, n)."""
-        return np.asarray(sum(w[:, :, None] * own for w, own in zip(self._weights[1].swapaxes(0, 1), u, strict=True)))
+    def _modal(self, temperature: Array) -> Array:
+        """Amplitudes of the modes in temperatures, (p, n)."""
+        return np.asarray((temperature * self.modes.capacity) @ self.modes.shapes)
 
-    def _states(self, u: Array, start: Array) -> Array:
-        """Amplitudes of the modes at all moments, for the power in each of them."""
-        (decay2, decay), (half, whole) = self._weights[0], self._forced(u)
-        x = scan(decay, whole, (start * self.modes.capacity) @ self.modes.shapes)
+    def _forced(self, u: Array, modes: slice = slice(None)) -> Array:
+        """What power in some modes, (3, K, p, m), makes over a half and over a whole interval, (2, K, p, m)."""
+        weights = self._weights[1][..., modes].swapaxes(0, 1)
+        return np.asarray(sum(w[:, :, None] * own for w, own in zip(weights, u, strict=True)))
+
+    def _states(self, u: Array, start: Array, modes: slice = slice(None)) -> Array:
+        """Amplitudes of some modes at all moments, for the power in each of them."""
+        (decay2, decay), (half, whole) = self._weights[0][..., modes], self._forced(u, modes)
+        x = scan(decay, whole, start)
         return np.array([x[:-1], decay2[:, None] * x[:-1] + half, x[1:]])
 
     def answer_with(self, power: Array, feedback: Array, start: Array) -> tuple[Array, Array]:
@@ -96,9 +101,10 @@ class Grid:
         Modes that fade `PROMPT`ly are fed by the slow ones; what they feed back is of second order, 1e-6 of a slope.
         """
         shapes, (decay, weights) = self.modes.shapes, self._weights
-        u, start = power @ shapes, (start * self.modes.capacity) @ shapes
+        u, start = power @ shapes, self._modal(start)
         n = int(np.sum(self.modes.time_constants > PROMPT * self.length.max()))
-        x, gain, forced, now = np.empty_like(u), np.empty_like(u), self._forced(u)[..., :n], start[:, :n]
+        x, gain, now = np.empty_like(u), np.empty_like(u), start[:, :n]
+        forced = self._forced(u[..., :n], slice(n))
         for first in range(0, u.shape[1], INTERVALS):
             at = slice(first, first + INTERVALS)
             F = shapes[:, :n].T @ feedback[:, at] @ shapes
@@ -113,7 +119,7 @@ class Grid:
                 x[:, k, :, :n] = now, after[:, :n], after[:, n:]
                 now = after[:, n:]
             gain[:, at] = u[:, at] + x[:, at, :, :n] @ F
-        x[..., n:] = self._states(gain, start)[..., n:]
+        x[..., n:] = self._states(gain[..., n:], start[:, n:], slice(n, None))
         return x, gain - x / self.modes.time_constants
 
 
@@ -171,11 +177,12 @@ def run_sweeps(
     T, delta, rate = T1, np.zeros_like(T1), np.zeros_like(T1)
     for _ in range(MOST_SWEEPS if not network.is_linear else 0):
         beyond = _beyond(network, linear, T, held, power)[:, :, None]
-        delta = grid.answer(beyond, start)[:, :, 0]
+        answer, states = grid.answer(beyond, start)
+        delta = answer[:, :, 0]
         last, T = T, T1 + delta
         change = np.abs(T - last).max()
         if change < SWEEP_TOLERANCE:
-            rate = grid.rates(beyond, start)[:, :, 0]
+            rate = grid.rates(beyond, states)[:, :, 0]
             break
         if not change < 1e4:
             raise SweepError("the radiation is too strong to be swept; integrate the network instead.")

@@ -102,7 +102,7 @@ def fit(problem: CardProblem, start: Array | None = None, progress: Progress = l
             found = (
                 marginal_noise(problem, rows, state, noise, waited > PATIENCE)
                 if straight
-                else residual_noise(problem, rows, state)
+                else residual_noise(problem, rows, state, noise)
             )
             noise = found if waited <= PATIENCE else {name: larger_noise(noise[name], found[name]) for name in found}
         if straight:
@@ -126,11 +126,11 @@ def fit(problem: CardProblem, start: Array | None = None, progress: Progress = l
 def at_point(found: CardFit, point: Array) -> CardFit:
     """A fit as it would begin at another point, its outliers being what stands out there."""
     problem, state = found.problem, found.problem.evaluate(point)
-    rows = dict(problem.rows)
+    rows, noise = dict(problem.rows), residual_noise(problem, problem.rows, state, {})
     for _ in range(2):  # outliers hide others as long as they are noise
-        noise = residual_noise(problem, rows, state)
         rows = {n: spare_outliers(problem.rows[n], state.residual[n], noise[n])[0] for n in problem.responses}
-    return replace(found, state=state, noise=residual_noise(problem, rows, state), rows=rows)
+        noise = residual_noise(problem, rows, state, noise)
+    return replace(found, state=state, noise=noise, rows=rows)
 
 
 def covariance_at(problem: Problem, state: State, noise: Mapping[str, Noise], rows: Mapping[str, NoiseRows]) -> Array:

@@ -23,9 +23,12 @@ UNSEEN = 0.1  # of the noise of one row: a column whose whole length is less tel
 LASTING = ("frequency_Hz", "inverse_q")  # responses without an offset of turn-on
 
 
-def residual_noise(problem: CardProblem, rows: Mapping[str, NoiseRows], state: State) -> dict[str, Noise]:
-    """Noise that the residuals would be as they are: far from the values, a straight line promises what no step keeps."""
-    return {n: _levels(problem, rows[n].coarse, n, rows[n].means(state.residual[n])) for n in problem.responses}
+def residual_noise(
+    problem: CardProblem, rows: Mapping[str, NoiseRows], state: State, near: Mapping[str, Noise]
+) -> dict[str, Noise]:
+    """Noise that the residuals would be as they are, looked for `near` another: far from the values, a straight line promises what no step keeps."""
+    means = {n: rows[n].means(state.residual[n]) for n in problem.responses}
+    return {n: _levels(problem, rows[n].coarse, n, own, near=near.get(n)) for n, own in means.items()}
 
 
 def marginal_noise(
