@@ -78,9 +78,10 @@ def _check_temperatures(instrument: "Instrument", record: "Record", as_read: "Le
         if needed < LIKELY**2 < _needed(instrument, record, changes, whole) - needed:
             right = columns[COLUMN["housing"] if COLUMN["housing"] in names else names[0]]
             wrong = [one for one in names if _apart(columns[one], right) <= _apart(record[one], right)]
+            reversed_too = ", or frequency_Hz if its changes are reversed" if "sign" in words else ""
             raise InputError(
                 f"{record.path}: frequency_Hz does not follow the temperatures as the card predicts, unless they are read {words}:"
-                f" {other:.2g} Hz of its {changes:.2g} Hz (rms) then remain. Correct {' and '.join(wrong)}."
+                f" {other:.2g} Hz of its {changes:.2g} Hz (rms) then remain. Correct {' and '.join(wrong)}{reversed_too}."
             )
 
 
