@@ -24,6 +24,7 @@ PER_DEGREE = np.radians(4.0)
 PERIOD = 90.0  # of an axis, °
 POINTS = 601  # of the plane, along each principal axis
 REACH = 6.0  # standard deviations, to each side
+EDGE = 1e-9  # of the half period: an axis so near its end lies at both, not where rounding puts it
 FIVE, NINETY_FIVE = 0.05, 0.95
 
 
@@ -116,13 +117,15 @@ class WavePrior:
         spread = self.length.sd / self.length.value
         middle = np.array([(weight * x).sum(), (weight * y).sum()])
         away = np.array([x - middle[0], y - middle[1]])
+        edge = np.abs(angle) > PERIOD / 2 * (1 - EDGE)
+        both, shares = np.append(angle, -angle[edge]), np.append(np.where(edge, 0.5, 1.0) * weight, weight[edge] / 2)
         return WavePosterior(
             _summed(A, weight, float(A[best]), _deviation(log, weight) / spread),
             _summed(
-                self.axis.value + angle,
-                weight,
+                self.axis.value + both,
+                shares,
                 self.axis.value + float(angle[best]),
-                _deviation(angle, weight) / self.axis.sd,
+                _deviation(both, shares) / self.axis.sd,
             ),
             np.array([x[best], y[best]]),
             middle,

@@ -38,6 +38,13 @@ def test_length_and_axis_are_what_draws_that_agree_with_the_data_say(priors, x, 
     assert float(np.sum(weight * seen) / weight.sum()) == pytest.approx(found.mean[0], abs=0.02)
 
 
+@pytest.mark.parametrize("turned", [0.0, 1e-14, -1e-14])
+def test_an_axis_of_which_nothing_is_known_has_ends_alike(priors, turned):
+    """Rounding put all axes at 45° on one side: −37.3 … 36.4 on one processor, −36.4 … 37.3 on another."""
+    found = priors.wave.posterior(np.array([[0.25, turned], [turned, 0.0]]), np.zeros(2), np.eye(2))
+    assert found.axis.low == pytest.approx(-found.axis.high, abs=0.01)
+
+
 def test_derivatives_by_the_components_are_those_of_length_and_axis(priors):
     u = 0.3 * np.random.default_rng(1).standard_normal(len(priors.values))
     slopes = priors.slopes(u)
