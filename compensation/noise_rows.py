@@ -116,6 +116,10 @@ class NoiseRows:
         np.einsum("ii->i", total)[:] += noise.white**2 * self.stretch[run] / self.spans[run]
         return total
 
+    def variances(self, noise: Noise) -> Array:
+        """Variance of every row."""
+        return np.concatenate([np.diag(self.covariance(run, noise)) for run in range(len(self.times))])
+
     def whiten(self, columns: Array, noise: Noise) -> Array:
         """Return stacked columns, (M,) or (M, p), in which this noise is white of variance 1: L⁻¹ of Σ = L Lᵀ."""
         return self.whitener(noise)(columns)

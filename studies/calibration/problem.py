@@ -184,7 +184,7 @@ class CardProblem:
 
     def predictions(self, point: Array, slopes: bool = True) -> Iterator[Prediction]:
         """Yield what is predicted of every part."""
-        varied = self._varied(point)
+        varied = self.varied(point)
         for k, part in enumerate(self.parts):
             names = [*self.priors.names, *(name for one, name, _ in self.starts if one == k)] if slopes else []
             drive, wanted, here = self.drive_at(point, k), varied.with_names(names), varied.here
@@ -202,7 +202,7 @@ class CardProblem:
                 if slopes:
                     slope[name].append(self._slopes(k, name, prediction, scale))
         if self.tables:
-            varied = self._varied(point)
+            varied = self.varied(point)
             law = varied.here.law
             for table in self.tables:
                 residual[SETTLED].append(table.frequency - law.frequency(table.temperature, extrapolate=True))
@@ -214,7 +214,8 @@ class CardProblem:
             {name: np.concatenate(found) for name, found in slope.items()} if slopes else {},
         )
 
-    def _varied(self, point: Array) -> Variations:
+    def varied(self, point: Array) -> Variations:
+        """Return the instrument with the values of a point, its law and damping, and its neighbours."""
         instrument = self.instrument_at(point)
         return Variations(instrument, self.law_at(instrument), self.priors.names)
 

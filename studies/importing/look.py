@@ -64,7 +64,7 @@ def look_at(path: str) -> Look:
     filled = max((k + 1 for row in rows for k, cell in enumerate(row) if cell.strip()), default=0)
     rows = [row[:filled] for row in rows]  # a spreadsheet writes separators of empty columns behind the last one
     decimal = "," if not excel and _has_decimal_commas(rows, separator) else "."
-    numeric = [sum(as_number(cell, decimal) is not None or is_stamp(cell) for cell in row) for row in rows]
+    numeric = [sum(_is_reading(cell, decimal) for cell in row) for row in rows]
     width = max(
         (len(row) for row, count in zip(rows, numeric, strict=True) if 2 * count >= len(row) and count), default=0
     )
@@ -83,13 +83,9 @@ def look_at(path: str) -> Look:
 
 def _last_line(first: Sequence[str], end: Sequence[Sequence[str]], total: int, decimal: str) -> int | None:
     """Return the line after which a file has words where its first row has a reading; None where it ends with readings."""
-
-    def is_reading(cell: str) -> bool:
-        return as_number(cell, decimal) is not None or is_stamp(cell)
-
-    place = next(k for k, cell in enumerate(first) if is_reading(cell))
+    place = next(k for k, cell in enumerate(first) if _is_reading(cell, decimal))
     below = [row[place].strip() if place < len(row) else "" for row in end]
-    kept = max((k + 1 for k, cell in enumerate(below) if is_reading(cell)), default=0)
+    kept = max((k + 1 for k, cell in enumerate(below) if _is_reading(cell, decimal)), default=0)
     return total - len(end) + kept if total and kept and any(below[kept:]) else None
 
 
@@ -160,6 +156,10 @@ def as_number(cell: str, decimal: str) -> float | None:
     """Return the number that a cell holds, None where it holds something else."""
     text = cell.strip().replace(parting(cell, decimal), "").replace(decimal, ".")
     return float(text) if re.fullmatch(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,2})?", text) else None
+
+
+def _is_reading(cell: str, decimal: str) -> bool:
+    return as_number(cell, decimal) is not None or is_stamp(cell)
 
 
 def is_stamp(cell: str) -> bool:

@@ -33,7 +33,7 @@ from studies.inference.heat_path import (
     slow_share,
     with_second_mass,
 )
-from studies.inference.held_out import Kept, Model, Rows, Unseen
+from studies.inference.held_out import HeldOut, Kept, Model, Rows
 from studies.inference.housing import evidence_of, set_housing_apart
 from studies.inference.inferred import Inferred
 from studies.inference.lack_of_fit import generic_bank, is_rounding, look
@@ -64,8 +64,6 @@ FAR = 2.0
 """The same, beyond which the search begins from the card's own values too."""
 FAINT = 60.0
 """Log evidence up to which a cause whose definite coefficients may all be 0 is not named: of 13 such names on 127 judged campaigns all 7 below were wrong, 4 of 6 above right."""
-TOLD = 2 / 3
-"""Part of the rows that the other runs must tell, below which blocks in time are held out of the others."""
 BEATEN = 100.0
 """Log evidence behind another search, from which on one is given up."""
 
@@ -254,7 +252,7 @@ def _confirmed(
     events = any(term.effect.event for term in outcome.final.terms)
     by_record = len(search.linear.problem.runs) > 1 and not events
     alone = calibrated if longer else _left_by(plain) or calibrated
-    before = {by_record: plain.held_out(by_record, alone[0])}
+    before = HeldOut(plain, alone[0], by_record)
     given_up: set[tuple[str, str]] = set()
     while True:
         final = outcome.final
@@ -263,7 +261,7 @@ def _confirmed(
         more = bool(final.terms) or longer
         told = _left_by(model) if more else alone
         rows, blocks = told or alone
-        held = _held_out(plain, alone[0], model if more else plain, rows, by_record, before)
+        held = before.beside(HeldOut(model, rows, by_record) if more else before)
         weak = [
             k
             for k, name in enumerate(term.response for term in final.terms)
@@ -279,28 +277,6 @@ def _confirmed(
         gone = min(weak, key=lambda k: final.score - outcome.without[k].score)
         given_up.add(final.terms[gone].key)
         outcome = _in_place(search, outcome, gone, given_up) or _left_out(search, outcome, gone)
-
-
-def _held_out(
-    plain: Model,
-    alone: Mapping[str, Rows],
-    model: Model,
-    rows: Mapping[str, Rows],
-    by_record: bool,
-    before: dict[bool, dict[str, Unseen]],
-) -> dict[str, tuple[float | None, float | None]]:
-    """Return the rms of rows that were held out, of both models: with their run; where the other runs tell few rows of it, the others with a block in time."""
-    found, after = {}, {by_record: model.held_out(by_record, rows)}
-    for name in rows:
-        pair = before[by_record][name], after[by_record][name]
-        told = pair[0].known & pair[1].known
-        if by_record and told.mean() < TOLD:
-            for own, one, left in ((before, plain, alone), (after, model, rows)):
-                if False not in own:
-                    own[False] = one.held_out(False, left)
-            pair = pair[0].beyond(told, before[False][name]), pair[1].beyond(told, after[False][name])
-        found[name] = pair[0].beside(pair[1])
-    return found
 
 
 def _left_by(model: Model) -> Left | None:

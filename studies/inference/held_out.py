@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 import scipy
@@ -21,6 +22,8 @@ KNOWN = 1.0
 """Standard deviation of a prediction, in parts of the noise, up to which the rest of the records predict a row."""
 CARRIED_OFF = 2.0
 """Standard deviations by which slow noise carries a whole run off at most."""
+TOLD = 2 / 3
+"""Part of the rows that the other runs must tell, below which blocks in time are held out of the others."""
 FEWEST = 0.5
 """Part of the rows from which on they speak for the records."""
 
@@ -182,8 +185,7 @@ class Model:
         if name not in LASTING:
             X = np.concatenate([X[own] - X[own].mean(axis=0) for own in level.slices])
         spread = np.sqrt(np.einsum("ij,jk,ik->i", X, C, X))
-        quiet = replace(self.noise[name], offset=0.0)
-        noise = np.sqrt(np.concatenate([np.diag(level.covariance(k, quiet)) for k in range(len(level.times))]))
+        noise = np.sqrt(level.variances(replace(self.noise[name], offset=0.0)))
         return np.asarray(spread < KNOWN * noise)
 
     def _near(self, name: str, k: int, time: Array, known: Mask) -> Mask:
@@ -239,6 +241,36 @@ class Model:
                     for own, block_of in zip(found[name][k], (rest, self._near(name, k, t, known)), strict=True):
                         own[inside] = block_of[inside]
         return {name: Unseen.of(own) for name, own in found.items()}
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """What a model leaves of rows that it has not seen: of runs, or of blocks in time; `rows`: what it leaves of those that it has seen."""
+
+    model: Model
+    rows: Mapping[str, Rows]
+    by_record: bool
+
+    @cached_property
+    def left(self) -> dict[str, Unseen]:
+        """Of runs, or of blocks where runs cannot be held out."""
+        return self.model.held_out(self.by_record, self.rows)
+
+    @cached_property
+    def blocks(self) -> dict[str, Unseen]:
+        """Of blocks in time."""
+        return self.model.held_out(False, self.rows)
+
+    def beside(self, other: "HeldOut") -> dict[str, tuple[float | None, float | None]]:
+        """Return the rms of both; where the other runs tell few rows of a run, the rest with a block in time."""
+        found = {}
+        for name in self.rows:
+            one, two = self.left[name], other.left[name]
+            told = one.known & two.known
+            if self.by_record and told.mean() < TOLD:
+                one, two = one.beyond(told, self.blocks[name]), two.beyond(told, other.blocks[name])
+            found[name] = one.beside(two)
+        return found
 
 
 def on_rows(rows: Array, time: Array, values: Array) -> Array:

@@ -159,8 +159,7 @@ def _slow(found: Inferred, name: str) -> float:
         change = float(np.mean(changes**2)) if len(changes) else 0.0
         brief = float(np.hypot(white_rms(*rows.residual), np.sqrt(change / 2.0)))
         return rows.rms / max(MINUTES * brief, 1e-300)
-    quiet = replace(stated, offset=0.0)  # a walk moves the level of a run too
-    slow = np.concatenate([np.diag(level.covariance(run, quiet)) for run in range(len(level.times))])
+    slow = level.variances(replace(stated, offset=0.0))  # a walk moves the level of a run too
     usual = np.average(slow, weights=np.concatenate(level.spans)) + white_rms(*rows.residual) ** 2
     return rows.rms / max(float(np.sqrt(usual)), 1e-300)
 

@@ -16,7 +16,6 @@ from shell.constants import zero_Celsius
 from studies.calibration.problem import CardProblem, Part
 from studies.effects import Effect, Span, library
 from studies.effects.states import States, remembered
-from studies.loss.damping_law import damping_law
 from studies.simulation.heat_path import slowest_lag
 from studies.simulation.prediction import Prediction
 from studies.simulation.response import Temperatures, read_out
@@ -192,13 +191,11 @@ class Signatures:
         """Paths at another point whose values move the law, and the temperatures only if it `warms`."""
         if warms and self.problem.instrument.polynomial is None:
             return Signatures.at(self.problem, point)
-        card = self.problem.instrument_at(point)
-        law = self.problem.law_at(card)
-        damping = damping_law(card, law.lowest, law.highest)
-        read = ((path, replace(path.prediction, law=law, damping=damping)) for path in self.paths)
-        return Signatures(
-            self.problem, point, tuple(replace(path, instrument=card, prediction=one) for path, one in read)
-        )
+        here, paths = self.problem.varied(point).here, []
+        for path in self.paths:
+            read = replace(path.prediction, law=here.law, damping=here.damping)
+            paths.append(replace(path, instrument=here.instrument, prediction=read))
+        return Signatures(self.problem, point, tuple(paths))
 
     def left(self) -> dict[str, Array]:
         """What the card alone leaves of the blocks of every response."""
