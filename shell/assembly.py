@@ -182,7 +182,7 @@ def _hold_end(rows: Rows, end: End, tie: Tie, n: int) -> None:
 
 def sections(resonator: Resonator, chain: Chain, xi: Array, weights: Array) -> Section:
     """The middle surface at ξ of every element of a chain."""
-    names = ("r", "tangent_r", "tangent_z", "curvature", "thickness", "thickness_slope", "position")
+    names = ("r", "z", "tangent_r", "tangent_z", "curvature", "thickness", "thickness_slope", "position")
     breaks, segments = np.array(chain.breaks), np.array(chain.segments)
     halves = np.diff(breaks) / 2
     s = (breaks[:-1] + halves)[:, None] + halves[:, None] * xi

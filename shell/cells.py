@@ -55,7 +55,7 @@ class CellTable:
         """∫ φ_α ψ_β dV, nine rows, and ∫ φ ψ dV, the last, of functions turned by their signs: (cells, 10, functions²)."""
         count, _, _, functions = self.gradients.shape
         weighted = self.gradients * (np.sqrt(self.volume)[..., None] * signs[:, None, None])
-        found = np.empty((count, 10, functions, functions))
+        found = np.empty((count, 10, functions, functions), weighted.dtype)
         np.matmul(
             np.swapaxes(weighted, 2, 3)[:, :, None],
             weighted[:, None],

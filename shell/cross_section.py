@@ -9,7 +9,7 @@ from shell.errors import ShellError, mm
 from shell.kernel import Section, StrainTable, shell_table
 from shell.quadrature import Array, gauss, nodal
 from shell.resonator import Resonator
-from shell.system import ShellGroup, System
+from shell.system import System
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,9 +39,7 @@ def cut(resonator: Resonator, system: System, position: float, heights: Array) -
     if not 0 <= position <= 1:
         raise ShellError(f"a position on the meridian lies in 0 (start) ... 1 (rim), not at {position:g}.")
     s, margin = position * resonator.length, 1e-9 * resonator.length
-    for number, group in enumerate(system.groups):
-        if not isinstance(group, ShellGroup):
-            continue
+    for number, group in system.chains.items():
         breaks = np.array(group.chain.breaks)
         if not breaks[0] - margin <= s <= breaks[-1] + margin:
             continue

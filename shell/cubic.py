@@ -27,7 +27,7 @@ from shell.modes import solve_modes
 from shell.quadrature import Array
 from shell.resonator import Resonator
 from shell.sparse import assemble_elements
-from shell.system import ShellGroup, System
+from shell.system import System
 
 REACH = 8  # harmonics above n that take part
 LOWEST = 16  # modes of all harmonics together among which the pair is sought
@@ -85,8 +85,6 @@ def solve_cubic(resonator: Resonator, crystal: Cubic, harmonic: int = 2, toleran
         raise ShellError(f"a cubic crystal is solved for n >= 2 that do not couple with n = 0, not n = {harmonic}.")
     mean = crystal.isotropic
     (mode,) = solve_modes(resonator, mean, harmonic, tolerance=tolerance)
-    assert mode.solution is not None
-    assert mode.resonator is not None
     first = harmonic % 4 if harmonic % 2 == 0 else 1
     harmonics = list(range(first, harmonic + REACH + 1, 4 if harmonic % 2 == 0 else 2))
     level = mode.solution.system.level
@@ -139,8 +137,7 @@ def _lowest(systems: list[System], harmonics: list[int], crystal: Cubic, n: int,
 
 def _strains(system: System) -> tuple[Array, Array, Array, Array]:
     """ε_z, ε_r + ε_θ, ε_r - ε_θ and γ_rθ at all points, times the root of their volume, per free unknown: (points, unknowns)."""
-    (group,) = system.groups
-    assert isinstance(group, ShellGroup)
+    (group,) = system.chains.values()
     place, table = group.section, group.table
     t_r, t_z = place.tangent_r[..., None], place.tangent_z[..., None]
     n_r, n_z = -t_z, t_r

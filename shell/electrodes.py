@@ -25,7 +25,6 @@ from shell.imperfection.pair import Pair
 from shell.imperfection.split import Split
 from shell.quadrature import Array, gauss
 from shell.resonator import FaceName
-from shell.system import ShellGroup
 
 VACUUM = 8.8541878188e-12  # ε₀, F/m (CODATA 2022)
 PIECE = pi / 12  # longest piece of an electrode that is integrated at once, rad
@@ -185,9 +184,7 @@ class Electrodes:
         side = float(resonator.height_of(self.face))
         x, weights = gauss(12)
         rows: list[tuple[float, float, float]] = []
-        for group in solution.system.groups:
-            if not isinstance(group, ShellGroup):
-                continue
+        for group in solution.system.chains.values():
             for one, two in pairwise(np.array(group.chain.breaks) / resonator.length):
                 low, high = max(one, first), min(two, last)
                 if high - low < 1e-12:

@@ -26,7 +26,7 @@ AROUND = np.array([[(i == 1) != (k == 1) for k in range(3)] for i in range(3)]) 
 
 def solved_as_solid(mode: Mode) -> Solution:
     """The solution of a mode of the solid theory."""
-    if mode.theory != "solid" or mode.solution is None or mode.resonator is None:
+    if mode.theory != "solid":
         raise ShellError("initial stress and large amplitudes need a mode of the solid theory.")
     return mode.solution
 

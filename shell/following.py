@@ -28,8 +28,6 @@ DEEPEST = 6  # halvings of the way
 @lru_cache(maxsize=16)  # a mode holds its solution
 def _motion(mode: Mode) -> tuple[Array, Array]:
     """Displacement (3, positions) along r, θ and z of the middle surface, NaN in solid parts, and radius (positions,)."""
-    if mode.solution is None or mode.resonator is None:
-        raise ShellError("a mode is followed by its shape: use theory solid or shell.")
     moved, radius = np.full((3, len(POSITIONS)), np.nan), np.full(len(POSITIONS), np.nan)
     for k, position in enumerate(POSITIONS):
         try:

@@ -69,6 +69,7 @@ class Section:
     """The middle surface at stations: arrays (elements, stations) and the factor ds/dξ."""
 
     r: Array
+    z: Array
     tangent_r: Array
     tangent_z: Array
     curvature: Array

@@ -70,7 +70,7 @@ class Loads:
 
     def __post_init__(self) -> None:
         solved_as_solid(self.mode)
-        if self.mode.resonator is None or self.mode.resonator.support == "free":
+        if self.mode.resonator.support == "free":
             raise ShellError("a free resonator is held against no load: give it a support.")
 
     @cached_property
@@ -105,7 +105,7 @@ class Loads:
             elif kind == "cooling":
                 stress[:, :, :3] = 3 * bulk * self.away(group.table.position)[..., None, None]
             elif kind == "spin":
-                force = directed(group, rho * group.radius)
+                force = directed(group, rho * group.places[0])
             elif kind == "axial":
                 force = directed(group, np.full(shape, -rho), 1)
             else:
@@ -153,20 +153,17 @@ class Loads:
     def gap(self, kind: Kind, first: float, last: float) -> float:
         """Mean displacement of the wall outwards between two positions, m per unit, at azimuth 0."""
         solution, sums = self.answers[kind], np.zeros(2)
-        for group, d in zip(solution.system.groups, solution.displacement, strict=True):
-            if isinstance(group, ShellGroup):
-                inside = (group.table.position >= first) & (group.table.position <= last)
-                weight = group.table.volume * inside[..., None]
-                sums += np.sum(weight * d[:, :, 2]), np.sum(weight)
+        for k, group in solution.system.chains.items():
+            inside = (group.table.position >= first) & (group.table.position <= last)
+            weight = group.table.volume * inside[..., None]
+            sums += np.sum(weight * solution.displacement[k][:, :, 2]), np.sum(weight)
         if not sums[1]:
             raise ShellError(f"no part of the wall lies between the positions {first:g} and {last:g}.")
-        assert self.mode.resonator is not None
         return self.mode.resonator.outward * float(sums[0] / sums[1])
 
     def away(self, position: Array) -> Array:
         """0 at the base and in the solid part that it holds, 1 at the free end, even along the meridian between."""
-        assert self.mode.resonator is not None
-        solids = [g.table.position[0, 0] for g in self._systems["axial"].groups if not isinstance(g, ShellGroup)]
+        solids = [g.table.position[0, 0] for g in self._systems["axial"].solids.values()]
         far, ends = position, solids
         if self.mode.resonator.support == "clamped-rim":
             far, ends = 1 - position, [1 - one for one in solids]
@@ -176,18 +173,17 @@ class Loads:
     @property
     def counted(self) -> tuple[str, ...]:
         """Parts whose stresses count: at sharp corners and rigid clamps a linear elastic stress is not finite."""
-        stem = self.mode.resonator.stem if self.mode.resonator else None
+        stem = self.mode.resonator.stem
         return ("wall", "root") if stem and stem.fillet else ("wall",)
 
     @cached_property
     def mass(self) -> MassProperties:
         """Of the whole body."""
-        assert self.mode.resonator is not None
         return weigh(self.mode.resonator, self.elastic.rho)
 
     def beam(self, axial: float, lateral: float) -> float:
         """Stress at the clamped end of a single stem as of a beam, N/A + M r/I with the weight of all; 0 without such a stem."""
-        stem = self.mode.resonator.stem if self.mode.resonator else None
+        stem = self.mode.resonator.stem
         if stem is None or len(stem.roots) != 1:
             return 0.0
         a, arm = stem.radius, abs(self.mass.center - stem.roots[0][1])
@@ -222,11 +218,10 @@ class Loads:
 
     def _rim(self, solution: Solution) -> tuple[float, float, float]:
         """Displacement along r and z of the middle surface next to the free end of the wall, and its radius."""
-        walls = [k for k, group in enumerate(solution.system.groups) if isinstance(group, ShellGroup)]
-        far = {k: self.away(solution.system.groups[k].table.position) for k in walls}
-        k = max(walls, key=lambda k: far[k].max())
-        group, (e, s) = solution.system.groups[k], np.unravel_index(int(np.argmax(far[k])), far[k].shape)
-        assert isinstance(group, ShellGroup)
+        chains = solution.system.chains
+        far = {k: self.away(group.table.position) for k, group in chains.items()}
+        k = max(chains, key=lambda k: far[k].max())
+        group, (e, s) = chains[k], np.unravel_index(int(np.argmax(far[k])), far[k].shape)
         weight, section = group.table.volume[e, s], group.section
         u, _, w = solution.displacement[k][e, s] @ weight / weight.sum()
         t_r, t_z = section.tangent_r[e, s], section.tangent_z[e, s]
@@ -241,9 +236,9 @@ def directed(group: Group, amount: Array, axis: int = 0) -> Array:
 
 
 def _edges(solution: Solution, number: int) -> StrainTable | CellTable:
-    group = solution.system.groups[number]
-    if isinstance(group, ShellGroup):
+    if number in solution.system.chains:
         return face_table(solution, number)
+    group = solution.system.solids[number]
     mesh, degree = group.mesh, group.mesh.grid.shape[2] - 1
     place = Reference.at(ACROSS, ACROSS, np.ones((len(ACROSS),) * 2), degree, degree)
     return tabulate_cells(mesh.grid, place, solution.system.n, float(group.table.position[0, 0]))

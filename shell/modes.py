@@ -51,15 +51,21 @@ class Mode:
     relative_error_estimate: float
     # precession of the standing wave per angle of rotation; 0 for n = 0, which has no pattern to turn.
     bryan_factor: float
+    resonator: Resonator = field(compare=False)  # that was solved
     label: str = ""  # "torsion" or "axial" for n = 0, else empty
-    # the eigenvector and its energies (None for "rayleigh").
-    solution: Solution | None = field(default=None, repr=False, compare=False)
-    resonator: Resonator | None = field(default=None, repr=False, compare=False)
+    eigenvector: Solution | None = field(default=None, compare=False)  # None for "rayleigh"
+
+    @property
+    def solution(self) -> Solution:
+        """The eigenvector and its energies."""
+        if self.eigenvector is None:
+            raise ShellError("Rayleigh's closed form carries no shape or energies: use theory solid or shell.")
+        return self.eigenvector
 
     @cached_property
     def sensitivities(self) -> "Sensitivities":
         """Derivatives of ln f, by energies of the mode at the unchanged shape; closed form for "rayleigh"."""
-        if self.solution is None or self.resonator is None:
+        if self.eigenvector is None:
             raise ShellError("Rayleigh's closed form has its own derivatives: shell.rayleigh.rayleigh_log_derivatives.")
         thickness = _by_thickness(self.resonator, self.solution)
         return Sensitivities(0.5, self.solution.by_nu, -0.5, thickness, -1 - thickness)
@@ -67,17 +73,17 @@ class Mode:
     @property
     def energy_fractions(self) -> EnergyFractions:
         """How the energy divides between bending, membrane, shear, root and stem."""
-        return self._solved().energy_fractions
+        return self.solution.energy_fractions
 
     @property
     def along(self) -> AlongMeridian:
         """What each place of the meridian contributes to d ln f: energy shares for fields along the meridian."""
-        return self._solved().along
+        return self.solution.along
 
     @cached_property
     def modal_mass(self) -> float:
         """Modal mass ∫ ρ |u|² dV, kg, of the mode scaled to a largest displacement of 1."""
-        return self._solved().mass / self.largest_displacement**2
+        return self.solution.mass / self.largest_displacement**2
 
     @cached_property
     def largest_displacement(self) -> float:
@@ -86,21 +92,18 @@ class Mode:
 
     def shape(self, points: int = 9) -> "tuple[ShapePatch, ...]":
         """Displacement on the cross-section, stem included, as curved grids of `points` by `points`."""
-        solution = self._solved()
-        assert self.resonator is not None
-        return sample_shape(self.resonator, solution, points)
+        return sample_shape(self.resonator, self.solution, points)
 
     def kept_on(self, resonator: Resonator, elastic: Elastic | VaryingElastic) -> "Mode":
         """The mode with its shape kept on a design a little aside: f is stationary in the shape, so exact to first order."""
-        assert self.resonator is not None
         fitted = fit_profile(resonator)[0]
-        moved = _keep_shape(fitted, elastic, self._solved(), self.resonator)
-        return replace(self, frequency=sqrt(moved.eigenvalue) / (2 * pi), solution=moved, resonator=fitted)
+        moved = _keep_shape(fitted, elastic, self.solution, self.resonator)
+        return replace(self, frequency=sqrt(moved.eigenvalue) / (2 * pi), eigenvector=moved, resonator=fitted)
 
     def solved_on(self, resonator: Resonator, elastic: Elastic) -> "Mode":
         """The mode of another design with the same elements, so that frequencies are smooth in its dimensions."""
         _check_theory(resonator, self.theory)
-        old, (fitted, rest) = self._solved().system, fit_profile(resonator)
+        old, (fitted, rest) = self.solution.system, fit_profile(resonator)
         system = build_system(fitted, old.n, replace(old.level, like=old.level.like or self.resonator))
         found, *_ = solve_level(system, fitted.size, elastic, self.index + 1, EXACT)
         error = FLOOR + float(estimate_errors(fitted, elastic, found)[:, self.index].sum())
@@ -115,11 +118,6 @@ class Mode:
     def __repr__(self) -> str:
         kind = f", {self.label}" if self.label else ""
         return f"Mode(n = {self.harmonic}, {self.frequency:.3f} Hz{kind}, Bryan factor {self.bryan_factor:.4f}, {self.theory}, relative error {self.relative_error_estimate:.1e})"
-
-    def _solved(self) -> Solution:
-        if self.solution is None:
-            raise ShellError("Rayleigh's closed form carries no shape or energies: use theory solid or shell.")
-        return self.solution
 
 
 @dataclass(frozen=True)
@@ -166,7 +164,7 @@ def solve_modes(
 
 def _name(solution: Solution, index: int, theory: Theory, error: float, resonator: Resonator) -> Mode:
     f, n = sqrt(solution.eigenvalue) / (2 * pi), solution.system.n
-    return Mode(n, index, f, theory, error, solution.bryan_factor, _label(solution), solution, resonator)
+    return Mode(n, index, f, theory, error, solution.bryan_factor, resonator, _label(solution), solution)
 
 
 def _check_theory(resonator: Resonator, theory: Theory) -> None:
@@ -261,4 +259,4 @@ def _rayleigh(resonator: Resonator, elastic: Elastic | VaryingElastic, n: int, c
     )
     (bent,) = solve_modes(resonator, elastic, n, theory="shell")
     bryan = rayleigh_bryan_factor(n, dome.first_angle, dome.last_angle)
-    return (Mode(n, 0, f, "rayleigh", abs(f / bent.frequency - 1), bryan),)
+    return (Mode(n, 0, f, "rayleigh", abs(f / bent.frequency - 1), bryan, resonator),)

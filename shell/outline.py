@@ -60,11 +60,9 @@ class Outline:
 
 def trace_outlines(resonator: Resonator, spacing: float, mode: "Mode | None" = None) -> tuple[Outline, ...]:
     """The outlines of a section, the outer one first, points `spacing` (m) apart; amplitudes have a largest displacement of 1."""
-    if mode is not None and mode.solution is None:
-        raise ShellError(f"theory '{mode.theory}' gives no shape through the thickness: use theory solid or shell.")
+    solution = mode.solution if mode is not None else None
     if mode is not None and mode.resonator != resonator:
         raise ShellError("the mode was solved for another resonator than the one to be shown.")
-    solution = mode.solution if mode is not None else None
     system = solution.system if solution else build_system(resonator, 2, LEVELS["solid"][0])
     lines = _join(list(_Sides(resonator, system, solution).all(spacing)), 1e-9 * resonator.size)
     outlines = [_thin(line, 0.02 * spacing, resonator.size) for line in lines]

@@ -54,18 +54,15 @@ class Prestress:
     @cached_property
     def by_base(self) -> float:
         """δ ln f over the growth of the base beyond the resonator's own; 0 where nothing is held."""
-        resonator = self.mode.resonator
-        if resonator is None or resonator.support == "free" or not self.is_solved:
+        if self.mode.resonator.support == "free" or not self.is_solved:
             return 0.0
         return 0.5 - float(self.shares.sum())
 
     @property
     def held(self) -> Array:
         """1 at the station next to the base, 0 at all others."""
-        position, resonator = self.mode.along.position, self.mode.resonator
-        at_rim = resonator is not None and resonator.support == "clamped-rim"
-        found = np.zeros(len(position))
-        found[-1 if at_rim else 0] = 1.0
+        found = np.zeros(len(self.mode.along.position))
+        found[-1 if self.mode.resonator.support == "clamped-rim" else 0] = 1.0
         return found
 
 
@@ -106,7 +103,6 @@ def mean_answer(mode: Mode) -> tuple[Solution, list[Array]]:
 def neighbour(mode: Mode, harmonic: int) -> System:
     """Another harmonic on the elements of a mode."""
     solution, resonator = solved_as_solid(mode), mode.resonator
-    assert resonator is not None
     level, rigid = solution.system.level, 2 if resonator.support == "free" and harmonic < 2 else 0
     return assemble(resonator, lay_resonator(resonator, mode.harmonic, level), harmonic, level, rigid)
 
@@ -114,7 +110,6 @@ def neighbour(mode: Mode, harmonic: int) -> System:
 def settle(system: System, mode: Mode, load: Array) -> Solution:
     """The static answer K⁻¹ f, without rigid motions: (K + s M) u = f + s M u, again and again, with what f does to them left out."""
     constants = solved_as_solid(mode).constants
-    assert mode.resonator is not None
     rigid = system.rigid_motions
     shift = 1e-2 * constants[0].wave_speed_squared / mode.resonator.size**2 if rigid else 0.0
     K, M = system.operators(constants, shift)

@@ -1,5 +1,6 @@
 """Rising polynomial orders: solve one level after the other until its own estimate of the error is small enough."""
 
+from collections.abc import Iterator
 from dataclasses import replace
 from math import ceil, e, exp, hypot, log, pi
 
@@ -14,7 +15,7 @@ from shell.quadrature import Array
 from shell.resonator import Resonator
 from shell.solution import Solution, total
 from shell.surplus import estimate_errors
-from shell.system import ShellGroup, System
+from shell.system import System
 
 UNDONE = 1e-4  # share of the tolerance, as error of ω², at which the iteration stops: sensitivities feel the root of it
 THIN = 1e-3  # h/R from which on the loss by rounding lies below 1e-13; it grows at most as (R/h)^4
@@ -103,10 +104,8 @@ def _cut(solutions: list[Solution], level: Level, tolerance: float) -> float:
     """The longest element, over the radius, on which the degree follows the waves of these modes."""
     longest = level.longest
     for solution in solutions:
-        for group, k in zip(solution.system.groups, _wavenumbers(solution), strict=True):
-            if isinstance(group, ShellGroup):
-                radians = np.max(2 * group.section.ds * k)
-                longest = min(longest, level.longest * _most(level, tolerance) / max(float(radians), 1e-9))
+        for half in _half_waves(solution):
+            longest = min(longest, level.longest * _most(level, tolerance) / max(2 * half, 1e-9))
     return _in_parts(max(longest, level.longest / AT_ONCE))  # waves that are not resolved seem shorter than they are
 
 
@@ -121,27 +120,17 @@ def _in_parts(longest: float) -> float:
     return LONGEST / max(1, ceil(LONGEST / longest - 1e-9))
 
 
-def _wavenumbers(solution: Solution) -> list[Array]:
-    """Wavenumbers, 1/m, of bending waves at the stations of every chain: k⁴ = 12 ρ (1 - ν²) ω²/(E h²), of which n/r runs around."""
-    found = []
-    for group, c in zip(solution.system.groups, solution.constants, strict=True):
-        if isinstance(group, ShellGroup):
-            section = group.section
-            k = np.sqrt(12 * c.rho * (1 - c.nu**2) * solution.eigenvalue / (c.E * section.thickness**2))
-            found.append(np.sqrt(np.maximum(k - (solution.system.n / section.r) ** 2, 0.0)))
-        else:
-            found.append(np.zeros(1))
-    return found
+def _half_waves(solution: Solution) -> Iterator[float]:
+    """Of every chain the largest k L/2 of bending waves over an element: k⁴ = 12 ρ (1 - ν²) ω²/(E h²), of which n/r runs around."""
+    for number, group in solution.system.chains.items():
+        section, c = group.section, solution.constants[number]
+        k = np.sqrt(12 * c.rho * (1 - c.nu**2) * solution.eigenvalue / (c.E * section.thickness**2))
+        yield float(np.max(np.sqrt(np.maximum(k - (solution.system.n / section.r) ** 2, 0.0)) * section.ds))
 
 
 def _is_resolved(solution: Solution) -> bool:
     """Whether the degree p follows bending waves over its elements, p > k L/2; before, no surplus tells their error."""
-    along = solution.system.level.along
-    return all(
-        np.max(k * group.section.ds) <= along
-        for group, k in zip(solution.system.groups, _wavenumbers(solution), strict=True)
-        if isinstance(group, ShellGroup)
-    )
+    return all(half <= solution.system.level.along for half in _half_waves(solution))
 
 
 def solve_level(

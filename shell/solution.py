@@ -231,8 +231,7 @@ def surface_energies(solution: Solution, number: int) -> tuple[Array, Array]:
 
 def face_table(solution: Solution, number: int) -> StrainTable:
     """Strains of one shell group at its faces η = -1 and 1, at the stations; the volumes are h/2 times the areas."""
-    system, group = solution.system, solution.system.groups[number]
-    assert isinstance(group, ShellGroup)
+    system, group = solution.system, solution.system.chains[number]
     faces = np.array([-1.0, 1.0]), np.ones(2)
     return shell_table(group.section, system.n, system.level.through, faces, Basis(*group.table.along))
 

@@ -49,7 +49,7 @@ def spin_shift(mode: Mode, elastic: Elastic) -> SpinShift:
         raise ShellError("the second-order effect of spin is computed for the lowest mode of a harmonic from 2 up.")
     system, mass, eigenvalue = solution.system, total(solution.kinetic), solution.eigenvalue
     rest = neighbour(mode, 0)
-    pull = [_pull(group, elastic.rho * directed(group, group.radius)) for group in rest.groups]
+    pull = [_pull(group, elastic.rho * directed(group, group.places[0])) for group in rest.groups]
     stiffening = 4 * float(mean_answer(mode)[0].vector @ rest.gather(pull)) / mass
     around = [(radial(group, d), d[:, :, 1]) for group, d in zip(system.groups, solution.displacement, strict=True)]
     softening = sum(

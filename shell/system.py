@@ -60,10 +60,13 @@ class ShellGroup:
         return np.array([[t_r, -t_z], [t_z, t_r]])
 
     @property
-    def radius(self) -> Array:
-        """Distance of the points from the axis, (elements, stations, points)."""
+    def places(self) -> Array:
+        """Distance of the points from the axis and height, (r or z, elements, stations, points)."""
         eta, section = gauss(self.table.volume.shape[2])[0], self.section
-        return np.asarray(section.r[..., None] - section.tangent_z[..., None] * section.thickness[..., None] * eta / 2)
+        out_r, out_z = (
+            one[..., None] * section.thickness[..., None] * eta / 2 for one in (section.tangent_z, section.tangent_r)
+        )
+        return np.array([section.r[..., None] - out_r, section.z[..., None] + out_z])
 
     def gather(self, loads: Array) -> Array:
         """Loads (elements, functions, amplitudes) on the unknowns (elements, size) that are solved for."""
@@ -101,9 +104,10 @@ class SolidGroup:
     axes: ClassVar[Array] = np.eye(2)[:, :, None, None, None]  # see `ShellGroup.axes`; a cell's own are r and z
 
     @property
-    def radius(self) -> Array:
-        """Distance of the points from the axis, (cells, 1, points)."""
-        return self.table.radius[:, None]
+    def places(self) -> Array:
+        """See `ShellGroup.places`."""
+        points = gauss(self.mesh.grid.shape[2] + 1)[0]
+        return self.mesh.place(points, points).reshape(2, *self.table.volume.shape)
 
     def gather(self, loads: Array) -> Array:
         """Loads (cells, functions, 3) of functions as they are in each cell, on the unknowns (cells, size)."""
@@ -134,6 +138,16 @@ class System:
     rigid_motions: int
     n: int
     level: Level
+
+    @cached_property
+    def chains(self) -> dict[int, ShellGroup]:
+        """The chains of shell elements, by their numbers among the groups."""
+        return {k: group for k, group in enumerate(self.groups) if isinstance(group, ShellGroup)}
+
+    @cached_property
+    def solids(self) -> dict[int, SolidGroup]:
+        """The solid parts likewise."""
+        return {k: group for k, group in enumerate(self.groups) if isinstance(group, SolidGroup)}
 
     @cached_property
     def pattern(self) -> Pattern:

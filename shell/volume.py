@@ -23,7 +23,6 @@ from shell.errors import ShellError, mm
 from shell.layout import Level
 from shell.quadrature import Array, nodal
 from shell.resonator import Resonator
-from shell.system import ShellGroup, SolidGroup
 
 Index = NDArray[np.intp]
 
@@ -87,7 +86,7 @@ def build_volume(resonator: Resonator, layers: int = 2, around: int = 48, spacin
 
 def _cut_section(resonator: Resonator, layers: int, spacing: float) -> Pieces:
     system = build_system(resonator, 2, LEVEL)
-    solids = [group for group in system.groups if isinstance(group, SolidGroup)]
+    solids = [*system.solids.values()]
     # how many cells of each lie on the cross-section that it shares with the shell
     crossing = [max((np.isfinite(eta).sum() - 1 for eta in place.boundary.heights), default=1) for place in solids]
     common = int(np.lcm.reduce(crossing)) if crossing else 1
@@ -95,7 +94,7 @@ def _cut_section(resonator: Resonator, layers: int, spacing: float) -> Pieces:
     grids: list[Array] = []  # (2, 2a + 1, 2b + 1) points of elements divided into a x b
     held: list[NDArray[np.bool_]] = []
     eta = np.linspace(-1.0, 1.0, 2 * layers + 1)
-    for chain in (group.chain for group in system.groups if isinstance(group, ShellGroup)):
+    for chain in (group.chain for group in system.chains.values()):
         for (start, stop), segment in zip(pairwise(chain.breaks), chain.segments, strict=True):
             count = int(np.ceil((stop - start) / spacing - 1e-9))
             place = resonator.at(np.linspace(start, stop, 2 * count + 1), segment)

@@ -15,7 +15,7 @@ from shell.patches import Patch, box, whole
 from shell.quadrature import Array, legendre
 from shell.resonator import Resonator
 from shell.solution import Solution, total
-from shell.system import ShellGroup, SolidGroup, System
+from shell.system import SolidGroup, System
 
 GROWTH = 6.0  # of the cells away from the stem
 PER_WAVE = 3  # cells over a shear wavelength
@@ -67,7 +67,6 @@ def unbalance_loss(mode: Mode, elastic: Elastic | VaryingElastic) -> Unbalance:
     if solution.system.n != 2:
         raise ShellError("only the first and third harmonics of the rim's mass couple a mode with n = 2 to the stem.")
     system, waves = _stand(mode, elastic, None, 1)
-    assert mode.resonator is not None
     raw = solution.system.constraint @ solution.vector
     radial, around, axial = (float(row @ raw) for row in _rim(mode.resonator, solution.system))
     rows = np.array(_rim(mode.resonator, system)) @ system.constraint
@@ -79,15 +78,14 @@ def unbalance_loss(mode: Mode, elastic: Elastic | VaryingElastic) -> Unbalance:
 
 
 def _solved(mode: Mode) -> Solution:
-    if mode.solution is None or mode.resonator is None or mode.resonator.stem is None:
-        raise ShellError("anchor loss needs a resonator on a stem, solved by theory solid or shell.")
+    if mode.resonator.stem is None:
+        raise ShellError("anchor loss needs a resonator on a stem.")
     return mode.solution
 
 
 def _stand(mode: Mode, elastic: Elastic | VaryingElastic, base: Elastic | None, n: int) -> tuple[System, RadiatingBody]:
     """The resonator on its half-space, for motion of harmonic n at the mode's frequency."""
     resonator, solution = mode.resonator, _solved(mode)
-    assert resonator is not None
     assert resonator.stem is not None
     if len(resonator.stem.roots) != 1 or not isinstance(elastic, Elastic):
         raise ShellError("anchor loss is computed for one stem of one material.")
@@ -121,7 +119,7 @@ def _stand(mode: Mode, elastic: Elastic | VaryingElastic, base: Elastic | None, 
 
 def _rim(resonator: Resonator, system: System) -> list[Array]:
     """Radial, circumferential and axial motion of the middle surface at the free rim, as rows over the raw unknowns."""
-    group = [one for one in system.groups if isinstance(one, ShellGroup)][-1]
+    group = [*system.chains.values()][-1]
     if group.chain.ends[1] != "free":
         raise ShellError("an imbalance of the rim needs a free rim.")
     orders, element = system.level.through, len(group.unknowns) - 1

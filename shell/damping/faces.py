@@ -14,7 +14,6 @@ from shell.elastic import Constants
 from shell.errors import ShellError
 from shell.kernel import StrainTable
 from shell.material import Material
-from shell.modes import Mode
 from shell.quadrature import Array, gauss
 from shell.resonator import Resonator
 from shell.solution import Solution, face_table, plane_energies, total
@@ -65,13 +64,6 @@ class Vibration:
     material: Material
     reference: float
 
-    @classmethod
-    def of(cls, mode: Mode, material: Material, reference: float) -> "Vibration":
-        """From a mode of theory solid or shell."""
-        if mode.solution is None or mode.resonator is None:
-            raise ShellError("Rayleigh's closed form carries no energies: a loss budget needs theory solid or shell.")
-        return cls(mode.solution, mode.resonator, material, reference)
-
     @cached_property
     def faces(self) -> tuple[FreeFaces, FreeFaces]:
         """Inner and outer face."""
@@ -109,10 +101,8 @@ class Vibration:
 def shell_faces(solution: Solution, resonator: Resonator) -> tuple[FreeFaces, FreeFaces]:
     """The inner and the outer face of the shell, without roots and corners; free of traction, so in plane stress."""
     found: tuple[list[tuple[Array, ...]], list[tuple[Array, ...]]] = ([], [])
-    for number, group in enumerate(solution.system.groups):
+    for number, group in solution.system.chains.items():
         c, q = solution.constants[number], solution.unknowns[number]
-        if not isinstance(group, ShellGroup):
-            continue
         section, table = group.section, face_table(solution, number)
         strain, moved = table.strains(q), table.displacements(q)
         area = table.volume * (2 / section.thickness)[..., None]

@@ -76,8 +76,6 @@ def film_energies(film: Film, face: FreeFaces) -> tuple[Array, Array]:
 
 def film_shift(mode: Mode, film: Film) -> float:
     """Relative change of a mode's frequency by a film's stiffness and mass; stem and root stay bare."""
-    if mode.solution is None or mode.resonator is None:
-        raise ShellError("Rayleigh's closed form carries no energies: use theory solid or shell.")
     check_film(film, min(value for _, value in mode.resonator.thickness))
     eigenvalue, changed = mode.solution.eigenvalue, 0.0
     for face in shell_faces(mode.solution, mode.resonator):

@@ -10,12 +10,13 @@ where k_i and m_i are sums over the layer alone: a loss of 1e-15 is not drowned 
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from shell.cells import at_gauss_points, cell_mass, cell_stiffness
+from shell.cells import cell_mass, cell_stiffness
 from shell.elastic import Elastic
 from shell.errors import ShellError
 from shell.kernel import lame
@@ -150,27 +151,18 @@ def _matrices(
 
 def _absorbing(group: SolidGroup, base: Mask, layer: Layer) -> tuple[Index, Complex]:
     """The cells of the absorbing layer, and their `CellTable.products` in complex coordinates."""
-    grid = group.mesh.grid
-    degree = grid.shape[2] - 1
-    place = at_gauss_points(degree, degree, degree + 2)
-    z = (place.along.values @ grid[1] @ place.across.values.T).reshape(len(base), -1)
+    z = group.places[1, :, 0]
     depth = (layer.surface - z) if layer.below else (z - layer.surface)
     by_r, to_r = layer.stretch(np.where(base[:, None], group.table.radius, 0.0))
     by_z, _ = layer.stretch(np.where(base[:, None], depth, 0.0))
     absorbs = np.flatnonzero((by_r.imag != 0).any(axis=1) | (by_z.imag != 0).any(axis=1))
     by_r, to_r, by_z = by_r[absorbs], to_r[absorbs], by_z[absorbs]
-    r, volume = group.table.radius[absorbs], group.table.volume[absorbs, 0]
+    r = group.table.radius[absorbs]
     radius = r + to_r
-    scale = np.stack([1 / by_r, 1 / by_z, r / radius], axis=1)[..., None]
-    gradients = group.table.gradients[absorbs] * scale * group.signs[absorbs][:, None, None]
-    volume = volume * by_r * by_z * radius / r
-    cells, _, _, functions = gradients.shape
-    found = np.empty((cells, 10, functions, functions), dtype=complex)
-    np.matmul(
-        np.swapaxes(gradients, 2, 3)[:, :, None],
-        (gradients * volume[:, None, :, None])[:, None],
-        out=found[:, :9].reshape(cells, 3, 3, functions, functions),
-    )
-    moved = gradients[:, 2] * radius[..., None]
-    np.matmul(np.swapaxes(moved, 1, 2), moved * volume[..., None], out=found[:, 9])
-    return absorbs, found.reshape(cells, 10, functions**2)
+    stretched: dict[str, Any] = {
+        "radius": radius,
+        "gradients": group.table.gradients[absorbs] * np.stack([1 / by_r, 1 / by_z, r / radius], axis=1)[..., None],
+        "volume": group.table.volume[absorbs] * (by_r * by_z * radius / r)[:, None],
+    }
+    products: Any = replace(group.table, **stretched).products(group.signs[absorbs])
+    return absorbs, products

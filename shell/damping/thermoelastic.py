@@ -48,8 +48,7 @@ def heat_flow(solution: Solution, x: float) -> float:
 
 def _through_wall(solution: Solution, index: int, x: float) -> float:
     """S(x) of a chain of shell elements, heat flowing along the normal only."""
-    group, c = solution.system.groups[index], solution.constants[index]
-    assert isinstance(group, ShellGroup)
+    group, c = solution.system.chains[index], solution.constants[index]
     stress = mean_stress(c, solution.strain[index])
     eta, weights = np.polynomial.legendre.leggauss(stress.shape[2])
     degree = len(eta) - 1

@@ -45,11 +45,8 @@ class Block:
     @cached_property
     def spreads(self) -> "dict[int, scipy.sparse.csr_matrix]":
         """From the unknowns to those of the elements of every chain of shell, in the plain basis."""
-        return {
-            number: _plain(group, self.system.constraint)[:, self.shell]
-            for number, group in enumerate(self.system.groups)
-            if isinstance(group, ShellGroup)
-        }
+        P = self.system.constraint
+        return {number: _plain(group, P)[:, self.shell] for number, group in self.system.chains.items()}
 
     def moves(self, resonator: Resonator, position: float, height: float) -> Array:
         """Displacements u, v, w of a place, at a height -1 (inner) ... 1 (outer face), per unit of every unknown, (3, size)."""
@@ -158,7 +155,6 @@ class Together:
         ends = np.cumsum([0, *(block.size for block in blocks)])
         self.size = int(ends[-1])
         self.rows = tuple(slice(int(a), int(b)) for a, b in pairwise(ends))
-        self.groups = blocks[0].system.groups
         np.empty(WORKSPACE)  # freed at once, so that the process keeps the memory of each solve for the next
         self._places: dict[tuple[float, float], tuple[scipy.sparse.csr_matrix, scipy.sparse.csr_matrix]] = {}
 
@@ -174,8 +170,9 @@ class Together:
     def plain(self, number: int, X: Array) -> Array:
         """Unknowns of a chain's elements, (amplitudes, elements, functions, vectors, harmonics, 2)."""
         found = self.spreads[number][0] @ X.reshape(self.size, -1)
-        table, (elements, _) = self._chain(number).table, self._chain(number).unknowns.shape
-        found = found.reshape(len(self.harmonics), elements, table.along.shape[2], -1, X.shape[1], 2)
+        group = self.blocks[0].system.chains[number]
+        functions = group.table.along.shape[2]
+        found = found.reshape(len(self.harmonics), len(group.unknowns), functions, -1, X.shape[1], 2)
         return np.ascontiguousarray(found.transpose(3, 1, 2, 4, 0, 5))
 
     def gather(self, number: int, loads: Array) -> Array:
@@ -203,8 +200,3 @@ class Together:
         """M of every harmonic times vectors."""
         parts = [one.weigh(X[at].reshape(one.size, -1)) for one, at in zip(self.blocks, self.rows, strict=True)]
         return np.concatenate(parts).reshape(X.shape)
-
-    def _chain(self, number: int) -> ShellGroup:
-        group = self.groups[number]
-        assert isinstance(group, ShellGroup)
-        return group

@@ -15,7 +15,6 @@ from shell.imperfection.imperfect import Imperfection, fade
 from shell.imperfection.wall import Around, Stretch, Wall, go_around
 from shell.kernel import Section
 from shell.quadrature import Array
-from shell.system import ShellGroup, SolidGroup
 
 ALONG, AROUND = [0, 2], [1]  # displacements
 Energies: TypeAlias = Callable[[Block, Block], tuple[Array, Array]]
@@ -68,9 +67,7 @@ class Core:
         return self._products[key]
 
     def _table(self, block: Block) -> CellTable:
-        group = block.system.groups[self.number]
-        assert isinstance(group, SolidGroup)
-        return group.table
+        return block.system.solids[self.number].table
 
     def _section(self, block: Block) -> tuple[Array, Array]:
         """Strains and displacements per unit of every shared unknown."""
@@ -101,7 +98,7 @@ class Body:
         self.walls = _walls(together, flaw, waves, theta)
         self.cores: list[tuple[Core, Array, Array]] = []
         for core in cores if flaw.modulus or flaw.density else ():
-            x = together.groups[core.number].table.position[:1, 0]
+            x = together.blocks[0].system.groups[core.number].table.position[:1, 0]
             stiff, heavy = (values_around(field, waves, x, theta)[0] for field in (flaw.modulus, flaw.density))
             self.cores.append((core, stiff * (2 * pi / theta.size), heavy * (2 * pi / theta.size)))
         self.masses: list[tuple[tuple[float, float], Array, Around]] = []
@@ -144,10 +141,9 @@ def _walls(together: Together, flaw: Imperfection, waves: tuple[int, ...], theta
     system = together.blocks[0].system
     orders, resonator = system.level.through, together.resonator
     faces = flaw.faces(fade(resonator, system))[:: resonator.outward]
-    found: dict[int, list[Wall]] = {number: [] for number in together.spreads}
+    found: dict[int, list[Wall]] = {number: [] for number in system.chains}
     for number, walls in found.items():
-        group, c = system.groups[number], together.constants[number]
-        assert isinstance(group, ShellGroup)
+        group, c = system.chains[number], together.constants[number]
         table = group.table
         for first in range(0, len(group.unknowns), RUN):
             run = slice(first, min(first + RUN, len(group.unknowns)))

@@ -32,7 +32,7 @@ from shell.modes import Mode
 from shell.quadrature import Array
 from shell.refinement import solve_level
 from shell.resonator import Resonator
-from shell.system import ShellGroup, System
+from shell.system import System
 
 SMALL = 1e-9  # of the largest wave of a field: smaller ones are left out
 MOST = 16  # rounds of answers
@@ -45,8 +45,8 @@ class CoupledHarmonics:
     """Harmonics of one resonator, prepared once for any imperfection."""
 
     def __init__(self, mode: Mode, elastic: Elastic | VaryingElastic, highest: int | None = None) -> None:
-        if mode.harmonic < 1 or mode.solution is None or mode.resonator is None:
-            raise ShellError("a pair needs a harmonic from 1 up and theory solid or shell.")
+        if mode.harmonic < 1:
+            raise ShellError("a pair needs a harmonic from 1 up.")
         self.mode = mode
         self.n = mode.harmonic
         self.highest = highest or self.n + REACH
@@ -83,8 +83,7 @@ class CoupledHarmonics:
     @cached_property
     def cores(self) -> tuple[Core, ...]:
         """The solid parts."""
-        groups = self.system(self.n).groups
-        return tuple(Core(k, self.constants[k]) for k, group in enumerate(groups) if not isinstance(group, ShellGroup))
+        return tuple(Core(k, self.constants[k]) for k in self.system(self.n).solids)
 
     def together(self, harmonics: tuple[int, ...]) -> Together:
         """Several of them side by side."""

@@ -9,7 +9,7 @@ import numpy as np
 from shell.imperfection.field import NOTHING, Field
 from shell.quadrature import Array
 from shell.resonator import Resonator
-from shell.system import ShellGroup, System
+from shell.system import System
 
 
 @dataclass(frozen=True)
@@ -58,14 +58,12 @@ def fade(resonator: Resonator, system: System) -> Callable[[Array], Array] | Non
     """Factor of the departures of the faces: 1, falling to 0 over √(h R) at a solid part or clamp, which keeps its shape; or None."""
     edges: list[tuple[float, int, float]] = []
     spans: list[tuple[float, float]] = []
-    for group in system.groups:
-        if isinstance(group, ShellGroup):
-            chain = group.chain
-            spans.append((chain.breaks[0] / resonator.length, chain.breaks[-1] / resonator.length))
-            for s, inward, end in zip((chain.breaks[0], chain.breaks[-1]), (1, -1), chain.ends, strict=True):
-                if end in ("tied", "clamped"):
-                    h = float(resonator.at([s], chain.segments[0 if inward > 0 else -1]).thickness[0])
-                    edges.append((s / resonator.length, inward, sqrt(h * resonator.size) / resonator.length))
+    for chain in (group.chain for group in system.chains.values()):
+        spans.append((chain.breaks[0] / resonator.length, chain.breaks[-1] / resonator.length))
+        for s, inward, end in zip((chain.breaks[0], chain.breaks[-1]), (1, -1), chain.ends, strict=True):
+            if end in ("tied", "clamped"):
+                h = float(resonator.at([s], chain.segments[0 if inward > 0 else -1]).thickness[0])
+                edges.append((s / resonator.length, inward, sqrt(h * resonator.size) / resonator.length))
     if not edges:
         return None
 

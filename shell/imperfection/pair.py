@@ -25,7 +25,6 @@ from shell.modes import Mode
 from shell.quadrature import Array
 from shell.resonator import FaceName, Resonator
 from shell.solution import Solution, squares_of, surface_energies, total
-from shell.system import ShellGroup
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,19 +50,16 @@ class Pair:
     def __post_init__(self) -> None:
         if self.mode.harmonic < 1:
             raise ShellError("a mode with n = 0 is single and cannot split: choose a harmonic from 1 up.")
-        if self.mode.solution is None:
-            raise ShellError("Rayleigh's closed form carries no energies: use theory solid or shell.")
+        _ = self.solution  # of Rayleigh's closed form there is none
 
     @property
     def solution(self) -> Solution:
         """The eigenvector."""
-        assert self.mode.solution is not None
         return self.mode.solution
 
     @property
     def resonator(self) -> Resonator:
         """The body of revolution."""
-        assert self.mode.resonator is not None
         return self.mode.resonator
 
     @cached_property
@@ -79,20 +75,15 @@ class Pair:
     @cached_property
     def faces(self) -> tuple[Density, Density]:
         """Per metre that the inner and the outer face stand out of the material; solid roots and corners are left out."""
-        x, c, s = [], [], []
-        for number, group in enumerate(self.solution.system.groups):
-            if isinstance(group, ShellGroup):
-                half = group.section.thickness[..., None] / 2
-                cosine, sine = surface_energies(self.solution, number)
-                x.append(group.table.position.ravel())
-                c.append((cosine / half).reshape(-1, 2))
-                s.append((sine / half).reshape(-1, 2))
-        position, cosine, sine = np.concatenate(x), np.concatenate(c) / self.scale, np.concatenate(s) / self.scale
+        walls = [(g, surface_energies(self.solution, k)) for k, g in self.solution.system.chains.items()]
         inner, outer = (
-            Density(position, (cosine + sine)[:, k], (cosine - sine)[:, k] / 2)
+            [
+                _columns(g.table.position, 2 / g.section.thickness[..., None], *(e[..., k : k + 1] for e in energies))
+                for g, energies in walls
+            ]
             for k in (0, 1)[:: self.resonator.outward]
         )
-        return inner, outer
+        return _gather(inner, self.scale), _gather(outer, self.scale)
 
     @cached_property
     def density(self) -> Density:

@@ -202,7 +202,7 @@ def _figures(resonator: "Resonator", material: Material, T: float, harmonic: int
             found["slope_ppm_per_degC"] = 1e6 * float(law.slope(at)[0])
             found["slope_sd_ppm_per_degC"] = 1e6 * float(law.slope_uncertainty(at)[0])
     found["frequency_Hz"] = mode.frequency
-    vibration = Vibration.of(mode, material, T)
+    vibration = Vibration(mode.solution, mode.resonator, material, T)
     per_layer = float(surface_cause(1.0, 0.0, "").inverse_q(vibration, at)[0])
     if (surface := known_losses(material.name).get("surface")) is not None:
         found["surface_q"] = 1 / (surface["depth_m"] * per_layer)

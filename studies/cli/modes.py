@@ -200,7 +200,6 @@ def _crystal(m: Mode, instrument: Instrument, T: float, tolerance: float) -> Ent
         return None
     from shell.cubic import solve_cubic
 
-    assert m.resonator is not None
     try:
         pair = solve_cubic(m.resonator, crystal, m.harmonic, tolerance)
     except ShellError:

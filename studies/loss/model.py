@@ -73,7 +73,7 @@ def loss_model(
     """
     T0, material = instrument.reference_temperature, instrument.material
     mode = mode or solve_lowest(instrument.resonator, material.elastic(T0), harmonic, theory)
-    vibration = Vibration.of(mode, material, T0)
+    vibration = Vibration(mode.solution, mode.resonator, material, T0)
     parts: LossParts = instrument.part("loss", "loss_parts")
     spread = _relative_sds(instrument)
     heat, lacking = _heat_law(instrument)

@@ -112,7 +112,6 @@ MOST_PREPARED = 4
 
 def _coupled(mode: Mode, elastic: Elastic) -> CoupledHarmonics:
     """The coupled harmonics of a pair, prepared once for all imperfections of one perfect resonator."""
-    assert mode.solution is not None
     key = (mode.resonator, elastic, mode.harmonic, mode.index, mode.theory, mode.solution.system.level)
     if key not in _PREPARED:
         if len(_PREPARED) >= MOST_PREPARED:

@@ -24,7 +24,7 @@ WALL, INSIDE = Heat(5.1e-7, 2203 * 740.0, 1.38), Heat(14.2e-6, 19300 * 129.0, 32
 
 
 def _vibration(mode: Mode) -> Vibration:
-    return Vibration.of(mode, constant_material("glass", 72.7e9, 0.17, 2203.0), 293.15)
+    return Vibration(mode.solution, mode.resonator, constant_material("glass", 72.7e9, 0.17, 2203.0), 293.15)
 
 
 def _dome(h: float) -> Vibration:

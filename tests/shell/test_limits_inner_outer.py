@@ -108,7 +108,7 @@ def effects(resonator):
     """What depends on a face, of each."""
     mode = solved(resonator)
     pair, coupled = Pair(mode), CoupledHarmonics(mode, SILICA)
-    vibration = Vibration.of(mode, find_material("fused-silica"), 293.15)
+    vibration = Vibration(mode.solution, mode.resonator, find_material("fused-silica"), 293.15)
     found = {"gas": viscous_loss(vibration, GASES["air"], 1e5, 293.15)}
     for face, height in (("inner", -1.0), ("outer", 1.0)):
         found[f"film {face}"] = film_internal_loss(Film(1e-7, 7e10, 0.4, 1e-3, faces=(face,)), vibration)
