@@ -103,7 +103,8 @@ def choose_memory(prepare: Prepare) -> Memory:
             return left(_moved(others, name, np.exp(logarithm)))
 
         for k in range(len(plain) * (memory.play > 0)):
-            memory = min((_started(memory, k, start) for start in (0.0, -1.0, 1.0)), key=left)
+            trials = ((*memory.starts[:k], start, *memory.starts[k + 1 :]) for start in (0.0, -1.0, 1.0))
+            memory = min((replace(memory, starts=starts) for starts in trials), key=left)
         for name in MEMORY:
             if value := getattr(memory, name):
                 ends = float(np.log(value / REACH)), float(np.log(value * REACH))
@@ -143,10 +144,6 @@ def choose_memory(prepare: Prepare) -> Memory:
 
 def _moved(memory: Memory, name: str, value: float) -> Memory:
     return replace(memory, lag=float(value)) if name == "lag" else replace(memory, play=float(value))
-
-
-def _started(memory: Memory, run: int, start: float) -> Memory:
-    return replace(memory, starts=(*memory.starts[:run], start, *memory.starts[run + 1 :]))
 
 
 def free_memory(fit: BiasFit, prepare: Prepare) -> BiasFit:

@@ -121,7 +121,8 @@ def _integrate(
     # nodes and middles of the steps, in rows
     place = np.interp(np.arange(2 * first[-1] + 1), 2 * first, np.arange(len(t)))
     time, turning, commanded = (np.interp(place, np.arange(len(t)), x) for x in (t, k * rate, command))
-    swept = angle + np.concatenate([[0.0], np.cumsum(np.diff(time) * _between(turning + commanded))])
+    speeds = turning + commanded
+    swept = angle + np.concatenate([[0.0], np.cumsum(np.diff(time) * ((speeds[1:] + speeds[:-1]) / 2))])
     answers = 2 * n * (k * (np.abs(drift) @ order) + known * float((np.abs(shown) + np.abs(arriving)) @ order))
     window = np.cumsum(np.diff(time)[::2] * np.interp(place[1::2], np.arange(len(t)), answers)) // WINDOW
     edges = 2 * np.concatenate([[0], np.flatnonzero(np.diff(window)) + 1, [first[-1]]])
@@ -144,10 +145,6 @@ def _integrate(
                 break
         departed[here] = x
     return np.asarray((swept + departed)[2 * first])
-
-
-def _between(values: Array) -> Array:
-    return np.asarray((values[1:] + values[:-1]) / 2)
 
 
 def _series(terms: Complex, e: Complex) -> Array:

@@ -16,7 +16,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise
-from math import atan2, ceil, hypot, log, pi
+from math import atan2, ceil, dist, log, pi
 
 import numpy as np
 
@@ -121,7 +121,7 @@ def _find_frame(resonator: Resonator, like: Resonator | None = None) -> Frame:
     shared = [corner == model.widest for corner in model.corners] if model else [widest - c.s < slant for c in contacts]
     corners = tuple(widest if one else contact.s for one, contact in zip(shared, contacts, strict=True))
     far_face, near, over = resonator.surface(above[0][0], 0), min(corners), above[0][1][0]
-    heights = [_distance(c.on_dome, _point(far_face, s)) for c, s in zip(contacts, corners, strict=True)]
+    heights = [dist(c.on_dome, _point(far_face, s)) for c, s in zip(contacts, corners, strict=True)]
     count, rings = 0, [0] * len(contacts)
     if model:
         count, rings = len(model.cuts), list(model.rings)
@@ -311,7 +311,3 @@ def _face(resonator: Resonator, face: int, s: Array) -> tuple[Planar, Planar]:
 def _point(surface: Callable[[Array], Planar], s: float) -> Spot:
     r, z = surface(np.array([s]))
     return float(r[0]), float(z[0])
-
-
-def _distance(one: Spot, two: Spot) -> float:
-    return hypot(one[0] - two[0], one[1] - two[1])

@@ -175,7 +175,8 @@ def run_sweeps(
     moments = grid.moments
     T1 = np.array([first.evaluate(t) for t in moments])
     T, delta, rate = T1, np.zeros_like(T1), np.zeros_like(T1)
-    for _ in range(MOST_SWEEPS if not network.is_linear else 0):
+    change = 0.0 if network.is_linear else np.inf
+    for _ in range(MOST_SWEEPS if change else 0):
         beyond = _beyond(network, linear, T, held, power)[:, :, None]
         answer, states = grid.answer(beyond, start)
         delta = answer[:, :, 0]
@@ -185,10 +186,9 @@ def run_sweeps(
             rate = grid.rates(beyond, states)[:, :, 0]
             break
         if not change < 1e4:
-            raise SweepError("the radiation is too strong to be swept; integrate the network instead.")
-    else:
-        if not network.is_linear:
-            raise SweepError("the radiation is too strong to be swept; integrate the network instead.")
+            break
+    if not change < SWEEP_TOLERANCE:
+        raise SweepError("the radiation is too strong to be swept; integrate the network instead.")
     return Sweep(network, linear, grid, held, power, T, delta, rate, first)
 
 

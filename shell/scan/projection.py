@@ -58,20 +58,17 @@ class Projector:
             for value, low, count in zip((r, z), self.low, self.shape, strict=True)
         )
         k = self.nearest[i, j]
-        for _ in range(2):
+        s = line.arc_length[k]
+        for _ in range(3):
+            k = np.clip(np.rint(s / self.step).astype(np.intp), 0, FINE - 1)
             d_r, d_z = r - line.r[k], z - line.z[k]
             height = d_z * line.tangent_r[k] - d_r * line.tangent_z[k]
-            along = (d_r * line.tangent_r[k] + d_z * line.tangent_z[k]) / (1 + line.curvature[k] * height)
+            bent = 1 + line.curvature[k] * height
+            along = (d_r * line.tangent_r[k] + d_z * line.tangent_z[k]) / bent
             s = line.arc_length[k] + along
-            k = np.clip(np.rint(s / self.step).astype(np.intp), 0, FINE - 1)
-        d_r, d_z = r - line.r[k], z - line.z[k]
-        height = d_z * line.tangent_r[k] - d_r * line.tangent_z[k]
-        bent = 1 + line.curvature[k] * height
-        along = (d_r * line.tangent_r[k] + d_z * line.tangent_z[k]) / bent
         # the curve leaves its tangent by κ s²/2, towards the side where ζ < 0
         height = height + line.curvature[k] * along**2 * bent / 2
-        position = (line.arc_length[k] + along) / self.resonator.length
-        return position, np.arctan2(y, x), height, line.thickness[k]
+        return s / self.resonator.length, np.arctan2(y, x), height, line.thickness[k]
 
 
 def check_unit(points: Array, resonator: Resonator, name: str) -> None:

@@ -45,7 +45,8 @@ PROFILE = (
 )
 Course = Annotated[str, Parameter(help=PROFILE)]
 Card = Annotated[str, Parameter(help=CARD)]
-Records = Annotated[str, Parameter(help="The records (CSV).")]
+Files = Annotated[str, Parameter(required=True)]  # one or more
+Records = Annotated[Files, Parameter(help="The records (CSV).")]
 Run = Annotated[str, Parameter(help="The record (CSV).")]
 Out = Annotated[str, Parameter(help="File to write.")]
 Temperature = Annotated[float | None, Parameter(help=REFERENCE, show_default=False)]

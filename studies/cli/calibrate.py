@@ -5,7 +5,7 @@ from typing import Any
 from studies import workbench
 from studies.calibration.calibrate import Calibration
 from studies.calibration.observed import UNITS
-from studies.cli.arguments import Card
+from studies.cli.arguments import Card, Files
 from studies.cli.calibrate_modes import calibrate_modes
 from studies.cli.output import answers, keep_card, say
 from studies.errors import InputError
@@ -20,7 +20,7 @@ STAGES = {"step 1:": 0.05, "held-out run": 0.2, "computing the intervals": 0.55}
 
 @answers("hrg.calibration/1; hrg.mode-calibration/1 for a table of modes")
 def calibrate(
-    card: Card, *data: str, save: str | None = None, hold_out: int = 0, exact: tuple[str, ...] = ()
+    card: Card, *data: Files, save: str | None = None, hold_out: int = 0, exact: tuple[str, ...] = ()
 ) -> Result:
     """Find the most probable values of a card, given its uncertainties and records of the device.
 
@@ -39,8 +39,6 @@ def calibrate(
         hold_out: Number of the record, from 1, that a second calibration predicts; 0: the last of several.
         exact: A value to keep fixed, such as thermal.film_emissivity; may be given more than once.
     """
-    if not data:
-        raise InputError("no data given; name at least one record (CSV) or steady-state table.")
     instrument = load_card(card)
     if tables := [path for path in data if is_mode_table(path)]:
         if len(data) > 1 or hold_out:

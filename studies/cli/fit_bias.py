@@ -5,7 +5,6 @@ from typing import Any, Literal
 from compensation.bias_selection import Method
 from studies.cli.arguments import Records, SaveModel
 from studies.cli.output import answers, keep_model, say
-from studies.errors import InputError
 from studies.fits.bias import BiasStudy, Judged, study_bias
 from studies.models.kinds.bias import name_term
 from studies.record import read_record
@@ -38,8 +37,6 @@ def fit_bias(
         causal: Take the rate from past samples only, as firmware must; it then lags by half the window.
         over: Variable of the fit; auto is the frequency if every record has it, else a temperature.
     """
-    if not data:
-        raise InputError("name at least one record (CSV) of a gyro at rest while its temperature changes.")
     records = []
     for path in data:
         say(f"reading {path}")

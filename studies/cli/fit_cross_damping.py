@@ -56,8 +56,6 @@ def fit_cross_damping(
         order: Highest power of the temperature; the paper uses 3.
         calibration_temperature: Temperature in °C about which the polynomial is expanded.
     """
-    if not data:
-        raise InputError("name at least one record (CSV) of a gyro at rest.")
     records = records_of_one_gyro([read_record(path) for path in data], say)
     carrier = frequency if frequency is not None else _median(records, "frequency_Hz", "--frequency")
     if quality is None:

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from compensation.ringdown.laws import Law
-from studies.cli.arguments import COUNT, POSITIVE, Harmonic
+from studies.cli.arguments import COUNT, POSITIVE, Files, Harmonic
 from studies.cli.output import answers, keep_card, say
 from studies.errors import InputError
 from studies.fits.ringdown import Decay, read_decay, with_decay
@@ -41,7 +41,7 @@ DECAY = "file | frequency_Hz: f (Hz) .9 | q: Q .6 | q_low … q_high: 90 % inter
 
 @answers("hrg.fit-ringdown/3")
 def fit_ringdown(
-    *data: str,
+    *data: Files,
     card: str | None = None,
     frequency: Annotated[float | None, POSITIVE] = None,
     harmonic: Annotated[Harmonic, COUNT] = 2,
@@ -65,8 +65,6 @@ def fit_ringdown(
         save: Write the card with the split, its axis, 1/Q and the damping axis of the first decay.
         out: Write a record with a row for each decay (temperature, frequency, 1/Q), for hrg calibrate and hrg diagnose.
     """
-    if not data:
-        raise InputError("name at least one file (CSV) with a free decay.")
     if save is not None and card is None:
         raise InputError("--save writes the card with the values found; name the card by --card.")
     instrument = load_card(card) if card else None

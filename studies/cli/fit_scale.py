@@ -8,7 +8,6 @@ from compensation.bell import PolynomialCurve
 from compensation.rate_law import CARRIED, SURE, RateCurve, RateLaw
 from studies.cli.arguments import Records, SaveModel
 from studies.cli.output import answers, keep_model
-from studies.errors import InputError
 from studies.fits.scale import ScaleStudy, study_scale
 from studies.models import source_of
 from studies.models.kinds.scale import save_scale
@@ -51,8 +50,6 @@ def fit_scale(
         order: Order of the FIR filter; the paper uses 50.
         no_filter: Omit the FIR filter; the record may then have gaps.
     """
-    if not data:
-        raise InputError("name a record (CSV) with several rates, best also at rest and at one rate over temperature.")
     records = [read_record(path) for path in data]
     study = study_scale(records, None if no_filter else cutoff, order)
     sources = tuple(source_of(record) for record in records)

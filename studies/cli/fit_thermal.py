@@ -50,8 +50,6 @@ def fit_thermal(
         card: A card whose law gives second and third order of the frequency over temperature; without it both are fitted.
         lags: Number of lags, 1 to 3; by default as many as the records support.
     """
-    if not data:
-        raise InputError("name at least one record (CSV) with a step, a ramp or a cycle of temperature.")
     records = [read_record(path) for path in data]
     stages = {"one lag": 0.05, "a heat path with 1": 0.15, "a heat path with 2": 0.25, "a heat path with 3": 0.8}
     with Told("heat path", stages) as told:

@@ -8,6 +8,7 @@ from typing import Annotated, Any
 from cyclopts import Parameter
 
 from compensation.arrays import Array
+from studies.cli.arguments import Files
 from studies.cli.output import answers
 from studies.errors import InputError
 from studies.files.writing import write_numbers, write_text
@@ -27,7 +28,7 @@ FIRST_ROWS = 5
 
 @answers("hrg.import/1, with --draft hrg.import-draft/1")
 def import_(
-    *raw: str,
+    *raw: Files,
     map_: Annotated[str | None, Parameter(name="--map")] = None,
     out: str | None = None,
     draft: str | None = None,
@@ -49,8 +50,6 @@ def import_(
         out: The record to write (.csv or .parquet).
         draft: Draft a map from the files instead; an existing file is not overwritten.
     """
-    if not raw:
-        raise InputError("no raw file given: 'hrg import RAW --draft MAP.toml' drafts a map from it.")
     if draft is not None and map_ is None and out is None:
         return _draft(raw, draft)
     if draft is not None or map_ is None or out is None:

@@ -4,7 +4,6 @@ from pathlib import Path
 
 from studies.cli.arguments import Records
 from studies.cli.output import answers
-from studies.errors import InputError
 from studies.instrument.display import display_name
 from studies.record import read_record
 from studies.record.survey import Survey, survey_record
@@ -21,8 +20,6 @@ def show(*runs: Records) -> Result:
     Needs no card and fits no model of the gyro. The page has every column over time and over temperature, spectra and Allan
     deviations; its figures show values under the pointer and can be enlarged.
     """
-    if not runs:
-        raise InputError("no record given: hrg show RUN.csv [RUN.csv ...].")
     records = [read_record(path) for path in runs]
     surveys = [survey_record(record) for record in records]
     told = [parts.tell(survey) for survey in surveys]

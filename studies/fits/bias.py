@@ -160,11 +160,7 @@ def find_output(records: Sequence[Record]) -> str:
     """Return the zero-rate output column that all records have."""
     for record in records:
         require_rest(record, "bias is fitted to runs at rest. Use hrg fit scale for runs with an applied rate.")
-    for name in OUTPUTS:
-        if all(name in record for record in records):
-            return name
-    where, names = records[0].path or "record", " or ".join(OUTPUTS)
-    raise InputError(f"{where}: a column {names} is missing, or not in all records.")
+    return choose_column(records, tuple(OUTPUTS), "a bias")
 
 
 def find_state(records: Sequence[Record], over: Over = "auto") -> str:

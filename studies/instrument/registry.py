@@ -24,10 +24,6 @@ class CardPlace:
     reference_temperature: float
 
 
-def _as_it_is(keys: Any, place: CardPlace) -> Any:
-    return keys
-
-
 @dataclass(frozen=True)
 class CardTable:
     """A table of the card, or some keys of one, and the part of the instrument that it becomes."""
@@ -36,7 +32,7 @@ class CardTable:
     keys: Any = None  # class of its keys (`studies.schema.keys.Keys`), or a union of classes that a tag tells apart
     part: str = ""  # name of what it becomes in `Instrument.parts`; that of the table unless given
     # callable (keys, place) -> part: The part in SI units; the keys themselves where they are the part.
-    build: Callable[[Any, CardPlace], Any] = _as_it_is
+    build: Callable[[Any, CardPlace], Any] = lambda keys, place: keys
     required: bool = False  # whether every card must have it
     # The documented uncertainties hold only where the card has the table: without it there is no such thing.
     optional: bool = False

@@ -75,7 +75,8 @@ def loss_model(
     mode = mode or solve_lowest(instrument.resonator, material.elastic(T0), harmonic, theory)
     vibration = Vibration(mode.solution, mode.resonator, material, T0)
     parts: LossParts = instrument.part("loss", "loss_parts")
-    spread = _relative_sds(instrument)
+    uncertain = [v for v in instrument.uncertain if v.name.startswith("loss.") and v.value]
+    spread = {v.name: v.sd / abs(v.value) for v in uncertain}
     heat, lacking = _heat_law(instrument)
     causes: list[LossCause] = []
     left_out: list[str] = []
@@ -272,8 +273,3 @@ def _rim_harmonics(instrument: Instrument, parts: LossParts) -> tuple[complex, c
 
 
 ON_RIM = 0.95  # position beyond which a small mass moves as the rim does
-
-
-def _relative_sds(instrument: Instrument) -> dict[str, float]:
-    """Return the relative standard deviation of every uncertain number of `[loss]` by its dotted key."""
-    return {v.name: v.sd / abs(v.value) for v in instrument.uncertain if v.name.startswith("loss.") and v.value}

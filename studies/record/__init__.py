@@ -237,10 +237,10 @@ def repeats(one: Record, two: Record) -> bool:
         return True
     names = [name for name in short if name != "time_s"]
     picked = np.unique(np.linspace(0, min(len(one), len(two)) - 1, PICKED).astype(int))
-    wanted = {name: short[name][picked] for name in names}
-    busiest = max(names, key=lambda name: np.unique(wanted[name]).size, default="time_s")
-    found = np.isin(long[busiest], short[busiest][picked])
-    rows, there = (_rows_of(own, names) for own in (wanted, {name: long[name][found] for name in names}))
+    busiest = max(names, key=lambda name: np.unique(short[name][picked]).size, default="time_s")
+    places = (short, picked), (long, np.isin(long[busiest], short[busiest][picked]))
+    columns = ([np.nan_to_num(own[name][at], nan=np.inf).tolist() for name in names] for own, at in places)
+    rows, there = (set(zip(*one, strict=True)) for one in columns)
     return len(rows & there) > REPEATED * len(picked)
 
 
@@ -254,10 +254,6 @@ def _same_noise(one: Array, two: Array) -> bool:
     both = np.clip(both / spread, -5.0, 5.0)
     rough = [np.corrcoef(own[1:], own[:-1])[0, 1] for own in both]  # of white noise −2/3
     return max(rough) < -0.5 and min(rough) > -0.8 and bool(abs(np.corrcoef(both)[0, 1]) > ALIKE)
-
-
-def _rows_of(columns: Mapping[str, Array], names: Sequence[str]) -> set[tuple[float, ...]]:
-    return set(zip(*(np.nan_to_num(columns[name], nan=np.inf).tolist() for name in names), strict=True))
 
 
 def read_profile(path: "str | Path | DataFrame") -> Columns:

@@ -57,7 +57,10 @@ def plan_table(plan: Plan) -> Table:
     rows += [{"shown": name, "instead": {why: 1.0}, "why": why} for name, why in plan.invisible.items()]
     columns: Head = (
         "shown: hidden effect | least.snr: smallest SNR identified .2",
-        Column(_size, "smallest size identified"),
+        Column(
+            lambda row: f"{row['coefficient']} = {plain(row['least']['value'], 2)}" if row.get("least") else "",
+            "smallest size identified",
+        ),
         *(Column(_at(snr), f"at SNR {snr:g}", "%", ".0f", scale=100.0) for snr in SNRS),
         "least_alone.snr: smallest SNR identified alone .2",
         Column(_listed("as_set_with"), "in one set with, at the smallest size"),
@@ -66,10 +69,6 @@ def plan_table(plan: Plan) -> Table:
     )
     note = f"Identified: the answer is the effect, or a set that contains it. Smallest: identified in {100 * SURE:.0f} % of cases. "
     return Table("Effects that this campaign can identify", rows, columns, note + SNR_WORDS)
-
-
-def _size(row: Mapping[str, Any]) -> str:
-    return f"{row['coefficient']} = {plain(row['least']['value'], 2)}" if row.get("least") else ""
 
 
 def _at(snr: float) -> Callable[[Mapping[str, Any]], float | None]:

@@ -177,7 +177,7 @@ SEARCHES: Mapping[str, Callable[..., dict[str, Any]]] = {"worst-case": find_wors
 def _starts(free: Sequence[StudyParameter]) -> Array:
     """Return the middle and the corners of the unit box; with many parameters the middles of its faces instead."""
     d = len(free)
-    middle = np.array([_share(p, float(p.nominal)) for p in free])
+    middle = np.array([(float(p.nominal) - p.low) / (p.high - p.low) for p in free])
     if d <= MOST_CORNERS:
         return np.array([middle, *(np.array(corner) for corner in product((0.0, 1.0), repeat=d))])
     faces = [np.where(np.arange(d) == k, end, middle) for k in range(d) for end in (0.0, 1.0)]
@@ -190,7 +190,3 @@ def _place(study: Study, free: Sequence[StudyParameter], shares: Array) -> Array
     for p, share in zip(free, shares.T, strict=True):
         designs[:, study.names.index(p.name)] = p.low + share * (p.high - p.low)
     return designs
-
-
-def _share(parameter: StudyParameter, value: float) -> float:
-    return (value - parameter.low) / (parameter.high - parameter.low)

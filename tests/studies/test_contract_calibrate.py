@@ -85,7 +85,7 @@ def test_what_cannot_be_calibrated_is_refused(run, tmp_path, capsys):
     t = np.arange(0.0, 3600.0, 60.0)
     bare.write_text("time_s,frequency_Hz\n" + "".join(f"{x:g},4432\n" for x in t), encoding="utf-8")
     for words, message in (
-        (["calibrate", "hrg-30mm"], "name at least one record"),
+        (["calibrate", "hrg-30mm"], "DATA is missing"),
         (["calibrate", "hrg-30mm", str(bare)], "add the column housing_temperature_degC or chamber_temperature_degC"),
         (["calibrate", "hrg-30mm", str(run), "--hold-out", "3"], "there is 1 record, numbered from 1"),
         (["calibrate", "hrg-30mm", str(run), "--exact", "thermal.film"], "is not an uncertain value of the card"),

@@ -299,7 +299,7 @@ def test_gaps_missing_values_and_spikes_do_not_harm(tmp_path, ask):
     ("spoil", "message"),
     [
         (lambda c: c.pop("frequency_Hz"), "housing_temperature_degC"),
-        (lambda c: c.pop("bias_deg_per_h"), "bias_deg_per_h or measured_rate_deg_per_s is missing"),
+        (lambda c: c.pop("bias_deg_per_h"), "no column bias_deg_per_h or measured_rate_deg_per_s"),
         (lambda c: c.update(frequency_Hz=np.full(TIME.size, 4433.0)), "frequency is constant"),
         (lambda c: c.update(frequency_Hz=-c["frequency_Hz"]), "is not a possible reading (allowed: 1e-06 to 1e+12)"),
         (lambda c: c.update(frequency_Hz=c["frequency_Hz"] / 1000), "is it in kHz"),

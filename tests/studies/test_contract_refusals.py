@@ -65,7 +65,7 @@ REFUSED = {
     "diagnose ROW": "is needed, with two values or more",
     "calibrate hrg-30mm ROW": "has 1 of the 10 rows",
     "diagnose RUN --chamber 'rate 1 range 85 -40'": "the lower one first",
-    "fit thermal": "name at least one record",
+    "fit thermal": "DATA is missing. See 'hrg fit thermal --help'.",
     "fit thermal HRG --confidence 90": "--confidence 90",
     "keys card --table los": "did you mean 'loss'",
     "keys crad": "did you mean 'card'",

@@ -317,7 +317,7 @@ def test_settled_rows():
 
 
 @pytest.mark.parametrize(
-    ("files", "words"), [([1, 2], "of several rates"), ([0, 1, 1], "both runs at rest"), ([], "name a record")]
+    ("files", "words"), [([1, 2], "of several rates"), ([0, 1, 1], "both runs at rest"), ([], "DATA is missing")]
 )
 def test_missing_runs_are_named(records, files, words, refuse):
     assert words in refuse(["fit", "scale", *(records[i] for i in files)])

@@ -229,14 +229,11 @@ def _test_rows(model: Model) -> list[tuple[float, ...]]:
     value = middle + (0.0 if r_low <= 0 <= r_high else (r_low + r_high) / 2) * (time - time[-1] / 2)
     value = np.round(value + speed * window / 3 * np.sin(time * 3 / window), 9)
     output = np.round(1.0 + 0.25 * np.cos(0.7 * np.arange(TEST_ROWS)), 9)
-    causal = model if model.number("rate_lag_s") > 0 else _made_causal(model)
+    lag = model.number("rate_lag_s") or model.number("rate_window_s") / 2
+    causal = replace(model, settings={**model.settings, "rate_lag_s": lag})
     record = Record({"time_s": time, column: value, model.compensates: output})
     expected = compensate(causal, record, extrapolate=True)[f"{COMPENSATED}{model.compensates}"]
     return list(zip(time.tolist(), output.tolist(), value.tolist(), expected.tolist(), strict=True))
-
-
-def _made_causal(model: Model) -> Model:
-    return replace(model, settings={**model.settings, "rate_lag_s": model.number("rate_window_s") / 2})
 
 
 def _variable(model: Model) -> Variable:
