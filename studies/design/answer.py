@@ -5,8 +5,8 @@ from itertools import product
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from studies.design.goals import EXACT, Scalar
 from studies.design.search import FINE, WIDE, Search
 from studies.design.task import Task, is_magnitude, shown
@@ -14,7 +14,6 @@ from studies.errors import InputError
 from studies.sweeps.evaluate import WorkPlan, evaluate_case
 from studies.sweeps.search import Explorer
 
-Array = NDArray[np.float64]
 ACTIVE = 2e-3  # of a column's spread: a limit nearer than this holds the design back
 ALIKE = 5e-3  # of the objectives' ranges: designs of the front nearer than this are one
 
@@ -103,7 +102,7 @@ def answer(task: Task, explorer: Explorer, plan: WorkPlan) -> Answer:
             column,
             sign,
             limit,
-            shown(column, values[search.task.columns.index(column)]),
+            shown(column, values[search.goals.place(column)]),
             _margin(search, column, values),
             price,
         )
@@ -112,7 +111,7 @@ def answer(task: Task, explorer: Explorer, plan: WorkPlan) -> Answer:
     spreads = spread_about(search, best) if task.keys.tolerance else ()
     design = np.round(search.low + centre * search.width, 12)
     row = evaluate_case(plan, task.named(design))
-    merits = [(search.goals.violation(v, search.margins), scalar(search.goals.objectives(v))) for v in search.values]
+    merits = [search.merit(k, scalar) for k in range(len(search.values))]
     return Answer(
         task,
         task.start,
@@ -179,7 +178,7 @@ def _refuse_infeasible(search: Search, best: int) -> None:
     for (column, sign, limit, _), over in zip(goals.limits, goals.excess(values, search.margins), strict=True):
         if over > EXACT * abs(limit):
             unit, side = search.task.unit(column), "above" if sign > 0 else "below"
-            value = shown(column, values[search.task.columns.index(column)])
+            value = shown(column, values[goals.place(column)])
             kept = ", its margin for tolerances included," if sign * (value - limit) < over - EXACT * abs(limit) else ""
             words.append(f"{column} = {value:.6g} {unit} is{kept} {over:.4g} {side} its limit {limit:.6g}")
     at = ", ".join(
@@ -202,8 +201,7 @@ def _foretell(search: Search, best: int) -> Array:
     """Return what the interpolant through all the other designs about the best one says of it, in units of the columns."""
     x = search.x[best]
     z = search.local(x, WIDE, without=best)(x[: search.task.free])[0]
-    log = search.goals.logarithmic
-    return np.where(log, np.exp(np.where(log, z, 0.0)), z)
+    return search.goals.uncount(z)
 
 
 def _prices(search: Search, scalar: Scalar, best: int) -> list[float | None]:

@@ -17,10 +17,10 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from studies.design.interpolant import Interpolant
 from studies.design.task import Task, is_magnitude
 
-Array = NDArray[np.float64]
 DECADE = 10.0  # greatest over least, from which on a positive column counts by its logarithm
 EXACT = 1e-6  # of a limit: what rounding and solver leave
 SLSQP: Any = {"maxiter": 100, "ftol": 1e-9}
@@ -67,12 +67,16 @@ class Goals:
         safe = np.where(self.logarithmic, values, 1.0)
         return np.where(self.logarithmic, np.log(np.maximum(safe, 1e-300)), values)
 
+    def uncount(self, z: Array) -> Array:
+        """Return values of columns from how they count."""
+        return np.where(self.logarithmic, np.exp(np.where(self.logarithmic, z, 0.0)), z)
+
     def objectives(self, values: Array) -> Array:
         """Return the objectives of one design, (objectives,), each to be small."""
         z = self.count(values)
         found = []
         for one in self.task.keys.objective:
-            c = self._place(one.column)
+            c = self.place(one.column)
             if one.target is not None:
                 found.append(abs(values[c] - one.target))
             else:
@@ -83,7 +87,7 @@ class Goals:
         """Return by how much each limit is passed with its margin, in units of its column; negative: what is left; (limits,)."""
         found = []
         for column, sign, limit, _ in self.limits:
-            c, parts = self._place(column), self.smooth(column)
+            c, parts = self.place(column), self.smooth(column)
             if is_magnitude(column):
                 found.append(limit - min(abs(values[c]), float(np.min(abs(values[parts]) - margins[parts]))))
             else:
@@ -94,7 +98,7 @@ class Goals:
         """Return the largest excess over limits with their margins, in spreads of its column; 0 where all is kept."""
         found = [0.0]
         for (column, sign, limit, _), over in zip(self.limits, self.excess(values, margins), strict=True):
-            c = self._place(column)
+            c = self.place(column)
             if self.logarithmic[c]:  # sign (v − limit) + margin = over
                 value = values[c]
                 found.append((sign * np.log(value / max(value - sign * over, 1e-300)) - EXACT) / self.spread[c])
@@ -107,7 +111,7 @@ class Goals:
         """Column, +1 for an upper and -1 for a lower one, limit, and number of the constraint."""
         found = []
         for number, one in enumerate(self.task.keys.constraint):
-            low, high = one.limits(float(self.nominal[self._place(one.column)]))
+            low, high = one.limits(float(self.nominal[self.place(one.column)]))
             found += [(one.column, sign, end, number) for sign, end in ((-1.0, low), (1.0, high)) if np.isfinite(end)]
         return found
 
@@ -153,9 +157,10 @@ class Goals:
         if is_magnitude(column):
             stem = column.removesuffix("_Hz") + "_of_n"
             return [k for k, name in enumerate(self.task.columns) if name.startswith(stem)]
-        return [self._place(column)]
+        return [self.place(column)]
 
-    def _place(self, column: str) -> int:
+    def place(self, column: str) -> int:
+        """Return where a column stands."""
         return self.task.columns.index(column)
 
 

@@ -10,13 +10,13 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from studies.design.goals import HELD, Goals, Scalar, lay_goals, step
 from studies.design.interpolant import Interpolant, interpolate
 from studies.design.task import Task
 from studies.errors import InputError
 from studies.sweeps.search import Explorer
 
-Array = NDArray[np.float64]
 TOGETHER = 4  # designs that are computed together
 ROUNDS = 6  # over the whole box, at most
 WIDE, FINE = 0.15, 0.01
@@ -176,7 +176,7 @@ class Search:
 
     def _is_as_good(self, best: int, other: int, scalar: Scalar) -> bool:
         """Whether a design is as good as another; margins are those of the first one, and the other's are not known."""
-        return self.task.keys.margin is not None or self._merit(best, scalar) <= self._merit(other, scalar)
+        return self.task.keys.margin is not None or self.merit(best, scalar) <= self.merit(other, scalar)
 
     def _best_near(self, best: int, half: float, scalar: Scalar, strict: bool) -> int:
         near = np.flatnonzero(self._is_plain() & (np.abs(self.x - self.x[best]).max(axis=1) <= half + 1e-9))
@@ -184,7 +184,7 @@ class Search:
 
     def _worth(self, k: int, scalar: Scalar, strict: bool) -> tuple[float, float]:
         """Return what designs are compared by on the way: limits first where `strict`, else a little beyond a limit for a gain."""
-        return self._mix(*self._merit(k, scalar), strict)
+        return self._mix(*self.merit(k, scalar), strict)
 
     @staticmethod
     def _mix(over: float, t: float, strict: bool) -> tuple[float, float]:
@@ -290,11 +290,11 @@ class Search:
         return (over, t), np.append(found, self.start[free:])
 
     def _judge(self, surface: Interpolant, scalar: Scalar, x: Array) -> tuple[float, float]:
-        z = surface(x[: self.task.free])[0]
-        values = np.where(self.goals.logarithmic, np.exp(np.where(self.goals.logarithmic, z, 0.0)), z)
+        values = self.goals.uncount(surface(x[: self.task.free])[0])
         return self.goals.violation(values, self.margins), scalar(self.goals.objectives(values))
 
-    def _merit(self, k: int, scalar: Scalar) -> tuple[float, float]:
+    def merit(self, k: int, scalar: Scalar) -> tuple[float, float]:
+        """Return the excess of a design over its limits, and its objective."""
         return self.goals.violation(self.values[k], self.margins), scalar(self.goals.objectives(self.values[k]))
 
     def _box(self, centre: Array, half: float) -> tuple[Array, Array]:

@@ -8,8 +8,7 @@ from pathlib import Path
 
 from studies.errors import InputError
 from studies.importing.channels import Group, is_container, open_channels, sort_groups
-from studies.importing.mapping import SEPARATORS
-from studies.importing.raw import decode, name_columns, read_filled
+from studies.importing.raw import decode, name_columns, read_filled, split_line
 from studies.importing.sheets import EXCEL, read_sheet
 
 SEEN = 2000  # lines that are looked at
@@ -129,10 +128,8 @@ def _find_separator(lines: Sequence[str]) -> str:
 
 
 def _split(line: str, separator: str) -> list[str]:
-    if separator == "space":
-        return line.split()
     try:
-        return next(csv.reader([line], delimiter=SEPARATORS[separator]), [])
+        return split_line(line, separator)
     except csv.Error:
         return [line]
 

@@ -184,14 +184,15 @@ def decode(path: str | Path, data: bytes, encoding: str) -> str:
 def _split_lines(path: str | Path, text: str, file: FileMap) -> list[list[str]]:
     """Return the cells of the lines down to the header; of the first line of data where there is none."""
     count = file.header_line or file.data_line
-    lines = text.split("\n", count)[:count]
-    separator = SEPARATORS[file.separator]
-    if file.separator == "space":
-        return [line.split() for line in lines]
     try:
-        return [next(csv.reader([line], delimiter=separator), []) for line in lines]
+        return [split_line(line, file.separator) for line in text.split("\n", count)[:count]]
     except csv.Error as error:
         raise InputError(f"{path}, line {file.header_line}: the header cannot be read ({error}).") from None
+
+
+def split_line(line: str, separator: str) -> list[str]:
+    """Return the cells of a line, by the name of a separator."""
+    return line.split() if separator == "space" else next(csv.reader([line], delimiter=SEPARATORS[separator]), [])
 
 
 def _head(path: str | Path, lines: Sequence[Sequence[str]], file: FileMap) -> list[str]:

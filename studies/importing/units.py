@@ -4,16 +4,10 @@ import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from math import pi
-from typing import TYPE_CHECKING
 
+from compensation.arrays import Array
 from shell.constants import zero_Celsius
 from studies.record import COLUMNS, DECAYS
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
-    Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
