@@ -253,7 +253,8 @@ def _margin(search: Search, column: str, values: Array) -> float:
     return float(search.margins[min(parts, key=lambda c: abs(values[c]) - search.margins[c])])
 
 
-DRAWN = 16  # designs drawn from the tolerances, besides the worst corners
+DRAWN = 16  # designs drawn from the tolerances and solved in full, besides the worst corners
+MANY = 2**16  # and drawn for the share that keeps the limits, to first order
 
 
 def spread_about(search: Search, best: int) -> tuple[Spread, ...]:
@@ -268,11 +269,9 @@ def spread_about(search: Search, best: int) -> tuple[Spread, ...]:
     corners = [x + side * np.sign(move) * most for move in nearest.values() for side in (1.0, -1.0)]
     rng = np.random.default_rng(task.keys.search.seed)
     ends = np.array([t.tolerance is not None if (t := task.tolerance(n)) else False for n in task.study.names])
-    drawn = [
-        x + np.where(ends, most * rng.uniform(-1, 1, len(x)), sd * rng.standard_normal(len(x))) for _ in range(DRAWN)
-    ]
+    off = np.where(ends, most * rng.uniform(-1, 1, (MANY, len(x))), sd * rng.standard_normal((MANY, len(x))))
     known = len(search.values)
-    search.look([*corners, *drawn])
+    search.look([*corners, *(x + off[:DRAWN])])
     around = np.vstack([search.values[known:], values])
     found = []
     for name in task.wanted:
@@ -280,11 +279,11 @@ def spread_about(search: Search, best: int) -> tuple[Spread, ...]:
         column = np.abs(around[:, c]) if is_magnitude(name) else around[:, c]
         one = float(np.sum(np.abs(move) * most)), float(np.linalg.norm(move * sd))
         value = shown(name, values[c])
-        passed = [
-            scipy.stats.norm.cdf(sign * (limit - value) / max(one[1], 1e-300))
+        kept = [
+            sign * (value + off @ move - limit) <= EXACT * abs(limit)
             for n, sign, limit, _ in goals.limits
             if n == name
         ]
-        share = float(max(0.0, sum(passed) - (len(passed) - 1))) if passed else None
+        share = float(np.all(kept, axis=0).mean()) if kept else None
         found.append(Spread(name, value, *one, float(column.min()), float(column.max()), share))
     return tuple(found)

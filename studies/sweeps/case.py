@@ -61,7 +61,7 @@ class Case:
         key = harmonic, index, theory, temperature
         if key in self._named:
             return self._named[key]
-        if self.start is None:
+        if self.start is None or theory == "rayleigh":  # whose closed form has one mode of a harmonic
             return self.modes(harmonic, index + 1, theory, temperature)[index]
         from shell.following import follow
 
@@ -83,6 +83,7 @@ class Case:
         case._solved |= {
             (n, theory, at[T]): (within, tuple(mode.kept_on(*grown[T]) for mode in found))
             for (n, theory, T), (within, found) in self._solved.items()
+            if theory != "rayleigh"
         }
         case._named |= {
             (n, k, theory, at[T]): case._solved[n, theory, at[T]][1][mode.index]

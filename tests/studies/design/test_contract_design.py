@@ -186,3 +186,12 @@ def test_recovery_robust_dome(tmp_path, monkeypatch):
     (frequency,) = [one for one in found.spreads if one.column == "frequency_n2_Hz"]
     assert frequency.low >= 4900
     assert frequency.high <= 5100.05
+
+
+def test_planted_the_closed_form_can_be_wanted(tmp_path):
+    """Frequency as h/R², mass as R² h: the lightest has the least radius, and the least step of the wall that keeps the limit."""
+    found = optimise(write(tmp_path, TASK.replace('"shell"', '"rayleigh"')), workers=1)
+    wall = 5000 / found.before[0] * 0.9 * (12 / 15) ** 2
+    assert wall < found.best[0] < wall + 0.01
+    assert found.best[1] == pytest.approx(12)
+    assert found.after == pytest.approx(found.verified, rel=1e-12)

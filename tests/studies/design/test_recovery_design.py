@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.stats import norm
 
 from studies.design import answer as module
 from studies.design.answer import answer
@@ -165,3 +166,24 @@ def test_no_random_design_is_better(pose, seed):
     assert found.after[1] <= limit + 1e-6
     assert found.after[0] <= draws[draws[:, 1] <= limit, 0].min() + 1e-6
     assert found.evaluations < 400
+
+
+def test_the_share_within_limits_is_that_of_the_tolerances_as_they_are_distributed(pose):
+    # an even ± 0.02 whose worst case touches a limit never passes it; a normal one passes it and, 2.6 of its sd away, the other
+    def share(**tolerance):
+        found = ask(
+            pose(
+                {"x": (0.1, 2.0, {"start": 1.0})},
+                ["x"],
+                lambda d: [d[0]],
+                objective=[{"column": "x"}],
+                constraint=[{"column": "x", "low": 0.5}, {"column": "x", "high": 0.55}],
+                tolerance=[{"name": "x", **tolerance}],
+                margin={"kind": "worst-case"} if "tolerance" in tolerance else {"kind": "probability", "share": 0.958},
+            )
+        )
+        (spread,) = found.spreads
+        return spread.passed
+
+    assert share(tolerance=0.02) == 1.0
+    assert share(standard_deviation=0.02 / 3**0.5) == pytest.approx(0.958 - norm.sf(0.03 * 3**0.5 / 0.02), abs=3e-3)
