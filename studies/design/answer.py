@@ -280,9 +280,7 @@ def spread_about(search: Search, best: int) -> tuple[Spread, ...]:
         one = float(np.sum(np.abs(move) * most)), float(np.linalg.norm(move * sd))
         value = shown(name, values[c])
         kept = [
-            sign * (value + off @ move - limit) <= EXACT * abs(limit)
-            for n, sign, limit, _ in goals.limits
-            if n == name
+            sign * (value + off @ move - limit) <= EXACT * abs(limit) for n, sign, limit, _ in goals.limits if n == name
         ]
         share = float(np.all(kept, axis=0).mean()) if kept else None
         found.append(Spread(name, value, *one, float(column.min()), float(column.max()), share))

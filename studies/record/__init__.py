@@ -277,7 +277,11 @@ def write_record(record: Record, path: str | Path) -> None:
             tell(f"writing {path}", part)
 
 
-def check_plausible(columns: Mapping[str, Array], where: Callable[[int], str]) -> None:
+def check_plausible(
+    columns: Mapping[str, Array],
+    where: Callable[[int], str],
+    mend: str = "leave the cell empty where the value is missing",
+) -> None:
     """Refuse readings that no instrument gives, naming the first; `where` tells the place of a row."""
     for name, values in columns.items():
         low, high = next((ends for ending, ends in LIMITS.items() if name.endswith(ending)), (-np.inf, np.inf))
@@ -287,7 +291,7 @@ def check_plausible(columns: Mapping[str, Array], where: Callable[[int], str]) -
             kelvin = name.endswith("_degC") and 200 < values[row] < 500
             hint = "it looks like kelvin, subtract 273.15" if kelvin else "check its unit"
             raise InputError(
-                f"{where(row)}: {name} = {values[row]:g} is not a possible reading (allowed: {low:g} to {high:g}); {hint}, or leave the cell empty where the value is missing."
+                f"{where(row)}: {name} = {values[row]:g} is not a possible reading (allowed: {low:g} to {high:g}); {hint}, or {mend}."
             )
 
 

@@ -12,7 +12,7 @@ from shell.constants import zero_Celsius
 from studies.effects import find_effect
 from studies.instrument.tables.noise import SILENT
 from studies.progress import tell
-from studies.record import Record
+from studies.record import Record, check_plausible
 from studies.resonator.law import unknown_slope
 from studies.simulation.chamber import check_profile
 from studies.simulation.drive import COLUMN, COMMANDS, RATE, Drive, drive_by_profile, rows_of
@@ -112,6 +112,9 @@ def simulate_run(
         columns["measured_rate_deg_per_s"] = columns[RATE] + columns["bias_deg_per_h"] / 3600
     for name, values in columns.items():
         columns[name] = np.round(values, DIGITS.get(name, COMMAND_DIGITS))
+    check_plausible(
+        columns, lambda row: f"{instrument.name} at {drive.time[row]:g} s", "correct the card, the profile or a command"
+    )
     resolution = {
         "frequency_Hz": levels.frequency_resolution_Hz,
         "bias_deg_per_h": levels.bias_resolution_deg_per_h,

@@ -221,6 +221,13 @@ def test_an_effect_whose_drive_stays_is_named(card, law):
     )
 
 
+def test_a_run_that_no_command_could_read_is_not_made(card, law):
+    """Once a softening in the wrong unit made a record of −876 kHz, which every other command refused."""
+    falling = card.with_table("effect", [{"name": "clock-drift", "drift_Hz_per_day": -1e6}])
+    with pytest.raises(InputError, match=r"open-dome at \d+ s: frequency_Hz = -\S+ is not a possible reading"):
+        run(falling, law, "soak 20 1h", noise=False)
+
+
 def test_drive_power_warms_the_shell(card):
     heated = build_network(card.with_table("thermal", {"drive_power_mW": 1.0}), radiation=False)
     resistance = find_relaxation(heated, 293.15)
