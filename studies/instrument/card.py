@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from importlib.resources import files
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Generic, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Generic, TypeAlias, TypeVar, cast
 
 from shell.constants import zero_Celsius
 from studies.errors import InputError, nearest
@@ -53,8 +53,10 @@ class Said(Generic[T]):
         self.names = names
 
     def __get__(self, card: "Instrument", _: object) -> T:
-        found: T = card.part(*self.names)
-        return found
+        found: T | None = card.part(*self.names)
+        if found is None and self.names[0] in OF_GEOMETRY:
+            raise InputError(f"{card.path}: this needs a card with [resonator] and [material]; this one has a polynomial ([law]) instead.")  # fmt: skip
+        return cast("T", found)
 
 
 @dataclass(frozen=True)
@@ -70,6 +72,8 @@ class Instrument:
     content: Mapping[str, Any] = field(default_factory=dict, repr=False, compare=False)
     path: str = field(default="", compare=False)  # the file it came from
 
+    resonator: ClassVar["Said[Resonator]"] = Said("resonator")  # at the reference temperature, SI units
+    material: ClassVar["Said[Material]"] = Said("material")  # over temperature, SI units
     polynomial: ClassVar["Said[PolynomialLaw | None]"] = Said("law")  # None where the card has a geometry
     thermal: ClassVar["Said[Thermal]"] = Said("thermal")
     bias: ClassVar["Said[Bias]"] = Said("bias")
@@ -84,18 +88,6 @@ class Instrument:
     def keys(self, table: str, name: str = "") -> Any:
         """Return the keys of a table as they stand in the card, with their defaults, in the units of their names."""
         return self.tables[table].keys[name or table]
-
-    @property
-    def resonator(self) -> "Resonator":
-        """The resonator at the reference temperature, SI units."""
-        found: Resonator = self._of_geometry("resonator")
-        return found
-
-    @property
-    def material(self) -> "Material":
-        """The material over temperature, SI units."""
-        found: Material = self._of_geometry("material")
-        return found
 
     @property
     def is_imperfect(self) -> bool:
@@ -141,11 +133,6 @@ class Instrument:
     def stated(self) -> frozenset[str]:
         """Names of the numbers whose uncertainty the card itself states, exact ones among them."""
         return frozenset[str]().union(*(table.stated for table in self.tables.values()))
-
-    def _of_geometry(self, table: str) -> Any:
-        if self.polynomial is not None:
-            raise InputError(f"{self.path}: this needs a card with [resonator] and [material]; this one has a polynomial ([law]) instead.")  # fmt: skip
-        return self.part(table)
 
     def at(self, temperature: float) -> "tuple[Resonator, Elastic]":
         """Return the resonator, grown by its expansion, and its elastic constants at a uniform temperature (K)."""
