@@ -84,5 +84,4 @@ def measure_rate(element: SensitiveElement, time: ArrayLike, rate: ArrayLike) ->
     """Return the rate (rad/s) of the 'realistic' gyro of figures 5–7: the full dynamics, demodulated in the phase of W₂(0), scaled."""
     read_columns(time=time, rate=rate)
     secondary = propagate_envelope(element, time, rate).secondary
-    measured: Array = (secondary / relate_rate_to_secondary(element).steady_gain).real
-    return measured
+    return np.asarray((secondary / relate_rate_to_secondary(element).steady_gain).real)

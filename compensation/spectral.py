@@ -33,8 +33,7 @@ class Spectrum:
     def density(self, frequency: ArrayLike) -> Array:
         """Return S(jω) at angular frequencies (rad/s)."""
         s = 1j * np.asarray(frequency, dtype=float)
-        values: Array = (np.polyval(self.numerator, s) / np.polyval(self.denominator, s)).real
-        return values
+        return np.asarray((np.polyval(self.numerator, s) / np.polyval(self.denominator, s)).real)
 
     @property
     def variance(self) -> float:

@@ -108,8 +108,7 @@ def energy_weights(cells: MeridianCells, place: ArrayLike, share: ArrayLike) -> 
     """Give the places' contributions to d ln f/dT to the cells, Σ weights (T − T_ref) = δ ln f, linear between middles, even beyond."""
     place = np.asarray(place, dtype=float)
     hats = np.array([np.interp(place, cells.middle, unit) for unit in np.eye(cells.count)])
-    weights: Array = hats @ np.asarray(share, dtype=float)
-    return weights
+    return np.asarray(hats @ np.asarray(share, dtype=float))
 
 
 def scale(value: Capacity, factor: float) -> Capacity:
@@ -122,5 +121,4 @@ def scale(value: Capacity, factor: float) -> Capacity:
 def _integrate(function: Along, start: Array, end: Array) -> Array:
     half = (end - start)[:, None] / 2
     s = start[:, None] + half * (POINTS + 1)
-    integral: Array = (half * WEIGHTS * np.broadcast_to(function(s), s.shape)).sum(axis=1)
-    return integral
+    return np.asarray((half * WEIGHTS * np.broadcast_to(function(s), s.shape)).sum(axis=1))

@@ -147,8 +147,7 @@ class Network:
 
     def outflow_slope(self, temperature: Array) -> Array:
         """Derivative of `outflow` by the temperatures, L + 4 σ R diag(T³) (W/K)."""
-        slope: Array = self.conduction + 4 * Stefan_Boltzmann * self.radiation * temperature**3
-        return slope
+        return np.asarray(self.conduction + 4 * Stefan_Boltzmann * self.radiation * temperature**3)
 
     def power(self, time: ArrayLike, derivative: int = 0) -> Array:
         """Heat that the sources put into each node at times (s), W, or its slope, W/s: shape (..., count)."""

@@ -69,8 +69,7 @@ class Profile:
     @property
     def jumps(self) -> NDArray[np.float64]:
         """Times (s) at which the value jumps."""
-        jumps: NDArray[np.float64] = self.time[1:][np.diff(self.time) == 0]
-        return jumps
+        return np.asarray(self.time[1:][np.diff(self.time) == 0])
 
     def segments(self, time: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Value and slope of the straight piece at each time; at a jump, of the piece after it."""

@@ -33,8 +33,7 @@ def step_remaining(network: Network, before: float, after: float, weights: Array
     time = np.asarray(time, dtype=float)
     profile = Profile(np.array([0.0, 0.0, time.max()]), np.array([before, after, after]))
     transient = simulate(network, {boundary.name: profile for boundary in network.boundaries})
-    left: Array = (transient.observe(time, weights[None, :])[:, 0] - after) / (before - after)
-    return left
+    return np.asarray((transient.observe(time, weights[None, :])[:, 0] - after) / (before - after))
 
 
 def integrate(
@@ -57,18 +56,15 @@ def integrate(
         inside = float(np.nextafter(end, start))  # the last moment before a jump at `end`
 
         def held(time: float, last: float = inside) -> Array:
-            row: Array = boundary_forcing(network, boundaries, np.array([min(time, last)]))[0][0]
-            return row
+            return np.asarray(boundary_forcing(network, boundaries, np.array([min(time, last)]))[0][0])
 
         def rate(time: float, T: Array, last: float = inside) -> Array:
             outflow = network.outflow(np.concatenate([T, held(time, last)]))[:n]
-            flow: Array = (network.power(min(time, last)) - outflow) / network.capacities(T)
-            return flow
+            return np.asarray((network.power(min(time, last)) - outflow) / network.capacities(T))
 
         def jacobian(time: float, T: Array, last: float = inside) -> Array:
             slope = network.outflow_slope(np.concatenate([T, held(time, last)]))[:n, :n]
-            matrix: Array = -slope / network.capacities(T)[:, None]
-            return matrix
+            return np.asarray(-slope / network.capacities(T)[:, None])
 
         solution = scipy.integrate.solve_ivp(
             rate, (start, end), T, method="Radau", jac=jacobian, dense_output=True, rtol=relative_tolerance,
@@ -83,7 +79,6 @@ def integrate(
     whole = scipy.integrate.OdeSolution(np.concatenate(times), pieces)
 
     def evaluate(time: Array) -> Array:
-        temperature: Array = np.asarray(whole(time)).T
-        return temperature
+        return np.asarray(whole(time).T)
 
     return Transient(tuple(node.name for node in network.nodes), np.concatenate(times), evaluate)

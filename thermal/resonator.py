@@ -80,5 +80,4 @@ def shell_weights(nodes: tuple[str, ...], weights: Array) -> Array:
     row = np.zeros(len(nodes))
     for name, weight in zip(cell_names(len(weights)), weights, strict=True):
         row[nodes.index(name)] = weight
-    normalised: Array = row / row.sum()
-    return normalised
+    return np.asarray(row / row.sum())

@@ -165,8 +165,7 @@ class _Slopes:
             push -= swept.everything @ change.conduction[:n].T
         if change.radiation.any():
             push -= Stefan_Boltzmann * (swept.everything**4 @ change.radiation[:n].T)
-        forcing: Array = self.ratio * (push + change.power) - self._heavier(change) * self.flow
-        return forcing
+        return np.asarray(self.ratio * (push + change.power) - self._heavier(change) * self.flow)
 
     def _heavier(self, change: NetworkChange) -> Array:
         """∂ ln C/∂p at all moments, (3, K, n), or (n,) where it does not depend on temperature."""

@@ -147,8 +147,7 @@ class Sweep:
 
         def evaluate(time: Array) -> Array:
             interpolated = hermite(self.grid, time, self.beyond, self.beyond_rate)[0]
-            total: Array = self.first.evaluate(time) + interpolated
-            return total
+            return np.asarray(self.first.evaluate(time) + interpolated)
 
         return Transient(self.first.nodes, self.first.knots, evaluate)
 
@@ -200,8 +199,7 @@ def _beyond(network: Network, linear: Network, T: Array, held: Array, power: Arr
         stiffer = (linear.conduction - network.conduction)[:, :n]
         return np.asarray(everything @ stiffer - (everything**2) ** 2 @ (Stefan_Boltzmann * network.radiation[:, :n]))
     flow = (power - network.outflow(everything)[..., :n]) * capacity_ratio(network, linear, everything)
-    beyond: Array = flow - (power - linear.outflow(everything)[..., :n])
-    return beyond
+    return np.asarray(flow - (power - linear.outflow(everything)[..., :n]))
 
 
 def capacity_ratio(network: Network, linear: Network, temperature: Array) -> Array:
@@ -259,8 +257,7 @@ def _mean_around(profile: Profile, time: Array, reach: Array) -> Array:
 
     low = np.maximum(time - reach, profile.start)
     high = np.minimum(time + reach, profile.end)
-    mean: Array = (antiderivative(high) - antiderivative(low)) / (high - low)
-    return mean
+    return np.asarray((antiderivative(high) - antiderivative(low)) / (high - low))
 
 
 def _choose_knots(corners: Array, boundaries: Mapping[str, Profile], longest: float) -> Array:

@@ -85,8 +85,7 @@ def propagate(network: Network, boundaries: Mapping[str, Profile], initial: Arra
         k = np.minimum(np.searchsorted(knots, time, side="right") - 1, len(length) - 1)
         s = (time - knots[k])[:, None]
         x = level[k] + trend[k] * s + departure[k] * np.exp(-rate * s)
-        temperature: Array = x @ shapes.T
-        return temperature
+        return np.asarray(x @ shapes.T)
 
     return Transient(modes.nodes, knots, evaluate)
 

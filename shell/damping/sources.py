@@ -8,20 +8,18 @@ from typing import Any
 
 
 @cache
-def _table() -> Mapping[str, Any]:
+def _table() -> Mapping[str, Mapping[str, Mapping[str, Any]]]:
     return tomllib.loads((files("shell") / "damping" / "losses.toml").read_text(encoding="utf-8"))
 
 
 def known_losses(material: str) -> Mapping[str, Mapping[str, Any]]:
     """Bulk and surface loss of a material with their sources; empty where no source states any."""
-    found: Mapping[str, Mapping[str, Any]] = _table()["material"].get(material, {})
-    return found
+    return _table()["material"].get(material, {})
 
 
 def known_film(name: str) -> Mapping[str, Any]:
     """Constants of a film and their source; empty where it is not in the table."""
-    found: Mapping[str, Any] = _table()["film"].get(name, {})
-    return found
+    return _table()["film"].get(name, {})
 
 
 def film_names() -> tuple[str, ...]:
