@@ -12,7 +12,7 @@ from shell.errors import ShellError
 from studies.calibration.agreement import keep_agreeing, put_back
 from studies.calibration.apart import fit_explained
 from studies.calibration.estimates import Estimate, estimate, find_groups, over_the_wave, posterior_card
-from studies.calibration.fit import CardFit, fit, whitened
+from studies.calibration.fit import CardFit, descend, fit
 from studies.calibration.ladder import Rung, build_ladder, noise_rms, spread_of
 from studies.calibration.levels import LEVELS, turn_on, with_level_spread, without_idle_levels
 from studies.calibration.misreading import check_readings
@@ -37,7 +37,6 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 Progress = Callable[[str], None]
-START_STEPS = 3
 EXCLUDED = 6.0  # prior standard deviations that no value of a right card is away
 
 
@@ -282,11 +281,7 @@ def _refit_start(problem: CardProblem, point: Array, whole: CardFit) -> State:
         name: replace(whole.noise[name], offset=1e3 * whole.noise[name].white / known.rows[name].span ** 0.5)
         for name in known.responses
     }
-    start = np.zeros(known.count)
-    for _ in range(START_STEPS):
-        J, r = whitened(known, known.evaluate(start), noise, known.rows)
-        start = np.clip(start + np.linalg.solve(J.T @ J + np.eye(len(start)), J.T @ r - start), *known.ends)
-    return known.evaluate(start, slopes=False)
+    return descend(known, known.evaluate(np.zeros(known.count)), noise, known.rows)
 
 
 def _rms(values: Array) -> float:

@@ -11,7 +11,7 @@ from shell.errors import ShellError
 from studies.calibration.ahead import BIAS
 from studies.calibration.priors import gather_priors
 from studies.calibration.problem import FARTHEST
-from studies.calibration.settled import READ_AS
+from studies.calibration.settled import READ_AS, REVERSED
 from studies.errors import InputError
 from studies.resonator.law import law_of, moved_law
 from studies.simulation.drive import COLUMN, drive_by_record
@@ -78,7 +78,7 @@ def _check_temperatures(instrument: "Instrument", record: "Record", as_read: "Le
         if needed < LIKELY**2 < _needed(instrument, record, changes, whole) - needed:
             right = columns[COLUMN["housing"] if COLUMN["housing"] in names else names[0]]
             wrong = [one for one in names if _apart(columns[one], right) <= _apart(record[one], right)]
-            reversed_too = ", or frequency_Hz if its changes are reversed" if "sign" in words else ""
+            reversed_too = ", or frequency_Hz if its changes are reversed" if words == REVERSED else ""
             raise InputError(
                 f"{record.path}: frequency_Hz does not follow the temperatures as the card predicts, unless they are read {words}:"
                 f" {other:.2g} Hz of its {changes:.2g} Hz (rms) then remain. Correct {' and '.join(wrong)}{reversed_too}."

@@ -23,9 +23,10 @@ NEAR, NEAR_LEVEL = 3.0, 2e-3
 """Standard deviations of the slope, and part of the level, within which another reading of the temperatures agrees."""
 NOTABLE = 2.0
 """Standard deviations of the level from which on it is said what would bridge it."""
+REVERSED = "with the opposite sign"
 READ_AS: dict[str, Callable[[Array], Array]] = {
     "in °F": lambda T: (T - zero_Celsius - 32.0) / 1.8 + zero_Celsius,
-    "with the opposite sign": lambda T: 2.0 * zero_Celsius - T,
+    REVERSED: lambda T: 2.0 * zero_Celsius - T,
 }
 """What a temperature column may have been, K: not in °C, or not with its sign."""
 
