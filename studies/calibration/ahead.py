@@ -3,8 +3,8 @@
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from studies.calibration.priors import gather_priors
 from studies.simulation.prediction import predict
 
@@ -13,7 +13,6 @@ if TYPE_CHECKING:
     from studies.instrument.card import Instrument
     from studies.simulation.drive import Drive
 
-Array = NDArray[np.float64]
 BIAS = "bias_deg_per_h"
 
 

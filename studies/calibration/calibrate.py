@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from shell.errors import ShellError
 from studies.calibration.agreement import keep_agreeing, put_back
 from studies.calibration.apart import fit_explained
@@ -35,7 +35,6 @@ if TYPE_CHECKING:
 
     from studies.instrument.card import Instrument
 
-Array = NDArray[np.float64]
 Progress = Callable[[str], None]
 EXCLUDED = 6.0  # prior standard deviations that no value of a right card is away
 

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from compensation.constants import NINETY
 from studies.calibration.fit import CardFit, whitened
 from studies.calibration.priors import Priors, from_standard, to_standard
@@ -17,7 +17,6 @@ from studies.instrument.uncertain import UncertainValue
 if TYPE_CHECKING:
     from studies.instrument.card import Instrument
 
-Array = NDArray[np.float64]
 NONLINEAR = ("thermal.", "noise.", "effect.", "resonator.")
 """Values whose intervals are looked at beyond the straight line."""
 BENT = 0.25  # relative departure of the objective at the ends of an interval from its parabola, beyond which it is profiled

@@ -12,8 +12,8 @@ from typing import Protocol
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from compensation.errors import CompensationError
 from compensation.noise import Noise
 from compensation.noise_rows import NoiseRows
@@ -23,7 +23,6 @@ from studies.calibration.problem import CardProblem, Progress, State
 from studies.errors import InputError
 from thermal.errors import ThermalError
 
-Array = NDArray[np.float64]
 MOST_STEPS = 30
 CLOSE = 0.05  # fall of the objective that a step still promises: a move of 0.2 standard deviations in any direction
 NEAR = 1.0  # the same, where no step makes the fit better: what differences and rounding leave

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from compensation.noise import Noise
 from compensation.noise_rows import KINDS, NoiseRows, estimate_noise
 from studies.calibration.observed import SETTLED
@@ -17,7 +17,6 @@ from studies.simulation.noise import bias_noise, frequency_noise
 if TYPE_CHECKING:
     from studies.instrument.tables.noise import NoiseKeys
 
-Array = NDArray[np.float64]
 OUTLIER, LOOKS = 5.0, 2  # standard deviations; looks, for one outlier hides another
 UNSEEN = 0.1  # of the noise of one row: a column whose whole length is less tells nothing
 LASTING = ("frequency_Hz", "inverse_q")  # responses without an offset of turn-on

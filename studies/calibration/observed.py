@@ -7,6 +7,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from compensation.decimation import average_groups, bend_of_means
 from compensation.noise import white_rms
 from compensation.spikes import find_spikes
@@ -15,7 +16,6 @@ from studies.errors import InputError
 from studies.record import Record, place_in_time, read_frequency_table, reading_resolution
 from studies.simulation.drive import COLUMN, Drive, bridge_holes, drive_by_record
 
-Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
 RESPONSES = ("frequency_Hz", "bias_deg_per_h", "inverse_q")
 QUADRATURE = "quadrature_V"

@@ -9,15 +9,14 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from studies.calibration.wave import ANISOTROPY, AXIS, WavePrior
 
 if TYPE_CHECKING:
     from studies.instrument.card import Instrument
     from studies.instrument.uncertain import UncertainValue
 
-Array = NDArray[np.float64]
 LEAST = 1e-12
 """Of the variances of a correlation's principal axes: what is left by the digits that a card keeps."""
 

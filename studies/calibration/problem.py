@@ -10,8 +10,8 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from compensation.noise import white_rms
 from compensation.noise_rows import NoiseRows
 from studies.calibration.observed import HOUSING, QUADRATURE, RESPONSES, SETTLED, ObservedRun, SettledTable
@@ -27,7 +27,6 @@ if TYPE_CHECKING:
     from shell.law import FrequencyLaw
     from studies.instrument.card import Instrument
 
-Array = NDArray[np.float64]
 MOST_JUMPS = 24  # of a run whose times are free, each for itself
 KNOTS = 5  # in a block
 SOAK = 1e3  # time from one row of a table to the next, in that of a reading

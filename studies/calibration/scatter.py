@@ -9,12 +9,11 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from shell.constants import zero_Celsius
 from studies.calibration.observed import LEAST_SCATTER, THERMOMETER, SettledTable
 
-Array = NDArray[np.float64]
 PART = 0.01  # of what temperature changes: measured tables leave a quarter to a half of it
 ROUNDINGS = 10.0
 SURE = 1e-4  # probability below which a row lies as far from the others by chance

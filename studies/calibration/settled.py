@@ -5,8 +5,8 @@ from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from shell.constants import zero_Celsius
 from studies.calibration.observed import SETTLED, SettledTable
 from studies.calibration.scatter import Scatter, find_scatter, largest_scatter
@@ -15,7 +15,6 @@ from studies.errors import InputError
 if TYPE_CHECKING:
     from studies.calibration.problem import CardProblem
 
-Array = NDArray[np.float64]
 DEGREE = 3
 FOREIGN = 6.0
 """Standard deviations beyond which a table is not of the card's gyro."""

@@ -12,14 +12,13 @@ of which an interval is summed.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from shell.errors import ShellError
 from studies.calibration.fit import LONGEST_STEP, CardFit, objective, step_within, whitened
 from studies.errors import InputError
 from thermal.errors import ThermalError
 
-Array = NDArray[np.float64]
 STRAIGHT = ("bias.", "loss.")
 """Values in which every response is a straight line."""
 UNKNOWN = 0.1  # variance that is left of a value, over its prior's, from which on the others may follow it in a curve

@@ -13,12 +13,12 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
+
+from compensation.arrays import Array
 
 if TYPE_CHECKING:
     from studies.instrument.uncertain import UncertainValue
 
-Array = NDArray[np.float64]
 ANISOTROPY, AXIS = "bias.damping_anisotropy", "bias.damping_axis_deg"
 PER_DEGREE = np.radians(4.0)
 PERIOD = 90.0  # of an axis, °

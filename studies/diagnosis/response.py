@@ -6,6 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from compensation.arrays import Array
+
 
 @dataclass(frozen=True)
 class Response:
@@ -28,9 +30,6 @@ RESPONSES: dict[str, Response] = {
     )
 }
 """By column, the thermometer first: what it finds is known when the others are asked."""
-
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from compensation.arrays import Array
 from shell.constants import zero_Celsius
 from studies.calibration.calibrate import calibrate
 from studies.calibration.observed import NEIGHBOURS, SETTLED, SettledTable, read_settled
@@ -18,7 +19,6 @@ from studies.diagnosis import table_words as words
 from studies.diagnosis.constants import CONSTANTS
 from studies.diagnosis.table_forms import cause_of, each_once, rms, weigh_forms
 from studies.diagnosis.verdict import ResponseResult, Shift, Verdict, doubted, wrong_values
-from studies.effects.states import FloatArray
 from studies.errors import InputError
 from studies.inference.model import Background, Linear
 from studies.inference.polynomial_card import settled_card
@@ -51,11 +51,11 @@ class TableDiagnosis(Shown):
     drawn_by = "studies.reports.diagnosis_table:table_residuals"
 
     verdict: Verdict
-    temperature: FloatArray  # °C, in the order of the rows
+    temperature: Array  # °C, in the order of the rows
     # What is left of the readings, Hz: by the law with f₀ and slope free, or the card as given; by the baseline; beside the cause.
-    law_residual: FloatArray
-    baseline_residual: FloatArray
-    extended_residual: FloatArray
+    law_residual: Array
+    baseline_residual: Array
+    extended_residual: Array
     curvature_ratio: float  # measured over the law's
     candidates: Sequence[tuple[str, float, float, float]]  # of COLUMNS
     sentences: Sequence[str]  # what was found, in words
@@ -161,5 +161,5 @@ def _moved(model: Background) -> tuple[Shift, ...]:
     return tuple(sorted(shifts_of(model), key=lambda one: -abs(one.shift_sd)))
 
 
-def _curvature(table: SettledTable, f: FloatArray) -> float:
+def _curvature(table: SettledTable, f: Array) -> float:
     return float(2.0 * np.polynomial.Polynomial.fit(table.temperature, np.log(f), 2).convert().coef[2])

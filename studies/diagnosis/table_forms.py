@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
+from compensation.arrays import Array
 from compensation.constants import NINETY
 from compensation.noise import Noise
 from studies.calibration.observed import SETTLED, SettledTable
@@ -13,7 +14,6 @@ from studies.calibration.problem import SOAK
 from studies.diagnosis.constants import CONSTANTS
 from studies.diagnosis.verdict import Cause, Interval, weigh
 from studies.effects import Effect, library
-from studies.effects.states import FloatArray
 from studies.inference.model import SCALES, Background, Linear, Term
 
 WHITES = 8
@@ -47,7 +47,7 @@ class Form:
         return self.term.effect.steady_words.format(*self.term.shape)
 
     @property
-    def residual(self) -> FloatArray:
+    def residual(self) -> Array:
         """What it leaves of the rows, Hz."""
         return self.model.residual(SETTLED)
 
@@ -96,7 +96,7 @@ def _noises(linear: Linear, table: SettledTable) -> list[Background]:
     ]
 
 
-def _averaged(levels: Sequence[Background], values: FloatArray) -> tuple[float, Noise]:
+def _averaged(levels: Sequence[Background], values: Array) -> tuple[float, Noise]:
     """Return the log of the mean of likelihoods over noises, and the white noise of the rows, weighted by them."""
     whites = np.log([one.noise[SETTLED].white for one in levels])
     white = Noise(float(np.exp(scipy.special.softmax(values) @ whites)))
@@ -132,6 +132,6 @@ def _weigh(effect: Effect, levels: Sequence[Background], table: SettledTable, no
     return found
 
 
-def rms(values: FloatArray) -> float:
+def rms(values: Array) -> float:
     """Root mean square."""
     return float(np.sqrt(np.mean(values**2)))

@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 import scipy
 
+from compensation.arrays import Array
 from compensation.decimation import average_groups
 from shell.constants import zero_Celsius
 from studies.calibration.observed import SettledTable
 from studies.diagnosis.table_forms import Form, each_once
 from studies.diagnosis.verdict import Shift
-from studies.effects.states import FloatArray
 from studies.instrument.display import display_name
 
 if TYPE_CHECKING:
@@ -156,7 +156,7 @@ def bends_beyond_a_cubic(table: SettledTable) -> bool:
     return cubic >= len(table.frequency) * table.rounding**2 and chance < DOUBTFUL
 
 
-def _turns(T: FloatArray) -> bool:
+def _turns(T: Array) -> bool:
     """Whether the rows go up and down again by more than a tenth of their range."""
     wide = TURN * float(np.ptp(T))
     back_down = float((np.maximum.accumulate(T) - T).max())

@@ -8,7 +8,8 @@ from functools import cache
 
 import numpy as np
 
-from studies.effects.states import FloatArray, States
+from compensation.arrays import Array
+from studies.effects.states import States
 from studies.errors import InputError, nearest
 
 UNITS = {"frequency_Hz": "Hz", "bias_deg_per_h": "deg_per_h", "inverse_q": "1"}
@@ -65,7 +66,7 @@ class Span:
     step: float
     tau: float
     runs: int
-    bins: tuple[FloatArray, ...] = ()
+    bins: tuple[Array, ...] = ()
     turns: bool = False  # whether the wave stands at several azimuths
     timed: bool = True  # whether the starts of the runs are known, so that time goes on from run to run
 
@@ -90,7 +91,7 @@ class Effect:
     # callable (states, shape, response) -> (N, k) array: Signature of a unit of each coefficient: a change of resonator
     # temperature in K when the effect `acts_on` the temperature (frequency, bias and 1/Q then follow by themselves),
     # else a change of the response in its own unit.
-    columns: Callable[[States, Shape, str], FloatArray]
+    columns: Callable[[States, Shape, str], Array]
     # mapping from response to number: How large the first coefficient is in strong cases that sources show; smaller
     # sizes are likely as well, down to a ten thousandth, every decade as much. Frequency and 1/Q count in parts of
     # their level. Its keys are the responses on which the effect acts directly.
@@ -126,7 +127,7 @@ class Effect:
     near: Callable[[Span, str, Shape], Sequence[tuple[float, ...]]] | None = None
     # callable (temperature - reference, shape) -> (N, k) array: What is left of it in a steady state, for tables, with
     # `steady_grid` (low, high) -> shapes, both in K.
-    steady: Callable[[FloatArray, Shape], FloatArray] | None = None
+    steady: Callable[[Array, Shape], Array] | None = None
     steady_grid: Callable[[float, float], Sequence[tuple[float, ...]]] | None = None
     steady_words: str = ""  # what such a form means, in words
 
@@ -146,7 +147,7 @@ class Effect:
         return replace(self, coefficients=(Coefficient("settled_{unit}"),), acts_on="response", positive=False)
 
     @property
-    def spread(self) -> FloatArray:
+    def spread(self) -> Array:
         """Prior standard deviations of all columns over the effect's size."""
         return np.array([value for coefficient in self.coefficients for value in coefficient.spread])
 
@@ -154,7 +155,7 @@ class Effect:
         """Return the names of the coefficients with the unit of `response` filled in."""
         return tuple(c.name.format(unit=UNITS[response]) for c in self.coefficients)
 
-    def numbers(self, values: FloatArray, response: str) -> dict[str, float | list[float]]:
+    def numbers(self, values: Array, response: str) -> dict[str, float | list[float]]:
         """Return coefficients by name from one value a column."""
         out: dict[str, float | list[float]] = {}
         begin = 0
@@ -184,7 +185,7 @@ def find_effect(name: str) -> Effect:
         raise InputError(f"no effect is called '{name}'{nearest(name, library())}") from None
 
 
-def spell_out(effect: Effect, parameters: Mapping[str, Numbers], response: str) -> tuple[list[float], FloatArray]:
+def spell_out(effect: Effect, parameters: Mapping[str, Numbers], response: str) -> tuple[list[float], Array]:
     """Return the shape and one value a column of an effect from the numbers of a card, which its reader has checked."""
     shape = [float(np.ravel(parameters.get(p.name, p.low))[0]) for p in effect.shape]
     weights: list[float] = []
@@ -196,7 +197,7 @@ def spell_out(effect: Effect, parameters: Mapping[str, Numbers], response: str) 
 
 def apply_effect(
     name: str, parameters: Mapping[str, Numbers], states: States, response: str | None = None
-) -> tuple[str, FloatArray]:
+) -> tuple[str, Array]:
     """Run one effect forward, on an even grid: return its target and the change of it, zero where its drive is no part of the run."""
     effect = find_effect(name)
     response = effect.responses[0] if response is None else response
@@ -207,11 +208,9 @@ def apply_effect(
     return target, np.asarray(effect.columns(states, shape, response) @ weights)
 
 
-def apply_effects(
-    entries: Sequence[tuple[str, str, Mapping[str, Numbers], float]], states: States
-) -> dict[str, FloatArray]:
+def apply_effects(entries: Sequence[tuple[str, str, Mapping[str, Numbers], float]], states: States) -> dict[str, Array]:
     """Run effects (name, response, parameters, its time (s) at the start of the run) forward, those on the temperature first; return the change of each target."""
-    changes: dict[str, FloatArray] = {}
+    changes: dict[str, Array] = {}
     warmed = states
     for stage in range(3):  # on the temperature; on the temperature that these leave; on the responses
         for name, response, parameters, begun in entries:

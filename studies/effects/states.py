@@ -8,33 +8,31 @@ import numpy as np
 from compensation.arrays import Array
 from compensation.memory import follow_lag, follow_play
 
-FloatArray = Array
-
 
 @dataclass(frozen=True)
 class States:
     """The drives and the thermal state of one run on an even time grid."""
 
     run: int  # number of the run in its campaign, from 0
-    time: FloatArray  # (N,) array: Seconds since the start of the run, evenly spaced
-    campaign_time: FloatArray  # (N,) array: Seconds since the start of the first run
-    housing: FloatArray  # (N,) array: Temperature that drives the resonator (housing sensor, else chamber), K
+    time: Array  # (N,) array: Seconds since the start of the run, evenly spaced
+    campaign_time: Array  # (N,) array: Seconds since the start of the first run
+    housing: Array  # (N,) array: Temperature that drives the resonator (housing sensor, else chamber), K
     # (N,) array: Temperature of the resonator, K: the housing's through one lag `tau`, unless something better is
     # known.
-    resonator: FloatArray
+    resonator: Array
     tau: float  # time constant of that lag, s
     reference: float  # temperature from which polynomials count, K
     # amplitude_squared, voltage_squared, quadrature, pattern_angle: (N,) array or None: Square of the drive amplitude
     # and of the electrode bias, V²; quadrature control, V; azimuth, rad.
-    amplitude_squared: FloatArray | None = None
-    voltage_squared: FloatArray | None = None
-    quadrature: FloatArray | None = None
-    pattern_angle: FloatArray | None = None
+    amplitude_squared: Array | None = None
+    voltage_squared: Array | None = None
+    quadrature: Array | None = None
+    pattern_angle: Array | None = None
     # (K,) array or None: Temperatures at which the resonator turned in the runs before, K: all that a loop may remember
     # of them.
-    before: FloatArray | None = None
+    before: Array | None = None
     # (N,) array or None: Rate of the resonator temperature, K/s, where a simulation knows it.
-    known_rate: FloatArray | None = None
+    known_rate: Array | None = None
 
     @property
     def step(self) -> float:
@@ -42,12 +40,12 @@ class States:
         return float(self.time[1] - self.time[0]) if self.time.size > 1 else 1.0
 
     @property
-    def excess(self) -> FloatArray:
+    def excess(self) -> Array:
         """Resonator temperature minus the reference, K."""
         return self.resonator - self.reference
 
     @property
-    def rate(self) -> FloatArray:
+    def rate(self) -> Array:
         """Rate of the resonator temperature, K/s: as it is known, else differences of the samples."""
         if self.known_rate is not None:
             return self.known_rate
@@ -55,13 +53,13 @@ class States:
             return np.zeros_like(self.time)
         return np.asarray(np.gradient(self.resonator, self.step))
 
-    def warmed(self, warming: FloatArray) -> "States":
+    def warmed(self, warming: Array) -> "States":
         """Return them with a resonator that is warmer (K)."""
         rate = None if self.known_rate is None else self.known_rate + np.gradient(warming, self.step)
         return replace(self, resonator=self.resonator + warming, known_rate=rate)
 
 
-def remembered(runs: Sequence[States]) -> list[FloatArray]:
+def remembered(runs: Sequence[States]) -> list[Array]:
     """Return, for every run, the temperatures at which the resonator turned in the runs before it, K."""
     past, out = np.empty(0), [np.empty(0)] * len(runs)
     for k in sorted(range(len(runs)), key=lambda k: float(runs[k].campaign_time[0])):
@@ -76,7 +74,7 @@ lag, play = follow_lag, follow_play
 ORDERS = 12  # a knee of a tenth of the range is followed, fringes of a sixth of it are not
 
 
-def waves(x: FloatArray, low: float, high: float, orders: int = ORDERS) -> FloatArray:
+def waves(x: Array, low: float, high: float, orders: int = ORDERS) -> Array:
     """Return cos(k π u), k = 2 … orders, of u = (x − low)/(high − low) held to the range: (N, orders − 1)."""
     u = np.clip((x - low) / max(high - low, 1e-9), 0.0, 1.0)
     return np.asarray(np.cos(np.pi * u[:, None] * np.arange(2, orders + 1)))

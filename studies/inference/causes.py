@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from compensation.constants import NINETY
 from studies.calibration.noise_levels import LASTING
 from studies.diagnosis.constants import CONSTANTS
@@ -21,7 +21,6 @@ from studies.inference.records import REFERENCE, settle
 from studies.inference.search import MARGIN, Hypothesis, Outcome, Search
 from studies.inference.signatures import SHARE, Signatures
 
-Array = NDArray[np.float64]
 DELAY = "law.delay_s"
 SURE_DELAY = 3.0
 """Standard deviations from which on a delay is said."""

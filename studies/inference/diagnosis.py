@@ -10,8 +10,8 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from compensation.noise import white_rms
 from shell.constants import zero_Celsius
 from studies.calibration.apart import fit_explained
@@ -54,7 +54,6 @@ if TYPE_CHECKING:
     from studies.instrument.card import Instrument
     from studies.planning.next_run import Advice
 
-Array = NDArray[np.float64]
 Report = Callable[[str], None]
 Left = tuple[dict[str, Rows], Mapping[str, Array]]
 """What a model leaves of the rows of every response, and of its blocks."""

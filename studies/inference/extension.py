@@ -4,8 +4,8 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from studies.diagnosis.verdict import Interval
 from studies.effects import Effect, Parameter
 from studies.inference.causes import parameters_of
@@ -17,7 +17,6 @@ from studies.record import Record
 if TYPE_CHECKING:
     from studies.calibration.calibrate import Calibration
 
-Array = NDArray[np.float64]
 WIDER = 3.0
 """Of what a diagnosis knows of an effect, the prior with which a calibration finds it anew beside all other values."""
 

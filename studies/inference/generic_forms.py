@@ -5,8 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from compensation.arrays import Array
 from studies.effects import Coefficient, Effect, Parameter, Span
-from studies.effects.states import FloatArray, States, lag, play
+from studies.effects.states import States, lag, play
 
 TEMPERATURE_ORDERS, TIME_ORDERS = 24, 24
 LAGS = tuple(2.0**k for k in range(-4, 4))
@@ -14,14 +15,14 @@ LAGS = tuple(2.0**k for k in range(-4, 4))
 STRONG = {"frequency_Hz": 1e-4, "bias_deg_per_h": 10.0, "inverse_q": 0.3}
 
 
-def _powers(x: FloatArray, orders: int) -> FloatArray:
+def _powers(x: Array, orders: int) -> Array:
     return np.stack([np.cos(k * np.arccos(np.clip(x, -1.0, 1.0))) for k in range(orders)], axis=1)
 
 
 def _generic(
     name: str,
-    columns: Callable[[States, Sequence[float], str], FloatArray],
-    spread: Sequence[float] | FloatArray,
+    columns: Callable[[States, Sequence[float], str], Array],
+    spread: Sequence[float] | Array,
     needs: tuple[str, ...] = (),
 ) -> Effect:
     return Effect(
@@ -41,13 +42,13 @@ def generic_forms(span: Span, runs: Sequence[States]) -> list[Effect]:
     """Return the generic forms of a campaign: of a drive, what it does where it leaves its mean, and no curve of the temperature."""
     low, high = span.temperature_low, span.temperature_high
 
-    def place(states: States) -> FloatArray:
+    def place(states: States) -> Array:
         return np.asarray(np.clip((states.resonator - low) / max(high - low, 1e-9), 0.0, 1.0))
 
-    def temperature(states: States, shape: Sequence[float], response: str) -> FloatArray:
+    def temperature(states: States, shape: Sequence[float], response: str) -> Array:
         return np.cos(np.pi * place(states)[:, None] * np.arange(2, TEMPERATURE_ORDERS))
 
-    def rate(states: States, shape: Sequence[float], response: str) -> FloatArray:
+    def rate(states: States, shape: Sequence[float], response: str) -> Array:
         fast = states.rate / max((high - low) / 3600.0, 1e-12)
         x = 2.0 * place(states) - 1.0
         curve = _powers(x, 4)
@@ -55,24 +56,24 @@ def generic_forms(span: Span, runs: Sequence[States]) -> list[Effect]:
             [curve * fast[:, None], curve * (fast**2)[:, None], curve * np.abs(fast)[:, None]], axis=1
         )
 
-    def history(states: States, shape: Sequence[float], response: str) -> FloatArray:
+    def history(states: States, shape: Sequence[float], response: str) -> Array:
         wide = high - low
         loops = play(states.resonator, [wide * part for part in (0.01, 0.03, 0.1, 0.25)])
         slow = [lag(states.resonator, states.step, span.longest_run * part) for part in (0.01, 0.04, 0.15, 0.6)]
         return np.asarray((np.concatenate([loops, np.stack(slow, 1)], axis=1) - states.resonator[:, None]) / wide)
 
-    def time(states: States, shape: Sequence[float], response: str) -> FloatArray:
+    def time(states: States, shape: Sequence[float], response: str) -> Array:
         t = (states.time - states.time[0]) / max(float(np.ptp(states.time)), 1e-9)
         waves = np.cos(np.pi * t[:, None] * np.arange(1, TIME_ORDERS + 1))
         out = np.zeros((t.size, len(runs) * TIME_ORDERS))
         out[:, states.run * TIME_ORDERS : (states.run + 1) * TIME_ORDERS] = waves
         return out
 
-    def drive(field: str) -> Callable[[States, Sequence[float], str], FloatArray]:
+    def drive(field: str) -> Callable[[States, Sequence[float], str], Array]:
         every = [own for run in runs if (own := getattr(run, field)) is not None]
         largest = max((float(np.abs(own).max()) for own in every), default=0.0) or 1e-12
 
-        def powers(states: States) -> FloatArray:
+        def powers(states: States) -> Array:
             values = np.asarray(getattr(states, field), dtype=float)
             if field == "pattern_angle":
                 return np.stack([np.sin(4 * values), np.cos(4 * values)], axis=1)
@@ -82,7 +83,7 @@ def generic_forms(span: Span, runs: Sequence[States]) -> list[Effect]:
         # a drive that a run lacks has no form
         means = np.mean(np.concatenate([powers(run) for run in runs]), axis=0) if len(every) == len(runs) else 0.0
 
-        def columns(states: States, shape: Sequence[float], response: str) -> FloatArray:
+        def columns(states: States, shape: Sequence[float], response: str) -> Array:
             curve = _powers(2.0 * place(states) - 1.0, 4)
             return np.concatenate([curve * power[:, None] for power in (powers(states) - means).T], axis=1)
 
@@ -109,7 +110,7 @@ def generic_forms(span: Span, runs: Sequence[States]) -> list[Effect]:
 def any_lags(span: Span) -> Effect:
     """Return the form of a heat path of any kind: the housing through lags of all lengths, and that times the temperature, in which radiation and capacities go."""
 
-    def columns(states: States, shape: Sequence[float], response: str) -> FloatArray:
+    def columns(states: States, shape: Sequence[float], response: str) -> Array:
         x = (states.resonator - states.reference) / max(span.temperature_range, 1e-3)
         behind = np.stack([lag(states.housing, states.step, span.tau * part) for part in LAGS], axis=1)
         away = behind - states.resonator[:, None]
@@ -122,13 +123,13 @@ def any_lags(span: Span) -> Effect:
 def offsets(count: int) -> Effect:
     """Return the form of runs that lie apart: a level of each."""
 
-    def levels(states: States, shape: Sequence[float], response: str) -> FloatArray:
+    def levels(states: States, shape: Sequence[float], response: str) -> Array:
         return np.tile(np.arange(count) == states.run, (states.time.size, 1)).astype(float)
 
     return _generic("offsets of the runs", levels, [1.0] * count)
 
 
-def _step(states: States, shape: Sequence[float], response: str) -> FloatArray:
+def _step(states: States, shape: Sequence[float], response: str) -> Array:
     run, moment = shape
     return np.asarray(np.clip((states.time - moment) / states.step + 0.5, 0.0, 1.0)[:, None] * (states.run == int(run)))
 
@@ -142,7 +143,7 @@ STEP = replace(
 )
 
 
-def _bump(states: States, shape: Sequence[float], response: str) -> FloatArray:
+def _bump(states: States, shape: Sequence[float], response: str) -> Array:
     """A bump at one temperature, what shifts it and what widens it: Hermite's functions of order 0, 1 and 2."""
     centre, width = shape
     z = (states.resonator - centre) / width

@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from studies.calibration.fit import CardFit, fit
 from studies.calibration.priors import gather_priors
 from studies.calibration.problem import CardProblem
@@ -19,7 +19,6 @@ from studies.instrument.card import Instrument
 from studies.simulation.heat_path import build_network, slowest_lag
 from studies.simulation.variations import LAG
 
-Array = NDArray[np.float64]
 FREQUENCY = "frequency_Hz"
 LAGS = ("lag_s", "second_lag_s", "third_lag_s")
 DIRECT, DELAY = "law.direct_share", "law.delay_s"

@@ -8,12 +8,12 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from compensation.noise import Noise
 from studies.calibration.noise_levels import LASTING
 from studies.inference.model import Linear, Term, solve_posterior, split
 from studies.inference.signatures import Path, Signatures
 
-Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 BLOCKS = 5
 FREE = 1e3

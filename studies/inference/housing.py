@@ -3,14 +3,11 @@
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from studies.calibration.fit import CardFit
 from studies.calibration.observed import HOUSING, RESPONSES
 from studies.calibration.problem import State
 from studies.inference.model import Background, Linear
-
-Array = NDArray[np.float64]
 
 
 def set_housing_apart(found: CardFit) -> CardFit:

@@ -4,7 +4,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from compensation.lines import Line
 from compensation.spikes import find_step
@@ -17,7 +16,6 @@ from studies.inference.model import Background, Term
 from studies.inference.search import LESS, SUSPICIOUS, Hypothesis, Search, Shapes
 from studies.inference.sharp import brief_events, fast_line, intermittent, tails_of
 
-Array = NDArray[np.float64]
 ENOUGH = CONSTANTS["margin"] - CONSTANTS["log_prior_unknown"]
 """Log evidence from which on structure is no chance."""
 

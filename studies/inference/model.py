@@ -16,6 +16,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from compensation.noise import Noise
 from compensation.noise_rows import NoiseRows, Whitener, log_prior
 from studies.calibration.fit import CardFit
@@ -23,7 +24,6 @@ from studies.calibration.noise_levels import OUTLIER, estimate_levels, spare_out
 from studies.calibration.problem import CardProblem
 from studies.effects import Effect
 
-Array = NDArray[np.float64]
 SCALES = 10.0 ** np.arange(-4.0, 0.51, 0.5)
 """Sizes of an effect over that of strong cases, every one as likely."""
 AT_ONCE = 500_000

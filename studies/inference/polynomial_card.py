@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from compensation.noise import white_rms
 from shell.constants import zero_Celsius
 from studies.calibration.noise_levels import LASTING
@@ -20,7 +20,6 @@ from studies.instrument.card import SCHEMA, Instrument, build_instrument
 from studies.record import Record
 from thermal.lag import lag
 
-Array = NDArray[np.float64]
 LAGS = np.geomspace(30.0, 3e4, 40)
 """Lags, s, among which one is looked for."""
 OF_RUN = 0.5

@@ -4,8 +4,8 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from compensation.noise import Noise
 from studies.calibration.fit import IMPOSSIBLE, CardFit
 from studies.inference.held_out import Model
@@ -14,7 +14,6 @@ from studies.inference.relinearise import relinearise
 from studies.inference.search import MOST_TERMS, Hypothesis, Outcome, Search, Shapes
 from studies.inference.signatures import Signatures
 
-Array = NDArray[np.float64]
 AGAIN, SETTLING = 7, 4
 """Most linearisations after the first, and how many of these look for no further effects."""
 STRAYED = 1.0

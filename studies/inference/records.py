@@ -4,18 +4,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from compensation.spikes import find_spikes
 from studies.calibration.observed import LEAST_ROWS, RESPONSES
-from studies.effects.states import FloatArray
 from studies.errors import InputError
 from studies.record import Record, drop_repeats, place_in_time, with_bias
 from studies.record.plausible import check_one_gyro
 from studies.record.rest import LEAST_SPIKE, check_temperatures
 from studies.simulation.drive import COMMAND_COLUMNS, RATE
 
-Array = NDArray[np.float64]
 HOUSING, CHAMBER, RESONATOR = "housing_temperature_degC", "chamber_temperature_degC", "resonator_temperature_degC"
 REFERENCE = "reference_frequency_Hz"
 
@@ -175,7 +173,7 @@ MOST_LOSS = 30.0
 """Times by which 1/Q of one gyro may differ from record to record."""
 
 
-def check_units(records: Sequence[Record], tables: Sequence[dict[str, FloatArray]]) -> list[str]:
+def check_units(records: Sequence[Record], tables: Sequence[dict[str, Array]]) -> list[str]:
     """Raise InputError when a column can hardly be in the unit that its name says; return the doubts about the time."""
     for record, table in zip(records, tables, strict=True):
         where = record.path or "record"
@@ -186,13 +184,13 @@ def check_units(records: Sequence[Record], tables: Sequence[dict[str, FloatArray
     return [doubt for doubt in map(check_temperatures, records) if doubt]
 
 
-def _level(table: dict[str, FloatArray], name: str, none: float) -> float:
+def _level(table: dict[str, Array], name: str, none: float) -> float:
     """Return the median of a column, or what stands for one without values."""
     known = table[name][np.isfinite(table[name])] if name in table else np.empty(0)
     return float(np.median(known)) if known.size else none
 
 
-def check_device(records: Sequence[Record], tables: Sequence[dict[str, FloatArray]]) -> None:
+def check_device(records: Sequence[Record], tables: Sequence[dict[str, Array]]) -> None:
     """Raise InputError when the records can hardly be of one gyro."""
     names = {record.instrument: record.path for record in records if record.instrument}
     if len(names) > 1:

@@ -9,8 +9,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from compensation.noise import Noise
 from compensation.noise_rows import NoiseRows
 from studies.calibration.fit import CardFit, descend
@@ -23,7 +23,6 @@ from studies.simulation.heat_path import build_network, slowest_lag
 from studies.simulation.prediction import Prediction
 from studies.simulation.variations import heats
 
-Array = NDArray[np.float64]
 Along = Mapping[str, tuple[Array, list[int]]]
 """By state: how it goes with the coordinates that reach a run, and their places."""
 STEP = 1e-3

@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from compensation.noise import Noise, white_rms
 from studies.calibration.noise_levels import LASTING, stated_noise
 from studies.diagnosis.constants import CONSTANTS
@@ -15,7 +15,6 @@ from studies.inference.causes import SURE_DELAY, delay_of
 from studies.inference.inferred import Inferred
 from studies.inference.lack_of_fit import doubt_of
 
-Array = NDArray[np.float64]
 FEWEST_LAGS = 3.0
 """Time constants that the records must cover before they confirm a law whose lag is free."""
 BRIEF, MINUTES = 300.0, 5.0

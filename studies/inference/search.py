@@ -8,13 +8,13 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from compensation.noise import Noise, white_rms
 from studies.effects import Effect
 from studies.inference.model import PRICE, Background, Linear, Term, estimate_noise_of
 from studies.inference.shapes import chosen, leading, polish
 from studies.inference.signatures import Signatures
 
-Array = NDArray[np.float64]
 Columns = Mapping[str, NDArray[np.floating]]
 LESS = (0.1, 0.01)
 """Of the slow noise of a response: what an effect has been taken for until it is named."""

@@ -4,12 +4,11 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from studies.effects import Effect, Parameter, Span
 from studies.inference.model import Background, Term
 
-Array = NDArray[np.float64]
 Moved = Callable[[Term, tuple[float, ...]], Term]
 """A term with another shape."""
 MOST_SHAPES = 400

@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 import scipy
 
+from compensation.arrays import Array
 from compensation.lines import Line, find_line
-from studies.effects.states import FloatArray
 
 RESOLVED = 2.5
 """Blocks to a period of a line that they resolve."""
@@ -21,15 +21,13 @@ def longest_resolved(period: float) -> float:
     return MOST_RESOLVED * period / RESOLVED
 
 
-def fast_line(
-    series: Sequence[tuple[FloatArray, FloatArray]], sampling: float, step: float, noise: float
-) -> Line | None:
+def fast_line(series: Sequence[tuple[Array, Array]], sampling: float, step: float, noise: float) -> Line | None:
     """Return the largest line that is too fast for steps of a grid, of readings or of what a model leaves of them."""
     line = find_line(series, sampling, RESOLVED * step)
     return line if line is not None and line.rms > LEAST_LINE * noise else None
 
 
-def intermittent(runs: Sequence[FloatArray]) -> float:
+def intermittent(runs: Sequence[Array]) -> float:
     """Return the log evidence of oscillations that come, go or wander: a mixture of powers against one exponential law of noise."""
     best = 0.0
     for length in CELLS:
@@ -58,7 +56,7 @@ UNEVEN = 2.5
 """Factor by which the spectrum of noise may differ from that of the kinds of wander."""
 
 
-def brief_events(rows: FloatArray, heaviest: float) -> float:
+def brief_events(rows: Array, heaviest: float) -> float:
     """Return the log evidence of brief events: two normal laws about 0 against Student's t of tails no heavier than given, by the BIC."""
     square = rows**2 / max(float(np.mean(rows**2)), 1e-300)
     best = -np.inf
@@ -76,11 +74,11 @@ def brief_events(rows: FloatArray, heaviest: float) -> float:
     return best - float(np.log(rows.size))
 
 
-def _normal(square: FloatArray, variance: float) -> FloatArray:
+def _normal(square: Array, variance: float) -> Array:
     return np.asarray(np.exp(-0.5 * square / variance) / np.sqrt(2.0 * np.pi * variance))
 
 
-def student_log(square: FloatArray, freedom: float) -> float:
+def student_log(square: Array, freedom: float) -> float:
     """Return the log likelihood of Student's law at its likeliest scale, from squares."""
     scale = max(float(np.mean(square)), 1e-300)
     for _ in range(30):
@@ -93,7 +91,7 @@ def student_log(square: FloatArray, freedom: float) -> float:
     return float(square.size * norm - (freedom + 1.0) / 2.0 * np.log1p(square / (freedom * scale)).sum())
 
 
-def tails_of(values: FloatArray) -> float:
+def tails_of(values: Array) -> float:
     """Return the likeliest degrees of freedom of Student's law for a sample about 0."""
     square = values[values != 0.0] ** 2
     return max(TAILS, key=lambda freedom: student_log(square, freedom)) if square.size else TAILS[-1]

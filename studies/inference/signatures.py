@@ -10,8 +10,8 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from compensation.arrays import Array
 from shell.constants import zero_Celsius
 from studies.calibration.problem import CardProblem, Part
 from studies.effects import Effect, Span, library
@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from studies.inference.model import Term
     from studies.instrument.card import Instrument
 
-Array = NDArray[np.float64]
 WARMER, FASTER, LOSSIER = 0.01, 1e-6, 0.01
 """Steps of temperature (K), of its rate (K/s) and of 1/Q (relative) for the slopes of the read-out."""
 VARIES = 1e-3

@@ -2,12 +2,13 @@
 
 import numpy as np
 
+from compensation.arrays import Array
 from shell.constants import zero_Celsius
 from studies.effects.effect import Coefficient, Effect, Parameter, Shape, Span
-from studies.effects.states import FloatArray, States
+from studies.effects.states import States
 
 
-def columns(states: States, shape: Shape, response: str) -> FloatArray:
+def columns(states: States, shape: Shape, response: str) -> Array:
     """With z = (T − T_d)/w, f shifts by z/(1 + z²), 1/Q by 1/(1 + z²); a stronger coupling mixes and widens the two.
 
     A loop that follows the branch δ ± √(δ² + κ²) hops where they cross: sgn(z) (√(z² + 1) − |z|), and 1 − |z|/√(z² + 1) in 1/Q.
@@ -47,7 +48,7 @@ def near(span: Span, response: str, shape: Shape) -> list[tuple[float, ...]]:
     return [(float(at), float(width * ratio)) for ratio in (0.7, 1.0, 1.4) for at in centres]
 
 
-def steady(x: FloatArray, shape: Shape) -> FloatArray:
+def steady(x: Array, shape: Shape) -> Array:
     """Dispersion of one crossing."""
     z = (x - shape[0]) / shape[1]
     return np.asarray((z / (1.0 + z * z))[:, None])

@@ -2,11 +2,12 @@
 
 import numpy as np
 
+from compensation.arrays import Array
 from studies.effects.effect import Coefficient, Effect, Parameter, Shape, Span
-from studies.effects.states import FloatArray, States
+from studies.effects.states import States
 
 
-def columns(states: States, shape: Shape, response: str) -> FloatArray:
+def columns(states: States, shape: Shape, response: str) -> Array:
     """C log(1 + t/t₀), beside it 1 − e^(−t/3t₀) and t/t₀; t from the start of the campaign or, after a restart, of the run."""
     onset, restarts = shape
     time = states.time if restarts else states.campaign_time

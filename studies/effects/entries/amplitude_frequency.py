@@ -2,11 +2,12 @@
 
 import numpy as np
 
+from compensation.arrays import Array
 from studies.effects.effect import Coefficient, Effect, Shape
-from studies.effects.states import FloatArray, States
+from studies.effects.states import States
 
 
-def columns(states: States, shape: Shape, response: str) -> FloatArray:
+def columns(states: States, shape: Shape, response: str) -> Array:
     """Backbone of a cubic (Duffing) spring: δf = κ A², at once; the next order, A⁴, of a spring that hardens or softens more."""
     power = states.amplitude_squared
     assert power is not None

@@ -1,10 +1,11 @@
 """Clock drift: the gyro's own clock runs ever faster or slower."""
 
+from compensation.arrays import Array
 from studies.effects.effect import Coefficient, Effect, Shape
-from studies.effects.states import FloatArray, States
+from studies.effects.states import States
 
 
-def columns(states: States, shape: Shape, response: str) -> FloatArray:
+def columns(states: States, shape: Shape, response: str) -> Array:
     """Measured frequency f (1 + c t): a straight line in time, per day."""
     return (states.campaign_time / 86400.0)[:, None]
 

@@ -1,10 +1,11 @@
 """Clock offset: the thermometer of one run was logged by another clock."""
 
+from compensation.arrays import Array
 from studies.effects.effect import Coefficient, Effect, Parameter, Shape, Span
-from studies.effects.states import FloatArray, States
+from studies.effects.states import States
 
 
-def columns(states: States, shape: Shape, response: str) -> FloatArray:
+def columns(states: States, shape: Shape, response: str) -> Array:
     """T_r(t − Δ) in place of T_r(t), in one run: −Δ dT_r/dt."""
     return (-states.rate * float(states.run == int(shape[0])))[:, None]
 

@@ -2,13 +2,14 @@
 
 import numpy as np
 
+from compensation.arrays import Array
 from compensation.wave import see_across
 from shell.constants import zero_Celsius
 from studies.effects.effect import Coefficient, Effect, Parameter, Shape, Span
-from studies.effects.states import ORDERS, FloatArray, States, lag, smoothness, waves
+from studies.effects.states import ORDERS, States, lag, smoothness, waves
 
 
-def columns(states: States, shape: Shape, response: str) -> FloatArray:
+def columns(states: States, shape: Shape, response: str) -> Array:
     """B ∝ ζ₁₂(T) sin 4(θ − θ_τ) through the loop's eq. (9): orders 0 … 7 of x = T_r − T₀ in units of 10 K, and smooth waves."""
     low, high, pole, axis = shape
     x = states.excess / 10.0

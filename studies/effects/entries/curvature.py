@@ -2,12 +2,13 @@
 
 import numpy as np
 
+from compensation.arrays import Array
 from shell.constants import zero_Celsius
 from studies.effects.effect import Coefficient, Effect, Parameter, Shape, Span
-from studies.effects.states import FloatArray, States, smoothness, waves
+from studies.effects.states import States, smoothness, waves
 
 
-def columns(states: States, shape: Shape, response: str) -> FloatArray:
+def columns(states: States, shape: Shape, response: str) -> Array:
     """Static terms x³ … x⁶ of the frequency, x = T_r − T₀ in units of 10 K, and smooth waves over the covered range."""
     x = states.excess / 10.0
     powers = np.stack([x**order for order in range(3, 7)], axis=1)
@@ -19,7 +20,7 @@ def grid(span: Span, response: str) -> list[tuple[float, ...]]:
     return [(span.temperature_low - zero_Celsius, span.temperature_high - zero_Celsius)]
 
 
-def steady(x: FloatArray, shape: Shape) -> FloatArray:
+def steady(x: Array, shape: Shape) -> Array:
     """Powers from the third to the named one."""
     return np.stack([(x / 10.0) ** power for power in range(3, int(shape[0]) + 1)], axis=1)
 

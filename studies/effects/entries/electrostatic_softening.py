@@ -2,12 +2,13 @@
 
 import numpy as np
 
+from compensation.arrays import Array
 from shell.electrodes import soften_at_gap
 from studies.effects.effect import Coefficient, Effect, Shape
-from studies.effects.states import FloatArray, States
+from studies.effects.states import States
 
 
-def columns(states: States, shape: Shape, response: str) -> FloatArray:
+def columns(states: States, shape: Shape, response: str) -> Array:
     """δf = −k V², at once, as of the electrodes of a card at a gap that stays; V⁴ as the field narrows the gap."""
     power = states.voltage_squared
     assert power is not None

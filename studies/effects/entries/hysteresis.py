@@ -2,12 +2,13 @@
 
 import numpy as np
 
+from compensation.arrays import Array
 from shell.constants import zero_Celsius
 from studies.effects.effect import Coefficient, Effect, Parameter, Shape, Span
-from studies.effects.states import FloatArray, States, play
+from studies.effects.states import States, play
 
 
-def columns(states: States, shape: Shape, response: str) -> FloatArray:
+def columns(states: States, shape: Shape, response: str) -> Array:
     """Plays less the temperature itself, K: half widths of 1, 0.4, 0.7, 1.5 and 2.2 times the named one (Prandtl-Ishlinskii).
 
     Beside them what curves of the first play do that the same curves of the temperature do not, in units of (play − T): a
@@ -21,7 +22,7 @@ def columns(states: States, shape: Shape, response: str) -> FloatArray:
     turns = np.pi * np.arange(1, ENVELOPE + 1) / max(high - low, 1e-9)
     bottom = low + zero_Celsius
 
-    def curves(temperature: FloatArray) -> FloatArray:
+    def curves(temperature: Array) -> Array:
         return np.asarray(np.cos(np.clip(temperature - bottom, 0.0, max(high - low, 0.0))[:, None] * turns) / turns)
 
     return np.concatenate([loops - states.resonator[:, None], curves(loops[:, 0]) - curves(states.resonator)], axis=1)
@@ -35,7 +36,7 @@ def grid(span: Span, response: str) -> list[tuple[float, ...]]:
     return [(float(radius), start, *ends) for radius in radii for start in starts]
 
 
-def steady(x: FloatArray, shape: Shape) -> FloatArray:
+def steady(x: Array, shape: Shape) -> Array:
     """A play through the temperatures in the order of the rows."""
     return np.asarray((play(x, shape[0]) - x)[:, None])
 

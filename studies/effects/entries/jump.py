@@ -2,11 +2,12 @@
 
 import numpy as np
 
+from compensation.arrays import Array
 from studies.effects.effect import Coefficient, Effect, Parameter, Shape, Span
-from studies.effects.states import FloatArray, States
+from studies.effects.states import States
 
 
-def columns(states: States, shape: Shape, response: str) -> FloatArray:
+def columns(states: States, shape: Shape, response: str) -> Array:
     """H(t − t*) of one run, and H(t − t*) e^(−(t − t*)/τ) for what relaxes after it; where the jump stays, later runs have the first."""
     run, time, stays = shape
     out = np.zeros((states.time.size, 1 + len(RELAXING)))

@@ -2,12 +2,13 @@
 
 import numpy as np
 
+from compensation.arrays import Array
 from shell.damping.gas import free_impedance
 from studies.effects.effect import AROUND, Coefficient, Effect, Parameter, Shape, Span
-from studies.effects.states import FloatArray, States
+from studies.effects.states import States
 
 
-def columns(states: States, shape: Shape, response: str) -> FloatArray:
+def columns(states: States, shape: Shape, response: str) -> Array:
     """1/Q ∝ p √(M/(R T)) of free molecules, as in a loss budget: with p ∝ t T in a sealed housing t (T/T₀)^½, with p ∝ t −½.
 
     Through a hole p ∝ t, and τ (1 − e^(−t/τ)) as it nears the pressure outside; where diffusion feeds it, outgassing, p ∝ √t.

@@ -2,13 +2,14 @@
 
 import numpy as np
 
+from compensation.arrays import Array
 from shell.constants import zero_Celsius
 from shell.damping.anelastic import activated_loss, activation_energy
 from studies.effects.effect import Coefficient, Effect, Parameter, Shape, Span
-from studies.effects.states import FloatArray, States
+from studies.effects.states import States
 
 
-def columns(states: States, shape: Shape, response: str) -> FloatArray:
+def columns(states: States, shape: Shape, response: str) -> Array:
     """2 ωτ/(1 + ω²τ²) = 1/cosh(ln ωτ) of an activated τ, as in a loss budget; E = k T_p²/w."""
     peak, width = shape[0] + zero_Celsius, shape[1]
     return activated_loss(1.0, activation_energy(peak, width), peak, states.resonator)[:, None]

@@ -2,11 +2,12 @@
 
 import numpy as np
 
+from compensation.arrays import Array
 from studies.effects.effect import Coefficient, Effect, Parameter, Shape, Span
-from studies.effects.states import FloatArray, States, lag
+from studies.effects.states import States, lag
 
 
-def columns(states: States, shape: Shape, response: str) -> FloatArray:
+def columns(states: States, shape: Shape, response: str) -> Array:
     """Maxwell elements: stress ∝ T_r − lag(T_r; τ_s), a mismatch that relaxes with τ_s, a third and three times of it,
     from none in a resonator that is as warm as its housing.
 
@@ -29,7 +30,7 @@ def grid(span: Span, response: str) -> list[tuple[float, ...]]:
     return [(float(tau),) for tau in np.geomspace(max(0.5 * span.tau, 600.0), max(4.0 * span.longest_run, 4000.0), 6)]
 
 
-def steady(x: FloatArray, shape: Shape) -> FloatArray:
+def steady(x: Array, shape: Shape) -> Array:
     """A bond that strains the mount on one side of a temperature only."""
     return np.maximum(x - shape[0], 0.0)[:, None]
 

@@ -2,11 +2,12 @@
 
 import numpy as np
 
+from compensation.arrays import Array
 from studies.effects.effect import Coefficient, Effect, Parameter, Shape, Span
-from studies.effects.states import FloatArray, States
+from studies.effects.states import States
 
 
-def columns(states: States, shape: Shape, response: str) -> FloatArray:
+def columns(states: States, shape: Shape, response: str) -> Array:
     """Σ A_h sin(2πht/P) + B_h cos(2πht/P), h = 1 … 3; t of the campaign or, after a restart, of the run.
 
     A line that nothing ties to the start of a run, or to runs whose starts are not known, has its own sines and cosines in each.

@@ -2,11 +2,12 @@
 
 import numpy as np
 
+from compensation.arrays import Array
 from studies.effects.effect import AROUND, Coefficient, Effect, Parameter, Shape, Span
-from studies.effects.states import FloatArray, States, lag
+from studies.effects.states import States, lag
 
 
-def columns(states: States, shape: Shape, response: str) -> FloatArray:
+def columns(states: States, shape: Shape, response: str) -> Array:
     """Heat ρ (g − 1)(T_h − T_r) reaches the resonator through its lag τ: the change of T_r over ρ.
 
     g = (T_h + T_r)(T_h² + T_r²)/(4 T₀³) for exchange between housing and resonator, or (T_r/T₀)³ for g(T_r); τ is the lag
@@ -32,7 +33,7 @@ def grid(span: Span, response: str) -> list[tuple[float, ...]]:
     return [(0.0, 1.0), (0.0, 0.0)]
 
 
-def steady(x: FloatArray, shape: Shape) -> FloatArray:
+def steady(x: Array, shape: Shape) -> Array:
     """What a soak of so many time constants at T₀ leaves of a step from there, its constant ∝ T⁻³."""
     return np.asarray((x * np.exp(-shape[0] * (1.0 + x / AROUND) ** 3))[:, None])
 

@@ -2,11 +2,12 @@
 
 import numpy as np
 
+from compensation.arrays import Array
 from studies.effects.effect import Coefficient, Effect, Shape
-from studies.effects.states import FloatArray, States, lag
+from studies.effects.states import States, lag
 
 
-def columns(states: States, shape: Shape, response: str) -> FloatArray:
+def columns(states: States, shape: Shape, response: str) -> Array:
     """B ∝ dT_r/dt, and its product with the temperature as in HRG paper eqs. (21), (22); the same behind 5 min."""
     late = lag(states.rate, states.step, LATE)
     return np.stack([states.rate, states.rate * states.excess, late - states.rate], axis=1)

@@ -1,10 +1,11 @@
 """Rate frequency: a gradient across the resonator shifts its frequency."""
 
+from compensation.arrays import Array
 from studies.effects.effect import Coefficient, Effect, Shape
-from studies.effects.states import FloatArray, States
+from studies.effects.states import States
 
 
-def columns(states: States, shape: Shape, response: str) -> FloatArray:
+def columns(states: States, shape: Shape, response: str) -> Array:
     """δf ∝ dT_r/dt: the frequency responds to the gradient that a changing temperature brings."""
     return states.rate[:, None]
 

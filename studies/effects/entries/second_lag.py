@@ -2,11 +2,12 @@
 
 import numpy as np
 
+from compensation.arrays import Array
 from studies.effects.effect import Coefficient, Effect, Parameter, Shape, Span
-from studies.effects.states import FloatArray, States, lag
+from studies.effects.states import States, lag
 
 
-def columns(states: States, shape: Shape, response: str) -> FloatArray:
+def columns(states: States, shape: Shape, response: str) -> Array:
     """T_r = (1 − w) lag(T_h; τ) + w lag(T_h; τ₂): the change for w = 1, and for paths at a third and at three times of τ₂."""
     first = lag(states.housing, states.step, states.tau)
     paths = [lag(states.housing, states.step, shape[0] * ratio) - first for ratio in (1.0, 1.0 / 3.0, 3.0)]

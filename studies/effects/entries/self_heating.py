@@ -1,10 +1,11 @@
 """Self-heating: the power of the vibration warms the resonator above its housing."""
 
+from compensation.arrays import Array
 from studies.effects.effect import Coefficient, Effect, Shape
-from studies.effects.states import FloatArray, States, lag
+from studies.effects.states import States, lag
 
 
-def columns(states: States, shape: Shape, response: str) -> FloatArray:
+def columns(states: States, shape: Shape, response: str) -> Array:
     """τ T_r′ = T_h − T_r + R P with P ∝ A²: the change for 1 K/V²."""
     assert states.amplitude_squared is not None
     return lag(states.amplitude_squared, states.step, states.tau)[:, None]

@@ -2,11 +2,12 @@
 
 import numpy as np
 
+from compensation.arrays import Array
 from studies.effects.effect import Coefficient, Effect, Parameter, Shape, Span
-from studies.effects.states import FloatArray, States, lag
+from studies.effects.states import States, lag
 
 
-def columns(states: States, shape: Shape, response: str) -> FloatArray:
+def columns(states: States, shape: Shape, response: str) -> Array:
     """The true housing temperature is T_s + Σ e_k x^k, k = 2, 3, 4, x = T_s − T₀ in units of 10 K; it then passes the lag.
 
     A sensor that was exchanged or wired anew has it from one run on, with another slope, e₁, and zero, e₀: those of a
@@ -28,7 +29,7 @@ def grid(span: Span, response: str) -> list[tuple[float, ...]]:
     return [(float(run),) for run in range(span.runs)]
 
 
-def steady(x: FloatArray, shape: Shape) -> FloatArray:
+def steady(x: Array, shape: Shape) -> Array:
     """Powers from the third to the named one: the second is the law's curvature."""
     return np.stack([(x / 10.0) ** power for power in range(3, int(shape[0]) + 1)], axis=1)
 
