@@ -1,7 +1,5 @@
 """Thermometer lag: the sensor on the housing is slower than the housing."""
 
-import numpy as np
-
 from compensation.arrays import Array
 from studies.effects.effect import Coefficient, Effect, Shape
 from studies.effects.states import States, lag
@@ -10,7 +8,7 @@ from studies.effects.states import States, lag
 def columns(states: States, shape: Shape, response: str) -> Array:
     """The true housing temperature is T_s + τ_s dT_s/dt; behind the resonator's lag τ that adds τ_s d lag(T_s; τ)/dt."""
     late = lag(states.housing, states.step, states.tau)
-    return np.gradient(late, states.step)[:, None] if late.size > 1 else np.zeros((late.size, 1))
+    return ((states.housing - late) / states.tau)[:, None]
 
 
 EFFECT = Effect(
