@@ -42,7 +42,9 @@ static int read_moment(const char *text, double *moment) {
         if (*text == ':') seconds = strtod(text + 1, &end), text = end;
     }
     minutes = 60 * at.tm_hour + at.tm_min;
-    if (at.tm_mon < 1 || at.tm_mon > 12 || at.tm_mday < 1 || at.tm_mday > 31 || minutes >= 1440 || at.tm_min > 59 || !(seconds >= 0 && seconds < 60)) return 0;
+    const int leap = at.tm_year % 4 == 0 && (at.tm_year % 100 != 0 || at.tm_year % 400 == 0);
+    const int longest = at.tm_mon == 2 ? 28 + leap : 30 + (at.tm_mon + at.tm_mon / 8) % 2;
+    if (at.tm_mon < 1 || at.tm_mon > 12 || at.tm_mday < 1 || at.tm_mday > longest || minutes >= 1440 || at.tm_min > 59 || !(seconds >= 0 && seconds < 60)) return 0;
     if (!*text) { /* of the zone of this computer */
         at.tm_year -= 1900, at.tm_mon -= 1;
         return *moment = (double)mktime(&at) + seconds, 1;
@@ -55,7 +57,7 @@ static int read_moment(const char *text, double *moment) {
 
 static int load(const char *file, Profile *profile) {
     FILE *in = fopen(file, "r");
-    char line[LONGEST_LINE];
+    char line[LONGEST_LINE], said[128];
     int order[64], width = 0;
     long number = 0;
     if (!in) return complain(file, 0, "cannot be read.");
@@ -64,6 +66,7 @@ static int load(const char *file, Profile *profile) {
         double row[COLUMNS] = {0};
         ++number;
         line[strcspn(line, "\r\n")] = 0;
+        if (number == 1 && !strncmp(line, "\xEF\xBB\xBF", 3)) memmove(line, line + 3, strlen(line) - 2); /* Excel's mark of UTF-8 */
         if (sscanf(line, "# start : %63[^\n]", profile->start) == 1) {
             for (size_t n = strlen(profile->start); n && profile->start[n - 1] == ' '; --n) profile->start[n - 1] = 0;
             if (!read_moment(profile->start, &profile->moment)) return fclose(in), complain(file, number, "'# start' is no ISO 8601 time such as 2026-01-31T12:00:00.");
@@ -75,8 +78,11 @@ static int load(const char *file, Profile *profile) {
             if (!width || !profile->rows) {
                 order[k] = -1;
                 for (int c = 0; c < COLUMNS; ++c)
-                    if (!strcmp(cell, names[c])) order[k] = c, profile->has[c] = 1;
-                if (order[k] < 0) return fclose(in), complain(file, number, "unknown column; main.c lists them.");
+                    if (!strcmp(cell, names[c]) && !profile->has[c]) order[k] = c, profile->has[c] = 1;
+                if (order[k] < 0) {
+                    snprintf(said, sizeof said, "column '%.60s' is unknown, or there twice; main.c lists all.", cell);
+                    return fclose(in), complain(file, number, said);
+                }
             } else {
                 char *end;
                 const double value = strtod(cell, &end);

@@ -351,6 +351,16 @@ def test_contract_words_and_files_of_the_program(folder):
     assert run(profile, out, 10, 3, "full").returncode == 0
     assert len(read_record(out)) == 61
     assert run(profile, "/dev/stdout", 10, 3, "full").stdout == out.read_text()
+    for start, words in (
+        ("# start: 2026-02-29\n", "'# start' is no ISO 8601 time"),
+        ("# start: 2026-04-31T08:00\n", "'# start' is no ISO 8601 time"),
+        ("temp_degC,", "column 'temp_degC' is unknown"),
+        ("time_s,", "column 'time_s' is unknown, or there twice"),
+    ):
+        hot.write_text(start + before)
+        assert words in run(hot, out, 10).stderr
+    hot.write_text("# start: 2028-02-29\n" + before, encoding="utf-8-sig")
+    assert run(hot, out, 10).returncode == 0
 
 
 @pytest.fixture(scope="module")
