@@ -94,6 +94,7 @@ def test_printed_twist_differs_from_the_derived_one_in_one_derivative():
     assert sp.simplify(strains.printed_twist_defect() - expected) == 0
 
 
+@pytest.mark.slow
 def test_printed_twist_has_the_wrong_parity_and_the_corrected_the_right_one():
     mode = displacements.Displacement(*(part.subs(t, 0) for part in inextensional.inextensional_displacement()))
     corrected, printed = (make(mode).tau for make in (strains.corrected_deformation, strains.printed_deformation))

@@ -132,6 +132,7 @@ def test_contract_a_channel_without_a_clock_asks_for_one(tmp_path, monkeypatch, 
     assert "no group 'g'" in refuse(["import", "run.tdms", "--map", "map.toml", "--out", "run.csv"])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", FORMATS)
 def test_contract_damaged_files_are_refused_in_a_sentence(kind, record, tmp_path, monkeypatch, capfd):
     monkeypatch.chdir(tmp_path)

@@ -45,6 +45,7 @@ def with_temperatures(record, read):
     return spoilt(record, **dict.fromkeys(TEMPERATURES, read))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("read", "said"),
     [(lambda T: 1.8 * T + 32.0, "read in °F"), (lambda T: -T, "read with the opposite sign")],

@@ -32,6 +32,7 @@ def test_drift_of_one_per_cent(quality: float, drift: float) -> None:
     assert Bias(damping_axis_deg=30.0, pattern_angle_deg=52.5).at(*at)[0] == pytest.approx(drift, rel=2e-4)
 
 
+@pytest.mark.slow
 def test_loss_and_bias_of_a_run_come_from_the_parts() -> None:
     card = build_instrument(PARTS)
     profile = Profile(np.array([0.0, 3600.0, 40000.0]), np.array([293.15, 333.15, 333.15]))

@@ -391,6 +391,7 @@ def test_rough_calibration_of_the_paper_is_taken(records, tmp_path, capsys):
     assert found["scale"]["value"] == pytest.approx(100 / step, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_rate_is_read_from_the_bells_own_elements():
     """(27)–(29) and the second form of (24) on the card's bell; σ_φφ alone is near ν/(1 + ν) = 0.23 where the wall only bends around."""
     from studies.papers.bvg_theory import read_planted_rate

@@ -36,6 +36,7 @@ def lock_in(tmp_path):
     return write(tmp_path / "decay.csv", columns, ["reference_frequency_Hz: 4599.7"])
 
 
+@pytest.mark.slow
 def test_a_lock_in_file_gives_split_axes_and_q_and_a_card_that_has_them(lock_in, tmp_path, capsys):
     card, page = tmp_path / "measured.toml", tmp_path / "page.html"
     words = ["fit", "ringdown", lock_in, "--card", "free-dome", "--save", str(card), "--report", str(page), "--json"]

@@ -17,6 +17,7 @@ def run():
     return simulate_run(load_card("hrg-30mm"), load_profile("staircase -20 40 20 6h"), 1 / 60, 3)
 
 
+@pytest.mark.slow
 def test_what_has_not_settled_is_no_soak(run):
     # The gyro has settled where the run begins, and nowhere after it.
     slow = find_soaks([run.record], time_constant=1e6)

@@ -17,6 +17,7 @@ def test_an_engine_that_does_not_look_is_caught(name, monkeypatch, tmp_path):
     for asked in ("judge_table", "diagnose_table"):
         monkeypatch.setattr(tables, asked, lambda *_: engine([{"frequency_Hz"}]))
     monkeypatch.setattr(card, "simulated", lambda *_: [{"frequency_Hz"}])
+    monkeypatch.setattr(card, "frequencies", lambda runs: runs)
     hidden = [
         lambda: tables.test_heating_against_cooling_shows_a_loop(1),
         lambda: tables.test_a_slope_four_standard_deviations_off_is_named_as_a_value(tmp_path),

@@ -213,8 +213,9 @@ def one_lag(k, late=0.0, by_rate=0.0):
     ],
     ids=["a late thermometer", "a frequency that follows the rate"],
 )
-def test_a_resonator_ahead_of_its_thermometer_has_a_late_one_or_follows_the_rate(hidden, said):
+def test_a_resonator_ahead_of_its_thermometer_has_a_late_one_or_follows_the_rate(hidden, said, only):
     """The first was called a mounting stress beside a delay, the second a mounting stress that nothing equals."""
+    only("thermometer-lag", "rate-frequency", "mounting-stress", "second-lag", "radiation", "hysteresis")
     verdict = judge([one_lag(k, **hidden) for k in range(2)])
     (cause,) = verdict.causes
     assert {cause.effect, *cause.equivalent} >= said
@@ -283,8 +284,9 @@ LUMPS = {
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("coarser")
-def test_two_lumps_behind_noisy_thermometers_are_diagnosed():
+def test_two_lumps_behind_noisy_thermometers_are_diagnosed(only):
     """One lag in the small noise of two was led to a housing below 0 K, and the records, which are healthy, were refused."""
+    only("second-lag", "radiation", "mounting-stress", "hysteresis")
     card, noise, runs = build_instrument(LUMPS), np.random.default_rng(1), []
     spread = {
         "chamber_temperature_degC": 0.02,

@@ -75,6 +75,7 @@ def test_one_mistyped_digit_far_beyond_the_noise_of_the_others_names_its_row(row
     assert "alone makes it" in found.sentences[0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("rows", "above"), [(11, 20.0), (40, 11.0)])
 def test_rows_of_two_gyros_one_after_the_other_are_no_noise_and_no_dip(rows, above):
     """A step of 1.3 Hz among readings of 10 mHz was a noise of 0.33 Hz, or an activity dip that left a good part of it."""

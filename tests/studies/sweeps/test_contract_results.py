@@ -299,6 +299,7 @@ def test_no_scheduler_is_said(protocol, monkeypatch):
     assert set(left) <= {"closed"}, "collected while another client starts, it would wait for that one's lock"
 
 
+@pytest.mark.slow
 def test_a_store_that_is_forgotten_is_closed():
     from studies.sweeps.store import memory_store
 

@@ -72,6 +72,7 @@ def test_designs_lie_within_their_stated_error_of_the_full_solve(results):
         assert results.errors[place, 7] < 2e-5
 
 
+@pytest.mark.slow
 def test_a_design_is_the_same_alone_and_among_others(spec, results):
     design = draw(results.study)
     plan = WorkPlan.of(results.study, choose_solver(results.study, design))

@@ -367,6 +367,7 @@ def test_modules_of_the_working_directory_are_not_run_by_workers(tmp_path, monke
     assert not (tmp_path / "was_run").exists()
 
 
+@pytest.mark.slow
 def test_other_versions_on_resuming_are_said(tmp_path, functions, hrg):
     spec = tmp_path / "square.toml"
     spec.write_text(spec_of("square", 'method = "grid"', 'name = "user.x"\nvalues = [1, 2, 3]'))
