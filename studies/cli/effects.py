@@ -29,6 +29,7 @@ def effects(name: str = "") -> Result:
     effect, entry = chosen[0], entries[0]
     keys = [{**one, "shown": "required" if one["required"] else one["default"]} for one in entry["parameters"]]
     said = {
+        "Its sizes, in their order, are factors of": entry["form"].rstrip("."),
         "Acts on": ", ".join(_words(effect)),
         "Drive that must be recorded and vary": ", ".join(entry["drives"]),
         "To isolate it": effect.isolate,
@@ -83,4 +84,5 @@ def parameters(effect: Effect) -> list[dict[str, Any]]:
 def describe(effect: Effect) -> dict[str, Any]:
     """Return an effect as a plain object."""
     told = row_of(effect, "name", "summary", "responses", "acts_on", "isolate", "sensor", "source")
+    told["form"] = " ".join((effect.columns.__doc__ or "").split())  # the formulas stand once, above what computes them
     return told | {"parameters": parameters(effect), "drives": [DRIVES[need] for need in effect.needs]}

@@ -23,7 +23,10 @@ SOLVERS = {"full": "each solved in full", "family": "interpolated between full s
 STATUS = ("state", "cases", "done", "failed", "seconds_each", "runs")
 
 
-@answers("hrg.study-status/1, with --dry-run hrg.study-estimate/1")
+Page = Annotated[str | None, Parameter(help="Write a page (HTML).")]
+
+
+@answers("hrg.study-status/1, with --dry-run hrg.study-estimate/1", page=False)
 def run(
     spec: str,
     *,
@@ -35,6 +38,7 @@ def run(
     retry_failed: bool = False,
     dry_run: bool = False,
     quiet: Quiet = False,
+    report: Page = None,
 ) -> Result:
     """Run or resume a parametric study. Finished cases are kept and never computed again.
 
@@ -66,6 +70,7 @@ def run(
         raise InputError("--workers and --scheduler cannot be combined: give one of them.")
     if out is None and not dry_run:
         raise InputError("--out is missing: name the folder for the study.")
+    _check_page(report)
     study = read_study(spec, card)
     if dry_run:
         check_functions(study, allow_python)
@@ -74,7 +79,9 @@ def run(
     if out is None or dry_run:
         estimate = estimate_study(study, workers)
         payload = {"schema": "hrg.study-estimate/1", **vars(estimate)}
-        return Result(payload, f"Estimate of {study.name}", "", [_estimate_words(estimate)])
+        told = Result(payload, f"Estimate of {study.name}", "", [_estimate_words(estimate)])
+        _write_page(told, report)
+        return told
     with resumable(out, "cases"):
         results = run_study(
             spec, out, card=card, workers=workers, scheduler=scheduler, allow_python=allow_python,
@@ -89,6 +96,9 @@ def run(
         for one in searches
     ]
     parts = [done, _reasons(results), *tolerances]
+    if report is not None:
+        _write_page(_found(results), report)
+        say(f"report: {report}")
     return Result(found, f"Study {study.name}", "What was computed.", parts, 4 if failed else 0)
 
 
@@ -112,19 +122,14 @@ def report(folder: Folder, *, report: Annotated[str | None, Parameter(name=("--r
     Args:
         report: The page; default: report.html in the folder.
     """
-    from studies.reports.sweep import study_result
-    from studies.results.page import render_result
-
     results = open_results(folder)
-    if report is not None:
-        check_ending("--report", report, "a report is an HTML page", ".html", ".htm")
-    page = Path(report or Path(folder) / "report.html")
-    say("writing the page, with mode shapes if the study has modes ...")
-    found = study_result(results)
-    write_text(page, render_result(found))
+    _check_page(report)
+    page = str(report or Path(folder) / "report.html")
+    found = _found(results)
+    _write_page(found, page)
     _say_unfinished(results, folder)
     told = f"report on {_done(results)} cases: {page}\n"
-    return replace(found, payload={**found.payload, "report": str(page)}, printed=told)
+    return replace(found, payload={**found.payload, "report": page}, printed=told)
 
 
 @answers("hrg.study-export/1", page=False, out=(UNITS,))
@@ -147,6 +152,25 @@ def export(folder: Folder, *, out: str | None = None, part_rows: Annotated[int, 
     payload |= row_of(results, "done", cases="total", columns="units")
     _say_unfinished(results, folder)
     return Result(payload, "Export", "", [f"{_done(results)} cases: {path}; units: {units}"])
+
+
+def _check_page(path: str | None) -> None:
+    if path is not None:
+        check_ending("--report", path, "a report is an HTML page", ".html", ".htm")
+
+
+def _found(results: Results) -> Result:
+    from studies.reports.sweep import study_result
+
+    say("writing the page, with mode shapes if the study has modes ...")
+    return study_result(results)
+
+
+def _write_page(result: Result, path: str | None) -> None:
+    from studies.results.page import render_result
+
+    if path is not None:
+        write_text(path, render_result(result))
 
 
 def _done(results: Results) -> str:

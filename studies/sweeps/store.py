@@ -21,6 +21,7 @@ from studies.sweeps.sealed import SealedFile
 
 FILE = "study.store"
 SHOWN_CHANGES = 6
+FOLLOWING = ("design: ", "exact: ", "exact[")  # what of an identity follows from the rest, hashes and places of columns
 
 
 class Stretch(NamedTuple):
@@ -138,6 +139,7 @@ class Store:
         changes: list[str] = []
         if self.study is not None:
             changes = list(find_changes({**self.study["identity"], "base": now["base"]}, now))
+            changes = [one for one in changes if not one.startswith(FOLLOWING)] or changes
         elif self._of - {_name(now)}:  # what the study is was damaged, its cases were not
             changes = ["its card, its quantities or its designs"]
         if self.study and self.study.get("repeats"):

@@ -129,7 +129,10 @@ def test_a_run_resumes_and_the_best_card_holds_what_was_asked(tmp_path, ask, ref
     heavier = write(tmp_path, TASK.replace("high = 5100.0", "high = 5200.0"))
     optimise(heavier, out, workers=1)  # other limits, the same designs
     other = write(tmp_path, TASK.replace("free-dome", "hrg-30mm"))
-    assert "holds results of a study that differs" in refuse(["optimise", other, "--out", str(out)])
+    assert "holds results of a study that differs: card." in refuse(["optimise", other, "--out", str(out)])
+    other = write(tmp_path, TASK.replace('"shell"', '"solid"'))
+    told = refuse(["optimise", other, "--out", str(out)])
+    assert 'a study that differs: quantity[1].theory: "shell" -> "solid". Use another folder' in told
 
 
 @pytest.mark.parametrize("name", sorted(shipped_tasks()))

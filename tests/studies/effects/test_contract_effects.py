@@ -219,9 +219,10 @@ def test_the_command_lists_every_effect_and_shows_one_in_full(capsys, ask, refus
     listed = ask(["effects"])
     assert listed["schema"] == "hrg.effects/2"
     assert {entry["name"] for entry in listed["effects"]} == set(library())
+    assert all(entry["form"] for entry in listed["effects"])
     assert main(["effects", "hysteresis"]) == 0
     said = " ".join(capsys.readouterr().out.split())
-    for part in ("half_width_K", "at least 0.02", "loop_deg_per_h_per_K", "To isolate it", "Source", "frequency"):
+    for part in ("half_width_K", "at least 0.02", "loop_deg_per_h_per_K", "factors of: Plays", "Source", "frequency"):
         assert part in said
     assert "hysteresis" in refuse(["effects", "histeresis"])
 

@@ -160,11 +160,13 @@ def test_failures_keep_their_reason_and_do_not_stop_the_rest(tmp_path, functions
     for part in ("one is not welcome", "time limit of 3 s", "ended its process", "not a finite number", "not a number"):
         assert part in reasons
     assert [status for _, status, _ in sorted(rows_of(tmp_path / "out"))] == ["ok", *["failed"] * 5, "ok"]
-    again = hrg("study", "run", spec, "--out", tmp_path / "out", "--allow-python")
+    again = hrg("study", "run", spec, "--out", tmp_path / "out", "--allow-python", "--report", tmp_path / "run.html")
     assert again.returncode == 4
     page = hrg("study", "report", tmp_path / "out")
     assert page.returncode == 0, page.stderr
-    assert "one is not welcome" in (tmp_path / "out" / "report.html").read_text()
+    for written in (tmp_path / "run.html", tmp_path / "out" / "report.html"):
+        assert "one is not welcome" in (shown := written.read_text())
+        assert "Provenance" in shown
 
 
 @pytest.mark.slow
