@@ -101,6 +101,7 @@ def test_slow_form_errs_in_proportion_to_damping_and_tuned_amplitude_to_its_squa
     assert tuned[0] < 4e-4
 
 
+@pytest.mark.slow
 def test_start_from_rest():
     """The primary builds up, and the secondary with it; against the integrated carrier."""
     time = np.linspace(0, 0.12, 1201)

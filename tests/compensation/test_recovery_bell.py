@@ -115,6 +115,7 @@ def test_intervals_cover():
         assert np.all(np.abs(count / runs - 0.95) < 4 * np.sqrt(0.95 * 0.05 / runs)), (name, count / runs)
 
 
+@pytest.mark.slow
 def test_intervals_allow_for_a_bias_that_wanders():
     """With a random walk of 0.003 °/s a row, white-noise intervals of the bias would hold in a fifth of the records."""
     runs, held, naive = 80, np.zeros(3), np.zeros(3)

@@ -162,6 +162,7 @@ def test_theta_tells_white_noise_from_a_random_walk():
     assert estimate_theta(X, np.cumsum(rng.normal(size=2000)), rows) < 0.1
 
 
+@pytest.mark.slow
 def test_coloured_intervals_cover_under_a_random_walk():
     x = np.column_stack([np.ones(300), np.linspace(-1, 1, 300) ** 2])
     inside = 0

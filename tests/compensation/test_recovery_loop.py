@@ -33,6 +33,7 @@ def integrate(rate, rebalance, seconds=0.03):
     return time, y[0], y[1], -rebalance * y[3]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rebalance", [0.0, 4.0], ids=["open loop", "force rebalance"])
 def test_planted_rate_is_read(rebalance):
     planted = 3.0

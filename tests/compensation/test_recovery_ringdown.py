@@ -187,6 +187,7 @@ def test_an_isotropic_resonator_has_no_axis_and_says_so():
     assert 0.29 < squares < 13.3  # 98 % of χ² with 4 degrees of freedom
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("axis", "said"), [(0.2, False), (0.6, True)])
 def test_why_the_frequencies_are_closer_than_the_split_is_said_where_they_are(axis, said):
     """Damping along the elastic axes leaves their distance the split; across them it pulls them together, here by 0.2 %."""
@@ -224,6 +225,7 @@ def test_recovery_of_a_decay_of_few_blocks():
     assert abs(found["decay_time_s"].value - 10) < 5 * found["decay_time_s"].sd < 0.1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("plateau", [0.0, 5.0])
 def test_a_trace_of_power_gives_the_decay_that_its_noise_allows(plateau):
     """Amplitude without phase, additive complex noise, a drive on for 5 s: the interval holds 1/τ, but for four of 12 traces."""
@@ -241,6 +243,7 @@ def test_a_trace_of_power_gives_the_decay_that_its_noise_allows(plateau):
     assert inside >= 8
 
 
+@pytest.mark.slow
 def test_a_spectrum_gives_frequency_and_q_with_intervals_that_hold():
     """Averaged periodograms of Lorentzian lines on a background: 24 spectra, two values of each."""
     random, inside, scores = np.random.default_rng(12), [], []
@@ -267,6 +270,7 @@ def test_a_spectrum_of_a_split_mode_gives_both_lines():
         fit_spectrum(f, np.random.default_rng(14).gamma(20, 1 / 20, f.size))
 
 
+@pytest.mark.slow
 def test_absent_rows_are_told_as_lost_like_empty_cells_and_an_uneven_clock_is_not():
     random = np.random.default_rng(5)
     z = ring(draw_gyro(random), random)
@@ -321,6 +325,7 @@ CLIPPED_TIME = np.arange(40_000) / 16_000
 CLIPPED = Gyro(4600.0, 4598.0, 8e3, 9e3, 0.2, 0.5)  # τ 0.6 s
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("rail", "noise"), [(0.1, 0.002), (0.9, 0.1)])
 def test_what_is_clipped_is_left_out_to_its_last_sample(rail, noise):
     """Most of the record, and a few peaks lifted by noise: fitted with the rest they gave a wrong decay, Q 3 sd off, or none."""
@@ -336,6 +341,7 @@ def test_what_is_clipped_is_left_out_to_its_last_sample(rail, noise):
         analyse_decay(mix_down(CLIPPED_TIME, np.clip(x, -0.005, 0.005)))
 
 
+@pytest.mark.slow
 def test_a_held_value_is_no_interference():
     """The mean of rows that measure nothing shifted the rest, and its alias was named as a line whose source was to be found."""
     x = CLIPPED.samples(CLIPPED_TIME, [1.0, 1.0]) + 0.002 * np.random.default_rng(4).standard_normal((2, 40_000))
@@ -389,6 +395,7 @@ def test_recovery_of_a_decay_whose_frequency_wanders():
     assert any("drifts" in one for one in found.remarks)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("hardening", "sd", "ratios"), [(5e-4, 4e-4, [1.0]), (0.01, 0.02, [1.0]), (0.01, 0.02, [1.0, 0.6])]
 )

@@ -41,6 +41,7 @@ def test_point_with_a_given_normal_lies_on_the_hyperbola_of_equation_1():
     assert sp.simplify(left) == 1
 
 
+@pytest.mark.slow
 def test_radii_are_those_of_the_solvers_meridian():
     mouth = BELL.at(np.linspace(BELL.joints[1], BELL.length, 8)[1:], segment=2)
     radii = [sp.lambdify(phi, sized(radius)) for radius in symbolic.principal_radii()["hyperbola"]]
@@ -105,6 +106,7 @@ def test_lagranges_equations_are_equation_20_without_c_1():
         assert sp.expand(derived - printed) == 0
 
 
+@pytest.mark.slow
 def test_numeric_coefficients_are_the_integrals_of_the_symbolic_ones():
     """Hemisphere and hyperbola by quadrature over φ; the cylinder, where φ does not move, by hand."""
     model = two_pattern_model(BELL, ALLOY, rayleigh_functions_without_factor)
@@ -167,6 +169,7 @@ def test_on_the_hemisphere_19_is_an_upper_bound_and_useless(theory):
     assert inextensional.bryan_factor == pytest.approx(mode.bryan_factor, rel=0.03)
 
 
+@pytest.mark.slow
 def test_pattern_19_folds_the_bell_where_the_cylinder_begins():
     """The normal turns by (u − dw/dφ)/R = −2/R at the foot of the dome, and not at all on the cylinder.
 
@@ -199,6 +202,7 @@ def test_on_the_bell_19_is_wrong_by_two_orders_in_frequency_and_half_in_precessi
     assert two_pattern_model(shell, ALLOY, rayleigh_functions).bryan_factor < 0.5 * mode.bryan_factor
 
 
+@pytest.mark.slow
 def test_inextensional_pattern_of_the_bell_closes_on_the_solver_like_the_root_of_the_thickness():
     """The free edge costs √(h/R) with a coefficient near 0.27, as on the hemisphere; precession agrees much sooner."""
     excess = []

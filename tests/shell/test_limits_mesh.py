@@ -158,6 +158,7 @@ def test_another_library_reads_the_still_glb(swinging):
     )
 
 
+@pytest.mark.slow
 def test_vtk_reads_the_animated_glb_at_its_largest_swing(swinging, tmp_path):
     import pyvista as pv
 

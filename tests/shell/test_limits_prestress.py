@@ -51,6 +51,7 @@ def disc(n: int, nu: float) -> float:
     return 6 * (1 + nu) * gradient / (k**4 * quad(lambda r: w(r) ** 2 * r, 0, 1)[0])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("n", [2, 3])
 def test_a_clamped_disc_that_its_frame_stretches(n):
     """Thick discs depart by shear and by the edge, as h and h²; three thicknesses take both out."""
@@ -82,6 +83,7 @@ def test_uneven_expansion_of_a_free_dome_as_another_code_has_it():
     assert expansion_shares(mode) @ np.cos(mode.along.position * pi / 2) ** 2 == pytest.approx(-0.2035640, abs=2e-6)
 
 
+@pytest.mark.slow
 def test_a_law_with_a_base():
     """Its parts add up, its derivatives are its own, its places too; the temperature of the joint moves f at once."""
     cup, alloy = cylinder(12.5e-3, 0.6e-3, 18e-3, bottom_thickness=1e-3, clamp_radius=3e-3), find_material("3j53")

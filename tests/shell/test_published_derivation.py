@@ -53,6 +53,7 @@ def test_quadratic_forms_around_the_axis_agree_with_direct_integration():
     assert displacements.integrate_around(density(n)) == sp.integrate(density(2), (theta, 0, 2 * sp.pi))
 
 
+@pytest.mark.slow
 def test_kirchhoff_hypothesis_gives_equation_8_with_the_corrected_twist():
     general = displacements.general_displacement()
     pairs = zip(strains.derive_deformation(general), strains.corrected_deformation(general), strict=True)
@@ -138,6 +139,7 @@ def test_thickness_integral_is_equation_7():
     assert sp.simplify(energies.surface_energy_density() - expected) == 0
 
 
+@pytest.mark.slow
 def test_both_separated_solutions_satisfy_the_inextensional_conditions():
     for sign, tangential in zip((1, -1), inextensional.general_solution(), strict=True):
         shape = {
@@ -166,6 +168,7 @@ def test_mode_is_equation_10():
     assert sp.simplify(mode.w + C * (n + sp.cos(phi)) * T**n) == 0
 
 
+@pytest.mark.slow
 def test_mode_does_not_stretch_and_bends_as_published():
     bend = C * n * (n**2 - 1) * T**n / (r**2 * sp.sin(phi) ** 2)
     deformation = inextensional.mode_deformation()

@@ -301,6 +301,7 @@ def test_mutated_tables_never_harm(tmp_path, name):
     assert accepted < CASES or read is draft  # and some refused; any table of numbers can be drafted
 
 
+@pytest.mark.slow
 def test_mutated_cards_through_the_whole_solver(tmp_path, capsys):
     """Cards with changed dimensions, solved by the command line: a result or one plain sentence."""
     rng = np.random.default_rng(11)

@@ -74,6 +74,7 @@ def test_a_neighbour_whose_solves_jump_between_layouts_has_sliders_too(monkeypat
     assert (radius["low"], radius["high"]) == pytest.approx((14.25, 15.75))
 
 
+@pytest.mark.slow
 def test_a_material_at_one_temperature_gets_no_slider_of_temperature():
     own = {"name": "own", "youngs_modulus_GPa": 70.0, "poisson_ratio": 0.2, "density_kg_m3": 2500.0}
     data, missing = describe_live(load_card("free-dome").with_table("material", own), 2, "shell")

@@ -57,6 +57,7 @@ def test_temperatures_that_are_something_else_are_named(read, said, card, record
         calibrate(card, [with_temperatures(record, read)])
 
 
+@pytest.mark.slow
 def test_temperatures_in_fahrenheit_beyond_the_law_are_named_and_not_its_range(card, record):
     far = with_temperatures(record, lambda T: 1.8 * (T + 60.0) + 32.0)
     own = spoilt(far, frequency_Hz=lambda f: f + 4432.0 * 88.7e-6 * 60.0)
@@ -86,6 +87,7 @@ def test_a_metal_of_a_likely_slope_and_a_start_that_is_not_settled_are_not_read_
     check_readings(card, [run])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scale", [0.7, 1.0, 1.4])
 def test_a_thermometer_with_a_bent_scale_is_not_read_in_fahrenheit(scale, card):
     """In the cold its slope is far from 1, and degrees Fahrenheit explained more than the card as it is."""

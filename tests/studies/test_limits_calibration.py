@@ -262,6 +262,7 @@ def test_a_measured_housing_drives_the_frequency_as_its_chamber_did(tau):
     assert error.max() < 0.05 * missed_by_lines * per_area
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rate", [0.1, 2.0])
 def test_means_of_a_long_record_are_predicted_as_means(rate):
     """The mean over a row of width w of a curve is w²/24 of its bend beside its middle: of a ramp that begins, 0.7 mK of a housing here."""

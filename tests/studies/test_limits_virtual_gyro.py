@@ -139,6 +139,7 @@ def test_loss_is_quadratic_in_the_excess():
     assert loss.at(np.array([-10.0, 0.0, 10.0])) == pytest.approx([2e-7 * 0.91, 2e-7, 2e-7 * 1.11])
 
 
+@pytest.mark.slow
 def test_after_a_long_soak_the_frequency_is_that_of_the_chamber(card, law):
     record = run(card, law, "step 20 -10 20h", rate=0.1, noise=False).record
     assert record["frequency_Hz"][-1] == pytest.approx(law.frequency(np.array([263.15]))[0], abs=1e-5)

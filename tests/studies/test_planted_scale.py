@@ -375,6 +375,7 @@ def test_the_command_compensates_a_record_of_raw_counts(records, fitted, tmp_pat
     assert "compensated_measured_rate_deg_per_s" in read_record(out)
 
 
+@pytest.mark.slow
 def test_rough_calibration_of_the_paper_is_taken(records, tmp_path, capsys):
     """Five minutes of rest, then +100 °/s (eq. 33): null = mean at rest, scale = 100 °/s over the difference of the means."""
     generator = np.random.default_rng(9)

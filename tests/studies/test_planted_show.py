@@ -164,6 +164,7 @@ def test_contract_bad_input_is_one_sentence(tmp_path, capsys):
     assert capsys.readouterr().err.count("Traceback") == 0
 
 
+@pytest.mark.slow
 def test_contract_numbers_of_a_figure_lie_where_the_picture_has_them():
     x, y = np.linspace(1, 3, 7), np.geomspace(1, 1000, 7)
     with style.figure(1, 2, x="x <b>", y="y (V)") as (made, axes):

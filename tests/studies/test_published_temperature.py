@@ -31,6 +31,7 @@ def test_table_2_of_the_paper_comes_from_the_measured_frequencies(model, tmp_pat
     assert read_record(tmp_path / "t.csv")["resonator_temperature_degC"] == pytest.approx(TABLE2, abs=1e-3)
 
 
+@pytest.mark.slow
 def test_a_simulated_resonator_is_its_own_thermometer(tmp_path, capsys):
     """The curve is fitted to settled points of the same virtual gyro; the ramp in between is then read from f alone."""
     soak = "time_s,chamber_temperature_degC\n0,-20\n9000,-20\n9001,40\n70000,40\n70001,-20\n"

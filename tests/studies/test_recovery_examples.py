@@ -78,6 +78,7 @@ def test_published_designs_beside_ours(printed):
     assert least - 2 * sd < slope < most + 2 * sd
 
 
+@pytest.mark.slow
 def test_modes_of_a_cup_in_the_order_of_thin_cups(printed):
     """The Bryan factor of a thin ring or cup falls with n as n/(n² + 1); df/dE is one half for one material."""
     text = printed("resonator_modes")

@@ -150,6 +150,7 @@ def test_the_radiated_share_of_lumps_is_found(taus, past, late):
         assert found["radiated_share"].value == pytest.approx(0.4, abs=0.008)
 
 
+@pytest.mark.slow
 def test_a_fit_that_ends_at_a_bound_converges():
     """A lump that only radiates: the share may reach 0.95 at most."""
     t, T_h = housing("step 20 -20 2h then step -20 40 2h")

@@ -103,6 +103,7 @@ def test_from_a_raw_decay_to_acceptance_in_five_commands(lock_in, tmp_path, caps
     assert found["run_down_time_s"]["verdict"] == "pass"
 
 
+@pytest.mark.slow
 def test_raw_samples_and_their_alias(tmp_path, ask, refuse):
     time = np.arange(40_000) / 16_000
     gyro = Gyro(4600.0, 4598.0, 8e3, 8e3, 0.2, 0.2)
@@ -210,6 +211,7 @@ def test_a_bad_decay_ends_in_one_sentence_with_cause_and_mend(tmp_path, refuse, 
     assert "bad.csv" in err
 
 
+@pytest.mark.slow
 def test_decays_over_pressure_give_the_gas_law(tmp_path, ask):
     """1/Q = 1e-7 + 5e-5 p planted in ten traces of power."""
     random = np.random.default_rng(3)
@@ -226,13 +228,9 @@ def test_decays_over_pressure_give_the_gas_law(tmp_path, ask):
     assert law["terms"][0]["value"] == pytest.approx(5e-5, rel=0.03)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
-    ("kind", "word"),
-    [
-        pytest.param("cubic", "cubic stiffness", marks=pytest.mark.slow),
-        ("crosstalk", "Interference"),
-        ("drift", "drifts with time"),
-    ],
+    ("kind", "word"), [("cubic", "cubic stiffness"), ("crosstalk", "Interference"), ("drift", "drifts with time")]
 )
 def test_decays_of_an_independent_generator_are_named_and_fitted(tmp_path, kind, word):
     """A shift of 6.6 line widths of an ellipse, a drive that leaks into the pick-offs, a drift: no interval misses by twice its width."""

@@ -64,6 +64,7 @@ def test_two_temperatures_are_no_polynomial(tmp_path, capsys):
     assert main(["fit", "frequency", str(path), "--order", "2"]) == 2
 
 
+@pytest.mark.slow
 def test_the_command_takes_a_record(run, tmp_path, ask, refuse):
     path = tmp_path / "run.csv"
     write_record(run.record, path)

@@ -191,6 +191,7 @@ def test_recovery_robust_dome(tmp_path, monkeypatch):
     assert frequency.high <= 5100.05
 
 
+@pytest.mark.slow
 def test_planted_the_closed_form_can_be_wanted(tmp_path):
     """Frequency as h/R², mass as R² h: the lightest has the least radius, and the least step of the wall that keeps the limit."""
     found = optimise(write(tmp_path, TASK.replace('"shell"', '"rayleigh"')), workers=1)

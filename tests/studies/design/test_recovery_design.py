@@ -148,6 +148,7 @@ def test_limits_that_contradict_are_named_with_what_lacks(pose):
         ask(posed)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(4))
 def test_no_random_design_is_better(pose, seed):
     rng = np.random.default_rng(seed)

@@ -200,6 +200,7 @@ def test_a_level_off_by_less_than_three_per_cent_is_a_value_of_the_card(own, tmp
     assert "would remove the difference in level" in " ".join(found.sentences)
 
 
+@pytest.mark.slow
 def test_the_papers_slope_is_shown_to_the_digits_of_the_cards_uncertainty():
     """Wang et al. 2012, Table 1: 79.2 ppm/°C at 20 °C; the card knows it to ± 6.3."""
     from studies.papers import hrg
@@ -225,6 +226,7 @@ SCRAMBLED = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "card"), [*((name, CARD) for name in SCRAMBLED), ("shuffled", None), ("2 Hz of noise", None)]
 )
@@ -257,6 +259,7 @@ def test_rows_that_scatter_like_measured_ones_are_not_questioned(part):
         assert find_scatter(SettledTable("t.csv", T, f, 0.01), law) is None
 
 
+@pytest.mark.slow
 def test_a_slope_within_six_standard_deviations_is_a_value_before_it_is_fahrenheit(tmp_path):
     """0.7 times the slope, 5.3 standard deviations, was refused as °F; it is a value, in words, and the unit a question."""
     f = 4432.07 + 0.7 * (np.array(PAPER) - 4432.07)
@@ -268,6 +271,7 @@ def test_a_slope_within_six_standard_deviations_is_a_value_before_it_is_fahrenhe
         beside_card(tmp_path, 1.8 * np.arange(-20.0, 41.0, 10.0) + 32.0, PAPER)
 
 
+@pytest.mark.slow
 def test_a_card_of_rows_that_follow_no_law_is_not_saved(tmp_path, capsys):
     """It was saved, with exit status 0."""
     path, card = tmp_path / "typo.csv", tmp_path / "card.toml"

@@ -32,6 +32,7 @@ def test_table1_is_not_identifiable_and_says_what_is_known():
     assert quartic[2] == pytest.approx(0.0216, abs=2e-4)
 
 
+@pytest.mark.slow
 def test_table1_beside_the_papers_card_says_what_an_engineer_asks_first():
     """The sheet's figures: 79.2 ppm/°C measured at 20 °C (cubic), 88.7 ± 6.3 predicted by the default law, 4432.07 Hz."""
     found = diagnose_table(TABLE, "hrg-30mm")

@@ -57,6 +57,7 @@ def through(results):
     return WorkPlan.of(results.study, choose_solver(results.study, design)), design.values
 
 
+@pytest.mark.slow
 def test_designs_lie_within_their_stated_error_of_the_full_solve(results):
     plan = WorkPlan.of(results.study)
     assert results.about["identity"]["solver"] != "full"
@@ -82,6 +83,7 @@ def test_a_design_is_the_same_alone_and_among_others(spec, results):
     assert smaller.values.tobytes() == results.values.tobytes()
 
 
+@pytest.mark.slow
 def test_a_design_that_cannot_be_computed_fails_alone(results):
     design = draw(results.study)
     plan = WorkPlan.of(results.study, choose_solver(results.study, design))
@@ -128,6 +130,7 @@ def vary(card):
     }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("card", sorted(shipped_cards()))
 def test_every_shipped_card_has_a_family(card):
     results = run_study(vary(card))

@@ -256,6 +256,7 @@ def test_a_store_that_is_damaged_is_refused_and_mended_by_a_run(spoil, tmp_path,
     results.close()
 
 
+@pytest.mark.slow
 def test_a_torn_store_holds_what_was_whole(tmp_path, functions, capsys, ask):
     spec = tmp_path / "square.toml"
     spec.write_text(spec_of("square", 'method = "grid"', 'name = "user.x"\nlow = 0\nhigh = 1\ncount = 400'))
