@@ -77,7 +77,9 @@ def simulate(
         f"Run through {profile}; the {summary['boundary']} temperature is imposed.",
         [
             f"{out}: {len(run.record)} rows over {length:g} s; the resonator's temperature varies by {span:.2f} K.",
-            f"Frequency law: interpolation error {run.law.interpolation_error:.0e}, solver error {run.law.solver_error:.0e}, both relative.",
+            f"Frequency law: interpolation error {run.law.interpolation_error:.0e}, solver error {run.law.solver_error:.0e}, both relative."
+            if instrument.polynomial is None
+            else None,
             *(Sentence(one, "warning", "page") for one in run.warnings),
             Table(
                 "Uncertainty of the prediction (standard deviation, rms over the run)",

@@ -16,7 +16,7 @@ from studies.sweeps.sensitivity import linear_shares, local_slopes, sobol_indice
 from studies.sweeps.tolerance import Yield, find_yield, resolve_limits
 
 SOBOL = "Parameter | first: First order .4f | first_low … first_high: 90 % interval .4f | total: Total .4f | total_low … total_high: 90 % interval .4f"
-SHARES = "Parameter | slope: Slope .6g | half_width: ± .2g | Unit | share: Share of variance (%) ×100 .2f"
+SHARES = "Parameter | slope ± half_width: Slope | Unit | share: Share of variance (%) ×100 .2f"
 YIELD = "Requirement | from: From .8g | to: To .8g | share: Designs that meet it (%) ×100 .2f | low … high: 90 % interval (%) ×100 .2f | unknown: Without a result"
 TOLERANCES = "label: Parameter | asked: Specified | Found"
 

@@ -20,7 +20,9 @@ class Thermal(Keys, frozen=True, kw_only=True):
         float,
         number("base to housing; identified from the settling of the HRG paper's Figure 3", above=0.0, relative_sd=0.5),
     ] = IDENTIFIED_MOUNT
-    mount_exchange_cm2: Annotated[float, number("base to housing, × emissivity", least=0.0, relative_sd=1.0)] = 10.0
+    mount_exchange_cm2: Annotated[float, number("area × emissivity, base to housing", least=0.0, relative_sd=1.0)] = (
+        10.0
+    )
     second_mass_J_per_K: Annotated[float, number("of a part that hangs on the base, with its conductance", above=0.0, relative_sd=1.0, example=5.0)] | None = None  # fmt: skip
     second_mass_conductance_W_per_K: Annotated[float, number("base to that part", above=0.0, relative_sd=1.0, example=0.002)] | None = None  # fmt: skip
     drive_power_mW: Annotated[float, number("heat of the vibration, spread over the shell", least=0.0)] = 0.0
