@@ -69,6 +69,8 @@ def compare(response: str, scores: Scores, batches: Mapping[str, str] | None = N
     if kind == "few":  # one exception in many devices must be clearer than what a search of so many finds
         odd = [d for d in odd if scores[d][effect].score > CONSTANTS["margin"] + np.log(len(scores))]
     sizes = {d: scores[d][effect] for d in shown}
+    if len({one.coefficient for one in sizes.values()}) > 1:  # a family in one device, a single coefficient in another
+        sizes = {d: one.as_rms(response) for d, one in sizes.items()}
     devices = (tuple(shown), tuple(lacking), tuple(odd))
     return Share(effect, response, tuple(sorted(equal)), kind, *devices, 2.0 * lead, sizes, batch)
 

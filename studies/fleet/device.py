@@ -1,7 +1,7 @@
 """The answer of one device: its diagnosis, its values with their errors, and how every effect stands in it."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -25,7 +25,7 @@ from studies.simulation.variations import Variations, heats
 from studies.workbench import diagnose_records
 from thermal.profile import Profile
 
-SCHEMA = "hrg.fleet-device/2"
+SCHEMA = "hrg.fleet-device/3"
 USUAL, APART = 20.0, 5.0  # °C at which devices are compared without a common card, and kelvin to either side for slopes
 KNOWN, LITTLE = 0.5, 0.9
 """Standard deviation of a value, over that of its prior, below which its records tell it, and above which they say nothing."""
@@ -51,6 +51,10 @@ class Standing:
     first_sd: float
     coefficient: str  # name of that
 
+    def as_rms(self, response: str) -> "Standing":
+        """Return it with its rms in the response in place of its first coefficient."""
+        return replace(self, first=self.size, first_sd=self.sd, coefficient=f"rms ({unit_of(response)})")
+
 
 @dataclass(frozen=True)
 class Answer:
@@ -61,7 +65,8 @@ class Answer:
     verdict: Mapping[str, Any]  # the object of `hrg diagnose --json`
     level: float | None  # its frequency (Hz), where it was measured
     measured: Mapping[str, Measured]  # name with unit -> Measured
-    standings: Mapping[str, Mapping[str, Standing]]  # response -> effect -> Standing
+    # response -> effect of which it would take the place, "" beside all -> effect -> Standing
+    standings: Mapping[str, Mapping[str, Mapping[str, Standing]]]
 
     def as_dict(self) -> dict[str, Any]:
         """Return the object of its file."""
@@ -71,7 +76,10 @@ class Answer:
     def read(cls, found: Mapping[str, Any]) -> "Answer":
         """Return the answer of a file."""
         measured = {name: Measured(**own) for name, own in found["measured"].items()}
-        standings = {r: {name: Standing(**own) for name, own in of.items()} for r, of in found["standings"].items()}
+        standings = {
+            r: {place: {name: Standing(**own) for name, own in of.items()} for place, of in places.items()}
+            for r, places in found["standings"].items()
+        }
         return cls(found["serial"], found["key"], found["verdict"], found["level"], measured, standings)
 
 
@@ -147,24 +155,24 @@ def _slowest(varied: Variations, T: float, slopes: Array) -> tuple[float, Array]
     return slowest_lag(varied.here.network("housing"), T), np.array(by_value) @ slopes
 
 
-def standings_of(found: Inferred) -> dict[str, dict[str, Standing]]:
-    """Return what every effect would stand at, its own rivals left out: response -> effect -> Standing."""
+def standings_of(found: Inferred) -> dict[str, dict[str, dict[str, Standing]]]:
+    """Return what every effect would stand at in the place of each that is there, and beside all of them, as an `Answer` has it."""
     linear, outcome = found.search.linear, found.outcome
-    out: dict[str, dict[str, Standing]] = {}
+    out: dict[str, dict[str, dict[str, Standing]]] = {}
 
-    def note(background: Background, score: float) -> None:
+    def note(place: str, background: Background, score: float) -> None:
         term = background.terms[-1]
-        known = out.setdefault(term.response, {})
+        known = out.setdefault(term.response, {}).setdefault(place, {})
         if term.effect.name not in known or score > known[term.effect.name].score:
             known[term.effect.name] = _standing(background, term, score)
 
-    for rivals, base in zip(outcome.rivals, outcome.without, strict=True):
+    for leader, rivals, base in zip(outcome.final.terms, outcome.rivals, outcome.without, strict=True):
         for rival in rivals:
-            note(Background(linear, rival.terms, rival.noise), rival.score - base.score)
+            note(leader.effect.name, Background(linear, rival.terms, rival.noise), rival.score - base.score)
     beside = found.background
     for seen in found.search.scan(outcome.final, less=()):
         term, _ = beside.with_term(seen.term)
-        note(Background(linear, (*beside.terms, term), beside.noise), seen.gain + PRICE)
+        note("", Background(linear, (*beside.terms, term), beside.noise), seen.gain + PRICE)
     return out
 
 
@@ -173,10 +181,9 @@ def _standing(background: Background, term: Term, score: float) -> Standing:
     own = term.columns.get(term.response, next(iter(term.columns.values())))
     size = float(np.sqrt(np.mean((own @ mean) ** 2)))
     times = float(np.sqrt(max(float(mean @ np.linalg.solve(C + 1e-12 * np.diag(np.diag(C)), mean)), 1e-12)))
-    if len(term.unit) == 1:
-        name = term.effect.coefficient_names(term.response)[term.members[0]]
-        return Standing(score, size, size / times, float(mean[0]), float(np.sqrt(C[0, 0])), name)
-    return Standing(score, size, size / times, size, size / times, f"rms ({unit_of(term.response)})")
+    name = term.effect.coefficient_names(term.response)[term.members[0]]
+    found = Standing(score, size, size / times, float(mean[0]), float(np.sqrt(C[0, 0])), name)
+    return found if len(term.unit) == 1 else found.as_rms(term.response)
 
 
 def interval(value: float, sd: float) -> dict[str, float]:

@@ -143,14 +143,20 @@ def _quantities(
 def _shares(answers: Mapping[str, Answer], batches: Mapping[str, str]) -> tuple[Share, ...]:
     shares = []
     for response, names in _places(answers):
-        scores: dict[str, dict[str, Standing]] = {
-            serial: {name: own for name, own in one.standings.get(response, {}).items() if name in names}
-            for serial, one in answers.items()
-        }
+        scores = {serial: _standing_there(one.standings.get(response, {}), names) for serial, one in answers.items()}
         share = compare(response, {s: of for s, of in scores.items() if of}, batches)
         if share is not None:
             shares.append(share)
     return tuple(sorted(shares, key=lambda one: -one.evidence))
+
+
+def _standing_there(standings: Mapping[str, Mapping[str, Standing]], names: set[str]) -> dict[str, Standing]:
+    """Return how effects of one place stand in a device: in the stead of one of them, or beside all; not in that of another cause."""
+    own = [of for place, of in standings.items() if place in names or not place]
+    best = {
+        name: max((of[name] for of in own if name in of), key=lambda one: one.score, default=None) for name in names
+    }
+    return {name: one for name, one in best.items() if one is not None}
 
 
 def _places(answers: Mapping[str, Answer]) -> list[tuple[str, set[str]]]:

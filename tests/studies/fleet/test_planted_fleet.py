@@ -104,12 +104,40 @@ def test_a_device_whose_cause_is_larger_than_in_the_others_is_odd():
     key = "coefficient_deg_per_h_per_K_per_s"
     answers = {}
     for serial, size in zip("ABCD", (500.0, 510.0, 495.0, 3000.0), strict=True):
-        standing = {"bias_deg_per_h": {"rate-bias": Standing(50.0, 1.0, 0.05, size, 3.0, key)}}
+        standing = {"bias_deg_per_h": {"rate-bias": {"rate-bias": Standing(50.0, 1.0, 0.05, size, 3.0, key)}}}
         answers[serial] = Answer(serial, "", {"causes": [cause], "verdict": "explained"}, 4432.0, {}, standing)
     lot = gather([Device(s, ()) for s in answers], answers, {})
     assert lot.odd == ["D"]
     assert "rate-bias: coefficient (°/h per K/min) is 50," in lot.reasons["D"][0]
     assert parts._sizes(lot.shares[0]) == "coefficient (°/h per K/min) 8.2 … 50"
+
+
+def test_an_effect_that_another_cause_beats_in_its_own_place_is_not_there_too():
+    """Once a mounting stress of one device was common to the lot: in the others it would do, less well, what curvature does."""
+    answers = {}
+    for serial in "ABCD":
+        named = "mounting-stress" if serial == "D" else "curvature"
+        cause = {"kind": "physics", "response": "frequency_Hz", "effect": named, "equivalent": []}
+        places = {named: {"curvature": stand(600.0), "mounting-stress": stand(100.0)}}
+        if serial == "D":
+            places[named] = {"mounting-stress": stand(900.0)}
+        standing = {"frequency_Hz": {**places, "": {"mounting-stress": stand(-4.0, 0.005, 0.01)}}}
+        answers[serial] = Answer(serial, "", {"causes": [cause], "verdict": "explained"}, 4432.0, {}, standing)
+    lot = gather([Device(s, ()) for s in answers], answers, {})
+    assert {share.effect: (share.having, share.odd) for share in lot.shares} == {
+        "curvature": (("A", "B", "C"), ()),
+        "mounting-stress": (("D",), ("D",)),
+    }
+
+
+def test_sizes_of_unlike_kinds_are_told_as_what_all_have():
+    """Once `rms (°/h) 0.41 … 80`, of which the 80 was a coefficient."""
+    one = Standing(50.0, 0.41, 0.01, 80.0, 0.2, "coefficient_deg_per_h_per_K_per_s")
+    share = compare("bias_deg_per_h", {"A": {"rate-bias": stand(50.0, 0.40)}, "B": {"rate-bias": one}})
+    assert parts._sizes(share) == "rms (°/h) 0.4 … 0.41"
+    assert parts._sizes(compare("bias_deg_per_h", {"A": {"rate-bias": one}, "B": {"rate-bias": one}})).startswith(
+        "coeff"
+    )
 
 
 def test_recovery_of_mean_and_scatter():
