@@ -59,7 +59,7 @@ def unknown_slope(instrument: "Instrument") -> str:
     keys = {name: f"[material.deviation.{name}] {key} (1/K)" for name, key in SLOPE_KEYS.items()}
     return (
         f"{said} how the {' and the '.join(named[name] for name in missing)} of '{instrument.material.name}' change{'s' if len(missing) == 1 else ''} with temperature, so the slope of the"
-        f" frequency is not known. Give {' and '.join(keys[name] for name in missing)}, or a material of the table (hrg materials) or of your own ('file')."
+        f" frequency is not known. Give {' and '.join(keys[name] for name in missing)}, or a material of the table (hrg materials) or of your own ('file') whose law is not constant."
     )
 
 
