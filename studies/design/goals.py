@@ -166,15 +166,19 @@ class Goals:
 
 def reach(task: Task, moves: Array) -> float:
     """Return what tolerances do to a column that moves so by the width of every parameter: at worst, or with a probability."""
-    margin, total = task.keys.margin, []
-    worst = margin is None or margin.kind == "worst-case"
-    for p, move in zip(task.study.parameters, moves, strict=True):
-        if (tolerance := task.tolerance(p.name)) is not None:
-            total.append(abs(move) * (tolerance.most if worst else tolerance.sd) / (p.high - p.low))
-    if worst:
-        return float(sum(total))
-    assert margin is not None
-    return float(scipy.stats.norm.ppf(margin.share) * np.linalg.norm(total))
+    known = [
+        (abs(move) / (p.high - p.low), tolerance)
+        for p, move in zip(task.study.parameters, moves, strict=True)
+        if (tolerance := task.tolerance(p.name)) is not None
+    ]
+    margin = task.keys.margin
+    if margin is None or margin.kind == "worst-case":
+        return float(sum(move * one.most for move, one in known))
+    times = float(scipy.stats.norm.ppf(margin.share))
+    each = np.linalg.norm([move * one.sd for move, one in known])
+    normal = np.linalg.norm([move * one.sd for move, one in known if one.tolerance is None])
+    ends = sum(move * one.most for move, one in known if one.tolerance is not None)  # an even one goes no farther
+    return float(min(times * each, ends + times * normal))
 
 
 def lay_goals(task: Task, values: Array, nominal: Array) -> Goals:

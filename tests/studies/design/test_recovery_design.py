@@ -188,3 +188,18 @@ def test_the_share_within_limits_is_that_of_the_tolerances_as_they_are_distribut
 
     assert share(tolerance=0.02) == 1.0
     assert share(standard_deviation=0.02 / 3**0.5) == pytest.approx(0.958 - norm.sf(0.03 * 3**0.5 / 0.02), abs=3e-3)
+
+
+def test_a_margin_with_a_probability_goes_no_farther_than_an_even_tolerance(pose):
+    found = ask(
+        pose(
+            {"x": (0.1, 2.0, {"start": 1.0})},
+            ["x"],
+            lambda d: [d[0]],
+            objective=[{"column": "x"}],
+            constraint=[{"column": "x", "low": 0.5}],
+            tolerance=[{"name": "x", "tolerance": 0.02}],
+            margin={"kind": "probability", "share": 0.99},
+        )
+    )
+    assert found.best[0] == pytest.approx(0.52, abs=1e-6)
