@@ -362,17 +362,6 @@ def test_every_run_is_drawn():
     assert [axes.get_title() for axes in figure.axes if axes.get_title()] == [f"run {k}" for k in range(1, 5)]
 
 
-def test_time_in_hours_is_said_and_not_judged(tmp_path, capsys):
-    """Five hours read as 5 s hold no average over 100 s; no figure is 'nan times' better."""
-    record = make_record(3)
-    path = tmp_path / "hours.csv"
-    write_record(record.with_columns({"time_s": TIME / 3600}), path)
-    assert main(["fit", "bias", str(path)]) == 2
-    captured = capsys.readouterr()
-    assert "in hours" in captured.err
-    assert "nan" not in captured.out
-
-
 def test_a_compensation_of_the_opposite_sign_is_refused(calibrated, tmp_path, capsys):
     """The model's terms with their signs turned double the error that they should take away."""
     run, out = calibrated / "run0.csv", tmp_path / "out.csv"
