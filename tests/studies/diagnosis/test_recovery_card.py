@@ -207,13 +207,12 @@ def test_what_has_not_converged_is_no_card(shipped, tmp_path, capsys, monkeypatc
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [1, 2])
-def test_slow_noise_of_a_loss_of_which_the_card_states_none_is_noise(seed):
+def test_slow_noise_of_a_loss_of_which_the_card_states_none_is_noise():
     """A card has no key for it: a walk of 1/Q of three times its white noise left a healthy gyro unexplained."""
-    card, random = load_card("hrg-30mm"), np.random.default_rng(seed)
+    card, random = load_card("hrg-30mm"), np.random.default_rng(1)
     records = []
     for k, words in enumerate(("staircase 20 -10 15 75min", "soak 20 12h")):
-        record = simulate_run(card, load_profile(words), 1 / 60, 10 * seed + k).record
+        record = simulate_run(card, load_profile(words), 1 / 60, 10 + k).record
         wander = 1.0 + Noise(walk=1e-4).draw(len(record), 1 / 60, random)
         records.append(replace(record.with_columns({"inverse_q": record["inverse_q"] * wander}), path=f"{k}.csv"))
     found = diagnose_records(records, card).verdict
