@@ -29,6 +29,7 @@ from studies.inference.heat_path import (
     effects_would_bring,
     find_heat_path,
     is_ahead,
+    is_strained,
     lags_would_bring,
     slow_share,
     with_second_mass,
@@ -223,10 +224,10 @@ def infer(card: "Instrument", campaign: Campaign, progress: Report = lambda _: N
 
 
 def _with_heat_path(whole: CardFit, found: CardFit, progress: Report) -> tuple[HeatPath | None, Search, Outcome]:
-    """Search beside the path of the card, or one lag, and where that leaves slow noise of which other lags would take something, or the sensor is late, beside a longer one; the likelier heat path stays."""
+    """Search beside the path of the card, or one lag, and where that leaves slow noise of which other lags would take something, strains the card's values, or the sensor is late, beside a longer one; the likelier heat path stays."""
     own, given, path = Pursuit(found, progress), whole.problem.instrument.polynomial is None, None
     bring = lags_would_bring(own.search) if slow_share(found) > SUSPICIOUS else -np.inf
-    if given and bring > WORTH and bring > effects_would_bring(own.search):
+    if given and (is_strained(found) or (bring > WORTH and bring > effects_would_bring(own.search))):
         path = with_second_mass(whole, found, progress)
     elif not given and (bring > WORTH or is_ahead(found)):
         path = find_heat_path(found, None if bring > WORTH else 1, progress)

@@ -50,6 +50,8 @@ WORTH = 10.0
 """Log evidence that one more lag must bring."""
 FOLLOWED = 3.0
 """Slow noise within a run over that of a row, up to which no more is asked of a path."""
+STRAINED = 3.0
+"""Standard deviations of the card by which a value of its heat path may stand for a part that the card lacks."""
 SURE_SHARE = 3.0
 """Standard deviations from which on a radiated share, or a late sensor, is named; and of the prior, by which a resonator is ahead of its sensor."""
 
@@ -193,6 +195,13 @@ def is_ahead(found: CardFit) -> bool:
         return slow_share(found) > FOLLOWED
     k = priors.names.index(DELAY)
     return bool(priors.standard(found.point[: len(priors.values)])[k] < -SURE_SHARE)
+
+
+def is_strained(found: CardFit) -> bool:
+    """Whether a value of the heat path goes so far from the card's as if it stood for another part."""
+    priors = found.problem.priors
+    away = priors.standard(found.point[: len(priors.values)])
+    return any(name.startswith("thermal.") and abs(z) > STRAINED for name, z in zip(priors.names, away, strict=True))
 
 
 def lags_would_bring(search: Search) -> float:

@@ -14,7 +14,7 @@ from studies.inference.generic_forms import BUMP, STEP, generic_forms
 from studies.inference.held_out import Model, Rows
 from studies.inference.model import Background, Term
 from studies.inference.search import LESS, SUSPICIOUS, Hypothesis, Search, Shapes
-from studies.inference.sharp import brief_events, fast_line, intermittent, tails_of
+from studies.inference.sharp import brief_events, fast_line, in_groups, intermittent, tails_of
 
 ENOUGH = CONSTANTS["margin"] - CONSTANTS["log_prior_unknown"]
 """Log evidence from which on structure is no chance."""
@@ -79,11 +79,13 @@ def look(
                 best = replace(best, term=instead.terms[-1])
                 word, smooth = best.term.effect.name, instead.evidence - final.evidence
         evidence, line = smooth, None
-        white = search.linear.rows[name].whiten(own.residual(name), final.noise[name])
-        brief = brief_events(white, tails_of(white / max(float(np.std(white)), 1e-300)))
+        level, rest = search.linear.rows[name], own.residual(name)
+        white = level.whiten(rest, final.noise[name])
+        apart = [np.sign(rest[place]) * (far > 1) for place, far in zip(level.slices, level.stretch, strict=True)]
+        brief = max(brief_events(white, tails_of(white / max(float(np.std(white)), 1e-300))), in_groups(apart))
         if brief > evidence:
             word, evidence = "time: brief events", brief
-        fitful = intermittent([white[place] for place in search.linear.rows[name].slices])
+        fitful = intermittent([white[place] for place in level.slices])
         if fitful > evidence:
             word, evidence = "time: an intermittent oscillation", fitful
         fast = _line(search, name, rows.get(name))

@@ -351,16 +351,22 @@ class Search:
 
     def _without_idle(self, plain: Hypothesis, now: Hypothesis) -> tuple[Hypothesis, Hypothesis]:
         """Leave out terms that do not pay beside the others, or only for rows that else are outliers, which are spared from then on."""
-        score = self.fair(now) if now.terms else 0.0
+        if now.terms:
+            plain, now = self._take(*self._spared(now), plain)
+        score = self.fair(now)
         for k in range(len(now.terms)):
             others = (*now.terms[:k], *now.terms[k + 1 :])
             there, fewer = self._spared(self.beside(others, plain, now.noise))
             if score - there.fair(fewer) < self.needed(now.terms[k], others):
-                if there is not self:
-                    self.linear = there.linear
-                    plain = self.settle((), plain.noise)
-                return self._without_idle(plain, fewer)
+                return self._without_idle(*self._take(there, fewer, plain))
         return plain, now
+
+    def _take(self, there: "Search", now: Hypothesis, plain: Hypothesis) -> tuple[Hypothesis, Hypothesis]:
+        """Go on in the rows of another search; return the model without effects in these, and that one."""
+        if there is self:
+            return plain, now
+        self.linear = there.linear
+        return self.settle((), plain.noise), now
 
 
 def _near(gain: float, best: float) -> bool:

@@ -74,6 +74,19 @@ def brief_events(rows: Array, heaviest: float) -> float:
     return best - float(np.log(rows.size))
 
 
+def in_groups(runs: Sequence[Array]) -> float:
+    """Return the log evidence that rows that stand out (±1 by their sign, others 0) stand side by side: events, not readings that failed.
+
+    Of n among N rows the next one stands out likewise with a chance of n/2N where each fails for itself, else with any chance.
+    """
+    out, rows = sum(int(np.count_nonzero(run)) for run in runs), sum(run.size for run in runs)
+    if not out:
+        return -np.inf
+    beside = sum(int(np.count_nonzero(run[1:] * run[:-1] > 0)) for run in runs)
+    alone, chance = out - beside, out / (2.0 * rows)
+    return float(scipy.special.betaln(beside + 1, alone + 1) - beside * np.log(chance) - alone * np.log1p(-chance))
+
+
 def _normal(square: Array, variance: float) -> Array:
     return np.asarray(np.exp(-0.5 * square / variance) / np.sqrt(2.0 * np.pi * variance))
 

@@ -7,7 +7,8 @@
 
 `low` and `high` are always hard bounds, within those of the key. With them and neither `sd` nor `relative_sd`, every value
 between them counts alike, and the standard deviation is that of an even distribution, (high − low)/√12. A number that
-cannot be negative and is not 0 is `logarithmic`: its logarithm is normal, with the standard deviation sd/value.
+cannot be negative and is not 0 is `logarithmic`: its logarithm is normal, with the standard deviation sd/value; beyond ten times
+the value, where that would say nothing of any decade, the number itself is normal and cut off at 0.
 """
 
 import math
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
     import numpy as np
 
 LONGEST_DRAW = 10_000
+WIDEST = 10.0  # sd over value, of a number whose logarithm is normal
 
 
 class Spread(Keys, frozen=True, kw_only=True):
@@ -136,5 +138,5 @@ def _read_spread(raw: Mapping[str, Any], place: str) -> Spread:
 def _make(table: str, path: Path, spread: Spread, low: float, high: float) -> UncertainValue:
     name = ".".join(map(str, (table, *path)))
     ends = (low if spread.low is None else spread.low, high if spread.high is None else spread.high)
-    logarithmic = low >= 0.0 and spread.value > 0.0
+    logarithmic = low >= 0.0 and spread.value > 0.0 and spread.width <= WIDEST * spread.value
     return UncertainValue(name, spread.value, spread.width, *ends, logarithmic, unit_of(name))
