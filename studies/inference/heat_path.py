@@ -162,7 +162,7 @@ def find_heat_path(
         words = f"a heat path with {number} {'lag' if number == 1 else 'lags in series'} and radiation"
         progress(words)
         path = _calibrated(lean, with_lags(whole.instrument, own, lumps))
-        if is_ahead(path.fit):
+        if is_ahead(path.fit) or slow_share(path.fit) > FOLLOWED:
             progress(f"{words}, its sensor late")
             late = _calibrated(lean, with_lags(whole.instrument, own, lumps, True))
             path = max(path, late, key=lambda one: one.evidence)

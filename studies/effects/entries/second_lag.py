@@ -15,9 +15,9 @@ def columns(states: States, shape: Shape, response: str) -> Array:
 
 
 def grid(span: Span, response: str) -> list[tuple[float, ...]]:
-    """Time constants away from the first one, none longer than a run, which then shows no more of it than a drift."""
+    """Time constants away from the first one."""
     ratios = (0.03, 0.1, 0.2, 0.4, 0.6, 1.6, 2.5, 4.0, 6.5, 10.0, 20.0)
-    return [(span.tau * ratio,) for ratio in ratios if span.step / 2 < span.tau * ratio < span.longest_run]
+    return [(span.tau * ratio,) for ratio in ratios if span.tau * ratio > span.step / 2]
 
 
 EFFECT = Effect(
@@ -31,7 +31,7 @@ EFFECT = Effect(
     grid=grid,
     delay=0,
     sizes={"frequency_Hz": 0.5},
-    shape=(Parameter("second_time_constant_s", 20.0, 3e5, "the other time constant", of_run=1.0),),
+    shape=(Parameter("second_time_constant_s", 20.0, 3e5, "the other time constant"),),
     acts_on="temperature",
     card_key="law.second_lag_s",
     memory="second_time_constant_s",
