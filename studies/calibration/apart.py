@@ -12,7 +12,7 @@ from studies.diagnosis.verdict import FAR
 from studies.simulation.variations import LAG
 
 APART = (
-    "The chamber's temperatures do not explain the housing's by the heat path of this card (a set point that the air follows late, say):"
+    "The chamber's temperatures do not explain the housing's by the heat path of this card (a set point that the air follows late, or a probe far from the gyro, would not):"
     " the chamber is left out, and the measured housing drives the gyro."
 )
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+import scipy
 
 from compensation.arrays import Array
 from studies.calibration.fit import CardFit, fit
@@ -50,8 +51,8 @@ WORTH = 10.0
 """Log evidence that one more lag must bring."""
 FOLLOWED = 3.0
 """Slow noise within a run over that of a row, up to which no more is asked of a path."""
-STRAINED = 3.0
-"""Standard deviations of the card by which a value of its heat path may stand for a part that the card lacks."""
+STRAINED = 0.01
+"""Chance below which values of a card's heat path are so far from it that they may stand for a part that it lacks."""
 SURE_SHARE = 3.0
 """Standard deviations from which on a radiated share, or a late sensor, is named; and of the prior, by which a resonator is ahead of its sensor."""
 
@@ -198,10 +199,11 @@ def is_ahead(found: CardFit) -> bool:
 
 
 def is_strained(found: CardFit) -> bool:
-    """Whether a value of the heat path goes so far from the card's as if it stood for another part."""
+    """Whether the values of the heat path are so far from the card's as if they stood for another part."""
     priors = found.problem.priors
-    away = priors.standard(found.point[: len(priors.values)])
-    return any(name.startswith("thermal.") and abs(z) > STRAINED for name, z in zip(priors.names, away, strict=True))
+    own = np.array([name.startswith("thermal.") for name in priors.names], dtype=bool)
+    away = priors.standard(found.point[: len(priors.values)])[own]
+    return bool(away @ away > scipy.special.chdtri(max(own.sum(), 1), STRAINED))
 
 
 def lags_would_bring(search: Search) -> float:

@@ -185,6 +185,15 @@ def test_priors_are_drawn_as_they_are_stated():
     assert np.std(np.log(q)) == pytest.approx(1.0, rel=0.1)
 
 
+def test_a_number_far_more_uncertain_than_itself_is_cut_off_at_0():
+    """A pole of 0.01 ± 1000 s of an extended model, log-normal, reached e^100 000 and could not be saved."""
+    card = load_card("hrg-30mm").with_values({"noise.housing_lag_s": {"value": 0.01, "sd": 1000.0}})
+    (lag,) = (one for one in card.uncertain if one.name == "noise.housing_lag_s")
+    drawn = [lag.draw(np.random.default_rng(seed)) for seed in range(200)]
+    assert 0.0 <= min(drawn) < max(drawn) < 5000.0
+    assert np.median(drawn) == pytest.approx(674.5, rel=0.25)  # of a half normal law
+
+
 @pytest.mark.parametrize(
     ("key", "unit"),
     [

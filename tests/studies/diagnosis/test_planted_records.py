@@ -46,6 +46,37 @@ def a_day_in_the_chamber():
     return records
 
 
+def follow(housing, tau, share):
+    """Temperatures (°C, every 4 s) behind a housing, of which radiation takes a share at 20 °C."""
+    out, now = np.empty(housing.size), housing[0] + 273.15
+    for k, T in enumerate(housing + 273.15):
+        for _ in range(4):
+            now += ((1 - share) * (T - now) + share * (T**4 - now**4) / (4 * 293.15**3)) / tau
+        out[k] = now - 273.15
+    return out
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [0, 1])
+def test_a_late_thermometer_is_named_beside_radiation_and_a_second_lag(seed):
+    """Late by a minute, it was told as mounting stress or a second lag: a late sensor was tried only where the gyro is ahead of it."""
+    records = []
+    for k, (corners, levels) in enumerate((
+        ([0, 600, 1500, 2600, 4000, 4700, 6500, 8000], [20, 20, 45, 45, -5, -5, 30, 20]),
+        ([0, 900, 1300, 3000, 3500, 5200, 5600, 8000], [20, 20, 0, 0, 40, 40, 10, 10]),
+    )):  # fmt: skip
+        rng, time = np.random.default_rng(10 * seed + k), np.arange(0.0, 8000.0, 4.0)
+        housing = np.interp(time, corners, levels)
+        x = lag(time, follow(housing, 330.0, 0.1), 40.0) - 20.0
+        frequency = 8000.0 + 0.6 * x + 2e-4 * x**2 + 0.004 * rng.standard_normal(time.size)
+        read = lag(time, housing, 60.0) + 0.002 * rng.standard_normal(time.size)
+        columns = {"time_s": time, "housing_temperature_degC": read, "frequency_Hz": frequency}
+        run = {name: own[::2] for name, own in columns.items()}
+        records.append(Record(run, path=f"run{k}.csv", sha256=str(k)))
+    named = [cause.effect for cause in diagnose_records(records).verdict.causes]
+    assert {"radiation", "thermometer-lag"} <= set(named)
+
+
 @pytest.mark.slow
 def test_a_slow_mass_that_the_runs_before_have_warmed_is_one_cause(only):
     """The second path starts every run with what it has kept; it was once called mounting stress, ageing and a jump."""
