@@ -14,7 +14,7 @@ from studies.inference.generic_forms import BUMP, STEP, generic_forms
 from studies.inference.held_out import Model, Rows
 from studies.inference.model import Background, Term
 from studies.inference.search import LESS, SUSPICIOUS, Hypothesis, Search, Shapes
-from studies.inference.sharp import brief_events, fast_line, in_groups, intermittent, tails_of
+from studies.inference.sharp import brief_events, fast_line, intermittent, recurring, tails_of
 
 ENOUGH = CONSTANTS["margin"] - CONSTANTS["log_prior_unknown"]
 """Log evidence from which on structure is no chance."""
@@ -82,7 +82,7 @@ def look(
         level, rest = search.linear.rows[name], own.residual(name)
         white = level.whiten(rest, final.noise[name])
         apart = [np.sign(rest[place]) * (far > 1) for place, far in zip(level.slices, level.stretch, strict=True)]
-        brief = max(brief_events(white, tails_of(white / max(float(np.std(white)), 1e-300))), in_groups(apart))
+        brief = max(brief_events(white, tails_of(white / max(float(np.std(white)), 1e-300))), recurring(apart))
         if brief > evidence:
             word, evidence = "time: brief events", brief
         fitful = intermittent([white[place] for place in level.slices])

@@ -74,17 +74,26 @@ def brief_events(rows: Array, heaviest: float) -> float:
     return best - float(np.log(rows.size))
 
 
-def in_groups(runs: Sequence[Array]) -> float:
-    """Return the log evidence that rows that stand out (±1 by their sign, others 0) stand side by side: events, not readings that failed.
+def recurring(runs: Sequence[Array]) -> float:
+    """Return the log evidence that rows that stand out (±1 by their sign, others 0) are events that recur: of one sign, side by side, several times.
 
-    Of n among N rows the next one stands out likewise with a chance of n/2N where each fails for itself, else with any chance.
+    Of n among N rows the next one stands out too with a chance of n/N where each fails for itself, else with any chance.
     """
-    out, rows = sum(int(np.count_nonzero(run)) for run in runs), sum(run.size for run in runs)
-    if not out:
-        return -np.inf
-    beside = sum(int(np.count_nonzero(run[1:] * run[:-1] > 0)) for run in runs)
-    alone, chance = out - beside, out / (2.0 * rows)
-    return float(scipy.special.betaln(beside + 1, alone + 1) - beside * np.log(chance) - alone * np.log1p(-chance))
+    best, count = -np.inf, sum(run.size for run in runs)
+    for sign in (1.0, -1.0):
+        rows = [np.concatenate([[False], run == sign, [False]]) for run in runs]
+        out = sum(int(own.sum()) for own in rows)
+        beside = sum(int(np.sum(own[1:] & own[:-1])) for own in rows)
+        groups = sum(int(np.sum(own[2:] & own[1:-1] & ~own[:-2])) for own in rows)  # where two or more begin
+        if groups >= FEWEST_EVENTS:
+            alone, chance = out - beside, out / count
+            even = beside * np.log(chance) + alone * np.log1p(-chance)
+            best = max(best, float(scipy.special.betaln(beside + 1, alone + 1) - even))
+    return best
+
+
+FEWEST_EVENTS = 4
+"""Groups of outliers of one sign: fewer are bursts of bad readings."""
 
 
 def _normal(square: Array, variance: float) -> Array:

@@ -15,7 +15,7 @@ from studies.inference.model import SCALES, Background, Linear
 from studies.inference.polynomial_card import polynomial_card
 from studies.inference.pursuit import Pursuit
 from studies.inference.search import Search
-from studies.inference.sharp import in_groups
+from studies.inference.sharp import recurring
 from studies.inference.signatures import Signatures
 from studies.instrument.card import load_card
 from studies.simulation.chamber import load_profile
@@ -207,16 +207,16 @@ def test_a_search_goes_on_where_values_have_moved_far_and_the_lines_are_still_st
         assert pursuit._near(final) is straight
 
 
-def test_rows_that_stand_out_side_by_side_are_events():
-    """Of n among N rows: k neighbours alike have B(k + 1, n − k + 1)/(n/2N)^k(1 − n/2N)^(n − k), here by counting; alone or of unlike signs they fail."""
+def test_outliers_that_recur_side_by_side_are_events():
+    """Of n among N rows: k neighbours alike have B(k + 1, n − k + 1)/(n/N)^k(1 − n/N)^(n − k), here by counting; alone, of both signs or a few bursts they fail."""
     rows = np.zeros(800)
-    rows[[100, 101, 300, 301, 500, 501, 502]] = 1.0
-    chance = 7 / 1600
-    assert in_groups([rows]) == pytest.approx(np.log(1 / 280) - 4 * np.log(chance) - 3 * np.log(1 - chance))  # B(5, 4)
-    assert in_groups([rows[:101], rows[101:]]) < in_groups([rows])  # the end of a run parts them
+    rows[[100, 101, 300, 301, 500, 501, 502, 600, 601]] = 1.0
+    chance = 9 / 800
+    assert recurring([rows]) == pytest.approx(np.log(1 / 1260) - 5 * np.log(chance) - 4 * np.log(1 - chance))  # B(6, 5)
+    assert recurring([rows[:350], rows[350:]]) == pytest.approx(recurring([rows]))
+    assert recurring([rows[:101], rows[101:]]) == -np.inf  # the end of a run parts one of them
+    assert recurring([np.where(np.arange(800) < 400, rows, -rows)]) == -np.inf
     for seed in range(20):
         alone = np.zeros(800)
         alone[np.random.default_rng(seed).choice(400, 12, replace=False) * 2] = 1.0
-        assert in_groups([alone]) < 0.0
-    assert in_groups([np.tile([1.0, -1.0], 6), np.zeros(800)]) < 0.0
-    assert in_groups([np.zeros(800)]) == -np.inf
+        assert recurring([alone]) == -np.inf
