@@ -22,7 +22,7 @@ ZERO = 1e-9  # prior standard deviations: what rounding leaves of a value that i
 def keep_agreeing(found: CardFit) -> CardFit:
     """Return the fit with the values of each table that the data do not contradict at the card's."""
     problem, priors = found.problem, found.problem.priors
-    z = priors.standard(found.point[: len(priors.values)]) - priors.shipped
+    z = found.away - priors.shipped
     C = priors.covariance(found.covariance)
     tables: dict[str, list[int]] = {}
     for k, name in enumerate(priors.names):

@@ -29,6 +29,5 @@ def fit_explained(problem: CardProblem, progress: Callable[[str], None]) -> tupl
 
 def _is_sound(found: CardFit) -> bool:
     """Whether it has converged with a sensor as late as the card says."""
-    priors = found.problem.priors
-    late = priors.standard(found.point[: len(priors.values)])[[name == LAG for name in priors.names]]
+    late = found.away[[name == LAG for name in found.problem.priors.names]]
     return found.converged and bool(np.all(np.abs(late) < FAR))

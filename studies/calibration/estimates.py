@@ -130,7 +130,7 @@ def _profiled(fit: CardFit, k: int, J: Array, ends: tuple[float, float]) -> tupl
     bend = np.zeros(problem.count)  # of the valley: the others at t are t² of it off the straight way
     limits = priors.values[k]
     lowest, highest = (to_standard(limits, end) for end in (limits.low, limits.high))
-    centre = float(priors.standard(fit.point[:count])[k])
+    centre = float(fit.away[k])
 
     def rise(t: float) -> float:
         """Rise along the valley; a parabola's where it cannot be followed."""

@@ -84,6 +84,12 @@ class CardFit:
         """Independent coordinates of the most probable values."""
         return self.state.point
 
+    @property
+    def away(self) -> Array:
+        """How far each value is from what the card says, in its prior standard deviations."""
+        priors = self.problem.priors
+        return priors.standard(self.point[: len(priors.values)])
+
 
 def fit(problem: CardProblem, start: Array | None = None, progress: Progress = lambda _: None) -> CardFit:
     """Find the most probable point."""

@@ -130,8 +130,8 @@ def curvature_of(instrument: Instrument, reference: float) -> dict[str, dict[str
 
 def _estimates(path: HeatPath, times: float) -> Iterator[tuple[str, ThermalEstimate]]:
     """Yield the constants; one whose prior the records narrow by less than half, or a share below 0, is not determined."""
-    priors, point = path.fit.problem.priors, path.fit.point
-    z, sd = priors.standard(point[: len(priors.values)]), np.sqrt(np.diag(priors.covariance(path.fit.covariance)))
+    priors = path.fit.problem.priors
+    z, sd = path.fit.away, np.sqrt(np.diag(priors.covariance(path.fit.covariance)))
     level = path.value("law.f0_Hz")[0]
     for name, told in NAMES.items():
         if name in priors.names:

@@ -181,12 +181,7 @@ def infer(card: "Instrument", campaign: Campaign, progress: Report = lambda _: N
     campaign = replace(campaign, notes=(*campaign.notes, *apart))
     problem = found.problem
     path, search, outcome = _with_heat_path(whole, found, progress)
-    values = len(problem.priors.values)
-    if (
-        card.polynomial is None
-        and path is None
-        and np.abs(problem.priors.standard(found.point[:values])).max(initial=0.0) > FAR
-    ):
+    if card.polynomial is None and path is None and np.abs(found.away).max(initial=0.0) > FAR:
         # values may have gone far to do what an effect does: look from the card as shipped too
         progress("again from the card's own values")
         pursuit = Pursuit(at_point(found, np.zeros(problem.count)), progress)

@@ -194,15 +194,13 @@ def is_ahead(found: CardFit) -> bool:
     priors = found.problem.priors
     if DELAY not in priors.names or FREQUENCY not in found.noise:
         return slow_share(found) > FOLLOWED
-    k = priors.names.index(DELAY)
-    return bool(priors.standard(found.point[: len(priors.values)])[k] < -SURE_SHARE)
+    return bool(found.away[priors.names.index(DELAY)] < -SURE_SHARE)
 
 
 def is_strained(found: CardFit) -> bool:
     """Whether the values of the heat path are so far from the card's as if they stood for another part."""
-    priors = found.problem.priors
-    own = np.array([name.startswith("thermal.") for name in priors.names], dtype=bool)
-    away = priors.standard(found.point[: len(priors.values)])[own]
+    own = np.array([name.startswith("thermal.") for name in found.problem.priors.names], dtype=bool)
+    away = found.away[own]
     return bool(away @ away > scipy.special.chdtri(max(own.sum(), 1), STRAINED))
 
 

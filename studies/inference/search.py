@@ -335,29 +335,30 @@ class Search:
 
     def fair(self, one: Hypothesis) -> float:
         """Log posterior of a model, its outliers being what stands out of it."""
-        return Background(self.linear, one.terms, one.noise).fair + sum(term.price for term in one.terms)
+        return _fair(Background(self.linear, one.terms, one.noise))
 
-    def _spared(self, one: Hypothesis) -> tuple["Search", Hypothesis]:
-        """Take for outliers what stands out of a model: the search in such rows, and the model with the noise of the rest."""
-        there = self
+    def _spared(self, one: Hypothesis) -> tuple["Search", Hypothesis, float]:
+        """Take for outliers what stands out of a model: the search in such rows, the model with the noise of the rest, and its `fair` score."""
+        there, beside = self, Background(self.linear, one.terms, one.noise)
         for _ in range(FORMS):  # an outlier hides in the noise that others make
-            beside = Background(there.linear, one.terms, one.noise)
             if not beside.hides_outliers:
                 break
             there = copy(there)
             there.linear = replace(there.linear, rows=beside.spared)
             one = there.settle(one.terms, one.noise)
-        return there, one
+            beside = Background(there.linear, one.terms, one.noise)
+        return there, one, _fair(beside)
 
     def _without_idle(self, plain: Hypothesis, now: Hypothesis) -> tuple[Hypothesis, Hypothesis]:
         """Leave out terms that do not pay beside the others, or only for rows that else are outliers, which are spared from then on."""
-        if now.terms:
-            plain, now = self._take(*self._spared(now), plain)
-        score = self.fair(now)
+        if not now.terms:
+            return plain, now
+        there, now, score = self._spared(now)
+        plain, now = self._take(there, now, plain)
         for k in range(len(now.terms)):
             others = (*now.terms[:k], *now.terms[k + 1 :])
-            there, fewer = self._spared(self.beside(others, plain, now.noise))
-            if score - there.fair(fewer) < self.needed(now.terms[k], others):
+            there, fewer, without = self._spared(self.beside(others, plain, now.noise))
+            if score - without < self.needed(now.terms[k], others):
                 return self._without_idle(*self._take(there, fewer, plain))
         return plain, now
 
@@ -372,6 +373,10 @@ class Search:
 def _near(gain: float, best: float) -> bool:
     part, less = NEAR
     return gain > max(part * best - less, HOPELESS)
+
+
+def _fair(beside: Background) -> float:
+    return beside.fair + sum(term.price for term in beside.terms)
 
 
 def _credited(now: Hypothesis, before: Hypothesis) -> Hypothesis:

@@ -169,37 +169,25 @@ def test_no_random_design_is_better(pose, seed):
     assert found.evaluations < 400
 
 
+def smallest(pose, *limits, **posed):
+    """The answer to the smallest x from 0.1 on within limits."""
+    constraint = [{"column": "x", **limit} for limit in limits]
+    box = {"x": (0.1, 2.0, {"start": 1.0})}
+    return ask(pose(box, ["x"], lambda d: [d[0]], objective=[{"column": "x"}], constraint=constraint, **posed))
+
+
 def test_the_share_within_limits_is_that_of_the_tolerances_as_they_are_distributed(pose):
     # an even ± 0.02 whose worst case touches a limit never passes it; a normal one passes it and, 2.6 of its sd away, the other
-    def share(**tolerance):
-        found = ask(
-            pose(
-                {"x": (0.1, 2.0, {"start": 1.0})},
-                ["x"],
-                lambda d: [d[0]],
-                objective=[{"column": "x"}],
-                constraint=[{"column": "x", "low": 0.5}, {"column": "x", "high": 0.55}],
-                tolerance=[{"name": "x", **tolerance}],
-                margin={"kind": "worst-case"} if "tolerance" in tolerance else {"kind": "probability", "share": 0.958},
-            )
-        )
-        (spread,) = found.spreads
+    def share(margin, **tolerance):
+        posed = {"tolerance": [{"name": "x", **tolerance}], "margin": margin}
+        (spread,) = smallest(pose, {"low": 0.5}, {"high": 0.55}, **posed).spreads
         return spread.passed
 
-    assert share(tolerance=0.02) == 1.0
-    assert share(standard_deviation=0.02 / 3**0.5) == pytest.approx(0.958 - norm.sf(0.03 * 3**0.5 / 0.02), abs=3e-3)
+    assert share({"kind": "worst-case"}, tolerance=0.02) == 1.0
+    normal = share({"kind": "probability", "share": 0.958}, standard_deviation=0.02 / 3**0.5)
+    assert normal == pytest.approx(0.958 - norm.sf(0.03 * 3**0.5 / 0.02), abs=3e-3)
 
 
 def test_a_margin_with_a_probability_goes_no_farther_than_an_even_tolerance(pose):
-    found = ask(
-        pose(
-            {"x": (0.1, 2.0, {"start": 1.0})},
-            ["x"],
-            lambda d: [d[0]],
-            objective=[{"column": "x"}],
-            constraint=[{"column": "x", "low": 0.5}],
-            tolerance=[{"name": "x", "tolerance": 0.02}],
-            margin={"kind": "probability", "share": 0.99},
-        )
-    )
-    assert found.best[0] == pytest.approx(0.52, abs=1e-6)
+    posed = {"tolerance": [{"name": "x", "tolerance": 0.02}], "margin": {"kind": "probability", "share": 0.99}}
+    assert smallest(pose, {"low": 0.5}, **posed).best[0] == pytest.approx(0.52, abs=1e-6)
