@@ -217,7 +217,8 @@ class Whitener:
         white = columns.astype(float)
         for K, runs in self.roots:
             for run in runs:
-                white[self.slices[run]] = K @ white[self.slices[run]]
+                own = white[self.slices[run]]
+                white[self.slices[run]] = K @ own if own.ndim == 1 else scipy.linalg.blas.dtrmm(1.0, K, own, lower=1)
         return white
 
     @property

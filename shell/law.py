@@ -188,6 +188,10 @@ class FrequencyLaw:
         """The same at the reference temperature."""
         return self.uneven_slopes(self.reference_temperature)
 
+    def between(self, lowest: float, highest: float) -> "FrequencyLaw":
+        """Return the law between two temperatures (K), as far as it goes."""
+        return replace(self, lowest=max(lowest, self.lowest), highest=min(highest, self.highest))
+
     def with_material(self, material: Material) -> "FrequencyLaw":
         """Return the law of the same resonator with another material; nothing is solved again."""
         nu = material.value("poisson_ratio", np.linspace(self.lowest, self.highest, 41))

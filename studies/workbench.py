@@ -117,7 +117,7 @@ def diagnose_records(
     from studies.record.plausible import check_card_frequency
     from studies.resonator.law import law_of
 
-    campaign = make_ready(records)
+    campaign, law = make_ready(records), None
     if card is None:
         card = polynomial_card(campaign.records)
     else:
@@ -129,7 +129,7 @@ def diagnose_records(
                 check_card_frequency(card, record["frequency_Hz"], record.path, law)
         check_readings(card, campaign.records, law)
     tell = progress or (lambda words: None)
-    found = infer(card, campaign, tell)
+    found = infer(card, campaign, tell, law)
     return found if chamber is None else replace(found, advice=suggest(found, found.verdict, chamber, tell))
 
 

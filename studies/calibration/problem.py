@@ -246,15 +246,17 @@ class CardProblem:
 
 
 def wide_law(
-    instrument: "Instrument", runs: Sequence[ObservedRun], tables: Sequence[SettledTable] = (), margin: float = 30.0
-) -> "FrequencyLaw":
-    """Build the law over all that the runs reach, and so much more that trial states stay within it."""
+    instrument: "Instrument", runs: Sequence[ObservedRun], tables: Sequence[SettledTable] = (), margin: float = 30.0,
+    whole: "FrequencyLaw | None" = None,
+) -> "FrequencyLaw":  # fmt: skip
+    """Build the law over all that the runs reach, and so much more that trial states stay within it; from the `whole` law where that is known."""
     ends = [instrument.reference_temperature, *(float(T) for table in tables for T in table.temperature)]
     for run in runs:
         for drive in (run.inner, run.outer):
             if drive is not None:
                 ends += [float(drive.profile.value.min()), float(drive.profile.value.max())]
-    return law_of(instrument, min(ends) - margin, max(ends) + margin)
+    low, high = min(ends) - margin, max(ends) + margin
+    return law_of(instrument, low, high) if whole is None else whole.between(low, high)
 
 
 MOST_SPREAD = 10.0  # K: a run may begin in the midst of a change

@@ -51,6 +51,7 @@ from studies.results.shown import Shown
 if TYPE_CHECKING:
     from pandas import DataFrame
 
+    from shell.law import FrequencyLaw
     from studies.diagnosis.verdict import Verdict
     from studies.instrument.card import Instrument
     from studies.planning.next_run import Advice
@@ -153,11 +154,13 @@ class Inference(Inferred, Shown):
         )  # fmt: skip
 
 
-def build_problem(card: "Instrument", records: Sequence[Record], housing: bool = True) -> CardProblem:
-    """Return the problem of a card's values and the starts of runs, driven by the measured temperature; a card explains its `housing` too."""
+def build_problem(
+    card: "Instrument", records: Sequence[Record], housing: bool = True, law: "FrequencyLaw | None" = None
+) -> CardProblem:
+    """Return the problem of a card's values and the starts of runs, driven by the measured temperature; a card explains its `housing` too, and its `law` may be known."""
     named = (*RESPONSES, HOUSING) if housing and card.polynomial is None else RESPONSES
     runs = tuple(run.explaining(named) for run in observe(records, blocks=blocks_of(records)))
-    return CardProblem(card, gather_priors(card), runs, wide_law(card, runs))
+    return CardProblem(card, gather_priors(card), runs, wide_law(card, runs, whole=law))
 
 
 def blocks_of(records: Sequence[Record]) -> int:
@@ -173,10 +176,12 @@ def blocks_of(records: Sequence[Record]) -> int:
     return count
 
 
-def infer(card: "Instrument", campaign: Campaign, progress: Report = lambda _: None) -> Inference:
-    """Find what records say of a card and of effects that it lacks."""
+def infer(
+    card: "Instrument", campaign: Campaign, progress: Report = lambda _: None, law: "FrequencyLaw | None" = None
+) -> Inference:
+    """Find what records say of a card, whose `law` may be known, and of effects that it lacks."""
     progress("calibration without effects")
-    whole, apart = fit_explained(build_problem(card, campaign.records), progress)
+    whole, apart = fit_explained(build_problem(card, campaign.records, law=law), progress)
     found = set_housing_apart(whole)
     campaign = replace(campaign, notes=(*campaign.notes, *apart))
     problem = found.problem

@@ -221,11 +221,11 @@ def _reread(instrument: Instrument, content: Mapping[str, Any], changed: set[str
             raise InputError(f"{instrument.path} [{name}]: a card has either [law] or [{name}]; leave one of them out.")
     for name in card_tables():
         if name in ("resonator", "material") and name in without:
-            tables[name] = ReadTable({name: None}, {name: None}, (), frozenset())
+            tables[name] = ReadTable({name: None}, {name: None})
         elif name in changed:
             place = CardPlace(f"{instrument.path} [{name}]", folder, instrument.reference_temperature)
             read = read_table(name, content.get(name), place)
-            tables[name] = replace(read, uncertain=()) if name in without else read
+            tables[name] = replace(read, given=()) if name in without else read
     unknown = changed - set(tables)
     if unknown:
         raise InputError(f"{instrument.path}: unknown table '{min(unknown)}'{nearest(min(unknown), tables)}")

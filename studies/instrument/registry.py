@@ -4,12 +4,12 @@ import importlib
 import pkgutil
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from functools import cache, lru_cache
+from functools import cache, cached_property, lru_cache
 from pathlib import Path
 from typing import Any
 
 from studies.errors import InputError, nearest
-from studies.instrument.uncertain import UncertainValue, read_uncertain
+from studies.instrument.uncertain import Given, UncertainValue, read_uncertain
 from studies.schema.keys import bounds, describe, holds_value, known_keys, structs
 
 TABLES = "studies.instrument.tables"
@@ -48,12 +48,21 @@ class CardTable:
 
 @dataclass(frozen=True)
 class ReadTable:
-    """What one table of a card says: `keys` as they stand, `parts` built from them, uncertain numbers, and those `stated` so, exact ones too."""
+    """What one table of a card says: `keys` as they stand, `parts` built from them, and what tells the numbers that are not exact."""
 
     keys: Mapping[str, Any]
     parts: Mapping[str, Any]
-    uncertain: tuple[UncertainValue, ...]
-    stated: frozenset[str]
+    given: tuple[Given, ...] = ()
+
+    @cached_property
+    def uncertain(self) -> tuple[UncertainValue, ...]:
+        """Its numbers that are not exact."""
+        return tuple(value for one in self.given for value in one.uncertain)
+
+    @property
+    def stated(self) -> frozenset[str]:
+        """Names of the numbers whose uncertainty it states, exact ones too."""
+        return frozenset(value.name for one in self.given for value in one.stated.values())
 
 
 @cache
@@ -108,36 +117,30 @@ def _read_given(name: str, raw: Any, place: CardPlace) -> ReadTable:
             raise InputError(f"{place.where}: unknown key '{key}'{home}")
         if not any(key in keys for keys in own) and len(entries) > 1:
             raise InputError(f"{place.where}: unknown key '{key}'{nearest(key, [k for keys in own for k in keys])}")
-    read: dict[str, Any] = {}
+    read: list[Given] = []
+    keys: dict[str, Any] = {}
     parts: dict[str, Any] = {}
-    uncertain: list[UncertainValue] = []
-    stated: set[str] = set()
-    for entry, keys in zip(entries, own, strict=True):
-        mine = {key: value for key, value in given.items() if key in keys or len(entries) == 1}
-        found, not_exact, said = read_uncertain(mine, entry.keys, place.where, name)
-        uncertain += not_exact if raw is not None or not entry.optional else []
-        stated |= said
-        read[entry.name], parts[entry.name] = found, entry.build(found, place)
-    return ReadTable(read, parts, tuple(uncertain), frozenset(stated))
+    for entry, known in zip(entries, own, strict=True):
+        mine = {key: value for key, value in given.items() if key in known or len(entries) == 1}
+        found = read_uncertain(mine, entry.keys, place.where, name)
+        read += [found] if raw is not None or not entry.optional else []
+        keys[entry.name], parts[entry.name] = found.keys, entry.build(found.keys, place)
+    return ReadTable(keys, parts, tuple(read))
 
 
 def _read_array(entry: CardTable, raw: Any, place: CardPlace) -> ReadTable:
     assert entry.keys_of is not None
     if not isinstance(raw, list | None):
         raise InputError(f"{place.where}: {entry.table} must be an array of tables ([[{entry.table}]]).")
+    read: list[Given] = []
     parts: list[Any] = []
-    uncertain: list[UncertainValue] = []
-    stated: set[str] = set()
     for number, member in enumerate(raw or []):
         where = f"{place.where.removesuffix(f'[{entry.table}]')}[[{entry.table}]] number {number + 1}"
         if not isinstance(member, Mapping):
             raise InputError(f"{where}: must be a table, not {member!r:.60}.")
-        keys = entry.keys_of(member, where)
-        found, not_exact, said = read_uncertain(member, keys, where, f"{entry.table}.{number}")
-        uncertain += not_exact
-        stated |= said
-        parts.append(entry.build(found, CardPlace(where, place.folder, place.reference_temperature)))
-    return ReadTable({}, {entry.name: tuple(parts)}, tuple(uncertain), frozenset(stated))
+        read.append(read_uncertain(member, entry.keys_of(member, where), where, f"{entry.table}.{number}"))
+        parts.append(entry.build(read[-1].keys, CardPlace(where, place.folder, place.reference_temperature)))
+    return ReadTable({}, {entry.name: tuple(parts)}, tuple(read))
 
 
 def possible_keys(content: Mapping[str, Any]) -> dict[str, tuple[float, float]]:

@@ -99,8 +99,31 @@ def is_spread(raw: Any) -> bool:
     return isinstance(raw, Mapping) and "value" in raw and 1 < len(raw) and set(raw) <= set(SPREAD_KEYS)
 
 
-def read_uncertain(raw: Any, keys: Any, where: str, name: str) -> tuple[Any, list[UncertainValue], set[str]]:
-    """Read a table of a card into its class; return it, its numbers that are not exact, and the names whose uncertainty it states."""
+@dataclass(frozen=True)
+class Given:
+    """A table as it was read, and the numbers whose uncertainty it states, by their places."""
+
+    keys: Any  # the class of its keys, filled
+    raw: Any
+    kind: Any  # the class, or the union of classes that a tag tells apart
+    name: str
+    stated: Mapping[Path, UncertainValue]
+
+    @property
+    def uncertain(self) -> list[UncertainValue]:
+        """Its numbers that are not exact: stated so, or by the documentation of their keys."""
+        documented = []
+        for path, node in priors(describe(self.kind), self.raw):
+            value = reduce(
+                lambda one, word: one[word] if isinstance(word, int) else getattr(one, word), path, self.keys
+            )
+            if path not in self.stated and value is not None:
+                documented.append(_make(self.name, path, Spread(value=value, **(node.extra or {})), *bounds(node)))
+        return [one for one in (*self.stated.values(), *documented) if one.sd > 0]
+
+
+def read_uncertain(raw: Any, kind: Any, where: str, name: str) -> Given:
+    """Read a table of a card into its class."""
     stated: dict[Path, UncertainValue] = {}
 
     def take(raw: Mapping[str, Any], path: Path, node: inspect.Type, place: str) -> Any:
@@ -116,14 +139,7 @@ def read_uncertain(raw: Any, keys: Any, where: str, name: str) -> tuple[Any, lis
         stated[path] = _make(name, path, spread, low, high)
         return spread.value
 
-    table = read_keys(raw, keys, where, take)
-    documented = []
-    for path, node in priors(describe(keys), raw):
-        value = reduce(lambda one, word: one[word] if isinstance(word, int) else getattr(one, word), path, table)
-        if path not in stated and value is not None:
-            documented.append(_make(name, path, Spread(value=value, **(node.extra or {})), *bounds(node)))
-    uncertain = [one for one in (*stated.values(), *documented) if one.sd > 0]
-    return table, uncertain, {one.name for one in stated.values()}
+    return Given(read_keys(raw, kind, where, take), raw, kind, name, stated)
 
 
 def _read_spread(raw: Mapping[str, Any], place: str) -> Spread:
