@@ -14,7 +14,7 @@ import numpy as np
 
 from shell.assembly import build_system
 from shell.curves import Arc
-from shell.elastic import Constants, Elastic, VaryingElastic, find_constants
+from shell.elastic import Elastic, VaryingElastic
 from shell.errors import ShellError
 from shell.fitted import fit_profile
 from shell.layout import Theory
@@ -93,12 +93,6 @@ class Mode:
     def shape(self, points: int = 9) -> "tuple[ShapePatch, ...]":
         """Displacement on the cross-section, stem included, as curved grids of `points` by `points`."""
         return sample_shape(self.resonator, self.solution, points)
-
-    def kept_on(self, resonator: Resonator, elastic: Elastic | VaryingElastic) -> "Mode":
-        """The mode with its shape kept on a design a little aside: f is stationary in the shape, so exact to first order."""
-        fitted = fit_profile(resonator)[0]
-        moved = _keep_shape(fitted, elastic, self.solution, self.resonator)
-        return replace(self, frequency=sqrt(moved.eigenvalue) / (2 * pi), eigenvector=moved, resonator=fitted)
 
     def solved_on(self, resonator: Resonator, elastic: Elastic) -> "Mode":
         """The mode of another design with the same elements, so that frequencies are smooth in its dimensions."""
@@ -199,23 +193,10 @@ def _by_thickness(resonator: Resonator, solution: Solution) -> float:
     if resonator.stem:
         top = float(resonator.at([0.0]).z[0])
         step = min(step, *(SMALL * (resonator.stem.radius / (end - top)) ** 2 for _, end in resonator.stem.roots))
-    low, high = (
-        _keep_shape(resonator.thickened(1 + change), solution.constants, solution, resonator).eigenvalue
-        for change in (-step, step)
-    )
+    level = replace(solution.system.level, like=solution.system.level.like or resonator)
+    systems = (build_system(resonator.thickened(1 + change), solution.system.n, level) for change in (-step, step))
+    low, high = (Solution(system, solution.constants, solution.vector).eigenvalue for system in systems)
     return log(high / low) / (2 * log((1 + step) / (1 - step)))
-
-
-def _keep_shape(
-    resonator: Resonator, material: Elastic | VaryingElastic | tuple[Constants, ...], solution: Solution, own: Resonator
-) -> Solution:
-    """Return the eigenvector of a design, its `own`, on the same elements of another one."""
-    level = solution.system.level
-    system = build_system(resonator, solution.system.n, replace(level, like=level.like or own))
-    if not isinstance(material, tuple):
-        tables = [group.table for group in system.groups]
-        material = tuple(find_constants(table.position, material, table.plane_stress) for table in tables)
-    return Solution(system, material, solution.vector)
 
 
 def _label(solution: Solution) -> str:

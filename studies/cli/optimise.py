@@ -67,13 +67,13 @@ def _parameters(found: Answer) -> list[dict[str, Any]]:
 
 
 def _columns(found: Answer) -> list[dict[str, Any]]:
-    wanted, exact = set(found.task.wanted), found.task.exact
+    wanted = set(found.task.wanted)
     solved = {"start": found.before, "interpolant": found.foretold, "best": found.after, "verified": found.verified}
     rows = [
         row_of(column, "label", "unit", column="name")
         | {name: float(of[k]) for name, of in solved.items()}
-        | {"slopes": "exact" if k in exact else "differences"}
-        for k, column in enumerate(found.task.study.columns[: len(found.after)])
+        | {"slopes": "differences"}
+        for k, column in enumerate(found.task.study.columns)
         if "_of_n" not in column.name and not column.name.endswith("nearest_harmonic")
     ]
     return sorted(rows, key=lambda row: row["column"] not in wanted)
@@ -116,8 +116,8 @@ def _parts(found: Answer, payload: dict[str, Any]) -> list[Any]:
             ]),
             Table("Before and after", payload["columns"], [
                 "label: quantity", Column(lambda row: row["unit"] if row["unit"] != "1" else None, "unit"),
-                "start: before .6 | interpolant: best, interpolated .7 | best: best, full solve .7 | slopes",
-            ], "Interpolated: from all other designs, with the exact slopes of each where a column hangs on frequencies and dimensions alone, else by differences. Full solve: the design itself, solved again from its card with the same result."
+                "start: before .6 | interpolant: best, interpolated .7 | best: best, full solve .7",
+            ], "Interpolated: from all other designs. Full solve: the design itself, solved again from its card with the same result."
                " Only the magnitude of a separation counts; its sign shows on which side the nearest mode lies."),
             Figure(lambda: show_mode(best_instrument(found)).mode.plot(), "Section of the best design, at rest and at maximum displacement."),
         ]),

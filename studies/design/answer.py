@@ -119,7 +119,7 @@ def answer(task: Task, explorer: Explorer, plan: WorkPlan) -> Answer:
         design,
         values,
         foretold,
-        row.values[: len(values)],
+        row.values,
         limits,
         spreads,
         search.low + search.x[front] * search.width,
@@ -208,7 +208,7 @@ def _prices(search: Search, scalar: Scalar, best: int) -> list[float | None]:
     """Return the multiplier of every limit: ∇t + Σ λ ∇g + Σ μ ∇bound = 0 with λ, μ ≥ 0, by least squares."""
     goals, task = search.goals, search.task
     free = slice(0, task.free)
-    z, slopes = search.local(search.x[best], FINE)(search.x[best][free])
+    z, slopes = goals.count(search.values[best]), search.slopes(best, FINE, both=True)[:, free]
     pieces = goals.pieces(scalar, z, search.margins)
     value = np.array([one.slope * z[one.column] + one.offset for one in pieces])
     slope = np.array([one.slope * slopes[one.column] for one in pieces])

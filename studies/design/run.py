@@ -69,7 +69,6 @@ def _describe(store: Store, task: Task) -> None:
         "parameters": list(study.names),
         "start": task.start.tolist(),
         "derived": study.content["derived"],
-        "exact": list(task.exact),
     }
     describe_study(store, study, {**physics, "base": digest(physics), "design": ""})
 

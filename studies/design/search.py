@@ -31,7 +31,6 @@ ENOUGH = 3  # regions that lead to one place
 STARTS = 24  # of every step on the interpolant over the whole box
 NEAR = 6.0  # half widths within which designs make the interpolant of a trust region
 PENALTY = 30.0  # of the excess over limits, in spreads, against the objective's
-SLOPED, MANY = 20, 60  # designs whose slopes the interpolant takes: about a centre, over the whole box
 GAIN = 1e-5  # of an objective's spread: less is none
 ASIDE = 0.05  # step of a parameter that is not free, in parts of its range
 MOST_CORNERS = 256  # of the grid of steps about a design
@@ -49,9 +48,6 @@ class Search:
         self.rng = np.random.default_rng(task.keys.search.seed)
         self.x = np.empty((0, len(self.low)))  # designs that have values, in parts of the ranges
         self.values = np.empty((0, len(task.columns)))
-        self.exact = np.empty(
-            (0, len(task.columns), len(self.low))
-        )  # slopes by the widths of the ranges; NaN where none
         self.seen: dict[bytes, Array | None] = {}  # every design looked at, in order, with its values
         self.failures: list[tuple[Array, str]] = []
         self._draw_first()
@@ -72,14 +68,10 @@ class Search:
             return
         cases = self.explorer.cases(np.array([design for design, _ in new.values()]))
         for (key, (_, x)), case in zip(new.items(), cases, strict=True):
-            values, slopes = np.split(case.values, [self.values.shape[1]])
             good = bool(np.isfinite(case.values).all())
-            self.seen[key] = values if good else None
+            self.seen[key] = case.values if good else None
             if good:
-                exact = np.full((1, *self.exact.shape[1:]), np.nan)
-                exact[0, list(self.task.exact)] = slopes.reshape(-1, len(self.low)) * self.width
-                self.x, self.values = np.vstack([self.x, x]), np.vstack([self.values, values])
-                self.exact = np.vstack([self.exact, exact])
+                self.x, self.values = np.vstack([self.x, x]), np.vstack([self.values, case.values])
             else:
                 self.failures.append((x, case.remark))
 
@@ -131,8 +123,7 @@ class Search:
     def descend(self, scalar: Scalar, best: int, rough: bool = False, known: Sequence[int] = ()) -> int:
         """Improve a design by steps within a box that grows with what they gain and shrinks without; return the place of the best one.
 
-        Where nothing more is foretold, what the interpolant knows no slopes of gets them from a star of designs. The last steps keep
-        all limits. Rough ones take no star, and end where they meet a design `known` before.
+        Where nothing more is foretold, a star of designs renews the interpolant. The last steps keep all limits. Rough ones take no star, and end where they meet a design `known` before.
         """
         first, centre = best, np.full_like(self.start, np.inf)
         for strict in (False,) if rough else (False, True):
@@ -216,16 +207,10 @@ class Search:
         plain = np.flatnonzero(self._is_plain() & (np.arange(len(self.x)) != without))
         apart = np.abs(self.x[plain] - centre).max(axis=1)
         count = max(int((apart <= NEAR * half).sum()), 2 * self.task.free + 2)
-        return self._surface(plain[np.argsort(apart, kind="stable")[:count]], SLOPED)
+        return self._surface(plain[np.argsort(apart, kind="stable")[:count]])
 
     def slopes(self, best: int, half: float, both: bool = False) -> Array:
-        """Return slopes of all columns as they count, (columns, parameters): exact ones, and where any that is wanted has none, from
-        a star of solves, to both sides where `both`.
-        """
-        exact = self._count_slopes(np.array([best]))[0]
-        lacking = [c for name in self.task.wanted for c in self.goals.smooth(name) if not np.isfinite(exact[c]).all()]
-        if not lacking:
-            return np.asarray(exact)
+        """Return slopes of all columns as they count, (columns, parameters), from a star of solves, to both sides where `both`."""
         x, count = self.x[best], len(self.low)
         by = np.where(np.arange(count) < self.task.free, half, ASIDE) * np.where(x <= 0.5, 1.0, -1.0)
         sides = [x + side * move for move in np.diag(by) for side in ((1.0, -1.0) if both else (1.0,))]
@@ -240,7 +225,7 @@ class Search:
             if ends:
                 (one, f), (other, g) = (*ends, here)[:2]
                 found[:, k] = (f - g) / (one - other)
-        return np.where(np.isfinite(exact), exact, found)
+        return found
 
     def _draw_first(self) -> None:
         """Compute the first design and some drawn over the box; InputError where the first one, or most of them, cannot be."""
@@ -248,9 +233,7 @@ class Search:
         if self.failures:
             raise InputError(f"the first design cannot be computed: {self.failures[0][1]}")
         free = self.task.free
-        drawn = scipy.stats.qmc.LatinHypercube(free, rng=self.rng).random(
-            max((1 if self.task.exact else 2) * free + 6, 8)
-        )
+        drawn = scipy.stats.qmc.LatinHypercube(free, rng=self.rng).random(2 * free + 6)
         self.look([np.append(x, self.start[free:]) for x in drawn])
         if len(self.failures) > len(drawn) / 2:
             raise InputError(
@@ -270,16 +253,8 @@ class Search:
                     " leads to a better design; ask for a quantity that changes continuously."
                 )
 
-    def _surface(self, places: NDArray[np.intp], sloped: int = MANY) -> Interpolant:
-        """Return the interpolant through designs, with the slopes of the first `sloped` of them."""
-        slopes = self._count_slopes(places)[:, :, : self.task.free]
-        slopes[sloped:] = np.nan
-        return interpolate(self.x[places, : self.task.free], self.goals.count(self.values[places]), slopes)
-
-    def _count_slopes(self, places: NDArray[np.intp]) -> Array:
-        """Return the exact slopes of columns as they count, (designs, columns, parameters)."""
-        over = np.where(self.goals.logarithmic, self.values[places], 1.0)
-        return np.asarray(self.exact[places] / over[:, :, None])
+    def _surface(self, places: NDArray[np.intp]) -> Interpolant:
+        return interpolate(self.x[places, : self.task.free], self.goals.count(self.values[places]))
 
     def _step(
         self, surface: Interpolant, scalar: Scalar, x: Array, low: Array, high: Array

@@ -1,7 +1,7 @@
 """A design task, read and checked: a study of its designs, and what their columns are wanted to be."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
 from pathlib import Path
@@ -11,59 +11,20 @@ import numpy as np
 
 from compensation.arrays import Array
 from studies.design.keys import SCHEMA, DesignKeys, Objective, Tolerance
-from studies.errors import UNUSABLE_INPUT, InputError, nearest
+from studies.errors import InputError, nearest
 from studies.files.reading import find_shipped, list_shipped
 from studies.instrument.card import load_card
 from studies.schema.reader import read_keys, read_text, read_toml
-from studies.sweeps.case import Case
 from studies.sweeps.definition import Study
 from studies.sweeps.keys import Requirement
 from studies.sweeps.parameters import find_nominal, set_parameters
 from studies.sweeps.quantities import library
 from studies.sweeps.quantities.split_per_wave import SURFACES
-from studies.sweeps.quantity import Column, Number, Quantity
 from studies.sweeps.spec import check_study
 
 MOST_HARMONIC = 12  # up to which a column finds its quantity
 # a limit of the distance needs no neighbour's frequency to better than the solver finds it at once
 NEIGHBOURS: dict[str, Any] = {"name": "mode-separation", "distances": True, "each": 3, "tolerance": 1e-4}
-STEP = 1e-6  # of a parameter's range: what is neglected is as small, rounding 1e-7
-
-
-class Slopes(Quantity, frozen=True, kw_only=True, tag="slopes"):
-    """Slope of every column of stationary quantities by every parameter, in their units: of frequencies, from one solve.
-
-    ∂λ/∂p = dR(p, x)/dp at the unchanged shape x, R(p, x) = xᵀ K(p) x / xᵀ M(p) x (Wittrick 1962; Haug, Choi and Komkov 1986).
-    """
-
-    of: tuple[Quantity, ...]
-    by: tuple[tuple[str, float], ...]  # names of parameters and their steps
-
-    def list_columns(self) -> tuple[Column, ...]:
-        """Return the columns of one quantity after the other, each by all parameters."""
-        return tuple(
-            Column(f"{column.name}_by_{name}", "1", f"slope of {column.label} by {name}")
-            for one in self.of
-            for column in one.columns
-            for name, _ in self.by
-        )
-
-    def evaluate(self, case: Case) -> tuple[Number, ...]:
-        """Return the change of every column with the shapes kept, over that of the parameter."""
-        here = self._values(case)
-        slopes = [self._slope(case, here, name, step) for name, step in self.by]
-        return tuple(Number(float(value)) for value in np.transpose(slopes).ravel())
-
-    def _slope(self, case: Case, here: Array, name: str, step: float) -> Array:
-        for move in (step, -step):
-            try:
-                return (self._values(case.moved(name, case.parameters[name] + move)) - here) / move
-            except UNUSABLE_INPUT as error:
-                reason = error
-        raise InputError(f"no design beside it by '{name}': {reason}")
-
-    def _values(self, case: Case) -> Array:
-        return np.array([number.value for one in self.of for number in one.evaluate(case)])
 
 
 @dataclass(frozen=True)
@@ -76,13 +37,11 @@ class Task:
     study: Study
     free: int  # how many of the parameters are free
     start: Array  # the first design, array (parameters,)
-    exact: tuple[int, ...] = ()  # places of the columns whose slopes follow all columns, each by all parameters
 
     @cached_property
     def columns(self) -> list[str]:
-        """The names of all columns, their slopes apart."""
-        names = [column.name for column in self.study.columns]
-        return names[: len(names) - len(self.exact) * len(self.study.parameters)]
+        """The names of all columns."""
+        return [column.name for column in self.study.columns]
 
     @property
     def wanted(self) -> list[str]:
@@ -143,14 +102,7 @@ def read_task(source: str | Path, text: str | None = None) -> Task:
     study = check_study(spec, instrument, where, str(path.parent.resolve()), text)
     if study.functions:
         raise InputError(f"{where}: a design asks for no Python function; use hrg study for that.")
-    of = tuple(one for one in study.asked if one.is_stationary and one.options.get("theory") != "rayleigh")
-    exact = tuple(k for k, column in enumerate(study.columns) if any(column in one.columns for one in of))
-    by = tuple(
-        (p.name, STEP * (p.high - p.low) * (1 if q < (p.low + p.high) / 2 else -1))
-        for p, q in zip(study.parameters, start, strict=True)
-    )
-    study = replace(study, asked=(*study.asked, Slopes(of=of, by=by)))
-    task = Task(keys, keys.name or path.stem, study, len(free), np.array(start), exact)
+    task = Task(keys, keys.name or path.stem, study, len(free), np.array(start))
     for goal in _goals(keys):
         _check_magnitude(goal, where)
     _check_bounds(task, where)

@@ -73,24 +73,6 @@ class Case:
         self._named[key] = follow(solve, solve(0.0, index + 1)[index])
         return self._named[key]
 
-    def moved(self, name: str, value: float) -> "Case":
-        """Return the design with another value, whose modes keep their shapes: f is exact to first order, for it is stationary."""
-        assert self.build is not None
-        parameters = {**self.parameters, name: value}
-        case = Case(self.build(parameters), parameters)
-        at = {T: case.temperature(None) if T == self.temperature(None) else T for _, _, T in self._solved}
-        grown = {T: case.instrument.at(at[T]) for T in at}
-        case._solved |= {
-            (n, theory, at[T]): (within, tuple(mode.kept_on(*grown[T]) for mode in found))
-            for (n, theory, T), (within, found) in self._solved.items()
-            if theory != "rayleigh"
-        }
-        case._named |= {
-            (n, k, theory, at[T]): case._solved[n, theory, at[T]][1][mode.index]
-            for (n, k, theory, T), mode in self._named.items()
-        }
-        return case
-
     def _on_the_way(self, place: float) -> Instrument:
         """Return the instrument at a place 0 ... 1 between the start and this design."""
         assert self.build is not None

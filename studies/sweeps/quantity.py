@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from math import nan
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
 
 import msgspec
 
@@ -42,8 +42,6 @@ class Column(NamedTuple):
 class Quantity(Keys, frozen=True, kw_only=True, tag_field="name"):
     """A quantity that a study computes for every design; its fields are the keys of its `[[quantity]]` table."""
 
-    # whether its columns hang on the modes by their frequencies alone, so that shapes that are kept tell their slopes
-    is_stationary: ClassVar[bool] = False
     label: Annotated[str, says("before the names of its columns, where a quantity is asked for twice")] = ""
 
     def list_columns(self) -> Sequence[Column]:

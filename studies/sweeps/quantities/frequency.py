@@ -7,8 +7,6 @@ from studies.sweeps.quantity import Column, Number, OvertoneQuantity
 class Frequency(OvertoneQuantity, frozen=True, kw_only=True, tag="frequency"):
     """Frequency of a mode, without the stress from the [mount], which tcf includes."""
 
-    is_stationary = True
-
     def list_columns(self) -> tuple[Column, ...]:
         return (Column(self.stem("frequency"), "Hz", f"frequency, {self.words}"),)
 

@@ -7,8 +7,6 @@ from studies.sweeps.quantity import Column, Number, Quantity
 class Mass(Quantity, frozen=True, kw_only=True, tag="mass"):
     """Mass of the resonator, its stem included, and the height of its centre of mass."""
 
-    is_stationary = True
-
     def list_columns(self) -> tuple[Column, ...]:
         return Column("mass", "g", "mass"), Column("center", "mm", "height of the centre of mass")
 

@@ -14,8 +14,6 @@ if TYPE_CHECKING:
 class ModeSeparation(ModeQuantity, frozen=True, kw_only=True, tag="mode-separation"):
     """Signed distance of the nearest other mode, among harmonics 0 ... `highest`, and its harmonic."""
 
-    is_stationary = True
-
     highest: Annotated[int, number("highest harmonic that is searched", least=0, most=20)] = 4
     each: Annotated[int, number("least number of modes solved for each harmonic", least=1, most=10)] = 2
     tolerance: Annotated[float, number("relative error allowed of the other harmonics", least=1e-8, most=1e-2)] = TOLERANCE  # fmt: skip

@@ -10,8 +10,6 @@ from studies.sweeps.quantity import Column, Number, Quantity, Temperature
 class ThermalTimeConstants(Quantity, frozen=True, kw_only=True, tag="thermal-time-constants"):
     """Slowest time constants of the heat path, linearised at one temperature."""
 
-    is_stationary = True
-
     count: Annotated[int, number("how many of the whole heat path", least=1, most=10)] = 2
     temperature_degC: Temperature | None = None
 

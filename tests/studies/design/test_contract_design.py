@@ -38,7 +38,7 @@ column = "frequency_n2_Hz"
 low = 5000.0
 high = 5100.0
 """
-FEW = '\n[[quantity]]\nname = "mode-separation"\nhighest = 1\neach = 1\n[search]\nstarts = 1\nevaluations = 16\n'
+FEW = '\n[[quantity]]\nname = "mode-separation"\nhighest = 1\neach = 1\n[search]\nstarts = 1\nevaluations = 32\n'
 
 
 def write(folder, text=TASK):
