@@ -1,6 +1,6 @@
 """Results as a page: text (escaped), tables and figures in one HTML file that works without a network.
 
-Long tables and chapters below `OPEN_HEIGHT` are folded, on a phone wide tables stacked; paper has `PAPER_ROWS` rows of a table at most.
+Long tables and chapters after the first `OPEN` are folded, on a phone wide tables stacked; paper has `PAPER_ROWS` rows of a table at most.
 """
 
 import base64
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from markupsafe import Markup
 
 PACKAGES = ("numpy", "scipy", "sympy", "pandas", "pyvista", "trimesh")
-OPEN_HEIGHT = 4600  # px: chapters that would end below are folded
+OPEN = 5  # chapters; those that follow are folded
 LONG_TABLE = 15  # rows; longer tables are folded, except in the first chapter, which is the answer
 LONG_ANSWER = 40  # rows of a table in the first chapter
 LONG_WORD = 15  # letters
@@ -52,7 +52,6 @@ class Picture:
     data_uri: str
     caption: str
     alt: str
-    height: float = 400.0  # px, roughly
     curves: str = ""  # what it shows as JSON, to be read and enlarged by curves.js
 
 
@@ -102,12 +101,11 @@ def render_page(title: str, lead: str, chapters: Sequence[Chapter], sources: Seq
     script = (files("studies.reports") / "templates" / "curves.js").read_text(encoding="utf-8")
     made = [(chapter.title, make_blocks(*chapter.parts)) for chapter in told(chapters, "chapters")]
     made = [(heading, blocks) for heading, blocks in made if blocks]
-    folded = _folded([blocks for _, blocks in made])
     return fill_template(
         "page.html",
         title=title,
         lead=lead,
-        chapters=[(heading, blocks, fold) for (heading, blocks), fold in zip(made, folded, strict=True)],
+        chapters=[(heading, blocks, k >= OPEN) for k, (heading, blocks) in enumerate(made)],
         contents=len(made) >= CONTENTS_FROM,
         script=script if any(isinstance(b, Picture) and b.curves for _, blocks in made for b in blocks) else "",
         long_table=LONG_TABLE,
@@ -190,31 +188,6 @@ def _stacked(table: Cells) -> bool:
     return sum(10.0 + 7.4 * width for width in columns) > PHONE
 
 
-def _folded(chapters: Sequence[Sequence[Block]]) -> list[bool]:
-    """Return which chapters are folded: from the first on that would end below `OPEN_HEIGHT`, never the first two."""
-    reached, folded = 340.0 + 26 * len(chapters), False
-    found: list[bool] = []
-    for k, chapter in enumerate(chapters):
-        reached += 80 + sum(_height(block, k == 0) for block in chapter)
-        folded = folded or (k > 1 and reached > OPEN_HEIGHT)
-        found.append(folded)
-    return found
-
-
-def _height(block: Block, answer: bool) -> float:
-    """Return about how many pixels a block is high, between a screen 1280 px wide and a phone."""
-    match block:
-        case Sentence(text, kind):
-            return 25 * max(1 + len(text) / 60, len(text.splitlines()) * (kind == "source")) + 20
-        case Cells(rows=rows):
-            return 60 if len(rows) > (LONG_ANSWER if answer else LONG_TABLE) else 120 + 45 * len(rows)
-        case Picture():
-            return 0.8 * block.height + 70
-        case Facts(facts):
-            return 60 + 50.0 * len(facts)
-    return 600
-
-
 def draw(figure: Drawing, caption: str, alt: str) -> Picture:
     """Embed a matplotlib figure as SVG, with the numbers of its curves."""
     import matplotlib as mpl
@@ -226,10 +199,9 @@ def draw(figure: Drawing, caption: str, alt: str) -> Picture:
         figure.set_layout_engine("none")  # laid out once
         shown = figure.get_tightbbox().padded(0.1)
         figure.savefig(buffer, format="svg", bbox_inches=shown, metadata={"Date": None})
-    height = 96 * float(figure.get_figheight())
     curves = read_curves(figure, *shown.bounds)
     source = "data:image/svg+xml;base64," + base64.b64encode(buffer.getvalue()).decode()
-    return Picture(source, caption, alt, height, curves)
+    return Picture(source, caption, alt, curves)
 
 
 def _provenance() -> str:
