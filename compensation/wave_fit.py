@@ -82,11 +82,12 @@ def fit_whole_angle(
 ) -> WaveFit:  # fmt: skip
     """Fit splits, axes, gain ratio, skew and phase error to a whole-angle run: measured `angle` (rad), `rate` less the command, n k.
 
-    Columns are means over rows; the angle is read `late` rows after each begins. The pick-offs' gains count where the run does not tell them.
+    Columns are means over rows; the angle is read `late` rows after each begins. A column that stands still, too coarse to follow the wave,
+    tells nothing. The pick-offs' gains count where the run does not tell them.
     """
     columns = {"angle": angle, "rate": rate}
     more = {"frequency": frequency, "quadrature": quadrature, "decay": decay}
-    columns |= {name: column for name, column in more.items() if column is not None}
+    columns |= {name: column for name, column in more.items() if column is not None and np.ptp(column)}
     t, *read = read_columns(time=time, **columns)
     step = require_regular(t, "the fit of a whole-angle run")
     # The angle turns by much of its span from row to row.
@@ -151,7 +152,7 @@ def fit_whole_angle(
     splits = {"rate": "damping", "decay": "damping"}
     alone = {name: _polar(splits.get(name, "frequency"), *one, harmonic) for name, one in told.items()}
     if W is None:
-        undetermined.append("frequency split, because neither frequency nor quadrature is recorded")
+        undetermined.append("frequency split, because neither frequency nor quadrature is recorded, or finely enough to vary")
     for name, one in {"frequency": W, "damping": joined and true(joined)}.items():
         polar = _polar(name, *one, harmonic) if one else {}
         if leak and one and np.divide(*polar[f"{name}_split"]) < 2:
@@ -159,7 +160,7 @@ def fit_whole_angle(
         elif name not in wrong:
             estimates |= polar
     if "decay" not in estimates:
-        undetermined.append("1/τ, because the drive effort (inverse_q) is not recorded")
+        undetermined.append("1/τ, because the drive effort (inverse_q) is not recorded, or finely enough to vary")
     if not both_ways:
         undetermined.append("gain ratio and skew: the wave precesses at one rate only; precess it in both directions")
     if epsilon is None and not wrong:

@@ -94,6 +94,16 @@ def test_quadrature_of_a_precessing_wave_resolves_a_split_of_a_third_of_a_millih
     assert found.low > 0.5 * found.value
 
 
+@pytest.mark.parametrize(("column", "lost"), [("omega", "frequency"), ("decay", "1/τ")])
+def test_a_column_too_coarse_to_vary_tells_nothing(uneven, column, lost):
+    """A counter's last digit stands still: no noise of it is known, and the fit is that of a run without the column."""
+    wave, run = uneven
+    still = np.full_like(run.time, np.median(getattr(run, column)))
+    coarse, without = (fit_of(replace(run, quadrature=None, **{column: value}), wave) for value in (still, None))
+    assert coarse.estimates == without.estimates
+    assert any(lost in sentence for sentence in coarse.undetermined)
+
+
 @pytest.mark.parametrize(
     ("column", "factor", "found"),
     [
