@@ -152,7 +152,9 @@ def fit_whole_angle(
     splits = {"rate": "damping", "decay": "damping"}
     alone = {name: _polar(splits.get(name, "frequency"), *one, harmonic) for name, one in told.items()}
     if W is None:
-        undetermined.append("frequency split, because neither frequency nor quadrature is recorded, or finely enough to vary")
+        undetermined.append(
+            "frequency split, because neither frequency nor quadrature is recorded, or finely enough to vary"
+        )
     for name, one in {"frequency": W, "damping": joined and true(joined)}.items():
         polar = _polar(name, *one, harmonic) if one else {}
         if leak and one and np.divide(*polar[f"{name}_split"]) < 2:

@@ -48,7 +48,8 @@ def draft_map(paths: Sequence[str]) -> Draft:
         '# source = "..."',
     ]
     if len(paths) == 1 and not is_container(paths[0]) and (table := _draft_table(paths[0])) is not None:
-        return Draft("\n".join([*head, 'target = "table"', "", *table]) + "\n", TABLE_TARGETS, ())
+        lines, unused = table
+        return Draft("\n".join([*head, 'target = "table"', "", *lines]) + "\n", TABLE_TARGETS, unused)
     head.append("# step_s = 1.0    # a regular time grid; without it the times of the first file")
     files: list[list[str]] = []
     mapped: list[str] = []
@@ -155,7 +156,7 @@ def _one_unit(one: str, two: str) -> bool:
     return one.endswith("_degC") and two.endswith("_degC")
 
 
-def _draft_table(path: str) -> list[str] | None:
+def _draft_table(path: str) -> tuple[list[str], tuple[str, ...]] | None:
     look = look_at(path)
     if look.header is None or any(re.search(TIME_WORDS, name.lower()) for name in look.names):
         return None
@@ -174,7 +175,7 @@ def _draft_table(path: str) -> list[str] | None:
         cells = [row[place] for row in body if place < len(row)]
         numbers = [n for cell in cells if (n := as_number(cell, look.decimal)) is not None]
         lines += ["", *draft_column(name, Meaning(target), hints[name], numbers, nominal=find_nominal([*above, name]))]
-    return lines
+    return lines, tuple(name for name in look.names if name not in (temperature, by_target["frequency_Hz"]))
 
 
 def _describe_notation(path: str, look: Look) -> list[str]:

@@ -74,11 +74,12 @@ _SETTING_WORDS = {
 
 
 def find_markers(names: Sequence[str], cells: Mapping[str, list[str]], time: Sequence[str], decimal: str) -> list[str]:
-    """Return texts that stand in columns of numbers."""
+    """Return texts that stand in columns of numbers; of the time its own name alone, where the head is written again."""
     markers: list[str] = []
     for name in names:
         words = [cell for cell in cells[name] if cell and as_number(cell, decimal) is None]
-        if name not in time and 0 < 2 * len(words) < len(cells[name]):
+        words = [name] * words.count(name) if name in time else words
+        if 0 < 2 * len(words) < len(cells[name]):
             markers += [word for word in dict.fromkeys(words) if word not in markers]
     return markers[:20]
 

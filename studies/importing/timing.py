@@ -12,7 +12,7 @@ from studies.importing.meaning import find_meanings, find_unit
 DATES = ("%Y-%m-%d", "%Y/%m/%d", "%d.%m.%Y", "%d/%m/%Y", "%m/%d/%Y", "%d.%m.%y", "%d/%m/%y", "%m/%d/%y")
 CLOCKS = ("%H:%M:%S", "%H:%M:%S.%f", "%H:%M")
 STAMPS = (*map(" ".join, itertools.product(DATES, CLOCKS)), "%m/%d/%Y %I:%M:%S %p", *CLOCKS[:2])
-TIME_WORDS = r"time|elapsed|zeit|date|datum|clock|stamp|uhr|^t$|^t\s*[ _/\[(]\s*[mµun]?s\b"
+TIME_WORDS = r"time|elapsed|zeit|date|datum|clock|stamp|uhr|^t$|^t\s*[ _/\[(]\s*([mµun]?s|min)\b|^t\s*[/\[(]\s*h\b"
 UNIX_BY_SIZE = ((1e9, "unix-s"), (1e12, "unix-ms"), (1e15, "unix-us"), (1e18, "unix-ns"))
 HOUSING = "housing_temperature_degC"  # whose units no time has
 LONGEST_RUN = 1000.0  # days of a file whose times look like Excel's
@@ -48,11 +48,11 @@ def find_time(
     for size, form in UNIX_BY_SIZE:
         if size <= first < 4 * size:
             return [time], form, unsure
-    hint = hints[time].lower()
+    hint = hints[time].lower().replace("_", " ")
     for pattern, form in (
-        (r"\bms\b|milli|_ms\b", "ms"),
-        (r"\b(us|µs|μs)\b|micro|_us\b", "us"),
-        (r"\bns\b|nano|_ns\b", "ns"),
+        (r"\bms\b|milli", "ms"),
+        (r"\b(us|µs|μs)\b|micro", "us"),
+        (r"\bns\b|nano", "ns"),
         (r"\bmin", "min"),
         (r"\b(h|hours?|std)\b", "h"),
         (r"\bdays?\b", "days"),
@@ -61,7 +61,7 @@ def find_time(
             return [time], form, unsure
     if 40000 < first < 60000 and any(value % 1 for value in values) and values[-1] - first < LONGEST_RUN:
         return [time], "excel-days", "the values look like Excel's days"
-    if re.search(r"_s\b|\bs\b|sec|sek", hint):
+    if re.search(r"\bs\b|sec|sek", hint):
         return [time], "s", unsure
     return [time], _likely_unit(values), unsure or "the name states no unit; chosen by the step between rows"
 

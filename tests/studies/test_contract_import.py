@@ -630,6 +630,28 @@ def test_a_draft_takes_the_unit_in_brackets_with_its_prefix(tmp_path, name, draf
     assert drafted in draft_map([str(tmp_path / "a.csv")]).text
 
 
+@pytest.mark.parametrize(
+    ("name", "form"),
+    [("t[min]", "min"), ("t / min", "min"), ("t_min", "min"), ("time_min", "min"), ("t (h)", "h"), ("time_hours", "h"), ("T_h", "")],
+)  # fmt: skip
+def test_a_time_in_minutes_or_hours_is_seen_by_its_name(tmp_path, name, form):
+    """Else a run becomes a table of settled readings, or its minutes seconds; `T_h` is a housing."""
+    (tmp_path / "a.csv").write_text(
+        f"{name},temp,freq [Hz],x\n" + "".join(f"{k},{20 + k % 7},{4600 + k / 8},1\n" for k in range(30))
+    )
+    draft = draft_map([str(tmp_path / "a.csv")])
+    drafted = tomllib.loads(draft.text)
+    assert drafted["file"][0].get("time_format", "") == form
+    assert ("target" in drafted) == (not form)
+    assert set(draft.left_over) == ({"x"} if form else {"x", "temp"})
+
+
+def test_a_head_that_is_written_again_is_no_reading(tmp_path):
+    head, rows = "time [s],temp [°C]\n", [f"{k},{20 + k / 10}\n" for k in range(9)]
+    (tmp_path / "a.csv").write_text(head + "".join(rows[:5]) + head + "".join(rows[5:]))
+    assert draft_and_import(tmp_path / "a.csv", tmp_path)["time_s"].tolist() == list(range(9))
+
+
 def test_a_column_that_rises_and_has_a_meaning_is_no_clock(tmp_path):
     (tmp_path / "a.csv").write_text("freq [Hz],quad [V]\n" + "".join(f"{4600 + k / 8},{k % 7}\n" for k in range(30)))
     text = draft_map([str(tmp_path / "a.csv")]).text
