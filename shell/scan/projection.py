@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy
+from scipy.interpolate import RegularGridInterpolator
 
 from shell.errors import ShellError
 from shell.quadrature import Array
@@ -33,16 +34,11 @@ class Projector:
         self.resonator = resonator
         self.line = line = resonator.sample(FINE)
         reach = 3 * float(line.thickness.max()) + 0.1 * resonator.size
-        self.low = np.array([line.r.min() - reach, line.z.min() - reach])
-        high = np.array([line.r.max() + reach, line.z.max() + reach])
-        self.cell = float((high - self.low).max()) / CELLS
-        self.shape = tuple(int(k) for k in np.ceil((high - self.low) / self.cell)) + np.array([1, 1])
-        i, j = (axis.ravel() for axis in np.meshgrid(*(np.arange(k) for k in self.shape), indexing="ij"))
-        centers = self.low + (np.stack([i, j], axis=1) + 0.5) * self.cell
+        cell = (max(np.ptp(line.r), np.ptp(line.z)) + 2 * reach) / CELLS
+        axes = [np.arange(x.min() - reach, x.max() + reach + cell, cell) for x in (line.r, line.z)]
         tree = scipy.spatial.cKDTree(np.stack([line.r, line.z], axis=1)[::COARSE])
-        nearest = COARSE * tree.query(centers, distance_upper_bound=reach)[1]
-        # far from the curve none is found, and any will do
-        self.nearest = np.where(nearest < FINE, nearest, 0).reshape(self.shape)
+        nearest = COARSE * tree.query(np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1))[1]
+        self.nearest = RegularGridInterpolator(axes, nearest, method="nearest", bounds_error=False, fill_value=0)
         self.step = resonator.length / (FINE - 1)
 
     def place(self, points: Array) -> Places:
@@ -53,12 +49,7 @@ class Projector:
     def _place(self, points: Array) -> tuple[Array, Array, Array, Array]:
         line, x, y, z = self.line, points[:, 0], points[:, 1], points[:, 2]
         r = np.hypot(x, y)
-        i, j = (
-            np.clip(((value - low) / self.cell).astype(np.intp), 0, count - 1)
-            for value, low, count in zip((r, z), self.low, self.shape, strict=True)
-        )
-        k = self.nearest[i, j]
-        s = line.arc_length[k]
+        s = line.arc_length[self.nearest((r, z)).astype(np.intp)]
         for _ in range(3):
             k = np.clip(np.rint(s / self.step).astype(np.intp), 0, FINE - 1)
             d_r, d_z = r - line.r[k], z - line.z[k]
