@@ -37,7 +37,7 @@ class Projector:
         cell = (max(np.ptp(line.r), np.ptp(line.z)) + 2 * reach) / CELLS
         axes = [np.arange(x.min() - reach, x.max() + reach + cell, cell) for x in (line.r, line.z)]
         tree = scipy.spatial.cKDTree(np.stack([line.r, line.z], axis=1)[::COARSE])
-        nearest = COARSE * tree.query(np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1))[1]
+        nearest = COARSE * np.asarray(tree.query(np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1))[1])
         self.nearest = RegularGridInterpolator(axes, nearest, method="nearest", bounds_error=False, fill_value=0)
         self.step = resonator.length / (FINE - 1)
 
