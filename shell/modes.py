@@ -137,6 +137,9 @@ def solve_modes(
     Warns:
         TheoryRangeWarning: Where the theory is outside its range, or the tolerance is out of reach.
     """
+    if not (isinstance(resonator, Resonator) and isinstance(elastic, Elastic | VaryingElastic)):
+        given = f"{type(resonator).__name__} and {type(elastic).__name__}"
+        raise ShellError(f"give a Resonator, such as hemisphere(...) or a card's .resonator, and an Elastic, such as a material's .elastic(T), not {given}.")  # fmt: skip
     _check_arguments(harmonic, count, theory, tolerance)
     _check_theory(resonator, theory)
     if theory == "rayleigh":

@@ -61,7 +61,7 @@ def calibrate(
 
     Args:
         card: Instrument, path, or name of a card that ships
-        data: records or their paths, and paths of steady-state tables
+        data: records and steady-state tables, or their paths
         hold_out: Number of the record, from 1, that a second calibration without it predicts; the last of several
             unless given.
         exact: Values of the card that stay fixed.
@@ -78,7 +78,7 @@ def calibrate(
     if hold_out is not None and not 1 <= hold_out <= len(records):
         raise InputError(f"hold_out = {hold_out}: there are {len(records)} records, numbered from 1.")
     left = (hold_out or len(records)) - 1 if len(records) > 1 else None
-    settled = [read_settled(str(one)) for one in tables]
+    settled = [read_settled(one) for one in tables]
     return find_values(load_card(card), records, settled, left, exact, progress=progress or (lambda _: None))
 
 
@@ -86,7 +86,7 @@ def diagnose(*runs: Run, card: Card | None = None) -> "Inference | TableDiagnosi
     """Return what a campaign shows and the simulation lacks, with its causes: `hrg diagnose`; `.verdict` is the outcome.
 
     Args:
-        runs: records of one gyro or their paths, or the path of one steady-state table
+        runs: records of one gyro, or one steady-state table; or their paths
         card: Its own simulation is the baseline.
     """
     from studies.diagnosis.table import diagnose_table
@@ -98,7 +98,7 @@ def diagnose(*runs: Run, card: Card | None = None) -> "Inference | TableDiagnosi
     if any(is_table(one) for one in runs):
         if len(runs) > 1:
             raise InputError("a steady-state table is diagnosed alone; leave the other files out.")
-        return diagnose_table(str(runs[0]), instrument)
+        return diagnose_table(runs[0], instrument)
     return diagnose_records([read_record(one) for one in runs], instrument)
 
 
@@ -142,6 +142,6 @@ def _flat(given: Iterable[Any]) -> Iterator[Any]:
 
 
 def is_table(run: Run) -> bool:
-    """Return whether a path is that of a steady-state table (temperature_degC, no time_s)."""
-    names = read_header(run) if isinstance(run, str | Path) else ["time_s"]
+    """Return whether it is a steady-state table (temperature_degC, no time_s)."""
+    names = ["time_s"] if isinstance(run, Record) else read_header(run)
     return "time_s" not in names and "temperature_degC" in names

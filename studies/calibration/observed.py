@@ -13,7 +13,7 @@ from compensation.noise import white_rms
 from compensation.spikes import find_spikes
 from shell.constants import zero_Celsius
 from studies.errors import InputError
-from studies.record import Record, place_in_time, read_frequency_table, reading_resolution
+from studies.record import TABLE_COLUMNS, Record, Run, place_in_time, read_frequency_table, reading_resolution
 from studies.simulation.drive import COLUMN, Drive, bridge_holes, drive_by_record
 
 Rows = NDArray[np.intp]
@@ -154,11 +154,11 @@ class SettledTable:
         return values - own @ (own.T @ values), np.sum(own**2, axis=1)
 
 
-def read_settled(path: str) -> SettledTable:
+def read_settled(table: Run) -> SettledTable:
     """Read a steady-state table (HRG paper, Table 1)."""
-    values = read_frequency_table(path).values
-    f = values["frequency_Hz"]
-    return SettledTable(path, values["temperature_degC"] + zero_Celsius, f, reading_resolution(f))
+    columns = read_frequency_table(table)
+    T, f = (columns.values[name] for name in TABLE_COLUMNS)
+    return SettledTable(columns.path, T + zero_Celsius, f, reading_resolution(f))
 
 
 def observe(

@@ -85,7 +85,8 @@ def _parts(payload: dict[str, Any], split: float, resolved: bool, keys: Electrod
     factor, limit, trim = payload["pull_in_factor"], payload["limit_V"], payload["trim"]
     where = f"{payload['frequency_Hz']:.3f} Hz at {payload['temperature_degC']:g} °C"
     quantities = (
-        ("softening by the card's voltages", payload["softening_ppm"], "ppm"),
+        ("softening by the card's voltages, first order", payload["softening_ppm"], "ppm"),
+        ("its second order, left out everywhere", -0.5e-6 * payload["softening_ppm"] ** 2, "ppm"),
         ("split by the card's voltages", *((1e3 * payload["split_Hz"], "mHz") if resolved else ("none", ""))),
         ("sensitivity to a change of all voltages", payload["per_volt_ppm"], "ppm/V"),
         ("sensitivity to temperature, through the gap", payload["per_kelvin_ppm"], "ppm/K"),

@@ -60,6 +60,7 @@ MISMATCH = (
     "The base has expanded {:.4g} ppm more than the resonator since they were joined. First order in the resulting stress"
     " and deformation. The frequencies above do not include it; those of hrg tcf and of simulations do."
 )
+FIRST_ORDER = "Slow, fast and shift are of first order; the second, δ²/2 of a shift δ, is about {:.2g} ppm."
 BARE = "By stiffness and mass, to first order in the thickness. The frequencies above are those of the bare wall."
 VOIGT = "[001] along the axis. The table above and every other command use the isotropic (Voigt-Reuss-Hill) mean of the elastic constants."
 SLOPES = (
@@ -215,7 +216,8 @@ def _effect_tables(modes: list[Entry]) -> list[Table]:
     of = {key: [row for row in modes if key in row] for key in ("split", "mount", "films", "crystal")}
     strain = next((row["mount"]["strain_ppm"] for row in of["mount"]), 0.0)
     films = [row | film for row in of["films"] for film in row["films"]]
-    antinode = "Slow axis: an antinode of the slower mode."
+    second = 0.5e-6 * max((row["split"]["shift_ppm"] ** 2 for row in of["split"]), default=0.0)
+    antinode = f"Slow axis: an antinode of the slower mode. {FIRST_ORDER.format(second)}"
     return [
         Table("Pairs with imperfections and electrodes", of["split"], SPLIT, antinode),
         Table("Thermal mismatch with the base", of["mount"], MOUNT, MISMATCH.format(strain)),

@@ -24,6 +24,7 @@ from studies.inference.model import Background, Linear
 from studies.inference.polynomial_card import settled_card
 from studies.inference.verdict import shifts_of
 from studies.instrument.card import load_card
+from studies.record import Run
 from studies.resonator.law import law_of
 from studies.results.shown import Shown
 
@@ -86,12 +87,12 @@ class TableDiagnosis(Shown):
         }
 
 
-def diagnose_table(path: str, card: "Instrument | str | None" = None) -> TableDiagnosis:
+def diagnose_table(data: Run, card: "Instrument | str | None" = None) -> TableDiagnosis:
     """Diagnose a steady-state table, of five temperatures or three beside a card, against a card's own simulation or a parabola."""
-    table = read_settled(path)
+    table = read_settled(data)
     if (distinct := np.unique(table.temperature).size) < (FEWEST_POINTS if card is None else FEWEST_BESIDE_CARD):
         given = "one temperature is" if distinct == 1 else f"{distinct} temperatures are"
-        raise InputError(f"{path}: {given} too few for a diagnosis; {words.MORE}")
+        raise InputError(f"{table.path}: {given} too few for a diagnosis; {words.MORE}")
     return judge_table(table, load_card(card) if isinstance(card, str) else card)
 
 

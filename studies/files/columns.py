@@ -181,7 +181,7 @@ def _check_names(
     names = [name.strip() for name in header]
     where = f"{path}, line {header_line}" if header_line else str(path)
     if len(names) == 1 and (";" in names[0] or "\t" in names[0]):
-        raise InputError(f"{where}: the columns are not separated by commas; 'hrg import' reads such files.")
+        raise InputError(f"{where}: the columns are not separated by commas: write commas and decimal points; 'hrg import' does so for a record or a table of settled readings.")  # fmt: skip
     if names[0].startswith(("schema =", "schema=")):
         raise InputError(f"{path}: a TOML file, not a table (CSV); exchange it for the file with the readings.")
     if all(_is_number(name) for name in names):

@@ -8,6 +8,7 @@ from compensation.arrays import Array
 from shell.constants import zero_Celsius
 from studies.errors import InputError
 from studies.files.columns import read_columns, read_header
+from studies.record import refuse_kilohertz
 
 COLUMNS = ("harmonic", "index", "frequency_Hz", "sd_Hz", "temperature_degC")
 USUAL = 1e-6  # relative standard deviation of a frequency where the table states none
@@ -35,7 +36,7 @@ class ModeReadings:
 def is_mode_table(path: str) -> bool:
     """Return whether a file is a table of modes."""
     names = read_header(path)
-    return "time_s" not in names and {"harmonic", "frequency_Hz"} <= set(names)
+    return "time_s" not in names and not {"harmonic", "index", "sd_Hz"}.isdisjoint(names)
 
 
 def read_modes(path: str) -> ModeReadings:
@@ -49,6 +50,7 @@ def read_modes(path: str) -> ModeReadings:
         wrong = ~np.isnan(column) & ((column < 0) | (column != np.round(column)) | (column > most))
         table.refuse(wrong, f"{name} must be a whole number from 0 to {most}, or empty where it is not known.")
     table.refuse(~(f > 0), "frequency_Hz must be a positive number.")
+    refuse_kilohertz(table)
     table.refuse(~np.isnan(sd) & ~(sd > 0), "sd_Hz must be positive, or empty.")
     named = [(a, b, c) for a, b, c in zip(n, k, T, strict=True) if not np.isnan(a) and not np.isnan(b)]
     if len({tuple(map(repr, one)) for one in named}) < len(named):

@@ -189,17 +189,25 @@ def place_of_largest(path: str, name: str) -> str:
     return table.place(int(np.nanargmax(np.abs(table.values[name]))))
 
 
-def read_frequency_table(path: str | Path) -> Columns:
+def read_frequency_table(path: Run) -> Columns:
     """Read a steady-state table `temperature_degC,frequency_Hz` (HRG paper, Table 1); no value may be missing."""
+    if isinstance(path, Record):
+        raise InputError(f"{path.path}: this is a record, but a table of settled points is needed.")
     table = read_columns(path, TABLE_COLUMNS, required=TABLE_COLUMNS)
     table.require(TABLE_COLUMNS, "a steady-state table")
     check_plausible(table.values, table.place)
     f = table.values["frequency_Hz"]
     usual = float(np.median(f))
-    table.refuse(f < LOWEST, lambda row: f"frequency_Hz = {f[row]:g} looks like kHz; multiply the column by 1000.")
+    refuse_kilohertz(table)
     far = f"is far from the others (median {usual:.6g} Hz); correct or remove the line."
     table.refuse(np.abs(np.log(f / usual)) > FAR, lambda row: f"frequency_Hz = {f[row]:g} {far}")
     return table
+
+
+def refuse_kilohertz(table: Columns) -> None:
+    """Refuse a resonator's frequencies that are too low for hertz."""
+    f = table.values["frequency_Hz"]
+    table.refuse(f < LOWEST, lambda row: f"frequency_Hz = {f[row]:g} looks like kHz; multiply the column by 1000.")
 
 
 def reading_resolution(values: Array) -> float:

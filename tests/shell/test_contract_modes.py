@@ -8,6 +8,7 @@ import pytest
 
 from shell.elastic import Elastic, VaryingElastic
 from shell.errors import ShellError
+from shell.materials import find_material
 from shell.meridian import cylinder, hemisphere
 from shell.modes import TheoryRangeWarning, solve_modes
 from shell.resonator import Resonator, Stem
@@ -110,11 +111,13 @@ def test_a_tolerance_out_of_reach_is_said() -> None:
         ({"count": 0}, "at least one mode"),
         ({"theory": "beam"}, "solid, shell, rayleigh"),
         ({"tolerance": 0.0}, "tolerance"),
+        ({"resonator": "hrg-30mm"}, "give a Resonator, .* not str and Elastic"),
+        ({"elastic": find_material("fused-silica")}, "a material's .elastic"),
     ],
 )
 def test_arguments_that_make_no_sense(options: dict[str, object], message: str) -> None:
     with pytest.raises(ShellError, match=message):
-        solve_modes(DOME, SILICA, **options)  # type: ignore[arg-type]
+        solve_modes(**{"resonator": DOME, "elastic": SILICA} | options)  # type: ignore[arg-type]
 
 
 def test_rayleigh_only_where_its_closed_form_holds() -> None:

@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import compensation
@@ -18,7 +19,8 @@ import studies
 import studies.papers
 import thermal
 from studies.cli import main
-from studies.record import read_record
+from studies.files.columns import read_columns
+from studies.record import TABLE_COLUMNS, read_record
 
 PACKAGES = {
     "shell": shell,
@@ -147,7 +149,8 @@ def test_records_show_themselves_shortly_and_as_tables_and_pictures():
 def test_results_show_themselves_shortly_and_as_tables(tmp_path):
     table = str(Path(studies.papers.__file__).parent / "hrg_table1.csv")
     comparison = studies.compare(["free-dome", "hrg-30mm"])
-    calibration = studies.calibrate("hrg-30mm", [table])
+    readings = read_columns(table, TABLE_COLUMNS).values  # of pandas, as of a path
+    calibration = studies.calibrate("hrg-30mm", pd.DataFrame(readings))
     spec = {"schema": "hrg.study/1", "name": "s", "card": "free-dome", "sampling": {"method": "grid"}}
     spec |= {
         "parameter": [{"name": "resonator.radius_mm", "values": [15.0]}],
@@ -159,7 +162,7 @@ def test_results_show_themselves_shortly_and_as_tables(tmp_path):
     shown = (
         (comparison, "Comparison(free-dome, hrg-30mm:"),
         (calibration, "Calibration(hrg-30mm: "),
-        (studies.diagnose([table]), "TableDiagnosis(not-identifiable: "),
+        (studies.diagnose(pd.DataFrame(readings)), "TableDiagnosis(not-identifiable: "),
         (study, "Results(s: 1 of 1 cases, 0 failed)"),
     )
     for one, begins in shown:

@@ -186,6 +186,28 @@ def test_even_voltages_make_no_split_and_rounding_is_not_trimmed(tmp_path, capsy
     assert "Trim voltages" not in out
 
 
+def test_what_the_first_order_of_a_large_softening_leaves_out_is_said(tmp_path, capsys):
+    """A negative spring κ m ω² on a thin ring, of modal mass 5/8 of its own at n = 2, lowers f to f √(1 − κ): by δ − δ²/2, δ = −κ/2."""
+    path = tmp_path / "card.toml"
+    ring = 'shape = "cylinder"\nradius_mm = 20.0\nthickness_mm = 0.4\nheight_mm = 2.0\n'
+    given = "youngs_modulus_GPa = 70.0\npoisson_ratio = 0.0\ndensity_kg_m3 = 2500.0\n"
+    gap = "gap_um = 50.0\nfirst = 0.0\nvoltage_V = 100.0\n"
+    path.write_text(
+        f'schema = "hrg.card/1"\nname = "x"\n[resonator]\n{ring}[material]\nname = "mine"\n{given}[electrodes]\n{gap}'
+    )
+    E, rho, h, r, length = 70e9, 2500.0, 0.4e-3, 20e-3, 2e-3
+    omega = np.sqrt(36 / 5 * E * h**2 / (12 * rho)) / r**2
+    spring = 8.8541878e-12 * 100.0**2 / 50e-6**3 * 0.8 * np.pi * (r - h / 2) * length
+    lowered = np.sqrt(1 - spring / (0.625 * 2 * np.pi * r * h * length * rho) / omega**2) - 1
+    assert main(["electrodes", str(path)]) == 0
+    out = capsys.readouterr().out
+    first, second = (float(re.search(rf"{words} *│ *(-[\d.]+)", out)[1]) for words in ("first order", "everywhere"))
+    assert first + second == pytest.approx(1e6 * lowered, rel=4e-4)
+    assert abs(first - 1e6 * lowered) > 50.0
+    assert main(["modes", str(path)]) == 0
+    assert f"about {-second:.2g} ppm" in " ".join(capsys.readouterr().out.split())
+
+
 def test_commands_refuse_a_voltage_beyond_pull_in_and_a_map_with_holes(tmp_path, refuse):
     loaded(tmp_path, "[electrodes]\ngap_um = 10.0\nvoltage_V = 2000.0\n")
     for command in ("electrodes", "modes"):

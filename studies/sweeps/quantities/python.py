@@ -10,7 +10,13 @@ from studies.sweeps.quantity import Column, Number, Quantity
 class Python(Quantity, frozen=True, kw_only=True, tag="python"):
     """A user's own function (instrument, parameters) -> number; needs --allow-python."""
 
-    function: Annotated[str, says('"package.module:name" or "file.py:name" beside the spec', example="mine.py:area")]
+    function: Annotated[
+        str,
+        says(
+            '"package.module:name" or "file.py:name" beside the spec: (instrument, {name of parameter: value}) -> number',
+            example="mine.py:area",
+        ),
+    ]
     unit: Annotated[str, says("of the value that it returns")] = "1"
     time_limit_s: Annotated[float, number("time limit of one design", above=0.0)] = 30.0
 

@@ -76,6 +76,7 @@ def test_limits_derivatives_by_modulus_and_density_are_exact():
         ("2,-1", ["line 2", "frequency_Hz", "positive"]),
         ("2,", ["line 2", "frequency_Hz"]),
         ("25,9000", ["line 2", "0 to 20"]),
+        ("2,4.6997\n3,12.159", ["line 2", "looks like kHz"]),
     ],
 )
 def test_contract_a_bad_row_is_named(tmp_path, rows, words):
@@ -85,6 +86,12 @@ def test_contract_a_bad_row_is_named(tmp_path, rows, words):
         read_modes(str(path))
     for word in [str(path), *words]:
         assert word in str(caught.value)
+
+
+def test_contract_a_table_without_its_harmonics_is_told_so(tmp_path, refuse):
+    path = tmp_path / "modes.csv"
+    path.write_text("frequency_Hz,sd_Hz\n4500,0.5\n")
+    assert "the column 'harmonic' is missing" in refuse(["calibrate", str(CARD[0]), str(path)])
 
 
 def test_contract_a_mode_stands_once_and_alone(tmp_path, refuse):
