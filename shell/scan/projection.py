@@ -4,7 +4,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy
-from scipy.interpolate import RegularGridInterpolator
 
 from shell.errors import ShellError
 from shell.quadrature import Array
@@ -38,7 +37,9 @@ class Projector:
         axes = [np.arange(x.min() - reach, x.max() + reach + cell, cell) for x in (line.r, line.z)]
         tree = scipy.spatial.cKDTree(np.stack([line.r, line.z], axis=1)[::COARSE])
         nearest = COARSE * np.asarray(tree.query(np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1))[1])
-        self.nearest = RegularGridInterpolator(axes, nearest, method="nearest", bounds_error=False, fill_value=0)
+        self.nearest = scipy.interpolate.RegularGridInterpolator(
+            axes, nearest, method="nearest", bounds_error=False, fill_value=0
+        )
         self.step = resonator.length / (FINE - 1)
 
     def place(self, points: Array) -> Places:
