@@ -79,7 +79,8 @@ def run(
     if out is None or dry_run:
         estimate = estimate_study(study, workers)
         payload = {"schema": "hrg.study-estimate/1", **vars(estimate)}
-        told = Result(payload, f"Estimate of {study.name}", "", [_estimate_words(estimate)])
+        fails = f"The nominal design fails: {estimate.nominal_fails}" if estimate.nominal_fails else None
+        told = Result(payload, f"Estimate of {study.name}", "", [_estimate_words(estimate), fails])
         _write_page(told, report)
         return told
     with resumable(out, "cases"):

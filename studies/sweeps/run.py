@@ -84,7 +84,10 @@ def run_study(
 
 @dataclass(frozen=True)
 class Effort:
-    """What a study would take: seconds of one design and of all, memory in MB, how they are solved, `why_full` without interpolation."""
+    """What a study would take: seconds of one design and of all, memory in MB, how they are solved, `why_full` without interpolation.
+
+    `nominal_fails` says why the nominal design fails, "" where it does not.
+    """
 
     cases: int
     batches: int
@@ -93,6 +96,7 @@ class Effort:
     memory_MB: float
     solver: str
     why_full: str = ""
+    nominal_fails: str = ""
 
 
 def estimate_study(study: Study, workers: int | None = None) -> Effort:
@@ -110,7 +114,7 @@ def estimate_study(study: Study, workers: int | None = None) -> Effort:
         count, size, trials = 1, BATCH_VECTORISED, 1000
     training = time.perf_counter() - began if families else 0.0
     began = time.perf_counter()
-    evaluate_task(plan, [_nominal(study, trials)])
+    (tried,) = evaluate_task(plan, [_nominal(study, trials)])
     each = (time.perf_counter() - began) / trials + STORE_SECONDS
     cases = len(design)
     resident = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
@@ -120,6 +124,7 @@ def estimate_study(study: Study, workers: int | None = None) -> Effort:
         cases=cases, batches=-(-cases // (study.sampling.batch or size)), seconds_each=each,
         seconds=training + each * cases / count, memory_MB=resident * processes + row * cases / 1e6,
         solver="family" if families else "full", why_full="" if families else why_not(study),
+        nominal_fails=next((remark.text for remark in tried.remarks if remark.status != "ok"), ""),
     )  # fmt: skip
 
 

@@ -171,6 +171,20 @@ def test_dry_run_knows_the_solver(spec):
     assert estimate.seconds_each < 0.01
 
 
+def test_dry_run_says_why_every_design_would_fail():
+    parameter = {"name": "resonator.radius_mm", "values": [15.0]}
+    spec = {
+        "schema": "hrg.study/1",
+        "name": "x",
+        "card": "free-dome",
+        "sampling": {"method": "grid"},
+        "parameter": [parameter],
+    }
+    assert estimate_study(read_study({**spec, "quantity": [{"name": "mass"}]})).nominal_fails == ""
+    estimate = estimate_study(read_study({**spec, "quantity": [{"name": "mass"}, {"name": "loads"}]}))
+    assert estimate.nominal_fails.startswith("loads: a free resonator")
+
+
 def test_running_again_resumes_and_computes_nothing(spec, results, tmp_path, monkeypatch):
     """The ranges of a family belong to the identity of a study, and are the same when they are read back."""
     run_study(spec, tmp_path)
