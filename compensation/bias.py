@@ -5,6 +5,8 @@ B = B₀ + k₁ f + k₂ f² + k₃ f³ + k₄ ḟ + k₅ ḟ² + k₆ ḟ³ + k
 lag, and the `play` d = p − T of a backlash p (`compensation.memory`) brings d, f d and d²: a parabola of p has all three.
 """
 
+from __future__ import annotations
+
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -71,7 +73,7 @@ class BiasRun:
     variable: Variable = FREQUENCY
     memory: Memory = field(default=NO_MEMORY)
 
-    def part(self, rows: slice) -> "BiasRun":
+    def part(self, rows: slice) -> BiasRun:
         """Return some consecutive rows as a run of its own."""
         cut = {name: getattr(self, name)[rows] for name in ("time", "state", "rate", "play", "bias")}
         return replace(self, **cut)

@@ -5,6 +5,8 @@ thermometer, so the inverse matters as much as the fit: it is refused where the 
 where nothing was measured. Temperatures here are in °C, as the names say; frequencies in Hz.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise

@@ -1,5 +1,7 @@
 """Kalman filter of a sampled linear system (x, P, F, C, Q, R as usual), and the model of a gyro by the CVG paper on optimal filtering."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 
 import numpy as np

@@ -5,6 +5,8 @@ and rate random walk K, IEEE Std 952. With the output in °/h and τ in s, N is 
 K in °/h/√s (multiply by 60 for °/h/√h). Equivalent degrees of freedom after Riley, NIST SP 1065, section 5.4.1.
 """
 
+from __future__ import annotations
+
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -40,7 +40,7 @@ class TheoryRangeWarning(UserWarning):
 
 @dataclass(frozen=True)
 class Mode:
-    """A mode of vibration."""
+    """A mode of vibration: its frequency (Hz), that frequency's error against the exact solution of its theory, and its Bryan factor."""
 
     harmonic: int  # n, the number of waves around
     index: int  # 0 for the lowest mode of its harmonic

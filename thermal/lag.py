@@ -1,5 +1,7 @@
 """First-order lags, exact for drives that are linear between their rows."""
 
+from __future__ import annotations
+
 import numpy as np
 import scipy
 from numpy.typing import ArrayLike

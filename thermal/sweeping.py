@@ -9,6 +9,8 @@ is a parabola between knots at most 60 s apart (its mean by Simpson's rule). Eac
 the relative change of T³; the error is of fourth order in the distance of the knots.
 """
 
+from __future__ import annotations
+
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property

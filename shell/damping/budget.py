@@ -1,5 +1,7 @@
 """The loss budget of a mode: 1/Q over temperature as a sum of parts, each with source and interval."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
