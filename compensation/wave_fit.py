@@ -235,10 +235,20 @@ def _modulated(
     for name in [name for name in terms if name in columns]:
         X, mean = np.stack([*terms[name], *leaks], axis=1), columns[name].mean()
         names = [*("first", "second", "mean", "drift")[: len(terms[name])], *LEAKS[: len(leaks)]]
-        fit = fit_coloured(X, columns[name][:-1] - mean, names, [slice(0, len(X))]).regression
+        coloured = fit_coloured(X, columns[name][:-1] - mean, names, [slice(0, len(X))])
+        fit = coloured.regression
         b, covariance = fit.coefficients, fit.covariance + (leaked if name != "decay" else 0.0) * np.eye(X.shape[1])
+        covariance[:2, :2] += (2 * _rounding(columns[name], coloured.residuals, np.hypot(*b[:2]) / 2)) ** 2 * np.eye(2)
         found[name] = (b[:2], covariance[:2, :2]), (float(mean + b[2]), float(np.sqrt(covariance[2, 2])))
     return found
+
+
+def _rounding(values: Array, residuals: Array, amplitude: float) -> float:
+    """Return the deviation that rounding to steps r gives the amplitude A of a wave: (2 r/π) J₁(2πA/r) exp(−2π² σ²/r²), σ the noise before it."""
+    r = float(np.median(np.diff(np.unique(values))))
+    noise = max(float(np.var(residuals)) - r**2 / 12, 0.0)
+    bessel = min(1 / np.sqrt(np.pi * (2 * np.pi * amplitude / r)), 0.582)  # rms over phases, at most the largest of J₁
+    return float(2 * r / np.pi * bessel * np.exp(-2 * (np.pi / r) ** 2 * noise))
 
 
 def _turned(

@@ -104,6 +104,34 @@ def test_a_column_too_coarse_to_vary_tells_nothing(uneven, column, lost):
     assert any(lost in sentence for sentence in coarse.undetermined)
 
 
+@pytest.mark.slow
+def test_rounding_that_noise_does_not_blur_widens_the_intervals():
+    """Steps r of a counter move the amplitude A of a wave by (2 r/π) J₁(2πA/r) exp(−2π² σ²/r²), here by 2 to 20 of the fit's errors."""
+    time = np.arange(0.0, 36000.0, 20.0)
+    angle = np.radians(0.02) * np.minimum(time, 36000.0 - time)
+    off = []
+    for seed in range(12):
+        rng = np.random.default_rng(seed)
+        step, amplitude, sigma = 1e-3, rng.uniform(0.7, 3.0), rng.choice([0.1, 0.2, 0.3])
+        f = (
+            4432.0
+            + rng.uniform(0, step)
+            + step * amplitude * np.cos(4 * angle - seed)
+            + sigma * step * rng.standard_normal(time.size)
+        )
+        fit = fit_whole_angle(
+            time,
+            angle,
+            1e-9 * rng.standard_normal(time.size),
+            coupling=0.55,
+            frequency=2 * np.pi * step * np.round(f / step),
+        )
+        found = fit.estimates["frequency_split"]
+        off.append((found.value - 4 * np.pi * step * amplitude) / (found.high - found.value))
+    assert np.max(np.abs(off)) < 1.6
+    assert np.sqrt(np.mean(np.square(off))) > 0.2  # nor are they much too wide: half of the errors of a normal one
+
+
 @pytest.mark.parametrize(
     ("column", "factor", "found"),
     [
