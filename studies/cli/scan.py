@@ -54,7 +54,7 @@ def scan(
 ) -> Result:
     """Compute wall maps, circumferential harmonics and frequency splits, with intervals, from measured faces of a shell.
 
-    Points are x y z text (comments after #), .ply or .stl; or a table over position and azimuth: first line
+    Points are x y z text (comments after #), .ply, .stl or .obj; or a table over position and azimuth: first line
     "position,0,5,10,…" with azimuths in degrees, then a line per position (0 ... 1 along the meridian) with the deviation of
     the face in µm, positive away from the material. Faces are aligned with the card's resonator; gaps and outliers are
     allowed. Eccentricity of the two spheres is part of the wall only if both share one frame (--frames common).

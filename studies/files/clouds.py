@@ -1,9 +1,10 @@
 """Measured points of a surface: x y z text, PLY or STL, or a table of deviations over position and azimuth."""
 
 import logging
+import re
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from studies.files.reading import check_file
 
 UNITS = {"m": 1.0, "mm": 1e-3, "um": 1e-6}
 Unit = Literal["m", "mm", "um"]
-MESHES = (".ply", ".stl")
+MESHES = (".ply", ".stl", ".obj")
 PORTION = 1_000_000  # lines at a time
 GRID = "position"  # the first cell of a table
 
@@ -35,33 +36,45 @@ def read_cloud(path: str | Path, unit: Unit = "mm") -> Array | FaceGrid:
     first, skipped = _first_line(file)
     if first.lower().startswith(GRID):
         return _read_grid(file, skipped)
-    return _read_text(file, first) * UNITS[unit]
+    if not any(sign.isdigit() for sign in first):  # names of the columns
+        first, skipped = _first_line(file, skipped + 1)
+    return _read_text(file, first, skipped) * UNITS[unit]
 
 
-def _first_line(path: Path) -> tuple[str, int]:
+def _first_line(path: Path, begin: int = 0) -> tuple[str, int]:
     try:
         with path.open(encoding="utf-8-sig") as lines:
             for number, line in enumerate(lines):
-                if line.strip() and not line.lstrip().startswith("#"):
+                if number >= begin and line.strip() and not line.lstrip().startswith("#"):
                     return line.strip(), number
     except UnicodeDecodeError:
-        raise InputError(f"{path}: not UTF-8 text; points must be x y z text, .ply, .stl or a table.") from None
+        raise InputError(f"{path}: not UTF-8 text; points must be x y z text, .ply, .stl, .obj or a table.") from None
     raise InputError(f"{path}: has no points.")
 
 
-def _read_text(path: Path, first: str) -> Array:
+def _read_text(path: Path, first: str, skipped: int) -> Array:
     import pandas as pd
 
-    separator = next((mark for mark in (";", ",") if mark in first), r"\s+")
+    spaced = len(first.split()) >= 3 and not re.search(r",\s|\s,", first)
+    separator = ";" if ";" in first else r"\s+" if spaced else ","
+    form: dict[str, Any] = {"sep": separator, "decimal": "." if separator == "," else "," if "," in first else "."}
     kept = []
     try:
         for part in pd.read_csv(
-            path, sep=separator, header=None, comment="#", usecols=[0, 1, 2], dtype=float, chunksize=PORTION, engine="c"
+            path,
+            **form,
+            skiprows=skipped,
+            header=None,
+            comment="#",
+            usecols=[0, 1, 2],
+            dtype=float,
+            chunksize=PORTION,
+            engine="c",
         ):
             values = part.to_numpy()
             kept.append(values[np.isfinite(values).all(axis=1)])
     except (ValueError, pd.errors.ParserError):
-        raise InputError(f"{path}: is not a table of x y z: each line needs three numbers with decimal points; comments start with #.") from None  # fmt: skip
+        raise InputError(f"{path}: is not a table of x y z: below the names of its columns each line needs three numbers; comments start with #.") from None  # fmt: skip
     points = np.concatenate(kept)
     if not len(points):
         raise InputError(f"{path}: has no points.")

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from studies.cli import main
+from studies.files.clouds import read_cloud
 from tests.shell.scans import dome_points
 
 OUTER = [(4, 0.4e-6, 0.4, 4), (2, 3e-6, 0.3, 2), (3, 1e-6, 0.1, 3)]
@@ -141,6 +142,24 @@ def test_a_known_imbalance_is_said_before_and_after_the_cuts(capsys):
     assert azimuth == pytest.approx(10, abs=1)
     assert main([*words[:-1], "2:50000@10"]) == 0
     assert "These cuts can take no more" in " ".join(capsys.readouterr().out.split())
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("a.asc", "# mm\n1.5 0.25 3\n-1 2e-3 4.0\n"),
+        ("a.txt", "1.5, 0.25, 3\n-1, 2e-3, 4.0\n"),
+        ("a.csv", "X [mm],Y [mm],Z [mm]\n1.5,0.25,3\n-1,2e-3,4.0\n"),
+        ("a.xyz", "# CMM\nX;Y;Z\n1,5;0,25;3,0\n-1;2e-3;4,0\n"),
+        ("a.dat", "1,5\t0,25\t3\n-1\t2e-3\t4,0\n"),
+        ("a.obj", "v 1.5 0.25 3\nv -1 2e-3 4\nv 0 0 0\nf 1 2 3\n"),
+    ],
+)
+def test_points_are_read_as_measuring_machines_write_them(tmp_path, name, text):
+    (tmp_path / name).write_text(text)
+    points = read_cloud(tmp_path / name)
+    for point in ((1.5e-3, 0.25e-3, 3e-3), (-1e-3, 2e-6, 4e-3)):
+        assert np.min(np.max(abs(points - point), axis=1)) < 1e-15
 
 
 def test_trim_refuses_what_is_no_scan(tmp_path, refuse):
