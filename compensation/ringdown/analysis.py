@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -106,12 +107,13 @@ def _check_decays(fit: DecayFit) -> None:
         )
 
 
-def _derive(decay: Decay, fit: DecayFit, harmonic: int) -> dict[str, float]:
+def _derive(decay: Decay, fit: DecayFit, harmonic: int) -> dict[str, Any]:
+    """Return the values of a decay, or those of draws as arrays."""
     carrier = fit.envelope.carrier
     rates = decay.rates
     frequencies = carrier + rates.imag / (2 * np.pi)
     mean = carrier + decay.detuning / (2 * np.pi)
-    found = {"frequency_Hz": mean, "decay_time_s": 1 / decay.decay}
+    found: dict[str, Any] = {"frequency_Hz": mean, "decay_time_s": 1 / decay.decay}
     if carrier > 0:
         found["inverse_q"] = decay.decay / (np.pi * mean)
     if not fit.one_mode:
@@ -120,7 +122,7 @@ def _derive(decay: Decay, fit: DecayFit, harmonic: int) -> dict[str, float]:
             found |= {
                 f"q_{k}": -np.pi * f / rate.real for k, (f, rate) in enumerate(zip(frequencies, rates, strict=True), 1)
             }
-        W, C = complex(decay.stiffness_cos, decay.stiffness_sin), complex(decay.damping_cos, decay.damping_sin)
+        W, C = decay.stiffness_cos + 1j * decay.stiffness_sin, decay.damping_cos + 1j * decay.damping_sin
         if fit.summed:
             found["split_Hz"] = frequencies[0] - frequencies[1]
         else:
@@ -141,10 +143,10 @@ def _derive(decay: Decay, fit: DecayFit, harmonic: int) -> dict[str, float]:
 def _estimate(fit: DecayFit, harmonic: int) -> dict[str, Estimate]:
     """Return every derived value with its interval, from draws; axes are cut where they are farthest from the value."""
     best = _derive(fit.decay, fit, harmonic)
-    draws = [_derive(one, fit, harmonic) for one in fit.draw(DRAWS, np.random.default_rng(0))]
+    draws = _derive(fit.draw(DRAWS, np.random.default_rng(0)), fit, harmonic)
     found = {}
     for name, value in best.items():
-        away = np.array([one[name] for one in draws]) - value
+        away = draws[name] - value
         if name.endswith("axis_deg"):
             period = 180 / harmonic
             value %= period

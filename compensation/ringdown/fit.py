@@ -10,6 +10,7 @@ rates (frequencies, Q, axes) gets its interval from draws of that normal distrib
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import scipy
@@ -88,11 +89,11 @@ class DecayFit:
         k = self.names.index(name)
         return float(np.sqrt(self.covariance[k, k]))
 
-    def draw(self, count: int, generator: np.random.Generator) -> list[Decay]:
-        """Draws of the rates from their normal distribution."""
+    def draw(self, count: int, generator: np.random.Generator) -> Decay:
+        """Draws of the rates from their normal distribution, each rate an array of them."""
         mean = self.decay.vector(self.names)
-        draws = generator.multivariate_normal(mean, self.covariance, count, method="eigh")
-        return [Decay(**dict(zip(self.names, map(float, one), strict=True))) for one in draws]
+        draws: Any = generator.multivariate_normal(mean, self.covariance, count, method="eigh").T
+        return Decay(**dict(zip(self.names, draws, strict=True)))
 
 
 def fit_decay(envelope: Envelope, terms: Terms = Terms(), starts: Sequence[Guess] = ()) -> DecayFit:

@@ -21,7 +21,7 @@ from compensation.arrays import Array, Complex
 
 @dataclass(frozen=True)
 class Decay:
-    """The rates of a free decay, all in 1/s (rad/s), about a carrier."""
+    """The rates of a free decay, all in 1/s (rad/s), about a carrier; those of draws are arrays."""
 
     detuning: float  # detuning, decay: δ and 1/τ
     decay: float
@@ -37,7 +37,7 @@ class Decay:
     @property
     def mean(self) -> complex:
         """Half the trace of M."""
-        return complex(-self.decay, self.detuning)
+        return -self.decay + 1j * self.detuning
 
     @property
     def matrix(self) -> Complex:
@@ -48,11 +48,11 @@ class Decay:
 
     @property
     def rates(self) -> Complex:
-        """The two eigenvalues of M, the higher frequency first."""
-        a, b = self.matrix[0]
+        """The two eigenvalues of M, the higher frequency first; of draws a row of them each."""
+        a, b = -self.damping_cos + 1j * self.stiffness_cos, -self.damping_sin + 1j * self.stiffness_sin
         s = np.sqrt(a * a + b * b)
-        found = np.array([self.mean + s, self.mean - s])
-        return found if found[0].imag >= found[1].imag else found[::-1]
+        s = np.where(s.imag < 0, -s, s)
+        return np.array([self.mean + s, self.mean - s])
 
     def vector(self, names: tuple[str, ...]) -> Array:
         """The named rates as an array."""

@@ -117,18 +117,18 @@ def test_a_mass_that_the_card_lacks_is_no_other_value(shipped):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [0, 1])
-def test_a_dip_is_one_cause_in_frequency_and_loss(seed, shipped, only):
+@pytest.mark.usefixtures("coarser")
+def test_a_dip_is_one_cause_in_frequency_and_loss(shipped, only):
     """In drawn devices a dip of 1/Q far above its noise spared ever more rows of 1/Q once that of the frequency was left out, which then seemed idle.
 
-    So it was in six of six; with these two, three or four of the six are right.
+    So it was in six of six; with this one, three or four of the six are right.
     """
     only("activity-dip", "loss-peak", "jump", "hysteresis")
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(0)
     drawn = {one.name: one.draw(rng) for one in shipped.uncertain if one.name.startswith(("thermal.", "material."))}
     dip = {"name": "activity-dip", "temperature_degC": 14.0, "width_K": 0.7}
     dips = [{**dip, "response": "frequency_Hz", "pull_Hz": 0.0126}, {**dip, "response": "inverse_q", "pull_1": 1e-6}]
-    runs = simulated(shipped.with_values(drawn).with_table("effect", dips), *WAYS, seed=10 * seed)
+    runs = simulated(shipped.with_values(drawn).with_table("effect", dips), *WAYS)
     left_out = {"bias_deg_per_h", "quadrature_V", "chamber_temperature_degC"}
     runs = [replace(run, columns={k: v for k, v in run.columns.items() if k not in left_out}) for run in runs]
     verdict = diagnose_records(runs, shipped).verdict
