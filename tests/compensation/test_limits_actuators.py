@@ -1,4 +1,4 @@
-"""Limits of the actuators, and quadrature nulled by a stiffness: against closed forms and against the carrier, every cycle of it."""
+"""Limits of the actuators, and quadrature nulled by a stiffness: against closed forms and, saturated, against the carrier."""
 
 from dataclasses import replace
 
@@ -13,13 +13,7 @@ from compensation.rebalance import settle_rebalance, simulate_rebalance
 from compensation.wave import from_quality
 from compensation.whole_angle import simulate_whole_angle
 from tests.compensation.carrier import simulate_carrier
-
-DEG_PER_H = np.degrees(1.0) * 3600
-ERRORS = Electronics(Channels(0.01, 0.002, 0.003, 0.001, 0.01), Channels(-0.02, 0.001, 0.002, 0.0005, 0.02))
-STIFF = Actuators(quadrature="stiffness")
-FREQUENCY = 4432.07
-SAMPLE = 8 / FREQUENCY
-FAST = Loops(8.0, 15.0, 15.0, 10.0, sampling=1 / SAMPLE, delay=SAMPLE, demodulator=100.0)
+from tests.compensation.test_limits_loops import ERRORS, FAST, FREQUENCY, SAMPLE
 
 
 def test_rate_and_quadrature_share_one_force():
@@ -116,53 +110,6 @@ def test_quadrature_nulled_by_a_stiffness_leaks_no_rate():
     angle = 0.2
     forced = settle_rebalance(wave, phases, 0.0, angle)
     assert forced.rate[0] == pytest.approx(-5e-3 * wave.quadrature(angle) / wave.coupling, rel=1e-3)
-    nulled = settle_rebalance(wave, replace(phases, actuators=STIFF), 0.0, angle)
+    nulled = settle_rebalance(wave, replace(phases, actuators=Actuators(quadrature="stiffness")), 0.0, angle)
     assert abs(nulled.rate[0]) < 1e-12 * abs(forced.rate[0])
     assert nulled.quadrature[0] == pytest.approx(wave.quadrature(angle), rel=1e-12)
-
-
-def test_settled_stiffness_is_where_the_simulation_comes_to_rest():
-    wave = from_quality(
-        4432.0, 1e5, damping_anisotropy=0.02, damping_axis=0.3, frequency_split=0.01, frequency_axis=0.2
-    )
-    electronics = replace(ERRORS, actuators=STIFF)
-    run = simulate_rebalance(wave, electronics, Loops(), np.arange(0.0, 40.0), rate=1e-3, angle=0.3)
-    settled = settle_rebalance(wave, electronics, 1e-3, 0.3)
-    for name in ("rate", "quadrature", "decay"):
-        assert getattr(run, name)[-1] == pytest.approx(getattr(settled, name)[0], rel=1e-6)
-
-
-def test_stiffness_against_the_carrier():
-    """The spring K_c x that couples the two patterns acts in every cycle; all errors at once, a step of rate."""
-    wave = from_quality(
-        FREQUENCY, 1e3, damping_anisotropy=0.01, damping_axis=0.1, frequency_split=0.5, frequency_axis=0.4
-    )
-    electronics = replace(ERRORS, actuators=STIFF)
-    true = simulate_carrier(wave, electronics, FAST, 1.6, rate=0.5, rate_from=0.8, angle=0.2)
-    time = SAMPLE * np.arange(len(true.time))
-    applied = np.where(time >= 0.8 - 1e-12, 0.5, 0.0)
-    averaged = simulate_rebalance(wave, electronics, replace(FAST, delay=1.5 * SAMPLE), time, rate=applied, angle=0.2)
-    for row in (int(0.75 / SAMPLE), len(time) - 1):
-        assert averaged.rate[row] == pytest.approx(true.rate[row], abs=2e-3)
-        assert averaged.quadrature[row] == pytest.approx(true.quadrature[row], rel=3e-3)
-        assert averaged.decay[row] == pytest.approx(true.decay[row], rel=2e-3)
-
-
-@pytest.mark.slow
-def test_a_free_wave_with_stiffness_against_the_carrier():
-    wave = from_quality(
-        FREQUENCY, 1e3, damping_anisotropy=0.02, damping_axis=0.1, frequency_split=0.3, frequency_axis=0.4
-    )
-    electronics = replace(ERRORS, actuators=STIFF)
-    loops = Loops(15.0, 15.0, 15.0, 15.0, sampling=1 / SAMPLE, delay=SAMPLE, demodulator=100.0)
-    true = simulate_carrier(wave, electronics, loops, 3.0, rate=0.3, angle=0.2, precession=0.5)
-    time = 4 * SAMPLE * np.arange(len(true.time) // 4)
-    averaged = simulate_whole_angle(
-        wave, electronics, replace(loops, delay=1.5 * SAMPLE), time, rate=0.3, angle=0.2, precession=0.5
-    )
-    ideal = 0.2 + (0.5 + 0.3 * wave.bryan_factor) * time
-    late = time > 0.5
-    carrier = np.interp(time, true.time - SAMPLE / 2, true.angle)
-    assert np.ptp((averaged.angle - carrier)[late]) < 0.02 * np.ptp((carrier - ideal)[late])
-    said, seen = averaged.quadrature[late], np.interp(time, true.time, true.quadrature)[late]
-    assert np.max(np.abs(said - seen)) < 0.02 * np.ptp(seen)

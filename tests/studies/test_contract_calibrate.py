@@ -3,24 +3,11 @@
 import json
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from studies.calibration.observed import UNITS
 from studies.cli import main
-from studies.instrument.card import load_card
-from studies.record import write_record
 from studies.reports.calibration import NAMES, SHOWN
-from studies.simulation.chamber import load_profile
-from studies.simulation.virtual_gyro import simulate_run
-
-
-@pytest.fixture(scope="module")
-def run(tmp_path_factory):
-    path = tmp_path_factory.mktemp("calibrate") / "run<1>.csv"
-    true = load_card("hrg-30mm").with_values({"loss.inverse_q": 2e-7, "thermal.chamber_conductance_W_per_K": 0.2})
-    write_record(simulate_run(true, load_profile("ramp 20 0 0.5 then soak 0 1h"), 1 / 60).record, path)
-    return path
 
 
 @pytest.mark.slow
@@ -57,13 +44,12 @@ def test_tables_are_for_people(tmp_path, capsys, ask):
 
 
 @pytest.mark.slow
-def test_a_saved_card_keeps_what_was_found_of_intervals(tmp_path, capsys, refuse):
+def test_a_saved_card_keeps_what_was_found_of_intervals(tmp_path, capsys, ask, refuse):
     """They need not be symmetric about the value, as value ± sd is."""
     card = tmp_path / "calibrated.toml"
-    assert main(["calibrate", "hrg-30mm", "studies/papers/hrg_table1.csv", "--save", str(card), "--json"]) == 0
-    told = {one["parameter"]: one for one in json.loads(capsys.readouterr().out)["values"]}
-    assert main(["cards", str(card), "--json"]) == 0
-    kept = {one["name"]: one for one in json.loads(capsys.readouterr().out)["values"]}
+    found = ask(["calibrate", "hrg-30mm", "studies/papers/hrg_table1.csv", "--save", card])
+    told = {one["parameter"]: one for one in found["values"]}
+    kept = {one["name"]: one for one in ask(["cards", card])["values"]}
     assert {name: kept[name]["interval"] for name in told} == {name: [v["low"], v["high"]] for name, v in told.items()}
     q = kept["loss.inverse_q"]
     assert q["interval"][1] - q["value"] > 1.2 * (q["value"] - q["interval"][0])  # its logarithm is normal
@@ -78,22 +64,6 @@ def test_every_response_has_a_name_and_a_unit_for_people():
     assert set(NAMES) == set(SHOWN) == set(UNITS)
     known = {"Hz": "mHz", "K": "mK", "V": "mV", "1": "ppb", "°/h": "°/h"}
     assert {name: known[unit] for name, unit in UNITS.items()} == {name: unit for name, (unit, _) in SHOWN.items()}
-
-
-def test_what_cannot_be_calibrated_is_refused(run, tmp_path, capsys):
-    bare = tmp_path / "bare.csv"
-    t = np.arange(0.0, 3600.0, 60.0)
-    bare.write_text("time_s,frequency_Hz\n" + "".join(f"{x:g},4432\n" for x in t), encoding="utf-8")
-    for words, message in (
-        (["calibrate", "hrg-30mm"], "DATA is missing"),
-        (["calibrate", "hrg-30mm", str(bare)], "add the column housing_temperature_degC or chamber_temperature_degC"),
-        (["calibrate", "hrg-30mm", str(run), "--hold-out", "3"], "there is 1 record, numbered from 1"),
-        (["calibrate", "hrg-30mm", str(run), "--exact", "thermal.film"], "is not an uncertain value of the card"),
-    ):
-        assert main(words) == 2
-        captured = capsys.readouterr()
-        assert message in captured.err
-        assert captured.out == ""
 
 
 @pytest.mark.slow

@@ -92,21 +92,6 @@ def test_a_foreign_package_of_our_name_is_status_3(tmp_path):
     assert "uninstall" in done.stderr
 
 
-@pytest.mark.parametrize(
-    ("rows", "part"),
-    [
-        ("0,4424.9\n0,4424.9\n0,4424.9\n0,4424.9\n0,4424.9\n", "constant"),
-        ("0,4424.9\n10,4428.5\n", "different values"),
-        ("0,4424\n10,4424\n20,4424\n30,4424\n40,4424\n50,4424\n", "constant"),
-        ("0,4424\n10,4430\n20,4432\n30,4430\n40,4424\n50,4414\n", "turning point"),
-    ],
-)
-def test_unusable_tables_are_refused(tmp_path, rows, part, refuse):
-    path = tmp_path / "t.csv"
-    path.write_text("temperature_degC,frequency_Hz\n" + rows)
-    assert part in refuse(["fit", "frequency", str(path)])
-
-
 def test_what_a_file_says_cannot_act_on_the_terminal(tmp_path, refuse):
     """An escape sequence in a card's name is refused; one in a column's name or an argument is spelled out."""
     card, table = tmp_path / "card.toml", tmp_path / "t.csv"

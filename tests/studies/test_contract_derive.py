@@ -174,16 +174,6 @@ def test_latex_equations_are_typeset_by_an_independent_parser(capsys):
             parser.parse("$" + latex.replace(r"\limits", "") + "$")
 
 
-def test_json_carries_the_published_integrals(capsys):
-    status, said = speak(capsys, "--json")
-    assert status == 0
-    payload = json.loads(said.out)
-    assert payload["schema"] == "hrg.derive/1"
-    assert payload["I"] == {"closed_form": "7/24", "value": pytest.approx(7 / 24)}
-    assert payload["J"]["value"] == pytest.approx(20 * np.log(2) - 37 / 3)
-    assert payload["bryan_factor"]["value"] == pytest.approx(0.27699, abs=5e-6)
-
-
 def test_the_bell_is_derived_beside_its_numbers(capsys):
     status, said = speak(capsys, "--bell", "--json")
     assert status == 0

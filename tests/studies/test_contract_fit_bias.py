@@ -57,12 +57,9 @@ def test_the_saved_model_holds_the_planted_coefficients(calibrated):
     assert model.settings["rate_lag_s"] == 0.0
 
 
-def test_a_compensated_record_is_flat_and_complete(calibrated, tmp_path, capsys):
+def test_a_compensated_record_is_flat_and_complete(calibrated, tmp_path, ask):
     out = tmp_path / "out.csv"
-    assert (
-        main(["compensate", str(calibrated / "m.toml"), str(calibrated / "run1.csv"), "--out", str(out), "--json"]) == 0
-    )
-    payload = json.loads(capsys.readouterr().out)
+    payload = ask(["compensate", calibrated / "m.toml", calibrated / "run1.csv", "--out", out])
     column = payload["columns"]["compensated_bias_deg_per_h"]
     assert column["rows_not_compensated"] == 0
     assert column["stability_before"] > 1.0
@@ -190,18 +187,14 @@ def test_a_lag_and_a_play_between_the_points_of_a_grid_leave_the_static_curve_al
 
 @pytest.mark.slow
 @pytest.mark.parametrize("loop", [0.0, 1.5])
-def test_a_gyro_without_a_frequency_is_fitted_over_its_temperature(tmp_path, capsys, loop):
+def test_a_gyro_without_a_frequency_is_fitted_over_its_temperature(tmp_path, ask, loop):
     """Law, lag and loop planted by another integrator; judged on an unseen run by what noise leaves: 1.5/√10."""
     names = []
     for k in range(4):
         write_record(make_thermometer_gyro(k, cooling=k % 2 == 0, loop=loop), tmp_path / f"r{k}.csv")
         names.append(str(tmp_path / f"r{k}.csv"))
     model = str(tmp_path / "m.toml")
-    assert (
-        main(["fit", "bias", *names[:3], "--causal", "--save", model, "--report", str(tmp_path / "p.html"), "--json"])
-        == 0
-    )
-    payload = json.loads(capsys.readouterr().out)
+    payload = ask(["fit", "bias", *names[:3], "--causal", "--save", model, "--report", tmp_path / "p.html"])
     assert payload["over"] == "housing_temperature_degC"
     assert 100 <= payload["lag_s"] <= 500
     assert (payload["play_half_width_degC"] > 0) == (loop > 0)

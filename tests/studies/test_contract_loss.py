@@ -1,7 +1,5 @@
 """`hrg loss` and the loss parts of a card: schema, units, uncertainties, bad input named with its mend, speed-free."""
 
-import json
-
 import numpy as np
 import pytest
 import tomli_w
@@ -20,17 +18,36 @@ GOLD = {"material": "gold", "thickness_nm": 100.0, "loss": 1e-4}
 PEAK = {"height": 1e-9, "energy_eV": 0.5, "peak_degC": 120.0}
 
 
-def _run(capsys, *words):
-    status = main(["loss", *words])
-    told = capsys.readouterr()
-    return status, told.out, told.err
+AT_20 = ("--from", "20", "--to", "20")
+
+
+@pytest.fixture
+def write(tmp_path):
+    """Write the dome with other tables as a card, and return its path."""
+
+    def written(**tables):
+        path = tmp_path / "card.toml"
+        path.write_text(tomli_w.dumps(DOME | tables), encoding="utf-8")
+        return str(path)
+
+    return written
+
+
+@pytest.fixture
+def say(capsys):
+    """Return what `hrg loss` prints of a card."""
+
+    def said(card):
+        capsys.readouterr()
+        assert main(["loss", card]) == 0
+        return capsys.readouterr().out
+
+    return said
 
 
 @pytest.mark.parametrize("card", sorted(shipped_cards()))
-def test_every_shipped_card_has_a_budget(capsys, card):
-    status, out, err = _run(capsys, card, "--from", "20", "--to", "30", "--json")
-    assert (status, err) == (0, "")
-    found = json.loads(out)
+def test_every_shipped_card_has_a_budget(ask, card):
+    found = ask(["loss", card, "--from", "20", "--to", "30"])
     assert found["schema"] == "hrg.loss/1"
     total = np.sum([part["inverse_q"] for part in found["parts"]], axis=0)
     assert found["inverse_q"] == pytest.approx(total.tolist(), rel=1e-12)
@@ -40,15 +57,11 @@ def test_every_shipped_card_has_a_budget(capsys, card):
     assert all(part["source"] for part in found["parts"])
 
 
-def test_gas_in_the_gap_is_named_with_its_bound(capsys, tmp_path):
+def test_gas_in_the_gap_is_named_with_its_bound(ask, write):
     """A thin ring bends with u = w/n: half a spring p/g on its face is 1/Q = p/(2 g ρ h ω²) / (1 + 1/n²)."""
     ring = {"shape": "cylinder", "radius_mm": 12.5, "thickness_mm": 0.3, "height_mm": 0.5}
     gap = {"gap_um": 20.0, "count": 16, "face": "outer"}
-    path = tmp_path / "card.toml"
-    path.write_text(tomli_w.dumps(DOME | {"resonator": ring, "loss": {"pressure_Pa": 1e-2}, "electrodes": gap}))
-    status, out, _ = _run(capsys, str(path), "--json", "--from", "20", "--to", "20")
-    assert status == 0
-    found = json.loads(out)
+    found = ask(["loss", write(resonator=ring, loss={"pressure_Pa": 1e-2}, electrodes=gap), *AT_20])
     (words,) = (words for words in found["left_out"] if words.startswith("gas squeezed in the gap"))
     gas = next(part for part in found["parts"] if part["name"] == "gas")["inverse_q"][0]
     density, omega = 2200.0, 2 * np.pi * found["frequency_Hz"]
@@ -58,36 +71,28 @@ def test_gas_in_the_gap_is_named_with_its_bound(capsys, tmp_path):
     assert times == pytest.approx(most / gas, rel=0.05)
 
 
-def test_every_key_of_the_card_makes_its_part(capsys, tmp_path):
+def test_every_key_of_the_card_makes_its_part(ask, write, say):
     loss = {"pressure_Pa": {"value": 1e-2, "relative_sd": 0.1}, "gas": "nitrogen", "anchor_inverse_q": 2e-9}
     loss |= {
         "film": [GOLD, GOLD | {"material": "chromium", "thickness_nm": 10.0, "face": "inner"}],
         "activated": [PEAK],
     }
-    path = tmp_path / "card.toml"
-    path.write_text(tomli_w.dumps(DOME | {"loss": loss}), encoding="utf-8")
-    status, out, _ = _run(capsys, str(path), "--json", "--from", "20", "--to", "20")
-    assert status == 0
-    found = {part["name"]: part for part in json.loads(out)["parts"]}
+    answer = ask(["loss", write(loss=loss), *AT_20])
+    found = {part["name"]: part for part in answer["parts"]}
     wanted = {
         "thermoelastic", "bulk", "surface", "gold film", "gold film, heat", "chromium film", "chromium film, heat",
     }  # fmt: skip
     assert set(found) == {*wanted, "gas", "mount", "activated"}
     assert found["gas"]["relative_sd"] == pytest.approx(np.hypot(0.1, 0.1))
     assert found["mount"]["inverse_q"] == pytest.approx([2e-9])
-    assert json.loads(out)["left_out"] == []
-    status, out, _ = _run(capsys, str(path))
-    assert status == 0
-    assert "Reduce first: gold film" in out
+    assert answer["left_out"] == []
+    assert "Reduce first: gold film" in say(write(loss=loss))
 
 
-def test_it_is_said_which_q_a_simulation_takes(capsys, tmp_path):
+def test_it_is_said_which_q_a_simulation_takes(write, say):
     """A budget of 2e7 once stood beside a simulation of 1e7 without a word."""
-    path = tmp_path / "card.toml"
-    path.write_text(tomli_w.dumps(DOME), encoding="utf-8")
-    assert "they use the default of [loss] inverse_q = 1e-07 (Q = 1e+07)" in _run(capsys, str(path))[1]
-    path.write_text(tomli_w.dumps(DOME | {"loss": {"film": [GOLD]}}), encoding="utf-8")
-    assert "Simulations take 1/Q from this budget." in _run(capsys, str(path))[1]
+    assert "they use the default of [loss] inverse_q = 1e-07 (Q = 1e+07)" in say(write())
+    assert "Simulations take 1/Q from this budget." in say(write(loss={"film": [GOLD]}))
 
 
 def test_uncertain_parts_are_values_of_the_card():
@@ -138,19 +143,14 @@ def test_what_no_source_states_is_left_out_and_said():
         ({"inverse_q": 1e7}, "inverse_q = 1e+07 must lie between 0 and 0.1: it is 1/Q, not Q."),
     ],
 )
-def test_an_unusable_part_is_named_with_its_mend(capsys, tmp_path, loss, words):
-    path = tmp_path / "card.toml"
-    path.write_text(tomli_w.dumps(DOME | {"loss": loss}), encoding="utf-8")
-    status, out, err = _run(capsys, str(path))
-    assert (status, out) == (2, "")
-    assert words in err
-    assert str(path) in err
+def test_an_unusable_part_is_named_with_its_mend(refuse, write, loss, words):
+    said = refuse(["loss", path := write(loss=loss)])
+    assert words in said
+    assert path in said
 
 
-def test_anchor_of_a_stem(capsys):
-    status, out, _ = _run(capsys, "hrg-30mm", "--anchor", "--from", "20", "--to", "20", "--json")
-    assert status == 0
-    found = {part["name"]: part for part in json.loads(out)["parts"]}
+def test_anchor_of_a_stem(ask):
+    found = {part["name"]: part for part in ask(["loss", "hrg-30mm", "--anchor", *AT_20])["parts"]}
     assert 0 < found["anchor"]["inverse_q"][0] < 1e-15
 
 
@@ -162,24 +162,19 @@ def test_anchor_of_a_stem(capsys):
         (9e8, "one of them is too large"),
     ],
 )
-def test_a_measured_q_stands_beside_what_the_parts_explain(capsys, tmp_path, quality, words):
-    path = tmp_path / "card.toml"
-    path.write_text(tomli_w.dumps(DOME | {"loss": {"inverse_q": 1 / quality}}), encoding="utf-8")
-    status, out, _ = _run(capsys, str(path), "--json")
-    found = json.loads(out)
+def test_a_measured_q_stands_beside_what_the_parts_explain(ask, write, say, quality, words):
+    found = ask(["loss", path := write(loss={"inverse_q": 1 / quality})])
     explained = found["stated"]["explained"]
-    assert status == 0
     assert found["stated"]["explained_low"] < explained < found["stated"]["explained_high"]
     at = found["temperature_degC"].index(20.0)
     assert explained == pytest.approx(found["inverse_q"][at] * quality, rel=1e-9)
-    assert words in _run(capsys, str(path))[1]
-    assert json.loads(_run(capsys, "free-dome", "--json")[1])["stated"] is None
+    assert words in say(path)
+    assert ask(["loss", "free-dome"])["stated"] is None
 
 
-def test_masses_on_the_rim_unbalance_it(capsys, tmp_path):
+def test_masses_on_the_rim_unbalance_it(ask, write):
     """A point mass of the card's [[imperfection.mass]] is the same first and third harmonic as given ones, and damps unequally."""
     stem = {"support": "stem", "stem": {"radius_mm": 2.5, "end_mm": -5.0, "fillet_mm": 0.5}}
-    card = DOME | {"resonator": DOME["resonator"] | stem}
     given = {
         "unbalance_mg": 10.0,
         "unbalance_azimuth_deg": 20.0,
@@ -187,13 +182,10 @@ def test_masses_on_the_rim_unbalance_it(capsys, tmp_path):
         "third_unbalance_azimuth_deg": 20.0,
     }
     masses = {"mass": [{"mass_ug": 1e4, "azimuth_deg": 20.0}]}
-    found = []
-    for name, tables in (("keys", {"loss": given}), ("mass", {"imperfection": masses})):
-        path = tmp_path / f"{name}.toml"
-        path.write_text(tomli_w.dumps(card | tables), encoding="utf-8")
-        status, out, _ = _run(capsys, str(path), "--json", "--from", "20", "--to", "20")
-        assert status == 0
-        found.append(json.loads(out))
+    found = [
+        ask(["loss", write(resonator=DOME["resonator"] | stem, **tables), *AT_20])
+        for tables in ({"loss": given}, {"imperfection": masses})
+    ]
     one, other = ({part["name"]: part["inverse_q"][0] for part in payload["parts"]}["imbalance"] for payload in found)
     assert one > 0
     assert other == pytest.approx(one, rel=1e-9)

@@ -1,7 +1,6 @@
 """Model files: what is saved is read back, what is broken is named, what is emitted compiles and agrees."""
 
 import ctypes
-import json
 import tomllib
 
 import numpy as np
@@ -68,7 +67,7 @@ def test_compensation_takes_the_curve_out_and_refuses_to_extrapolate(model):
         compensate(model, compensate(model, record))
 
 
-def test_a_frequency_model_needs_no_housing_sensor(model, tmp_path, capsys):
+def test_a_frequency_model_needs_no_housing_sensor(model, tmp_path, ask):
     true = np.array([-10.0, 5.0, 25.0])
     columns = {"time_s": np.arange(3.0), "frequency_Hz": evaluate(model, true) + 0.5}
     f0 = model.part("frequency")["f0"]
@@ -79,14 +78,13 @@ def test_a_frequency_model_needs_no_housing_sensor(model, tmp_path, capsys):
     write_model(model, tmp_path / "m.toml")
     write_record(Record(columns | {"frequency_Hz": evaluate(model, true)}), tmp_path / "run.csv")
     words = ["compensate", str(tmp_path / "m.toml"), str(tmp_path / "run.csv"), "--out", str(tmp_path / "out.csv")]
-    assert main([*words, "--json"]) == 0
-    assert json.loads(capsys.readouterr().out)["added"] == ["resonator_temperature_degC"]
+    assert ask(words)["added"] == ["resonator_temperature_degC"]
     out = read_record(tmp_path / "out.csv")
     assert out["resonator_temperature_degC"] == pytest.approx(true, abs=1e-6)
     assert "compensated_frequency_Hz" not in out
 
 
-def test_a_record_too_short_for_its_stability_is_compensated_all_the_same(model, tmp_path, capsys):
+def test_a_record_too_short_for_its_stability_is_compensated_all_the_same(model, tmp_path, capsys, ask):
     housing = np.array([-10.0, 5.0, 25.0])
     columns = {"time_s": np.arange(3.0), "housing_temperature_degC": housing, "frequency_Hz": evaluate(model, housing)}
     write_model(model, tmp_path / "m.toml")
@@ -94,8 +92,7 @@ def test_a_record_too_short_for_its_stability_is_compensated_all_the_same(model,
     words = ["compensate", str(tmp_path / "m.toml"), str(tmp_path / "run.csv"), "--out", str(tmp_path / "out.csv")]
     assert main(words) == 0
     assert "too few rows" in capsys.readouterr().out
-    assert main([*words, "--json"]) == 0
-    assert json.loads(capsys.readouterr().out)["columns"]["compensated_frequency_Hz"]["stability_after"] is None
+    assert ask(words)["columns"]["compensated_frequency_Hz"]["stability_after"] is None
     assert read_record(tmp_path / "out.csv")["compensated_frequency_Hz"] == pytest.approx(model.part("frequency")["f0"])
 
 

@@ -1,6 +1,5 @@
 """`hrg render`: every kind of file, side by side, colours with units, and the exits that a user can mend."""
 
-import json
 import subprocess
 import sys
 
@@ -60,14 +59,12 @@ imperfection = {wave = [{of = "inner", order = 4, amplitude_um = 2.0, azimuth_de
 """
 
 
-def test_contract_a_split_pair_is_told_by_the_mode_that_is_shown_and_its_azimuth(tmp_path, capsys):
+def test_contract_a_split_pair_is_told_by_the_mode_that_is_shown_and_its_azimuth(tmp_path, ask):
     """The frequency is the slower mode's, as `hrg modes` has it; in the picture the azimuths 0° and 90° lie along x and y, beyond the axes."""
     card = tmp_path / "wave.toml"
     card.write_text(WAVE)
-    assert hrg_render(card, "--out", tmp_path / "mode.stl", "--json") == 0
-    (told,) = json.loads(capsys.readouterr().out)["modes"]
-    assert main(["modes", str(card), "--json"]) == 0
-    split = json.loads(capsys.readouterr().out)["modes"][0]["split"]
+    (told,) = ask(["render", card, "--out", tmp_path / "mode.stl"])["modes"]
+    split = ask(["modes", card])["modes"][0]["split"]
     assert told["split"] == pytest.approx({key: split[key] for key in told["split"]}, rel=1e-9)
     assert told["frequency_Hz"] == told["split"]["slow_Hz"] < told["split"]["fast_Hz"]
     shown = show_mode(load_card(card))

@@ -10,6 +10,7 @@ from studies.cli import main
 from studies.files.clouds import read_cloud
 from tests.shell.scans import dome_points
 
+TRIM = ("trim", "free-dome", "--split", "0.12", "--axis", "31")
 OUTER = [(4, 0.4e-6, 0.4, 4), (2, 3e-6, 0.3, 2), (3, 1e-6, 0.1, 3)]
 
 
@@ -44,11 +45,8 @@ def test_a_scan_says_its_noise_saves_the_card_that_it_saw_and_can_be_trimmed(fac
     assert plan["before"][0]["split_Hz"] == pytest.approx(split["split_Hz"]["value"])
 
 
-def test_a_plan_is_one_object_a_table_for_the_machine_and_a_page(tmp_path, capsys):
-    words = ["trim", "free-dome", "--split", "0.12", "--axis", "31", "--json"]
-    words += ["--out", str(tmp_path / "cuts.csv"), "--report", str(tmp_path / "trim.html")]
-    assert main(words) == 0
-    found = json.loads(capsys.readouterr().out)
+def test_a_plan_is_one_object_a_table_for_the_machine_and_a_page(tmp_path, ask):
+    found = ask([*TRIM, "--out", tmp_path / "cuts.csv", "--report", tmp_path / "trim.html"])
     assert found["schema"] == "hrg.trim/1"
     first = found["rounds"][0]
     assert sorted(round(c["azimuth_deg"]) for c in first["cuts"]) == [31, 121, 211, 301]
@@ -109,34 +107,28 @@ def test_a_table_of_departures_must_close_the_circle(tmp_path, refuse, ask):
     assert "gaps between the points are too large" in refuse(["scan", "free-dome", "none", path])
 
 
-def test_a_measured_gain_turns_the_cuts_to_the_other_antinodes(capsys):
-    words = ["trim", "free-dome", "--split", "0.12", "--axis", "31", "--gain", "-0.5", "--json"]
-    assert main(words) == 0
-    found = json.loads(capsys.readouterr().out)
+def test_a_measured_gain_turns_the_cuts_to_the_other_antinodes(ask):
+    found = ask([*TRIM, "--gain", "-0.5"])
     (only,) = found["rounds"]
     assert sorted(round(c["azimuth_deg"]) for c in only["cuts"]) == [76, 166, 256, 346]
     assert found["measure"][0].startswith("--gain -0.5: the prediction is known to ± 3 %")  # doubted, and followed
-    assert main([*words[:-3], "--gain", "0.9", "--json"]) == 0
-    assert not any("--gain 0.9" in sentence for sentence in json.loads(capsys.readouterr().out)["measure"])
+    assert not any("--gain 0.9" in sentence for sentence in ask([*TRIM, "--gain", "0.9"])["measure"])
 
 
 @pytest.mark.slow
-def test_the_depth_of_a_cut_of_the_edge_removes_its_mass_through_the_wall(capsys):
-    words = ["trim", "free-dome", "--split", "1", "--axis", "31", "--cut", "edge", "--width-mm", "4", "--json"]
-    assert main(words) == 0
-    found = json.loads(capsys.readouterr().out)
+def test_the_depth_of_a_cut_of_the_edge_removes_its_mass_through_the_wall(ask):
+    found = ask(["trim", "free-dome", "--split", "1", "--axis", "31", "--cut", "edge", "--width-mm", "4"])
     for cut in found["rounds"][0]["cuts"]:
         assert cut["mass_ug"] == pytest.approx(2.203 * 4 * 0.9 * cut["depth_um"], rel=2e-3)
     (gain,) = found["gains"]
     assert 0.8 < gain["low"] < gain["value"] < gain["high"] < 1
 
 
-def test_a_known_imbalance_is_said_before_and_after_the_cuts(capsys):
-    words = ["trim", "free-dome", "--split", "0.12", "--axis", "31", "--unbalance", "1:120@35", "2:50@10"]
+def test_a_known_imbalance_is_said_before_and_after_the_cuts(capsys, ask):
+    words = [*TRIM, "--unbalance", "1:120@35", "2:50@10"]
     assert main(words) == 0
     assert "k = 1: 120 → 0 µg, k = 2: 50 → 0 µg." in " ".join(capsys.readouterr().out.split())
-    assert main([*words[:-1], "2:50000@10", "--json"]) == 0
-    (only,) = json.loads(capsys.readouterr().out)["rounds"]
+    (only,) = ask([*words[:-1], "2:50000@10"])["rounds"]
     left, azimuth = only["unbalance"]["2"]
     assert 20000 < left < 50000
     assert azimuth == pytest.approx(10, abs=1)

@@ -122,11 +122,10 @@ def test_planted_correlation_of_changes_tells_a_cause_from_a_drift():
 
 
 @pytest.mark.slow
-def test_contract_what_is_named_possible_runs_and_what_is_missing_is_said(tmp_path, capsys, monkeypatch):
+def test_contract_what_is_named_possible_runs_and_what_is_missing_is_said(tmp_path, ask, monkeypatch):
     monkeypatch.chdir(tmp_path)
     shutil.copy(INPUTS / "cross.csv", tmp_path)
-    assert main(["show", "cross.csv", "--json"]) == 0
-    uses = {use["command"]: use for use in json.loads(capsys.readouterr().out)["uses"]}
+    uses = {use["command"]: use for use in ask(["show", "cross.csv"])["uses"]}
     cross = uses["fit cross-damping"]  # the record has no frequency_Hz and no inverse_q
     assert "cross.csv --frequency HZ --quality Q --save" in cross["line"]
     assert main(shlex.split(cross["line"].replace("HZ", "5000").replace(" Q ", " 2e4 "))[1:]) == 0
@@ -139,7 +138,7 @@ def test_contract_what_is_named_possible_runs_and_what_is_missing_is_said(tmp_pa
 
 
 @pytest.mark.slow
-def test_contract_every_line_that_is_named_possible_runs(tmp_path, capsys, monkeypatch):
+def test_contract_every_line_that_is_named_possible_runs(tmp_path, ask, monkeypatch):
     """But for those that have a golden answer with the same words; fits to their first step, the diagnosis up to its search."""
     search = Mock(side_effect=InputError("as far as this"))
     monkeypatch.chdir(tmp_path)
@@ -147,8 +146,7 @@ def test_contract_every_line_that_is_named_possible_runs(tmp_path, capsys, monke
     monkeypatch.setattr("studies.inference.diagnosis.infer", search)
     run = read_record(INPUTS / "run1.csv")
     write_record(replace(run, columns={name: own[::4] for name, own in run.columns.items()}), "run1.csv")
-    assert main(["show", "run1.csv", "--json"]) == 0
-    for use in json.loads(capsys.readouterr().out)["uses"]:
+    for use in ask(["show", "run1.csv"])["uses"]:
         words = shlex.split(use["line"].replace("CARD.toml", "hrg-30mm"))[1:]
         known = any(case["words"] == shlex.join(words[: case["words"].count(" ") + 1]) for case in CASES.values())
         if use["ready"] and not known:

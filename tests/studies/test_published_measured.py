@@ -3,8 +3,6 @@
 Sources and licences: `tests/reference/measured/SOURCES.md`.
 """
 
-import json
-
 import numpy as np
 import pytest
 
@@ -13,14 +11,8 @@ from studies.record import read_record
 from tests.measured import DATA, bring_in
 
 
-def fit(run, capsys, *words):
-    capsys.readouterr()
-    assert main(["fit", "bias", str(run), *words, "--json"]) == 0
-    return json.loads(capsys.readouterr().out)
-
-
 @pytest.mark.slow
-def test_a_gyro_of_three_axes_in_a_chamber(tmp_path, capsys):
+def test_a_gyro_of_three_axes_in_a_chamber(tmp_path, ask):
     """The clock counts µs without saying so; one file makes three records; axis y gains more than tenfold on unseen blocks.
 
     A cubic is known to leave 196 °/h of y, white noise 73; the steps of x at 1 021 s keep its gain small.
@@ -30,21 +22,21 @@ def test_a_gyro_of_three_axes_in_a_chamber(tmp_path, capsys):
     assert np.median(np.diff(y["time_s"])) == pytest.approx(1.517, abs=0.01)  # 0.5057 s a row, every third
     assert y.instrument == "axis y"
     assert y["housing_temperature_degC"].min() == pytest.approx(-18, abs=1)
-    found = fit(tmp_path / "run_y.csv", capsys)
+    found = ask(["fit", "bias", tmp_path / "run_y.csv"])
     assert found["over"] == "housing_temperature_degC"
     guarded = found["methods"]["guarded"]
     assert guarded["held_out"]["gain"] > 8
     assert guarded["training"]["after"] * 3600 < 250
-    assert fit(tmp_path / "run_x.csv", capsys)["methods"]["guarded"]["training"]["gain"] < 5
+    assert ask(["fit", "bias", tmp_path / "run_x.csv"])["methods"]["guarded"]["training"]["gain"] < 5
 
 
 @pytest.mark.slow
-def test_a_gyro_in_bursts_with_raw_temperatures(tmp_path, capsys):
+def test_a_gyro_in_bursts_with_raw_temperatures(tmp_path, ask):
     """Of 1 770 °/h in x a law in temperature leaves about 20 (burst means: 19); magnetometers in [T] are no temperatures."""
     scale = ("scale = 1.0 ", "scale = 0.00390625 "), ("offset = 0.0 ", "offset = -231.0 ")
     bring_in("pan_bursts.csv", tmp_path, *scale, preview=True)
     run = tmp_path / "run_x.csv"
-    found = fit(run, capsys, "--save", str(tmp_path / "m.toml"))
+    found = ask(["fit", "bias", run, "--save", tmp_path / "m.toml"])
     guarded = found["methods"]["guarded"]
     assert "T" in guarded["terms"]
     assert 400 < guarded["training"]["before"] * 3600 < 700

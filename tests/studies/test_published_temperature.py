@@ -1,6 +1,5 @@
 """`hrg temperature`: the HRG paper's Table 2 from its Table 1, a simulated run's own temperature, bad input named."""
 
-import json
 from pathlib import Path
 
 import numpy as np
@@ -32,7 +31,7 @@ def test_table_2_of_the_paper_comes_from_the_measured_frequencies(model, tmp_pat
 
 
 @pytest.mark.slow
-def test_a_simulated_resonator_is_its_own_thermometer(tmp_path, capsys):
+def test_a_simulated_resonator_is_its_own_thermometer(tmp_path, ask):
     """The curve is fitted to settled points of the same virtual gyro; the ramp in between is then read from f alone."""
     soak = "time_s,chamber_temperature_degC\n0,-20\n9000,-20\n9001,40\n70000,40\n70001,-20\n"
     (tmp_path / "p.csv").write_text(soak.replace("70001,-20\n", "90000,10\n"))
@@ -43,10 +42,8 @@ def test_a_simulated_resonator_is_its_own_thermometer(tmp_path, capsys):
     table = "temperature_degC,frequency_Hz\n" + "".join(f"{T[k]},{f[k]}\n" for k in points)
     (tmp_path / "table.csv").write_text(table)
     assert main(["fit", "frequency", str(tmp_path / "table.csv"), "--save", str(tmp_path / "m.toml")]) == 0
-    capsys.readouterr()
-    out = ["--out", str(tmp_path / "o.csv"), "--report", str(tmp_path / "o.html"), "--json"]
-    assert main(["temperature", str(tmp_path / "m.toml"), str(tmp_path / "r.csv"), *out]) == 0
-    payload = json.loads(capsys.readouterr().out)
+    out = ["--out", tmp_path / "o.csv", "--report", tmp_path / "o.html"]
+    payload = ask(["temperature", tmp_path / "m.toml", tmp_path / "r.csv", *out])
     assert payload["schema"] == "hrg.temperature/1"
     assert payload["rms_difference_from_simulated_K"] < 0.05  # of 60 K; the unevenness of the shell while it cools
     assert "<svg" in (tmp_path / "o.html").read_text() or "data:image" in (tmp_path / "o.html").read_text()

@@ -4,8 +4,6 @@ Records: a housing with a lag of its own, a resonator behind it by closed lags o
 of the HRG paper's Table 1, white noise, a random walk, noise of the sensor.
 """
 
-import json
-
 import numpy as np
 import pytest
 from scipy.constants import Stefan_Boltzmann
@@ -63,7 +61,7 @@ def test_one_lag_without_radiation_is_found_with_its_interval(tmp_path, ask):
 
 
 @pytest.mark.slow
-def test_a_cubic_law_is_no_heat_path_and_a_law_beyond_it_no_negative_radiation(tmp_path, capsys):
+def test_a_cubic_law_is_no_heat_path_and_a_law_beyond_it_no_negative_radiation(tmp_path, capsys, ask):
     """The cubic of the HRG paper behind one lag (it made a lag of 2 s and a negative share); a quartic that no cubic follows is a misfit."""
     found = fit_thermal_constants([one_lag(higher=(1.5e-5, 0.0))]).estimates
     assert "time_constant_2" not in found
@@ -71,8 +69,7 @@ def test_a_cubic_law_is_no_heat_path_and_a_law_beyond_it_no_negative_radiation(t
         half = 0.5 * (found[name].high - found[name].low)
         assert abs(found[name].value - planted) < 3 * half
     write_record(one_lag(higher=(1.5e-5, 1e-7)), tmp_path / "run.csv")
-    assert main(["fit", "thermal", str(tmp_path / "run.csv"), "--lags", "1", "--json"]) == 0
-    share = json.loads(capsys.readouterr().out)["estimates"]["radiated_share"]
+    share = ask(["fit", "thermal", tmp_path / "run.csv", "--lags", "1"])["estimates"]["radiated_share"]
     assert share["value"] is None
     assert share["high"] < 0.0
     assert main(["fit", "thermal", str(tmp_path / "run.csv"), "--lags", "1"]) == 0

@@ -1,6 +1,5 @@
 """hrg fit ringdown on files of a resonator whose values are known, and on files that are no ring-down."""
 
-import json
 from pathlib import Path
 
 import numpy as np
@@ -37,11 +36,9 @@ def lock_in(tmp_path):
 
 
 @pytest.mark.slow
-def test_a_lock_in_file_gives_split_axes_and_q_and_a_card_that_has_them(lock_in, tmp_path, capsys):
+def test_a_lock_in_file_gives_split_axes_and_q_and_a_card_that_has_them(lock_in, tmp_path, capsys, ask):
     card, page = tmp_path / "measured.toml", tmp_path / "page.html"
-    words = ["fit", "ringdown", lock_in, "--card", "free-dome", "--save", str(card), "--report", str(page), "--json"]
-    assert main(words) == 0
-    (decay,) = json.loads(capsys.readouterr().out)["decays"]
+    (decay,) = ask(["fit", "ringdown", lock_in, "--card", "free-dome", "--save", card, "--report", page])["decays"]
     found = {row["name"]: row for row in decay["estimates"]}
     truth = {
         "split_Hz": 0.12,
@@ -67,7 +64,7 @@ def test_a_lock_in_file_gives_split_axes_and_q_and_a_card_that_has_them(lock_in,
 
 
 @pytest.mark.slow
-def test_from_a_raw_decay_to_acceptance_in_five_commands(lock_in, tmp_path, capsys, ask):
+def test_from_a_raw_decay_to_acceptance_in_five_commands(lock_in, tmp_path, ask):
     """Decay, split, trim plan, decay of the trimmed shell (2 mHz left), acceptance of its run-down."""
     measured, trimmed = str(tmp_path / "measured.toml"), str(tmp_path / "trimmed.toml")
     after = Gyro(4599.702, 4599.700, 1.0e6, 1.04e6, 0.3, 1.0)
@@ -93,9 +90,7 @@ def test_from_a_raw_decay_to_acceptance_in_five_commands(lock_in, tmp_path, caps
     assert main(["fit", "ringdown", again, "--card", measured, "--save", trimmed]) == 0
     assert load_card(trimmed).content["imperfection"]["split"]["split_Hz"] == pytest.approx(0.002, abs=2e-4)
     assert main(["modes", trimmed]) == 0
-    capsys.readouterr()
-    assert main(["acceptance", trimmed, again, "--limits", str(limits), "--json"]) == 0
-    found = {row["key"]: row for row in json.loads(capsys.readouterr().out)["quantities"]}
+    found = {row["key"]: row for row in ask(["acceptance", trimmed, again, "--limits", limits])["quantities"]}
     q = 2 / (1 / 1.0e6 + 1 / 1.04e6)
     assert found["quality_factor"]["low"] < q < found["quality_factor"]["high"]
     assert found["quality_factor"]["verdict"] == "fail"

@@ -1,11 +1,8 @@
 """`hrg diagnose`: the JSON of the contract, and what it says of unusable or undecidable input."""
 
-import json
-
 import numpy as np
 import pytest
 
-from studies.cli import main
 from studies.record import Record, write_record
 from tests.studies.diagnosis.bench import BACK, CYCLE, STAIRS, Bench
 
@@ -26,12 +23,6 @@ def campaign(tmp_path_factory):
     return records, paths
 
 
-def run(capsys, *words):
-    status = main(["diagnose", *map(str, words)])
-    out, err = capsys.readouterr()
-    return status, out, err
-
-
 def save(tmp_path, columns, name="run.csv", **notes):
     path = tmp_path / name
     write_record(Record({key: np.asarray(value, dtype=float) for key, value in columns.items()}, **notes), path)
@@ -42,23 +33,15 @@ def columns_of(record):
     return {key: values.copy() for key, values in record.columns.items()}
 
 
-def test_two_gyros_are_refused(campaign, capsys, tmp_path):
+def test_two_gyros_are_refused(campaign, refuse, tmp_path):
     records, _ = campaign
     other = columns_of(records[1])
     other["frequency_Hz"] *= 1.2
-    status, out, err = run(
-        capsys, save(tmp_path, columns_of(records[0]), "a.csv"), save(tmp_path, other, "b.csv"), "--json"
-    )
-    assert status == 2
-    assert out == ""
-    assert "different gyros" in err
-    status, _, err = run(
-        capsys,
-        save(tmp_path, columns_of(records[0]), "a.csv", instrument="one"),
-        save(tmp_path, columns_of(records[1]), "b.csv", instrument="two"),
-    )
-    assert status == 2
-    assert "'two'" in err
+    one, two = save(tmp_path, columns_of(records[0]), "a.csv"), save(tmp_path, other, "b.csv")
+    assert "different gyros" in refuse(["diagnose", one, two, "--json"])
+    save(tmp_path, columns_of(records[0]), "a.csv", instrument="one")
+    save(tmp_path, columns_of(records[1]), "b.csv", instrument="two")
+    assert "'two'" in refuse(["diagnose", one, two])
 
 
 @pytest.mark.parametrize(
@@ -69,53 +52,39 @@ def test_two_gyros_are_refused(campaign, capsys, tmp_path):
         ("bias_deg_per_h", 1000.0, "another unit"),
     ],
 )
-def test_units_off_by_a_thousand_are_named(campaign, capsys, tmp_path, column, factor, words):
+def test_units_off_by_a_thousand_are_named(campaign, refuse, tmp_path, column, factor, words):
     records, _ = campaign
     wrong = columns_of(records[1])
     wrong[column] *= factor
-    status, _, err = run(capsys, save(tmp_path, columns_of(records[0]), "a.csv"), save(tmp_path, wrong, "b.csv"))
-    assert status == 2
-    assert words in err
-    assert "b.csv" in err
+    said = refuse(["diagnose", save(tmp_path, columns_of(records[0]), "a.csv"), save(tmp_path, wrong, "b.csv")])
+    assert words in said
+    assert "b.csv" in said
 
 
-def test_missing_columns_are_named(campaign, capsys, tmp_path):
+def test_missing_columns_are_named(campaign, refuse, tmp_path):
     records, _ = campaign
     cold = columns_of(records[0])
     del cold["housing_temperature_degC"]
-    status, _, err = run(capsys, save(tmp_path, cold))
-    assert status == 2
-    assert "housing_temperature_degC" in err
+    assert "housing_temperature_degC" in refuse(["diagnose", save(tmp_path, cold)])
     dumb = {key: records[0].columns[key] for key in ("time_s", "housing_temperature_degC")}
-    status, _, err = run(capsys, save(tmp_path, dumb))
-    assert status == 2
-    assert "frequency_Hz" in err
-    status, _, err = run(capsys)
-    assert status == 2
-
-
-def verdict_of(capsys, *words):
-    status, out, err = run(capsys, *words, "--json")
-    assert status == 0, err
-    return json.loads(out)
+    assert "frequency_Hz" in refuse(["diagnose", save(tmp_path, dumb)])
+    refuse(["diagnose"])
 
 
 @pytest.mark.parametrize("rows", [2, 10])
-def test_few_rows_decide_nothing(campaign, capsys, tmp_path, rows):
+def test_few_rows_decide_nothing(campaign, refuse, tmp_path, rows):
     few = {key: values[:rows] for key, values in campaign[0][0].columns.items()}
-    status, out, err = run(capsys, save(tmp_path, few))
-    assert (status, out) == (2, "")
-    assert "too little for a diagnosis: frequency_Hz: " in err
+    assert "too little for a diagnosis: frequency_Hz: " in refuse(["diagnose", save(tmp_path, few)])
 
 
 @pytest.mark.slow
-def test_a_poor_record_is_said_to_be_what_it_is(campaign, capsys, tmp_path):
+def test_a_poor_record_is_said_to_be_what_it_is(campaign, ask, tmp_path):
     """An hour is missing, the frequency is constant, 1/Q and every second bias are not there, and the file is given twice."""
     poor = columns_of(campaign[0][0])
     time = poor["time_s"]
     poor["frequency_Hz"][:], poor["inverse_q"][:], poor["bias_deg_per_h"][::2] = 5000.0, np.nan, np.nan
     poor = {key: values[(time < 9000) | (time > 12600)] for key, values in poor.items()}
-    found = verdict_of(capsys, save(tmp_path, poor, "a.csv"), save(tmp_path, poor, "b.csv"))
+    found = ask(["diagnose", save(tmp_path, poor, "a.csv"), save(tmp_path, poor, "b.csv")])
     assert any("repeats" in note for note in found["notes"])
     assert found["responses"]["frequency_Hz"]["remark"] == "constant"
     assert found["responses"]["inverse_q"]["remark"] == "every value is missing"
@@ -123,32 +92,25 @@ def test_a_poor_record_is_said_to_be_what_it_is(campaign, capsys, tmp_path):
 
 
 @pytest.mark.slow
-def test_constant_temperature_is_adequate_and_says_what_cannot_show(capsys, tmp_path):
+def test_constant_temperature_is_adequate_and_says_what_cannot_show(ask, tmp_path):
     rng = np.random.default_rng(5)
     time = np.arange(0.0, 20000.0, 20.0)
-    found = verdict_of(
-        capsys,
-        save(
-            tmp_path,
-            {
-                "time_s": time,
-                "housing_temperature_degC": 20.0 + 0.003 * rng.standard_normal(time.size),
-                "frequency_Hz": 5000.0 + 0.01 * rng.standard_normal(time.size),
-            },
-        ),
-    )
+    columns = {
+        "time_s": time,
+        "housing_temperature_degC": 20.0 + 0.003 * rng.standard_normal(time.size),
+        "frequency_Hz": 5000.0 + 0.01 * rng.standard_normal(time.size),
+    }
+    found = ask(["diagnose", save(tmp_path, columns)])
     assert found["verdict"] == "adequate"  # nothing beyond noise, and what could not show is said
     assert "K only" in found["responses"]["frequency_Hz"]["remark"]
 
 
 @pytest.mark.parametrize("kind", ["run", "table"])
-def test_temperatures_beyond_the_material_law_are_named(campaign, capsys, tmp_path, kind):
+def test_temperatures_beyond_the_material_law_are_named(campaign, refuse, tmp_path, kind):
     """The law of the card ends at -60 degrees: nothing is extrapolated in silence."""
     if kind == "run":
         cold = columns_of(campaign[0][0])
         cold["housing_temperature_degC"] = cold["housing_temperature_degC"] - 60.0
     else:
         cold = {"temperature_degC": np.linspace(-90.0, 20.0, 8), "frequency_Hz": np.linspace(4400.0, 4432.0, 8)}
-    status, _, err = run(capsys, save(tmp_path, cold), "--card", "hrg-30mm")
-    assert status == 2
-    assert "outside the range" in err
+    assert "outside the range" in refuse(["diagnose", save(tmp_path, cold), "--card", "hrg-30mm"])
