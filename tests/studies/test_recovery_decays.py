@@ -16,15 +16,9 @@ from scipy.special import ellipk
 from studies.calibration.observed import observe
 from studies.cli import main
 from studies.record import read_record
+from tests.tables import write_columns
 
 MEASURED = Path(os.environ.get("HRG_MEASURED", "missing"))
-
-
-def write(path, columns, comments=()):
-    lines = [*(f"# {one}" for one in comments), ",".join(columns)]
-    lines += [",".join(f"{value:.12g}" for value in row) for row in zip(*columns.values(), strict=True)]
-    path.write_text("\n".join(lines) + "\n")
-    return str(path)
 
 
 def laws(ask, *words):
@@ -51,7 +45,7 @@ def test_a_pendulum_that_is_solved_exactly_follows_the_printed_law(tmp_path, ask
             (720.0 * decay + 3.4 * k, decay, 1 / p, T, a) for k, (p, a) in enumerate(zip(period, seen, strict=True))
         ]
     names = ("time_s", "decay", "frequency_Hz", "housing_temperature_degC", "vibration_amplitude_V")
-    law = laws(ask, write(tmp_path / "swings.csv", dict(zip(names, zip(*rows, strict=True), strict=True))))[
+    law = laws(ask, write_columns(tmp_path / "swings.csv", dict(zip(names, zip(*rows, strict=True), strict=True))))[
         "frequency_Hz"
     ]
     assert law["left_out_rows"] == 3
@@ -66,7 +60,7 @@ def test_a_step_between_sessions_is_a_step_and_ageing_is_ageing(tmp_path, ask):
     noise = 1e-7 * random.standard_normal(time.size)
     stepped = np.repeat([0.0, 4e-6, -2e-6, 1e-6], 8)
     for shape, term in ((stepped, "step 2"), (2e-7 * time / 86400, "time")):
-        path = write(tmp_path / "f.csv", {"time_s": time, "frequency_Hz": 7000 * (1 + shape + noise)})
+        path = write_columns(tmp_path / "f.csv", {"time_s": time, "frequency_Hz": 7000 * (1 + shape + noise)})
         law = laws(ask, path)["frequency_Hz"]
         assert term in law
         assert abs(law[term]["value"] - (-6e-6 if term == "step 2" else 2e-7)) < 4 * law[term]["sd"]
@@ -76,7 +70,7 @@ def test_a_step_between_sessions_is_a_step_and_ageing_is_ageing(tmp_path, ask):
 def test_decays_that_depend_on_nothing_tell_their_level_and_scatter(tmp_path, capsys):
     random = np.random.default_rng(6)
     columns = {"time_s": 900.0 * np.arange(40), "frequency_Hz": 7000 + 1e-3 * random.standard_normal(40)}
-    assert main(["fit", "ringdown", write(tmp_path / "still.csv", columns)]) == 0
+    assert main(["fit", "ringdown", write_columns(tmp_path / "still.csv", columns)]) == 0
     assert "no condition explains it, nor does time. Level: 7000.0" in capsys.readouterr().out
 
 
@@ -84,7 +78,7 @@ def test_viscous_gas_goes_with_the_root_of_the_pressure(tmp_path, ask):
     random = np.random.default_rng(5)
     p = np.geomspace(1.0, 1e5, 16)
     loss = (2e-6 + 3e-7 * np.sqrt(p)) * (1 + 0.05 * random.standard_normal(16))
-    law = laws(ask, write(tmp_path / "p.csv", {"pressure_Pa": p, "inverse_q": loss}))["inverse_q"]
+    law = laws(ask, write_columns(tmp_path / "p.csv", {"pressure_Pa": p, "inverse_q": loss}))["inverse_q"]
     assert holds(law["root pressure"], 3e-7)
 
 
@@ -101,7 +95,7 @@ def test_decays_over_temperature_become_a_record_for_calibration(tmp_path, ask):
             f"start: {when.isoformat()}",
             f"reference_frequency_Hz: {4599.7 * (1 + 8e-5 * (T - 20))}",
         ]
-        paths.append(write(tmp_path / f"{k}.csv", {"time_s": t, "power_dB": power}, notes))
+        paths.append(write_columns(tmp_path / f"{k}.csv", {"time_s": t, "power_dB": power}, notes))
     out = tmp_path / "decays.csv"
     law = laws(ask, *paths, "--out", str(out))["inverse_q"]
     assert law["temperature"]["value"] == pytest.approx(1e-8, rel=0.05)
@@ -120,7 +114,7 @@ def test_decays_over_temperature_become_a_record_for_calibration(tmp_path, ask):
     ],
 )
 def test_tables_that_hold_no_decays_are_refused(tmp_path, refuse, columns, said):
-    err = refuse(["fit", "ringdown", write(tmp_path / "x.csv", columns)])
+    err = refuse(["fit", "ringdown", write_columns(tmp_path / "x.csv", columns)])
     assert said in err
     assert "x.csv" in err
 
@@ -140,7 +134,7 @@ def test_published_gas_law_of_a_membrane(tmp_path, ask):
         "inverse_q": [1 / float(row["Q"]) for row in rows],
         "pressure_Pa": [100 * float(row["pressure_mbar"]) for row in rows],
     }
-    found = laws(ask, write(tmp_path / "membrane.csv", columns))
+    found = laws(ask, write_columns(tmp_path / "membrane.csv", columns))
     assert holds(found["inverse_q"]["pressure"], 5.3e-5)
     assert "step 4" in found["frequency_Hz"]
     assert "time" not in found["frequency_Hz"]
@@ -160,6 +154,6 @@ def test_published_law_of_a_pendulum(tmp_path, ask, first):
         "housing_temperature_degC": [float(row["temperature_degC"]) for row in rows],
         "vibration_amplitude_V": [float(row["velocity_cm_per_s"]) / 100 / np.sqrt(9.81 * 2.8155) for row in rows],
     }
-    law = laws(ask, write(tmp_path / "swings.csv", columns))["frequency_Hz"]
+    law = laws(ask, write_columns(tmp_path / "swings.csv", columns))["frequency_Hz"]
     assert holds(law["energy"], -1 / 16)
     assert holds(law["temperature"], -0.8e-5)

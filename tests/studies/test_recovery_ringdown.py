@@ -10,6 +10,7 @@ from studies.fits.ringdown import read_decay
 from studies.instrument.card import load_card
 from tests.benchmarks.hands.decays import make
 from tests.compensation.two_oscillators import Gyro, noisy
+from tests.tables import write_columns
 
 GYRO = Gyro(4599.75, 4599.63, 9.0e5, 1.1e6, np.radians(31), np.radians(70))
 TIME = np.arange(0.0, 120.0, 0.1)
@@ -19,20 +20,13 @@ PAIRS = {
 }  # fmt: skip
 
 
-def write(path, columns, comments=()):
-    lines = [*(f"# {one}" for one in comments), ",".join(columns)]
-    lines += [",".join(f"{value:.9g}" for value in row) for row in zip(*columns.values(), strict=True)]
-    path.write_text("\n".join(lines) + "\n")
-    return str(path)
-
-
 @pytest.fixture
 def lock_in(tmp_path):
     z = noisy(GYRO.envelope(TIME, 4599.7, [1.0, 0.8j]), 0.003, np.random.default_rng(1))
     columns = {"time_s": TIME}
     for part, channel in zip(("cos", "sin"), z, strict=True):
         columns[f"amplitude_{part}_V"], columns[f"phase_{part}_deg"] = np.abs(channel), np.degrees(np.angle(channel))
-    return write(tmp_path / "decay.csv", columns, ["reference_frequency_Hz: 4599.7"])
+    return write_columns(tmp_path / "decay.csv", columns, ["reference_frequency_Hz: 4599.7"])
 
 
 @pytest.mark.slow
@@ -72,7 +66,7 @@ def test_from_a_raw_decay_to_acceptance_in_five_commands(lock_in, tmp_path, ask)
     columns = {"time_s": TIME}
     for part, channel in zip(("cos", "sin"), z, strict=True):
         columns |= {f"in_phase_{part}_V": channel.real, f"out_of_phase_{part}_V": channel.imag}
-    again = write(tmp_path / "after.csv", columns, ["reference_frequency_Hz: 4599.7"])
+    again = write_columns(tmp_path / "after.csv", columns, ["reference_frequency_Hz: 4599.7"])
     limits = tmp_path / "limits.toml"
     limits.write_text('schema = "hrg.limits/1"\n[limits]\nrun_down_time_s = 60.0\nquality_factor = 1.1e6\n')
     assert main(["fit", "ringdown", lock_in, "--card", "free-dome", "--save", measured]) == 0
@@ -103,12 +97,12 @@ def test_raw_samples_and_their_alias(tmp_path, ask, refuse):
     time = np.arange(40_000) / 16_000
     gyro = Gyro(4600.0, 4598.0, 8e3, 8e3, 0.2, 0.2)
     x = gyro.samples(time, [1.0, 1.0]) + 0.01 * np.random.default_rng(2).standard_normal((2, time.size))
-    good = write(tmp_path / "raw.csv", {"time_s": time, "pickoff_cos_V": x[0], "pickoff_sin_V": x[1]})
+    good = write_columns(tmp_path / "raw.csv", {"time_s": time, "pickoff_cos_V": x[0], "pickoff_sin_V": x[1]})
     (decay,) = ask(["fit", "ringdown", good, "--card", "free-dome"])["decays"]
     found = {row["name"]: row["value"] for row in decay["estimates"]}
     assert found["split_Hz"] == pytest.approx(2.0, rel=0.01)
     assert found["q_1"] == pytest.approx(8e3, rel=0.01)
-    slow = write(tmp_path / "slow.csv", {"time_s": time[::4], "pickoff_cos_V": x[0, ::4]})
+    slow = write_columns(tmp_path / "slow.csv", {"time_s": time[::4], "pickoff_cos_V": x[0, ::4]})
     said = refuse(["fit", "ringdown", slow, "--card", "free-dome"])
     assert "alias" in said
     assert "slow.csv" in said
@@ -121,7 +115,7 @@ def test_raw_samples_and_their_alias(tmp_path, ask, refuse):
 def test_a_spectrum_analysers_trace(tmp_path, ask, name):
     f = np.linspace(4590, 4610, 501)
     power = (0.01 + 1 / (1 + (2 * (f - 4599.7) / 0.8) ** 2)) * np.random.default_rng(5).gamma(30, 1 / 30, f.size)
-    path = write(
+    path = write_columns(
         tmp_path / "trace.csv", {"frequency_Hz": f, name: 10 * np.log10(power) if name == "power_dBm" else power}
     )
     (line,) = ask(["fit", "ringdown", path, "--report", str(tmp_path / "page.html")])["decays"]
@@ -144,7 +138,7 @@ def test_a_spectrum_analysers_trace(tmp_path, ask, name):
     ],
 )
 def test_what_is_no_ring_down_is_refused_with_its_file(tmp_path, refuse, columns, said):
-    path = write(tmp_path / "x.csv", columns)
+    path = write_columns(tmp_path / "x.csv", columns)
     err = refuse(["fit", "ringdown", path])
     assert said in err
     assert "x.csv" in err
@@ -165,7 +159,7 @@ def test_what_is_no_ring_down_is_refused_with_its_file(tmp_path, refuse, columns
 def test_a_number_that_a_decay_cannot_have_is_refused_by_its_comment_or_option(tmp_path, refuse, comment, more, said):
     """A negative reference gave a decay of −4431.93 Hz, a word was taken for none, a negative harmonic turned the axes round."""
     z = LOCK + 1e-3 * np.random.default_rng(1).standard_normal(TIME.size)
-    path = write(tmp_path / "x.csv", lock(z), [comment])
+    path = write_columns(tmp_path / "x.csv", lock(z), [comment])
     assert said in refuse(["fit", "ringdown", path, *more])
 
 
@@ -198,7 +192,7 @@ def test_a_bad_decay_ends_in_one_sentence_with_cause_and_mend(tmp_path, refuse, 
     for name in columns:
         if name.endswith("_V") and said not in ("own column", "lower the gain"):
             columns = columns | {name: columns[name] + 1e-3 * random.standard_normal(len(columns[name]))}
-    path = write(
+    path = write_columns(
         tmp_path / "bad.csv", columns, ["reference_frequency_Hz: 4599.7"] if "in_phase_cos_V" in columns else []
     )
     err = refuse(["fit", "ringdown", path, "--card", "free-dome"])
@@ -216,7 +210,7 @@ def test_decays_over_pressure_give_the_gas_law(tmp_path, ask):
         t = np.linspace(0, 5 / rate, 2000)
         power = 20 * np.log10(np.abs(noisy(np.exp(-rate * t) + 0j, 0.01, random)))
         comments = [f"pressure_Pa: {p:.6g}", "reference_frequency_Hz: 2e5"]
-        paths.append(write(tmp_path / f"p{k}.csv", {"time_s": t, "power_dBm": power}, comments))
+        paths.append(write_columns(tmp_path / f"p{k}.csv", {"time_s": t, "power_dBm": power}, comments))
     law = ask(["fit", "ringdown", *paths])["laws"]["inverse_q"]
     assert law["level"] == pytest.approx(1e-7, rel=0.03)
     assert law["terms"][0]["term"] == "pressure"
