@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from studies.calibration.calibrate import Calibration
     from studies.diagnosis.table import TableDiagnosis
     from studies.inference.diagnosis import Inference
+    from studies.inversion.invert import ModeCalibration
     from studies.planning.chamber import Chamber
     from studies.resonator.comparison import Comparison
 
@@ -56,21 +57,36 @@ def compare(*cards: Card) -> "Comparison":
 
 def calibrate(
     card: Card, *data: Run, hold_out: int | None = None, exact: Sequence[str] = (), progress: Progress | None = None
-) -> "Calibration":
+) -> "Calibration | ModeCalibration":
     """Return the most probable values of a card, given data of one device: `hrg calibrate`.
 
     Args:
         card: Instrument, path, or name of a card that ships
-        data: records and steady-state tables, or their paths
+        data: records and steady-state tables, or one table of modes; or their paths
         hold_out: Number of the record, from 1, that a second calibration without it predicts; the last of several
             unless given.
         exact: Values of the card that stay fixed.
         progress: Is told in a few words what comes next.
     """
+    from studies.inversion.invert import invert
+    from studies.inversion.readings import is_mode_table, read_modes
+
+    data = tuple(_flat(data))
+    tables = [one for one in data if is_mode_table(one)]
+    if not tables:
+        return calibrate_records(load_card(card), data, hold_out, exact, progress)
+    if len(data) > 1:
+        raise InputError("a table of modes is calibrated alone; calibrate the card that it gives with the others.")
+    return invert(load_card(card), read_modes(tables[0]), exact, progress or (lambda _: None))
+
+
+def calibrate_records(
+    instrument: Instrument, data: Sequence[Run], hold_out: int | None, exact: Sequence[str], progress: Progress | None
+) -> "Calibration":
+    """Return the most probable values of a card, given records and steady-state tables."""
     from studies.calibration.calibrate import calibrate as find_values
     from studies.calibration.observed import read_settled
 
-    data = tuple(_flat(data))
     tables = [one for one in data if is_table(one)]
     records = [read_record(one) for one in data if not is_table(one)]
     if not data:
@@ -79,7 +95,7 @@ def calibrate(
         raise InputError(f"hold_out = {hold_out}: there are {len(records)} records, numbered from 1.")
     left = (hold_out or len(records)) - 1 if len(records) > 1 else None
     settled = [read_settled(one) for one in tables]
-    return find_values(load_card(card), records, settled, left, exact, progress=progress or (lambda _: None))
+    return find_values(instrument, records, settled, left, exact, progress=progress or (lambda _: None))
 
 
 def diagnose(*runs: Run, card: Card | None = None) -> "Inference | TableDiagnosis":

@@ -1,7 +1,7 @@
 """A card calibrated against records: the most probable instrument, what is known of it, and how well it predicts."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,7 +11,7 @@ from compensation.arrays import Array
 from shell.errors import ShellError
 from studies.calibration.agreement import keep_agreeing, put_back
 from studies.calibration.apart import fit_explained
-from studies.calibration.estimates import Estimate, estimate, find_groups, over_the_wave, posterior_card
+from studies.calibration.estimates import Estimate, OfEstimates, estimate, find_groups, over_the_wave, posterior_card
 from studies.calibration.fit import CardFit, descend, fit
 from studies.calibration.ladder import Rung, build_ladder, noise_rms, spread_of
 from studies.calibration.levels import LEVELS, turn_on, with_level_spread, without_idle_levels
@@ -26,13 +26,10 @@ from studies.instrument.display import display_name
 from studies.record import Record, drop_repeats, repeats, with_bias
 from studies.record.plausible import check_card_frequency, check_one_gyro
 from studies.record.rest import check_temperatures
-from studies.results.shown import Shown
 from studies.simulation.drive import COLUMN
 from studies.simulation.variations import JUMP, SHIFT
 
 if TYPE_CHECKING:
-    from pandas import DataFrame
-
     from studies.instrument.card import Instrument
 
 Progress = Callable[[str], None]
@@ -55,7 +52,7 @@ class HeldOutRun:
 
 
 @dataclass(frozen=True, repr=False)
-class Calibration(Shown):
+class Calibration(OfEstimates):
     """A card and what records say of it."""
 
     drawn_by = "studies.reports.calibration:residual_figure"
@@ -72,9 +69,8 @@ class Calibration(Shown):
     settled: tuple[SettledComparison, ...] = ()  # level and slope of every table beside the card as shipped
 
     def __repr__(self) -> str:
-        told = sum(one.told_by == "data" for one in self.estimates)
         residuals = ", ".join(f"{name} {rung.calibrated:.3g}" for name, rung in self.ladder.items())
-        return f"Calibration({self.card.name}: {told} of {len(self.estimates)} values determined by the data; residuals {residuals})"
+        return f"Calibration({self.card.name}: {self.determined}; residuals {residuals})"
 
     @property
     def unsaved(self) -> str | None:
@@ -97,14 +93,6 @@ class Calibration(Shown):
                 " may be wrong a tolerance in the card, or check that the data are of this gyro"
             )
         return None
-
-    def to_frame(self) -> "DataFrame":
-        """Return one row an uncertain value, best known first: card, value, interval, shift, width, told by."""
-        import pandas as pd
-
-        rows = [asdict(one) | {"told_by": one.told_by} for one in sorted(self.estimates, key=lambda one: one.width)]
-        columns = ["unit", "card", "value", "low", "high", "shift_sd", "width", "told_by"]
-        return pd.DataFrame(rows).set_index("parameter")[columns]
 
 
 def calibrate(

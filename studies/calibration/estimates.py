@@ -1,7 +1,7 @@
 """What a fit says of each value: how far it moved, how well it is known, and what it cannot be told apart from."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,8 +13,11 @@ from studies.calibration.priors import Priors, from_standard, to_standard
 from studies.calibration.valley import find_bend, follow
 from studies.calibration.wave import Polar
 from studies.instrument.uncertain import UncertainValue
+from studies.results.shown import Shown
 
 if TYPE_CHECKING:
+    from pandas import DataFrame
+
     from studies.instrument.card import Instrument
 
 NONLINEAR = ("thermal.", "noise.", "effect.", "resonator.")
@@ -47,6 +50,26 @@ class Estimate:
     def told_by(self) -> str:
         """Who says so: the data, the prior, or both."""
         return "data" if self.width <= TOLD else "prior" if self.width >= SILENT else "both"
+
+
+class OfEstimates(Shown):
+    """A result that is values of a card."""
+
+    estimates: tuple[Estimate, ...]
+
+    @property
+    def determined(self) -> str:
+        """How many of the values the data determine, in words."""
+        told = sum(one.told_by == "data" for one in self.estimates)
+        return f"{told} of {len(self.estimates)} values determined by the data"
+
+    def to_frame(self) -> "DataFrame":
+        """Return one row an uncertain value, best known first: card, value, interval, shift, width, told by."""
+        import pandas as pd
+
+        rows = [asdict(one) | {"told_by": one.told_by} for one in sorted(self.estimates, key=lambda one: one.width)]
+        columns = ["unit", "card", "value", "low", "high", "shift_sd", "width", "told_by"]
+        return pd.DataFrame(rows).set_index("parameter")[columns]
 
 
 def estimate(fit: CardFit, profile: bool = True) -> tuple[Estimate, ...]:

@@ -49,7 +49,7 @@ def calibrate(
         there = "is 1 record" if records == 1 else f"are {records} records"
         raise InputError(f"--hold-out {hold_out}: there {there}, numbered from 1.")
     with Told("calibration", STAGES) as told:
-        found = workbench.calibrate(instrument, *data, hold_out=hold_out or None, exact=exact, progress=told)
+        found = workbench.calibrate_records(instrument, data, hold_out or None, exact, told)
     for warning in found.warnings:
         say(f"warning: {warning}")
     saved = keep_card(found.instrument, save, found.unsaved)

@@ -15,7 +15,7 @@ import scipy
 
 from compensation.arrays import Array
 from compensation.constants import NINETY
-from studies.calibration.estimates import Estimate, find_groups, posterior_card
+from studies.calibration.estimates import Estimate, OfEstimates, find_groups, posterior_card
 from studies.calibration.priors import Priors, check_exact, from_standard, gather_priors
 from studies.errors import InputError
 from studies.instrument.card import Instrument
@@ -47,8 +47,8 @@ class NextMode:
     sd_then: float
 
 
-@dataclass(frozen=True, eq=False)
-class ModeCalibration:
+@dataclass(frozen=True, eq=False, repr=False)
+class ModeCalibration(OfEstimates):
     """A card and what its modes say of it."""
 
     # card, instrument: as given; with the values found.
@@ -65,6 +65,9 @@ class ModeCalibration:
     next_modes: tuple[NextMode, ...]
     misfit: float  # squared, over what is expected
     warnings: tuple[str, ...]
+
+    def __repr__(self) -> str:
+        return f"ModeCalibration({self.card.name}: {self.determined}; {len(self.readings)} modes)"
 
 
 def invert(

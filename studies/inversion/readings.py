@@ -1,6 +1,8 @@
 """A table of measured modes: `harmonic` (empty where n is not known), `index`, `frequency_Hz`, `sd_Hz`, `temperature_degC`."""
 
 from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, TypeGuard
 
 import numpy as np
 
@@ -8,7 +10,10 @@ from compensation.arrays import Array
 from shell.constants import zero_Celsius
 from studies.errors import InputError
 from studies.files.columns import read_columns, read_header
-from studies.record import refuse_kilohertz
+from studies.record import Record, Run, refuse_kilohertz
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
 COLUMNS = ("harmonic", "index", "frequency_Hz", "sd_Hz", "temperature_degC")
 USUAL = 1e-6  # relative standard deviation of a frequency where the table states none
@@ -33,15 +38,16 @@ class ModeReadings:
         return len(self.frequency)
 
 
-def is_mode_table(path: str) -> bool:
-    """Return whether a file is a table of modes."""
-    names = read_header(path)
+def is_mode_table(path: Run) -> "TypeGuard[str | Path | DataFrame]":
+    """Return whether it is a table of modes."""
+    names = ["time_s"] if isinstance(path, Record) else read_header(path)
     return "time_s" not in names and not {"harmonic", "index", "sd_Hz"}.isdisjoint(names)
 
 
-def read_modes(path: str) -> ModeReadings:
+def read_modes(data: "str | Path | DataFrame") -> ModeReadings:
     """Read a table of modes."""
-    table = read_columns(path, COLUMNS, required=("harmonic", "frequency_Hz"))
+    table = read_columns(data, COLUMNS, required=("harmonic", "frequency_Hz"))
+    path = table.path
     count = len(table.values["frequency_Hz"])
     n, k, f, sd, T = (table.values.get(name, np.full(count, np.nan)) for name in COLUMNS)
     if not count:

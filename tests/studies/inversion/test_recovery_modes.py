@@ -1,8 +1,10 @@
 """Recovery: values, assignment and the mode to measure next from frequencies of modes; what cannot be decided is said."""
 
 import numpy as np
+import pandas as pd
 import pytest
 
+import studies
 from studies.errors import InputError
 from studies.instrument.card import build_instrument, load_card
 from studies.inversion.assignment import assign
@@ -100,3 +102,16 @@ def test_contract_a_mode_stands_once_and_alone(tmp_path, refuse):
     run.write_text("time_s,housing_temperature_degC,frequency_Hz\n0,20,4500\n1,20,4500\n")
     assert "twice" in refuse(["calibrate", str(CARD[0]), str(path)])
     assert "alone" in refuse(["calibrate", str(CARD[0]), str(path), str(run)])
+
+
+def test_contract_from_python_as_from_the_command_line():
+    """A table of modes by path or of pandas; the result is short, and a table of values."""
+    path = CARD[1]
+    one = studies.calibrate(CARD[0], path)
+    same = studies.calibrate(CARD[0], pd.read_csv(path, comment="#"))
+    assert repr(one).startswith("ModeCalibration(")
+    assert len(repr(one)) < 120
+    assert same.to_frame().equals(one.to_frame())
+    assert one.to_frame().loc["resonator.thickness_mm", "told_by"] == "data"
+    with pytest.raises(InputError, match="alone"):
+        studies.calibrate(CARD[0], path, path)
