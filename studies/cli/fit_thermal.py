@@ -19,6 +19,7 @@ NAMES = {
     "capacity_ratio": ("Heat capacity of the resonator over that of the base", ""),
     "capacity_slope_per_K": ("Relative slope of the resonator's heat capacity", "1/K"),
     "sensor_time_constant": ("Time constant of the housing's sensor", "s"),
+    "delay": ("Delay of the frequency behind the sensor, besides", "s"),
     "offset": ("Frequency at the reference temperature", "Hz"),
     "slope": ("Slope of the frequency", "Hz/K"),
     "curvature": ("Second-order coefficient", "Hz/K²"),
@@ -43,7 +44,7 @@ def fit_thermal(
     """Find the time constants with which the resonator follows its housing, with intervals, and what the records do not determine.
 
     The records need time_s, frequency_Hz and housing_temperature_degC (or chamber_temperature_degC). The model is a series of
-    lags with heat exchange by conduction and radiation; where these leave slow noise, of lumps that may also radiate past one another, behind a sensor that may be late. The initial temperatures of each run are fitted, and the noise may
+    lags with heat exchange by conduction and radiation; where these leave slow noise, of lumps that may also radiate past one another, behind a sensor that may be late, or a delay of seconds. The initial temperatures of each run are fitted, and the noise may
     drift. The frequency is a cubic in temperature. The intervals hold only for a gyro that fits this model; slow noise well above that of a row shows a misfit.
 
     Args:

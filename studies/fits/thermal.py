@@ -6,6 +6,7 @@ with radiation along or past them (`studies.inference.heat_path`), each run with
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import scipy
@@ -16,7 +17,19 @@ from studies.calibration.fit import fit
 from studies.calibration.priors import from_standard
 from studies.errors import InputError
 from studies.inference.diagnosis import build_problem
-from studies.inference.heat_path import LAGS, OF_LUMPS, SENSOR, HeatPath, cubic_of, find_heat_path, slow_share
+from studies.inference.heat_path import (
+    DELAY,
+    FOLLOWED,
+    LAGS,
+    OF_LUMPS,
+    SENSOR,
+    SURE_SHARE,
+    WORTH,
+    HeatPath,
+    cubic_of,
+    find_heat_path,
+    slow_share,
+)  # fmt: skip
 from studies.inference.polynomial_card import polynomial_card
 from studies.inference.records import driving, make_ready
 from studies.inference.signatures import SHARE
@@ -25,7 +38,7 @@ from studies.record import Record
 from studies.resonator.law import law_of
 
 NAMES = {f"law.{key}": f"time_constant_{k}" for k, key in enumerate(LAGS, 1)} | {
-    SHARE: "radiated_share", **{f"law.{key}": key for key in OF_LUMPS}, SENSOR: "sensor_time_constant", "law.f0_Hz": "offset", "law.a1_per_K": "slope", "law.a2_per_K2": "curvature", "law.a3_per_K3": "third_order"
+    SHARE: "radiated_share", **{f"law.{key}": key for key in OF_LUMPS}, SENSOR: "sensor_time_constant", DELAY: "delay", "law.f0_Hz": "offset", "law.a1_per_K": "slope", "law.a2_per_K2": "curvature", "law.a3_per_K3": "third_order"
 }  # fmt: skip
 
 SHARES = ("radiated_share", "base_radiated_share")
@@ -97,14 +110,22 @@ def fit_thermal_constants(
         why = "; ".join(campaign.skipped.values()) or "too few rows"
         raise InputError(f"{records[0].path or 'record'}: nothing can be identified: {why}.")
     card = polynomial_card(campaign.records)
-    law = card.content["law"] | {"delay_s": {"value": 0.0, "sd": 0.0}}
-    law |= cubic_of(card)
+    law = card.content["law"] | cubic_of(card)
     if max(float(np.ptp(driving(record))) for record in campaign.records) < RESTS:
         law = {key: own for key, own in law.items() if not key.startswith("a")}
     if instrument is not None:
         law |= curvature_of(instrument, card.reference_temperature)
     progress("one lag")
-    path = find_heat_path(fit(build_problem(card.with_table("law", law), campaign.records)), lags, progress)
+
+    def find(law: dict[str, Any]) -> HeatPath:
+        return find_heat_path(fit(build_problem(card.with_table("law", law), campaign.records)), lags, progress)
+
+    path = find(law | {"delay_s": {"value": 0.0, "sd": 0.0}})
+    share, error = path.value(SHARE)
+    if lags is None and (abs(share) > SURE_SHARE * error or slow_share(path.fit) > FOLLOWED):
+        # Seconds by which a sensor or a clock is late look like radiation, or like slow noise.
+        late = find(law)
+        path = late if late.evidence > path.evidence + WORTH else path
     estimates = dict(_estimates(path, float(scipy.stats.norm.ppf(0.5 + 0.5 * confidence))))
     groups = (
         [NAMES[name] for name in group if name in NAMES]

@@ -48,6 +48,18 @@ def one_lag(words=STEPS, tau=1800.0, departure=1.5, **noise):
     return record(t, T_h, lag(t, T_h, tau) + departure * np.exp(-t / tau), **noise)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("late", [5.0, 10.0])
+def test_a_sensor_that_leads_by_seconds_is_no_radiation(late):
+    """A second lag of seconds was told as a radiated share of 0.04 to 0.10, 4 to 6 of its errors from none."""
+    t, T_h = housing("ramp -20 25 0.75 then soak 25 4h", step=10.0)
+    found = fit_thermal_constants([record(t, T_h, lag(t, lag(t, T_h, late), 1200.0), white=1e-3)]).estimates
+    tau, share, delay = found["time_constant_1"], found["radiated_share"], found["delay"]
+    assert tau.low < 1200.0 < tau.high
+    assert share.low == 0.0
+    assert delay.low < late < delay.high
+
+
 def test_one_lag_without_radiation_is_found_with_its_interval(tmp_path, ask):
     path = tmp_path / "run.csv"
     write_record(one_lag(), path)
