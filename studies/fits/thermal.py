@@ -29,7 +29,7 @@ from studies.inference.heat_path import (
     cubic_of,
     find_heat_path,
     slow_share,
-)  # fmt: skip
+)
 from studies.inference.polynomial_card import polynomial_card
 from studies.inference.records import driving, make_ready
 from studies.inference.signatures import SHARE

@@ -72,7 +72,9 @@ def make_ready(given: Sequence[Record]) -> Campaign:
     if not any(long):
         short = {name: "too few rows in every run" for name in RESPONSES if any(name in own for own in out)}
         why = "; ".join(f"{name}: {words}" for name, words in (skipped | short).items())
-        raise InputError(f"{', '.join(paths)}: too little for a diagnosis: {why}. Give longer records.")
+        still = not short and set(skipped.values()) == {"constant"}
+        mend = "Record more digits, or a run in which it varies." if still else "Give longer records."
+        raise InputError(f"{', '.join(paths)}: too little for a diagnosis: {why}. {mend}")
     notes += [f"{own.path}: too few rows; it is left out." for own, enough in zip(out, long, strict=True) if not enough]
     chosen = [k for k, enough in enumerate(long) if enough]
     return Campaign(

@@ -105,6 +105,12 @@ def test_constant_temperature_is_adequate_and_says_what_cannot_show(ask, tmp_pat
     assert "K only" in found["responses"]["frequency_Hz"]["remark"]
 
 
+def test_a_response_that_stands_still_asks_for_more_digits(refuse, tmp_path):
+    time = np.arange(0.0, 20000.0, 20.0)
+    columns = {"time_s": time, "housing_temperature_degC": time / 1000.0, "frequency_Hz": np.full(time.shape, 5000.0)}
+    assert "frequency_Hz: constant. Record more digits" in refuse(["diagnose", save(tmp_path, columns)])
+
+
 @pytest.mark.parametrize("kind", ["run", "table"])
 def test_temperatures_beyond_the_material_law_are_named(campaign, refuse, tmp_path, kind):
     """The law of the card ends at -60 degrees: nothing is extrapolated in silence."""
