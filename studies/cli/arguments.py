@@ -92,7 +92,7 @@ def ending_of(out: str, kinds: Sequence[str]) -> str:
 
 
 def lay_temperatures(from_degC: float, to_degC: float, step: float) -> "Array":
-    """Return the temperatures (K) of --from, --to and --step."""
+    """Return the temperatures (K) of --from, --to and --step, --to among them."""
     import numpy as np
 
     asked = f"--from {from_degC:g} --to {to_degC:g} --step {step:g}"
@@ -100,4 +100,5 @@ def lay_temperatures(from_degC: float, to_degC: float, step: float) -> "Array":
         raise InputError(f"{asked}: the step must be positive and --to not below --from.")
     if not (to_degC - from_degC) / step < MOST_TEMPERATURES:
         raise InputError(f"{asked}: more than {MOST_TEMPERATURES} temperatures; take a longer step.")
-    return np.arange(from_degC, to_degC + 1e-9 * step, step) + zero_Celsius
+    laid = np.arange(from_degC, to_degC - 1e-9 * step, step)
+    return np.append(laid, to_degC) + zero_Celsius

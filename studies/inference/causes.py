@@ -8,7 +8,7 @@ import scipy
 
 from compensation.arrays import Array
 from compensation.constants import NINETY
-from studies.calibration.noise_levels import LASTING
+from studies.calibration.noise_levels import has_levels
 from studies.diagnosis.constants import CONSTANTS
 from studies.diagnosis.verdict import Cause, Interval, same_cause, weigh
 from studies.effects import library
@@ -237,7 +237,7 @@ def _clock_cause(found: Inferred) -> list[Cause]:
 def with_levels(search: Search, now: Hypothesis, name: str) -> Hypothesis:
     """Return a model with a level of every run of a response, where that is more probable by far; else the model."""
     problem = search.linear.problem
-    if len(problem.runs) == 1 or name not in LASTING:
+    if len(problem.runs) == 1 or has_levels(problem, name):
         return now
     form = offsets(len(problem.runs))
     bank = search.shapes_of([(form, name)])

@@ -31,6 +31,8 @@ from studies.inference.heat_path import (
     is_ahead,
     is_strained,
     lags_would_bring,
+    levels_apart,
+    levels_would_bring,
     slow_share,
     with_second_mass,
 )
@@ -182,10 +184,13 @@ def infer(
     """Find what records say of a card, whose `law` may be known, and of effects that it lacks."""
     progress("calibration without effects")
     whole, apart = fit_explained(build_problem(card, campaign.records, law=law), progress)
-    found = set_housing_apart(whole)
     campaign = replace(campaign, notes=(*campaign.notes, *apart))
+    found = set_housing_apart(whole)
+    own = Pursuit(found, progress)
+    if levels_would_bring(own.search) > MARGIN + max(effects_would_bring(own.search), lags_would_bring(own.search)):
+        campaign = replace(campaign, notes=(*campaign.notes, levels_apart(found)))
     problem = found.problem
-    path, search, outcome = _with_heat_path(whole, found, progress)
+    path, search, outcome = _with_heat_path(whole, own, progress)
     if card.polynomial is None and path is None and np.abs(found.away).max(initial=0.0) > FAR:
         # values may have gone far to do what an effect does: look from the card as shipped too
         progress("again from the card's own values")
@@ -223,9 +228,9 @@ def infer(
     )
 
 
-def _with_heat_path(whole: CardFit, found: CardFit, progress: Report) -> tuple[HeatPath | None, Search, Outcome]:
+def _with_heat_path(whole: CardFit, own: Pursuit, progress: Report) -> tuple[HeatPath | None, Search, Outcome]:
     """Search beside the path of the card, or one lag, and where that leaves slow noise of which other lags would take something, strains the card's values, or the sensor is late, beside a longer one; the likelier heat path stays."""
-    own, given, path = Pursuit(found, progress), whole.problem.instrument.polynomial is None, None
+    found, given, path = own.start, whole.problem.instrument.polynomial is None, None
     bring = lags_would_bring(own.search) if slow_share(found) > SUSPICIOUS else -np.inf
     if given and (is_strained(found) or (bring > WORTH and bring > effects_would_bring(own.search))):
         path = with_second_mass(whole, found, progress)
@@ -236,11 +241,14 @@ def _with_heat_path(whole: CardFit, found: CardFit, progress: Report) -> tuple[H
     progress(f"effects beside a heat path with {path.lags} time constants")
     there, grown = Pursuit(path.fit, progress).outcome()
     score = there.fair(grown.final) + path.housing + path.price
+    gain, plain = score - evidence_of(found), own.search.settle((), found.noise)
+    if with_levels(own.search, plain, FREQUENCY).score - plain.score > gain + MARGIN:
+        return (None, *own.outcome())
     search, outcome = own.outcome(-np.inf if given else score - BEATEN)
-    gain, lead = score - evidence_of(found), score - search.fair(outcome.final)
-    levels = with_levels(search, outcome.plain, FREQUENCY).score - outcome.plain.score
-    needed = MARGIN + given * FURTHER * sum(term.brought for term in outcome.final.terms if term.response == FREQUENCY)
-    if lead < needed or levels > gain + MARGIN:
+    lead = score - search.fair(outcome.final)
+    if lead < MARGIN + given * FURTHER * sum(
+        term.brought for term in outcome.final.terms if term.response == FREQUENCY
+    ):
         return None, search, outcome
     return replace(path, evidence=gain, lead=lead), there, grown
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from compensation.arrays import Array
 from compensation.noise import Noise
-from studies.calibration.noise_levels import LASTING
+from studies.calibration.noise_levels import has_levels
 from studies.inference.model import Linear, Term, solve_posterior, split
 from studies.inference.signatures import Path, Signatures
 
@@ -108,7 +108,7 @@ class Model:
             for name in part.responses:
                 rows, own = run.own_rows[name]
                 rest = own - on_rows(rows, drive.time - run.record["time_s"][0], columns[name])
-                if name not in LASTING:  # from turn-on to turn-on
+                if has_levels(self.problem, name):  # from turn-on to turn-on
                     rest -= rest.mean()
                 found[name][0].append(rows)
                 found[name][1].append(rest)
@@ -152,7 +152,7 @@ class Model:
 
     def _level(self, name: str, k: int, mean: float) -> float:
         """Return the part of a run's mean that is its own: of a turn-on all, else what slow noise may carry a whole run off."""
-        if name not in LASTING:
+        if has_levels(self.problem, name):
             return mean
         slow = self.linear.rows[name].covariance(k, replace(self.noise[name], white=0.0))
         most = CARRIED_OFF * float(np.sqrt(max(float(slow.mean()), 0.0)))
@@ -182,7 +182,7 @@ class Model:
     def _known(self, name: str, C: Array, others: NDArray[np.intp]) -> Mask:
         """Blocks that a trained model predicts to `KNOWN` times the noise; the level of a run of its own is refitted."""
         X, level = self.linear.columns(self.terms, name)[:, others], self.linear.rows[name]
-        if name not in LASTING:
+        if has_levels(self.problem, name):
             X = np.concatenate([X[own] - X[own].mean(axis=0) for own in level.slices])
         spread = np.sqrt(np.einsum("ij,jk,ik->i", X, C, X))
         noise = np.sqrt(level.variances(replace(self.noise[name], offset=0.0)))

@@ -171,6 +171,8 @@ def settle(names: Sequence[str], judge: str, equals: Sequence[str], drifts: bool
 
 FEWEST_BINS = 24
 """Values from which on the noise of a response can be told."""
+ONE_WAVE = 1e-3
+"""Relative difference of two clocks beyond which they count different waves."""
 MOST_LOSS = 30.0
 """Times by which 1/Q of one gyro may differ from record to record."""
 
@@ -181,6 +183,12 @@ def check_units(records: Sequence[Record], tables: Sequence[dict[str, Array]]) -
         where = record.path or "record"
         if not 100.0 < (value := _level(table, "frequency_Hz", 1e3)) < 1e9:
             raise InputError(f"{where}: frequency_Hz is about {value:g}, not 100 Hz to 1 GHz. Is it in another unit?")
+        own, other = (_level(table, name, np.nan) for name in ("frequency_Hz", REFERENCE))
+        if abs(other / own - 1) > ONE_WAVE:
+            raise InputError(
+                f"{where}: {REFERENCE} is about {other:.6g} Hz, frequency_Hz about {own:.6g} Hz: the two are to be of one wave,"
+                " by two clocks. Correct the one that is wrong, or leave that column out."
+            )
         if not 0.0 < (value := _level(table, "inverse_q", 1e-3)) < 0.1:
             raise InputError(f"{where}: inverse_q is about {value:g}, not between 0 and 0.1. Is it Q itself?")
     return [doubt for doubt in map(check_temperatures, records) if doubt]

@@ -63,19 +63,18 @@ def result_of(found: Inferred, name: str, causes: Sequence[Cause]) -> ResponseRe
 def _judge(
     found: Inferred, name: str, terms: bool, mine: Sequence[Cause], values: bool, slow: float, share: float | None
 ) -> tuple[str, str]:
-    left = found.left[name]
+    left, apart = found.left[name], _apart(found, name)
     clean = share is None or share >= CONSTANTS["share_explained"]
     patched = bool(mine) and max(cause.probability for cause in mine) < CONSTANTS["believed"]
     if left.significant and (share is None or not clean or patched):
-        return "unexplained", ""
-    apart = _apart(found, name)
+        return "unexplained", apart
     if apart and not terms and not mine and found.card.polynomial is not None:
         return "not-identifiable", apart
     if slow > CONSTANTS["wander_usual"]:
         return "not-identifiable", (
             f"the slow part of the residual is {slow:.2g} times {SLOW_THAN[_stated(found, name) is not None]}: these records cannot"
             " distinguish slow noise from a cause that acts slowly"
-        )
+        ) + (apart and f"; {apart}")
     if terms or mine:
         return ("not-identifiable" if any(cause.equivalent for cause in mine) else "explained"), apart
     if values:
@@ -113,17 +112,10 @@ def _turned_on(found: Inferred, name: str, verdict: str) -> str:
     """Return the sentence on offsets of runs far beyond what is left within them."""
     if name in LASTING or verdict != "adequate":
         return ""
-    shifts, within = _shifts_and_rest(found, name)
+    if odd := _odd_run(found, name):
+        return f"{odd}: one turn-on, or something done between the runs"
+    apart, within = _apart_and_within(found, name)
     response = RESPONSES[name]
-    far = int(np.argmax(np.abs(shifts - np.median(shifts))))
-    others = np.delete(shifts, far)
-    if len(others) > 1 and abs(odd := shifts[far] - others.mean()) > ODD * max(float(np.std(others, ddof=1)), within):
-        record = found.campaign.records[far].path or f"run {far + 1}"
-        return (
-            f"{record}: its bias lies {odd * response.scale:+.3g} {response.shown} from that of the other runs, which agree to"
-            f" {np.std(others, ddof=1) * response.scale:.2g} {response.shown}: one turn-on, or something done between the runs"
-        )
-    apart = float(np.sqrt(np.mean(shifts**2)))
     if apart <= CONSTANTS["wander_usual"] * within or found.card.polynomial is None:
         return ""
     return (
@@ -134,18 +126,36 @@ def _turned_on(found: Inferred, name: str, verdict: str) -> str:
 
 def _apart(found: Inferred, name: str) -> str:
     """Return the sentence on runs of a response without turn-on that lie farther apart than what is left within them."""
-    if name not in LASTING:
+    apart, within = _apart_and_within(found, name)
+    if name not in LASTING or apart <= CONSTANTS["wander_usual"] * within:
         return ""
-    shifts, within = _shifts_and_rest(found, name)
-    apart = float(np.sqrt(np.mean(shifts**2)))
-    if apart <= CONSTANTS["wander_usual"] * within:
-        return ""
+    if odd := _odd_run(found, name):
+        return f"{odd}: another gyro, or something done between the runs"
     response = RESPONSES[name]
     text = (
         f"the runs lie {apart * response.scale:.3g} {response.shown} (rms) apart, {apart / within:.0f} times the residual within them:"
         " ageing, clock error, handling, or drift between runs"
     )
     return text if found.campaign.timed else text + "; start times ('# start' in the records) would show which of these"
+
+
+def _odd_run(found: Inferred, name: str) -> str:
+    """Name a run whose level lies far from those of the others, which agree; or nothing."""
+    shifts, within, response = np.array(_run_shifts(found, name)), found.rows[name].within, RESPONSES[name]
+    far = int(np.argmax(np.abs(shifts - np.median(shifts))))
+    others = np.delete(shifts, far)
+    if len(others) < 2 or abs(odd := shifts[far] - others.mean()) <= ODD * max(scatter := float(np.std(others, ddof=1)), within):  # fmt: skip
+        return ""
+    record = found.campaign.records[far].path or f"run {far + 1}"
+    return (
+        f"{record}: its {response.word} lies {odd * response.scale:+.3g} {response.shown} from that of the other runs, which agree to"
+        f" {scatter * response.scale:.2g} {response.shown}"
+    )
+
+
+def _apart_and_within(found: Inferred, name: str) -> tuple[float, float]:
+    """How far the runs lie apart (rms), and what is left within them."""
+    return float(np.sqrt(np.mean(np.square(_run_shifts(found, name))))), found.rows[name].within
 
 
 def _slow(found: Inferred, name: str) -> float:
@@ -171,11 +181,6 @@ def _stated(found: Inferred, name: str) -> Noise | None:
 def is_slow(found: Inferred, name: str) -> bool:
     """Whether more slow noise is left of a response than is usual."""
     return _slow(found, name) > CONSTANTS["wander_usual"]
-
-
-def _shifts_and_rest(found: Inferred, name: str) -> tuple[Array, float]:
-    """Means of the runs about their mean, and the rms of what is left within the runs."""
-    return np.array(_run_shifts(found, name)), found.rows[name].within
 
 
 def _run_shifts(found: Inferred, name: str) -> tuple[float, ...]:

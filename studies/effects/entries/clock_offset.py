@@ -17,7 +17,7 @@ def grid(span: Span, response: str) -> list[tuple[float, ...]]:
 
 EFFECT = Effect(
     name="clock-offset",
-    summary="the columns of one run were logged by clocks that are seconds apart",
+    summary="the columns of one run were logged by clocks that are seconds apart; to first order in the offset",
     source="two loggers with clocks of their own",
     isolate="log a mark that both loggers see, such as a step of the supply, at the start and the end of the run",
     sensor="one logger for all columns, or a common mark",

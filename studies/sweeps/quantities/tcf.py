@@ -22,6 +22,10 @@ class TemperatureCoefficient(ModeQuantity, frozen=True, kw_only=True, tag="tcf")
         case.require_lowest(self.harmonic, self.theory, T)
         law = law_of(case.instrument, T, T, self.theory, self.harmonic)
         found, level = law.parts(T), STEEPEST * law.solver_error
+        if self.theory == "rayleigh":  # closed: what it lacks is bending, as shell theory has it
+            bent = law_of(case.instrument, T, T, "shell", self.harmonic).parts(T)
+            both = [(getattr(found, part), getattr(bent, part)) for part in ("total", *PARTS)]
+            return tuple(Number(1e6 * float(own), 1e6 * abs(float(own - other))) for own, other in both)
         of_nu = level * abs(float(law.material.slope("poisson_ratio", T)))
         of_h = level * abs(float(law.material.value("expansion", T)))
         # the parts of h and r add up to −alpha whatever the slope by h

@@ -5,6 +5,7 @@ from datetime import UTC, datetime, timedelta
 import numpy as np
 import pytest
 
+from studies.errors import InputError
 from studies.workbench import diagnose_records
 from tests.studies.diagnosis.bench import BACK, CYCLE, Bench, searched
 
@@ -103,3 +104,20 @@ def test_a_reference_clock_finds_a_drift_that_the_record_hides():
     """A drift that white noise of each row covers: without the reference nothing is named, with it the clock is."""
     assert "clock-drift" in {cause.effect for cause in told(drifting(2e-5, 2e-3, False)).causes}
     assert not told(drifting(2e-5, 2e-3)).causes
+
+
+def test_a_file_of_another_gyro_of_the_lot_is_said(only):
+    """A run 7 Hz above the others, 1400 ppm: no effect does that, and the run is named."""
+    only("second-lag", "curvature", "ageing", "thermometer-lag")
+    records = []
+    for k, corners in enumerate([CYCLE, BACK, CYCLE]):
+        bench = Bench(corners, seed=70 + k)
+        records.append(bench.record(k, frequency_Hz=bench.frequency(2e-3) + 7.0 * (k == 1)))
+    assert any("that of run1.csv lies farthest" in note for note in told(records).notes)
+
+
+def test_a_second_clock_that_counts_another_wave_is_refused():
+    bench = Bench(CYCLE, seed=80)
+    frequency = bench.frequency(2e-3)
+    with pytest.raises(InputError, match="of one wave, by two clocks"):
+        told([bench.record(0, frequency_Hz=frequency, reference_frequency_Hz=frequency / 2)])

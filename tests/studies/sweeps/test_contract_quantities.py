@@ -61,3 +61,10 @@ def test_quantities_of_one_case_share_their_solves(case):
         asked("bryan-factor", theory="shell").evaluate(case)
     finally:
         modes.solve_modes = solve
+
+
+def test_the_error_of_a_closed_slope_is_what_it_lacks_of_shell_theory():
+    dome = Case(load_card("free-dome"), {})
+    closed, bent = (asked("tcf", theory=theory).evaluate(dome)[0] for theory in ("rayleigh", "shell"))
+    assert closed.error == pytest.approx(abs(closed.value - bent.value))
+    assert closed.error < 10.0
