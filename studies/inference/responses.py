@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from compensation.arrays import Array
 from compensation.noise import Noise, white_rms
 from studies.calibration.noise_levels import LASTING, stated_noise
 from studies.diagnosis.constants import CONSTANTS
