@@ -9,7 +9,7 @@ its prior, 0 for none, are those of the highest marginal likelihood
 uneven and have gaps. A run takes N³/3 operations per evaluation, once for all runs of equal rows: average long records to some hundred rows.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from itertools import pairwise
@@ -29,6 +29,10 @@ WHITE = -0.3  # ln of white noise over the scatter of neighbouring rows, where t
 TOO_QUIET = 1.0  # ln by which white noise below that is odd
 USUAL, SPREAD = -1.0, 3.0  # their weak prior, which keeps a level that the rows say nothing about from running away
 STATED_SPREAD = 0.7  # the same about ln of a level that is stated: a factor of 2
+LONGEST, CLOSE = 3.0, 1e-3  # of a step in ln of a level, and fall of −2 ln L that the last one promises
+MOST_STEPS, MOST_HALVINGS = 50, 12
+LOUD = 1.0  # ln of slow noise within a run over that of a row, beyond which its kinds are searched each for itself
+PURE = 0.02  # of it, within which it is of one kind
 
 
 @dataclass(frozen=True)
@@ -154,10 +158,11 @@ class NoiseRows:
 
     def deviance(
         self, target: Array, columns: Array, precision: Array, noise: Noise, mean: Array | None = None
-    ) -> tuple[float, dict[str, float]]:
-        """Return −2 ln L (see the module) of residuals (M,) beside columns (M, p) of prior precision and mean, and its slopes.
+    ) -> tuple[float, Array, Array]:
+        """Return −2 ln L (see the module) of residuals (M,) beside columns (M, p) of prior precision and mean, its slopes by ln θ of the levels `KINDS`, and their curvature.
 
-        By ln θ of a level Σ_ij (Σ⁻¹ − U Uᵀ)_ij θ ∂Σ_ij/∂θ, U = Σ⁻¹ [X C, e], C Cᵀ = (Λ + XᵀΣ⁻¹X)⁻¹, e what is left.
+        With Σ_θ = θ ∂Σ/∂θ, V⁻¹ = Σ⁻¹ − U Uᵀ, U = Σ⁻¹ X C, C Cᵀ = (Λ + XᵀΣ⁻¹X)⁻¹, and v = Σ⁻¹ times what is left: tr V⁻¹Σ_θ − vᵀΣ_θ v,
+        and vᵀΣ_θ V⁻¹ Σ_φ v, the mean of observed and expected information (Johnson & Thompson 1995, J. Dairy Sci. 78, 449).
         """
         whitener = self._factor(noise)
         white, total = whitener(np.column_stack([columns, target])), whitener.log_determinant
@@ -170,17 +175,22 @@ class NoiseRows:
         rest = r - X @ found
         total += float(rest @ rest + (found - about) @ (precision * (found - about)))
         total += 2 * float(np.log(np.diag(root)).sum())
-        both, slopes = np.column_stack([beside, rest]), dict.fromkeys(KINDS, 0.0)
+        both, slopes, moved = np.column_stack([beside, rest]), np.zeros(len(KINDS)), np.zeros((len(rest), len(KINDS)))
+        levels = 2 * np.array([noise.white, noise.flicker, noise.walk, noise.offset]) ** 2
         for (K, runs), (F, W, _) in zip(whitener.roots, self._groups, strict=True):
-            S = len(runs) * (K.T @ K)
+            S = len(runs) * scipy.linalg.lapack.dlauum(K, lower=1)[0]  # of V⁻¹ − v vᵀ the lower half
+            wide = self.stretch[runs[0]] / self.spans[runs[0]]
             for run in runs:
-                U = K.T @ both[self.slices[run]]
-                S -= U @ U.T
-            slopes["white"] += 2 * noise.white**2 * float(S.diagonal() @ (self.stretch[runs[0]] / self.spans[runs[0]]))
-            for kind, level, own in (("flicker", noise.flicker, F), ("walk", noise.walk, W)):
-                slopes[kind] += 2 * level**2 * float(np.vdot(S, own)) if level else 0.0
-            slopes["offset"] += 2 * noise.offset**2 * float(S.sum()) if noise.offset else 0.0
-        return total, slopes
+                U = scipy.linalg.blas.dtrmm(1.0, K, both[self.slices[run]], lower=1, trans_a=1)
+                S = scipy.linalg.blas.dsyrk(-1.0, U, beta=1.0, c=S, lower=1)
+                v = U[:, -1]
+                own = np.column_stack([wide * v, F @ v, W @ v, np.full(len(v), v.sum())])
+                moved[self.slices[run]] = scipy.linalg.blas.dtrmm(1.0, K, own * levels, lower=1)
+            diagonal = S.diagonal()
+            by_kind = diagonal @ wide, *(2 * np.vdot(S, own) - diagonal @ own.diagonal() for own in (F, W))
+            slopes += levels * np.array([*by_kind, 2 * S.sum() - diagonal.sum()])
+        told = beside.T @ moved
+        return total, slopes, moved.T @ moved - told.T @ told
 
 
 @lru_cache(maxsize=8)
@@ -254,15 +264,22 @@ def estimate_noise(
         slow = {kind: white * unit[kind] * float(np.exp(one)) for kind, one in zip(free, x[1:], strict=True)}
         return Noise(white * root, **slow)
 
-    def objective(x: Array) -> tuple[float, Array]:
+    places = [0, *(KINDS.index(kind) for kind in free)]
+    along = np.eye(len(places))
+    along[:, 0] = 1.0  # slow levels are over the white one
+
+    def objective(x: Array) -> tuple[float, Array, Array]:
         noise = levels(x)
-        total, by_level = rows.deviance(rest, X, lam, noise, -free_part)
-        slopes = np.array([sum(by_level.values()), *(by_level[kind] for kind in free)])
+        try:
+            total, slopes, curvature = rows.deviance(rest, X, lam, noise, -free_part)
+        except np.linalg.LinAlgError:  # levels so far apart that rounding decides
+            return np.inf, x, np.eye(len(x))
+        bend = curvature[np.ix_(places, places)] + np.diag(2 * np.maximum(slopes[places], 0.0))  # Σ goes with θ²
+        slope, bend = slopes[places] @ along, along.T @ bend @ along
         for k, (surprise, spread, absolute) in enumerate(_surprises(rows, noise, free, stated), 1):
-            total += surprise**2
-            slopes[k] += 2 * surprise / spread
-            slopes[0] += 2 * surprise / spread * absolute
-        return total, slopes
+            way = (np.eye(len(x))[k] + absolute * np.eye(len(x))[0]) / spread
+            total, slope, bend = total + surprise**2, slope + 2 * surprise * way, bend + 2 * np.outer(way, way)
+        return total, slope, bend
 
     first = usual = np.array([WHITE, *[USUAL] * len(free)])
     if near is not None and near.white > 0:
@@ -270,35 +287,59 @@ def estimate_noise(
         slow = [max(getattr(near, kind) / unit[kind] / white, float(np.exp(LEAST))) for kind in free]
         first = np.log([white / spread, *slow])
         first[1:] = np.clip(first[1:], LEAST, MOST)
-    bounds = [(-12.0, 12.0), *[(LEAST, MOST)] * len(free)]
+    low, high = (np.array([end, *[slow] * len(free)]) for end, slow in ((-12.0, LEAST), (12.0, MOST)))
 
-    def search(start: Array) -> scipy.optimize.OptimizeResult:
-        return scipy.optimize.minimize(
-            objective, start, jac=True, method="L-BFGS-B", bounds=bounds, options={"ftol": 1e-7}
-        )
+    def search(start: Array) -> tuple[float, Array]:
+        return _newton(objective, start, low, high)
 
     found = search(first)
-    for start in _other_slow(found.x, free):  # what is slow may be of another kind than where the search began
-        if objective(start)[0] < found.fun:
-            found = min(found, search(start), key=lambda one: one.fun)
-    if found.x[0] < WHITE - TOO_QUIET:  # slow noise that stands for the scatter of rows may only be a lesser optimum
-        found = min(found, search(usual), key=lambda one: one.fun)
-    return levels(found.x)
+    for start in _other_slow(found[1], free):  # what is slow may be of another kind than where the search ended
+        if start.max() > LOUD or objective(start)[0] < found[0]:
+            found = min(found, search(start), key=lambda one: one[0])
+    if found[1][0] < WHITE - TOO_QUIET:  # slow noise that stands for the scatter of rows may only be a lesser optimum
+        found = min(found, search(usual), key=lambda one: one[0])
+    return levels(found[1])
+
+
+def _newton(
+    objective: Callable[[Array], tuple[float, Array, Array]], x: Array, low: Array, high: Array
+) -> tuple[float, Array]:
+    """Return the least value between bounds, and where, by Newton's steps, halved until they lower it."""
+    value, slope, bend = objective(x)
+    for _ in range(MOST_STEPS):
+        free = ~(((x <= low) & (slope > 0)) | ((x >= high) & (slope < 0)))
+        step = np.zeros_like(x)
+        step[free] = -np.linalg.solve(bend[np.ix_(free, free)] + 1e-9 * np.eye(free.sum()), slope[free])
+        step *= min(1.0, LONGEST / max(np.abs(step).max(), 1e-300))
+        promised = -(slope @ step + 0.5 * step @ bend @ step)
+        if promised < CLOSE:
+            break
+        for _ in range(MOST_HALVINGS):
+            tried = np.clip(x + step, low, high)
+            there = objective(tried)
+            if there[0] < value:
+                break
+            step /= 2
+        else:
+            break
+        x, (value, slope, bend) = tried, there
+    return value, x
 
 
 def _other_slow(x: Array, free: Sequence[str]) -> list[Array]:
-    """Return starts with all slow noise within a run as flicker, and as random walk."""
+    """Return starts with all slow noise within a run as flicker, or as random walk: of the kind that it is not already."""
     kinds = [k for k, kind in enumerate(free, 1) if kind != "offset"]
     if len(kinds) < 2:
         return []
     total = 0.5 * float(np.logaddexp.reduce(2.0 * x[kinds]))
     starts = []
     for k in kinds:
-        start = x.copy()
-        start[kinds] = total + USUAL - SPREAD
-        start[k] = total
-        start[1:] = np.clip(start[1:], LEAST, MOST)
-        starts.append(start)
+        if x[k] < total - PURE:
+            start = x.copy()
+            start[kinds] = total + USUAL - SPREAD
+            start[k] = total
+            start[1:] = np.clip(start[1:], LEAST, MOST)
+            starts.append(start)
     return starts
 
 

@@ -187,7 +187,8 @@ def infer(
     campaign = replace(campaign, notes=(*campaign.notes, *apart))
     found = set_housing_apart(whole)
     own = Pursuit(found, progress)
-    if levels_would_bring(own.search) > MARGIN + max(effects_would_bring(own.search), lags_would_bring(own.search)):
+    levels = levels_would_bring(own.search)
+    if levels > WORTH and levels > MARGIN + max(effects_would_bring(own.search), lags_would_bring(own.search)):
         campaign = replace(campaign, notes=(*campaign.notes, levels_apart(found)))
     problem = found.problem
     path, search, outcome = _with_heat_path(whole, own, progress)

@@ -5,11 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.linalg import block_diag
 from scipy.stats import chi2
 
 from compensation.errors import CompensationError
 from compensation.noise import Noise
-from compensation.noise_rows import NoiseRows, estimate_noise
+from compensation.noise_rows import KINDS, NoiseRows, estimate_noise
 
 Array = NDArray[np.float64]
 GAPPED = np.cumsum(np.concatenate([np.full(60, 80.0), [4000.0], np.full(50, 130.0)]))
@@ -80,7 +81,7 @@ def test_a_prior_narrows_and_its_absence_is_restricted_likelihood():
     noise = Noise(1.1 * np.sqrt(96.0))
     V = 1.21 * np.eye(50) + X @ X.T / 4.0
     exact = np.linalg.slogdet(V)[1] + r @ np.linalg.solve(V, r)
-    given, _ = rows.deviance(r, X, np.full(2, 4.0), noise)
+    given = rows.deviance(r, X, np.full(2, 4.0), noise)[0]
     assert given - 2 * np.log(4.0) == pytest.approx(exact, rel=1e-9)
     rss = float(np.linalg.lstsq(X, r, rcond=None)[1][0])
     restricted = 100 * np.log(1.1) + np.linalg.slogdet(X.T @ X / 1.21)[1] + rss / 1.21
@@ -97,9 +98,17 @@ def test_slopes_of_the_likelihood_are_its_differences():
         moved = replace(noise, **{level: getattr(noise, level) * np.exp(e)})
         return rows.deviance(r, X, prior[0], moved, prior[1])[0]
 
-    _, slopes = rows.deviance(r, X, prior[0], noise, prior[1])
-    for level, slope in slopes.items():
+    _, slopes, curvature = rows.deviance(r, X, prior[0], noise, prior[1])
+    for level, slope in zip(KINDS, slopes, strict=True):
         assert slope == pytest.approx((at(level, 1e-4) - at(level, -1e-4)) / 2e-4, rel=1e-6, abs=1e-6)
+
+    def dense(one):
+        return block_diag(*(rows.covariance(run, one) for run in range(3)))
+
+    P = np.linalg.inv(dense(noise) + X @ np.diag(1 / prior[0]) @ X.T)
+    v = P @ (r - X @ prior[1])
+    moved = [2 * dense(replace(Noise(0.0), **{kind: getattr(noise, kind)})) @ v for kind in KINDS]
+    assert curvature == pytest.approx(np.array([[a @ P @ b for b in moved] for a in moved]), rel=1e-6)
 
 
 def test_the_unit_of_the_signal_does_not_matter():
