@@ -188,7 +188,8 @@ def infer(
     found = set_housing_apart(whole)
     own = Pursuit(found, progress)
     levels = levels_would_bring(own.search)
-    if levels > WORTH and levels > MARGIN + max(effects_would_bring(own.search), lags_would_bring(own.search)):
+    rest = max(effects_would_bring(own.search), lags_would_bring(own.search)) if levels > WORTH else np.inf
+    if levels > MARGIN + rest:
         campaign = replace(campaign, notes=(*campaign.notes, levels_apart(found)))
     problem = found.problem
     path, search, outcome = _with_heat_path(whole, own, progress)
@@ -225,7 +226,19 @@ def infer(
         best = max((one.gain for one in seen), default=-np.inf)
         unknown.append(base.score + best + CONSTANTS["log_prior_unknown"] - outcome.final.score)
     return Inference(
-        card, found, search, outcome, left, shipped, calibrated, rows, held, tuple(unknown), campaign, path
+        card,
+        found,
+        search,
+        outcome,
+        left,
+        shipped,
+        calibrated,
+        rows,
+        held,
+        tuple(unknown),
+        campaign,
+        path,
+        levels > MARGIN + rest,
     )
 
 

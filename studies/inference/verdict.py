@@ -24,7 +24,7 @@ from studies.diagnosis.verdict import (
 )
 from studies.effects import find_effect
 from studies.inference.causes import candidates_of, causes_of
-from studies.inference.heat_path import MASS
+from studies.inference.heat_path import FREQUENCY, MASS
 from studies.inference.inferred import Inferred
 from studies.inference.model import Background
 from studies.inference.records import Campaign
@@ -40,7 +40,9 @@ def judge(found: Inferred) -> Verdict:
     causes = tuple(sorted((*wrong_values(shifts), *causes_of(found)), key=lambda cause: -cause.evidence))
     results = {name: result_of(found, name, causes) for name in found.search.linear.responses}
     results |= skipped_results(found.campaign)
-    named = tuple(cause for cause in _patching(doubted(causes), results) if cause.probability >= CONSTANTS["member"])
+    named = tuple(
+        cause for cause in _patching(found, doubted(causes), results) if cause.probability >= CONSTANTS["member"]
+    )
     told = {cause.response for cause in named}
     for name in found.search.linear.responses:
         if results[name].verdict == "not-identifiable" and name not in told:
@@ -58,11 +60,12 @@ def judge(found: Inferred) -> Verdict:
     )
 
 
-def _patching(causes: Sequence[Cause], results: Mapping[str, ResponseResult]) -> Iterator[Cause]:
-    """Yield the causes, those of responses that stay unexplained and are hardly predicted better as doubtful as such names were."""
+def _patching(found: Inferred, causes: Sequence[Cause], results: Mapping[str, ResponseResult]) -> Iterator[Cause]:
+    """Yield the causes, as doubtful as such names were where a response stays unexplained and is hardly predicted better, or where levels of the runs lead."""
     for cause in causes:
         own = results.get(cause.response)
         patches = own is not None and own.verdict == "unexplained" and (own.gain or 0.0) < CONSTANTS["patching"]
+        patches |= found.levels_lead and cause.response == FREQUENCY
         patches &= cause.kind == "physics"
         yield replace(cause, probability=cause.probability * (1.0 - CONSTANTS["doubt_unexplained"] * patches))
 

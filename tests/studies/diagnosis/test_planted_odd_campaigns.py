@@ -113,7 +113,9 @@ def test_a_file_of_another_gyro_of_the_lot_is_said(only):
     for k, corners in enumerate([CYCLE, BACK, CYCLE]):
         bench = Bench(corners, seed=70 + k)
         records.append(bench.record(k, frequency_Hz=bench.frequency(2e-3) + 7.0 * (k == 1)))
-    assert any("that of run1.csv lies farthest" in note for note in told(records).notes)
+    verdict = told(records)
+    assert any("that of run1.csv lies farthest" in note for note in verdict.notes)
+    assert all(cause.probability < 0.5 for cause in verdict.causes)
 
 
 def test_a_second_clock_that_counts_another_wave_is_refused():
