@@ -189,7 +189,7 @@ def infer(
     own = Pursuit(found, progress)
     levels = levels_would_bring(own.search)
     rest = max(effects_would_bring(own.search), lags_would_bring(own.search)) if levels > WORTH else np.inf
-    if levels > MARGIN + rest:
+    if lead := levels > MARGIN + rest:
         campaign = replace(campaign, notes=(*campaign.notes, levels_apart(found)))
     problem = found.problem
     path, search, outcome = _with_heat_path(whole, own, progress)
@@ -226,19 +226,7 @@ def infer(
         best = max((one.gain for one in seen), default=-np.inf)
         unknown.append(base.score + best + CONSTANTS["log_prior_unknown"] - outcome.final.score)
     return Inference(
-        card,
-        found,
-        search,
-        outcome,
-        left,
-        shipped,
-        calibrated,
-        rows,
-        held,
-        tuple(unknown),
-        campaign,
-        path,
-        levels > MARGIN + rest,
+        card, found, search, outcome, left, shipped, calibrated, rows, held, tuple(unknown), campaign, path, lead
     )
 
 
@@ -260,9 +248,7 @@ def _with_heat_path(whole: CardFit, own: Pursuit, progress: Report) -> tuple[Hea
         return (None, *own.outcome())
     search, outcome = own.outcome(-np.inf if given else score - BEATEN)
     lead = score - search.fair(outcome.final)
-    if lead < MARGIN + given * FURTHER * sum(
-        term.brought for term in outcome.final.terms if term.response == FREQUENCY
-    ):
+    if lead < MARGIN + given * FURTHER * sum(t.brought for t in outcome.final.terms if t.response == FREQUENCY):
         return None, search, outcome
     return replace(path, evidence=gain, lead=lead), there, grown
 
