@@ -73,6 +73,7 @@ def test_contract_a_card_has_one_law() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("fine")
 def test_recovery_of_a_hidden_effect_without_a_card_and_of_an_unseen_run(tmp_path, capsys, ask) -> None:
     hidden = {"name": "rate-bias", "response": "bias_deg_per_h", "coefficient_deg_per_h_per_K_per_s": 600.0}
     device = build_instrument({**TRUE, "effect": [hidden]})
