@@ -27,6 +27,7 @@ COARSE = 150  # most rows of a run from which noise is estimated in a model with
 LEAST, MOST = -7.0, 8.0  # ln of the rms of slow noise within a run over that of a row's white noise
 KINDS = ("white", "flicker", "walk", "offset")
 WHITE = -0.3  # ln of white noise over the scatter of neighbouring rows, where the search begins
+TOO_QUIET = 1.0  # ln by which white noise below that is odd
 USUAL, SPREAD = -1.0, 3.0  # their weak prior, which keeps a level that the rows say nothing about from running away
 STATED_SPREAD = 0.7  # the same about ln of a level that is stated: a factor of 2
 LONGEST, CLOSE = 3.0, 1e-3  # of a step in ln of a level, and fall of −2 ln L that the last one promises
@@ -282,7 +283,7 @@ def estimate_noise(
             total, slope, bend = total + surprise**2, slope + 2 * surprise * way, bend + 2 * np.outer(way, way)
         return total, slope, bend
 
-    first = np.array([WHITE, *[USUAL] * len(free)])
+    first = usual = np.array([WHITE, *[USUAL] * len(free)])
     if near is not None and near.white > 0:
         white = near.white / root
         slow = [max(getattr(near, kind) / unit[kind] / white, float(np.exp(LEAST))) for kind in free]
@@ -297,6 +298,8 @@ def estimate_noise(
     for start in _other_slow(found[1], free):  # what is slow may be of another kind than where the search ended
         if start.max() > LOUD or objective(start)[0] < found[0]:
             found = min(found, search(start), key=lambda one: one[0])
+    if found[1][0] < WHITE - TOO_QUIET:  # slow noise that stands for the scatter of rows may only be a lesser optimum
+        found = min(found, search(usual), key=lambda one: one[0])
     return levels(found[1])
 
 
