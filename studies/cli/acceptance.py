@@ -13,6 +13,7 @@ from studies.errors import InputError, nearest
 from studies.fits.ringdown import is_decay, read_decay
 from studies.instrument.card import load_card
 from studies.record import read_record
+from studies.record.plausible import records_of_one_gyro
 from studies.record.uses import OUTPUT
 from studies.reports import style
 from studies.reports.digits import plain
@@ -43,7 +44,9 @@ def acceptance(card: Card, *runs: Records, limits: str | None = None, output: st
     """
     instrument = load_card(card)
     free = [path for path in runs if is_decay(path)]
-    records = [read_record(path) for path in runs if path not in free]
+    records = records_of_one_gyro(
+        [read_record(path) for path in runs if path not in free], lambda doubt: say(f"warning: {doubt}")
+    )
     if output != OUTPUT and not any(output in record for record in records):
         known = {name for record in records for name in record.columns}
         raise InputError(f"--output {output}: no record has this column{nearest(output, known)}")

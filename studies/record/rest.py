@@ -11,9 +11,9 @@ from compensation.arrays import Array
 from compensation.cross_damping import RestRun
 from compensation.decimation import average_blocks
 from compensation.memory import follow_lag
-from compensation.spikes import find_spikes
+from compensation.spikes import find_spikes, find_stuck
 from studies.errors import InputError
-from studies.record import Record
+from studies.record import OUTPUTS, Record
 
 TEMPERATURES = ("housing_temperature_degC", "resonator_temperature_degC", "chamber_temperature_degC")
 MOST_ROWS = 20_000  # beyond which a run is averaged in blocks before a fit: temperature is slow, and noise averages
@@ -94,7 +94,23 @@ def gather_rest(records: Sequence[Record], outputs: dict[str, float]) -> RestDat
 
 
 def check_temperatures(record: Record) -> str:
-    """Refuse temperatures that contradict each other or lag as in no chamber and no resonator; else return a doubt, if any."""
+    """Refuse temperatures that contradict each other or lag as in no chamber and no resonator; else return doubts of them and of outputs that stand still, if any."""
+    return " ".join(filter(None, (_check_rates(record), *_stuck(record))))
+
+
+def _stuck(record: Record) -> list[str]:
+    """Sentences on outputs that hold one reading where the readings beside it differ; a temperature may well be held."""
+    found = {name: find_stuck(record[name]) for name in OUTPUTS if name in record}
+    return [
+        f"{record.path or 'record'}: {name} repeats one reading in {rows.sum()} rows, the first at {record['time_s'][rows][0]:.6g} s,"
+        " where the readings beside them differ: a stuck logger or a mark for missing values? If so, leave the cells empty ('drop' in the map of hrg import)."
+        for name, rows in found.items()
+        if rows.any()
+    ]
+
+
+def _check_rates(record: Record) -> str:
+    """Refuse temperatures that no chamber and no resonator gives; else return a doubt, if any."""
     name = next((one for one in DRIVING if one in record and np.isfinite(record[one]).sum() > 1), None)
     if name is None:
         return ""

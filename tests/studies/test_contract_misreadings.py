@@ -228,6 +228,19 @@ def test_a_housing_that_follows_a_jump_of_its_chamber_tells_minutes_by_itself(re
         check_temperatures(dataclasses.replace(record, columns=slow))
 
 
+@pytest.mark.parametrize(("name", "value"), [("frequency_Hz", None), ("bias_deg_per_h", 0.0), ("frequency_Hz", 9999.0)])
+def test_outputs_that_stand_still_are_told(record, name, value):
+    """A frequency that stuck for an hour was explained by a jump, hysteresis and mounting stress, and a bias fitted to it."""
+    own = record[name].copy()
+    own[100:160] = own[100] if value is None else value
+    said = check_temperatures(record.with_columns({name: own}))
+    at = f"{name} repeats one reading in 60 rows, the first at {record['time_s'][100]:g} s"
+    assert at in said
+    T = record["housing_temperature_degC"].copy()
+    T[100:160] = T[100]  # as a rounded one may be between two ramps
+    assert check_temperatures(record.with_columns({"housing_temperature_degC": T})) == check_temperatures(record) == ""
+
+
 def test_a_housing_of_the_opposite_sign_is_seen_beside_its_chamber(record):
     """Without a card nothing else tells: the frequency follows either sign."""
     chamber = np.where(record["time_s"] < 9000.0, 30.0, -20.0)

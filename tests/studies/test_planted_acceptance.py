@@ -8,7 +8,7 @@ import pytest
 
 from studies.acceptance.measure import measure_scale
 from studies.cli import main
-from studies.record import Record, write_record
+from studies.record import Record, read_record, write_record
 
 TRUTH = {
     "warm_up_time_s": 400 * np.log(20),  # 20 e^{-t/400} reaches 1 deg/h
@@ -146,6 +146,16 @@ def test_a_record_that_shows_no_test_is_named(folder, tmp_path, capsys):
     assert status == 0
     assert "its columns fit none of the tests" in said
     assert found["verdict"] == "incomplete"
+
+
+def test_records_of_two_gyros_or_modes_are_refused(folder, tmp_path, capsys):
+    """A run at n = 3 beside one at n = 2 once gave 11 500 ppm/K."""
+    cycle = read_record(folder / "cycle.csv")
+    time = {"time_s": cycle["time_s"]}
+    turned = {name: own[::-1] for name, own in cycle.columns.items()} | time
+    write_record(Record(turned | {"frequency_Hz": 2.8 * turned["frequency_Hz"]}), tmp_path / "third.csv")
+    assert main(["acceptance", "free-dome", str(folder / "cycle.csv"), str(tmp_path / "third.csv")]) == 2
+    assert "The records are of different gyros" in capsys.readouterr().err
 
 
 def test_bandwidth_and_delay_of_a_shaken_gyro(folder, capsys):
