@@ -26,7 +26,7 @@ from studies.errors import InputError, naming
 from studies.models import Model, compensate, source_of
 from studies.models.kinds.bias import OUTPUTS, save_bias
 from studies.record import COMPENSATED, Record
-from studies.record.plausible import records_of_one_gyro
+from studies.record.plausible import check_one_unit, records_of_one_gyro
 from studies.record.rest import TEMPERATURES, choose_column, require_rest
 from studies.record.stability import Stability, read_stability, unbroken
 
@@ -82,6 +82,8 @@ def study_bias(
     records = records_of_one_gyro(records, progress)
     check_lengths(records)
     output, column = find_output(records), find_state(records, over)
+    if output == "bias_deg_per_h":
+        check_one_unit(records)
     width = choose_width(records) if width is None else width
     window = 3 * width if window is None else window
     variable = FREQUENCY if column == "frequency_Hz" else TEMPERATURE

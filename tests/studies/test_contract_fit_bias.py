@@ -369,6 +369,22 @@ def test_a_compensation_of_the_opposite_sign_is_refused(calibrated, tmp_path, ca
     assert not out.exists()
 
 
+@pytest.mark.parametrize(("factor", "unit"), [(1 / 3600, "°/s"), (24.0, "°/day"), (np.pi / 648000, "rad/s")])
+@pytest.mark.parametrize("count", [2, 3])
+def test_a_run_in_another_unit_is_refused(tmp_path, refuse, factor, unit, count):
+    """One of three in °/day once left no term, and a model that removed the mean."""
+    runs = [str(tmp_path / f"{k}.csv") for k in range(count)]
+    for k, path in enumerate(runs):
+        record = make_record(k, cooling=k != 1)
+        write_record(
+            record.with_columns({"bias_deg_per_h": record["bias_deg_per_h"] * (factor if k == 1 else 1.0)}), path
+        )
+    said = refuse(["fit", "bias", *runs])
+    assert f"hrg: {runs[1]}: bias_deg_per_h scatters and changes" in said
+    mend = f"Multiply the column by {1 / factor:.6g}" if factor < 1 else f"Divide the column by {factor:.6g}"
+    assert f"as in {unit}. {mend}" in said
+
+
 @pytest.mark.parametrize("turned", [None, 1, 2])
 def test_a_run_with_the_opposite_sign_is_named(tmp_path, ask, turned):
     for k in range(3):
