@@ -61,7 +61,7 @@ class Columns:
         for name in names:
             self.refuse(self.values[name] != self.values[name], f"{name} is empty; {what} needs every value.")
 
-    def check_order(self, name: str, words: str) -> None:
+    def check_order(self, name: str, words: str | Callable[[int], str]) -> None:
         """Refuse a column that does not increase from row to row."""
         values = self.values[name]
         wrong = values != values
@@ -291,7 +291,9 @@ def _parse_by_line(path: str | Path, body: str, names: list[str], first_line: in
                     rows.append([np.nan] * len(names))
                 continue
             if cells[0].startswith("#"):
-                raise InputError(f"{path}, line {number}: comments are allowed only above the header; move it there.")
+                raise InputError(
+                    f"{path}, line {number}: comments are allowed only above the header; move it there, or split the file here if another begins."
+                )
             if len(cells) != len(names):
                 raise InputError(f"{path}, line {number}: {len(cells)} values where the header has {len(names)} columns ({', '.join(names)}); decimal commas must become points.")  # fmt: skip
             rows.append([_number(path, number, name, cell) for name, cell in zip(names, cells, strict=True)])

@@ -3,6 +3,7 @@
 import datetime
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
 
@@ -177,7 +178,10 @@ def read_record(path: "Run") -> Record:
         )
     table = read_columns(path, COLUMNS, required=("time_s",), prefixes=(COMPENSATED,))
     table.refuse(np.isnan(table.values["time_s"]), "time_s is empty; every row needs its time.")
-    table.check_order("time_s", "time_s does not increase; sort the rows and remove repeated ones.")
+    time = table.values["time_s"]
+    again = "time_s starts over: where a second run begins, split the file here; each run is a file of its own."
+    sort = "time_s does not increase; sort the rows and remove repeated ones."
+    table.check_order("time_s", lambda row: again if row > 1 and time[row] <= time[0] else sort)
     check_plausible(table.values, table.place)
     notes = _read_notes(table.path, table)
     return Record(table.values, table.path, table.sha256, **notes)  # type: ignore[arg-type]
@@ -217,7 +221,7 @@ def reading_resolution(values: Array) -> float:
 
 
 def drop_repeats(records: Sequence[Record]) -> tuple[list[Record], list[str]]:
-    """Return the records without those that repeat most of a longer one, and a sentence for each that was left out."""
+    """Return the records without those that repeat most of a longer one, and a sentence for each that was left out and for those that overlap in time."""
     kept: list[Record] = []
     said = []
     for record in records:
@@ -229,7 +233,23 @@ def drop_repeats(records: Sequence[Record]) -> tuple[list[Record], list[str]]:
             place = next(k for k, one in enumerate(kept) if one is twin)
             kept[place], record, twin = record, twin, record
         said.append(f"{record.path or 'a record'} repeats {twin.path or 'another'} and is left out.")
-    return kept, said
+    return kept, said + _overlaps(kept)
+
+
+def _overlaps(records: Sequence[Record]) -> list[str]:
+    """Sentences on runs of which one starts before another ends, whether a start is that of the clock or of the first row."""
+    starts, placed = place_in_time(records)
+    order = sorted(zip(starts, records, strict=True), key=lambda pair: pair[0]) if placed else []
+    found = []
+    for (start, one), (later, two) in pairwise(order):
+        end, begins = float(one["time_s"][-1]), float(two["time_s"][0])
+        early = start - later + min(end - float(one["time_s"][0]), end - begins)
+        if early > 0:
+            found.append(
+                f"{two.path or 'a record'} starts {early:.6g} s before {one.path or 'another'} ends, and one gyro makes one run at a time:"
+                " check '# start' (its date and time zone), and that both are of this gyro."
+            )
+    return found
 
 
 def repeats(one: Record, two: Record) -> bool:

@@ -1,6 +1,7 @@
 """Mistakes of the person at the bench end in their cause: °F, a turned sign, °/s, a time in minutes, a file given twice, two gyros, metres and radians."""
 
 import dataclasses
+import datetime
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ from studies.fits.bias import study_bias
 from studies.fits.thermal import fit_thermal_constants
 from studies.inference.records import make_ready
 from studies.instrument.card import load_card, save_card
-from studies.record import Record, drop_repeats
+from studies.record import Record, drop_repeats, read_record
 from studies.record.plausible import records_of_one_gyro
 from studies.record.rest import check_temperatures
 from studies.resonator.law import law_of
@@ -301,3 +302,34 @@ def test_a_near_copy_is_the_same_run_and_the_longer_one_is_kept(card, record, co
     assert len(kept[0]) == len(record)
     other = simulate_run(card, load_profile("cycle 20 -15 40 0.5 30min 1"), 1 / 60, 2).record
     assert drop_repeats([record, other]) == ([record, other], [])
+
+
+@pytest.mark.parametrize(("hours", "said"), [(4.0, True), (6.0, False)])
+def test_runs_of_one_gyro_that_overlap_in_time_are_told(card, record, hours, said):
+    """A time zone too many was no word: ageing and drift were placed by it."""
+    begun = datetime.datetime(2026, 3, 2, 8, tzinfo=datetime.UTC)
+    other = simulate_run(card, load_profile("cycle 20 -15 40 0.5 30min 1"), 1 / 60, 2).record
+    first, lasts = (dataclasses.replace(record, start=begun), float(np.ptp(record["time_s"])))
+    later = begun + datetime.timedelta(seconds=lasts * hours / 5.0)
+    second = dataclasses.replace(other, start=later, path="second.csv")
+    kept, told = drop_repeats([second, first])
+    assert kept == [second, first]
+    assert told == (
+        [
+            f"second.csv starts {0.2 * lasts:.6g} s before run.csv ends, and one gyro makes one run at a time:"
+            " check '# start' (its date and time zone), and that both are of this gyro."
+        ]
+        if said
+        else []
+    )
+
+
+def test_a_file_of_two_runs_is_to_be_split(tmp_path):
+    """It said to sort the rows, which makes one run of two."""
+    rows = "time_s,housing_temperature_degC,frequency_Hz\n0,20,4432.0\n10,20,4432.1\n20,20,4432.0\n"
+    (tmp_path / "two.csv").write_text(rows + rows.partition("\n")[2], encoding="utf-8")
+    with pytest.raises(InputError, match=r"two\.csv, line 5: time_s starts over: .* split the file here"):
+        read_record(tmp_path / "two.csv")
+    (tmp_path / "twice.csv").write_text(rows + "# start: 2026-03-02\n" + rows, encoding="utf-8")
+    with pytest.raises(InputError, match=r"twice\.csv, line 5: comments .* or split the file here"):
+        read_record(tmp_path / "twice.csv")
