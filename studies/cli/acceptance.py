@@ -13,7 +13,7 @@ from studies.errors import InputError, nearest
 from studies.fits.ringdown import is_decay, read_decay
 from studies.instrument.card import load_card
 from studies.record import read_record
-from studies.record.plausible import records_of_one_gyro
+from studies.record.plausible import check_card_frequency, records_of_one_gyro
 from studies.record.uses import OUTPUT
 from studies.reports import style
 from studies.reports.digits import plain
@@ -57,6 +57,12 @@ def acceptance(card: Card, *runs: Records, limits: str | None = None, output: st
     for record in records:
         if record.instrument and record.instrument != instrument.name:
             say(f"warning: {record.path} is a record of '{record.instrument}', not of '{instrument.name}'.")
+        if "frequency_Hz" in record:  # its level alone: a card without a slope over temperature will do here
+            f = record["frequency_Hz"][np.isfinite(record["frequency_Hz"])]
+            try:
+                check_card_frequency(instrument, np.median(f, keepdims=True) if f.size else f, record.path)
+            except InputError as doubt:
+                say(f"warning: {doubt}")
         if found.used[record.path].startswith("no test"):
             say(f"warning: {record.path} is not used: its columns fit none of the tests.")
     for line in lines:

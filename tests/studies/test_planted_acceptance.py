@@ -156,6 +156,11 @@ def test_records_of_two_gyros_or_modes_are_refused(folder, tmp_path, capsys):
     write_record(Record(turned | {"frequency_Hz": 2.8 * turned["frequency_Hz"]}), tmp_path / "third.csv")
     assert main(["acceptance", "free-dome", str(folder / "cycle.csv"), str(tmp_path / "third.csv")]) == 2
     assert "The records are of different gyros" in capsys.readouterr().err
+    assert main(["acceptance", "hrg-30mm", str(folder / "cycle.csv")]) == 0
+    assert "is not a record of that gyro" not in (told := capsys.readouterr().err)
+    assert "frequency_Hz is near" not in told
+    assert main(["acceptance", "hrg-30mm", str(tmp_path / "third.csv")]) == 0
+    assert "third.csv: frequency_Hz is near 12410 Hz, but the card hrg-30mm resonates" in capsys.readouterr().err
 
 
 def test_bandwidth_and_delay_of_a_shaken_gyro(folder, capsys):
