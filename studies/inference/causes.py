@@ -246,6 +246,21 @@ def with_levels(search: Search, now: Hypothesis, name: str) -> Hypothesis:
     return best if best.score > now.score + MARGIN else now
 
 
+def levels_apart(search: Search, now: Hypothesis) -> str:
+    """Return the sentence on levels of the runs that are likelier than what is named, and on the run that lies farthest."""
+    runs = search.linear.problem.runs
+    k, term = next((k, one) for k, one in enumerate(now.terms) if one.effect.name == offsets(len(runs)).name)
+    levels = np.zeros(len(runs))
+    levels[list(term.members)] = Background(search.linear, now.terms, now.noise).coefficients(k)[0]
+    far = int(np.argmax(np.abs(levels - np.median(levels))))
+    away = levels[far] - np.delete(levels, far).mean()
+    return (
+        f"The runs have levels of their own of the frequency ({runs[far].record.path or f'run {far + 1}'}: about {away:+.2g} Hz from the"
+        f" {'others' if len(runs) > 2 else 'other'}): another gyro, or something done between the runs. What is named may only stand for"
+        " these levels: diagnose the runs apart."
+    )
+
+
 def only_apart(search: Search, outcome: Outcome, k: int) -> bool:
     """Whether levels of the runs are far likelier where a cause stands."""
     return with_levels(search, outcome.without[k], outcome.final.terms[k].response).score > outcome.final.score + MARGIN

@@ -21,7 +21,7 @@ from studies.calibration.priors import gather_priors
 from studies.calibration.problem import CardProblem, wide_law
 from studies.diagnosis.constants import CONSTANTS
 from studies.diagnosis.response import SeenResponse
-from studies.inference.causes import only_apart, with_levels
+from studies.inference.causes import levels_apart, only_apart, with_levels
 from studies.inference.heat_path import (
     FREQUENCY,
     WORTH,
@@ -31,8 +31,6 @@ from studies.inference.heat_path import (
     is_ahead,
     is_strained,
     lags_would_bring,
-    levels_apart,
-    levels_would_bring,
     slow_share,
     with_second_mass,
 )
@@ -67,6 +65,8 @@ FAR = 2.0
 """The same, beyond which the search begins from the card's own values too."""
 FAINT = 60.0
 """Log evidence up to which a cause whose definite coefficients may all be 0 is not named: of 13 such names on 127 judged campaigns all 7 below were wrong, 4 of 6 above right."""
+LEADING = 0.5
+"""Part of what causes bring the frequency, which levels of the runs must bring beside them to be the likelier reason."""
 BEATEN = 100.0
 """Log evidence behind another search, from which on one is given up."""
 
@@ -186,13 +186,8 @@ def infer(
     whole, apart = fit_explained(build_problem(card, campaign.records, law=law), progress)
     campaign = replace(campaign, notes=(*campaign.notes, *apart))
     found = set_housing_apart(whole)
-    own = Pursuit(found, progress)
-    levels = levels_would_bring(own.search)
-    rest = max(effects_would_bring(own.search), lags_would_bring(own.search)) if levels > WORTH else np.inf
-    if lead := levels > MARGIN + rest:
-        campaign = replace(campaign, notes=(*campaign.notes, levels_apart(found)))
     problem = found.problem
-    path, search, outcome = _with_heat_path(whole, own, progress)
+    path, search, outcome = _with_heat_path(whole, found, progress)
     if card.polynomial is None and path is None and np.abs(found.away).max(initial=0.0) > FAR:
         # values may have gone far to do what an effect does: look from the card as shipped too
         progress("again from the card's own values")
@@ -215,9 +210,16 @@ def infer(
         none, _ = search.grow(most=0)
         outcome = Outcome(none, none, (), ())
     progress("lack of fit")
-    without, levelled = outcome.plain, outcome.final
+    without, levelled, levels = outcome.plain, outcome.final, dict[str, float]()
     for name in search.linear.responses:
+        before = levelled.score
         without, levelled = (with_levels(search, one, name) for one in (without, levelled))
+        levels[name] = levelled.score - before
+    explained = sum(term.brought for term in outcome.final.terms if term.response == FREQUENCY)
+    explained += 0.0 if path is None else path.evidence
+    lead = levels.get(FREQUENCY, 0.0) > max(WORTH, LEADING * explained) and explained > 0.0
+    if lead:
+        campaign = replace(campaign, notes=(*campaign.notes, levels_apart(search, levelled)))
     bank = generic_bank(search)
     left = look(search, bank, without if path is None else plain, levelled, rows)
     unknown = []
@@ -230,9 +232,9 @@ def infer(
     )
 
 
-def _with_heat_path(whole: CardFit, own: Pursuit, progress: Report) -> tuple[HeatPath | None, Search, Outcome]:
+def _with_heat_path(whole: CardFit, found: CardFit, progress: Report) -> tuple[HeatPath | None, Search, Outcome]:
     """Search beside the path of the card, or one lag, and where that leaves slow noise of which other lags would take something, strains the card's values, or the sensor is late, beside a longer one; the likelier heat path stays."""
-    found, given, path = own.start, whole.problem.instrument.polynomial is None, None
+    own, given, path = Pursuit(found, progress), whole.problem.instrument.polynomial is None, None
     bring = lags_would_bring(own.search) if slow_share(found) > SUSPICIOUS else -np.inf
     if given and (is_strained(found) or (bring > WORTH and bring > effects_would_bring(own.search))):
         path = with_second_mass(whole, found, progress)

@@ -11,7 +11,7 @@ from compensation.arrays import Array
 from studies.calibration.fit import CardFit, fit
 from studies.calibration.priors import gather_priors
 from studies.calibration.problem import CardProblem
-from studies.inference.generic_forms import any_lags, offsets
+from studies.inference.generic_forms import any_lags
 from studies.inference.housing import evidence_of, set_housing_apart
 from studies.inference.model import PRICE, Linear
 from studies.inference.search import Hypothesis, Search, Shapes
@@ -213,24 +213,6 @@ def effects_would_bring(search: Search) -> float:
     """The same of the best effect on the frequency that is no lag itself."""
     lag = f"law.{LAGS[1]}"
     return _best(search, [own for own in search.bank if own.response == FREQUENCY and own.effect.card_key != lag])
-
-
-def levels_would_bring(search: Search) -> float:
-    """The same of a level of every run."""
-    runs = len(search.linear.problem.runs)
-    return _best(search, search.shapes_of([(offsets(runs), FREQUENCY)]) if runs > 1 else [])
-
-
-def levels_apart(found: CardFit) -> str:
-    """Return the sentence on runs whose levels of the frequency are likelier than any effect, and on the one that lies farthest."""
-    rest, level, runs = found.state.residual[FREQUENCY], found.rows[FREQUENCY], found.problem.runs
-    means = np.array([rest[own].mean() for own in level.slices])
-    far = runs[found.problem.members(FREQUENCY)[int(np.argmax(np.abs(means - np.median(means))))].run].record.path
-    one = f"; that of {far} lies farthest from the others" if len(means) > 2 and far else ""
-    return (
-        f"The frequencies of the runs have levels of their own, far more probably than any effect{one}: another gyro, or something"
-        " done between the runs. Diagnose each run alone; what is named beside may only stand for these levels."
-    )
 
 
 def _best(search: Search, bank: Sequence[Shapes]) -> float:

@@ -32,7 +32,7 @@ class Inferred:
     unknown: tuple[float, ...]
     campaign: Campaign
     path: HeatPath | None = None
-    levels_lead: bool = False  # whether levels of the runs are far likelier than any effect on the frequency
+    levels_lead: bool = False  # whether levels of the runs are likelier than what is named in the frequency
 
     @property
     def final(self) -> Hypothesis:
