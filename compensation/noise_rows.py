@@ -183,11 +183,11 @@ class NoiseRows:
             S = len(runs) * scipy.linalg.lapack.dlauum(K, lower=1)[0]  # of V⁻¹ − v vᵀ the lower half
             wide = self.stretch[runs[0]] / self.spans[runs[0]]
             for run in runs:
-                U = scipy.linalg.blas.dtrmm(1.0, K, both[self.slices[run]], lower=1, trans_a=1)
+                U = multiply_lower(K, both[self.slices[run]], transposed=True)
                 S = scipy.linalg.blas.dsyrk(-1.0, U, beta=1.0, c=S, lower=1)
                 v = U[:, -1]
                 own = np.column_stack([wide * v, F @ v, W @ v, np.full(len(v), v.sum())])
-                moved[self.slices[run]] = scipy.linalg.blas.dtrmm(1.0, K, own * levels, lower=1)
+                moved[self.slices[run]] = multiply_lower(K, own * levels)
             diagonal = S.diagonal()
             by_kind = diagonal @ wide, *(2 * np.vdot(S, own) - diagonal @ own.diagonal() for own in (F, W))
             slopes += levels * np.array([*by_kind, 2 * S.sum() - diagonal.sum()])
@@ -217,6 +217,13 @@ def solve_lower(root: Array, columns: Array, transposed: bool = False) -> Array:
     return np.asarray(scipy.linalg.lapack.dtrtrs(root, columns, lower=1, trans=transposed)[0]).reshape(columns.shape)
 
 
+def multiply_lower(root: Array, columns: Array, transposed: bool = False) -> Array:
+    """Return L or Lᵀ times columns, (N,) or (N, p)."""
+    if columns.ndim == 1:
+        return np.asarray((root.T if transposed else root) @ columns)
+    return np.asarray(scipy.linalg.blas.dtrmm(1.0, root, columns, lower=1, trans_a=transposed))
+
+
 @dataclass(frozen=True)
 class Whitener:
     """L⁻¹ of the covariance L Lᵀ of rows, with the runs that each is of."""
@@ -229,8 +236,7 @@ class Whitener:
         white = columns.astype(float)
         for K, runs in self.roots:
             for run in runs:
-                own = white[self.slices[run]]
-                white[self.slices[run]] = K @ own if own.ndim == 1 else scipy.linalg.blas.dtrmm(1.0, K, own, lower=1)
+                white[self.slices[run]] = multiply_lower(K, white[self.slices[run]])
         return white
 
     @property
@@ -279,7 +285,7 @@ def estimate_noise(
         bend = curvature[np.ix_(places, places)] + np.diag(2 * np.maximum(slopes[places], 0.0))  # Σ goes with θ²
         slope, bend = slopes[places] @ along, along.T @ bend @ along
         for k, (surprise, spread, absolute) in enumerate(_surprises(rows, noise, free, stated), 1):
-            way = (np.eye(len(x))[k] + absolute * np.eye(len(x))[0]) / spread
+            way = (along if absolute else np.eye(len(x)))[k] / spread
             total, slope, bend = total + surprise**2, slope + 2 * surprise * way, bend + 2 * np.outer(way, way)
         return total, slope, bend
 

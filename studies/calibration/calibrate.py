@@ -25,7 +25,7 @@ from studies.errors import InputError
 from studies.instrument.display import display_name
 from studies.record import Record, drop_repeats, repeats, with_bias
 from studies.record.plausible import check_card_frequency, check_one_gyro
-from studies.record.rest import check_temperatures
+from studies.record.rest import check_record
 from studies.simulation.drive import COLUMN
 from studies.simulation.variations import JUMP, SHIFT
 
@@ -117,7 +117,7 @@ def calibrate(
         raise InputError("no data given; calibration needs a record or a steady-state table.")
     given = [with_bias(record) for record in records]
     records, repeated = drop_repeats(given)
-    doubts = [doubt for doubt in map(check_temperatures, records) if doubt]
+    doubts = [doubt for doubt in map(check_record, records) if doubt]
     if hold_out is not None:  # the one that a repeated record repeats
         held = given[hold_out % len(given)]
         hold_out = next((k for k, one in enumerate(records) if repeats(one, held)), 0)

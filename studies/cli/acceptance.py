@@ -17,6 +17,7 @@ from studies.record.plausible import check_card_frequency, records_of_one_gyro
 from studies.record.uses import OUTPUT
 from studies.reports import style
 from studies.reports.digits import plain
+from studies.resonator.law import law_of
 from studies.results import Chapter, Column, Drawing, Facts, Figure, Part, Result, Sentence, Table, row_of
 from studies.schema.reader import read_file
 
@@ -54,13 +55,15 @@ def acceptance(card: Card, *runs: Records, limits: str | None = None, output: st
     allowed = None if limits is None else read_file(limits, Limits, SCHEMA)
     found = judge(records, allowed, output, decays)
     lines = [_line(line) for line in found.lines]
+    law = None
     for record in records:
         if record.instrument and record.instrument != instrument.name:
             say(f"warning: {record.path} is a record of '{record.instrument}', not of '{instrument.name}'.")
         if "frequency_Hz" in record:  # its level alone: a card without a slope over temperature will do here
             f = record["frequency_Hz"][np.isfinite(record["frequency_Hz"])]
             try:
-                check_card_frequency(instrument, np.median(f, keepdims=True) if f.size else f, record.path)
+                law = law or law_of(instrument, instrument.reference_temperature, instrument.reference_temperature)
+                check_card_frequency(instrument, np.median(f, keepdims=True) if f.size else f, record.path, law)
             except InputError as doubt:
                 say(f"warning: {doubt}")
         if found.used[record.path].startswith("no test"):

@@ -252,13 +252,18 @@ def levels_apart(search: Search, now: Hypothesis) -> str:
     k, term = next((k, one) for k, one in enumerate(now.terms) if one.effect.name == offsets(len(runs)).name)
     levels = np.zeros(len(runs))
     levels[list(term.members)] = Background(search.linear, now.terms, now.noise).coefficients(k)[0]
-    far = int(np.argmax(np.abs(levels - np.median(levels))))
-    away = levels[far] - np.delete(levels, far).mean()
+    far, away = farthest(levels)
     return (
         f"The runs have levels of their own of the frequency ({runs[far].record.path or f'run {far + 1}'}: about {away:+.2g} Hz from the"
         f" {'others' if len(runs) > 2 else 'other'}): another gyro, or something done between the runs. What is named may only stand for"
         " these levels: diagnose the runs apart."
     )
+
+
+def farthest(levels: Array) -> tuple[int, float]:
+    """Return which of some levels lies farthest from their median, and how far from the mean of the others."""
+    far = int(np.argmax(np.abs(levels - np.median(levels))))
+    return far, float(levels[far] - np.delete(levels, far).mean())
 
 
 def only_apart(search: Search, outcome: Outcome, k: int) -> bool:

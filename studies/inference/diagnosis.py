@@ -210,14 +210,15 @@ def infer(
         none, _ = search.grow(most=0)
         outcome = Outcome(none, none, (), ())
     progress("lack of fit")
-    without, levelled, levels = outcome.plain, outcome.final, dict[str, float]()
+    without, levelled, levels = outcome.plain, outcome.final, 0.0
     for name in search.linear.responses:
         before = levelled.score
         without, levelled = (with_levels(search, one, name) for one in (without, levelled))
-        levels[name] = levelled.score - before
+        if name == FREQUENCY:
+            levels = levelled.score - before
     explained = sum(term.brought for term in outcome.final.terms if term.response == FREQUENCY)
     explained += 0.0 if path is None else path.evidence
-    lead = levels.get(FREQUENCY, 0.0) > max(WORTH, LEADING * explained) and explained > 0.0
+    lead = levels > max(WORTH, LEADING * explained) and explained > 0.0
     if lead:
         campaign = replace(campaign, notes=(*campaign.notes, levels_apart(search, levelled)))
     bank = generic_bank(search)

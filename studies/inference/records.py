@@ -11,7 +11,7 @@ from studies.calibration.observed import LEAST_ROWS, RESPONSES
 from studies.errors import InputError
 from studies.record import Record, drop_repeats, place_in_time, with_bias
 from studies.record.plausible import check_one_gyro
-from studies.record.rest import LEAST_SPIKE, check_temperatures
+from studies.record.rest import LEAST_SPIKE, check_record
 from studies.simulation.drive import COMMAND_COLUMNS, RATE
 
 HOUSING, CHAMBER, RESONATOR = "housing_temperature_degC", "chamber_temperature_degC", "resonator_temperature_degC"
@@ -191,7 +191,7 @@ def check_units(records: Sequence[Record], tables: Sequence[dict[str, Array]]) -
             )
         if not 0.0 < (value := _level(table, "inverse_q", 1e-3)) < 0.1:
             raise InputError(f"{where}: inverse_q is about {value:g}, not between 0 and 0.1. Is it Q itself?")
-    return [doubt for doubt in map(check_temperatures, records) if doubt]
+    return [doubt for doubt in map(check_record, records) if doubt]
 
 
 def _level(table: dict[str, Array], name: str, none: float) -> float:

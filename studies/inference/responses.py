@@ -10,7 +10,7 @@ from studies.calibration.noise_levels import LASTING, stated_noise
 from studies.diagnosis.constants import CONSTANTS
 from studies.diagnosis.response import RESPONSES
 from studies.diagnosis.verdict import Cause, ResponseResult
-from studies.inference.causes import SURE_DELAY, delay_of
+from studies.inference.causes import SURE_DELAY, delay_of, farthest
 from studies.inference.inferred import Inferred
 from studies.inference.lack_of_fit import doubt_of
 
@@ -140,10 +140,12 @@ def _apart(found: Inferred, name: str) -> str:
 
 def _odd_run(found: Inferred, name: str) -> str:
     """Name a run whose level lies far from those of the others, which agree; or nothing."""
-    shifts, within, response = np.array(_run_shifts(found, name)), found.rows[name].within, RESPONSES[name]
-    far = int(np.argmax(np.abs(shifts - np.median(shifts))))
-    others = np.delete(shifts, far)
-    if len(others) < 2 or abs(odd := shifts[far] - others.mean()) <= ODD * max(scatter := float(np.std(others, ddof=1)), within):  # fmt: skip
+    shifts, response = np.array(_run_shifts(found, name)), RESPONSES[name]
+    if len(shifts) < 3:
+        return ""
+    far, odd = farthest(shifts)
+    scatter = float(np.std(np.delete(shifts, far), ddof=1))
+    if abs(odd) <= ODD * max(scatter, found.rows[name].within):
         return ""
     record = found.campaign.records[far].path or f"run {far + 1}"
     return (

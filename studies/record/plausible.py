@@ -11,7 +11,7 @@ from shell.constants import zero_Celsius
 from studies.errors import InputError
 from studies.instrument.card import Instrument
 from studies.record import Record, drop_repeats
-from studies.record.rest import TEMPERATURES, check_temperatures
+from studies.record.rest import TEMPERATURES, check_record
 from studies.resonator.law import check_slope_known, law_of
 
 if TYPE_CHECKING:
@@ -98,7 +98,7 @@ def records_of_one_gyro(records: Sequence[Record], say: Callable[[str], None]) -
         return next((record[name] for name in TEMPERATURES if name in record), None)
 
     kept, repeated = drop_repeats(records)
-    for sentence in (*repeated, *filter(None, map(check_temperatures, kept))):
+    for sentence in (*repeated, *filter(None, map(check_record, kept))):
         say(sentence)
     check_one_gyro([(r.path or "a record", thermometer(r), r["frequency_Hz"]) for r in kept if "frequency_Hz" in r])
     return kept

@@ -93,7 +93,7 @@ def gather_rest(records: Sequence[Record], outputs: dict[str, float]) -> RestDat
     return RestData(tuple(runs), output, column, left_out, widest)
 
 
-def check_temperatures(record: Record) -> str:
+def check_record(record: Record) -> str:
     """Refuse temperatures that contradict each other or lag as in no chamber and no resonator; else return doubts of them and of outputs that stand still, if any."""
     return " ".join(filter(None, (_check_rates(record), *_stuck(record))))
 

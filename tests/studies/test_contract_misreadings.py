@@ -17,7 +17,7 @@ from studies.inference.records import make_ready
 from studies.instrument.card import load_card, save_card
 from studies.record import Record, drop_repeats, read_record
 from studies.record.plausible import records_of_one_gyro
-from studies.record.rest import check_temperatures
+from studies.record.rest import check_record
 from studies.resonator.law import law_of
 from studies.simulation.chamber import load_profile
 from studies.simulation.drive import drive_by_profile, drive_by_record
@@ -218,15 +218,15 @@ def test_a_housing_that_follows_a_jump_of_its_chamber_tells_minutes_by_itself(re
         "housing_temperature_degC": 42.0 * np.exp(-time / 600.0) - 20.0,
         "inverse_q": 1e-7 + 0 * time,
     }
-    assert check_temperatures(dataclasses.replace(record, columns=jumped)) == ""
+    assert check_record(dataclasses.replace(record, columns=jumped)) == ""
     with pytest.raises(InputError, match=r"faster than any housing\. time_s must be in seconds"):
-        check_temperatures(dataclasses.replace(record, columns=jumped | {"time_s": time / 60.0}))
+        check_record(dataclasses.replace(record, columns=jumped | {"time_s": time / 60.0}))
     slow = jumped | {
         "frequency_Hz": 4433.0 + follow_lag(jumped["housing_temperature_degC"], np.diff(time), 1800.0),
         "time_s": 1e3 * time,
     }
     with pytest.raises(InputError, match="is it in milliseconds"):  # most of its rows have settled
-        check_temperatures(dataclasses.replace(record, columns=slow))
+        check_record(dataclasses.replace(record, columns=slow))
 
 
 @pytest.mark.parametrize(("name", "value"), [("frequency_Hz", None), ("bias_deg_per_h", 0.0), ("frequency_Hz", 9999.0)])
@@ -234,12 +234,12 @@ def test_outputs_that_stand_still_are_told(record, name, value):
     """A frequency that stuck for an hour was explained by a jump, hysteresis and mounting stress, and a bias fitted to it."""
     own = record[name].copy()
     own[100:160] = own[100] if value is None else value
-    said = check_temperatures(record.with_columns({name: own}))
+    said = check_record(record.with_columns({name: own}))
     at = f"{name} repeats one reading in 60 rows, the first at {record['time_s'][100]:g} s"
     assert at in said
     T = record["housing_temperature_degC"].copy()
     T[100:160] = T[100]  # as a rounded one may be between two ramps
-    assert check_temperatures(record.with_columns({"housing_temperature_degC": T})) == check_temperatures(record) == ""
+    assert check_record(record.with_columns({"housing_temperature_degC": T})) == check_record(record) == ""
 
 
 def test_a_housing_of_the_opposite_sign_is_seen_beside_its_chamber(record):
@@ -248,24 +248,24 @@ def test_a_housing_of_the_opposite_sign_is_seen_beside_its_chamber(record):
     heated = record.with_columns(
         {"chamber_temperature_degC": chamber, "housing_temperature_degC": 60.0 + 0.01 * chamber}
     )
-    assert check_temperatures(heated) == ""
+    assert check_record(heated) == ""
     turned = record.with_columns({"chamber_temperature_degC": chamber, "housing_temperature_degC": -chamber + 0.3})
     with pytest.raises(
         InputError, match=r"away from chamber_temperature_degC .* with the sign changed\. Correct the column"
     ):
-        check_temperatures(turned)
+        check_record(turned)
 
 
 @pytest.mark.parametrize(("factor", "unit"), [(1 / 60.0, "minutes"), (1e3, "milliseconds")])
 def test_a_time_that_only_the_thermometer_tells_of_is_a_doubt(record, factor, unit):
     """Without a frequency no lag is seen: such a chamber is unusual and not impossible."""
     alone = {name: own for name, own in record.columns.items() if name != "frequency_Hz"}
-    assert check_temperatures(record) == check_temperatures(dataclasses.replace(record, columns=alone)) == ""
+    assert check_record(record) == check_record(dataclasses.replace(record, columns=alone)) == ""
     odd = dataclasses.replace(record, columns=alone | {"time_s": record["time_s"] * factor})
-    assert f"if time_s is in {unit}, convert it" in check_temperatures(odd)
+    assert f"if time_s is in {unit}, convert it" in check_record(odd)
     said = []
     assert records_of_one_gyro([odd], said.append) == [odd]
-    assert said == [check_temperatures(odd)]
+    assert said == [check_record(odd)]
 
 
 @pytest.mark.parametrize(
@@ -276,7 +276,7 @@ def test_a_resonator_however_quick_or_slow_in_seconds_is_not_refused(rate, lasts
     time = np.linspace(0.0, lasts, 600)
     T = rate * (lasts / 2 - np.abs(time - lasts / 2))
     f = 4432.0 + 0.4 * follow_lag(T, np.diff(time), lag) + 1e-4 * np.random.default_rng(1).standard_normal(time.size)
-    said = check_temperatures(Record({"time_s": time, "housing_temperature_degC": T, "frequency_Hz": f}))
+    said = check_record(Record({"time_s": time, "housing_temperature_degC": T, "frequency_Hz": f}))
     assert ("milliseconds" in said) == (lasts > 1e6)
 
 
