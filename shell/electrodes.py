@@ -5,8 +5,9 @@ derivative is a spring of negative stiffness, -ε₀ V²/g³ per area, which low
 
     δ(ω²) = -Σ_j V_j² ∫ ε₀/g³ w² dA / ∫ ρ |u|² dV,
 
-for each orientation of the mode (shell.imperfection.pair). For a full ring of electrodes this is
-δf/f = -½ ε₀ V²/(g³ ρ h ω²) times the mode factor h ∫ w² dA / ∫ |u|² dV. The waves of the gap enter through 1/g³, all orders of it.
+for each orientation of the mode (shell.imperfection.pair). For a full ring of electrodes this is δ(ω²)/ω² =
+-ε₀ V²/(g³ ρ h ω²) times the mode factor h ∫ w² dA / ∫ |u|² dV. The waves of the gap enter through 1/g³, all orders of it. The frequency
+is the root, f √(1 + δ(ω²)/ω²): exact where the springs leave the shape of the mode, which on a shell moves it by less than 1e-2 (δ(ω²)/ω²)².
 """
 
 from collections.abc import Sequence
@@ -16,13 +17,12 @@ from itertools import pairwise
 from math import pi
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from shell.cross_section import cut
 from shell.errors import ShellError
 from shell.imperfection.field import NOTHING, Complex, Field, values_around
 from shell.imperfection.pair import Pair
-from shell.imperfection.split import Split
+from shell.imperfection.split import Split, shift_of
 from shell.quadrature import Array, gauss
 from shell.resonator import FaceName
 
@@ -81,30 +81,31 @@ class Electrodes:
 
     @cached_property
     def per_square_volt(self) -> tuple[Array, Complex]:
-        """Mean shift of ln f and wave of the split, (f_fast - f_slow)/f exp(2 i n α), per V² on each electrode."""
+        """Mean and z of δ(ω²)/ω² (`Split.of_squares`) per V² on each electrode."""
         n = self.pair.mode.harmonic
         means, waves = [], []
         for one in self.electrodes:
             area, w, theta, weight, gap = self._patch(one)
             spring = -VACUUM / gap**3 * (area * w**2)[:, None] * weight / (pi * self.pair.scale)
-            # δ ln ω² of the two orientations: ∫ spring cos² nθ, the mean of the two and the wave between them
+            # of the two orientations ∫ spring cos² nθ: the mean of the two and the wave between them
             means.append(float(spring.sum()) / 2)
             waves.append(complex((spring * np.exp(2j * n * theta)).sum()) / 2)
-        return np.array(means) / 2, np.array(waves)
+        return np.array(means), np.array(waves)
+
+    @property
+    def mean(self) -> float:
+        """Mean δ(ω²)/ω² by the voltages."""
+        return float(self.per_square_volt[0] @ self.voltages**2)
 
     def soften(self) -> Split:
-        """The pair under the voltages, to first order in V²/g³."""
-        squares = self.voltages**2
-        means, waves = self.per_square_volt
-        split = Split(
-            self.pair.mode.harmonic, self.pair.mode.frequency, float(means @ squares), complex(waves @ squares)
-        )
+        """The pair under the voltages."""
         if self._bearing(10) < 1.0 and self.pull_in < 1.0:  # a few places tell where the voltage is far from it
             raise ShellError(
                 f"the electrodes pull in the shell: {self.voltages.max():g} V is {1 / self.pull_in:.3g} times the pull-in voltage at "
                 f"a gap of {1e6 * self.gap:g} µm. Lower the voltage or widen the gap."
             )
-        return split
+        mode, z = self.pair.mode, complex(self.per_square_volt[1] @ self.voltages**2)
+        return Split.of_squares(mode.harmonic, mode.frequency, self.mean, z)
 
     @cached_property
     def pull_in(self) -> float:
@@ -153,12 +154,12 @@ class Electrodes:
         return found / (pi * self.pair.scale)
 
     def per_volt(self) -> float:
-        """df/dV when all voltages change together by the same volts, over f, 1/V."""
-        return float(2 * self.per_square_volt[0] @ self.voltages)
+        """df/dV when all voltages change together by the same volts, over f of the perfect pair, 1/V."""
+        return float(self.per_square_volt[0] @ self.voltages / np.sqrt(1 + self.mean))
 
     def per_kelvin(self, gap_expansion: float) -> float:
-        """Relative change of f per kelvin by the electrodes alone, from (1/g) dg/dT, 1/K."""
-        return float(self.per_square_volt[0] @ self.voltages**2) * -3 * gap_expansion
+        """Change of f per kelvin by the electrodes alone, from (1/g) dg/dT, over f of the perfect pair, 1/K."""
+        return float(-1.5 * gap_expansion * self.mean / np.sqrt(1 + self.mean))
 
     def _patch(self, one: Electrode) -> tuple[Array, Array, Array, Array, Array]:
         """Area per radian and w at places along the meridian; azimuths with weights; the gap (places, azimuths)."""
@@ -206,15 +207,15 @@ LIGHT = 1e-6  # weight of the voltages beside that of the split they null
 
 @dataclass(frozen=True)
 class Trim:
-    """Voltages that null a split: of every electrode, V; `left` the wave of the split that stays; `shift` of ln f."""
+    """Voltages that null a split: of every electrode, V; `left` the z of the split that stays; `shift` of f that they add."""
 
     voltages: tuple[float, ...]
     left: complex
     shift: float
 
 
-def trim_voltages(electrodes: Electrodes, wave: complex, limit: float) -> Trim:
-    """The voltages, of least Σ V⁴ and none above `limit` (V), with which electrodes null the wave of a split.
+def trim_voltages(electrodes: Electrodes, z: complex, limit: float) -> Trim:
+    """The voltages, of least Σ V⁴ and none above `limit` (V), with which electrodes null a split (z of `Split.squares`).
 
     They are alike on electrodes that act alike, so that an even ring of one gap is not pulled sideways, Σ V² exp(iθ) = 0.
     """
@@ -222,17 +223,18 @@ def trim_voltages(electrodes: Electrodes, wave: complex, limit: float) -> Trim:
 
     means, waves = electrodes.per_square_volt
     scale, count = float(abs(waves).max()), len(waves)
-    effect, aim = np.array([waves.real, waves.imag]) / scale, -np.array([wave.real, wave.imag]) / (scale * limit**2)
+    effect, aim = np.array([waves.real, waves.imag]) / scale, -np.array([z.real, z.imag]) / (scale * limit**2)
     sides = np.concatenate([aim, np.zeros(count)])
     sought = lsq_linear(np.vstack([effect, LIGHT * np.eye(count)]), sides, (0.0, 1.0), "bvls", tol=1e-15)
     if float(np.hypot(*(effect @ sought.x - aim))) > 1e-6 * float(np.hypot(*aim)):
         hertz = electrodes.pair.mode.frequency
         raise ShellError(
             f"{limit:g} V on these electrodes null a split of at most {hertz * reach(electrodes, limit):.3g} Hz in any direction, "
-            f"not {hertz * abs(wave):.4g} Hz: raise the voltage, narrow the gap, or trim by mass first."
+            f"not {hertz * abs(z):.4g} Hz: raise the voltage, narrow the gap, or trim by mass first."
         )
     squares = np.maximum(np.asarray(sought.x), 0.0) * limit**2
-    return Trim(tuple(np.sqrt(squares).tolist()), complex(waves @ squares + wave), float(means @ squares))
+    shift = shift_of(electrodes.mean + means @ squares) - shift_of(electrodes.mean)
+    return Trim(tuple(np.sqrt(squares).tolist()), complex(waves @ squares + z), float(shift))
 
 
 def reach(electrodes: Electrodes, limit: float) -> float:
@@ -241,8 +243,3 @@ def reach(electrodes: Electrodes, limit: float) -> float:
     normals = np.exp(1j * (np.angle(waves)[:, None] + np.array([-pi / 2, pi / 2]))).ravel()
     support: Array = np.maximum((waves[:, None] * np.conj(normals)).real, 0.0).sum(axis=0)
     return float(support.min()) * limit**2
-
-
-def soften_at_gap(per_square_volt: float, voltage_squared: ArrayLike, gap: ArrayLike = 1.0) -> Array:
-    """S V²/g³: relative change of f by a voltage on all electrodes, s per V² at the gap over which g is counted."""
-    return np.asarray(per_square_volt * np.asarray(voltage_squared) / np.asarray(gap, dtype=float) ** 3)

@@ -135,22 +135,16 @@ class CoupledHarmonics:
     def _split(self, basis: "PairBasis", closing: Array | float = 0.0) -> Split:
         """From the folded pair; closing : what is added to its A."""
         value, at = basis.value, 0.0
-        shift, wave = 0.0, 0j
         for _ in range(4):
             folded, _, norm = basis.fold(at)
             size, axes = np.linalg.eigh(norm)
             root = (axes / np.sqrt(size)) @ axes.T  # the symmetric root, which turns neither axis
             B = root @ (folded + closing) @ root
-            mean, z = (B[0, 0] + B[1, 1]) / 2, _difference(B)
-            shift, wave, at = at + mean, z, at + mean
-            if abs(mean) < 1e-13 * value:
+            step, z = (B[0, 0] + B[1, 1]) / 2, _difference(B)
+            at += step
+            if abs(step) < 1e-13 * value:
                 break
-        slow, fast = (sqrt(1 + (shift + sign * abs(wave)) / value) for sign in (-1, 1))
-        base = (slow + fast) / 2
-        turn = wave / abs(wave) if wave else 1.0
-        # f_fast - f_slow from δ(ω²), which keeps its digits
-        relative = 2 * abs(wave) / value / (slow + fast)
-        return Split(self.n, self.mode.frequency, base - 1, complex(relative * turn))
+        return Split.of_squares(self.n, self.mode.frequency, float(at / value), z / value)
 
 
 def _difference(B: Array) -> complex:

@@ -4,9 +4,11 @@ from dataclasses import dataclass
 from math import pi
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from shell.imperfection.imperfect import Imperfection
 from shell.imperfection.pair import Pair
+from shell.quadrature import Array
 
 ROUNDING = 1e-14  # relative; below it a split has no axis
 
@@ -19,6 +21,17 @@ class Split:
     frequency: float  # of the perfect pair, Hz
     shift: float  # of the mean frequency, relative
     wave: complex  # (f_fast - f_slow)/f · exp(2 i n α), α the azimuth of an antinode of the faster mode
+
+    @classmethod
+    def of_squares(cls, harmonic: int, frequency: float, mean: float, z: complex) -> "Split":
+        """From the relative changes of ω², mean ± |z|, in which what stiffens or loads a resonator adds; `z` has the direction of `wave`."""
+        shift = float(shift_of(np.array([mean - abs(z), mean + abs(z)])).mean())
+        return cls(harmonic, frequency, shift, z / (1 + shift))
+
+    @property
+    def squares(self) -> tuple[float, complex]:
+        """Mean and z of the relative changes of ω²."""
+        return self.shift * (2 + self.shift) + abs(self.wave) ** 2 / 4, self.wave * (1 + self.shift)
 
     @property
     def relative(self) -> float:
@@ -52,6 +65,12 @@ class Split:
         """Of the slower and of the faster mode, Hz."""
         mean = self.frequency * (1 + self.shift)
         return mean - self.hertz / 2, mean + self.hertz / 2
+
+
+def shift_of(change: ArrayLike) -> Array:
+    """√(1 + x) - 1: the relative change of f by that of ω²."""
+    x = np.maximum(change, -1.0)
+    return np.asarray(x / (1 + np.sqrt(1 + x)))
 
 
 def find_split(pair: Pair, imperfection: Imperfection) -> Split:

@@ -49,13 +49,13 @@ def electrodes(
         charged = instrument.part("electrodes").on(whole.pair, T)
         own = charged.soften()
         if split is not None and axis is not None:
-            wave = complex(-split / mode.frequency * np.exp(2j * harmonic * np.deg2rad(axis)))
+            z = complex(-split / mode.frequency * np.exp(2j * harmonic * np.deg2rad(axis)))
         else:
-            wave = whole.split.wave
+            z = whole.split.squares[1]
         factor, most = charged.pull_in, reach(charged, limit)
         # the card's own split only where it can be nulled
-        asked = split is not None or (whole.split.resolved and abs(wave) <= most)
-        trim = trim_voltages(charged, wave, limit) if asked else None
+        asked = split is not None or (whole.split.resolved and abs(z) <= most)
+        trim = trim_voltages(charged, z, limit) if asked else None
     nulled = trim and {
         "voltages_V": trim.voltages, "left_Hz": abs(trim.left) * mode.frequency, "shift_ppm": 1e6 * trim.shift
     }  # fmt: skip
@@ -76,7 +76,7 @@ def electrodes(
         payload,
         f"Electrodes of {instrument.name}",
         f"Effect of the electrodes on the pair n = {harmonic} at {mode.frequency:.3f} Hz and {T - zero_Celsius:g} °C.",
-        _parts(payload, abs(wave) * mode.frequency, own.resolved, keys),
+        _parts(payload, abs(z) * mode.frequency, own.resolved, keys),
     )
 
 
@@ -85,8 +85,7 @@ def _parts(payload: dict[str, Any], split: float, resolved: bool, keys: Electrod
     factor, limit, trim = payload["pull_in_factor"], payload["limit_V"], payload["trim"]
     where = f"{payload['frequency_Hz']:.3f} Hz at {payload['temperature_degC']:g} °C"
     quantities = (
-        ("softening by the card's voltages, first order", payload["softening_ppm"], "ppm"),
-        ("its second order, left out everywhere", -0.5e-6 * payload["softening_ppm"] ** 2, "ppm"),
+        ("softening by the card's voltages", payload["softening_ppm"], "ppm"),
         ("split by the card's voltages", *((1e3 * payload["split_Hz"], "mHz") if resolved else ("none", ""))),
         ("sensitivity to a change of all voltages", payload["per_volt_ppm"], "ppm/V"),
         ("sensitivity to temperature, through the gap", payload["per_kelvin_ppm"], "ppm/K"),

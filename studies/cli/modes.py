@@ -1,7 +1,7 @@
 """`hrg modes`: frequencies, Bryan factors and sensitivities of a card's modes.
 
 Where the card has imperfections or charged electrodes, the pairs n >= 1 have `split` in the JSON besides: `split_Hz`, `slow_Hz`, `fast_Hz`,
-`slow_axis_deg` (azimuth of an antinode of the slower mode), `shift_ppm` of the mean, all to first order, and `every_order_split_Hz`; and `parts`,
+`slow_axis_deg` (azimuth of an antinode of the slower mode), `shift_ppm` of the mean, the imperfection to first order, and `every_order_split_Hz`; and `parts`,
 split_Hz, slow_axis_deg and shift_ppm by the imperfection, the measured split and the electrodes alone. Where the card has a [mount] the pairs of n >=
 1 have `mount`: `strain_ppm` of the base, `shift_ppm`, `slope_ppm_per_degC`, `per_strain`. Where the card has films ([[loss.film]]), modes have
 `films`: `film`, `shift_ppm`, and the `missing` keys where that is null. Where its material is a crystal, the lowest pairs of n = 2, 3, 5, 6, 7, 9 …
@@ -60,7 +60,6 @@ MISMATCH = (
     "The base has expanded {:.4g} ppm more than the resonator since they were joined. First order in the resulting stress"
     " and deformation. The frequencies above do not include it; those of hrg tcf and of simulations do."
 )
-FIRST_ORDER = "Slow, fast and shift are of first order; the second, δ²/2 of a shift δ, is about {:.2g} ppm."
 BARE = "By stiffness and mass, to first order in the thickness. The frequencies above are those of the bare wall."
 VOIGT = "[001] along the axis. The table above and every other command use the isotropic (Voigt-Reuss-Hill) mean of the elastic constants."
 SLOPES = (
@@ -216,8 +215,7 @@ def _effect_tables(modes: list[Entry]) -> list[Table]:
     of = {key: [row for row in modes if key in row] for key in ("split", "mount", "films", "crystal")}
     strain = next((row["mount"]["strain_ppm"] for row in of["mount"]), 0.0)
     films = [row | film for row in of["films"] for film in row["films"]]
-    second = 0.5e-6 * max((row["split"]["shift_ppm"] ** 2 for row in of["split"]), default=0.0)
-    antinode = f"Slow axis: an antinode of the slower mode. {FIRST_ORDER.format(second)}"
+    antinode = "Slow axis: an antinode of the slower mode. Slow, fast and shift: the imperfection to first order, the electrodes' springs exactly."
     return [
         Table("Pairs with imperfections and electrodes", of["split"], SPLIT, antinode),
         Table("Thermal mismatch with the base", of["mount"], MOUNT, MISMATCH.format(strain)),

@@ -7,8 +7,8 @@ import numpy as np
 
 from compensation.arrays import Array
 from shell.elastic import Elastic
-from shell.electrodes import soften_at_gap
 from shell.imperfection import CoupledHarmonics, Imperfection, Pair, Split, find_split
+from shell.imperfection.split import shift_of
 from shell.modes import Mode, solve_modes
 from shell.resonator import Resonator
 from studies.errors import InputError, naming
@@ -60,7 +60,7 @@ class SplitPair:
 
     @property
     def split(self) -> Split:
-        """All of it, to first order."""
+        """All of it, the imperfection to first order."""
         return self._sum(self.imperfection, self.measured, self.electrodes)
 
     def of_every_order(self) -> Split:
@@ -80,8 +80,8 @@ class SplitPair:
         return card.fields
 
     def _sum(self, *parts: Split) -> Split:
-        shift, wave = sum(p.shift for p in parts), sum(p.wave for p in parts)
-        return Split(self.mode.harmonic, self.mode.frequency, float(shift), complex(wave))
+        mean, z = sum(p.squares[0] for p in parts), sum(p.squares[1] for p in parts)
+        return Split.of_squares(self.mode.harmonic, self.mode.frequency, float(mean), complex(z))
 
 
 def _check_wall(instrument: Instrument, fields: Imperfection) -> None:
@@ -122,9 +122,10 @@ def _coupled(mode: Mode, elastic: Elastic) -> CoupledHarmonics:
 
 @lru_cache(maxsize=64)
 def _softening(pair: Pair, electrodes: CardElectrodes) -> tuple[float, float]:
-    """Mean shift by the card's own voltages, and per V² on all of the electrodes together, at the reference temperature."""
+    """Mean δ(ω²)/ω² by the card's own voltages, and per V² on all of the electrodes together, at the reference temperature."""
     charged = electrodes.on(pair, electrodes.reference_temperature)
-    return charged.soften().shift, float(charged.per_square_volt[0].sum())
+    charged.soften()  # refuses voltages that pull in the shell
+    return charged.mean, float(charged.per_square_volt[0].sum())
 
 
 def reference_split(instrument: Instrument, harmonic: int = 2) -> SplitPair:
@@ -134,18 +135,29 @@ def reference_split(instrument: Instrument, harmonic: int = 2) -> SplitPair:
     return SplitPair(instrument, pair.mode, instrument.reference_temperature, pair)
 
 
-def mean_shift(instrument: Instrument, temperature: Array, voltage_squared: Array | None = None) -> Array | float:
-    """What imperfection and electrodes, as V²/g³ with a common V² or the card's voltages, add to the mean frequency of the n = 2 pair, relative."""
+def mean_changes(instrument: Instrument) -> tuple[float, float, float]:
+    """Mean δ(ω²)/ω² of the n = 2 pair by the imperfection, by the card's own voltages, and per V² on all electrodes of a charged card."""
     electrodes: CardElectrodes = instrument.part("electrodes")
     card: CardImperfection = instrument.part("imperfection")
     if not electrodes.are_charged and card.fields is None:
-        return 0.0
+        return 0.0, 0.0, 0.0
     whole = reference_split(instrument)
-    shift: Array | float = whole.imperfection.shift
-    if electrodes.are_charged:
-        with naming(f"{instrument.path} [electrodes]"):
-            own, per_square_volt = _softening(whole.pair, electrodes)
-        commanded = 0.0 if voltage_squared is None else voltage_squared - electrodes.keys.voltage_V**2
-        gap = 1 + electrodes.keys.gap_expansion_per_K * (temperature - instrument.reference_temperature)
-        shift = shift + soften_at_gap(own, 1.0, gap) + soften_at_gap(per_square_volt, commanded, gap)
-    return shift
+    with naming(f"{instrument.path} [electrodes]"):
+        charged = _softening(whole.pair, electrodes) if electrodes.are_charged else (0.0, 0.0)
+    return whole.imperfection.squares[0], *charged
+
+
+def mean_shift(instrument: Instrument, temperature: Array, voltage_squared: Array | None = None) -> Array | float:
+    """What imperfection and electrodes, as V²/g³ with a common V² or the card's voltages, add to the frequency of the n = 2 pair, relative."""
+    imperfection, own, per_square_volt = mean_changes(instrument)
+    if not own:
+        return shift_of(imperfection)
+    keys = instrument.part("electrodes").keys
+    commanded = 0.0 if voltage_squared is None else voltage_squared - keys.voltage_V**2
+    gap = 1 + keys.gap_expansion_per_K * (temperature - instrument.reference_temperature)
+    change = imperfection + (own + per_square_volt * commanded) / gap**3
+    if np.any(change <= -1):
+        raise InputError(
+            f"{instrument.path} [electrodes]: the commanded voltage pulls in the shell; lower it or widen the gap."
+        )
+    return shift_of(change)

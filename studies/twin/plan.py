@@ -15,7 +15,7 @@ from studies.effects.effect import spell_out
 from studies.errors import InputError
 from studies.instrument.registry import possible_keys
 from studies.instrument.units import unit_of
-from studies.resonator.splitting import mean_shift, reference_split
+from studies.resonator.splitting import mean_changes, reference_split
 from studies.simulation.heat_path import SENSOR, behind_housing, build_network, slowest_lag, with_sensor
 from studies.simulation.response import observed_rows
 from thermal.meridian import cell_names
@@ -245,17 +245,11 @@ def _constants(instrument: "Instrument", law: "FrequencyLaw", boundary: "Boundar
     """Numbers that are no keys of the card: the solver's, and those of imperfection and electrodes."""
     T0, polynomial = instrument.reference_temperature, instrument.polynomial
     keys = instrument.part("electrodes").keys if instrument.part("electrodes").are_charged else None
-    split, shift, own, per_volt = 0j, 0.0, 0.0, 0.0
-    at = np.array([T0])
+    imperfection, softening, per_square_volt = mean_changes(instrument)
+    split = 0j
     if instrument.is_imperfect:
         found = reference_split(instrument).split
-        split = complex(found.frequency * found.wave)
-        shift = float(np.ravel(mean_shift(instrument, at))[0])
-    if keys is not None:
-        shift = float(reference_split(instrument).imperfection.shift)
-        own = float(np.ravel(mean_shift(instrument, at))[0]) - shift
-        commanded = mean_shift(instrument, at, np.array([keys.voltage_V**2 + 1.0]))
-        per_volt = float(np.ravel(commanded)[0]) - shift - own
+        split = found.frequency * found.wave
     lag = slowest_lag(build_network(instrument, boundary=boundary), T0) if instrument.effects else 1.0
     return {
         "REFERENCE": T0,
@@ -267,9 +261,9 @@ def _constants(instrument: "Instrument", law: "FrequencyLaw", boundary: "Boundar
         "DELAY": 0.0 if polynomial is None else polynomial.delay,
         "SPLIT_RE": split.real,
         "SPLIT_IM": split.imag,
-        "SHIFT": shift,
-        "SOFTENING": own,
-        "PER_SQUARE_VOLT": per_volt,
+        "IMPERFECTION": imperfection,
+        "SOFTENING": softening,
+        "PER_SQUARE_VOLT": per_square_volt,
         "VOLTAGE_SQUARED": 0.0 if keys is None else keys.voltage_V**2,
         "BIAS_SLOPE": 0.0 if polynomial is None else polynomial.f0 * polynomial.coefficients[0],
         "BIAS_BEND": 1.0 if polynomial is None else polynomial.bias_bend,

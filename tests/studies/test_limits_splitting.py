@@ -111,11 +111,16 @@ def test_each_table_splits_as_published(tmp_path):
     assert np.rad2deg(charged.slow_axis) == pytest.approx(5.0 + 45.0, abs=0.01)  # the narrow gap is soft
 
 
-def test_parts_add_as_waves(tmp_path):
-    alone = [split_of(loaded(tmp_path, table)).split for table in (WALL, MASS, SPLIT, ELECTRODES)]
+def test_parts_add_in_the_square_of_the_frequency(tmp_path):
+    wall, mass, both, *others = (
+        split_of(loaded(tmp_path, *tables)).split
+        for tables in ((WALL,), (MASS,), (WALL, MASS), (SPLIT,), (ELECTRODES,))
+    )
+    assert both.wave == pytest.approx(wall.wave + mass.wave, rel=1e-9)  # to first order as waves
+    assert both.shift == pytest.approx(wall.shift + mass.shift, rel=1e-9)
     whole = split_of(loaded(tmp_path, WALL, MASS, SPLIT, ELECTRODES))
-    assert whole.split.wave == pytest.approx(sum(s.wave for s in alone), rel=1e-9)
-    assert whole.split.shift == pytest.approx(sum(s.shift for s in alone), rel=1e-9)
+    mean, z = map(sum, zip(*(s.squares for s in (both, *others)), strict=True))
+    assert whole.split.squares == (pytest.approx(mean, rel=1e-9), pytest.approx(z, rel=1e-9))
     assert whole.of_every_order().hertz == pytest.approx(whole.split.hertz, rel=2e-4)
 
 
@@ -186,26 +191,32 @@ def test_even_voltages_make_no_split_and_rounding_is_not_trimmed(tmp_path, capsy
     assert "Trim voltages" not in out
 
 
-def test_what_the_first_order_of_a_large_softening_leaves_out_is_said(tmp_path, capsys):
-    """A negative spring κ m ω² on a thin ring, of modal mass 5/8 of its own at n = 2, lowers f to f √(1 − κ): by δ − δ²/2, δ = −κ/2."""
+def test_springs_on_a_thin_ring_soften_it_by_the_root(tmp_path, ask):
+    """A negative spring κ m ω² on a thin ring, of modal mass 5/8 of its own at n = 2, lowers f to f √(1 − κ): in every command."""
     path = tmp_path / "card.toml"
     ring = 'shape = "cylinder"\nradius_mm = 20.0\nthickness_mm = 0.4\nheight_mm = 2.0\n'
     given = "youngs_modulus_GPa = 70.0\npoisson_ratio = 0.0\ndensity_kg_m3 = 2500.0\n"
-    gap = "gap_um = 50.0\nfirst = 0.0\nvoltage_V = 100.0\n"
+    gap = "gap_um = 50.0\nfirst = 0.0\nvoltage_V = 300.0\n"
     path.write_text(
         f'schema = "hrg.card/1"\nname = "x"\n[resonator]\n{ring}[material]\nname = "mine"\n{given}[electrodes]\n{gap}'
     )
     E, rho, h, r, length = 70e9, 2500.0, 0.4e-3, 20e-3, 2e-3
     omega = np.sqrt(36 / 5 * E * h**2 / (12 * rho)) / r**2
-    spring = 8.8541878e-12 * 100.0**2 / 50e-6**3 * 0.8 * np.pi * (r - h / 2) * length
-    lowered = np.sqrt(1 - spring / (0.625 * 2 * np.pi * r * h * length * rho) / omega**2) - 1
-    assert main(["electrodes", str(path)]) == 0
-    out = capsys.readouterr().out
-    first, second = (float(re.search(rf"{words} *│ *(-[\d.]+)", out)[1]) for words in ("first order", "everywhere"))
-    assert first + second == pytest.approx(1e6 * lowered, rel=4e-4)
-    assert abs(first - 1e6 * lowered) > 50.0
-    assert main(["modes", str(path)]) == 0
-    assert f"about {-second:.2g} ppm" in " ".join(capsys.readouterr().out.split())
+    spring = 8.8541878e-12 * 300.0**2 / 50e-6**3 * 0.8 * np.pi * (r - h / 2) * length
+    kappa = spring / (0.625 * 2 * np.pi * r * h * length * rho) / omega**2
+    assert kappa > 0.2
+    lowered = pytest.approx(np.sqrt(1 - kappa) - 1, rel=4e-4)
+    assert 1e-6 * ask(["electrodes", str(path)])["softening_ppm"] == lowered
+    (mode,) = ask(["modes", str(path)])["modes"]
+    assert 1e-6 * mode["split"]["shift_ppm"] == lowered
+    assert mode["split"]["slow_Hz"] / mode["frequency_Hz"] - 1 == lowered
+    card = load_card(path)
+    for volts, gap in ((300.0, 1.0), (200.0, 1.0), (200.0, 0.9)):
+        warm = card.with_values({"electrodes.gap_expansion_per_K": (gap - 1) / 10})
+        found = mean_shift(warm, np.array([303.15]), np.array([volts**2]))
+        assert found == pytest.approx(np.sqrt(1 - kappa * (volts / 300.0) ** 2 / gap**3) - 1, rel=4e-4)
+    with pytest.raises(InputError, match="the commanded voltage pulls in the shell"):
+        mean_shift(card, np.array([293.15]), np.array([700.0**2]))
 
 
 def test_commands_refuse_a_voltage_beyond_pull_in_and_a_map_with_holes(tmp_path, refuse):
@@ -220,13 +231,17 @@ def test_commands_refuse_a_voltage_beyond_pull_in_and_a_map_with_holes(tmp_path,
 
 
 def test_a_simulated_run_is_softened_by_the_volts_and_the_gap(tmp_path):
-    """δf/f = shift V²/V₀² (g₀/g)³ with the gap's own expansion, against a run of the perfect card."""
+    """f √(1 + m), m that of the card's volts times V²/V₀² (g₀/g)³ with the gap's own expansion, against a run of the perfect card."""
     gap = "[electrodes]\ngap_um = 100.0\nvoltage_V = 100.0\ngap_expansion_per_K = 1e-3\n"
     instrument = loaded(tmp_path, HEAT, gap)
-    shift = split_of(instrument).electrodes.shift
+    mean, _ = split_of(instrument).electrodes.squares
+
+    def shift(factor):
+        return np.sqrt(1 + mean * factor) - 1
+
     T = np.array([instrument.reference_temperature, instrument.reference_temperature + 10.0])
-    assert mean_shift(instrument, T) == pytest.approx([shift, shift / 1.01**3], rel=1e-9)
-    assert mean_shift(instrument, T, np.array([4e4, 1e4])) == pytest.approx([4 * shift, shift / 1.01**3], rel=1e-9)
+    assert mean_shift(instrument, T) == pytest.approx([shift(1), shift(1.01**-3)], rel=1e-9)
+    assert mean_shift(instrument, T, np.array([4e4, 1e4])) == pytest.approx([shift(4), shift(1.01**-3)], rel=1e-9)
     perfect = loaded(tmp_path, HEAT)
     rows = np.linspace(0.0, 3600.0, 5)
     drive = replace(
@@ -234,7 +249,7 @@ def test_a_simulated_run_is_softened_by_the_volts_and_the_gap(tmp_path):
         commands={"voltage_squared": np.array([1, 1, 4, 4, 0]) * 1e4},
     )
     ratio = predict(instrument, drive).columns["frequency_Hz"] / predict(perfect, drive).columns["frequency_Hz"]
-    assert ratio - 1 == pytest.approx([shift, shift, 4 * shift, 4 * shift, 0.0], rel=1e-4, abs=1e-10)
+    assert ratio - 1 == pytest.approx([shift(1), shift(1), shift(4), shift(4), 0.0], rel=1e-4, abs=1e-10)
 
 
 def test_the_loop_holds_the_cards_split(tmp_path):

@@ -3,16 +3,15 @@
 import numpy as np
 
 from compensation.arrays import Array
-from shell.electrodes import soften_at_gap
 from studies.effects.effect import Coefficient, Effect, Shape
 from studies.effects.states import States
 
 
 def columns(states: States, shape: Shape, response: str) -> Array:
-    """δf = −k V², at once, as of the electrodes of a card at a gap that stays; V⁴ as the field narrows the gap."""
+    """δf = −k V², at once, as of the electrodes of a card at a gap that stays; V⁴ of the root f √(1 + δ(ω²)/ω²), and as the field narrows the gap."""
     power = states.voltage_squared
     assert power is not None
-    return np.stack([soften_at_gap(-1.0, power), soften_at_gap(-1.0, power) * power], axis=1)
+    return np.stack([-power, -(power**2)], axis=1)
 
 
 EFFECT = Effect(

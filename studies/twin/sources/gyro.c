@@ -125,7 +125,9 @@ const char *twin_row(Twin *w, const TwinInput *in) {
     }
     const double thermal = exp(logarithm), gap = 1 + TWIN_GAP_EXPANSION * excess, volts = in->value[IN_VOLTAGE];
     const double charged = in->given[IN_VOLTAGE] ? TWIN_PER_SQUARE_VOLT * (volts * volts - TWIN_VOLTAGE_SQUARED) : 0.0;
-    const double frequency = thermal * (1 + TWIN_SHIFT + (TWIN_SOFTENING + charged) / (gap * gap * gap)) + change[TARGET_FREQUENCY];
+    const double stiffness = 1 + TWIN_IMPERFECTION + (TWIN_SOFTENING + charged) / (gap * gap * gap);
+    if (!(stiffness > 0)) return "the electrode voltage pulls in the shell.";
+    const double frequency = thermal * sqrt(stiffness) + change[TARGET_FREQUENCY];
     double loss = p[P_loss_inverse_q] * (1 + excess * (p[P_loss_slope_per_K] + p[P_loss_curvature_per_K2] * excess));
     if (twin_loss.count) loss = exp(twin_spline(&twin_loss, T, NULL));
     loss += change[TARGET_LOSS];

@@ -48,7 +48,8 @@ def test_softening_is_that_of_the_cards_electrodes(card, law):
     per_square_volt = charged.part("electrodes").on(whole.pair, 293.15).per_square_volt[0].sum()
     thermal = read(card, law, {})["frequency_Hz"]
     drives = (states(voltage_squared=v) for v in (volts**2, np.full_like(volts, 1e4)))
-    sized = {"softening_Hz_per_V2": -float(per_square_volt)}
+    size = -float(per_square_volt) / 2  # √(1 - 2 x) = 1 - x - x²/2 …
+    sized = {"softening_Hz_per_V2": size, "narrowing_Hz_per_V4": size**2 / 2}
     moved, level = (apply_effect("electrostatic-softening", sized, one)[1] for one in drives)
     assert np.ptp(stepped - still) > 1e-3
     assert stepped - still == pytest.approx(thermal * (moved - level), rel=1e-6, abs=1e-9)
