@@ -70,9 +70,7 @@ def _columns(found: Answer) -> list[dict[str, Any]]:
     wanted = set(found.task.wanted)
     solved = {"start": found.before, "interpolant": found.foretold, "best": found.after, "verified": found.verified}
     rows = [
-        row_of(column, "label", "unit", column="name")
-        | {name: float(of[k]) for name, of in solved.items()}
-        | {"slopes": "differences"}
+        row_of(column, "label", "unit", column="name") | {name: float(of[k]) for name, of in solved.items()}
         for k, column in enumerate(found.task.study.columns)
         if "_of_n" not in column.name and not column.name.endswith("nearest_harmonic")
     ]

@@ -259,7 +259,8 @@ def _draft_look(path: str, look: Look, taken: Sequence[str]) -> tuple[list[str],
             lines.append('repeated_times = "{}"    # CHECK: {}'.format(*kept))
     lines.append("# clock_offset_s = 0.0    # added to this file's times: positive when its clock is behind")
     usable = {name: hints[name] for name in names if name not in time and numbers[name]}
-    meanings = find_meanings(usable, taken) if look.header is not None else guess_meanings(usable, numbers)
+    group = look.group.name if look.group is not None else ""
+    meanings = find_meanings(usable, taken, group) if look.header is not None else guess_meanings(usable, numbers)
     others = [name for name in names if name not in time and name not in meanings and any(cells[name])]
     for name in names:
         if name in others:

@@ -56,14 +56,17 @@ class Meaning:
     rather: str = ""
 
 
-def find_meanings(hints: Mapping[str, str], taken: Sequence[str] = ()) -> dict[str, Meaning]:
-    """Return the meaning of every column for which one is found, from `hints` of name and unit; `taken` are filled by other files."""
+def find_meanings(hints: Mapping[str, str], taken: Sequence[str] = (), group: str = "") -> dict[str, Meaning]:
+    """Return the meaning of every column for which one is found, from `hints` of name and unit; `taken` are filled by other files.
+
+    The name of their `group` says which temperature a column is of.
+    """
     axes = _find_axes(hints)
     bids = sorted(
         (-weight, place, name, target)
         for place, (name, hint) in enumerate(hints.items())
         if name not in axes
-        for target, weight in _bids(hint).items()
+        for target, weight in _bids(hint, group.lower()).items()
     )
     first = {name: target for _, _, name, target in reversed(bids)}
     found = {name: Meaning("measured_rate_deg_per_s", axis) for name, axis in axes.items()}
@@ -88,7 +91,7 @@ def find_unit(target: str, hint: str) -> str | None:
     return next(filter(None, (*spelled, *described)), None)
 
 
-def _bids(hint: str) -> dict[str, int]:
+def _bids(hint: str, group: str = "") -> dict[str, int]:
     name = re.sub(r"[\[(][^\])]*[\])]", " ", hint).lower().replace("_", " ").replace(".", " ")
     exact = next((column for column in TARGETS if name.split() == column.lower().split("_")), None)
     if exact is not None:
@@ -100,7 +103,8 @@ def _bids(hint: str) -> dict[str, int]:
         fits = _unit_fits(target, hint)
         if fits is not False:
             bids[target] = max(bids.get(target, 0), weight + (FITTING_UNIT if fits else 0))
-    return bids
+    told = BIDS[:2] if bids and all(target.endswith("_degC") for target in bids) else ()
+    return {target: weight for pattern, target, weight in told if re.search(pattern, group)} or bids
 
 
 def _unit_fits(target: str, hint: str) -> bool | None:

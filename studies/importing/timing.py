@@ -29,6 +29,7 @@ def find_time(
 ) -> tuple[list[str], str, str]:
     """Return the time columns, their format and doubts; `evenly`: the file states its step, and a column that merely rises is no time."""
     named = [name for name in names if re.search(TIME_WORDS, name.lower()) and not find_unit(HOUSING, hints[name])]
+    named = [name for name in named if name != "T" or "t" not in names]
     stamps = [name for name in names if cells[name] and all(is_stamp(cell) for cell in cells[name] if cell)]
     stamped = [name for name in (named or stamps) if name in stamps][:2]
     if stamped:

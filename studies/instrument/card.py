@@ -183,9 +183,9 @@ def build_instrument(content: Mapping[str, Any], path: str = "card") -> Instrume
     return _reread(bare, content, set(card_tables()))
 
 
-def save_card(instrument: Instrument, path: str | Path) -> None:
+def save_card(card: Card, path: str | Path) -> None:
     """Write an instrument as a card, whole or not at all."""
-    write_text(path, spell_card(instrument, path)[1])
+    write_text(path, spell_card(load_card(card), path)[1])
 
 
 def spell_card(instrument: Instrument, path: str | Path) -> tuple[dict[str, Any], str]:

@@ -28,6 +28,7 @@ ACTING = ("resonator.", "material.")
 IDLE = ("conductivity", "heat_capacity")
 CURVED = 1.5  # of the squared prior width of ln f: what a straight line leaves at that distance
 ABOVE = 1.15  # frequency of the highest candidate over the highest reading
+OTHER = 0.4  # of ln f, beyond which a reading is of another mode than is said
 NEAR, FAR, MOST_STEPS = 0.02, 0.02, 12  # posterior and prior standard deviations, Gauss-Newton steps
 RIVALS, UNLIKELY = 4, 20.0  # assignments that are fitted, and their cost above the best's
 EXCLUDED = 6.0  # prior standard deviations that no value of a right card is away
@@ -129,7 +130,12 @@ def _fit_likely(
     y, start = np.log(readings.frequency), np.zeros(len(model.priors.values))
     n, k = readings.harmonic, readings.index
     if not (np.isnan(n) | np.isnan(k)).any():
-        modes = [Which(int(a), int(b), float(t)) for a, b, t in zip(n, k, T, strict=True)]
+        modes, exchanged = (
+            [Which(int(a), int(b), float(t)) for a, b, t in zip(*both, T, strict=True)] for both in ((n, k), (k, n))
+        )
+        far = np.abs(y - model.predict(modes, start)[0]).max()
+        if far > OTHER and np.abs(y - model.predict(exchanged, start)[0]).max() < far / 4:
+            raise InputError(f"{readings.path}: harmonic and index are exchanged: the frequencies are those of modes with the one in place of the other. Exchange the names of the columns.")  # fmt: skip
         return [_fit(model, modes, y, relative, model.derivatives(modes, start))]
     most = int(max(12, np.nan_to_num(n).max()))
     highest = ABOVE * float(readings.frequency.max())

@@ -33,7 +33,7 @@ from shell.layout import Theory
 from shell.modes import Mode, solve_modes
 from shell.resonator import Resonator
 from studies.errors import InputError, naming, nearest
-from studies.instrument.card import Instrument
+from studies.instrument.card import Card, Instrument, load_card
 from studies.instrument.tables.loss_parts import LossParts
 from studies.loss.films import film_losses
 
@@ -65,12 +65,13 @@ class LossModel:
 
 
 def loss_model(
-    instrument: Instrument, harmonic: int = 2, theory: Theory = "solid", anchor: bool = False,
+    card: Card, harmonic: int = 2, theory: Theory = "solid", anchor: bool = False,
     mode: Mode | None = None,
 ) -> LossModel:  # fmt: skip
     """Solve the lowest mode of a harmonic and gather its causes of loss; the `anchor`, what a stem sends into its base,
     takes a second or two. `mode`: where it is known, at the reference temperature.
     """
+    instrument = load_card(card)
     T0, material = instrument.reference_temperature, instrument.material
     mode = mode or solve_lowest(instrument.resonator, material.elastic(T0), harmonic, theory)
     vibration = Vibration(mode.solution, mode.resonator, material, T0)

@@ -191,9 +191,9 @@ def make_part(
     )
 
 
-def write_model(model: Model, path: str | Path) -> None:
+def write_model(model: Model | str | Path, path: str | Path) -> None:
     """Save a model, whole or not at all."""
-    write_text(path, format_model(model))
+    write_text(path, format_model(read_any_model(model)))
 
 
 def format_model(model: Model) -> str:
@@ -239,8 +239,10 @@ class Known:
                     raise InputError(f"{model.where} [[part]] {part.name}: the coefficient '{one.name}' must be in {unit}, not {one.unit}; convert its value.")  # fmt: skip
 
 
-def read_any_model(path: str | Path) -> Model:
-    """Read a model's file, whatever its kind."""
+def read_any_model(path: Model | str | Path) -> Model:
+    """Read a model's file, whatever its kind; a model is what it is."""
+    if isinstance(path, Model):
+        return path
     from studies.instrument.card import shipped_cards
 
     if not as_path(path).exists() and str(path) in shipped_cards():

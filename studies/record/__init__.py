@@ -293,8 +293,9 @@ def read_profile(path: "str | Path | DataFrame") -> Columns:
     return table
 
 
-def write_record(record: Record, path: str | Path) -> None:
+def write_record(run: Run, path: str | Path) -> None:
     """Write one run, whole or not at all, as CSV or (by the end of its name) Parquet."""
+    record = read_record(run)
     notes = record.notes
     with written_whole(path) as file:
         if is_parquet(path):

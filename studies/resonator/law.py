@@ -6,20 +6,22 @@ from typing import TYPE_CHECKING, cast
 
 from shell.errors import ShellError
 from studies.errors import InputError, naming
+from studies.instrument.card import load_card
 
 if TYPE_CHECKING:
     from shell.law import FrequencyLaw
     from shell.layout import Theory
     from shell.material import Mount
-    from studies.instrument.card import Instrument
+    from studies.instrument.card import Card, Instrument
 
 SLOPE_KEYS = {"youngs_modulus": "log_slope_per_K", "shear_modulus": "log_slope_per_K", "expansion": "value"}
 
 
 def law_of(
-    instrument: "Instrument", lowest: float = -inf, highest: float = inf, theory: "Theory" = "solid", harmonic: int = 2
+    card: "Card", lowest: float = -inf, highest: float = inf, theory: "Theory" = "solid", harmonic: int = 2
 ) -> "FrequencyLaw":
-    """Build the frequency law of an instrument between two temperatures (K), within its material's range: over all of it unless given."""
+    """Build the frequency law of a card between two temperatures (K), within its material's range: over all of it unless given."""
+    instrument = load_card(card)
     if instrument.polynomial is not None:
         return cast("FrequencyLaw", instrument.polynomial.between(lowest, highest))
     from shell.law import build_law

@@ -12,7 +12,7 @@ from shell.imperfection.split import shift_of
 from shell.modes import Mode, solve_modes
 from shell.resonator import Resonator
 from studies.errors import InputError, naming
-from studies.instrument.card import Instrument
+from studies.instrument.card import Card, Instrument, load_card
 from studies.instrument.tables.electrodes import CardElectrodes
 from studies.instrument.tables.imperfection import CardImperfection
 
@@ -128,8 +128,9 @@ def _softening(pair: Pair, electrodes: CardElectrodes) -> tuple[float, float]:
     return charged.mean, float(charged.per_square_volt[0].sum())
 
 
-def reference_split(instrument: Instrument, harmonic: int = 2) -> SplitPair:
+def reference_split(card: Card, harmonic: int = 2) -> SplitPair:
     """The pair of a harmonic at the card's reference temperature."""
+    instrument = load_card(card)
     resonator, elastic = instrument.at(instrument.reference_temperature)
     pair = solved_pair(resonator, elastic, harmonic)
     return SplitPair(instrument, pair.mode, instrument.reference_temperature, pair)

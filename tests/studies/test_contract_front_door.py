@@ -123,14 +123,19 @@ def test_contract_numbers_of_a_run_are_refused_by_name(wrong):
 
 
 def test_contract_what_is_no_file_card_or_run_is_refused_with_words(given):
-    for command in (studies.load_card, studies.compare, studies.read_model, studies.emit_c, studies.run_study):
+    of_cards = (studies.load_card, studies.compare, studies.law_of, studies.reference_split, studies.loss_model)
+    for command in (*of_cards, studies.read_model, studies.emit_c, studies.run_study):
         with pytest.raises(studies.InputError, match="3: give a path or a name, not int"):
             command(3)
+    for write in (studies.save_card, studies.write_model, studies.write_record):
+        with pytest.raises(studies.InputError, match="3: give a path"):
+            write(3, "never.toml")
     for fit in (compensation.fit_bias, lambda runs: compensation.fit_cross_damping(runs, k=1.0, zeta=1.0)):
         with pytest.raises(compensation.CompensationError, match="hrg fit"):
             fit("cooling.csv")
     card = studies.load_card("free-dome")
     assert studies.load_card(card) is card
+    assert studies.law_of("free-dome").frequency(293.15) == studies.law_of(card).frequency(293.15)
     model = studies.read_model(given[1])
     assert studies.emit_c(model) == studies.emit_c(str(given[1]))
 

@@ -873,6 +873,18 @@ def test_a_temperature_that_rises_is_no_time_and_local_stamps_of_the_file_may_ha
     assert record["housing_temperature_degC"] == pytest.approx(np.arange(50.0))
 
 
+def test_the_group_of_a_temperature_says_whose_it_is(tmp_path):
+    h5py = pytest.importorskip("h5py")
+    t = np.arange(50.0)
+    columns = {"chamber": ("T", 20 + 0.02 * t), "gyro": ("f", 4432 + t % 7), "housing": ("T", 20 + 0.01 * t)}
+    with h5py.File(tmp_path / "lab.h5", "w") as file:
+        for group, (name, values) in columns.items():
+            file[f"{group}/t"], file[f"{group}/{name}"] = t, values
+    record = draft_and_import(tmp_path / "lab.h5", tmp_path)
+    assert record["chamber_temperature_degC"] == pytest.approx(20 + 0.02 * t)
+    assert record["housing_temperature_degC"] == pytest.approx(20 + 0.01 * t)
+
+
 def test_lines_below_the_table_of_one_of_several_files_end_no_other(tmp_path):
     for name, begin, below in (("a.csv", 0, "end;;\n"), ("b.csv", 300, "")):
         lines = [f"{begin + k};{4432 + k % 7};{20 + k % 5}" for k in range(300)]

@@ -96,6 +96,12 @@ def test_contract_a_table_without_its_harmonics_is_told_so(tmp_path, refuse):
     assert "the column 'harmonic' is missing" in refuse(["calibrate", str(CARD[0]), str(path)])
 
 
+def test_contract_exchanged_columns_are_named(tmp_path, refuse):
+    path = tmp_path / "modes.csv"
+    path.write_text("index,harmonic,frequency_Hz\n2,0,4600\n3,0,11927\n4,0,21402\n")
+    assert "harmonic and index are exchanged" in refuse(["calibrate", "free-dome", str(path)])
+
+
 def test_contract_a_mode_stands_once_and_alone(tmp_path, refuse):
     path, run = tmp_path / "modes.csv", tmp_path / "run.csv"
     path.write_text("harmonic,index,frequency_Hz\n2,0,4500\n2,0,4501\n")
