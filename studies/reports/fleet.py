@@ -172,10 +172,10 @@ def _draw_chart(axis: "Axes", lot: Lot, one: Quantity, by_date: bool) -> None:
     scatter = float(np.hypot(one.population.scatter, error))
     axis.axhline(lot_mean, color="0.5", linewidth=0.8)
     axis.axhspan(lot_mean - 3 * scatter, lot_mean + 3 * scatter, color="0.5", alpha=0.12)
+    axis.tick_params(labelsize=7)
     if by_date:
         axis.set_xlabel(f"days since {first}", fontsize=7)
     elif len(serials) <= NAMED:
-        axis.set_xticks(range(len(serials)), serials, rotation=60, fontsize=6)
-    axis.tick_params(axis="x", labelrotation=60, labelsize=6)
+        axis.set_xticks(range(len(serials)), serials, rotation=90, fontsize=6)
     axis.ticklabel_format(axis="y", useOffset=False)
     axis.set_title(_name(one), fontsize=7, loc="right")  # a power of ten stands on the left
