@@ -1,35 +1,26 @@
-"""Comma-separated tables of numbers, read fast and refused with the line that is wrong; `#` begins a comment, empty cells are missing."""
+"""Tables of numbers under the names of their columns: comma-separated, Parquet or of pandas; `#` begins a comment, empty cells are missing."""
 
-import codecs
 import csv
-import hashlib
 import io
-import re
 from collections import Counter
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from studies.errors import InputError, nearest
+from studies.files.numbers import IMPORT, check_text, is_number, parse_numbers
 from studies.files.parquet import is_parquet, read_comments_and_names, read_table
-from studies.files.reading import MOST_BYTES, PORTION, opened, read_bytes
-from studies.progress import tell
+from studies.files.reading import read_bytes
 
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-Table: TypeAlias = dict[str, NDArray[np.float64]]
-
 LARGEST = 1e20  # no reading of an instrument, time or count is larger; what is larger would overflow in its powers
-_SOMETHING = re.compile(rb"\S")
-IMPORT = " 'hrg import' brings laboratory files with other names, units and notations into this form."
 HEAD = 1 << 20  # bytes in which comments and header are looked for first
-FEW = 400_000  # numbers that are read before pandas, which reads faster, is loaded
-ROWS_AT_ONCE = 200_000  # rows that are parsed at once, so that a large table costs its numbers and little more
 
 
 @dataclass(frozen=True)
@@ -38,8 +29,8 @@ class Columns:
 
     path: str
     values: Mapping[str, NDArray[np.float64]]
-    comments: tuple[str, ...] = ()
     sha256: str = ""
+    comments: tuple[str, ...] = ()
     first_line: int = field(default=2, repr=False)
 
     def line(self, row: int) -> int:
@@ -79,20 +70,17 @@ def read_columns(
     if not isinstance(path, str | Path):
         columns = _take_frame(path)
         _check_names(columns.path, list(columns.values), 0, known, required, prefixes)
-        _check_size(columns)
-        return columns
-    if is_parquet(path):
+    elif is_parquet(path):
         comments, header = read_comments_and_names(path)
         _check_names(path, header, 0, known, required, prefixes)
-        values, sha256 = read_table(path)
-        columns = Columns(str(path), values, comments, sha256, first_line=1)
-        _check_size(columns)
-        return columns
-    comments, header, header_line, start = _read_head(path)
-    names = _check_names(path, header, header_line, known, required, prefixes)
-    values, sha256 = parse_fast(path, start, names) or _parse_with_care(path, start, names, header_line + 1)
-    columns = Columns(str(path), values, comments, sha256, header_line + 1)
-    _check_size(columns)
+        columns = Columns(str(path), *read_table(path), comments, first_line=1)
+    else:
+        comments, header, header_line, start = _read_head(path)
+        names = _check_names(path, header, header_line, known, required, prefixes)
+        columns = Columns(str(path), *parse_numbers(path, start, names, header_line + 1), comments, header_line + 1)
+    for name, values in columns.values.items():
+        large = np.abs(values) > LARGEST
+        columns.refuse(large, lambda row: f"{name} = {values[row]:g} is not a possible reading; correct it.")  # noqa: B023
     return columns
 
 
@@ -112,7 +100,7 @@ def _take_frame(frame: "DataFrame") -> Columns:
     except (TypeError, ValueError) as error:
         raise InputError(f"{path}: the table has cells that are no numbers ({error}).") from None
     named = dict(zip(names, numbers, strict=True))
-    return Columns(path, named, tuple(frame.attrs.get("comments", ())), first_line=1)
+    return Columns(path, named, "", tuple(frame.attrs.get("comments", ())), first_line=1)
 
 
 def read_header(path: "str | Path | DataFrame") -> list[str]:
@@ -129,26 +117,10 @@ def _read_head(path: str | Path) -> tuple[tuple[str, ...], list[str], int, int]:
     head = read_bytes(path, first=HEAD)
     if len(head) == HEAD:  # whole lines only
         try:
-            return _split_head(path, _check_text(path, head[: head.rfind(b"\n") + 1]))
+            return _split_head(path, check_text(path, head[: head.rfind(b"\n") + 1]))
         except InputError:
             head = read_bytes(path)
-    return _split_head(path, _check_text(path, head))
-
-
-def _check_text(path: str | Path, data: bytes) -> bytes:
-    """Make sure that a file is UTF-8 text with something in it, and take its byte-order mark off."""
-    data = data.removeprefix(codecs.BOM_UTF8)
-    if b"\0" in data:
-        raise InputError(f"{path}: not a text table (it holds zero bytes); export it as CSV in UTF-8.{IMPORT}")
-    if not data.isascii():
-        try:
-            data.decode()
-        except UnicodeDecodeError as error:
-            line = data.count(b"\n", 0, error.start) + 1
-            raise InputError(f"{path}, line {line}: not UTF-8 text; save the file as UTF-8 (CSV).{IMPORT}") from None
-    if not _SOMETHING.search(data):
-        raise InputError(f"{path}: the file is empty; it needs a header line and rows of numbers.")
-    return data
+    return _split_head(path, check_text(path, head))
 
 
 def _split_head(path: str | Path, data: bytes) -> tuple[tuple[str, ...], list[str], int, int]:
@@ -184,7 +156,7 @@ def _check_names(
         raise InputError(f"{where}: the columns are not separated by commas: write commas and decimal points; 'hrg import' does so for a record or a table of settled readings.")  # fmt: skip
     if names[0].startswith(("schema =", "schema=")):
         raise InputError(f"{path}: a TOML file, not a table (CSV); exchange it for the file with the readings.")
-    if all(_is_number(name) for name in names):
+    if all(is_number(name) for name in names):
         raise InputError(f"{where}: a header line with the column names is missing; add {','.join(required)}.")
     counts = Counter(names)
     for name in names:
@@ -200,128 +172,3 @@ def _check_names(
         if name not in counts:
             raise InputError(f"{where}: the column '{name}' is missing; the header has {', '.join(names)}.{IMPORT}")
     return names
-
-
-def parse_fast(path: str | Path, start: int, names: Sequence[str]) -> tuple[Table, str] | None:
-    """Parse a clean table quickly, never all of its text in memory; None when the careful way must decide."""
-    table, done, sha256 = np.empty((len(names), 0)), 0, ""
-    try:
-        for rows, sha256, part in parse_portions(path, start, names):  # noqa: B007
-            table = table if done else np.empty((len(names), rows))
-            table[:, done : done + part.shape[1]] = part
-            done += part.shape[1]
-    except ValueError:
-        return None
-    return dict(zip(names, table, strict=True)), sha256
-
-
-def parse_portions(
-    path: str | Path, start: int, names: Sequence[str], separator: str = ",", decimal: str = ".", most: int = MOST_BYTES
-) -> Iterator[tuple[int, str, NDArray[np.float64]]]:
-    """Yield the number of all rows, the hash and the next rows (columns, rows) of a clean table; ValueError when the careful way must decide."""
-    with opened(path, most) as file:
-        if (found := _scan(file, start, len(names), separator, decimal)) is None:
-            raise ValueError("not plain numbers")
-        rows, body, sha256 = found
-        file.seek(body)
-        if rows * len(names) <= FEW and (separator, decimal) == (",", "."):
-            cells = b",".join(file.read().split()).split(b",")
-            yield rows, sha256, np.reshape([float(cell or b"nan") for cell in cells], (rows, -1)).T
-            return
-        import pandas as pd
-
-        done = 0
-        with pd.read_csv(
-            file,
-            sep=separator,
-            decimal=decimal,
-            names=list(names),
-            header=None,
-            dtype="float64",
-            keep_default_na=False,
-            na_values=[""],
-            skip_blank_lines=False,
-            index_col=False,
-            chunksize=ROWS_AT_ONCE,
-        ) as parts:
-            for part in parts:
-                done += len(part)
-                tell(f"reading {path}", done / rows)
-                yield rows, sha256, part.to_numpy().T
-        if done != rows:
-            raise ValueError("uneven rows")
-
-
-def _scan(file: IO[bytes], start: int, columns: int, separator: str, decimal: str) -> tuple[int, int, str] | None:
-    """Return rows, place of the body and hash; None unless all rows have all columns and nothing but plain decimal numbers."""
-    usual = f"0123456789eE+-\r\n{separator}{decimal}".encode()
-    if file.read(len(codecs.BOM_UTF8)) != codecs.BOM_UTF8:
-        file.seek(0)
-    body = file.tell() + start
-    sum_ = hashlib.sha256(file.read(start))
-    rows = between = 0
-    is_empty, last = True, b""
-    while portion := file.read(PORTION):
-        if portion.translate(None, usual):
-            return None
-        sum_.update(portion)
-        rows += portion.count(b"\n")
-        between += portion.count(separator.encode())
-        is_empty = is_empty and not _SOMETHING.search(portion)
-        last = portion
-    rows += not last.endswith(b"\n")
-    return None if is_empty or between != rows * (columns - 1) else (rows, body, sum_.hexdigest())
-
-
-def _parse_with_care(path: str | Path, start: int, names: list[str], first_line: int) -> tuple[Table, str]:
-    data = _check_text(path, read_bytes(path))
-    if not _SOMETHING.search(data, start):
-        raise InputError(f"{path}: the table has a header but no rows; add one line per measurement.")
-    return _parse_by_line(path, data[start:].decode(), names, first_line), hashlib.sha256(data).hexdigest()
-
-
-def _parse_by_line(path: str | Path, body: str, names: list[str], first_line: int) -> Table:
-    rows: list[list[float]] = []
-    reader = csv.reader(io.StringIO(body, newline=""))
-    try:
-        for cells in reader:
-            number = first_line + reader.line_num - 1
-            if not any(cell.strip() for cell in cells):
-                if len(cells) > 1 or (cells and len(names) == 1):
-                    rows.append([np.nan] * len(names))
-                continue
-            if cells[0].startswith("#"):
-                raise InputError(
-                    f"{path}, line {number}: comments are allowed only above the header; move it there, or split the file here if another begins."
-                )
-            if len(cells) != len(names):
-                raise InputError(f"{path}, line {number}: {len(cells)} values where the header has {len(names)} columns ({', '.join(names)}); decimal commas must become points.")  # fmt: skip
-            rows.append([_number(path, number, name, cell) for name, cell in zip(names, cells, strict=True)])
-    except csv.Error as error:
-        raise InputError(f"{path}, line {first_line + reader.line_num - 1}: {error}.") from None
-    table = np.array(rows, dtype=float).reshape(-1, len(names))
-    return {name: np.ascontiguousarray(table[:, k]) for k, name in enumerate(names)}
-
-
-def _check_size(columns: Columns) -> None:
-    for name, values in columns.values.items():
-        large = np.abs(values) > LARGEST
-        columns.refuse(large, lambda row: f"{name} = {values[row]:g} is not a possible reading; correct it.")  # noqa: B023
-
-
-def _number(path: str | Path, line: int, name: str, cell: str) -> float:
-    text = cell.strip()
-    if not text:
-        return float("nan")
-    if not _is_number(text):
-        raise InputError(f"{path}, line {line}: '{text}' in column '{name}' is not a number; correct it, or leave the cell empty where the value is missing.")  # fmt: skip
-    return float(text)
-
-
-def _is_number(text: str) -> bool:
-    """Tell whether the text is a finite decimal number (not 'nan', 'inf' or '1_000', which float() would take)."""
-    try:
-        value = float(text)
-    except ValueError:
-        return False
-    return abs(value) != float("inf") and value == value and "_" not in text

@@ -178,7 +178,7 @@ def _read_trace(path: str | Path) -> tuple[Columns, dict[str, float]]:
         raise InputError(f"{path}: {error}; every row needs a time and a power.") from None
     if rows.ndim != 2 or rows.shape[1] != 2:
         raise InputError(f"{path}: every row needs a time and a power.")
-    return Columns(str(path), {"time_s": rows[:, 0], "power_dBm": rows[:, 1]}, tuple(comments)), notes
+    return Columns(str(path), {"time_s": rows[:, 0], "power_dBm": rows[:, 1]}, comments=tuple(comments)), notes
 
 
 def _pairs(path: str | Path, columns: Mapping[str, Array]) -> list[NDArray[np.complex128]]:

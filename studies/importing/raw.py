@@ -15,7 +15,7 @@ import numpy as np
 
 from compensation.arrays import Array
 from studies.errors import InputError
-from studies.files.columns import ROWS_AT_ONCE, parse_portions
+from studies.files.numbers import ROWS_AT_ONCE, parse_portions
 from studies.files.reading import ANY_SIZE, PORTION, digest, opened, read_bytes
 from studies.importing.mapping import NUMERIC_TIMES, SEPARATORS, FileMap
 from studies.importing.sheets import EXCEL, read_sheet

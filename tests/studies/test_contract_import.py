@@ -12,7 +12,7 @@ import pytest
 
 from studies.cli import main
 from studies.errors import InputError, MissingEnvironment
-from studies.files import columns, stored
+from studies.files import numbers, stored
 from studies.importing import clock, raw
 from studies.importing.draft import draft_map
 from studies.importing.join import import_records
@@ -830,10 +830,10 @@ def test_portions_change_nothing(tmp_path, monkeypatch):
         paths, loaded = [str(tmp_path / "one.csv"), str(tmp_path / "two.csv")], load_map(tmp_path / "map.toml")
         whole = import_records(paths, loaded)[""]
         with monkeypatch.context() as patch:
-            for module in (clock, stored, columns):
-                patch.setattr(module, "ROWS_AT_ONCE" if module is columns else "PORTION", 7)
+            for module in (clock, stored, numbers):
+                patch.setattr(module, "ROWS_AT_ONCE" if module is numbers else "PORTION", 7)
             patch.setattr(raw, "ROWS_AT_ONCE", 7)
-            patch.setattr(columns, "FEW", 4)
+            patch.setattr(numbers, "FEW", 4)
             found.append((whole, import_records(paths, loaded)[""]))
     for whole, parts in found:
         assert np.ptp(np.diff(whole["time_s"])) < 1e-6

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from studies.errors import InputError
-from studies.files import columns
+from studies.files import columns, numbers
 from studies.files.writing import written_whole
 from studies.record import Record, read_frequency_table, read_profile, read_record, reading_resolution, write_record
 
@@ -149,10 +149,11 @@ def test_a_file_that_fails_halfway_leaves_nothing(tmp_path):
 def test_a_large_table_costs_its_numbers_not_its_text(tmp_path, monkeypatch):
     path, rows = tmp_path / "run.csv", 60_000
     write_record(Record({"time_s": np.arange(rows) / 7, "frequency_Hz": 4432 + np.sin(np.arange(rows))}, ""), path)
-    monkeypatch.setattr(columns, "FEW", 0)
+    monkeypatch.setattr(numbers, "FEW", 0)
     whole = read_record(path)
-    for name, value in {"ROWS_AT_ONCE": 5003, "PORTION": 1 << 16, "HEAD": 1 << 12}.items():
-        monkeypatch.setattr(columns, name, value)
+    monkeypatch.setattr(columns, "HEAD", 1 << 12)
+    for name, value in {"ROWS_AT_ONCE": 5003, "PORTION": 1 << 16}.items():
+        monkeypatch.setattr(numbers, name, value)
     tracemalloc.start()
     try:
         parts = read_record(path)
