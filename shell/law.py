@@ -27,18 +27,16 @@ from shell.errors import ShellError
 from shell.layout import Theory
 from shell.material import Material, Mount
 from shell.modes import Mode, solve_modes
-from shell.prestress import Prestress
+from shell.prestress import Prestress, check_mount
 from shell.property import coefficient_names, powers
 from shell.quadrature import Array
 from shell.resonator import Resonator
-from shell.shape_factor import ShapeFactor, interpolate_shape, shape_of
+from shell.shape_factor import ShapeFactor, interpolate_shape, ratios_to_cover, shape_of
 from shell.solution import AlongMeridian
 
 if TYPE_CHECKING:
     from scipy.interpolate import CubicSpline
 
-REACH = 5.0  # standard deviations of Poisson's ratio that Φ covers beside the law's own range
-WIDEST = 0.04  # and not more than this
 SPACING = 1.0  # K, of the knots of ln f(T)
 ACTING = ("shear_modulus", "youngs_modulus", "poisson_ratio", "density", "expansion")
 
@@ -287,44 +285,13 @@ def build_law(
     def solve(elastic: Elastic) -> Mode:
         return solve_modes(resonator, elastic, harmonic, theory=theory)[0]
 
-    T = np.linspace(lowest, highest, 41)
-    nu = material.value("poisson_ratio", T)
-    if lowest == highest:
-        elastic = material.elastic(lowest)
-        mode = solve(elastic)
+    elastic = material.elastic(lowest if lowest == highest else reference_temperature)
+    mode = solve(elastic)
+    low, high = ratios_to_cover(material, np.linspace(lowest, highest, 41), elastic.nu)
+    if lowest == highest or high - low < 1e-9:
         shape = shape_of(mode, resonator, elastic)
     else:
-        elastic = material.elastic(reference_temperature)
-        mode = solve(elastic)
-        reach = min(REACH * _ratio_spread(material, T), WIDEST)
-        low, high = min(float(nu.min()), elastic.nu) - reach, max(float(nu.max()), elastic.nu) + reach
-        if high - low < 1e-9:
-            shape = shape_of(mode, resonator, elastic)
-        else:
-            shape = interpolate_shape(mode, resonator, elastic, max(low, -0.99), min(high, 0.499), solve)
+        shape = interpolate_shape(mode, resonator, elastic, low, high, solve)
     return FrequencyLaw(
         material, reference_temperature, lowest, highest, theory, harmonic, shape, mode, Prestress(mode), mount
     )
-
-
-def check_mount(resonator: Resonator, theory: Theory, harmonic: int) -> None:
-    """Refuse cases for which thermal mismatch with the base is not computed."""
-    if resonator.support == "free":
-        raise ShellError("a free resonator is not joined to a base: give it a support, or leave the mount out.")
-    if theory != "solid" or harmonic < 1:
-        raise ShellError("the stress from a base is computed in the solid theory, for harmonics from 1 up.")
-
-
-def _ratio_spread(material: Material, T: Array) -> float:
-    """Return the largest standard deviation of ν by the material's prior."""
-    open_ones = dict(zip(material.prior.names, material.prior.sd, strict=True))
-
-    def spread(name: str) -> Array:
-        x = powers(T - material.reference)
-        terms = [open_ones.get(f"{name}.{c}", 0.0) * power for c, power in zip(coefficient_names(name), x, strict=True)]
-        return np.asarray(np.linalg.norm(terms, axis=0))
-
-    if "poisson_ratio" in material.properties:
-        return float(spread("poisson_ratio").max())
-    both = np.hypot(spread("youngs_modulus"), spread("shear_modulus"))
-    return float(((1 + material.value("poisson_ratio", T)) * both).max())

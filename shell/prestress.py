@@ -23,8 +23,10 @@ from shell.assembly import assemble, lay_resonator
 from shell.eigen import Factor, lowest_pairs
 from shell.errors import ShellError
 from shell.finite import QuadraticForce, solved_as_solid
+from shell.layout import Theory
 from shell.modes import Mode
 from shell.quadrature import Array
+from shell.resonator import Resonator
 from shell.solution import Solution, total
 from shell.system import Inertia, ShellGroup, System
 
@@ -135,3 +137,11 @@ def answer_without(vectors: Array, factor: Factor, M: Inertia, load: Array, shif
         if np.max(abs(u - before)) <= DONE * np.max(abs(u)):
             return np.asarray(u[:, 0])
     return None
+
+
+def check_mount(resonator: Resonator, theory: Theory, harmonic: int) -> None:
+    """Refuse cases for which thermal mismatch with the base is not computed."""
+    if resonator.support == "free":
+        raise ShellError("a free resonator is not joined to a base: give it a support, or leave the mount out.")
+    if theory != "solid" or harmonic < 1:
+        raise ShellError("the stress from a base is computed in the solid theory, for harmonics from 1 up.")

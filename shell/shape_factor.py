@@ -10,13 +10,17 @@ from numpy.polynomial.chebyshev import chebfit, chebpts1
 
 from shell.curves import Arc
 from shell.elastic import Elastic
+from shell.material import Material
 from shell.modes import Mode
+from shell.property import coefficient_names, powers
 from shell.quadrature import Array
 from shell.rayleigh import rayleigh_log_derivatives
 from shell.resonator import Resonator
 
 NODES = (6, 8, 12)  # Poisson's ratios tried, until the error is small enough
 CLOSE = 1e-8  # wanted error of ln Φ between them
+REACH = 5.0  # standard deviations of Poisson's ratio that are covered beside the law's own range
+WIDEST = 0.04  # and not more than this
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,6 +46,28 @@ class ShapeFactor:
         """∂ ln f/∂ ln h over ν."""
         slopes = [_slopes(mode, self.resonator, float(nu))[1] for mode, nu in zip(self.modes, self.ratios, strict=True)]
         return _through(slopes, *(self.logarithm.domain if len(slopes) == 1 else (self.lowest, self.highest)))
+
+
+def ratios_to_cover(material: Material, T: Array, nu: float) -> tuple[float, float]:
+    """Return the Poisson's ratios between which Φ is needed for a material at temperatures (K), `nu` and its prior among them."""
+    own = np.append(material.value("poisson_ratio", T), nu)
+    reach = min(REACH * _ratio_spread(material, T), WIDEST)
+    return max(float(own.min()) - reach, -0.99), min(float(own.max()) + reach, 0.499)
+
+
+def _ratio_spread(material: Material, T: Array) -> float:
+    """Return the largest standard deviation of ν by the material's prior."""
+    open_ones = dict(zip(material.prior.names, material.prior.sd, strict=True))
+
+    def spread(name: str) -> Array:
+        x = powers(T - material.reference)
+        terms = [open_ones.get(f"{name}.{c}", 0.0) * power for c, power in zip(coefficient_names(name), x, strict=True)]
+        return np.asarray(np.linalg.norm(terms, axis=0))
+
+    if "poisson_ratio" in material.properties:
+        return float(spread("poisson_ratio").max())
+    both = np.hypot(spread("youngs_modulus"), spread("shear_modulus"))
+    return float(((1 + material.value("poisson_ratio", T)) * both).max())
 
 
 def interpolate_shape(

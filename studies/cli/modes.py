@@ -15,9 +15,8 @@ import numpy as np
 
 from shell.constants import zero_Celsius
 from shell.errors import ShellError
-from shell.law import check_mount
 from shell.modes import Mode, solve_modes
-from shell.prestress import Prestress
+from shell.prestress import Prestress, check_mount
 from studies.cli.arguments import COUNT, FRACTION, MANY, WHOLE, AnyTheory, Card, Temperature, open_resonator
 from studies.cli.output import answers
 from studies.errors import naming

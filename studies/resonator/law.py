@@ -39,7 +39,7 @@ def law_of(
 
 def mount_of(instrument: "Instrument", theory: "Theory", harmonic: int) -> "Mount | None":
     """Return the base that an instrument is joined to, of a mode whose stress by it can be computed; None without one."""
-    from shell.law import check_mount
+    from shell.prestress import check_mount
 
     mount: Mount | None = instrument.part("mount")
     if mount is not None:
