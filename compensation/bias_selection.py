@@ -8,20 +8,18 @@ Two ways of selecting stand side by side; the coefficients of the chosen terms a
            the path that best predicts a run from the others is kept, if any does better than a constant.
 """
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Literal
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 
 from compensation.arrays import Array
-from compensation.bias import MEMORY, PARENTS, POWERS, TERMS, BiasDesign, BiasFit, BiasRun, fit_terms
+from compensation.bias import PARENTS, TERMS, BiasDesign, BiasFit, BiasRun, fit_terms
 from compensation.errors import CompensationError, require_runs
 from compensation.improvement import FEWEST
-from compensation.memory import NO_MEMORY, Memory
 from compensation.noise_regression import estimate_theta, whiten
 from compensation.samples import block_means
 from compensation.stepwise import StepwiseSelection, select_stepwise
@@ -32,14 +30,6 @@ AVERAGING = 100.0
 BLOCKS = 5
 # The noise is taken at one standard deviation towards the random walk, which keeps the rate of false terms near 5 %.
 CAUTION = 1.0
-LAGS = (20.0, 50.0, 100.0, 200.0, 500.0, 1000.0, 2000.0, 5000.0)  # s, of a temperature, from which a search starts
-PLAYS = (0.02, 0.05, 0.1, 0.2)  # the same of half-widths over the span of the temperature
-REACH, ROUNDS = 2.5, 8  # times by which one search may change a number; searches, each with terms selected anew
-# Deviance that each number of a memory must gain: a chance of 0.001 by noise alone (χ² of one degree of freedom).
-WORTH = 10.8
-
-Prepare = Callable[[Memory], Sequence[BiasRun]]
-
 OPPOSITE = 0.5  # of the residual: what changed signs of one run leave where its output has the opposite sign
 
 
@@ -75,97 +65,6 @@ def fit_bias(runs: Sequence[BiasRun], method: Method = "guarded", reference: flo
     return _select(runs, method, reference, by_runs=len(runs) > 1)
 
 
-def choose_memory(prepare: Prepare) -> Memory:
-    """Return the lag and the play behind which the fewest terms leave least, each minimised beside the terms that it selects.
-
-    m ln(SSE/m) + p ln m of whitened rows, and `WORTH` for each number of the memory. The grid is the start of four searches:
-    with a lag or without, with a play or without, which starts in its middle or where an end of the range has left it.
-    """
-    plain = prepare(NO_MEMORY)
-    reference, rows = float(plain[0].state[0]), sum(run.time.size for run in plain)
-    span = float(np.ptp(np.concatenate([run.state for run in plain])))
-
-    def design_of(memory: Memory) -> BiasDesign:
-        return BiasDesign(plain if memory == NO_MEMORY else prepare(memory), reference)
-
-    def select(memory: Memory) -> tuple[float, tuple[str, ...]]:
-        found = _tested(design_of(memory), theta)
-        price = WORTH * ((memory.lag > 0) + (memory.play > 0))
-        return (found.start, *found.steps)[-1].criterion + price, found.terms
-
-    def refine(memory: Memory, terms: tuple[str, ...]) -> Memory:
-        def left(other: Memory) -> float:
-            design = design_of(other)
-            X, bias = (whiten(part, theta, design.rows) for part in (design.columns(terms), design.bias))
-            return float(np.linalg.norm(bias - _follow(X, bias)))
-
-        def along(logarithm: float, name: str, others: Memory) -> float:
-            return left(_moved(others, name, np.exp(logarithm)))
-
-        for k in range(len(plain) * (memory.play > 0)):
-            trials = ((*memory.starts[:k], start, *memory.starts[k + 1 :]) for start in (0.0, -1.0, 1.0))
-            memory = min((replace(memory, starts=starts) for starts in trials), key=left)
-        for name in MEMORY:
-            if value := getattr(memory, name):
-                ends = float(np.log(value / REACH)), float(np.log(value * REACH))
-                found = scipy.optimize.minimize_scalar(
-                    along, bounds=ends, args=(name, memory), method="bounded", options={"xatol": 1e-4}
-                )
-                memory = _moved(memory, name, np.exp(found.x))
-        return memory
-
-    def search(memory: Memory) -> Memory:
-        memory = refine(
-            memory, tuple(name for name in select(memory)[1] if not POWERS[name][1])
-        )  # else rates stand for a lag
-        for _ in range(ROUNDS):
-            before, memory = memory, refine(memory, select(memory)[1])
-            if np.allclose(
-                [memory.lag, memory.play, *memory.starts], [before.lag, before.play, *before.starts], 1e-3, 0.0
-            ):
-                break
-        return memory
-
-    theta = _cautious_theta(design_of(NO_MEMORY))
-    plays = PLAYS if rows > 2 * (len(plain) + len(POWERS)) else ()
-    side = np.sign([run.state[0] - np.mean([one.state.mean() for one in plain]) for run in plain])
-    loops = [Memory(0.0, part * span, tuple(side * way)) for part in plays for way in (0.0, -1.0, 1.0)]
-    grids = [
-        [NO_MEMORY],
-        loops,
-        *([replace(one, lag=lag) for one in some for lag in LAGS] for some in ([NO_MEMORY], loops)),
-    ]
-    kinds = [min(grid, key=lambda one: select(one)[0]) for grid in grids if grid]
-    for _ in range(2):  # noise is what the better memory leaves
-        kinds = [search(memory) for memory in kinds]
-        theta = _cautious_theta(design_of(min(kinds, key=lambda one: select(one)[0])))
-    return min(kinds, key=lambda one: select(one)[0])
-
-
-def _moved(memory: Memory, name: str, value: float) -> Memory:
-    return replace(memory, lag=float(value)) if name == "lag" else replace(memory, play=float(value))
-
-
-def free_memory(fit: BiasFit, prepare: Prepare) -> BiasFit:
-    """Return a fit with the errors that it has beside a lag and a play that are not known exactly."""
-
-    def slope(name: str) -> Array:
-        value = getattr(fit.memory, name)
-        ends = [prepare(_moved(fit.memory, name, value * part)) for part in (0.99, 1.01)]
-        low, high = (np.concatenate([fit.predict(run.state, run.rate, run.play) for run in runs]) for runs in ends)
-        return np.asarray((high - low) / (0.02 * value))
-
-    slopes = {name: slope(name) for name in MEMORY if getattr(fit.memory, name)}
-    slopes = {name: own for name, own in slopes.items() if own.any()}  # a play without a term of its own has none
-    design = BiasDesign(prepare(fit.memory), fit.reference)
-    try:
-        return (
-            fit_terms(design, fit.terms, selection=fit.selection, scores=fit.held_out, beside=slopes) if slopes else fit
-        )
-    except CompensationError:  # the terms make up what the memory does: its interval has no end
-        return fit
-
-
 def find_opposite(runs: Sequence[BiasRun], reference: float) -> int | None:
     """Return the run whose bias has the opposite sign to the others', by B = ±(B₀ᵢ + X k) of half the residual, or None."""
     design = BiasDesign(runs, reference)
@@ -175,7 +74,7 @@ def find_opposite(runs: Sequence[BiasRun], reference: float) -> int | None:
         bias = design.bias.copy()
         if run is not None:
             bias[design.rows[run]] *= -1.0
-        return float(np.linalg.norm(bias - _follow(X, bias)))
+        return float(np.linalg.norm(bias - follow_columns(X, bias)))
 
     if len(runs) < 2:
         return None
@@ -207,7 +106,7 @@ def _select(pieces: Sequence[BiasRun], method: Method, reference: float | None, 
     if method == "paper":
         selection = select_stepwise(design.constants, design.candidates, design.bias, names, PARENTS)
         return fit_terms(design, selection.terms, selection=selection)
-    selection = _tested(design, _cautious_theta(design))
+    selection = select_guarded(design, cautious_theta(design))
     if not by_runs or not selection.steps:
         return fit_terms(design, selection.terms, selection=selection)
     try:
@@ -218,17 +117,18 @@ def _select(pieces: Sequence[BiasRun], method: Method, reference: float | None, 
     return fit_terms(design, tuple(sorted(best, key=names.index)), selection=selection, scores=scores)
 
 
-def _cautious_theta(design: BiasDesign) -> float:
+def cautious_theta(design: BiasDesign) -> float:
+    """Return θ of the noise beside all terms, `CAUTION` standard deviations towards the random walk."""
     return estimate_theta(design.columns(design.names), design.bias, design.rows, CAUTION)
 
 
-def _follow(X: Array, y: Array) -> Array:
+def follow_columns(X: Array, y: Array) -> Array:
     """Return what columns make of y, also where one is a combination of others."""
     unit = X / np.maximum(np.linalg.norm(X, axis=0), 1e-300)
     return np.asarray(unit @ np.linalg.lstsq(unit, y, rcond=1e-10)[0])
 
 
-def _tested(design: BiasDesign, theta: float) -> StepwiseSelection:
+def select_guarded(design: BiasDesign, theta: float) -> StepwiseSelection:
     """Select terms by F-tests in noise of `theta`, the level shared among candidates."""
     constants, candidates, bias = (
         whiten(part, theta, design.rows) for part in (design.constants, design.candidates, design.bias)

@@ -30,31 +30,14 @@ from compensation.noise_regression import fit_coloured
 from compensation.ringdown.answer import Estimate
 from compensation.samples import read_columns, require_regular
 from compensation.spikes import find_spikes
+from compensation.split_columns import Conflict, Told, join_columns, polar
 
 LEAST_TURN = 2 * np.pi  # least span of x (rad): one period of what is looked for
 LEAKS = ("leak", "leak cos", "leak sin")
 LEAST_CONTRAST = 0.05  # least spread of the turn rate over its largest: below it, turning both ways is missing
 FEW, ODD = 30, 6.0  # rows whose turns may be unknowns, and robust standard deviations that make one so
 LEAST_SPIKE = 1e-3  # of a column's span, by which a spike stands out
-CHANCE = 1e-3  # of a disagreement that is none
-LARGE = 0.1  # part of what columns tell, by which they disagree, beyond which one is wrong
-FAR = 10.0  # standard deviations apart, from which one that a factor mends is wrong too
 UNEVEN = np.array([0.005, 1e-3])  # usual standard deviations of gain ratio and skew (rad) of pick-offs and drives
-Told = tuple[Array, Array]
-"""Both components of a split, and their covariance."""
-
-
-@dataclass(frozen=True)
-class Conflict:
-    """Two columns that disagree about a split, and the `factor` on the second with which they agree (NaN: there is none).
-
-    `widened`, where it is not 0: they disagree by little, and the intervals were widened so many times instead.
-    """
-
-    split: str  # "frequency" or "damping"
-    columns: tuple[str, str]
-    factor: float
-    widened: float
 
 
 @dataclass(frozen=True)
@@ -131,8 +114,8 @@ def fit_whole_angle(
         told["decay"] = told["decay"][0] + leak * (gains + drives)[::-1] * [1, -1], told["decay"][1]
         estimates["decay"] = found["decay"][1]
         loss = estimates["decay"][0]
-    W = _join("frequency", ("frequency", "quadrature"), told, conflicts)[0]
-    joined, epsilon = _join("damping", ("decay", "rate"), told, conflicts, W)
+    W = join_columns("frequency", ("frequency", "quadrature"), told, conflicts)[0]
+    joined, epsilon = join_columns("damping", ("decay", "rate"), told, conflicts, W)
     wrong = {one.split for one in conflicts if not one.widened}
     if "damping" in wrong:  # nor is what the turn says of the gains believed
         gains, spread = card, UNEVEN
@@ -150,17 +133,17 @@ def fit_whole_angle(
         told["rate"] = turn + epsilon[0] * W[0], spread_of_turn + epsilon[1] ** 2 * np.outer(W[0], W[0])
     told |= {name: true(told[name]) for name in ("decay", "rate") if name in told}
     splits = {"rate": "damping", "decay": "damping"}
-    alone = {name: _polar(splits.get(name, "frequency"), *one, harmonic) for name, one in told.items()}
+    alone = {name: polar(splits.get(name, "frequency"), *one, harmonic) for name, one in told.items()}
     if W is None:
         undetermined.append(
             "frequency split, because neither frequency nor quadrature is recorded, or finely enough to vary"
         )
     for name, one in {"frequency": W, "damping": joined and true(joined)}.items():
-        polar = _polar(name, *one, harmonic) if one else {}
-        if leak and one and np.divide(*polar[f"{name}_split"]) < 2:
+        own = polar(name, *one, harmonic) if one else {}
+        if leak and one and np.divide(*own[f"{name}_split"]) < 2:
             undetermined.append(f"{name} split and axis: in one direction they are not told from what uneven gains make of a commanded turn")  # fmt: skip
         elif name not in wrong:
-            estimates |= polar
+            estimates |= own
     if "decay" not in estimates:
         undetermined.append("1/τ, because the drive effort (inverse_q) is not recorded, or finely enough to vary")
     if not both_ways:
@@ -284,50 +267,3 @@ def _turned(
     new = np.abs(fit.regression.residuals[1:])  # what a row adds that the one before does not foretell
     odd = np.flatnonzero(new > max(ODD * 1.4826 * float(np.median(new)), LEAST_SPIKE * float(np.ptp(np.diff(phi)))))
     return (float(b[1]), float(np.sqrt(covariance[1, 1]))), (b[2:4], covariance[2:4, 2:4]), missed, spread, odd
-
-
-def _join(
-    split: str, columns: tuple[str, str], told: dict[str, Told], conflicts: list[Conflict], W: Told | None = None
-) -> tuple[Told | None, tuple[float, float] | None]:
-    """Return what two columns tell together, the second less ε W, and ε; of one column what it tells; and note where they disagree."""
-    if len(found := [told[name] for name in columns if name in told]) < 2:
-        return (found[0] if found else None), None
-    (one, one_cov), (two, two_cov) = found
-    free, eye, epsilon = [] if W is None else [-W[0][:, None]], np.eye(2), 0.0
-    X = np.block([[eye, *(np.zeros((2, 1)) for _ in free)], [eye, *free]])
-    for _ in range(3):  # the uncertainty of W counts with ε
-        V = scipy.linalg.block_diag(one_cov, two_cov + (0.0 if W is None else epsilon**2 * W[1]))
-        weight = np.linalg.inv(V)
-        covariance = np.linalg.inv(X.T @ weight @ X)
-        b = covariance @ X.T @ weight @ np.concatenate([one, two])
-        epsilon = float(b[2]) if free else 0.0
-    left = np.concatenate([one, two]) - X @ b
-    dof = 4 - X.shape[1]
-    misfit, most = float(left @ weight @ left) / dof, float(scipy.special.chdtri(dof, CHANCE)) / dof
-    if misfit > most:
-        A = np.column_stack([one, *free])
-        scale = np.linalg.lstsq(A, two, rcond=None)[0]
-        off = two - A @ scale
-        apart = float(off @ np.linalg.solve(two_cov + scale[0] ** 2 * one_cov, off))
-        factor = 1 / scale[0] if apart < scipy.special.chdtri(1, CHANCE) else np.nan
-        little = np.hypot(*(left[:2] - left[2:])) < LARGE * max(np.hypot(*one), np.hypot(*two))
-        little &= not (misfit > FAR**2 and abs(factor - 1) > LARGE)
-        conflicts.append(Conflict(split, columns, float(factor), float(np.sqrt(misfit)) if little else 0.0))
-        if not little:
-            return found[0], None
-        covariance = covariance * misfit
-    phase = (epsilon, float(np.sqrt(covariance[2, 2]))) if free else None
-    return (b[:2], covariance[:2, :2]), phase
-
-
-def _polar(name: str, vector: Array, covariance: Array, harmonic: int) -> dict[str, tuple[float, float]]:
-    """Return a split and its axis from its two components, their deviations to first order."""
-    size = float(np.hypot(*vector))
-    along, across = vector / size, np.array([-vector[1], vector[0]]) / size
-    return {
-        f"{name}_split": (size, float(np.sqrt(along @ covariance @ along))),
-        f"{name}_axis": (
-            float(np.arctan2(vector[1], vector[0])) / (2 * harmonic),
-            float(np.sqrt(across @ covariance @ across)) / size / (2 * harmonic),
-        ),
-    }

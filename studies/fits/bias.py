@@ -8,15 +8,14 @@ from typing import Literal
 import numpy as np
 
 from compensation.bias import FREQUENCY, TEMPERATURE, BiasFit, BiasRun, average_run, rate_run
+from compensation.bias_memory import choose_memory, free_memory
 from compensation.bias_selection import (
     HeldOutRows,
     Method,
     NoHeldOut,
     bias_stability,
-    choose_memory,
     find_opposite,
     fit_bias,
-    free_memory,
     score_held_out,
     score_path,
 )

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from compensation.bias import TEMPERATURE, TERMS, BiasDesign, fit_terms, prepare_run, term_columns
-from compensation.bias_selection import NoHeldOut, bias_stability, fit_bias, free_memory, score_held_out, score_runs
+from compensation.bias_memory import free_memory
+from compensation.bias_selection import NoHeldOut, bias_stability, fit_bias, score_held_out, score_runs
 from compensation.decimation import average_blocks
 from compensation.derivative import differentiate
 from compensation.errors import CompensationError
