@@ -12,7 +12,6 @@ ends at the height of T1 under an inner stem; under an outer one, towards which 
 and so has the dome's thickness however thin that is.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise
@@ -23,16 +22,14 @@ import numpy as np
 from shell.blocks import Solid
 from shell.errors import ShellError, mm
 from shell.layout import OTHERS, Level
-from shell.patches import Cell, Patch, Path, Planar, along, circular, layers, rings, shrinking, straight, whole
+from shell.patches import Patch, Path, Planar, along, circular, layers, rings, shrinking, straight, whole
 from shell.quadrature import Array
 from shell.resonator import Resonator, Stem
-
-Spot = tuple[float, float]
+from shell.stem import Base, Spot, arc_at_radius, columns_of, crossing, find_base, lay_rows, mesh_stem, point_on
 
 COLLAR = 1.5  # width of the solid ring around the root, in thicknesses
 FILLET_SHRINK = 0.3
 SLANT = 0.25  # most by which a cut through the shell may slant, over the thickness
-QUIET = 2.5  # stem lengths over its radius from which its clamp is not felt by n > 1
 
 
 @dataclass(frozen=True)
@@ -61,7 +58,7 @@ class Frame:
     widest: float
     collar: float  # arc length where the shell begins; `widest` : that of the outermost contact
     corners: tuple[float, ...]  # for each contact, the arc length of O
-    bases: tuple["Base", ...]  # for each contact, where the core ends
+    bases: tuple[Base, ...]  # for each contact, where the core ends
     radii: tuple[float, ...]  # bounds of the columns of the stem, from its side to the axis
     # for each contact, η of the face opposite (0: the middle surface) and its arc lengths at the inner radii.
     above: tuple[tuple[float, tuple[float, ...]], ...]
@@ -83,8 +80,8 @@ def lay_root(resonator: Resonator, level: Level, n: int) -> tuple[Solid, float]:
         # rings shrink to nothing at a sharp corner
         steps = shrinking(model.rings[which], FILLET_SHRINK) if stem.fillet else shrinking(level.rings)
         patches += _half_root(resonator, stem, frame, which, steps)
-        rows, is_felt = _rows(model.radii, model.bases[which], model.contacts[which].end, n)
-        patches += _stem(base, contact.end, rows, steps, rings(shrinking(level.rings)) if is_felt else ())
+        rows, is_felt = lay_rows(model.radii, model.bases[which], model.contacts[which].end, n)
+        patches += mesh_stem(base, contact.end, rows, steps, rings(shrinking(level.rings)) if is_felt else ())
     ends = [contact.end for contact in frame.contacts]
 
     def held(r: float, z: float) -> bool:
@@ -110,18 +107,18 @@ def _find_frame(resonator: Resonator, like: Resonator | None = None) -> Frame:
             f"the stem (radius {mm(stem.radius)}, fillet {mm(stem.fillet)}) with {mm(collar - widest)} of solid around its root "
             f"leaves no room for the shell, whose meridian is {mm(resonator.length)} long: make the stem or its fillet smaller, or the shell thinner."
         )
-    radii = [radius * stem.radius / model.radii[0] for radius in model.radii] if model else _columns(stem, h)
+    radii = [radius * stem.radius / model.radii[0] for radius in model.radii] if model else columns_of(stem, h)
     above = []
     for contact in contacts:
         far = 0.0 if len(contacts) == 2 else -float(contact.face)
         surface = resonator.surface(far, 0)
-        above.append((far, tuple(_at_radius(surface, r, widest) for r in radii[1:])))
+        above.append((far, tuple(arc_at_radius(surface, r, widest) for r in radii[1:])))
     # two fillets end at different places of a thin shell; where they nearly do not, one slanting cut serves both
     slant = SLANT * h if stem.fillet else np.inf
     shared = [corner == model.widest for corner in model.corners] if model else [widest - c.s < slant for c in contacts]
     corners = tuple(widest if one else contact.s for one, contact in zip(shared, contacts, strict=True))
     far_face, near, over = resonator.surface(above[0][0], 0), min(corners), above[0][1][0]
-    heights = [dist(c.on_dome, _point(far_face, s)) for c, s in zip(contacts, corners, strict=True)]
+    heights = [dist(c.on_dome, point_on(far_face, s)) for c, s in zip(contacts, corners, strict=True)]
     count, rings = 0, [0] * len(contacts)
     if model:
         count, rings = len(model.cuts), list(model.rings)
@@ -132,18 +129,10 @@ def _find_frame(resonator: Resonator, like: Resonator | None = None) -> Frame:
         reaches = [min(radii[0] - radii[1], height) / (2 * stem.fillet) for height in heights]
         rings = [1 + max(0, ceil(log(reach) / -log(FILLET_SHRINK))) for reach in reaches]
     cuts = [near, *(near + (over - near) * step for step in shrinking(count - 1, 1 / 3)[:0:-1])] if count else []
-    bases = tuple(_base(resonator, contact, tuple(radii)) for contact in contacts)
+    bases = tuple(
+        find_base(resonator, contact.face, contact.s, contact.on_stem[1], tuple(radii)) for contact in contacts
+    )
     return Frame(contacts, widest, collar, corners, bases, tuple(radii), tuple(above), tuple(cuts), tuple(rings))
-
-
-def _columns(stem: Stem, h: float) -> list[float]:
-    """Bounds of the columns of the stem, from its side to the axis, wider the further in."""
-    inset = min(0.5 * stem.radius, 2 * h + stem.fillet)
-    radii, step = [stem.radius, stem.radius - inset], 3 * inset
-    while radii[-1] > 1.5 * step:
-        radii.append(radii[-1] - step)
-        step *= 3
-    return [*radii, 0.0]
 
 
 def _touch(resonator: Resonator, stem: Stem, face: int, end: float) -> Contact:
@@ -159,7 +148,7 @@ def _touch(resonator: Resonator, stem: Stem, face: int, end: float) -> Contact:
     beyond = np.flatnonzero(center(trial)[0] > reach)
     if not len(beyond):
         raise ShellError("the stem with its fillet is larger than the dome it stands on.")
-    s = _crossing(lambda x: center(x)[0] - reach, trial[beyond[0] - 1], trial[beyond[0]])
+    s = crossing(lambda x: center(x)[0] - reach, trial[beyond[0] - 1], trial[beyond[0]])
     middle, on_dome = (
         (float(r[0]), float(z[0])) for r, z in (center(np.array([s])), _face(resonator, face, np.array([s]))[0])
     )
@@ -171,20 +160,22 @@ def _half_root(resonator: Resonator, stem: Stem, frame: Frame, which: int, steps
     contact, (far, arcs), own = frame.contacts[which], frame.above[which], frame.corners[which]
     near_face, far_face = resonator.surface(contact.face, 0), resonator.surface(far, 0)
     collar, base = frame.collar, frame.bases[which]
-    over = _point(far_face, arcs[0])  # X; `arcs` are those of X and of the points further in
-    corner = _point(far_face, own)  # O
-    under = _point(base.path, base.arcs[1])  # X1
+    over = point_on(far_face, arcs[0])  # X; `arcs` are those of X and of the points further in
+    corner = point_on(far_face, own)  # O
+    under = point_on(base.path, base.arcs[1])  # X1
     cross, roof = straight(contact.on_dome, corner), along(far_face, own, arcs[0])
     ends = [collar] if own == frame.widest else [frame.widest, collar]
     patches: list[Patch] = []
     begin, near = cross, contact.s
     for end in ends:
-        section = straight(_point(near_face, end), _point(far_face, end))
+        section = straight(point_on(near_face, end), point_on(far_face, end))
         sides = along(near_face, near, end), along(far_face, near if patches else own, end)
         patches.append(Patch(begin, section, *sides, whole() if patches else rings(steps), "root"))
         begin, near = section, end
     for (a_out, s_out), (a_in, s_in) in pairwise(zip(base.arcs[1:], arcs, strict=True)):
-        left, right = (straight(_point(base.path, a), _point(far_face, s)) for a, s in ((a_in, s_in), (a_out, s_out)))
+        left, right = (
+            straight(point_on(base.path, a), point_on(far_face, s)) for a, s in ((a_in, s_in), (a_out, s_out))
+        )
         floor = along(base.path, a_in, a_out)
         patches.append(Patch(floor, along(far_face, s_in, s_out), left, right, whole(), "root"))
     floor, wall = along(base.path, *base.arcs[:2]), straight(under, over)
@@ -194,30 +185,6 @@ def _half_root(resonator: Resonator, stem: Stem, frame: Frame, which: int, steps
     else:
         patches.append(Patch(cross, wall, floor, roof, rings(steps), "root"))
     return patches
-
-
-@dataclass(frozen=True)
-class Base:
-    """Where the core ends and the stem begins: a curve, and its parameters at the radii of the columns."""
-
-    path: Callable[[Array], Planar]
-    arcs: tuple[float, ...]
-
-
-def _base(resonator: Resonator, contact: Contact, radii: tuple[float, ...]) -> Base:
-    """The level of T1, or under an outer stem the dome's face raised to T1."""
-    level = contact.on_stem[1]
-    if contact.face < 0:
-        return Base(lambda r: (r, np.full_like(r, level)), radii)
-    face = resonator.surface(contact.face, 0)
-    arcs = tuple(_at_radius(face, r, (1 + 1e-6) * contact.s) for r in radii)
-    rise = level - _point(face, arcs[0])[1]
-
-    def raised(s: Array) -> Planar:
-        r, z = face(s)
-        return r, z + rise
-
-    return Base(raised, arcs)
 
 
 def _fillet(
@@ -234,80 +201,9 @@ def _fillet(
     ]
 
 
-def _rows(radii: tuple[float, ...], base: Base, end: float, n: int) -> tuple[list[float], bool]:
-    """Bounds of the rows of cells, 0 at the root and 1 at the clamp, and whether that is felt: n > 1 dies out as exp(-1.8 z/a) within `QUIET` radii."""
-    length = min(abs(end - _point(base.path, arc)[1]) for arc in (base.arcs[0], base.arcs[-1]))
-    # cells grow from both ends; the first is as tall as the outer column is wide
-    step = min(radii[0] - radii[1], 0.4 * length)
-    low, high = [0.0], [length]
-    is_felt = n < 2 or length <= QUIET * radii[0]
-    if not is_felt:
-        while low[-1] + 3.5 * step < length:
-            low.append(low[-1] + step)
-            step *= 2.5
-    else:
-        while high[-1] - low[-1] > 2.4 * step:
-            low.append(low[-1] + step)
-            high.append(high[-1] - step)
-            step = min(2.5 * step, 1.5 * radii[0])
-        middle = np.linspace(low[-1], high[-1], 1 + ceil((high[-1] - low[-1]) / (1.5 * step)))
-        low += middle[1:-1].tolist()
-    return [height / length for height in (*low, *high[::-1])], is_felt
-
-
-def _stem(base: Base, end: float, rows: list[float], steps: tuple[float, ...], sharp: tuple[Cell, ...]) -> list[Patch]:
-    """The stem from its root to the clamped end, in columns between the radii; `sharp` cells at the edge of a clamp that is felt."""
-    patches = []
-    for k, (one, two) in enumerate(pairwise(rows)):
-        if k == len(rows) - 2 and sharp:  # as singular as a sharp corner
-            side = _block(base, base.arcs[:2], (two, one), end, sharp)
-        else:
-            side = _block(base, base.arcs[:2], (one, two), end, rings(steps) if k == 0 else whole())
-        patches += [side, *(_block(base, arcs, (one, two), end, whole()) for arcs in pairwise(base.arcs[1:]))]
-    return patches
-
-
-def _block(
-    base: Base, arcs: tuple[float, ...], rows: tuple[float, float], end: float, cells: tuple[Cell, ...]
-) -> Patch:
-    """A patch between two columns and two rows, 0 at the base and 1 at the flat end."""
-
-    def row(x: float) -> Path:
-        def path(y: Array) -> Planar:
-            r, z = base.path(arcs[0] + (arcs[1] - arcs[0]) * y)
-            return r, (1 - x) * z + x * end
-
-        return path
-
-    bottom, top = row(rows[0]), row(rows[1])
-    left, right = (straight(_point(bottom, y), _point(top, y)) for y in (0.0, 1.0))
-    return Patch(bottom, top, left, right, cells, "stem")
-
-
-def _at_radius(surface: Callable[[Array], Planar], r: float, s_most: float) -> float:
-    """Arc length at which a surface is r away from the axis."""
-    if r == 0:
-        return 0.0
-    return _crossing(lambda s: surface(s)[0] - r, 0.0, s_most)
-
-
-def _crossing(value: Callable[[Array], Array], low: float, high: float) -> float:
-    """Where a rising function vanishes, by intervals of 256 (importing scipy.optimize takes half of what a start and solve take)."""
-    for _ in range(7):  # 256^7 = 2^56
-        places = np.linspace(low, high, 257)
-        k = max(int(np.searchsorted(value(places[1:-1]), 0.0)), 0)
-        low, high = places[k], places[k + 1]
-    return float((low + high) / 2)
-
-
 def _face(resonator: Resonator, face: int, s: Array) -> tuple[Planar, Planar]:
     """Points of a face of the dome and its unit normals, out of the material."""
     there = resonator.at(s, 0)
     (r, z), (t_r, t_z) = there.at_heights([face]), there.along_face(face)
     scale = face / np.hypot(t_r, t_z)
     return (r[:, 0], z[:, 0]), (-scale * t_z, scale * t_r)
-
-
-def _point(surface: Callable[[Array], Planar], s: float) -> Spot:
-    r, z = surface(np.array([s]))
-    return float(r[0]), float(z[0])
