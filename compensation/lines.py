@@ -8,6 +8,7 @@ import scipy
 
 from compensation.arrays import Array
 from compensation.noise import white_rms
+from compensation.samples import robust_spread
 from compensation.spikes import find_step
 
 AROUND = 101
@@ -74,5 +75,5 @@ def _fast(time: Array, values: Array, sampling: float, slowest: float) -> Array:
     fast = table - scipy.ndimage.uniform_filter1d(
         scipy.ndimage.uniform_filter1d(table, width, mode="nearest"), width, mode="nearest"
     )
-    most = TALLEST * 1.4826 * float(np.median(np.abs(fast)))
+    most = TALLEST * robust_spread(fast)
     return np.asarray(np.clip(fast, -most, most))

@@ -21,6 +21,7 @@ import scipy
 from numpy.typing import ArrayLike
 
 from compensation.arrays import Array
+from compensation.samples import robust_spread
 
 FLAT = math.sqrt(2 * math.log(2) / math.pi)  # Allan deviation of flicker noise of bias instability B = 1
 FLICKER_TIMES = np.asarray(60.0 * 4.0 ** np.arange(-11, 7), dtype=np.float64)  # correlation times of flicker noise, s
@@ -119,7 +120,7 @@ def white_rms(*series: Array) -> float:
     """Return the white noise, rms, of series that change slowly, from the median size of their second differences; 0 of none."""
     second = np.concatenate([np.diff(values, 2) for values in series])
     second = second[np.isfinite(second)]
-    return float(1.4826 * np.median(np.abs(second)) / np.sqrt(6.0)) if second.size else 0.0
+    return float(robust_spread(second) / np.sqrt(6.0)) if second.size else 0.0
 
 
 def variance_of_mean(x: Array) -> Array:

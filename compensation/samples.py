@@ -34,6 +34,11 @@ def block_means(values: NDArray[Any], size: int) -> NDArray[Any]:
     return np.asarray(values[..., : count * size].reshape(*values.shape[:-1], count, size).mean(axis=-1))
 
 
+def robust_spread(values: NDArray[np.float64]) -> float:
+    """Return 1.4826 median |x|, the standard deviation of normal values about 0 whatever a few others are."""
+    return float(1.4826 * np.median(np.abs(values)))
+
+
 def check_time(time: NDArray[np.float64]) -> None:
     """Raise unless `time` (s) has two rows or more, all finite, and increases strictly."""
     if len(time) < 2:

@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from compensation.arrays import Array
+from compensation.samples import robust_spread
 
 REACH = 3
 NEIGHBOURS = 2 * REACH + 1
@@ -69,7 +70,7 @@ def _stand_out(values: Array) -> NDArray[np.bool_]:
     distance = _distance(left)
     positive = distance[distance > 0]
     # Rounded readings may have no spread at all: then the smallest distance takes its place.
-    spread = max(1.4826 * float(np.median(distance)), float(positive.min()) if positive.size else 1.0)
+    spread = max(robust_spread(distance), float(positive.min()) if positive.size else 1.0)
     while True:
         around = np.pad(distance, REACH)
         peak = distance >= np.fmax.reduce([_shifted(around, k) for k in (-2, -1, 1, 2)])

@@ -28,7 +28,7 @@ from compensation.arrays import Array
 from compensation.errors import CompensationError
 from compensation.noise_regression import fit_coloured
 from compensation.ringdown.answer import Estimate
-from compensation.samples import read_columns, require_regular
+from compensation.samples import read_columns, require_regular, robust_spread
 from compensation.spikes import find_spikes
 from compensation.split_columns import Conflict, Told, join_columns, polar
 
@@ -265,5 +265,5 @@ def _turned(
     b, covariance = fit.regression.coefficients, fit.regression.covariance
     missed, spread = (b[4:6], np.sqrt(np.diag(covariance))[4:6]) if both_ways else (np.zeros(2), UNEVEN)
     new = np.abs(fit.regression.residuals[1:])  # what a row adds that the one before does not foretell
-    odd = np.flatnonzero(new > max(ODD * 1.4826 * float(np.median(new)), LEAST_SPIKE * float(np.ptp(np.diff(phi)))))
+    odd = np.flatnonzero(new > max(ODD * robust_spread(new), LEAST_SPIKE * float(np.ptp(np.diff(phi)))))
     return (float(b[1]), float(np.sqrt(covariance[1, 1]))), (b[2:4], covariance[2:4, 2:4]), missed, spread, odd

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from compensation.arrays import Array
 from compensation.errors import CompensationError
 from compensation.ringdown.answer import Estimate
+from compensation.samples import robust_spread
 
 Whole = NDArray[np.int64]
 PAYS = 12.0  # least fall of −2 ln L, over the widening², for which time or a bend comes in, beside ln N for each value
@@ -76,7 +77,7 @@ def fit_law(rows: Rows, *, loss: bool) -> Law:
         rival = _fit(later, loss)
         one, two = law.terms["energy"], rival.terms["energy"]
         means = np.bincount(place, law.fitted - rows.value) / np.bincount(place)
-        usual = 1.4826 * float(np.median(np.abs(means[first:])))
+        usual = robust_spread(means[first:])
         stands_out = float(np.max(np.abs(means[:first]))) > OUT * usual
         if stands_out or abs(one.value - two.value) > UNLIKE * sqrt(abs(two.sd**2 - one.sd**2)):
             fitted = np.full(len(rows.value), np.nan)
@@ -173,7 +174,7 @@ def _solve(X: Array, rows: Rows, loss: bool) -> tuple[Array, Array, Array]:
         if loss:
             size = np.maximum(X @ found, 0.1 * np.abs(y))
         left = np.abs(y - X @ found) / np.hypot(size * scatter, rows.sd)
-        scatter *= max(float(1.4826 * np.median(left)), 1e-6) if y.size > 2 * X.shape[1] else 1.0
+        scatter *= max(robust_spread(left), 1e-6) if y.size > 2 * X.shape[1] else 1.0
         robust = np.minimum(1.0, ROBUST / np.maximum(left, 1e-9))
         weight = 1 / np.hypot(size * scatter, rows.sd)
     return found, weight, robust

@@ -5,7 +5,7 @@ import numpy as np
 from compensation.ringdown.envelope import Envelope, estimate_noise, thin
 from compensation.ringdown.fit import carry_over
 from compensation.ringdown.terms import Found, describes, fit_terms
-from compensation.samples import block_means
+from compensation.samples import block_means, robust_spread
 
 LATER = (0.6, 0.35, 0.15)  # parts of the record after which a free decay is looked for, where the whole is none
 EASY, NEXT = 3, 1  # terms that are tried on the whole before, and beside those known of a part
@@ -46,7 +46,7 @@ def find_jump(envelope: Envelope) -> float | None:
     steady &= t[pairs + 2] - t[pairs] < 2.5 * float(np.median(np.diff(t)))
     level = np.median(np.lib.stride_tricks.sliding_window_view(size, NEAR), axis=1)[: loud.size]
     steady &= loud > 0.5 * level  # the phase of a beat turns by itself where it is low
-    limit = np.maximum(JUMP, 8 * np.maximum(1.4826 * float(np.median(np.abs(away))), usual / np.maximum(loud, 1e-300)))
+    limit = np.maximum(JUMP, 8 * np.maximum(robust_spread(away), usual / np.maximum(loud, 1e-300)))
     jumps = steady & (np.abs(away) > limit)
     # a jump within a row shares itself out between the pair that ends and the pair that begins with it
     whole = np.abs(away[:-2] + away[2:] - away[1:-1]) < 0.2

@@ -10,6 +10,7 @@ import scipy
 from compensation.arrays import Array
 from compensation.noise import Noise
 from compensation.noise_rows import KINDS, NoiseRows, estimate_noise
+from compensation.samples import robust_spread
 from studies.calibration.observed import SETTLED
 from studies.calibration.problem import CardProblem, State
 from studies.simulation.noise import bias_noise, frequency_noise
@@ -130,7 +131,7 @@ def spare_outliers(rows: NoiseRows, residual: Array, noise: Noise) -> tuple[Nois
         white = np.concatenate([noise.white**2 / own for own in rows.spans])
         more = np.concatenate(spared.stretch) - np.concatenate(rows.stretch)
         z = np.abs(error) / np.sqrt(variance - more * white)
-        ratio = np.maximum((z / (OUTLIER * max(1.4826 * float(np.median(z)), 1.0))) ** 2, 1.0)
+        ratio = np.maximum((z / (OUTLIER * max(robust_spread(z), 1.0))) ** 2, 1.0)
         beyond = int(np.count_nonzero(ratio > 1))
         if not beyond:
             return rows, 0

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from compensation.arrays import Array
+from compensation.samples import robust_spread
 from studies.record.rest import LEAST_SPIKE
 
 SIDE = 25  # means on either side of a step, through which straight lines go
@@ -53,7 +54,7 @@ def _candidates(values: Array) -> list[tuple[int, float]]:
     ahead = 1 / n - place * 0.5 * n / float(place @ place)
     D = np.correlate(values, ahead, mode="valid")[n:] - np.correlate(values, ahead[::-1], mode="valid")[:-n]
     near = np.correlate(values, np.r_[-np.ones(3), np.ones(3)] / 3, mode="valid")[n - 3 : n - 3 + len(D)]
-    spread = max(1.4826 * float(np.median(np.abs(D))), 1e-9 * float(np.ptp(values)))
+    spread = max(robust_spread(D), 1e-9 * float(np.ptp(values)))
     found: list[int] = []
     for k in map(int, np.argsort(-np.abs(D))[:CANDIDATES]):
         if abs(D[k]) <= STANDS_OUT * spread:
