@@ -4,6 +4,7 @@ from math import isfinite
 
 from studies.cli.output import answers
 from studies.errors import InputError
+from studies.files.given import shorten
 from studies.results import Column, Result, Table, row_of
 
 
@@ -29,7 +30,10 @@ def compare(*card: str) -> Result:
     names = [f"{name} ({k})" if found.names.count(name) > 1 else name for k, name in enumerate(found.names, 1)]
     note = "±: one standard deviation from the published values of the material, common to designs of one material."
     known = [row | {"values": [v if isfinite(v) else "not known" for v in row["values"]]} for row in figures]
-    keys = [{"key": key, "values": list(map(_short, values))} for key, values in found.differing.items()]
+    keys = [
+        {"key": key, "values": ["—" if value is None else shorten(str(value), 40) for value in values]}
+        for key, values in found.differing.items()
+    ]
     return Result(
         payload,
         "Comparison of designs",
@@ -45,8 +49,3 @@ def compare(*card: str) -> Result:
             None if keys else "The cards are the same.",
         ],
     )  # fmt: skip
-
-
-def _short(value: object) -> str:
-    text = "—" if value is None else str(value)
-    return text if len(text) <= 40 else text[:37] + "..."

@@ -23,6 +23,12 @@ def refuse_unsound(_: Any, value: Any) -> None:
             raise InputError(f"{one:g}: must be a finite number below {LARGEST:g} in size.")
 
 
+def shorten(text: str, most: int = 60) -> str:
+    """Return at most so many characters of somebody's text, on one line."""
+    line = " ".join(text.split())
+    return line if len(line) <= most else line[: most - 3] + "..."
+
+
 def printable(text: str) -> str:
     """Return a text with characters spelled out that would act on a terminal."""
     return ACTING.sub(lambda found: ascii(found[0])[1:-1], text)

@@ -17,13 +17,14 @@ import numpy as np
 
 from compensation.arrays import Array
 from studies.errors import InputError, MissingEnvironment, nearest
+from studies.files.given import shorten
 from studies.files.reading import ANY_SIZE, digest, opened
 from studies.files.stored import portions
 from studies.importing.channel import Channel, Clock
 from studies.importing.formats import KINDS, READERS
 from studies.importing.mapping import FileMap
 from studies.importing.raw import name_columns, read_text
-from studies.importing.tables import Part, RawTable, shorten
+from studies.importing.tables import Part, RawTable
 from studies.progress import tell
 
 

@@ -10,9 +10,10 @@ import numpy as np
 
 from compensation.arrays import Array
 from studies.errors import InputError
+from studies.files.given import shorten
 from studies.files.stored import PORTION, Stored
 from studies.importing.mapping import NUMERIC_TIMES, OWN, SECONDS, UNIX, FileMap
-from studies.importing.tables import RawTable, shorten
+from studies.importing.tables import RawTable
 
 if TYPE_CHECKING:
     import pandas as pd

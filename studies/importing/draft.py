@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from studies.errors import InputError
+from studies.files.given import shorten
 from studies.files.stored import Stored
 from studies.importing.channels import is_container, open_channels, sort_groups
 from studies.importing.draft_columns import comment_of, draft_column, draft_unknown, find_markers, guess_meanings
@@ -17,7 +18,6 @@ from studies.importing.mapping import NUMERIC_TIMES, SCHEMA, TABLE_TARGETS, File
 from studies.importing.meaning import Meaning, find_meanings
 from studies.importing.offset import Offset, estimate_offset
 from studies.importing.resampling import ClockedFile
-from studies.importing.tables import shorten
 from studies.importing.timing import TIME_WORDS, find_time
 from studies.schema.keys import spell_value
 from studies.schema.reader import read_keys

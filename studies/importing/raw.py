@@ -15,11 +15,12 @@ import numpy as np
 
 from compensation.arrays import Array
 from studies.errors import InputError
+from studies.files.given import shorten
 from studies.files.numbers import ROWS_AT_ONCE, parse_portions
 from studies.files.reading import ANY_SIZE, PORTION, digest, opened, read_bytes
 from studies.importing.mapping import NUMERIC_TIMES, SEPARATORS, FileMap
 from studies.importing.sheets import EXCEL, read_sheet
-from studies.importing.tables import ParsedTable, Part, RawTable, check_column, shorten
+from studies.importing.tables import ParsedTable, Part, RawTable, check_column
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -4,7 +4,7 @@ import importlib
 from pathlib import Path
 
 from studies.errors import InputError, MissingEnvironment, nearest
-from studies.importing.tables import shorten
+from studies.files.given import shorten
 
 EXCEL = (".xlsx", ".xlsm")
 MOST_CELLS = 20_000_000

@@ -122,9 +122,3 @@ def check_column(path: str, column: str, columns: Iterable[str]) -> None:
     """Refuse the name of a column that a table lacks."""
     if column not in columns:
         raise InputError(f"{path}: there is no column '{column}'{nearest(column, list(columns))}")
-
-
-def shorten(text: str) -> str:
-    """Return at most 60 characters of somebody's text, on one line."""
-    line = " ".join(text.split())
-    return line if len(line) <= 60 else line[:57] + "..."

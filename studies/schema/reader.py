@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 from msgspec import inspect
 
 from studies.errors import InputError, nearest
-from studies.files.given import is_sound, printable
+from studies.files.given import is_sound, printable, shorten
 from studies.files.reading import read_bytes
 from studies.schema.keys import Path, describe, known_keys, number_in, options, structs
 
@@ -94,7 +94,7 @@ class _Reader:
         for kind in kinds:
             if (found := self._read_as(kind, raw, path)) is not UNFIT:
                 return found
-        raise self._refused(path, f"must be {spell_wanted(kinds, path)}, not {_short(raw)}.")
+        raise self._refused(path, f"must be {spell_wanted(kinds, path)}, not {shorten(repr(raw))}.")
 
     def _read_table(self, tables: list[inspect.StructType], raw: Mapping[str, Any], path: Path) -> Any:
         table = tables[0]
@@ -103,9 +103,9 @@ class _Reader:
             if table.tag_field not in raw:
                 raise self._lacking(path, table.tag_field)
             if not isinstance(tag, str):
-                raise self._refused((*path, table.tag_field), f"must be text in quotes, not {_short(tag)}.")
+                raise self._refused((*path, table.tag_field), f"must be text in quotes, not {shorten(repr(tag))}.")
             if tag not in tags:
-                raise self._refused((*path, table.tag_field), f"= {_short(tag)} is unknown{nearest(tag, tags)}")
+                raise self._refused((*path, table.tag_field), f"= {shorten(repr(tag))} is unknown{nearest(tag, tags)}")
             table = tags[tag]
         fields = {field.encode_name: field for field in table.fields}
         for key in raw:
@@ -133,7 +133,7 @@ class _Reader:
                 found = self._read_number(kind, raw, path)
             case inspect.LiteralType():
                 if isinstance(raw, str) and raw not in kind.values:
-                    raise self._refused(path, f"= {_short(raw)} is unknown{nearest(raw, map(str, kind.values))}")
+                    raise self._refused(path, f"= {shorten(repr(raw))} is unknown{nearest(raw, map(str, kind.values))}")
                 found = raw if isinstance(raw, str) else UNFIT
             case inspect.StrType():
                 found = raw if isinstance(raw, str) else UNFIT
@@ -165,7 +165,7 @@ class _Reader:
         for bound, words in BOUNDS.items():
             end = getattr(kind, bound)
             if end is not None and not getattr(operator, bound)(found, end):
-                shown = f"{found:g}" if is_sound(found) else _short(found)
+                shown = f"{found:g}" if is_sound(found) else shorten(repr(found))
                 raise self._refused(path, f"must be {words} {end:g}, not {shown}.")
         return found
 
@@ -257,8 +257,3 @@ def _texts(content: Any, key: str = "") -> Iterator[tuple[str, str]]:
             yield from _texts(value, key)
     elif isinstance(content, str):
         yield key, content
-
-
-def _short(value: Any) -> str:
-    text = repr(value)
-    return text if len(text) <= 60 else text[:57] + "..."

@@ -10,6 +10,8 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from studies.files.given import shorten
+
 if TYPE_CHECKING:
     from shell.material import Material
 
@@ -82,9 +84,5 @@ def find_changes(old: Any, new: Any, path: str = "") -> Iterator[str]:
         for place, (one, other) in enumerate(zip(old, new, strict=True), 1):
             yield from find_changes(one, other, f"{path}[{place}]")
     elif old != new:
-        yield f"{path}: {_short(old)} -> {_short(new)}"
-
-
-def _short(value: Any) -> str:
-    text = "absent" if value is None else spell(value)
-    return text if len(text) <= 60 else text[:57] + "..."
+        was, now = (shorten("absent" if value is None else spell(value)) for value in (old, new))
+        yield f"{path}: {was} -> {now}"
