@@ -74,6 +74,15 @@ def open_card(card: str, temperature: float | None) -> "tuple[Instrument, float]
     return instrument, instrument.reference_temperature if temperature is None else temperature + zero_Celsius
 
 
+def open_given(card: str | None, save: str | None = None) -> "Instrument | None":
+    """Return the instrument of --card where it is given; --save writes that card with what was found."""
+    from studies.instrument.card import load_card
+
+    if save is not None and card is None:
+        raise InputError("--save writes a card with the values found; name the card to start from by --card.")
+    return load_card(card) if card else None
+
+
 def open_resonator(card: str, temperature: float | None) -> "tuple[Instrument, float, Resonator, Elastic]":
     """Return the same, and the resonator and the elastic constants at that temperature."""
     instrument, T = open_card(card, temperature)

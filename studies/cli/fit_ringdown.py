@@ -7,11 +7,10 @@ from typing import Annotated, Any
 import numpy as np
 
 from compensation.ringdown.laws import Law
-from studies.cli.arguments import COUNT, POSITIVE, Files, Harmonic
+from studies.cli.arguments import COUNT, POSITIVE, Files, Harmonic, open_given
 from studies.cli.output import answers, keep_card, say
 from studies.errors import InputError
 from studies.fits.ringdown import Decay, read_decay, with_decay
-from studies.instrument.card import load_card
 from studies.progress import Told
 from studies.record.decays import Decays, fit_laws, is_table, read_table, table_of, write_decays
 from studies.reports import style
@@ -65,9 +64,7 @@ def fit_ringdown(
         save: Write the card with the split, its axis, 1/Q and the damping axis of the first decay.
         out: Write a record with a row for each decay (temperature, frequency, 1/Q), for hrg calibrate and hrg diagnose.
     """
-    if save is not None and card is None:
-        raise InputError("--save writes the card with the values found; name the card by --card.")
-    instrument = load_card(card) if card else None
+    instrument = open_given(card, save)
     expected = None
     if instrument is not None and harmonic == 2:
         T = instrument.reference_temperature

@@ -1,11 +1,10 @@
 """`hrg fit thermal`: time constants of the resonator behind its housing, from records."""
 
 from shell.constants import zero_Celsius
-from studies.cli.arguments import Confidence, Records
+from studies.cli.arguments import Confidence, Records, open_given
 from studies.cli.output import answers, say
 from studies.errors import InputError
 from studies.fits.thermal import ThermalFit, fit_thermal_constants
-from studies.instrument.card import load_card
 from studies.progress import Told
 from studies.record import read_record
 from studies.reports import style
@@ -54,7 +53,7 @@ def fit_thermal(
     records = [read_record(path) for path in data]
     stages = {"one lag": 0.05, "a heat path with 1": 0.15, "a heat path with 2": 0.25, "a heat path with 3": 0.8}
     with Told("heat path", stages) as told:
-        found = fit_thermal_constants(records, load_card(card) if card else None, lags, confidence, told)
+        found = fit_thermal_constants(records, open_given(card), lags, confidence, told)
     for note in found.notes:
         say(f"note: {note}")
     if found.estimates["time_constant_1"].value is None:

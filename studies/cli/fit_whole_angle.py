@@ -8,10 +8,10 @@ import numpy as np
 from compensation.ringdown.answer import Estimate
 from compensation.wave_fit import WaveFit
 from compensation.wave_fit import fit_whole_angle as fit
-from studies.cli.arguments import FRACTION, Confidence, Run
+from studies.cli.arguments import FRACTION, Confidence, Run, open_given
 from studies.cli.output import answers, keep_card, say
 from studies.errors import InputError, naming
-from studies.instrument.card import Instrument, load_card
+from studies.instrument.card import Instrument
 from studies.instrument.tables.loop import Loop
 from studies.record import Record, read_record
 from studies.resonator.law import law_of
@@ -74,9 +74,7 @@ def fit_whole_angle(
             (such as its mean, like the other columns), or at the end.
         save: Write the card with the estimates and their uncertainties.
     """
-    instrument = load_card(card) if card else None
-    if save is not None and instrument is None:
-        raise InputError("--save writes a card with the estimates: name the card to start from with --card.")
+    instrument = open_given(card, save)
     record, loop = read_record(run), instrument.loop if instrument is not None else None
     if bryan_factor is None:
         if instrument is None:
