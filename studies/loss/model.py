@@ -30,12 +30,12 @@ from shell.damping.sources import known_losses
 from shell.elastic import Elastic
 from shell.imperfection import Pair
 from shell.layout import Theory
-from shell.modes import Mode, solve_modes
-from shell.resonator import Resonator
+from shell.modes import Mode
 from studies.errors import InputError, naming, nearest
 from studies.instrument.card import Card, Instrument, load_card
 from studies.instrument.tables.loss_parts import LossParts
 from studies.loss.films import film_losses
+from studies.resonator.splitting import solve_lowest
 
 
 @dataclass(frozen=True)
@@ -192,12 +192,6 @@ def _surface_ripple(parts: LossParts, vibration: Vibration, causes: Sequence[Los
         return []
     angle = math.radians(parts.surface_anisotropy_angle_deg)
     return [Ripple("surface", parts.surface_anisotropy, angle, surface_weight(vibration.surfaces))]
-
-
-@lru_cache(maxsize=8)
-def solve_lowest(resonator: Resonator, elastic: Elastic, harmonic: int, theory: Theory) -> Mode:
-    """The lowest mode; kept, since many values of a card leave it as it is."""
-    return solve_modes(resonator, elastic, harmonic, theory=theory)[0]
 
 
 @lru_cache(maxsize=8)

@@ -24,10 +24,10 @@ from shell.modes import Mode
 from shell.prestress import Prestress
 from studies.errors import UNUSABLE_INPUT, InputError
 from studies.instrument.card import Instrument
-from studies.loss.model import LossModel, loss_model, solve_lowest
+from studies.loss.model import LossModel, loss_model
 from studies.reports.webgl import outline_rows
 from studies.resonator.law import mount_of
-from studies.resonator.splitting import SplitPair
+from studies.resonator.splitting import SplitPair, solve_lowest
 
 LOSS_DEGREE, WAVE_DEGREE = 12, 1  # over temperature
 THRESHOLD, MOST = 1e-4, 40  # of the grid: surplus of its first number, and designs that are computed

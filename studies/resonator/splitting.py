@@ -9,6 +9,7 @@ from compensation.arrays import Array
 from shell.elastic import Elastic
 from shell.imperfection import CoupledHarmonics, Imperfection, Pair, Split, find_split
 from shell.imperfection.split import shift_of
+from shell.layout import Theory
 from shell.modes import Mode, solve_modes
 from shell.resonator import Resonator
 from studies.errors import InputError, naming
@@ -101,9 +102,15 @@ def _check_wall(instrument: Instrument, fields: Imperfection) -> None:
 
 
 @lru_cache(maxsize=8)
+def solve_lowest(resonator: Resonator, elastic: Elastic, harmonic: int, theory: Theory) -> Mode:
+    """The lowest mode; kept, since many values of a card leave it as it is."""
+    return solve_modes(resonator, elastic, harmonic, theory=theory)[0]
+
+
+@lru_cache(maxsize=8)
 def solved_pair(resonator: Resonator, elastic: Elastic, harmonic: int) -> Pair:
     """The perfect pair of a harmonic, solved once."""
-    return Pair(solve_modes(resonator, elastic, harmonic)[0])
+    return Pair(solve_lowest(resonator, elastic, harmonic, "solid"))
 
 
 _PREPARED: dict[tuple[object, ...], CoupledHarmonics] = {}
