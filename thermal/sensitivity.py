@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from thermal.constants import Stefan_Boltzmann
 from thermal.network import Array, Network
 from thermal.profile import Profile
-from thermal.steady import find_steady_state
+from thermal.steady import first_steady_state
 from thermal.sweeping import Sweep, capacity_ratio, hermite, hold, run_sweeps
 from thermal.transient import BLOCK
 
@@ -87,9 +87,7 @@ def respond(
 ) -> ObservedSums:  # fmt: skip
     """Temperatures at the rows, weighed (sums, n), with derivatives by every change; departures (n,) are from the first steady state."""
     rows = np.asarray(time, dtype=float)
-    first = {name: float(profile.value[0]) for name, profile in boundaries.items()}
-    begin = min(profile.start for profile in boundaries.values())
-    steady = find_steady_state(network, first, begin)
+    steady = first_steady_state(network, boundaries)
     n = network.count
     swept = run_sweeps(network, boundaries, steady[:n] if departure is None else steady[:n] + departure, longest)
     # in blocks of rows, so that only the sums are stored

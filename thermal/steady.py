@@ -75,12 +75,16 @@ def boundary_forcing(network: Network, boundaries: Mapping[str, Profile], time: 
     return value, slope
 
 
+def first_steady_state(network: Network, boundaries: Mapping[str, Profile]) -> Array:
+    """The steady state before the profiles begin."""
+    first = {name: float(profile.value[0]) for name, profile in boundaries.items()}
+    return find_steady_state(network, first, min(profile.start for profile in boundaries.values()))
+
+
 def initial_state(network: Network, boundaries: Mapping[str, Profile], initial: ArrayLike | None) -> Array:
     """Temperatures (K) of the nodes at the start: as given, else the steady state before the profiles begin."""
     if initial is None:
-        first = {name: float(profile.value[0]) for name, profile in boundaries.items()}
-        start = min(profile.start for profile in boundaries.values())
-        return find_steady_state(network, first, start)[: network.count]
+        return first_steady_state(network, boundaries)[: network.count]
     T = np.asarray(initial, dtype=float)
     if T.shape != (network.count,) or not (np.isfinite(T).all() and (T > 0).all()):
         raise ThermalError(f"the initial state needs {network.count} temperatures above 0 K.")
