@@ -57,8 +57,9 @@ def _frequency_split(instrument: "Instrument", loop: "Loop", harmonic: int) -> t
     return float(2 * np.pi * abs(wave)), float(np.angle(wave)) / (2 * harmonic)
 
 
-def electronics_of(loop: "Loop", wave: StandingWave, temperature: float, amplitude: float = 1.0) -> Electronics:
-    """Return pick-offs, drives and noise for a vibration of `amplitude` times the card's, at a temperature (K)."""
+def electronics_of(instrument: "Instrument", wave: StandingWave) -> Electronics:
+    """Return pick-offs, drives and noise for the card's vibration at its reference temperature."""
+    loop = require_loop(instrument)
 
     def channels(side: str, rotation: float) -> Channels:
         return Channels(
@@ -72,18 +73,18 @@ def electronics_of(loop: "Loop", wave: StandingWave, temperature: float, amplitu
     full = wave.coupling * np.radians(loop.rate_range_deg_per_s)  # of the force over 2ω and the amplitude
     thermal = 0.0
     if loop.vibration_um is not None and loop.modal_mass_mg is not None:
-        thermal = thermal_noise(wave, temperature, 1e-6 * loop.modal_mass_mg, 1e-6 * loop.vibration_um * amplitude)
-    volts = loop.amplitude_V * amplitude
+        temperature = instrument.reference_temperature
+        thermal = thermal_noise(wave, temperature, 1e-6 * loop.modal_mass_mg, 1e-6 * loop.vibration_um)
     noise = LoopNoise(
-        pickoff=1e-6 * loop.pickoff_noise_uV_per_rt_Hz / volts,
-        adc_step=1e-6 * loop.adc_step_uV / volts,
-        dac_step=2 * full / 2**loop.dac_bits / amplitude,
-        drive=1e-6 * loop.drive_noise_ppm_per_rt_Hz * full / amplitude,
+        pickoff=1e-6 * loop.pickoff_noise_uV_per_rt_Hz / loop.amplitude_V,
+        adc_step=1e-6 * loop.adc_step_uV / loop.amplitude_V,
+        dac_step=2 * full / 2**loop.dac_bits,
+        drive=1e-6 * loop.drive_noise_ppm_per_rt_Hz * full,
         thermal=thermal,
     )
     actuators = Actuators(
-        force=full / amplitude,
-        drive=loop.drive_headroom * float(np.median(1 / np.asarray(wave.tau))) / amplitude,
+        force=full,
+        drive=loop.drive_headroom * float(np.median(1 / np.asarray(wave.tau))),
         stiffness=np.pi * loop.quadrature_range_Hz,
         quadrature=loop.quadrature_control,
     )
@@ -95,7 +96,7 @@ def find_range_use(
 ) -> RangeUse:
     """Return what part of the actuators' ranges the settled loops use; a free wave meets the quadrature of every azimuth."""
     loop = require_loop(instrument)
-    electronics = electronics_of(loop, wave, instrument.reference_temperature)
+    electronics = electronics_of(instrument, wave)
     angle = np.radians(instrument.bias.pattern_angle_deg) if pattern_angle is None else np.asarray(pattern_angle)
     if loop.mode == "whole-angle":
         turn = wave.harmonic * np.radians(loop.self_precession_deg_per_s)
@@ -193,7 +194,7 @@ def settled_columns(
     loop, start = require_loop(instrument), float(np.radians(instrument.bias.pattern_angle_deg))
     angle = np.broadcast_to(np.asarray(start if pattern_angle is None else pattern_angle), np.shape(frequency))
     wave = wave_of(instrument, frequency, inverse_q, bryan_factor, damping=damping)
-    electronics = electronics_of(loop, wave, instrument.reference_temperature)
+    electronics = electronics_of(instrument, wave)
     precession = np.radians(loop.self_precession_deg_per_s)
     if loop.mode == "force-rebalance":
         run = settle_rebalance(wave, electronics, rate, angle)
@@ -225,16 +226,15 @@ def run_loops(
     bryan_factor: float,
     *,
     rate: ArrayLike = 0.0,
-    pattern_angle: ArrayLike | None = None,
     both_ways: bool = False,
     damping: NDArray[np.complex128] | None = None,
     generator: np.random.Generator | None = None,
 ) -> LoopRun:
-    """Run the card's loops over even rows (s); frequency (Hz), loss, `rate` (rad/s) and azimuth (rad) are numbers or rows."""
+    """Run the card's loops over even rows (s); frequency (Hz), loss and `rate` (rad/s) are numbers or rows."""
     loop = require_loop(instrument)
-    angle = np.radians(instrument.bias.pattern_angle_deg) if pattern_angle is None else np.asarray(pattern_angle)
+    angle = float(np.radians(instrument.bias.pattern_angle_deg))
     wave = wave_of(instrument, frequency, inverse_q, bryan_factor, damping=damping)
-    electronics = electronics_of(loop, wave, instrument.reference_temperature)
+    electronics = electronics_of(instrument, wave)
     told = partial(tell, "the loops, row by row")
     back = both_ways & (np.arange(len(time)) >= len(time) // 2)
     with naming(f"{instrument.path} [loop]"):
@@ -246,7 +246,7 @@ def run_loops(
                 time,
                 rate=rate,
                 precession=np.radians(loop.self_precession_deg_per_s) * np.where(back, -1.0, 1.0),
-                angle=float(np.ravel(angle)[0]),
+                angle=angle,
                 generator=generator,
                 progress=told,
             )

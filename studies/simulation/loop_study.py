@@ -108,7 +108,7 @@ def study_loops(
     """Return margins, bias by source, noise by source, start and range of a card's loops, the range under a rate (rad/s)."""
     loop = require_loop(instrument)
     wave = wave_of(instrument, frequency, inverse_q, bryan_factor)
-    electronics, loops = electronics_of(loop, wave, instrument.reference_temperature), loops_of(loop)
+    electronics, loops = electronics_of(instrument, wave), loops_of(loop)
     decay = float(1 / np.asarray(wave.tau))
     margins = require_stable_loops(instrument, frequency, inverse_q)
     use = find_range_use(instrument, wave, rate)
