@@ -43,7 +43,8 @@ def card(path: str, *, like: str = "hrg-30mm", name: str | None = None) -> int:
     head = "# Optional entries. Remove the # of a line to set it; entries left out have their documented default."
     lines = [text, head, *(f"# {line}".rstrip() for line in write_form(_other_tables(content)))]
     write_text(path, "\n".join(lines) + "\n")
-    say(f"{path}: written as a copy of {like}. Edit it, then run: hrg modes {quote(path)}")
+    check = "cards" if "law" in content else "modes"
+    say(f"{path}: written as a copy of {like}. Edit it, then run: hrg {check} {quote(path)}")
     return 0
 
 
@@ -79,6 +80,7 @@ def _own_task(path: str, card_: str) -> str:
     """Return a task that any card can have: other modes far away, at the frequency that it has."""
     instrument = load_card(Path(path).parent / card_ if card_.endswith(".toml") else card_)
     text = OWN_TASK.format(spell_value(card_))
+    _ = instrument.resonator  # a card without one says so
     for name in ("resonator.thickness_mm", "resonator.radius_mm"):
         if name.split(".")[1] in instrument.content["resonator"]:
             value = float(find_nominal(instrument, name, card_) or 0.0)

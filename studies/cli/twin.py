@@ -9,7 +9,7 @@ from studies.errors import InputError
 from studies.files.writing import check_folder, write_text
 from studies.instrument.card import load_card
 from studies.results import Result, Sentence, Table
-from studies.twin.fmu import write_fmu
+from studies.twin.fmu import name_of_input, write_fmu
 from studies.twin.plan import idle_input, input_starts, plan_twin, symbol
 from studies.twin.source import PROGRAM, exposed, outputs_of, sources
 
@@ -61,7 +61,7 @@ def twin(
     exposed_ones = ((key, value) for key, value in plan.parameters.items() if exposed(plan, key))
     parameters = [{"name": key, "unit": symbol(key), "start": value} for key, value in exposed_ones]
     inputs = [
-        {"name": name, "unit": symbol(name), "start": start}
+        {"name": name if fmu is None else name_of_input(plan, name), "unit": symbol(name), "start": start}
         for name, start in input_starts(plan).items()
         if name != idle_input(plan)
     ]

@@ -179,15 +179,16 @@ def drive_by_record(record: Record, boundary: Boundary | None = None, time: Arra
     if t[-1] < rows[-1]:
         t, T = np.append(t, rows[-1]), np.append(T, T[-1])
     commands = {
-        name: (record[column] * factor) ** power
+        name: (_held(rows, record[column]) * factor) ** power
         for name, (column, factor, power) in COMMANDS.items()
-        if column in record and np.isfinite(record[column]).all()
+        if column in record and np.isfinite(record[column]).any()
     }
     if time is not None:
         commands = {name: np.interp(time, rows, values) for name, values in commands.items()}
     turned = None
-    if RATE in record and np.isfinite(record[RATE]).all():
-        turned = np.radians(record[RATE] if time is None else np.interp(time, rows, record[RATE]))
+    if RATE in record and np.isfinite(record[RATE]).any():
+        applied = _held(rows, record[RATE])
+        turned = np.radians(applied if time is None else np.interp(time, rows, applied))
     return Drive(
         rows if time is None else time,
         boundary,
@@ -197,6 +198,16 @@ def drive_by_record(record: Record, boundary: Boundary | None = None, time: Arra
         rate=turned,
         source=record.path,
     )
+
+
+def _held(rows: Array, values: Array) -> Array:
+    """Return a commanded column with the value of the nearest row, in time, where it is missing: a command is held."""
+    known = np.isfinite(values)
+    if known.all():
+        return values
+    t, own = rows[known], values[known]
+    middles = (t[1:] + t[:-1]) / 2
+    return np.asarray(np.where(known, values, own[np.searchsorted(middles, rows)]))
 
 
 def _settled_at(record: Record) -> float | None:

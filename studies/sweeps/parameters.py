@@ -13,7 +13,7 @@ import numpy as np
 
 from shell.constants import zero_Celsius
 from studies.errors import InputError, nearest
-from studies.instrument.card import Instrument
+from studies.instrument.card import OF_GEOMETRY, Instrument
 from studies.instrument.dotted import look_up, names, plain_number
 from studies.instrument.material_values import LAW
 from studies.instrument.registry import possible_keys
@@ -33,6 +33,8 @@ def find_nominal(instrument: Instrument, name: str, where: str) -> float | str |
     try:
         value = look_up(instrument.content, name)
     except (LookupError, ValueError, TypeError):
+        if name.split(".")[0] in OF_GEOMETRY:
+            _ = instrument.resonator  # a card without one says so
         if name not in possible_keys(instrument.content):
             known = [*_named(instrument), *possible_keys(instrument.content), TEMPERATURE]
             raise InputError(f"{where}: card '{instrument.name}' has no parameter '{name}'{nearest(name, known)}") from None  # fmt: skip

@@ -136,14 +136,19 @@ def _variables(plan: Plan) -> Iterator[Row]:
         yield OUT + k, name, "output", symbol(name), None
     if plan.instrument.loop is not None:
         yield USE, "actuator_use", "output", "1", None
-    taken = set(outputs_of(plan))
     for k, (name, start) in enumerate(input_starts(plan).items()):
-        assert name not in taken or plan.boundary == "housing"
         if name != idle_input(plan):
-            yield IN + k, f"imposed_{name}" if name in taken else name, "input", symbol(name), start
+            yield IN + k, name_of_input(plan, name), "input", symbol(name), start
     for k, (key, value) in enumerate(plan.parameters.items()):
         if exposed(plan, key):
             yield PARAMETER + k, key, "parameter", symbol(key), value
+
+
+def name_of_input(plan: Plan, name: str) -> str:
+    """Return the name of an input as the FMU has it: that of a housing is an output too."""
+    taken = name in outputs_of(plan)
+    assert not taken or plan.boundary == "housing"
+    return f"imposed_{name}" if taken else name
 
 
 def _all(rows: list[Row], version: Version) -> list[Row]:

@@ -153,3 +153,24 @@ def test_a_shipped_study_that_does_not_fit_a_card_is_named_by_its_name(tmp_path,
     said = refuse(["study", "run", "dimension-tolerance", "--card", str(tmp_path / "line.toml"), "--dry-run"])
     assert "the shipped study 'dimension-tolerance'" in said
     assert "templates" not in said
+
+
+POLYNOMIAL = 'schema = "hrg.card/1"\nname = "fitted"\n[law]\nf0_Hz = 4432.0\n'
+
+
+@pytest.mark.parametrize("words", ["design new FILE", "study new FILE", "study run dimension-tolerance --dry-run"])
+def test_a_card_without_geometry_is_refused_as_such(tmp_path, refuse, words):
+    card, path = tmp_path / "fitted.toml", tmp_path / "x.toml"
+    card.write_text(POLYNOMIAL)
+    said = refuse([str(path) if word == "FILE" else word for word in [*words.split(), "--card", str(card)]])
+    assert "this needs a card with [resonator] and [material]" in said
+    assert not path.exists()
+
+
+@pytest.mark.parametrize(("like", "command"), [("free-dome", "modes"), ("fitted.toml", "cards")])
+def test_the_command_named_after_a_new_card_takes_it(tmp_path, capsys, like, command):
+    (tmp_path / "fitted.toml").write_text(POLYNOMIAL)
+    path = tmp_path / "mine.toml"
+    assert main(["card", "new", str(path), "--like", str(tmp_path / like) if like.endswith(".toml") else like]) == 0
+    assert f"then run: hrg {command} {path}" in capsys.readouterr().err
+    assert main([command, str(path)]) == 0

@@ -93,6 +93,26 @@ def test_the_measured_housing_gives_the_record_that_the_chamber_gives(card, driv
     assert again.columns["bias_deg_per_h"][late] == pytest.approx(whole.columns["bias_deg_per_h"][late], abs=5e-3)
 
 
+def test_a_command_is_held_where_its_cell_is_empty():
+    """One empty cell does not take the whole column away; the nearest row says what was commanded."""
+    time = np.arange(0.0, 100.0, 10.0)
+    volts, turned = np.where(time < 50.0, 75.0, 125.0), np.full(10, 2.0)
+    columns = {"time_s": time, "housing_temperature_degC": np.full(10, 20.0)}
+    holes = {
+        "electrode_bias_V": volts.copy(),
+        "rate_deg_per_s": turned.copy(),
+        "drive_amplitude_V": np.full(10, np.nan),
+    }
+    holes["electrode_bias_V"][[0, 3, 6, 9]] = np.nan
+    holes["rate_deg_per_s"][4] = np.nan
+    found = drive_by_record(Record(columns | holes))
+    assert found.commands["voltage_squared"] == pytest.approx(volts**2, rel=1e-13)
+    assert found.rate == pytest.approx(np.radians(turned), rel=1e-13)
+    assert set(found.commands) == {"voltage_squared"}
+    sparse = drive_by_record(Record(columns | holes), time=np.array([5.0, 30.0, 95.0]))
+    assert sparse.commands["voltage_squared"] == pytest.approx([75.0**2, 75.0**2, 125.0**2], rel=1e-13)
+
+
 def test_the_recorded_chamber_gives_the_record_again_with_its_jumps_and_its_start():
     """The column is sampled, yet a set point that jumps is no ramp, and before the first row the housing says what was."""
     card = load_card("hrg-30mm")

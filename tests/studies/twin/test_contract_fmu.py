@@ -1,5 +1,6 @@
 """FMUs in FMPy, what the archive holds, and what is said of a card that cannot be carried or of a missing compiler."""
 
+import json
 import shutil
 import subprocess
 import zipfile
@@ -100,6 +101,22 @@ def test_contract_fmu_draws_by_its_seed(tmp_path):
     one, again, other = (simulate_fmpy(path, {"seed": seed})[0]["frequency_Hz"] for seed in (1, 1, 2))
     assert np.array_equal(one, again)
     assert 0.5 < np.std(one - other) / (2e-3 * np.sqrt(2)) < 2.0
+
+
+def _names_of_inputs(path):
+    with zipfile.ZipFile(path) as archive:
+        root = ElementTree.fromstring(archive.read("modelDescription.xml"))
+    return [one.get("name") for one in root.iter() if one.get("causality") == "input"]
+
+
+@pytest.mark.parametrize("boundary", ["chamber", "housing"])
+def test_contract_the_inputs_that_are_told_are_those_of_the_fmu(tmp_path, capsys, boundary):
+    path = tmp_path / "twin.fmu"
+    assert main(["twin", "hrg-30mm", "--fmu", str(path), "--boundary", boundary, "--json"]) == 0
+    told = [one["name"] for one in json.loads(capsys.readouterr().out)["inputs"]]
+    assert told == _names_of_inputs(path)
+    assert main(["twin", "hrg-30mm", "--c", str(tmp_path / "c"), "--boundary", boundary, "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["inputs"][0]["name"] == f"{boundary}_temperature_degC"
 
 
 def test_contract_without_compiler(tmp_path, monkeypatch, capsys, ask):
