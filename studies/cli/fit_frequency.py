@@ -1,11 +1,12 @@
 """`hrg fit frequency`: f(T) and its inverse from a steady-state table, or from the settled parts of records."""
 
+from collections import Counter
 from pathlib import Path
 
 from compensation.arrays import Array
 from studies.cli.arguments import SaveModel
 from studies.cli.output import answers, keep_model, say
-from studies.errors import naming
+from studies.errors import InputError, naming
 from studies.files.columns import read_header
 from studies.models import ModelSource
 from studies.models.kinds.frequency import save_frequency
@@ -47,11 +48,12 @@ def fit_frequency(
         reference_temperature: Temperature T0 in °C about which the polynomial is expanded.
         resolution: Resolution of the frequency readings in Hz; by default the last digit in the file.
     """
-    T, f, step, source, soaks = _read_points((table, *more), time_constant, left)
-    with naming(table):
+    T, f, step, sources, soaks = _read_points((table, *more), time_constant, left, order)
+    read = ", ".join((table, *more))
+    with naming(read):
         study = study_table(T, f, order, reference_temperature, step if resolution is None else resolution)
     fit = study.fit
-    keep_model(save_frequency(fit, (source,), "hrg-workbench, hrg fit frequency"), save)
+    keep_model(save_frequency(fit, sources, "hrg-workbench, hrg fit frequency"), save)
     rows = [row_of(soak, *SHOWN, record="path", start_s="start", end_s="end") for soak in soaks]
     slowest = max((soak.time_constant for soak in soaks), default=0.0)
     payload = {
@@ -69,34 +71,42 @@ def fit_frequency(
     return Result(
         payload,
         "Frequency over temperature",
-        f"{len(f)} settled points of {table} from {low:.4g} to {high:.4g} °C, fitted with a {parts.name_order(fit.order)}.",
+        f"{len(f)} settled points of {read} from {low:.4g} to {high:.4g} °C, fitted with a {parts.name_order(fit.order)}.",
         [
             parts.facts(study),
             parts.order_sentence(study),
             Chapter("Settled parts", [Table("Settled parts of the records", rows, SOAKS, note)]),
             Chapter("Fit and inverse", [parts.coefficients_table(study), parts.inverse_table(study), *figures]),
-            Chapter("Order of the polynomial", parts.order_parts(study)),
+            Chapter("Order of the polynomial", parts.order_parts(study, bool(soaks) and resolution is None)),
         ],
         sources=parts.SOURCES,
     )
 
 
 def _read_points(
-    paths: tuple[str, ...], time_constant: float, left: float
-) -> tuple[Array, Array, float, ModelSource, tuple[Soak, ...]]:
-    """Return temperatures (°C), frequencies (Hz), their resolution (Hz), their source, and the soaks where they are of records."""
+    paths: tuple[str, ...], time_constant: float, left: float, order: int
+) -> tuple[Array, Array, float, tuple[ModelSource, ...], tuple[Soak, ...]]:
+    """Return temperatures (°C), frequencies (Hz), their resolution (Hz), their sources, and the soaks where they are of records."""
     first = paths[0]
     soaks: tuple[Soak, ...] = ()
     if len(paths) == 1 and "time_s" not in read_header(first):
         data = read_frequency_table(first)
-        T, f, sha256 = data.values["temperature_degC"], data.values["frequency_Hz"], data.sha256
-        step = reading_resolution(f)
+        T, f = data.values["temperature_degC"], data.values["frequency_Hz"]
+        step, sources = reading_resolution(f), (ModelSource(Path(first).name, data.sha256, len(f)),)
     else:
         records = records_of_one_gyro([read_record(path) for path in paths], say)
         soaks = find_soaks(records, time_constant, left)
-        T, f, step = settled_table(soaks, first, advise_hold(records, time_constant, left) if len(soaks) < 2 else "")
-        sha256 = records[0].sha256
+        advice = advise_hold(records, time_constant, left) if len(soaks) < order + 2 else ""
+        T, f, step = settled_table(soaks, ", ".join(paths), advice)
+        if len(soaks) < order + 2:
+            raise InputError(
+                f"{', '.join(paths)}: found {len(soaks)} settled parts; order {order} needs {order + 2}. {advice or 'Hold more temperatures.'}"
+                " Raising --left accepts parts that are less settled; lowering --order needs fewer."
+            )
+        counts = Counter(soak.path for soak in soaks)
+        of_soaks = [(record, counts[record.path]) for record in records if counts[record.path]]
+        sources = tuple(ModelSource(Path(record.path).name, record.sha256, count) for record, count in of_soaks)
         shown = max(soak.time_constant for soak in soaks)
         if shown > 1.01 * time_constant:
             say(f"the records show a time constant of {shown / 60:.3g} min, used instead of {time_constant / 60:.3g}.")
-    return T, f, step, ModelSource(Path(first).name, sha256, len(f)), soaks
+    return T, f, step, sources, soaks

@@ -56,7 +56,7 @@ def inverse_table(study: FrequencyStudy) -> Table:
     return Table("Temperature from frequency", rows, columns, "Error: actual minus calculated temperature.")
 
 
-def order_table(study: FrequencyStudy) -> Table:
+def order_table(study: FrequencyStudy, settled: bool = False) -> Table:
     """Return the fits of rising order and the F-test of each against the one before."""
     rows = list(zip(study.orders.fits, [None, *study.orders.against_next], strict=False))
     columns: Head = [
@@ -64,7 +64,10 @@ def order_table(study: FrequencyStudy) -> Table:
         "0.regression.degrees_of_freedom: Degrees of freedom | 0.regression.sum_of_squares: Sum of squares (Hz²) .3e | 0.chi_squared: χ² .3g"
         " | 0.regression.leave_one_out_rms: Leave-one-out error (Hz) .4f | 1.statistic: F .3g | 1.p_value: p .2g",
     ]
-    note = "χ² assumes that rounding to the last digit is the only noise. F and p test each order against the one below."  # fmt: skip
+    noise = "rounding to the last digit is the only noise"
+    if settled:  # the resolution stands for the error of the parts
+        noise = f"every settled part is uncertain by {(study.fit.resolution or 0.0) / np.sqrt(12.0):.2g} Hz, as the least certain one"
+    note = f"χ² assumes that {noise}. F and p test each order against the one below."
     return Table("Polynomials of rising order", rows, columns, note)
 
 
@@ -78,9 +81,9 @@ def order_sentence(study: FrequencyStudy) -> str:
     return f"A {name_order(order)} is not sufficient: a {name_order(asked)} is significantly better. The leave-one-out error changes from {before:.4f} to {after:.4f} Hz."
 
 
-def order_parts(study: FrequencyStudy) -> list[Part]:
+def order_parts(study: FrequencyStudy, settled: bool = False) -> list[Part]:
     """Return what shows the order that the data support, and what that means outside the measured range."""
-    return [order_table(study), _extrapolation(study, study.next_fit) if study.next_fit else None]
+    return [order_table(study, settled), _extrapolation(study, study.next_fit) if study.next_fit else None]
 
 
 def fit_figure(study: FrequencyStudy) -> Figure:

@@ -6,7 +6,8 @@ import pytest
 from studies.cli import main
 from studies.errors import InputError
 from studies.instrument.card import load_card
-from studies.record import Record, write_record
+from studies.models import read_model
+from studies.record import Record, read_record, write_record
 from studies.record.settled import find_soaks
 from studies.simulation.chamber import load_profile
 from studies.simulation.virtual_gyro import simulate_run
@@ -78,3 +79,37 @@ def test_the_command_takes_a_record(run, tmp_path, ask, refuse):
     assert "a fit over temperature needs at least two temperatures" in refuse(
         ["fit", "frequency", str(path), "--time-constant", "1e7"]
     )
+
+
+def _staircase(path, *levels):
+    """Write holds of six hours, at once settled, with a frequency of 0.37 Hz/°C."""
+    t = np.arange(0.0, 6 * 3600.0 * len(levels), 60.0)
+    T = np.repeat(levels, t.size // len(levels)).astype(float)
+    noise = np.random.default_rng(len(levels)).normal(scale=1e-3, size=t.size)
+    path.parent.mkdir(exist_ok=True)
+    columns = {"time_s": t, "housing_temperature_degC": T, "frequency_Hz": 4424 + 0.37 * T - 3e-4 * T**2 + noise}
+    write_record(Record(columns), path)
+
+
+def test_a_model_of_several_records_names_them_all(tmp_path, capsys):
+    """Of one name in two folders; χ² is said to be by the error of the settled parts, not by the last digit."""
+    first, second = tmp_path / "a" / "run.csv", tmp_path / "b" / "run.csv"
+    _staircase(first, 20, -20, 0)
+    _staircase(second, 10, 40, 30)
+    assert main(["fit", "frequency", str(first), str(second), "--save", str(tmp_path / "m.toml")]) == 0
+    said = capsys.readouterr().out
+    assert "every settled part is uncertain by" in said
+    assert "last digit" not in said
+    sources = read_model(tmp_path / "m.toml").sources
+    assert [source.sha256 for source in sources] == [read_record(path).sha256 for path in (first, second)]
+    assert sum(source.rows for source in sources) == 6
+
+
+def test_too_few_settled_parts_of_several_records_are_said(tmp_path, capsys):
+    paths = [tmp_path / name / "run.csv" for name in "ab"]
+    for path, levels in zip(paths, ((20,), (40, 40)), strict=True):
+        _staircase(path, *levels)
+    assert main(["fit", "frequency", *map(str, paths)]) == 2
+    said = capsys.readouterr().err
+    assert all(str(path) in said for path in paths)
+    assert "found 2 settled parts; order 3 needs 5" in said
