@@ -16,12 +16,14 @@ from compensation.regression import LinearFit, fit_linear
 from compensation.ringdown.answer import Estimate
 from compensation.ringdown.trace import analyse_trace
 from compensation.stability import AllanDeviation, NoiseCoefficients
+from studies.acceptance.lags import MOST, PARTS, Followed, slope_behind
 from studies.acceptance.runs import temperature_column
 from studies.errors import InputError, naming
 from studies.fits.ringdown import Decay
 from studies.record import Record
 from studies.record.stability import read_stability
 
+FEWEST = 20  # averages of a run over temperature that are not made wider
 BLOCK = 100.0  # averaging of the output over temperature (s)
 WARM_BLOCK = 10.0
 MOST_POINTS = 100_000
@@ -104,29 +106,32 @@ def _deviation(deviation: float, free: int, sources: Sequence[str]) -> Measured:
 
 
 def measure_temperature(records: Sequence[Record], output: str) -> Found:
-    """Bias over temperature and its rate, fitted together, what they leave, and the frequency's slope (12.8)."""
+    """Bias over temperature and its rate, fitted together, what they leave, and the frequency's slope (12.8).
+
+    Where the frequency is measured, the temperature is that of the resonator, which lags as the frequency shows.
+    """
+    whole = sum(float(np.ptp(record["time_s"])) for record in records)
+    followed = [_follow(record, whole / MOST) for record in records if "frequency_Hz" in record]
+    paths = [record.path for record in records]
+    found: Found = {}
+    lags: tuple[float, ...] = ()
+    if followed:
+        lags, value, sd = slope_behind(followed)
+        scale = 1e6 / float(np.mean(np.concatenate([run.frequency for run in followed])))
+        found["frequency_temperature_slope_ppm_per_K"] = within(value, sd, paths, PARTS - 1, scale=scale)
     columns: dict[str, list[Array]] = {"output": [], "temperature": [], "slope": []}
-    frequencies: list[tuple[Array, Array]] = []
     runs, start = [], 0
     for record in records:
-        column = temperature_column(record)
-        if column is None:
-            raise InputError(f"{record.path}: a test over temperature needs a temperature column.")
         if output in record:
+            column = _temperature_of(record)
             blocks = average_blocks(record["time_s"], {"output": record[output], "T": record[column]}, BLOCK)
-            if len(blocks.time) < 10:
-                raise InputError(f"{record.path}: a test over temperature needs ten averages of {BLOCK:g} s or more; record longer.")  # fmt: skip
-            T = blocks.columns["T"]
+            _check_length(record, blocks.time)
+            T = Followed(blocks.time, blocks.columns["T"], blocks.columns["output"]).behind(lags)
             columns["output"].append(blocks.columns["output"])
             columns["temperature"].append(T)
             columns["slope"].append(np.gradient(T, blocks.time))
             runs.append(slice(start, start + len(T)))
             start += len(T)
-        if "frequency_Hz" in record:
-            blocks = average_blocks(record["time_s"], {"f": record["frequency_Hz"], "T": record[column]}, BLOCK)
-            frequencies.append((blocks.columns["T"], blocks.columns["f"]))
-    found: Found = {}
-    paths = [record.path for record in records]
     if runs:
         y, T, slope = (np.concatenate(parts) for parts in columns.values())
         offsets = np.zeros((len(y), len(runs)))
@@ -136,19 +141,35 @@ def measure_temperature(records: Sequence[Record], output: str) -> Found:
         names = [*(f"offset {k + 1}" for k in range(len(runs))), "temperature", "rate of temperature"]
         with naming(", ".join(paths)):
             fit = fit_coloured(X, y, names, runs)
-        b, sd, free = fit.regression.coefficients, fit.regression.standard_errors, max(len(y) - X.shape[1], 1)
-        found["bias_temperature_slope_deg_per_h_per_K"] = within(float(b[-2]), float(sd[-2]), paths, free)
-        found["bias_temperature_rate_deg_per_h_s_per_K"] = within(float(b[-1]), float(sd[-1]), paths, free)
+        b, sd_of, free = fit.regression.coefficients, fit.regression.standard_errors, max(len(y) - X.shape[1], 1)
+        found["bias_temperature_slope_deg_per_h_per_K"] = within(float(b[-2]), float(sd_of[-2]), paths, free)
+        found["bias_temperature_rate_deg_per_h_s_per_K"] = within(float(b[-1]), float(sd_of[-1]), paths, free)
         left = fit.residuals - offsets @ np.array([fit.residuals[rows].mean() for rows in runs])
         found["bias_temperature_residual_deg_per_h"] = _deviation(float(np.sqrt(np.mean(left**2))), free, paths)
-    if frequencies:
-        T, f = (np.concatenate(parts) for parts in zip(*frequencies, strict=True))
-        line = fit_linear((T - T.mean())[:, None], f, ["temperature"])
-        scale = 1e6 / float(line.coefficients[0])
-        value, width = float(line.coefficients[1]), 2 * float(line.standard_errors[1])
-        low, high = scale * (value - width), scale * (value + width)
-        found["frequency_temperature_slope_ppm_per_K"] = Measured(scale * value, low, high, tuple(paths))
     return found
+
+
+def _temperature_of(record: Record) -> str:
+    column = temperature_column(record)
+    if column is None:
+        raise InputError(f"{record.path}: a test over temperature needs a temperature column.")
+    return column
+
+
+def _check_length(record: Record, blocks: Array) -> None:
+    if len(blocks) < 10:
+        raise InputError(
+            f"{record.path}: a test over temperature needs ten averages of {BLOCK:g} s or more; record longer."
+        )
+
+
+def _follow(record: Record, width: float) -> Followed:
+    """Return the averages of a record's frequency and temperature, over `width` (s) where that is more than usual and leaves enough."""
+    columns = {"f": record["frequency_Hz"], "T": record[_temperature_of(record)]}
+    width = max(BLOCK, min(width, float(np.ptp(record["time_s"])) / FEWEST))
+    blocks = average_blocks(record["time_s"], columns, width)
+    _check_length(record, blocks.time)
+    return Followed(blocks.time, blocks.columns["T"], blocks.columns["f"])
 
 
 def measure_scale(record: Record) -> Found:

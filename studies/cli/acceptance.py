@@ -36,7 +36,7 @@ def acceptance(card: Card, *runs: Records, limits: str | None = None, output: st
 
     Each record serves the test that its columns show: rest over temperature, rest for an hour or more, several applied rates, a swept
     rate, or a free decay: vibration_amplitude_V, or raw samples, lock-in pairs or a power as hrg fit ringdown reads them. A line '# test: warm-up' (or temperature, scale-factor, drift, run-down, transfer,
-    angle-storage) above the header overrides this; warm-up and angle storage need it. Every value has a 90 % interval; a limit is
+    angle-storage) above the header overrides this; warm-up and angle storage need it. Over temperature, that of the resonator counts, which lags its thermometer as the frequency shows. Every value has a 90 % interval; a limit is
     judged only if the whole interval lies on one side of it.
 
     Args:

@@ -9,6 +9,7 @@ import pytest
 from studies.acceptance.measure import measure_scale
 from studies.cli import main
 from studies.record import Record, read_record, write_record
+from thermal.lag import lag
 
 TRUTH = {
     "warm_up_time_s": 400 * np.log(20),  # 20 e^{-t/400} reaches 1 deg/h
@@ -107,6 +108,35 @@ def test_planted_quantities_are_found(folder, capsys):
     text = page.read_text()
     assert "Acceptance of free-dome: fail" in text
     assert "12.15" in text
+
+
+@pytest.mark.parametrize("lags", [(), (2400.0,), (1900.0, 1100.0)])
+def test_sensitivities_are_of_a_resonator_that_lags_its_housing(tmp_path, capsys, lags):
+    """80 ppm/K and 0.05 °/h/K, while the resonator has not settled anywhere."""
+    g, paths, levels_of = np.random.default_rng(5), [], []
+    for k, (hours, levels) in enumerate(
+        [([0, 1, 1.7, 4, 5, 7], [20, 20, -15, -15, 45, 45]), ([0, 2, 3, 5], [25, 25, 0, 30])]
+    ):
+        t = np.arange(0.0, 3600.0 * hours[-1], 20.0)
+        T = resonator = np.interp(t, np.array(hours) * 3600.0, levels) + 0.2 * np.sin(t / 400.0)
+        for tau in lags:
+            resonator = lag(t, resonator, tau)
+        x = resonator - 20
+        f = 4432 + 4432 * 80e-6 * x + g.normal(0, 2e-3, t.size)
+        levels_of.append(f)
+        bias = 1 + k + 0.05 * x + g.normal(0, 0.02, t.size)
+        paths.append(tmp_path / f"run{k}.csv")
+        columns = {"time_s": t, "housing_temperature_degC": T, "frequency_Hz": f, "bias_deg_per_h": bias}
+        write_record(Record(columns, instrument="free-dome"), paths[-1])
+    assert main(["acceptance", "free-dome", *map(str, paths), "--json"]) == 0
+    lines = {line["key"]: line for line in json.loads(capsys.readouterr().out)["quantities"]}
+    for key, truth in (
+        ("frequency_temperature_slope_ppm_per_K", 80.0 * 4432 / np.mean(np.concatenate(levels_of))),
+        ("bias_temperature_slope_deg_per_h_per_K", 0.05),
+    ):
+        assert lines[key]["value"] == pytest.approx(truth, rel=0.01), key
+        reach = (lines[key]["high"] - lines[key]["low"]) / 2 + 1e-4 * truth  # the lags act on averages over 100 s
+        assert lines[key]["low"] - reach < truth < lines[key]["high"] + reach, key
 
 
 def test_a_limit_without_a_record_is_said_and_leaves_the_verdict_open(folder, capsys):
