@@ -49,9 +49,11 @@ def find_lags(
 
     best = near or min(((one, other) for k, one in enumerate(LAGS) for other in LAGS[: k + 1]), key=left)
     start = np.log(np.maximum(best, 2 * SHORTEST))
-    found = scipy.optimize.minimize(
-        lambda own: left(np.exp(own)), start, method="Nelder-Mead", options={"maxiter": 200, "xatol": 1e-3}
-    )
+
+    def left_of(own: Array) -> float:
+        return left([float(one) for one in np.exp(own)])
+
+    found = scipy.optimize.minimize(left_of, start, method="Nelder-Mead", options={"maxiter": 200, "xatol": 1e-3})
     one, other = np.exp(found.x) if found.fun < left(best) else best
     return float(one), float(other)
 

@@ -89,6 +89,7 @@ def _read_points(
     """Return temperatures (°C), frequencies (Hz), their resolution (Hz), their sources, and the soaks where they are of records."""
     first = paths[0]
     soaks: tuple[Soak, ...] = ()
+    sources: tuple[ModelSource, ...]
     if len(paths) == 1 and "time_s" not in read_header(first):
         data = read_frequency_table(first)
         T, f = data.values["temperature_degC"], data.values["frequency_Hz"]
