@@ -22,6 +22,8 @@ from compensation.arrays import Array
 from compensation.errors import CompensationError
 from compensation.noise import SLOW_TIMES, Noise, flicker, random_walk
 
+Seen = tuple[float, Array, Array]
+"""−2 ln L at a point, its slopes and curvature."""
 KEPT = 4  # roots of the covariance of rows
 COARSE = 150  # most rows of a run from which noise is estimated in a model with many unknowns
 LEAST, MOST = -7.0, 8.0  # ln of the rms of slow noise within a run over that of a row's white noise
@@ -33,6 +35,9 @@ STATED_SPREAD = 0.7  # the same about ln of a level that is stated: a factor of 
 LONGEST, CLOSE = 3.0, 1e-3  # of a step in ln of a level, and fall of −2 ln L that the last one promises
 MOST_STEPS, MOST_HALVINGS = 50, 12
 LOUD = 1.0  # ln of slow noise within a run over that of a row, beyond which its kinds are searched each for itself
+STOOD = (
+    0.1  # fall of −2 ln L up to which a search has ended where it began: every kind was searched when that was found
+)
 PURE = 0.02  # of it, within which it is of one kind
 
 
@@ -43,6 +48,10 @@ class NoiseRows:
     times: tuple[Array, ...]
     spans: tuple[Array, ...]
     stretch: tuple[Array, ...]
+    _of: "tuple[NoiseRows, Sequence[tuple[int, NDArray[np.bool_]]]] | None" = field(
+        default=None, repr=False, compare=False
+    )
+    """Rows of which they are some, and the run and the rows of each that are kept."""
     _roots: dict[Noise, "Whitener"] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     @classmethod
@@ -75,9 +84,20 @@ class NoiseRows:
             x = np.round(t - t[0], 3)
             key = x.tobytes() + np.round(spans, 6).tobytes() + np.round(stretch, 9).tobytes()
             if key not in found:
-                found[key] = (*_slow(x.tobytes(), spans.tobytes()), [])
+                found[key] = (*self._slow(run), [])
             found[key][2].append(run)
         return tuple((F, W, tuple(runs)) for F, W, runs in found.values())
+
+    def _slow(self, run: int) -> tuple[Array, Array]:
+        """Flicker and walk matrices of one run; of rows that are kept, from those of all: a walk is 0 where the first row begins."""
+        if self._of is None:
+            t = self.times[run]
+            return _slow(np.round(t - t[0], 3).tobytes(), self.spans[run].tobytes())
+        whole, kept = self._of
+        place, mask = kept[run]
+        F, W = (own[np.ix_(mask, mask)] for own in whole._slow(place))
+        begin = self.times[run][0] - whole.times[place][0] + 0.5 * (whole.spans[place][0] - self.spans[run][0])
+        return F, W - begin
 
     @cached_property
     def _starts(self) -> tuple[tuple[NDArray[np.intp], ...], "NoiseRows"]:
@@ -131,11 +151,11 @@ class NoiseRows:
 
     def whitener(self, noise: Noise) -> "Whitener":
         """Return the root of the covariance; those of a few levels are kept, for a search goes to and fro between them."""
-        if noise not in self._roots:
-            if len(self._roots) == KEPT:
-                del self._roots[next(iter(self._roots))]
-            self._roots[noise] = self._factor(noise)
-        return self._roots[noise]
+        found = self._roots.pop(noise) if noise in self._roots else self._factor(noise)
+        if len(self._roots) == KEPT:  # the one that was not asked for longest goes
+            del self._roots[next(iter(self._roots))]
+        self._roots[noise] = found
+        return found
 
     def _factor(self, noise: Noise) -> "Whitener":
         """Factor the covariance of every distinct set of rows once; products with L⁻¹ cost less than solutions with L."""
@@ -156,7 +176,7 @@ class NoiseRows:
         """Return the rows that a mask of each run keeps; a run without any is left out."""
         parts = [k for k, mask in enumerate(masks) if mask.any()]
         own = [tuple(one[k][masks[k]] for k in parts) for one in (self.times, self.spans, self.stretch)]
-        return NoiseRows(own[0], own[1], own[2])
+        return NoiseRows(own[0], own[1], own[2], (self, [(k, masks[k]) for k in parts]))
 
     def deviance(
         self, target: Array, columns: Array, precision: Array, noise: Noise, mean: Array | None = None
@@ -195,7 +215,7 @@ class NoiseRows:
         return total, slopes, moved.T @ moved - told.T @ told
 
 
-@lru_cache(maxsize=8)
+@lru_cache(maxsize=32)
 def _slow(times: bytes, spans: bytes) -> tuple[Array, Array]:
     """Flicker and walk matrices of rows, which many sets share."""
     x, wide = np.frombuffer(times), np.frombuffer(spans)
@@ -217,11 +237,12 @@ def solve_lower(root: Array, columns: Array, transposed: bool = False) -> Array:
     return np.asarray(scipy.linalg.lapack.dtrtrs(root, columns, lower=1, trans=transposed)[0]).reshape(columns.shape)
 
 
-def multiply_lower(root: Array, columns: Array, transposed: bool = False) -> Array:
-    """Return L or Lᵀ times columns, (N,) or (N, p)."""
+def multiply_lower(root: NDArray[np.floating], columns: NDArray[np.floating], transposed: bool = False) -> Array:
+    """Return L or Lᵀ times columns, (N,) or (N, p), in their digits."""
     if columns.ndim == 1:
         return np.asarray((root.T if transposed else root) @ columns)
-    return np.asarray(scipy.linalg.blas.dtrmm(1.0, root, columns, lower=1, trans_a=transposed))
+    multiply = scipy.linalg.blas.strmm if columns.dtype == np.float32 else scipy.linalg.blas.dtrmm
+    return np.asarray(multiply(1.0, root, columns, lower=1, trans_a=transposed))
 
 
 @dataclass(frozen=True)
@@ -232,12 +253,13 @@ class Whitener:
     roots: tuple[tuple[Array, tuple[int, ...]], ...]
 
     def __call__(self, columns: NDArray[np.floating]) -> Array:
-        """Return stacked columns, (M,) or (M, p), whitened."""
-        white = columns.astype(float)
+        """Return stacked columns, (M,) or (M, p), whitened; those of seven digits in seven."""
+        white: NDArray[np.floating] = np.array(columns, np.float32 if columns.dtype == np.float32 else np.float64)
         for K, runs in self.roots:
+            root = K.astype(white.dtype, copy=False)
             for run in runs:
-                white[self.slices[run]] = multiply_lower(K, white[self.slices[run]])
-        return white
+                white[self.slices[run]] = multiply_lower(root, white[self.slices[run]])
+        return white.astype(np.float64, copy=False)
 
     @property
     def log_determinant(self) -> float:
@@ -297,23 +319,21 @@ def estimate_noise(
         first[1:] = np.clip(first[1:], LEAST, MOST)
     low, high = (np.array([end, *[slow] * len(free)]) for end, slow in ((-12.0, LEAST), (12.0, MOST)))
 
-    def search(start: Array) -> tuple[float, Array]:
-        return _newton(objective, start, low, high)
-
-    found = search(first)
-    for start in _other_slow(found[1], free):  # what is slow may be of another kind than where the search ended
-        if start.max() > LOUD or objective(start)[0] < found[0]:
-            found = min(found, search(start), key=lambda one: one[0])
+    begin = objective(first)
+    found = _newton(objective, first, begin, low, high)
+    if near is None or begin[0] - found[0] > STOOD:
+        for start in _other_slow(found[1], free):  # what is slow may be of another kind than where the search ended
+            there = objective(start)
+            if start.max() > LOUD or there[0] < found[0]:
+                found = min(found, _newton(objective, start, there, low, high), key=lambda one: one[0])
     if found[1][0] < WHITE - TOO_QUIET:  # slow noise that stands for the scatter of rows may only be a lesser optimum
-        found = min(found, search(usual), key=lambda one: one[0])
+        found = min(found, _newton(objective, usual, objective(usual), low, high), key=lambda one: one[0])
     return levels(found[1])
 
 
-def _newton(
-    objective: Callable[[Array], tuple[float, Array, Array]], x: Array, low: Array, high: Array
-) -> tuple[float, Array]:
-    """Return the least value between bounds, and where, by Newton's steps, halved until they lower it."""
-    value, slope, bend = objective(x)
+def _newton(objective: Callable[[Array], Seen], x: Array, seen: Seen, low: Array, high: Array) -> tuple[float, Array]:
+    """Return the least value between bounds, and where, by Newton's steps from what is seen at x, halved until they lower it."""
+    value, slope, bend = seen
     for _ in range(MOST_STEPS):
         free = ~(((x <= low) & (slope > 0)) | ((x >= high) & (slope < 0)))
         step = np.zeros_like(x)

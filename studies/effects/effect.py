@@ -115,6 +115,7 @@ class Effect:
     event: bool = False  # whether other runs know nothing of it, so that no held-out run can confirm it
     # Whether time alone drives it, so that no programme of temperatures and drives shows it better than another.
     by_clock: bool = False
+    alike: bool = False  # whether its columns are the same of every response
     dated: bool = False  # whether it counts its time from the start of the campaign
     # Whether it happens once in a gyro's life rather than in every run, so that a saved card does not repeat it.
     once: bool = False

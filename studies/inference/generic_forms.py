@@ -35,6 +35,7 @@ def _generic(
         grid=lambda span, response: [()],
         sizes=STRONG,
         needs=needs,
+        alike=True,
     )
 
 

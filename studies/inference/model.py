@@ -264,7 +264,10 @@ class Background:
     def by_scale(self, term: Term) -> Array:
         """Log evidence that a term adds at each of `SCALES`."""
         beside = replace(self, linear=self.linear.bent([term])) if term.bend else self
-        own = beside.gains({n: X[:, None, :] for n, X in term.columns.items()}, term.unit[None], term.effect)[:, 0]
+        there = np.any([X.any(axis=0) for X in term.columns.values()], axis=0)
+        there[0] = True  # it says which way the effect goes
+        columns = {n: X[:, None, there] for n, X in term.columns.items()}
+        own = beside.gains(columns, term.unit[None, there], term.effect)[:, 0]
         return np.asarray(beside.evidence - self.evidence + own)
 
     def with_term(self, term: Term) -> tuple[Term, float]:
@@ -337,6 +340,10 @@ def estimate_noise_of(
 ) -> dict[str, Noise]:
     """Return the levels of highest marginal likelihood of each response (or those named), given what the others say."""
     linear = linear.bent(terms)
-    slopes = {name: linear.columns(terms, name) for name in linear.responses}
-    told = linear.told_beside(terms)
+    slopes, told = {name: linear.columns(terms, name) for name in linear.responses}, linear.told_beside(terms)
+    there = np.any([own.any(axis=0) for own in slopes.values()], axis=0)  # what no row shows says nothing of noise
+    if told is not None:
+        there |= told[:, :-1].any(axis=0)
+        told = told[:, np.append(there, True)]
+    slopes = {name: own[:, there] for name, own in slopes.items()}
     return estimate_levels(linear.problem, linear.rows, linear.target, slopes, noise, names or linear.responses, told)

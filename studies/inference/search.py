@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
+from itertools import groupby
 
 import numpy as np
 import scipy
@@ -99,20 +100,31 @@ class Search:
     def shapes_of(self, effects: Iterable[tuple[Effect, str]]) -> list[Shapes]:
         """Return the columns of all shapes of some effects, in seven digits: whatever leads is computed anew."""
         found = []
-        for effect, response in effects:
-            grid = [tuple(shape) for shape in effect.grid(self.signatures.span, response)]
-            groups: dict[tuple[int, ...], list[tuple[tuple[float, ...], Columns]]] = {}
-            first = leading(effect, len(grid))
-            for shape in chosen(effect, grid):
-                columns = self.signatures.columns(effect, shape, response)
-                there = np.any([np.any(own != 0, axis=0) for own in columns.values()], axis=0)
-                members = tuple(k for k in first if there[k])
+        for _, pairs in groupby(effects, lambda one: id(one[0]) if one[0].alike else one):
+            (effect, *_), responses = zip(*pairs, strict=True)
+            found += self._shapes(effect, responses)
+        return found
+
+    def _shapes(self, effect: Effect, responses: Sequence[str]) -> list[Shapes]:
+        """Return those of one effect, whose columns are the same of these responses."""
+        grids = {name: [tuple(shape) for shape in effect.grid(self.signatures.span, name)] for name in responses}
+        scanned = {name: dict.fromkeys(chosen(effect, grid)) for name, grid in grids.items()}
+        first = {name: leading(effect, len(grid)) for name, grid in grids.items()}
+        groups: dict[tuple[str, tuple[int, ...]], list[tuple[tuple[float, ...], Columns]]] = {}
+        for shape in dict.fromkeys(shape for shapes in scanned.values() for shape in shapes):
+            runs = [effect.columns(one, shape, responses[0]).T for one in self.signatures.states]
+            for name in (one for one in responses if shape in scanned[one]):
+                own = [run[first[name]] for run in runs]
+                there = np.any([run.any(axis=1) for run in own], axis=0)
+                members = tuple(k for k, seen in zip(first[name], there, strict=True) if seen)
                 if members:
-                    kept = {name: own[:, members].astype(np.float32) for name, own in columns.items()}
-                    groups.setdefault(members, []).append((shape, kept))
-            for members, own in groups.items():
-                stacked = {name: np.stack([columns[name] for _, columns in own], axis=1) for name in own[0][1]}
-                found.append(Shapes(effect, response, tuple(shape for shape, _ in own), members, stacked, len(grid)))
+                    columns = self.signatures.made_of(np.hstack([run[there] for run in own]).T, effect, name)
+                    kept = {n: X.astype(np.float32) for n, X in columns.items()}
+                    groups.setdefault((name, members), []).append((shape, kept))
+        found = []
+        for (name, members), made in sorted(groups.items(), key=lambda one: responses.index(one[0][0])):
+            stacked = {n: np.stack([columns[n] for _, columns in made], axis=1) for n in made[0][1]}
+            found.append(Shapes(effect, name, tuple(shape for shape, _ in made), members, stacked, len(grids[name])))
         return found
 
     def unit(self, effect: Effect, response: str, members: Sequence[int]) -> Array:

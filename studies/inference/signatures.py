@@ -270,6 +270,16 @@ class Signatures:
         self, effect: Effect, shape: tuple[float, ...], response: str, states: Sequence[States] = ()
     ) -> dict[str, Array]:
         """Return what the members of an effect make of each response, stacked over its rows, in `states` beside the paths if given."""
+        grids = [effect.columns(one, shape, response).T for one in states or self.states]
+        there = np.any([own.any(axis=1) for own in grids], axis=0)
+        made, found = self.made_of(np.hstack([own[there] for own in grids]).T, effect, response), {}
+        for name, own in made.items():
+            found[name] = np.zeros((len(own), len(there)))
+            found[name][:, there] = own
+        return found
+
+    def made_of(self, own: Array, effect: Effect, response: str) -> dict[str, Array]:
+        """Return what columns of an effect on the even grids of all runs make of each response."""
         kinds = dict.fromkeys(self.problem.responses, WARMED) if effect.thermal else {response: DIRECT}
         if (
             response == "inverse_q"
@@ -278,7 +288,6 @@ class Signatures:
             and "bias_deg_per_h" in self.problem.responses
         ):
             kinds["bias_deg_per_h"] = DAMPED
-        own = np.concatenate([effect.columns(one, shape, response) for one in states or self.states])
         return {name: self._operator(name, kind) @ own for name, kind in kinds.items()}
 
     def of_term(
@@ -298,7 +307,7 @@ class Signatures:
         """Return what gives these columns on the even grid of a run."""
 
         def columns(states: States, shape: Sequence[float], response: str) -> Array:
-            own = np.asarray(effect.columns(states, shape, response))[:, list(members)]
+            own = np.asarray(effect.columns(states, shape, response)).T[list(members)].T
             if not starts:
                 return own
             began = starts_of(effect, states, shape, len(self.problem.runs), self.span.temperature_range)

@@ -88,6 +88,15 @@ def test_whitened_rows_have_the_identity_as_covariance_where_rows_are_uneven():
     assert W @ covariance @ W.T == pytest.approx(np.eye(rows.count), abs=1e-9)
 
 
+def test_rows_that_are_kept_have_the_covariance_of_rows_at_their_times():
+    """Rows apart: of neighbours, what they share of brief noise goes with the rows between them."""
+    times, kept, noise = 90.0 * np.arange(80.0), np.arange(80) % 2 == 1, Noise(0.2, 0.3, 0.01, 0.5)
+    rows = NoiseRows.of([times, times], [np.full(80, 30.0)] * 2)
+    few = rows.kept([kept, np.zeros(80, dtype=bool)])
+    assert [len(t) for t in few.times] == [40]
+    assert few.covariance(0, noise) == pytest.approx(noise.covariance(times[kept], 30.0), rel=1e-9)
+
+
 @pytest.mark.slow
 def test_coarse_rows_are_means_of_neighbours_and_have_their_covariance():
     """400 rows of a run are 134 of three and a rest of one; rows without gaps: the walk and the white noise of means are exact."""

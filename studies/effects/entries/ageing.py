@@ -38,6 +38,7 @@ EFFECT = Effect(
     columns=columns,
     grid=grid,
     sizes={"frequency_Hz": 1e-4, "bias_deg_per_h": 20.0, "inverse_q": 1.0},
+    alike=True,
     shape=(
         Parameter("onset_s", 60.0, 1e8, "time after which the drift slows down"),
         Parameter("restarts_each_run", 0.0, 1.0, "1 when the drift starts anew in each run", False, True),

@@ -61,6 +61,7 @@ EFFECT = Effect(
     columns=columns,
     grid=grid,
     sizes={"bias_deg_per_h": 2.0, "frequency_Hz": 3e-5, "inverse_q": 0.02},
+    alike=True,
     shape=(
         Parameter("half_width_K", 0.02, 40.0, "half width of the loop in temperature", of_range=WIDEST),
         Parameter(

@@ -47,6 +47,7 @@ EFFECT = Effect(
     columns=columns,
     grid=grid,
     sizes={"frequency_Hz": 1e-4, "bias_deg_per_h": 30.0, "inverse_q": 0.5},
+    alike=True,
     shape=(
         Parameter("run", 0.0, 1e4, "run that has the jump, from 0", False, True),
         Parameter("time_s", 0.0, 1e9, "when in that run", False),

@@ -14,13 +14,12 @@ def columns(states: States, shape: Shape, response: str) -> Array:
     """
     period, restarts = shape
     turn = np.exp(2j * np.pi * (states.time if restarts else states.campaign_time) / period)
-    waves = np.stack([turn, turn**2, turn**3], axis=1)
-    pairs = np.concatenate([waves.imag, waves.real], axis=1)
-    out = np.zeros((states.time.size, 6 * (1 + MOST_RUNS)))
+    waves = np.stack([turn, turn * turn, turn * turn * turn])
+    out = np.zeros((6 * (1 + MOST_RUNS), states.time.size))
     place = 1 + states.run if restarts == OWN else 0
     if place <= MOST_RUNS:
-        out[:, 6 * place : 6 * (place + 1)] = pairs
-    return out
+        out[6 * place : 6 * (place + 1)] = np.concatenate([waves.imag, waves.real])
+    return out.T
 
 
 def grid(span: Span, response: str) -> list[tuple[float, ...]]:
@@ -70,6 +69,7 @@ EFFECT = Effect(
     grid=grid,
     near=near,
     sizes={"bias_deg_per_h": 10.0, "frequency_Hz": 5e-5, "inverse_q": 0.3},
+    alike=True,
     shape=(
         Parameter("period_s", 1.0, 1e7, "period", of_run=1.0 / CYCLES),
         Parameter(

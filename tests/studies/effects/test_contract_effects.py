@@ -78,6 +78,8 @@ def test_effect_keeps_the_contract(name):
             columns = effect.columns(make_states(), shape, response)
             assert columns.shape == (make_states().time.size, effect.spread.size)
             assert np.isfinite(columns).all()
+            for other in effect.responses if effect.alike else ():
+                assert np.array_equal(effect.columns(make_states(), shape, other), columns)
         for other in effect.equivalents.get(response, ()):
             assert other in library()
 
