@@ -12,6 +12,7 @@ from studies.cli.output import answers, say
 from studies.errors import InputError, nearest
 from studies.fits.ringdown import is_decay, read_decay
 from studies.instrument.card import load_card
+from studies.instrument.units import unit_of
 from studies.record import read_record
 from studies.record.plausible import check_card_frequency, records_of_one_gyro
 from studies.record.uses import OUTPUT
@@ -51,6 +52,8 @@ def acceptance(card: Card, *runs: Records, limits: str | None = None, output: st
     if output != OUTPUT and not any(output in record for record in records):
         known = {name for record in records for name in record.columns}
         raise InputError(f"--output {output}: no record has this column{nearest(output, known)}")
+    if unit_of(output) != unit_of(OUTPUT):
+        raise InputError(f"--output {output}: the zero-rate output is a column in °/h, such as compensated_{OUTPUT}.")
     decays = [read_decay(path) for path in free]
     allowed = None if limits is None else read_file(limits, Limits, SCHEMA)
     found = judge(records, allowed, output, decays)

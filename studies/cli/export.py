@@ -18,6 +18,9 @@ if TYPE_CHECKING:
 
 ENDINGS = {"csv": (".csv",), "parquet": (".parquet",), "mat": (".mat",), "tdms": (".tdms",), "mf4": (".mf4",), "hdf5": (".h5", ".hdf5")}  # fmt: skip
 
+UNDATED = ("mat", "tdms", "hdf5")
+"""Formats in which a record's time has no clock that began at a date."""
+
 
 @answers("hrg.export/1", page=False)
 def export(run: Run, *, to: Literal["parquet", "mat", "tdms", "csv", "mf4", "hdf5"], out: Out) -> Result:
@@ -33,8 +36,11 @@ def export(run: Run, *, to: Literal["parquet", "mat", "tdms", "csv", "mf4", "hdf
     record = read_record(run)
     export_record(record, to, out)
     payload = {"record": run, "to": to, "out": out, "rows": len(record), "columns": list(record.columns)}  # fmt: skip
-    said = f"{out}: {len(record):,} rows of {', '.join(record.columns)}."
-    return Result(payload, "Export", parts=[Sentence(said)])
+    parts = [Sentence(f"{out}: {len(record):,} rows of {', '.join(record.columns)}.")]
+    if record.start is not None and to in UNDATED:
+        moment = record.start.isoformat()
+        parts.append(Sentence(f"Its start is in the notes only; hrg import takes it from the map: start = {moment}."))
+    return Result(payload, "Export", parts=parts)
 
 
 GROUP = "record"

@@ -31,7 +31,7 @@ def headline(lot: Lot) -> str:
     """Return what the lot has in common and who differs, in a few sentences."""
     shared = (one for one in lot.shares if one.kind in ("all", "all but"))
     common = [f"{' or '.join(one.names)} ({NAMES[one.response]})" for one in shared]
-    text = f"Common to the lot: {', '.join(common)}." if common else "The devices have no cause in common."
+    text = f"Common to the lot: {', '.join(common)}." if common else _of_all(lot)
     for name, why in lot.bad_batches.items():
         text += f" Batch {name} differs: {_first(why)}."
     if len(lot.odd) == 1:
@@ -43,6 +43,18 @@ def headline(lot: Lot) -> str:
     else:
         text += f" No device differs from the others.{_farthest(lot)}"
     return text + (f" No answer: {', '.join(sorted(lot.failed))}." if lot.failed else "")
+
+
+def _of_all(lot: Lot) -> str:
+    """Return what is said of a lot without shared causes: those of the heat path, values of each card, every device may have."""
+    having = [
+        {cause["effect"] for cause in own.verdict["causes"] if cause["kind"] == "physics"}
+        for own in lot.answers.values()
+    ]
+    names = sorted(set.intersection(*having)) if having else []
+    if not names:
+        return "The devices have no cause in common."
+    return f"All devices have {' and '.join(names)}, and no other cause in common."
 
 
 def _farthest(lot: Lot) -> str:

@@ -1,8 +1,10 @@
 """Files of other laboratories and programs: read to the last digit, damaged ones refused in a sentence, nothing unpickled."""
 
+import datetime
 import json
 import re
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -47,6 +49,24 @@ def test_contract_a_record_comes_back_from_every_format_to_the_last_digit(kind, 
     back = read_record("back.csv")
     assert set(back.columns) == set(record.columns)
     assert same(record, back)
+
+
+@pytest.mark.parametrize("kind", ["mat", "tdms", "hdf5", "mf4"])
+def test_contract_the_start_of_a_record_comes_back_as_is_said(kind, record, tmp_path, monkeypatch, capsys):
+    """A file without a dated clock loses it, once without a word; what the map then needs is told."""
+    monkeypatch.chdir(tmp_path)
+    moment = datetime.datetime(2026, 3, 3, 8, 0, 5, tzinfo=datetime.UTC)
+    write_record(replace(record, start=moment), "run.csv")
+    out = f"run.{FORMATS[kind]}"
+    assert main(["export", "run.csv", "--to", kind, "--out", out]) == 0
+    told = re.search(r"from the map: (start = \S+?)\.\s", capsys.readouterr().out)
+    assert (told is None) == (kind == "mf4")
+    assert main(["import", out, "--draft", "map.toml"]) == 0
+    if told:
+        text = Path("map.toml").read_text(encoding="utf-8")
+        Path("map.toml").write_text(text.replace("[[file]]", f"[[file]]\n{told[1]}", 1), encoding="utf-8")
+    assert main(["import", out, "--map", "map.toml", "--out", "back.csv"]) == 0
+    assert read_record("back.csv").start == moment
 
 
 def test_contract_a_parquet_record_is_accepted_where_a_csv_is(record, tmp_path, monkeypatch, capsys):

@@ -139,6 +139,13 @@ def test_sensitivities_are_of_a_resonator_that_lags_its_housing(tmp_path, capsys
         assert lines[key]["low"] - reach < truth < lines[key]["high"] + reach, key
 
 
+@pytest.mark.parametrize("column", ["frequency_Hz", "housing_temperature_degC"])
+def test_what_is_no_rate_is_not_judged_as_the_bias(folder, capsys, column):
+    status, _, said = judged(capsys, folder, ("cycle",), "--output", column)
+    assert status == 2
+    assert f"--output {column}: the zero-rate output is a column in °/h" in said
+
+
 def test_a_limit_without_a_record_is_said_and_leaves_the_verdict_open(folder, capsys):
     path = limits(folder, "run_down_time_s = 500\nscale_factor_error_ppm = 100")
     status, found, said = judged(capsys, folder, ("rundown",), "--limits", path)

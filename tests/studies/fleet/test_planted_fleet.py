@@ -130,6 +130,25 @@ def test_an_effect_that_another_cause_beats_in_its_own_place_is_not_there_too():
     }
 
 
+def test_causes_of_the_heat_path_that_every_device_has_are_said():
+    """Once "no cause in common" stood above rows that all had second-lag and radiation."""
+
+    def lot(*lists):
+        answers = {}
+        for serial, names in zip("ABCD", lists, strict=False):
+            causes = [
+                {"kind": "physics", "response": "frequency_Hz", "effect": name, "equivalent": []} for name in names
+            ]
+            values = [{"kind": "value", "response": "frequency_Hz", "effect": "loss.inverse_q", "equivalent": []}]
+            answers[serial] = Answer(serial, "", {"causes": causes + values, "verdict": "explained"}, 4432.0, {}, {})
+        return gather([Device(s, ()) for s in answers], answers, {})
+
+    both = ("second-lag", "radiation")
+    said = parts.headline(lot(both, both, (*both, "jump")))
+    assert said.startswith("All devices have radiation and second-lag, and no other cause in common.")
+    assert parts.headline(lot(both, (), both)).startswith("The devices have no cause in common.")
+
+
 def test_sizes_of_unlike_kinds_are_told_as_what_all_have():
     """Once `rms (°/h) 0.41 … 80`, of which the 80 was a coefficient."""
     one = Standing(50.0, 0.41, 0.01, 80.0, 0.2, "coefficient_deg_per_h_per_K_per_s")
