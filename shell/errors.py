@@ -1,6 +1,7 @@
 """What `shell` raises when it is asked for something that cannot be computed."""
 
 import difflib
+import re
 from collections.abc import Iterable
 from itertools import accumulate
 
@@ -21,10 +22,11 @@ def mm(length: float) -> str:
 
 
 def nearest(word: str, known: Iterable[str]) -> str:
-    """Return "; did you mean 'x'?" for the known word nearest to `word`, or else with `word` in it; else the first known words."""
+    """Return "; did you mean 'x'?" for the known word that has `word` as a part, the nearest to it, or else one with it inside; else the first known words."""
     known = sorted(known, key=lambda one: (word.lower() not in one.lower(), one))
     inside = [one for one in sorted(known, key=len) if len(word) > 2 and word.lower() in one.lower()]
-    if close := difflib.get_close_matches(word, known, n=1, cutoff=0.5) or inside:
+    whole = [one for one in inside if word.lower() in re.split(r"[-_. ]", one.lower())]
+    if close := whole or difflib.get_close_matches(word, known, n=1, cutoff=0.5) or inside:
         return f"; did you mean '{close[0]}'?"
     told = sum(length <= MOST_TOLD for length in accumulate(len(one) + 2 for one in known))
     more = f" and {len(known) - told} more" if told < len(known) else ""

@@ -8,10 +8,11 @@ from cyclopts import Parameter
 from studies import workbench
 from studies.cli.output import answers, keep_card, say
 from studies.errors import InputError
+from studies.files.columns import read_header
 from studies.instrument.card import load_card
 from studies.planning.chamber import Chamber, parse_chamber
 from studies.progress import Told
-from studies.record import read_record
+from studies.record import OUTPUTS, read_record
 from studies.reports.diagnosis import diagnosis_parts, headline
 from studies.results import Result
 
@@ -66,6 +67,9 @@ def _plan(profiles: list[str], card: str | None, limits: Chamber | None) -> Resu
     from studies.planning.plan import plan_campaign
     from studies.reports import plan as parts
 
+    for path in profiles:
+        if Path(path).is_file() and set(OUTPUTS) & set(read_header(path)):
+            raise InputError(f"{path}: this is a record of a run; --plan takes profiles of runs to come. Leave out --plan to diagnose records; --next then proposes a run.")  # fmt: skip
     if card is None:
         say(f"no --card given: planning with the card {PLANNED}.")
     with Told("plan", {"all effects in all shapes": 0.3, "what would be answered": 0.7}) as told:

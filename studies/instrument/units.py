@@ -5,7 +5,7 @@ from functools import lru_cache
 
 SYMBOLS = {"um": "µm", "deg": "°", "degC": "°C", "day": "d", "rt": "√", "ohm": "Ω", "percent": "%"}
 UNIT = re.compile(
-    r"(10)?(per|rt|degC|deg|mrad|ppm|day|counts|[GMkmun]?(?:Pa|Hz|W|J|V|eV|N|g|K|s)|[cmunp]?m|pF|ohm|percent|h|1)([2-9])?"
+    r"(10)?(per|rt|degC|deg|mrad|ppm|day|year|counts|[GMkmun]?(?:Pa|Hz|W|J|V|eV|N|g|K|s)|[cmunp]?m|pF|ohm|percent|h|1)([2-9])?"
 )
 RATES = {
     # words of a key: one unit, so that what follows belongs to it as a whole

@@ -217,3 +217,19 @@ def test_every_command_that_takes_a_card_is_tried():
         if {"card", "cards"} & set(inspect.signature(getattr(importlib.import_module(module), function)).parameters):
             takes.add(name)
     assert takes <= {" ".join(words.split()[:k]) for words in WITH_A_CARD for k in (1, 2)}
+
+
+def test_a_record_is_no_plan(tmp_path, refuse):
+    """Once its housing column was called unknown, and `hrg import` advised."""
+    path = tmp_path / "run.csv"
+    path.write_text("time_s,housing_temperature_degC,frequency_Hz\n0,20,4432.1\n60,21,4432.4\n")
+    for words in (["diagnose", path, "--plan", "soak 20 1h"], ["diagnose", "--plan", path]):
+        said = refuse(words)
+        assert "run.csv: this is a record of a run; --plan takes profiles" in said
+        assert "import" not in said
+
+
+def test_a_word_that_a_name_has_as_a_part_is_that_name(refuse):
+    """Once 'silica' was taken for silicon."""
+    assert "did you mean 'fused-silica'?" in refuse(["materials", "silica"])
+    assert "did you mean 'silicon'?" in refuse(["materials", "silicone"])
