@@ -21,6 +21,7 @@ RATE, APPLIED = "measured_rate_deg_per_s", "rate_deg_per_s"
 WANTED = 10  # averages of a record that is too short for as many of 100 s
 NOISE = 0.02  # relative: what the noise of a model's inputs may add to a record that has nothing to compensate
 WORSE = "{} is worse than the record: the standard deviation of {:.3g} s averages increases from {:.4g} to {:.4g}. Use it only if the model is of this gyro."
+MOVING = " A model of the frequency is that of settled states: while the temperature changes, the resonator lags its thermometer."
 OPPOSITE = 0.5  # of the record's deviation: what a correction of the opposite sign leaves where the output's is changed
 SIGN = (
     "{}: the correction of {} has the wrong sign for this record: it would increase the standard deviation of {:.3g} s averages from {:.4g}"
@@ -105,7 +106,8 @@ def _find_worse(record: Record, result: Record, columns: dict[str, dict[str, Any
         turned = _stability(record, name, 2 * record[output] - result[name])
         if turned is not None and turned < OPPOSITE * was:
             raise InputError(SIGN.format(record.path, output, _width(record), was, now, turned))
-        found.append(WORSE.format(name, _width(record), was, now))
+        moving = MOVING if output == "frequency_Hz" else ""
+        found.append(WORSE.format(name, _width(record), was, now) + moving)
     return found
 
 

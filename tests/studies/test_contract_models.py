@@ -14,6 +14,7 @@ from studies.models import Model, ModelSource, compensate, emit_c, format_model,
 from studies.models.kinds.frequency import evaluate, find_temperature, save_frequency
 from studies.record import Record, read_record, write_record
 from tests.compiled import compile_c
+from thermal.lag import lag
 
 T = np.linspace(-20, 40, 7)
 F = 4424.9 + 0.3716 * T - 9.7e-4 * T**2 + 1.5e-5 * T**3 + 0.01 * np.cos(5 * T)
@@ -228,3 +229,19 @@ def test_a_frequency_model_of_another_column_is_refused(model):
     record = Record({"time_s": np.arange(3.0), "frequency_Hz": np.full(3, 4430.0)})
     with pytest.raises(InputError, match="compensates frequency_Hz"):
         compensate(replace(model, compensates="bias_deg_per_h"), record)
+
+
+def test_a_frequency_that_lags_its_thermometer_is_told_as_such(model, tmp_path, capsys):
+    """A moving record of the right gyro comes out worse; that is no other gyro."""
+    time = np.arange(0.0, 20000.0, 20.0)
+    housing = 10 + 25 * np.sin(time / 1500)
+    late = lag(time, housing, 3000.0)
+    columns = {"time_s": time, "housing_temperature_degC": housing, "frequency_Hz": evaluate(model, late)}
+    write_model(model, tmp_path / "m.toml")
+    write_record(Record(columns), tmp_path / "run.csv")
+    assert (
+        main(["compensate", str(tmp_path / "m.toml"), str(tmp_path / "run.csv"), "--out", str(tmp_path / "o.csv")]) == 0
+    )
+    said = capsys.readouterr().err
+    assert "compensated_frequency_Hz is worse than the record" in said
+    assert "the resonator lags its thermometer" in said
