@@ -30,7 +30,6 @@ AVERAGING = 100.0
 BLOCKS = 5
 # The noise is taken at one standard deviation towards the random walk, which keeps the rate of false terms near 5 %.
 CAUTION = 1.0
-OPPOSITE = 0.5  # of the residual: what changed signs of one run leave where its output has the opposite sign
 
 
 class NoHeldOut(CompensationError):
@@ -63,24 +62,6 @@ def fit_bias(runs: Sequence[BiasRun], method: Method = "guarded", reference: flo
     """Select and fit the bias model, HRG paper eqs. (21), (22), about a reference; every run has its own constant, B₀ is their mean."""
     require_runs(runs, BiasRun, "prepare_run makes one")
     return _select(runs, method, reference, by_runs=len(runs) > 1)
-
-
-def find_opposite(runs: Sequence[BiasRun], reference: float) -> int | None:
-    """Return the run whose bias has the opposite sign to the others', by B = ±(B₀ᵢ + X k) of half the residual, or None."""
-    design = BiasDesign(runs, reference)
-    X = design.columns(design.names)
-
-    def left(run: int | None) -> float:
-        bias = design.bias.copy()
-        if run is not None:
-            bias[design.rows[run]] *= -1.0
-        return float(np.linalg.norm(bias - follow_columns(X, bias)))
-
-    if len(runs) < 2:
-        return None
-    turned = [left(k) for k in range(len(runs))]
-    best = len(runs) - 1 if len(runs) == 2 else int(np.argmin(turned))
-    return best if turned[best] < OPPOSITE * left(None) else None
 
 
 def score_held_out(runs: Sequence[BiasRun], method: Method = "guarded") -> HeldOutRows:

@@ -1,13 +1,12 @@
 """The resonator's temperature behind a thermometer: two lags in series, those with which the frequency follows it best."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import scipy
 
 from compensation.arrays import Array
-from thermal.lag import lag
+from studies.record.one_law import Course, parabola
 
 LAGS = np.append(0.0, np.geomspace(30.0, 1e4, 16))
 """Lags (s) among which a pair is looked for first; 0: none."""
@@ -19,31 +18,15 @@ MOST = 2000
 """Averages of all runs, of which the lags are found."""
 
 
-@dataclass(frozen=True)
-class Followed:
-    """Averages of one run: their times (s), the thermometer's temperatures and the frequencies (Hz)."""
-
-    time: Array
-    temperature: Array
-    frequency: Array
-
-    def behind(self, lags: Sequence[float]) -> Array:
-        """Return the temperature behind lags in series, settled at the start."""
-        found = self.temperature
-        for tau in lags:
-            found = lag(self.time, found, tau) if tau > SHORTEST else found
-        return found
-
-
 def find_lags(
-    runs: Sequence[Followed], keep: Array | None = None, near: Sequence[float] | None = None
+    runs: Sequence[Course], keep: Array | None = None, near: Sequence[float] | None = None
 ) -> tuple[float, float]:
     """Return the two lags (s) behind which a parabola of the temperature leaves least of the frequency, from the rows kept."""
-    f = np.concatenate([run.frequency for run in runs])
+    f = np.concatenate([run.output for run in runs])
     keep = np.ones(f.size, dtype=bool) if keep is None else keep
 
     def left(lags: Sequence[float]) -> float:
-        design = _parabola(runs, lags)[keep]
+        design = parabola(runs, lags)[keep]
         found = f[keep] - design @ np.linalg.lstsq(design, f[keep], rcond=None)[0]
         return float(found @ found)
 
@@ -58,32 +41,19 @@ def find_lags(
     return float(one), float(other)
 
 
-def slope_behind(runs: Sequence[Followed]) -> tuple[tuple[float, float], float, float]:
+def slope_behind(runs: Sequence[Course]) -> tuple[tuple[float, float], float, float]:
     """Return the lags (s), the slope of the frequency at the mean of the resonator's temperature, and its standard error.
 
     The error is the jackknife's over parts of the runs, the lags found anew without each of them: what the lags leave is no noise.
     """
-    f = np.concatenate([run.frequency for run in runs])
+    f = np.concatenate([run.output for run in runs])
 
     def slope(lags: Sequence[float], keep: Array) -> float:
-        design = _parabola(runs, lags)
-        return float(np.linalg.lstsq(design[keep], f[keep], rcond=None)[0][-2])
+        design = parabola(runs, lags)
+        return float(np.linalg.lstsq(design[keep], f[keep], rcond=None)[0][1])
 
     lags = find_lags(runs)
     part = np.arange(f.size) * PARTS // f.size
     without = np.array([slope(find_lags(runs, keep, lags), keep) for keep in (part != one for one in range(PARTS))])
     error = np.sqrt((PARTS - 1) / PARTS * np.sum((without - without.mean()) ** 2))
     return lags, slope(lags, np.ones(f.size, dtype=bool)), float(error)
-
-
-def _parabola(runs: Sequence[Followed], lags: Sequence[float]) -> Array:
-    """Return the columns of the frequency: a level, what each start was off by, slope and bend about the mean."""
-    x = np.concatenate([run.behind(lags) for run in runs])
-    x = x - x.mean()
-    slowest = max(*lags, SHORTEST)
-    starts = np.zeros((x.size, len(runs)))
-    begin = 0
-    for k, run in enumerate(runs):
-        starts[begin : begin + len(run.time), k] = np.exp((run.time[0] - run.time) / slowest)
-        begin += len(run.time)
-    return np.column_stack([np.ones_like(x), starts, x, x**2 - np.mean(x**2)])

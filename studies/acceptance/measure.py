@@ -16,11 +16,12 @@ from compensation.regression import LinearFit, fit_linear
 from compensation.ringdown.answer import Estimate
 from compensation.ringdown.trace import analyse_trace
 from compensation.stability import AllanDeviation, NoiseCoefficients
-from studies.acceptance.lags import MOST, PARTS, Followed, slope_behind
+from studies.acceptance.lags import MOST, PARTS, slope_behind
 from studies.acceptance.runs import temperature_column
 from studies.errors import InputError, naming
 from studies.fits.ringdown import Decay
 from studies.record import Record
+from studies.record.one_law import Course
 from studies.record.stability import read_stability
 
 FEWEST = 20  # averages of a run over temperature that are not made wider
@@ -117,7 +118,7 @@ def measure_temperature(records: Sequence[Record], output: str) -> Found:
     lags: tuple[float, ...] = ()
     if followed:
         lags, value, sd = slope_behind(followed)
-        scale = 1e6 / float(np.mean(np.concatenate([run.frequency for run in followed])))
+        scale = 1e6 / float(np.mean(np.concatenate([run.output for run in followed])))
         found["frequency_temperature_slope_ppm_per_K"] = within(value, sd, paths, PARTS - 1, scale=scale)
     columns: dict[str, list[Array]] = {"output": [], "temperature": [], "slope": []}
     runs, start = [], 0
@@ -126,7 +127,7 @@ def measure_temperature(records: Sequence[Record], output: str) -> Found:
             column = _temperature_of(record)
             blocks = average_blocks(record["time_s"], {"output": record[output], "T": record[column]}, BLOCK)
             _check_length(record, blocks.time)
-            T = Followed(blocks.time, blocks.columns["T"], blocks.columns["output"]).behind(lags)
+            T = Course(blocks.time, blocks.columns["T"], blocks.columns["output"]).behind(lags)
             columns["output"].append(blocks.columns["output"])
             columns["temperature"].append(T)
             columns["slope"].append(np.gradient(T, blocks.time))
@@ -163,13 +164,13 @@ def _check_length(record: Record, blocks: Array) -> None:
         )
 
 
-def _follow(record: Record, width: float) -> Followed:
+def _follow(record: Record, width: float) -> Course:
     """Return the averages of a record's frequency and temperature, over `width` (s) where that is more than usual and leaves enough."""
     columns = {"f": record["frequency_Hz"], "T": record[_temperature_of(record)]}
     width = max(BLOCK, min(width, float(np.ptp(record["time_s"])) / FEWEST))
     blocks = average_blocks(record["time_s"], columns, width)
     _check_length(record, blocks.time)
-    return Followed(blocks.time, blocks.columns["T"], blocks.columns["f"])
+    return Course(blocks.time, blocks.columns["T"], blocks.columns["f"])
 
 
 def measure_scale(record: Record) -> Found:

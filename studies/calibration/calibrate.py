@@ -23,10 +23,9 @@ from studies.calibration.remarks import warn
 from studies.calibration.settled import SettledComparison, compare_settled
 from studies.errors import InputError
 from studies.instrument.display import display_name
-from studies.record import Record, drop_repeats, repeats, with_bias
-from studies.record.plausible import check_card_frequency, check_one_gyro
-from studies.record.rest import check_record
-from studies.simulation.drive import COLUMN
+from studies.record import Record, repeats, with_bias
+from studies.record.one_gyro import records_of_one_gyro
+from studies.record.plausible import check_card_frequency
 from studies.simulation.variations import JUMP, SHIFT
 
 if TYPE_CHECKING:
@@ -116,8 +115,8 @@ def calibrate(
     if not records and not tables:
         raise InputError("no data given; calibration needs a record or a steady-state table.")
     given = [with_bias(record) for record in records]
-    records, repeated = drop_repeats(given)
-    doubts = [doubt for doubt in map(check_record, records) if doubt]
+    doubts: list[str] = []
+    records = records_of_one_gyro(given, doubts.append)
     if hold_out is not None:  # the one that a repeated record repeats
         held = given[hold_out % len(given)]
         hold_out = next((k for k, one in enumerate(records) if repeats(one, held)), 0)
@@ -131,9 +130,6 @@ def calibrate(
             check_card_frequency(instrument, record["frequency_Hz"], record.path)
     for table in tables:
         check_card_frequency(instrument, table.frequency, table.path)
-    check_one_gyro(
-        [(record.path, _driving(record), record["frequency_Hz"]) for record in records if "frequency_Hz" in record]
-    )
     try:
         problem = _pose(instrument, runs, tables, exact)
     except ShellError:
@@ -166,7 +162,6 @@ def calibrate(
         ladder,
         held_out,
         (
-            *repeated,
             *apart,
             *doubts,
             *(one.scatter.sentence for one in settled if one.scatter),
@@ -174,12 +169,6 @@ def calibrate(
         ),
         settled,
     )
-
-
-def _driving(record: Record) -> Array:
-    """Temperature of a record, °C."""
-    name = next((one for one in COLUMN.values() if one in record), None)
-    return np.full(len(record), np.nan) if name is None else np.asarray(record[name])
 
 
 def _pose(

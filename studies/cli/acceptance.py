@@ -14,7 +14,8 @@ from studies.fits.ringdown import is_decay, read_decay
 from studies.instrument.card import load_card
 from studies.instrument.units import unit_of
 from studies.record import read_record
-from studies.record.plausible import check_card_frequency, records_of_one_gyro
+from studies.record.one_gyro import records_of_one_gyro
+from studies.record.plausible import check_card_frequency
 from studies.record.uses import OUTPUT
 from studies.reports import style
 from studies.reports.digits import plain

@@ -42,8 +42,7 @@ def fit_bias(
         say(f"reading {path}")
         records.append(read_record(path))
     study = study_bias(records, method, average, window, causal=causal, over=over, progress=say)
-    against = "the runs have biases of opposite sign" if study.opposite is not None else ""
-    saved = keep_model(study.model, save, against)
+    keep_model(study.model, save)
     judged, other = study.by(method), study.by("paper" if method == "guarded" else "guarded")
     variable = judged.fit.variable.name
     return Result(
@@ -62,7 +61,6 @@ def fit_bias(
             Chapter("Stability", parts.stability_parts(study)),
         ],
         sources=parts.SOURCES,
-        status=2 * (saved != save),
     )  # fmt: skip
 
 
@@ -71,7 +69,7 @@ def _payload(study: BiasStudy, method: Method, data: tuple[str, ...]) -> dict[st
     allan = {"step_s": study.allan_step, "before": _spectrum(study.before), "after": _spectrum(study.after)}
     return {
         "data": data,
-        **row_of(study, "output", over="column", opposite_sign="opposite"),
+        **row_of(study, "output", over="column"),
         **row_of(
             study.runs[0],
             lag_s="memory.lag",

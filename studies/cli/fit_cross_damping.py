@@ -15,7 +15,7 @@ from studies.models import source_of
 from studies.models.kinds.cross_damping import OUTPUTS, save_cross_damping
 from studies.papers.cvg_cross_damping import SOURCES, draw_runs
 from studies.record import Record, read_record
-from studies.record.plausible import records_of_one_gyro
+from studies.record.one_gyro import records_of_one_gyro
 from studies.record.rest import RestData, gather_rest
 from studies.reports import style
 from studies.reports.digits import lowered, raised

@@ -12,7 +12,7 @@ from studies.models import ModelSource
 from studies.models.kinds.frequency import save_frequency
 from studies.papers.hrg import study_table
 from studies.record import read_frequency_table, read_record, reading_resolution
-from studies.record.plausible import records_of_one_gyro
+from studies.record.one_gyro import records_of_one_gyro
 from studies.record.settled import Soak, advise_hold, find_soaks, settled_table
 from studies.reports import frequency as parts
 from studies.results import Chapter, Result, Table, row_of

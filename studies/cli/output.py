@@ -120,11 +120,11 @@ def keep_card(instrument: "Instrument", path: str | None, against: str | None = 
     return _keep(lambda: save_card(instrument, str(path)), kind, path, against)
 
 
-def keep_model(model: "Model", path: str | None, against: str = "") -> str | None:
+def keep_model(model: "Model", path: str | None) -> None:
     """Save a model likewise."""
     from studies.models import write_model
 
-    return _keep(lambda: write_model(model, str(path)), "model", path, against)
+    _keep(lambda: write_model(model, str(path)), "model", path, "")
 
 
 def _keep(write: Callable[[], object], kind: str, path: str | None, against: str | None) -> str | None:

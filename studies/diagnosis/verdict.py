@@ -33,9 +33,9 @@ class Interval:
     high: float
 
     @classmethod
-    def about(cls, value: float, sd: float) -> "Interval":
-        """Return the interval of a value with a normal error."""
-        return cls(value, value - NINETY * sd, value + NINETY * sd)
+    def about(cls, value: float, sd: float, low: float = -np.inf, high: float = np.inf) -> "Interval":
+        """Return the interval of a value with a normal error, within bounds."""
+        return cls(value, max(value - NINETY * sd, low), min(value + NINETY * sd, high))
 
     @property
     def sd(self) -> float:

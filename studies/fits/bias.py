@@ -14,7 +14,6 @@ from compensation.bias_selection import (
     Method,
     NoHeldOut,
     bias_stability,
-    find_opposite,
     fit_bias,
     score_held_out,
     score_path,
@@ -25,7 +24,7 @@ from studies.errors import InputError, naming
 from studies.models import Model, compensate, source_of
 from studies.models.kinds.bias import OUTPUTS, save_bias
 from studies.record import COMPENSATED, Record
-from studies.record.plausible import check_one_unit, records_of_one_gyro
+from studies.record.one_gyro import records_of_one_gyro
 from studies.record.rest import TEMPERATURES, choose_column, require_rest
 from studies.record.stability import Stability, read_stability, unbroken
 
@@ -66,7 +65,6 @@ class BiasStudy:
     after: Stability | None
     allan_step: float  # s, of the series
     no_held_out: str  # why there is no held-out score
-    opposite: str | None = None  # file of a run whose output has the opposite sign to the others'
 
     def by(self, method: Method) -> Judged:
         """Return what one method made of the runs."""
@@ -81,8 +79,6 @@ def study_bias(
     records = records_of_one_gyro(records, progress)
     check_lengths(records)
     output, column = find_output(records), find_state(records, over)
-    if output == "bias_deg_per_h":
-        check_one_unit(records)
     width = choose_width(records) if width is None else width
     window = 3 * width if window is None else window
     variable = FREQUENCY if column == "frequency_Hz" else TEMPERATURE
@@ -133,9 +129,7 @@ def study_bias(
     step, series = unbroken(longest["time_s"], {"before": longest[output], "after": after})
     long = min(map(len, series.values())) >= FEWEST_FOR_ALLAN
     spectra = [read_stability(values, step, 0.9) if long else None for values in series.values()]
-    odd = find_opposite(runs, fit.reference)
-    opposite = None if odd is None else records[odd].path or f"run {odd + 1}"
-    return BiasStudy(output, column, tuple(runs), tuple(judged), model, spectra[0], spectra[1], step, why, opposite)
+    return BiasStudy(output, column, tuple(runs), tuple(judged), model, spectra[0], spectra[1], step, why)
 
 
 def check_lengths(records: Sequence[Record]) -> None:

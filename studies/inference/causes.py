@@ -185,21 +185,19 @@ def _path_causes(found: Inferred) -> list[Cause]:
     causes, names = [], {effect.card_key: effect.name for effect in library().values()}
     if path.lags > 1:
         keys = MASS if found.card.polynomial is None else [f"law.{key}" for key in LAGS[: path.lags]]
-        numbers = {key.partition(".")[2]: Interval.about(*path.value(key)) for key in keys}
+        numbers = {key.partition(".")[2]: path.interval(key) for key in keys}
         if keys is MASS:
             numbers["second_time_constant_s"] = Interval.about(*path.value(*MASS))
         causes.append(
             Cause(names[f"law.{LAGS[1]}"], name, probability, (), numbers, evidence, peak=peak, together=True)
         )
     if path.radiates:
-        share, sd = path.value(SHARE)
-        own = min((share / sd) ** 2, evidence) if causes else evidence
+        own = path.evidence_for(SHARE) if causes else evidence
         told = [key for key in (SHARE, DIRECT) if key in path.fit.problem.priors.names]  # plain lags have one share
-        numbers = {key.removeprefix("law."): Interval.about(*path.value(key)) for key in told}
+        numbers = {key.removeprefix("law."): path.interval(key) for key in told}
         causes.append(Cause(names[SHARE], name, probability, (), numbers, own, peak=peak, together=True))
     if path.is_late:
-        late, sd = path.value(SENSOR)
-        numbers, own = {"sensor_time_constant_s": Interval.about(late, sd)}, min((late / sd) ** 2, evidence)
+        numbers, own = {"sensor_time_constant_s": path.interval(SENSOR)}, path.evidence_for(SENSOR)
         causes.append(Cause(names[SENSOR], name, probability, (), numbers, own, peak=peak, together=True))
     return causes
 
@@ -244,20 +242,6 @@ def with_levels(search: Search, now: Hypothesis, name: str) -> Hypothesis:
     tried = [search.settle((*now.terms, one.term), one.noise, [name]) for one in search.scan(now, bank)]
     best = max(tried, key=lambda one: one.score, default=now)
     return best if best.score > now.score + MARGIN else now
-
-
-def levels_apart(search: Search, now: Hypothesis) -> str:
-    """Return the sentence on levels of the runs that are likelier than what is named, and on the run that lies farthest."""
-    runs = search.linear.problem.runs
-    k, term = next((k, one) for k, one in enumerate(now.terms) if one.effect.name == offsets(len(runs)).name)
-    levels = np.zeros(len(runs))
-    levels[list(term.members)] = Background(search.linear, now.terms, now.noise).coefficients(k)[0]
-    far, away = farthest(levels)
-    return (
-        f"The runs have levels of their own of the frequency ({runs[far].record.path or f'run {far + 1}'}: about {away:+.2g} Hz from the"
-        f" {'others' if len(runs) > 2 else 'other'}): another gyro, or something done between the runs. What is named may only stand for"
-        " these levels: diagnose the runs apart."
-    )
 
 
 def farthest(levels: Array) -> tuple[int, float]:

@@ -21,7 +21,7 @@ from studies.calibration.priors import gather_priors
 from studies.calibration.problem import CardProblem, wide_law
 from studies.diagnosis.constants import CONSTANTS
 from studies.diagnosis.response import SeenResponse
-from studies.inference.causes import levels_apart, only_apart, with_levels
+from studies.inference.causes import only_apart, with_levels
 from studies.inference.heat_path import (
     FREQUENCY,
     WORTH,
@@ -46,6 +46,7 @@ from studies.inference.sharp import RESOLVED, fast_line, longest_resolved
 from studies.inference.signatures import Signatures
 from studies.inference.verdict import judge
 from studies.record import Record
+from studies.record.one_gyro import run_apart
 from studies.results.shown import Shown
 
 if TYPE_CHECKING:
@@ -65,8 +66,6 @@ FAR = 2.0
 """The same, beyond which the search begins from the card's own values too."""
 FAINT = 60.0
 """Log evidence up to which a cause whose definite coefficients may all be 0 is not named: of 13 such names on 127 judged campaigns all 7 below were wrong, 4 of 6 above right."""
-LEADING = 0.5
-"""Part of what causes bring the frequency, which levels of the runs must bring beside them to be the likelier reason."""
 BEATEN = 100.0
 """Log evidence behind another search, from which on one is given up."""
 
@@ -188,39 +187,41 @@ def infer(
     found = set_housing_apart(whole)
     problem = found.problem
     path, search, outcome = _with_heat_path(whole, found, progress)
-    if card.polynomial is None and path is None and np.abs(found.away).max(initial=0.0) > FAR:
-        # values may have gone far to do what an effect does: look from the card as shipped too
-        progress("again from the card's own values")
-        pursuit = Pursuit(at_point(found, np.zeros(problem.count)), progress)
-        there = pursuit.outcome(search.fair(outcome.final) - BEATEN)
-        search, outcome = max((there, (search, outcome)), key=lambda found: found[0].fair(found[1].final))
-    # one lag in its own noise: in that of a longer path its straight lines lead out of the world
-    alone = outcome.plain.noise if path is None else found.noise
-    paths = search.signatures.there(found.point) if path is None else Signatures.at(problem, found.point)
-    plain = Model(Linear.of(found), paths, (), alone)
-    shipped = {name: rows.rms for name, rows in plain.residuals(Kept(np.zeros(problem.count), ())).items()}
-    calibrated, blocks = plain.residuals(Kept(found.point, ())), found.state.residual
+    while True:
+        if card.polynomial is None and path is None and np.abs(found.away).max(initial=0.0) > FAR:
+            # values may have gone far to do what an effect does: look from the card as shipped too
+            progress("again from the card's own values")
+            pursuit = Pursuit(at_point(found, np.zeros(problem.count)), progress)
+            there = pursuit.outcome(search.fair(outcome.final) - BEATEN)
+            search, outcome = max((there, (search, outcome)), key=lambda found: found[0].fair(found[1].final))
+        # one lag in its own noise: in that of a longer path its straight lines lead out of the world
+        alone = outcome.plain.noise if path is None else found.noise
+        paths = search.signatures.there(found.point) if path is None else Signatures.at(problem, found.point)
+        plain = Model(Linear.of(found), paths, (), alone)
+        shipped = {name: rows.rms for name, rows in plain.residuals(Kept(np.zeros(problem.count), ())).items()}
+        calibrated, blocks = plain.residuals(Kept(found.point, ())), found.state.residual
+        progress("held-out rows")
+        named = bool(outcome.final.terms)
+        outcome, held, rows = _confirmed(search, outcome, plain, (calibrated, blocks), path is not None)
+        if named and not outcome.final.terms:  # the values are those of the card, or of the longer path, alone again
+            own = found if path is None else path.fit
+            here = paths if path is None else Signatures.at(own.problem, own.point)
+            search = Search(Linear.of(own), here, alone if path is None else own.noise, progress=progress)
+            none, _ = search.grow(most=0)
+            outcome = Outcome(none, none, (), ())
+            if path is not None:
+                outcome, held, rows = _confirmed(search, outcome, plain, (calibrated, blocks), True)
+        if path is None or not _worse(*held[FREQUENCY]):
+            break
+        progress("again without the longer heat path, which predicts unseen rows no better")
+        path, (search, outcome) = None, Pursuit(found, progress).outcome()
     if path is not None:
         card, found = path.card, path.fit
-    progress("held-out rows")
-    named = bool(outcome.final.terms)
-    outcome, held, rows = _confirmed(search, outcome, plain, (calibrated, blocks), path is not None)
-    if named and not outcome.final.terms and path is None:  # the values are those of the card alone again
-        search = Search(plain.linear, paths, alone, progress=progress)
-        none, _ = search.grow(most=0)
-        outcome = Outcome(none, none, (), ())
+        path = replace(path, beside=Background(search.linear, outcome.final.terms, outcome.final.noise).posterior)
     progress("lack of fit")
-    without, levelled, levels = outcome.plain, outcome.final, 0.0
+    without, levelled = outcome.plain, outcome.final
     for name in search.linear.responses:
-        before = levelled.score
         without, levelled = (with_levels(search, one, name) for one in (without, levelled))
-        if name == FREQUENCY:
-            levels = levelled.score - before
-    explained = sum(term.brought for term in outcome.final.terms if term.response == FREQUENCY)
-    explained += 0.0 if path is None else path.evidence
-    lead = levels > max(WORTH, LEADING * explained) and explained > 0.0
-    if lead:
-        campaign = replace(campaign, notes=(*campaign.notes, levels_apart(search, levelled)))
     bank = generic_bank(search)
     left = look(search, bank, without if path is None else plain, levelled, rows)
     unknown = []
@@ -229,7 +230,19 @@ def infer(
         best = max((one.gain for one in seen), default=-np.inf)
         unknown.append(base.score + best + CONSTANTS["log_prior_unknown"] - outcome.final.score)
     return Inference(
-        card, found, search, outcome, left, shipped, calibrated, rows, held, tuple(unknown), campaign, path, lead
+        card,
+        found,
+        search,
+        outcome,
+        left,
+        shipped,
+        calibrated,
+        rows,
+        held,
+        tuple(unknown),
+        campaign,
+        path,
+        run_apart(campaign.records) is not None,
     )
 
 

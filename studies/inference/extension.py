@@ -1,6 +1,7 @@
 """The extended model: the card with the named effects as `[[effect]]` tables, calibrated against the records by the one simulation."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from studies.inference.diagnosis import Inference
 from studies.inference.heat_path import MASS
 from studies.inference.model import Term
 from studies.record import Record
+from studies.simulation.noise import noise_keys
 
 if TYPE_CHECKING:
     from studies.calibration.calibrate import Calibration
@@ -22,7 +24,7 @@ WIDER = 3.0
 
 
 def extend(found: Inference, progress: Callable[[str], None] = lambda words: None) -> "Calibration":
-    """Calibrate the card with the named effects: its instrument predicts what was diagnosed."""
+    """Calibrate the card with the named effects: its instrument predicts what was diagnosed, with the noise that was found."""
     from studies.calibration.calibrate import calibrate
 
     progress("calibrating the extended card")
@@ -34,7 +36,11 @@ def extend(found: Inference, progress: Callable[[str], None] = lambda words: Non
         at = priors.at(found.numbers.point[: len(priors.values)])
         card = card.with_values({name: at[name] for name in (MASS if card.polynomial is None else at)})
     card = card.with_table("effect", [*card.content.get("effect", []), *named])
-    return calibrate(card, without_events(found), profile=False, progress=progress, keep=False)
+    done = calibrate(card, without_events(found), profile=False, progress=progress, keep=False)
+    losses = [own["inverse_q"] for own in found.campaign.records if "inverse_q" in own]
+    loss = float(np.nanmedian(np.concatenate(losses))) if losses else 1.0
+    stated = done.instrument.content.get("noise", {}) | noise_keys(done.fit.noise, loss)
+    return replace(done, instrument=done.instrument.with_table("noise", stated))
 
 
 def entry_of(found: Inference, k: int) -> dict[str, Any]:

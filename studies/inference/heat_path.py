@@ -11,6 +11,7 @@ from compensation.arrays import Array
 from studies.calibration.fit import CardFit, fit
 from studies.calibration.priors import gather_priors
 from studies.calibration.problem import CardProblem
+from studies.diagnosis.verdict import Interval
 from studies.inference.generic_forms import any_lags
 from studies.inference.housing import evidence_of, set_housing_apart
 from studies.inference.model import PRICE, Linear
@@ -66,6 +67,7 @@ class HeatPath:
     evidence: float = 0.0
     lead: float = 0.0
     housing: float = 0.0  # of the log evidence, what the rows of the housing add that stand apart
+    beside: tuple[Array, Array] | None = None  # coordinates and their covariance beside the effects that were found
 
     @property
     def lags(self) -> int:
@@ -102,12 +104,24 @@ class HeatPath:
 
     def value(self, name: str, over: str = "") -> tuple[float, float]:
         """Return a value of the card, or its ratio to another one, and its standard deviation."""
-        priors, count = self.fit.problem.priors, len(self.fit.problem.priors.values)
-        slope, at = priors.slopes(self.fit.point[:count]), priors.at(self.fit.point[:count])
+        priors, (point, C) = self.fit.problem.priors, self.beside or (self.fit.point, self.fit.covariance)
+        count = len(priors.values)
+        slope, at = priors.slopes(point[:count]), priors.at(point[:count])
         value, own = at[name], slope[priors.names.index(name)]
         if over:
             value, own = value / at[over], (own - value / at[over] * slope[priors.names.index(over)]) / at[over]
-        return value, float(np.sqrt(own @ self.fit.covariance[:count, :count] @ own))
+        return value, float(np.sqrt(own @ C[:count, :count] @ own))
+
+    def interval(self, name: str) -> Interval:
+        """Return a value of the card with its 90 % interval, within the bounds that it has."""
+        priors = self.fit.problem.priors
+        own = priors.values[priors.names.index(name)]
+        return Interval.about(*self.value(name), own.low, own.high)
+
+    def evidence_for(self, name: str) -> float:
+        """Return −2 ln of what speaks against a value of 0, alone or beside effects, and no more than for the path."""
+        alone, beside = (value / sd for value, sd in (replace(self, beside=None).value(name), self.value(name)))
+        return min(max(alone, beside) ** 2, 2.0 * self.evidence)
 
 
 def with_second_mass(

@@ -133,7 +133,7 @@ class Model:
 
     def mean(self) -> Array:
         """Most probable coordinates."""
-        return solve_posterior(*self.linear.stacked(self.terms, self.noise))[0]
+        return solve_posterior(*self.linear.stacked(self.terms, self.noise), self.problem.ends)[0]
 
     def held_out(self, by_record: bool, rows: Mapping[str, Rows]) -> "dict[str, Unseen]":
         """Return what is left of rows that were held out; `rows`: what the model that has seen them leaves."""
@@ -205,7 +205,7 @@ class Model:
 
     def _trained(self, keep: Mapping[str, Sequence[Mask]]) -> tuple[Array, Array]:
         seen = {name: own for name, own in keep.items() if any(mask.any() for mask in own)}
-        return solve_posterior(*self.linear.stacked(self.terms, self.noise, seen))
+        return solve_posterior(*self.linear.stacked(self.terms, self.noise, seen), self.problem.ends)
 
     def _restarted(self, mean: Array, run: int, keep: Mapping[str, Sequence[Mask]]) -> Array:
         """Refit start and offset of a run that was held out."""

@@ -32,7 +32,7 @@ class Inferred:
     unknown: tuple[float, ...]
     campaign: Campaign
     path: HeatPath | None = None
-    levels_lead: bool = False  # whether levels of the runs are likelier than what is named in the frequency
+    one_apart: bool = False  # whether one run lies apart from the law of the others
 
     @property
     def final(self) -> Hypothesis:

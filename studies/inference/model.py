@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from compensation.arrays import Array
 from compensation.noise import Noise
 from compensation.noise_rows import NoiseRows, Whitener, log_prior
-from studies.calibration.fit import CardFit
+from studies.calibration.fit import CardFit, step_within
 from studies.calibration.noise_levels import OUTLIER, estimate_levels, spare_outliers, stated_noise
 from studies.calibration.problem import CardProblem
 from studies.effects import Effect
@@ -279,7 +279,7 @@ class Background:
     @cached_property
     def posterior(self) -> tuple[Array, Array]:
         """Mean and covariance of all coordinates: the card's and starts, then coefficients in units of their priors."""
-        return solve_posterior(*self._bent.stacked(self.terms, self.noise))
+        return solve_posterior(*self._bent.stacked(self.terms, self.noise), self.linear.problem.ends)
 
     def coefficients(self, k: int) -> tuple[Array, Array]:
         """Return mean and covariance of the coefficients of one term, in its own units."""
@@ -327,12 +327,19 @@ def split(terms: Sequence[Term], coordinates: Array) -> list[Array]:
     return [coordinates[a:b] * term.spread for a, b, term in zip(ends[:-1], ends[1:], terms, strict=True)]
 
 
-def solve_posterior(X: Array, r: Array) -> tuple[Array, Array]:
-    """Return mean and covariance of unknowns of unit prior from whitened rows."""
+def solve_posterior(X: Array, r: Array, ends: tuple[Array, Array] | None = None) -> tuple[Array, Array]:
+    """Return mean and covariance of unknowns of unit prior from whitened rows; the first have `ends`, and where one is held at its end the others are solved anew."""
     p = X.shape[1]
     R = np.linalg.qr(np.column_stack([np.vstack([X, np.eye(p)]), np.append(r, np.zeros(p))])).R[:p]
     root = scipy.linalg.solve_triangular(R[:, :p], np.eye(p))
-    return root @ R[:, p], root @ root.T
+    mean = root @ R[:, p]
+    if ends is not None:
+        low, high = (
+            np.append(end, np.full(p - len(end), fill)) for end, fill in zip(ends, (-np.inf, np.inf), strict=True)
+        )
+        if np.any((mean < low) | (mean > high)):
+            mean = step_within(R[:, :p], R[:, p], low, high)
+    return mean, root @ root.T
 
 
 def estimate_noise_of(

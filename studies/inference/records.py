@@ -9,9 +9,9 @@ from compensation.arrays import Array
 from compensation.spikes import find_spikes
 from studies.calibration.observed import LEAST_ROWS, RESPONSES
 from studies.errors import InputError
-from studies.record import Record, drop_repeats, place_in_time, with_bias
-from studies.record.plausible import check_one_gyro
-from studies.record.rest import LEAST_SPIKE, check_record
+from studies.record import Record, place_in_time, with_bias
+from studies.record.one_gyro import records_of_one_gyro, run_apart
+from studies.record.rest import LEAST_SPIKE
 from studies.simulation.drive import COMMAND_COLUMNS, RATE
 
 HOUSING, CHAMBER, RESONATOR = "housing_temperature_degC", "chamber_temperature_degC", "resonator_temperature_degC"
@@ -40,12 +40,16 @@ def make_ready(given: Sequence[Record]) -> Campaign:
     """Check several records of one gyro and keep what can be used; InputError where they disagree or lack a column or unit."""
     if not given:
         raise InputError("no records given; a diagnosis needs at least one.")
-    kept, repeated = drop_repeats(given)
-    notes = list(repeated)
-    source = _temperature_source(kept)
+    given = [with_bias(record) for record in given]
+    source = _temperature_source(given)
+    check_units(given)
+    check_device(given)
+    notes: list[str] = []
+    kept = records_of_one_gyro(given, notes.append)
+    if len(kept) > 2 and (odd := run_apart(kept)) is not None:
+        notes.append(f"{kept[odd[0]].path or f'run {odd[0] + 1}'} is left out of the diagnosis.")
+        del kept[odd[0]]
     tables = [_columns(record, source) for record in kept]
-    notes += check_units(kept, tables)
-    check_device(kept, tables)
     outliers = sum(_remove_outliers(table) for table in tables)
     skipped = _unusable(kept, tables)
     if all(name in skipped or not any(name in table for table in tables) for name in RESPONSES) and not skipped:
@@ -54,7 +58,7 @@ def make_ready(given: Sequence[Record]) -> Campaign:
     if not timed and len(kept) > 1:
         notes.append("The records have no distinct start times (# start: …); they are treated as consecutive.")
     for name in COMMAND_COLUMNS:
-        there = [name in record and np.isfinite(record[name]).all() for record in kept]
+        there = [name in record and np.isfinite(record[name]).any() for record in kept]
         if any(there) and not all(there) and name != RATE:
             notes.append(f"{name} is not in every record and was left out.")
             tables = [{key: own for key, own in table.items() if key != name} for table in tables]
@@ -66,7 +70,7 @@ def make_ready(given: Sequence[Record]) -> Campaign:
         columns = {key: own for key, own in table.items() if key != "temperature" and key not in skipped}
         place = CHAMBER if source == CHAMBER else HOUSING
         out.append(replace(record, columns=columns | {place: table["temperature"]}))
-    numbers = [1 + next(k for k, one in enumerate(given) if one is record) for record in kept]
+    numbers = [1 + next(k for k, one in enumerate(given) if one["time_s"] is record["time_s"]) for record in kept]
     long = [any(name in own and np.isfinite(own[name]).sum() >= LEAST_ROWS for name in RESPONSES) for own in out]
     paths = tuple(record.path or f"run {number}" for record, number in zip(kept, numbers, strict=True))
     if not any(long):
@@ -95,7 +99,6 @@ def _temperature_source(records: Sequence[Record]) -> str:
 
 
 def _columns(record: Record, source: str) -> dict[str, Array]:
-    record = with_bias(record)
     names = ("time_s", *RESPONSES, *COMMAND_COLUMNS, REFERENCE, *((CHAMBER,) if source == HOUSING else ()))
     table = {name: np.asarray(record[name], dtype=float) for name in names if name in record}
     table["temperature"] = np.asarray(record[source], dtype=float)
@@ -177,61 +180,37 @@ MOST_LOSS = 30.0
 """Times by which 1/Q of one gyro may differ from record to record."""
 
 
-def check_units(records: Sequence[Record], tables: Sequence[dict[str, Array]]) -> list[str]:
-    """Raise InputError when a column can hardly be in the unit that its name says; return the doubts about the time."""
-    for record, table in zip(records, tables, strict=True):
+def check_units(records: Sequence[Record]) -> None:
+    """Raise InputError when a column can hardly be in the unit that its name says."""
+    for record in records:
         where = record.path or "record"
-        if not 100.0 < (value := _level(table, "frequency_Hz", 1e3)) < 1e9:
+        if not 100.0 < (value := _level(record, "frequency_Hz", 1e3)) < 1e9:
             raise InputError(f"{where}: frequency_Hz is about {value:g}, not 100 Hz to 1 GHz. Is it in another unit?")
-        own, other = (_level(table, name, np.nan) for name in ("frequency_Hz", REFERENCE))
+        own, other = (_level(record, name, np.nan) for name in ("frequency_Hz", REFERENCE))
         if abs(other / own - 1) > ONE_WAVE:
             raise InputError(
                 f"{where}: {REFERENCE} is about {other:.6g} Hz, frequency_Hz about {own:.6g} Hz: the two are to be of one wave,"
                 " by two clocks. Correct the one that is wrong, or leave that column out."
             )
-        if not 0.0 < (value := _level(table, "inverse_q", 1e-3)) < 0.1:
+        if not 0.0 < (value := _level(record, "inverse_q", 1e-3)) < 0.1:
             raise InputError(f"{where}: inverse_q is about {value:g}, not between 0 and 0.1. Is it Q itself?")
-    return [doubt for doubt in map(check_record, records) if doubt]
 
 
-def _level(table: dict[str, Array], name: str, none: float) -> float:
+def _level(record: Record, name: str, none: float) -> float:
     """Return the median of a column, or what stands for one without values."""
-    known = table[name][np.isfinite(table[name])] if name in table else np.empty(0)
+    known = record[name][np.isfinite(record[name])] if name in record else np.empty(0)
     return float(np.median(known)) if known.size else none
 
 
-def check_device(records: Sequence[Record], tables: Sequence[dict[str, Array]]) -> None:
-    """Raise InputError when the records can hardly be of one gyro."""
+def check_device(records: Sequence[Record]) -> None:
+    """Raise InputError when the records name different gyros, or have losses that no gyro has both of."""
     names = {record.instrument: record.path for record in records if record.instrument}
     if len(names) > 1:
         (one, first), (two, second), *_ = names.items()
         raise InputError(f"{second}: instrument '{two}' is not that of {first}, '{one}'; diagnose one gyro at a time.")
-    check_one_gyro(
-        [
-            (record.path, table["temperature"], table["frequency_Hz"])
-            for record, table in zip(records, tables, strict=True)
-            if "frequency_Hz" in table
-        ]
-    )
-    levels = [
-        (float(np.nanmedian(table["inverse_q"])), record.path)
-        for record, table in zip(records, tables, strict=True)
-        if "inverse_q" in table and np.isfinite(table["inverse_q"]).any()
-    ]
+    levels = [(level, record.path) for record in records if np.isfinite(level := _level(record, "inverse_q", np.nan))]
     if levels and max(levels)[0] > MOST_LOSS * min(levels)[0]:
         raise InputError(
             f"{max(levels)[1]}: inverse_q is about {max(levels)[0]:g}, in {min(levels)[1]} about {min(levels)[0]:g}; "
             "the records are of different gyros, or one is in another unit."
-        )
-    spreads = []
-    for record, table in zip(records, tables, strict=True):
-        if "bias_deg_per_h" in table and np.isfinite(table["bias_deg_per_h"]).sum() > FEWEST_BINS:
-            known = table["bias_deg_per_h"][np.isfinite(table["bias_deg_per_h"])]
-            noise = float(np.median(np.abs(np.diff(known))))
-            if noise > 0:
-                spreads.append((noise, record.path))
-    if spreads and max(spreads)[0] > 150.0 * min(spreads)[0]:
-        raise InputError(
-            f"{max(spreads)[1]}: bias_deg_per_h is {max(spreads)[0] / min(spreads)[0]:.0f} times as noisy as in "
-            f"{min(spreads)[1]}; one of the two is in another unit, or of another gyro."
         )

@@ -61,11 +61,11 @@ def judge(found: Inferred) -> Verdict:
 
 
 def _patching(found: Inferred, causes: Sequence[Cause], results: Mapping[str, ResponseResult]) -> Iterator[Cause]:
-    """Yield the causes, as doubtful as such names were where a response stays unexplained and is hardly predicted better, or where levels of the runs lead."""
+    """Yield the causes, as doubtful as such names were where a response stays unexplained and is hardly predicted better, or where one run lies apart."""
     for cause in causes:
         own = results.get(cause.response)
         patches = own is not None and own.verdict == "unexplained" and (own.gain or 0.0) < CONSTANTS["patching"]
-        patches |= found.levels_lead and cause.response == FREQUENCY
+        patches |= found.one_apart and cause.response == FREQUENCY
         patches &= cause.kind == "physics"
         yield replace(cause, probability=cause.probability * (1.0 - CONSTANTS["doubt_unexplained"] * patches))
 
@@ -90,7 +90,8 @@ def shifts_of(model: Background) -> list[Shift]:
         if k in polar:
             low, high, sd, z = polar[k].low, polar[k].high, polar[k].width, to_standard(value, polar[k].value)
         if sd < SILENT or abs(z) > FAR:
-            out.append(Shift(value.name, value.value, at[value.name], min(low, high), max(low, high), float(z)))
+            low, high = max(min(low, high), value.low), min(max(low, high), value.high)
+            out.append(Shift(value.name, value.value, at[value.name], low, high, float(z)))
     return out
 
 

@@ -10,16 +10,16 @@ from numpy.typing import NDArray
 from compensation.arrays import Array
 from compensation.cross_damping import RestRun
 from compensation.decimation import average_blocks
-from compensation.memory import follow_lag
 from compensation.spikes import find_spikes, find_stuck
 from studies.errors import InputError
 from studies.record import OUTPUTS, Record
+from studies.record.one_law import course_of, follow
 
 TEMPERATURES = ("housing_temperature_degC", "resonator_temperature_degC", "chamber_temperature_degC")
 MOST_ROWS = 20_000  # beyond which a run is averaged in blocks before a fit: temperature is slow, and noise averages
 LEAST_SPIKE = 1e-3  # of a column's span, by which a spike stands out: a smooth column has no noise to measure it by
 DRIVING = (TEMPERATURES[0], TEMPERATURES[2], TEMPERATURES[1])
-BLOCKS, LAG_ROWS = 100, 1000  # by which a rate, and rows by which a lag are told
+BLOCKS = 100  # by which a rate is told
 FASTEST = 1.0  # K/s over a record, beyond which its time cannot be in seconds
 OPPOSITE = 15.0  # K between a chamber and the housing in it, from which on one of them may have the opposite sign, and
 FOLLOWS_NOT, STANDS = (
@@ -98,14 +98,27 @@ def check_record(record: Record) -> str:
     return " ".join(filter(None, (_check_rates(record), *_stuck(record))))
 
 
-def _stuck(record: Record) -> list[str]:
-    """Sentences on outputs that hold one reading where the readings beside it differ; a temperature may well be held."""
+def stuck_rows(record: Record) -> dict[str, NDArray[np.bool_]]:
+    """Return output -> rows in which it holds one reading where the readings beside it differ; a temperature may well be held."""
     found = {name: find_stuck(record[name]) for name in OUTPUTS if name in record}
+    return {name: rows for name, rows in found.items() if rows.any()}
+
+
+def without_stuck(record: Record) -> Record:
+    """Return a record without its stuck readings."""
+    stuck = stuck_rows(record)
+    return (
+        record.with_columns({name: np.where(rows, np.nan, record[name]) for name, rows in stuck.items()})
+        if stuck
+        else record
+    )
+
+
+def _stuck(record: Record) -> list[str]:
     return [
         f"{record.path or 'record'}: {name} repeats one reading in {rows.sum()} rows, the first at {record['time_s'][rows][0]:.6g} s,"
-        " where the readings beside them differ: a stuck logger or a mark for missing values? If so, leave the cells empty ('drop' in the map of hrg import)."
-        for name, rows in found.items()
-        if rows.any()
+        " where the readings beside them differ, as of a stuck logger or a mark for missing values: they are left out."
+        for name, rows in stuck_rows(record).items()
     ]
 
 
@@ -133,7 +146,7 @@ def _check_rates(record: Record) -> str:
         return ""
     lag = None
     if "frequency_Hz" in record and name != TEMPERATURES[1]:
-        lag = _lag_of(time, T, record["frequency_Hz"][known])
+        lag = _lag_of(record, name)
     part = "faster than {:.2g} K/min for a tenth" if unit == "minutes" else "slower than {:.2g} K/min for nine tenths"
     said = f"{where}: {name} changes {part.format(60 * held)} of its {lasts:.3g} s"
     if lag is not None:
@@ -178,20 +191,12 @@ def _held_rate(time: Array, T: Array, lasts: float) -> float:
     return float(np.percentile(np.abs(np.diff(mean) / np.diff(at)), 90))
 
 
-def _lag_of(time: Array, T: Array, f: Array) -> float | None:
-    """Lag τ (s) with which f = c₀ + c₁ x + c₂ x² + c₃ e^(−t/τ), τ ẋ + x = T, leaves least; None where no lag is clear."""
-    known = np.flatnonzero(np.isfinite(f))
-    known = known[:: max(1, known.size // LAG_ROWS)]
-    if known.size < BLOCKS // 4:
+def _lag_of(record: Record, name: str) -> float | None:
+    """Lag (s) with which the frequency follows a temperature by one law; None where none is clear."""
+    course = course_of(record, name, "frequency_Hz")
+    if course is None or course.time.size < BLOCKS // 4:
         return None
-    time, T, f = time[known], (T[known] - T[known].mean()) / np.ptp(T[known]), f[known]
-
-    def left(lag: float) -> float:
-        x = follow_lag(T, np.diff(time), lag)
-        terms = np.column_stack([np.ones_like(x), x, x**2, np.exp(-time / lag) if lag else 0 * x])
-        return float(np.std(f - terms @ np.linalg.lstsq(terms, f, rcond=None)[0]))
-
-    rest = {lag: left(lag) for lag in (0.0, *np.logspace(0, 7, 29))}
-    best = min(rest, key=rest.__getitem__)
-    shorter = [own for lag, own in rest.items() if lag < best / APART]
-    return best if shorter and rest[best] < CLEAR * min(shorter) else None
+    left = {lag: follow([course], lag).left for lag in (0.0, *np.logspace(0, 7, 29))}
+    best = min(left, key=left.__getitem__)
+    shorter = [own for lag, own in left.items() if lag < best / APART]
+    return best if shorter and left[best] < CLEAR * min(shorter) else None

@@ -86,7 +86,7 @@ def verdict(study: BiasStudy, method: Method) -> str:
 
 
 def doubts(study: BiasStudy) -> list[Sentence]:
-    """Warn where the runs are too short to select terms by, or where one has the opposite sign to the others."""
+    """Warn where the runs are too short to select terms by."""
     found, lasts = [], sum(float(np.ptp(run.time)) + run.width for run in study.runs)
     averages = int(lasts / AVERAGING)
     if averages < FEW:
@@ -95,9 +95,6 @@ def doubts(study: BiasStudy) -> list[Sentence]:
             f"The data are short: {averages} averages of {AVERAGING:g} s. A standard deviation of so few is uncertain by {spread:.0f} %,"
             f" and the selection of terms is unreliable; record {FEW * AVERAGING / 3600:.1f} h or more, over the full temperature range."
         )
-    if study.opposite is not None:
-        which = "One of the two runs" if len(study.runs) == 2 else study.opposite
-        found.append(f"{which} has a bias of the opposite sign: with its sign changed, the terms fit all runs at least twice as well. Check the sign of the output in the files.")  # fmt: skip
     return [Sentence(text, "warning") for text in found]
 
 

@@ -8,6 +8,8 @@ from compensation.arrays import Array
 from compensation.noise import Noise
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from studies.instrument.tables.noise import NoiseKeys
 
 
@@ -24,6 +26,22 @@ def bias_noise(noise: "NoiseKeys") -> Noise:
         noise.bias_walk_deg_per_h_per_rt_h / 60.0,
         noise.bias_turn_on_deg_per_h,
     )
+
+
+def noise_keys(noise: "Mapping[str, Noise]", loss: float) -> dict[str, float]:
+    """Entries of `[noise]` that state the levels of responses; those of 1/Q are relative to a `loss`."""
+    keys: dict[str, float] = {}
+    if own := noise.get("frequency_Hz"):
+        keys |= {"frequency_white_Hz": own.white, "frequency_flicker_Hz": own.flicker, "frequency_walk_Hz": own.walk}
+    if own := noise.get("bias_deg_per_h"):
+        keys |= {
+            "bias_white_deg_per_rt_h": own.white / 60.0,
+            "bias_flicker_deg_per_h": own.flicker,
+            "bias_walk_deg_per_h_per_rt_h": own.walk * 60.0,
+        }
+    if own := noise.get("inverse_q"):
+        keys["inverse_q_white"] = own.white / loss
+    return keys
 
 
 def quantise(values: Array, resolution: float) -> Array:

@@ -386,13 +386,15 @@ def test_a_run_in_another_unit_is_refused(tmp_path, refuse, factor, unit, count)
 
 
 @pytest.mark.parametrize("turned", [None, 1, 2])
-def test_a_run_with_the_opposite_sign_is_named(tmp_path, ask, turned):
+def test_a_run_with_the_opposite_sign_is_refused(tmp_path, ask, refuse, turned):
     for k in range(3):
         record = make_record(k, cooling=k != 1)
         sign = -1.0 if k == turned else 1.0
         write_record(record.with_columns({"bias_deg_per_h": sign * record["bias_deg_per_h"]}), tmp_path / f"{k}.csv")
     runs, saved = [str(tmp_path / f"{k}.csv") for k in range(3)], tmp_path / "m.toml"
-    named = ask(["fit", "bias", *runs])["opposite_sign"]
-    assert named == (None if turned is None else str(tmp_path / f"{turned}.csv"))
-    assert main(["fit", "bias", *runs, "--save", str(saved)]) == (0 if turned is None else 2)
+    if turned is None:
+        ask(["fit", "bias", *runs, "--save", str(saved)])
+    else:
+        said = refuse(["fit", "bias", *runs, "--save", str(saved)])
+        assert f"{tmp_path / f'{turned}.csv'}: bias_deg_per_h has the opposite sign" in said
     assert saved.exists() == (turned is None)

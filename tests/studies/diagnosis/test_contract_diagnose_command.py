@@ -49,7 +49,7 @@ def test_two_gyros_are_refused(campaign, refuse, tmp_path):
     [
         ("frequency_Hz", 1e-3, "another unit"),
         ("inverse_q", 1e9, "inverse_q"),
-        ("bias_deg_per_h", 1000.0, "another unit"),
+        ("bias_deg_per_h", 1000.0, "as in m°/h. Divide the column by 1000"),
     ],
 )
 def test_units_off_by_a_thousand_are_named(campaign, refuse, tmp_path, column, factor, words):

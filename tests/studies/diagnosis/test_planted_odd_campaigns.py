@@ -108,11 +108,10 @@ def test_a_reference_clock_finds_a_drift_that_the_record_hides():
 
 @pytest.mark.slow
 def test_a_file_of_another_gyro_of_the_lot_is_said():
-    """One lag behind a housing that lags, and a run 3 Hz above the others: what two lags take of that is doubted, and the run is named."""
+    """One lag behind a housing that lags, and a run 3 Hz above the other: which of the two is right is not known, and what lags take of that is doubted."""
     cool, warm = [(0, 25), (0.333, 25), (0.335, -15), (4, -15)], [(0, -15), (0.333, -15), (0.335, 40), (4, 40)]
-    cycle = [(0, 20), (0.333, 20), (1.333, 45), (2, 45), (3.333, -5), (4, -5)]
     records = []
-    for k, corners in enumerate([cool, warm, cycle]):
+    for k, corners in enumerate([cool, warm]):
         bench = Bench(corners, sampling=30.0, seed=90 + k)
         housing = bench.behind(500.0)
         x = (2200.0 * bench.behind(2200.0) - 500.0 * housing) / 1700.0 - 20.0  # both lags in series
@@ -120,7 +119,7 @@ def test_a_file_of_another_gyro_of_the_lot_is_said():
         housing = housing + 0.005 * bench.rng.standard_normal(x.size)
         records.append(bench.record(k, housing_temperature_degC=housing, frequency_Hz=frequency + 3.0 * (k == 1)))
     verdict = told(records)
-    assert any("(run1.csv: about +3 Hz from the others)" in note for note in verdict.notes)
+    assert any("frequency_Hz is +3 Hz from" in note or "frequency_Hz is -3 Hz from" in note for note in verdict.notes)
     assert verdict.causes
     assert all(cause.probability < 0.5 for cause in verdict.causes)
 

@@ -5,13 +5,14 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import scipy
 
 from compensation.noise import Noise
 from studies.calibration.fit import fit
 from studies.inference.causes import parameters_of
 from studies.inference.diagnosis import build_problem
 from studies.inference.held_out import Kept, Model
-from studies.inference.model import SCALES, Background, Linear
+from studies.inference.model import SCALES, Background, Linear, solve_posterior
 from studies.inference.polynomial_card import polynomial_card
 from studies.inference.pursuit import Pursuit
 from studies.inference.search import Search
@@ -151,6 +152,20 @@ def test_rows_held_out_are_those_of_a_refit_to_the_other_records(search):
         assert np.ptp(own) < 0.1 * np.sqrt(np.mean(rest**2)), name
         slow = linear.rows[name].covariance(1, replace(noise[name], white=0.0)).mean()
         assert abs(own.mean()) < 2.0 * np.sqrt(slow) + 0.1 * np.sqrt(np.mean(rest**2)), name
+
+
+def test_a_value_held_at_its_end_moves_the_others():
+    """Cut off alone, it left its neighbours where they were: a share of heat at its end left 14 times the noise."""
+    rng = np.random.default_rng(4)
+    X = rng.standard_normal((40, 3)) @ np.array([[1.0, 0.99, 0.0], [0.0, 0.14, 0.0], [0.0, 0.0, 1.0]])
+    r = X @ [2.0, 3.0, -1.0] + 0.1 * rng.standard_normal(40)
+    ends = np.array([-1.0, -1.0]), np.array([1.5, 5.0])  # the third has none
+    mean, C = solve_posterior(X, r, ends)
+    both, target = np.vstack([X, np.eye(3)]), np.append(r, np.zeros(3))
+    best = scipy.optimize.lsq_linear(both, target, ([*ends[0], -np.inf], [*ends[1], np.inf]), tol=1e-14).x
+    assert solve_posterior(X, r)[0][0] > 1.5
+    assert mean == pytest.approx(best, abs=1e-6)
+    assert C == pytest.approx(np.linalg.inv(both.T @ both))
 
 
 def test_a_block_whose_gaps_leave_no_row_for_the_fit_is_not_held_out(search):

@@ -5,12 +5,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from compensation.noise import white_rms
 from studies.calibration.calibrate import calibrate
 from studies.cli import main
 from studies.errors import InputError
 from studies.inference.heat_path import with_lags
 from studies.inference.polynomial_card import _likeliest_lag, polynomial_card
 from studies.instrument.card import build_instrument, load_card, save_card
+from studies.record import read_record
 from studies.simulation.chamber import load_profile
 from studies.simulation.virtual_gyro import simulate_run
 from thermal.lag import lag
@@ -89,6 +91,9 @@ def test_recovery_of_a_hidden_effect_without_a_card_and_of_an_unseen_run(tmp_pat
     verdict = ask(["diagnose", *runs, "--save", str(saved)])
     (cause,) = verdict["causes"]
     assert "rate-bias" in (cause["effect"], *cause["equivalent"])
+    read, again = read_record(runs[0]), simulate_run(load_card(saved), load_profile(words[0]), 1 / 60, 9).record
+    for column in ("frequency_Hz", "bias_deg_per_h", "inverse_q"):  # the saved noise was up to 18 times too much
+        assert white_rms(again[column]) == pytest.approx(white_rms(read[column]), rel=0.2), column
     unseen = load_profile("ramp 25 -5 1 then soak -5 1h then ramp -5 35 2 then soak 35 2h")
     true, own = (simulate_run(card, unseen, 0.05, noise=False).record for card in (device, load_card(saved)))
     noise = verdict["responses"]["bias_deg_per_h"]["noise"]

@@ -1,0 +1,108 @@
+"""An output of some runs by one law of what it follows with a lag: y = c₀ + c₁ x + c₂ x² + sᵣ e^(−t/τ) in run r, τ ẋ + x = T; with further lags, Σ cⱼ xⱼ too."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import scipy
+
+from compensation.arrays import Array
+from compensation.memory import follow_lag
+from studies.record import Record
+
+LAGS = (0.0, *np.logspace(1.5, 5.0, 12).tolist())  # s
+ROWS, FEWEST = 300, 8  # means of all runs, and the fewest of one that counts
+NEAR = 2.0  # times shorter or longer than the likeliest of `LAGS` the lag may be
+
+
+@dataclass(frozen=True)
+class Course:
+    """Time from the start (s) of one run, what its output follows, and the output."""
+
+    time: Array
+    drive: Array
+    output: Array
+
+    def behind(self, lags: Sequence[float]) -> Array:
+        """Return what is followed behind lags (s) in series, settled at the start."""
+        found = self.drive
+        for lag in lags:
+            found = follow_lag(found, np.diff(self.time), lag)
+        return found
+
+
+@dataclass(frozen=True)
+class Law:
+    """Further lags (s) of a law, and what its bend makes at most at one standard deviation of what is followed, of the changes of the output."""
+
+    further: tuple[float, ...] = ()
+    bend: float = np.inf
+
+
+@dataclass(frozen=True, order=True)
+class Followed:
+    """What the law leaves (rms) with a lag (s), and by how much the run that may lie apart does."""
+
+    left: float
+    lag: float
+    apart: float = 0.0
+
+
+ONE_LAG = Law()
+ANY_PATH = Law(tuple(np.logspace(2.0, 4.6, 5).tolist()))  # what these lags do together is near to any heat path's work
+
+
+def course_of(record: Record, drive: str, output: str, runs: int = 1) -> Course | None:
+    """Return one of some runs as means of groups of its rows; None where too few are complete."""
+    columns = [np.asarray(record[name], dtype=float) for name in ("time_s", drive, output)]
+    complete = np.flatnonzero(np.isfinite(columns).all(axis=0))
+    if complete.size < FEWEST:
+        return None
+    groups = np.array_split(complete, min(max(ROWS // runs, 3 * FEWEST), complete.size))
+    time, x, y = (np.array([column[rows].mean() for rows in groups]) for column in columns)
+    return Course(time - time[0], x, y)
+
+
+def parabola(runs: Sequence[Course], lags: Sequence[float]) -> Array:
+    """Return the columns of a bend and a slope about the mean of what is followed behind lags in series, a level, and what each start was off by."""
+    x = np.concatenate([run.behind(lags) for run in runs])
+    x = x - x.mean()
+    slowest, of_run = max(lags), np.repeat(range(len(runs)), [len(run.time) for run in runs])
+    faded = np.concatenate([np.exp((run.time[0] - run.time) / slowest) if slowest else 0.0 * run.time for run in runs])
+    return np.column_stack(
+        [x**2 - np.mean(x**2), x, np.ones_like(x), *((of_run == k) * faded for k in range(len(runs)))]
+    )
+
+
+def follow(runs: Sequence[Course], lag: float, law: Law = ONE_LAG, apart: Sequence[int] = ()) -> Followed:
+    """Return what a law leaves with one lag, where some runs have levels of their own."""
+    X, y = parabola(runs, [lag]), np.concatenate([run.output for run in runs])
+    more = [np.concatenate([run.behind([tau]) for run in runs]) for tau in law.further]
+    own = [np.concatenate([np.full(len(run.time), float(k == j)) for j, run in enumerate(runs)]) for k in apart]
+    X = np.column_stack([X, *(one - one.mean() for one in more), *own])
+    y = y - y.mean()
+    found = _solve(X, y)
+    most = law.bend * float(y.std()) / max(float(X[:, 1].var()), 1e-300)
+    if abs(found[0]) > most:  # else a temperature in another unit bends the law to its needs
+        found[0] = np.copysign(most, found[0])
+        found[1:] = _solve(X[:, 1:], y - X[:, 0] * found[0])
+    return Followed(float(np.std(y - X @ found)), lag, float(found[-1]))
+
+
+def likeliest(runs: Sequence[Course], law: Law = ONE_LAG, apart: Sequence[int] = ()) -> Followed:
+    """Return what a law leaves with the lag that leaves least."""
+    best = min(follow(runs, lag, law, apart) for lag in LAGS)
+    if not best.lag:
+        return best
+    ends = np.log(best.lag / NEAR), np.log(best.lag * NEAR)
+    found = scipy.optimize.minimize_scalar(
+        lambda u: follow(runs, float(np.exp(u)), law, apart).left,
+        bounds=ends,
+        method="bounded",
+        options={"xatol": 0.01},
+    )
+    return min(best, follow(runs, float(np.exp(found.x)), law, apart))
+
+
+def _solve(X: Array, y: Array) -> Array:
+    return np.asarray(scipy.linalg.lstsq(X, y, lapack_driver="gelsy", check_finite=False)[0])
