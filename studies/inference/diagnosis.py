@@ -15,7 +15,7 @@ from compensation.arrays import Array
 from compensation.noise import white_rms
 from shell.constants import zero_Celsius
 from studies.calibration.apart import fit_explained
-from studies.calibration.fit import IMPOSSIBLE, CardFit, at_point
+from studies.calibration.fit import CardFit, at_point
 from studies.calibration.observed import HOUSING, RESPONSES, observe
 from studies.calibration.priors import gather_priors
 from studies.calibration.problem import CardProblem, wide_law
@@ -60,6 +60,8 @@ if TYPE_CHECKING:
 Report = Callable[[str], None]
 Left = tuple[dict[str, Rows], Mapping[str, Array]]
 """What a model leaves of the rows of every response, and of its blocks."""
+Confirmed = tuple[Outcome, dict[str, tuple[float | None, float | None]], dict[str, Rows]]
+"""What is named, what is left of rows that were held out before and after, and of those that were seen."""
 BLOCKS, BLOCKS_OF_RUN = 800, (100, 400)
 """Block averages of a campaign, and fewest and most of a run."""
 FAR = 2.0
@@ -217,7 +219,9 @@ def infer(
         path, (search, outcome) = None, Pursuit(found, progress).outcome()
     if path is not None:
         card, found = path.card, path.fit
-        path = replace(path, beside=Background(search.linear, outcome.final.terms, outcome.final.noise).posterior)
+        final = Model(search.linear, search.signatures, outcome.final.terms, outcome.final.noise)
+        covariance = Background(search.linear, final.terms, final.noise).posterior[1]
+        path = replace(path, beside=None if final.numbers is None else (final.numbers.point, covariance))
     progress("lack of fit")
     without, levelled = outcome.plain, outcome.final
     for name in search.linear.responses:
@@ -269,15 +273,14 @@ def _with_heat_path(whole: CardFit, found: CardFit, progress: Report) -> tuple[H
     return replace(path, evidence=gain, lead=lead), there, grown
 
 
-def _confirmed(
-    search: Search, outcome: Outcome, plain: Model, calibrated: Left, longer: bool
-) -> tuple[Outcome, dict[str, tuple[float | None, float | None]], dict[str, Rows]]:
-    """Leave out faint causes of no definite size, and those whose model predicts unseen rows no better than the card alone, the weakest first."""
+def _confirmed(search: Search, outcome: Outcome, plain: Model, calibrated: Left, longer: bool) -> Confirmed:
+    """Leave out faint causes of no definite size, and those whose model predicts unseen rows no better than the card alone, the weakest first; none, where a `longer` heat path predicts better only beside them."""
     events = any(term.effect.event for term in outcome.final.terms)
     by_record = len(search.linear.problem.runs) > 1 and not events
     alone = calibrated if longer else _left_by(plain) or calibrated
     before = HeldOut(plain, alone[0], by_record)
     given_up: set[tuple[str, str]] = set()
+    better: list[tuple[float, int, Confirmed]] = []
     while True:
         final = outcome.final
         beside = Background(search.linear, final.terms, final.noise)
@@ -296,8 +299,10 @@ def _confirmed(
             or is_rounding(search.linear.problem, name, alone[0][name])
             or only_apart(search, outcome, k)
         ]
+        if longer and told is not None and not _worse(*held[FREQUENCY]):
+            better.append((held[FREQUENCY][1] or np.inf, len(better), (outcome, held, rows)))
         if not weak:
-            return outcome, held, rows
+            return min(better)[2] if better and _worse(*held[FREQUENCY]) else (outcome, held, rows)
         gone = min(weak, key=lambda k: final.score - outcome.without[k].score)
         given_up.add(final.terms[gone].key)
         outcome = _in_place(search, outcome, gone, given_up) or _left_out(search, outcome, gone)
@@ -305,12 +310,11 @@ def _confirmed(
 
 def _left_by(model: Model) -> Left | None:
     """What a model leaves of the records' rows and of their blocks; None where its straight lines end and there is no prediction."""
-    numbers = model.kept(model.mean())
-    try:
-        there = model.signatures.there(numbers.point)
-        return model.residuals(numbers, there), model.left(numbers, there)
-    except IMPOSSIBLE:
+    numbers = model.numbers
+    if numbers is None:
         return None
+    there = model.signatures.there(numbers.point)
+    return model.residuals(numbers, there), model.left(numbers, there)
 
 
 def _in_place(search: Search, outcome: Outcome, gone: int, given_up: set[tuple[str, str]]) -> Outcome | None:

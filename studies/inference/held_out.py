@@ -10,12 +10,15 @@ from numpy.typing import NDArray
 
 from compensation.arrays import Array
 from compensation.noise import Noise
+from studies.calibration.fit import IMPOSSIBLE
 from studies.calibration.noise_levels import has_levels
 from studies.inference.model import Linear, Term, solve_posterior, split
 from studies.inference.signatures import Path, Signatures
 
 Mask = NDArray[np.bool_]
 BLOCKS = 5
+STRAYED = 1.0
+"""Error of −2 ln L up to which a linearisation is taken as it is."""
 FREE = 1e3
 """Prior standard deviation of the offset of a run that is held out, in parts of the noise of its mean."""
 KNOWN = 1.0
@@ -94,6 +97,32 @@ class Model:
         count = self.linear.count
         point = self.problem.inside(np.clip(mean[:count], *self.problem.ends))
         return Kept(point, tuple(split(self.terms, mean[count:])))
+
+    def strayed(self, mean: Array, left: Mapping[str, Array]) -> float:
+        """Error of −2 ln L where straight lines end and the simulation leaves other blocks than they do."""
+        linear = self.linear
+        apart = {n: linear.target[n] - linear.columns(self.terms, n) @ mean - left[n] for n in linear.responses}
+        return sum(float(np.sum(linear.rows[n].whiten(own, self.noise[n]) ** 2)) for n, own in apart.items())
+
+    @cached_property
+    def numbers(self) -> Kept | None:
+        """Most probable numbers, where straight lines end or, where the simulation leaves less there, nearer to where they begin; None where nothing can be predicted."""
+        X, r = self.linear.stacked(self.terms, self.noise)
+        mean, begin, count = self.mean(), self.signatures.point, self.linear.count
+        found: list[tuple[float, Kept]] = []
+        for part in (1.0, 0.5, 0.0):
+            u = begin + part * (mean[:count] - begin)
+            sizes = mean[count:] if part == 1.0 else solve_posterior(X[:, count:], r - X[:, :count] @ u)[0]
+            numbers = self.kept(np.append(u, sizes))
+            try:
+                left = self.left(numbers)
+            except IMPOSSIBLE:
+                continue
+            if part == 1.0 and self.strayed(mean, left) < STRAYED:
+                return numbers
+            rows = sum(float(np.sum(self.linear.rows[n].whiten(own, self.noise[n]) ** 2)) for n, own in left.items())
+            found.append((rows + float(u @ u + sizes @ sizes), numbers))
+        return min(found, key=lambda one: one[0])[1] if found else None
 
     def residuals(self, numbers: Kept, there: Signatures | None = None) -> dict[str, Rows]:
         """Return what is left of every response on the rows of all runs; `there`: the paths at these numbers, where they are known."""

@@ -62,4 +62,4 @@ class Inferred:
     @cached_property
     def numbers(self) -> Kept:
         """Its most probable numbers."""
-        return self.model.kept(self.background.posterior[0])
+        return self.model.numbers or self.model.kept(self.background.posterior[0])

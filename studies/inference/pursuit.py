@@ -8,7 +8,7 @@ import numpy as np
 from compensation.arrays import Array
 from compensation.noise import Noise
 from studies.calibration.fit import IMPOSSIBLE, CardFit
-from studies.inference.held_out import Model
+from studies.inference.held_out import STRAYED, Model
 from studies.inference.model import Linear, Term
 from studies.inference.relinearise import relinearise
 from studies.inference.search import MOST_TERMS, Hypothesis, Outcome, Search, Shapes
@@ -16,8 +16,6 @@ from studies.inference.signatures import Signatures
 
 AGAIN, SETTLING = 7, 4
 """Most linearisations after the first, and how many of these look for no further effects."""
-STRAYED = 1.0
-"""Error of −2 ln L up to which a linearisation is taken as it is."""
 STILL = 0.2
 """Prior standard deviations by which it must have moved to be made anew once more."""
 STRAIGHT = 1.0
@@ -139,13 +137,11 @@ class Pursuit:
     def _holds(self, final: Hypothesis) -> bool:
         """Whether the straight lines are those of the simulation where they end."""
         model = self._model(final)
-        linear, mean = model.linear, model.mean()
+        mean = model.mean()
         try:
-            left = model.left(model.kept(mean))
+            return model.strayed(mean, model.left(model.kept(mean))) < STRAYED
         except IMPOSSIBLE:
             return False
-        apart = {n: linear.target[n] - linear.columns(final.terms, n) @ mean - left[n] for n in linear.responses}
-        return STRAYED > sum(np.sum(linear.rows[n].whiten(own, final.noise[n]) ** 2) for n, own in apart.items())
 
     def _beaten(self, final: Hypothesis) -> bool:
         return self.least > -np.inf and self.search.fair(final) < self.least

@@ -101,16 +101,13 @@ def test_a_voltmeter_in_an_air_bath_gets_no_false_name():
 @pytest.mark.slow
 @pytest.mark.usefixtures("fine")
 def test_the_thermometer_of_a_crystal_is_slower_than_the_crystal(tmp_path):
-    """Known: by 100 to 130 s, of a crystal at 25 MHz. To the frequency it is as if a gradient shifted it: one set.
-
-    A late sensor alone predicts unseen fifths of this one run no better (0.066 Hz against 0.064), so it is told as what may be.
-    """
+    """Known: by 100 to 130 s, of a crystal at 25 MHz. To the frequency it is as if a gradient shifted it: one set."""
     column = '# unknown column: "column 3"'
     named = '[[file.column]]\nfrom = "column 3"\nto = "frequency_Hz"\nunit = "ppm"\nnominal_Hz = 25e6\n'
     verdict = diagnose(bring_in("dcxo_gps.txt", tmp_path, (column, named)))
     cause = verdict.causes[0]
     assert "thermometer-lag" in {cause.effect, *cause.equivalent}
-    assert cause.probability > 0.1
+    assert cause.probability > 0.8
 
 
 @pytest.mark.slow

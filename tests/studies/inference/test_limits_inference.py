@@ -168,6 +168,18 @@ def test_a_value_held_at_its_end_moves_the_others():
     assert C == pytest.approx(np.linalg.inv(both.T @ both))
 
 
+def test_numbers_are_not_sought_where_straight_lines_lead_astray(search, monkeypatch):
+    """Lines along which values hardly matter led far away, where the simulation leaves four times the noise."""
+    model = Model(search.linear, search.signatures, (), search.noise)
+    count, begin = search.linear.count, search.signatures.point
+    assert np.array_equal(model.numbers.point, model.kept(model.mean()).point)
+    thermal = [name.startswith("thermal.") for name in search.linear.problem.priors.names]
+    away = 2.0 * np.append(thermal, np.zeros(count - len(thermal)))
+    astray = Model(search.linear, search.signatures, (), search.noise)
+    monkeypatch.setattr(astray, "mean", lambda: begin + away)
+    assert astray.numbers.point == pytest.approx(begin)
+
+
 def test_a_block_whose_gaps_leave_no_row_for_the_fit_is_not_held_out(search):
     paths, span = search.signatures.paths, replace(search.signatures.span, tau=1e6)
     model = Model(search.linear, SimpleNamespace(span=span, paths=paths), (), search.noise)
