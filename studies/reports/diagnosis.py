@@ -154,11 +154,12 @@ def diagnosis_parts(diagnosis: "Inference") -> list[Chapter]:
             Facts(_facts(verdict), "page"),
             *([Figure(lambda: pictures.ladder(diagnosis), "Rms residual of each response; for the frequency also as a temperature error. Calibrated and with causes: on held-out rows where these can be predicted, else on the rows of the fit.")] if diagnosis.shown_responses else []),
             *next_step(verdict),
+            *remarks(verdict),
             Sentence(f"Files read: {files}.", where="page"),
         ]),
         Chapter("Residual and next run", list(_residual(diagnosis))),
         Chapter("Causes and responses", [
-            *remarks(verdict), cause_table(verdict), response_table(verdict),
+            cause_table(verdict), response_table(verdict),
             *(Sentence(f"{cause.effect}: {_summary(cause)}", where="page") for cause in physics),
         ]),
         *(Chapter(f"Residual of {spoken(name)}", list(_alternatives(diagnosis, name))) for name in diagnosis.shown_responses),
