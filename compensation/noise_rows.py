@@ -35,9 +35,8 @@ STATED_SPREAD = 0.7  # the same about ln of a level that is stated: a factor of 
 LONGEST, CLOSE = 3.0, 1e-3  # of a step in ln of a level, and fall of −2 ln L that the last one promises
 MOST_STEPS, MOST_HALVINGS = 50, 12
 LOUD = 1.0  # ln of slow noise within a run over that of a row, beyond which its kinds are searched each for itself
-STOOD = (
-    0.1  # fall of −2 ln L up to which a search has ended where it began: every kind was searched when that was found
-)
+STOOD = 0.1
+"""Fall of −2 ln L up to which a search has ended where it began: every kind was searched when that was found."""
 PURE = 0.02  # of it, within which it is of one kind
 
 

@@ -178,7 +178,8 @@ def _path_causes(found: Inferred) -> list[Cause]:
     """Return a second lag, radiation, and a sensor that is late, of a heat path that stands in place of one lag."""
     if found.path is None:
         return []
-    name, path = found.search.linear.responses[0], found.path
+    name = found.search.linear.responses[0]
+    path = replace(found.path, beside=(found.numbers.point, found.background.posterior[1]))
     probability, evidence = 1.0 / (1.0 + float(np.exp(-path.lead))), 2.0 * path.evidence
     pairs = zip(found.plain[name].residual, found.rows[name].residual, strict=True)
     peak = float(np.ptp(np.concatenate([before - after for before, after in pairs])))

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from compensation.arrays import Array
-from compensation.noise import white_rms
+from compensation.noise import Noise, white_rms
 from shell.constants import zero_Celsius
 from studies.calibration.apart import fit_explained
 from studies.calibration.fit import CardFit, at_point
@@ -46,7 +46,6 @@ from studies.inference.sharp import RESOLVED, fast_line, longest_resolved
 from studies.inference.signatures import Signatures
 from studies.inference.verdict import judge
 from studies.record import Record
-from studies.record.one_gyro import run_apart
 from studies.results.shown import Shown
 
 if TYPE_CHECKING:
@@ -194,8 +193,8 @@ def infer(
             # values may have gone far to do what an effect does: look from the card as shipped too
             progress("again from the card's own values")
             pursuit = Pursuit(at_point(found, np.zeros(problem.count)), progress)
-            there = pursuit.outcome(search.fair(outcome.final) - BEATEN)
-            search, outcome = max((there, (search, outcome)), key=lambda found: found[0].fair(found[1].final))
+            again = pursuit.outcome(search.fair(outcome.final) - BEATEN)
+            search, outcome = max((again, (search, outcome)), key=lambda found: found[0].fair(found[1].final))
         # one lag in its own noise: in that of a longer path its straight lines lead out of the world
         alone = outcome.plain.noise if path is None else found.noise
         paths = search.signatures.there(found.point) if path is None else Signatures.at(problem, found.point)
@@ -206,12 +205,11 @@ def infer(
         named = bool(outcome.final.terms)
         outcome, held, rows = _confirmed(search, outcome, plain, (calibrated, blocks), path is not None)
         if named and not outcome.final.terms:  # the values are those of the card, or of the longer path, alone again
-            own = found if path is None else path.fit
-            here = paths if path is None else Signatures.at(own.problem, own.point)
-            search = Search(Linear.of(own), here, alone if path is None else own.noise, progress=progress)
-            none, _ = search.grow(most=0)
-            outcome = Outcome(none, none, (), ())
-            if path is not None:
+            if path is None:
+                search, outcome = _without_effects(plain.linear, paths, alone, progress)
+            else:
+                there = Signatures.at(path.fit.problem, path.fit.point)
+                search, outcome = _without_effects(Linear.of(path.fit), there, path.fit.noise, progress)
                 outcome, held, rows = _confirmed(search, outcome, plain, (calibrated, blocks), True)
         if path is None or not _worse(*held[FREQUENCY]):
             break
@@ -219,9 +217,6 @@ def infer(
         path, (search, outcome) = None, Pursuit(found, progress).outcome()
     if path is not None:
         card, found = path.card, path.fit
-        final = Model(search.linear, search.signatures, outcome.final.terms, outcome.final.noise)
-        covariance = Background(search.linear, final.terms, final.noise).posterior[1]
-        path = replace(path, beside=None if final.numbers is None else (final.numbers.point, covariance))
     progress("lack of fit")
     without, levelled = outcome.plain, outcome.final
     for name in search.linear.responses:
@@ -234,19 +229,7 @@ def infer(
         best = max((one.gain for one in seen), default=-np.inf)
         unknown.append(base.score + best + CONSTANTS["log_prior_unknown"] - outcome.final.score)
     return Inference(
-        card,
-        found,
-        search,
-        outcome,
-        left,
-        shipped,
-        calibrated,
-        rows,
-        held,
-        tuple(unknown),
-        campaign,
-        path,
-        run_apart(campaign.records) is not None,
+        card, found, search, outcome, left, shipped, calibrated, rows, held, tuple(unknown), campaign, path
     )
 
 
@@ -271,6 +254,15 @@ def _with_heat_path(whole: CardFit, found: CardFit, progress: Report) -> tuple[H
     if lead < MARGIN + given * FURTHER * sum(t.brought for t in outcome.final.terms if t.response == FREQUENCY):
         return None, search, outcome
     return replace(path, evidence=gain, lead=lead), there, grown
+
+
+def _without_effects(
+    linear: Linear, paths: Signatures, noise: Mapping[str, Noise], progress: Report
+) -> tuple[Search, Outcome]:
+    """Return a search that has found nothing, about the values of a card alone."""
+    search = Search(linear, paths, noise, progress=progress)
+    none, _ = search.grow(most=0)
+    return search, Outcome(none, none, (), ())
 
 
 def _confirmed(search: Search, outcome: Outcome, plain: Model, calibrated: Left, longer: bool) -> Confirmed:

@@ -107,12 +107,11 @@ class Model:
     @cached_property
     def numbers(self) -> Kept | None:
         """Most probable numbers, where straight lines end or, where the simulation leaves less there, nearer to where they begin; None where nothing can be predicted."""
-        X, r = self.linear.stacked(self.terms, self.noise)
         mean, begin, count = self.mean(), self.signatures.point, self.linear.count
         found: list[tuple[float, Kept]] = []
         for part in (1.0, 0.5, 0.0):
             u = begin + part * (mean[:count] - begin)
-            sizes = mean[count:] if part == 1.0 else solve_posterior(X[:, count:], r - X[:, :count] @ u)[0]
+            sizes = mean[count:] if part == 1.0 else self._sizes(u)
             numbers = self.kept(np.append(u, sizes))
             try:
                 left = self.left(numbers)
@@ -123,6 +122,11 @@ class Model:
             rows = sum(float(np.sum(self.linear.rows[n].whiten(own, self.noise[n]) ** 2)) for n, own in left.items())
             found.append((rows + float(u @ u + sizes @ sizes), numbers))
         return min(found, key=lambda one: one[0])[1] if found else None
+
+    def _sizes(self, u: Array) -> Array:
+        """Most probable coefficients of the terms beside given values of the card."""
+        X, r = self.linear.stacked(self.terms, self.noise)
+        return solve_posterior(X[:, len(u) :], r - X[:, : len(u)] @ u)[0]
 
     def residuals(self, numbers: Kept, there: Signatures | None = None) -> dict[str, Rows]:
         """Return what is left of every response on the rows of all runs; `there`: the paths at these numbers, where they are known."""

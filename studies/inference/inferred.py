@@ -32,7 +32,6 @@ class Inferred:
     unknown: tuple[float, ...]
     campaign: Campaign
     path: HeatPath | None = None
-    one_apart: bool = False  # whether one run lies apart from the law of the others
 
     @property
     def final(self) -> Hypothesis:

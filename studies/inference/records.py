@@ -28,6 +28,7 @@ class Campaign:
     skipped: dict[str, str] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     timed: bool = False
+    one_apart: bool = False  # whether one run lies apart from the law of the others
 
 
 def driving(record: Record) -> Array:
@@ -46,9 +47,11 @@ def make_ready(given: Sequence[Record]) -> Campaign:
     check_device(given)
     notes: list[str] = []
     kept = records_of_one_gyro(given, notes.append)
-    if len(kept) > 2 and (odd := run_apart(kept)) is not None:
+    odd = run_apart(kept)
+    if odd is not None and len(kept) > 2:
         notes.append(f"{kept[odd[0]].path or f'run {odd[0] + 1}'} is left out of the diagnosis.")
         del kept[odd[0]]
+        odd = run_apart(kept)
     tables = [_columns(record, source) for record in kept]
     outliers = sum(_remove_outliers(table) for table in tables)
     skipped = _unusable(kept, tables)
@@ -82,7 +85,13 @@ def make_ready(given: Sequence[Record]) -> Campaign:
     notes += [f"{own.path}: too few rows; it is left out." for own, enough in zip(out, long, strict=True) if not enough]
     chosen = [k for k, enough in enumerate(long) if enough]
     return Campaign(
-        paths, tuple(out[k] for k in chosen), tuple(numbers[k] for k in chosen), skipped, tuple(notes), timed
+        paths,
+        tuple(out[k] for k in chosen),
+        tuple(numbers[k] for k in chosen),
+        skipped,
+        tuple(notes),
+        timed,
+        odd is not None,
     )
 
 

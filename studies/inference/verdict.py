@@ -65,7 +65,7 @@ def _patching(found: Inferred, causes: Sequence[Cause], results: Mapping[str, Re
     for cause in causes:
         own = results.get(cause.response)
         patches = own is not None and own.verdict == "unexplained" and (own.gain or 0.0) < CONSTANTS["patching"]
-        patches |= found.one_apart and cause.response == FREQUENCY
+        patches |= found.campaign.one_apart and cause.response == FREQUENCY
         patches &= cause.kind == "physics"
         yield replace(cause, probability=cause.probability * (1.0 - CONSTANTS["doubt_unexplained"] * patches))
 

@@ -95,9 +95,7 @@ def check_one_sign(records: Sequence[Record]) -> None:
         if len(runs) > 1:
             levels = range(1, len(runs))
             turned = _put_in(runs, [replace(run, output=-run.output) for run in runs])
-            k = _better(
-                runs, likeliest(runs, ANY_PATH, levels), (likeliest(one, ANY_PATH, levels) for one in turned), OTHERWISE
-            )
+            k = _better(runs, likeliest(runs, ANY_PATH, levels), (likeliest(one, ANY_PATH, levels) for one in turned))
             if k is not None:
                 which = [_path(records, one) for one in (members if len(runs) == 2 else members[k : k + 1])]
                 raise InputError(

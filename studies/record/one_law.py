@@ -67,10 +67,10 @@ def parabola(runs: Sequence[Course], lags: Sequence[float]) -> Array:
     """Return the columns of a bend and a slope about the mean of what is followed behind lags in series, a level, and what each start was off by."""
     x = np.concatenate([run.behind(lags) for run in runs])
     x = x - x.mean()
-    slowest, of_run = max(lags), np.repeat(range(len(runs)), [len(run.time) for run in runs])
+    slowest = max(lags)
     faded = np.concatenate([np.exp((run.time[0] - run.time) / slowest) if slowest else 0.0 * run.time for run in runs])
     return np.column_stack(
-        [x**2 - np.mean(x**2), x, np.ones_like(x), *((of_run == k) * faded for k in range(len(runs)))]
+        [x**2 - np.mean(x**2), x, np.ones_like(x), *(_rows_of(runs, k) * faded for k in range(len(runs)))]
     )
 
 
@@ -78,8 +78,7 @@ def follow(runs: Sequence[Course], lag: float, law: Law = ONE_LAG, apart: Sequen
     """Return what a law leaves with one lag, where some runs have levels of their own."""
     X, y = parabola(runs, [lag]), np.concatenate([run.output for run in runs])
     more = [np.concatenate([run.behind([tau]) for run in runs]) for tau in law.further]
-    own = [np.concatenate([np.full(len(run.time), float(k == j)) for j, run in enumerate(runs)]) for k in apart]
-    X = np.column_stack([X, *(one - one.mean() for one in more), *own])
+    X = np.column_stack([X, *(one - one.mean() for one in more), *(_rows_of(runs, k) for k in apart)])
     y = y - y.mean()
     found = _solve(X, y)
     most = law.bend * float(y.std()) / max(float(X[:, 1].var()), 1e-300)
@@ -102,6 +101,11 @@ def likeliest(runs: Sequence[Course], law: Law = ONE_LAG, apart: Sequence[int] =
         options={"xatol": 0.01},
     )
     return min(best, follow(runs, float(np.exp(found.x)), law, apart))
+
+
+def _rows_of(runs: Sequence[Course], k: int) -> Array:
+    """1 in the rows of a run, else 0."""
+    return np.concatenate([np.full(len(run.time), float(j == k)) for j, run in enumerate(runs)])
 
 
 def _solve(X: Array, y: Array) -> Array:

@@ -95,7 +95,7 @@ def gather_rest(records: Sequence[Record], outputs: dict[str, float]) -> RestDat
 
 def check_record(record: Record) -> str:
     """Refuse temperatures that contradict each other or lag as in no chamber and no resonator; else return doubts of them and of outputs that stand still, if any."""
-    return " ".join(filter(None, (_check_rates(record), *_stuck(record))))
+    return " ".join(filter(None, (check_temperatures(record), *_stuck(record))))
 
 
 def stuck_rows(record: Record) -> dict[str, NDArray[np.bool_]]:
@@ -107,11 +107,9 @@ def stuck_rows(record: Record) -> dict[str, NDArray[np.bool_]]:
 def without_stuck(record: Record) -> Record:
     """Return a record without its stuck readings."""
     stuck = stuck_rows(record)
-    return (
-        record.with_columns({name: np.where(rows, np.nan, record[name]) for name, rows in stuck.items()})
-        if stuck
-        else record
-    )
+    if not stuck:
+        return record
+    return record.with_columns({name: np.where(rows, np.nan, record[name]) for name, rows in stuck.items()})
 
 
 def _stuck(record: Record) -> list[str]:
@@ -122,7 +120,7 @@ def _stuck(record: Record) -> list[str]:
     ]
 
 
-def _check_rates(record: Record) -> str:
+def check_temperatures(record: Record) -> str:
     """Refuse temperatures that no chamber and no resonator gives; else return a doubt, if any."""
     name = next((one for one in DRIVING if one in record and np.isfinite(record[one]).sum() > 1), None)
     if name is None:

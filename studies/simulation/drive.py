@@ -11,7 +11,7 @@ from compensation.decimation import bend_of_means
 from shell.constants import zero_Celsius
 from studies.errors import InputError
 from studies.record import Record
-from studies.record.rest import check_record
+from studies.record.rest import check_temperatures
 from studies.simulation.heat_path import SENSOR
 from thermal.profile import Profile
 
@@ -166,7 +166,7 @@ def drive_by_record(record: Record, boundary: Boundary | None = None, time: Arra
     known = np.isfinite(values)
     if np.count_nonzero(known) < 2:
         raise InputError(f"{record.path}: {COLUMN[boundary]} has fewer than two values.")
-    check_record(record)
+    check_temperatures(record)
     t, T = rows[known], values[known] + zero_Celsius
     if boundary == "chamber":
         t, T = _with_jumps(t, T, _settled_at(record))
