@@ -45,7 +45,7 @@ def simulate(card: Card, profile: Run, *, row: float = 1.0, seed: int = 0, noise
     if not isinstance(seed, Integral) or seed < 0:
         raise InputError(f"seed = {seed!r}: give a whole number, 0 or above.")
     driven = load_drive(str(profile) if isinstance(profile, str | Path) else read_record(profile), None, 1 / row)
-    return simulate_run(load_card(card), driven, 1 / row, int(seed), noise).record
+    return simulate_run(load_card(card), driven, 1 / row, int(seed), noise).told()
 
 
 def compare(*cards: Card) -> "Comparison":

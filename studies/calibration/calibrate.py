@@ -8,6 +8,7 @@ import numpy as np
 import scipy
 
 from compensation.arrays import Array
+from shell.constants import zero_Celsius
 from shell.errors import ShellError
 from studies.calibration.agreement import keep_agreeing, put_back
 from studies.calibration.apart import fit_explained
@@ -150,12 +151,14 @@ def calibrate(
         _, point, _, covariance = over_the_wave(problem.priors, found.point, found.covariance)
     else:
         estimates, found, point, covariance = put_back(estimates, kept), kept, kept.point, kept.covariance
-    levels = {key: found.noise[name].offset for name, key in LEVELS.items() if name in found.noise}
+    levels: dict[str, object] = {key: found.noise[name].offset for name, key in LEVELS.items() if name in found.noise}
     found = replace(found, noise=likeliest.noise)
     ladder = build_ladder(found)
     return Calibration(
         instrument,
-        posterior_card(instrument, problem.priors, point, covariance, estimates, turn_on(found), levels),
+        posterior_card(
+            instrument, problem.priors, point, covariance, estimates, turn_on(found), levels | _covered(problem)
+        ),
         found,
         estimates,
         find_groups(problem.priors, found.covariance),
@@ -169,6 +172,16 @@ def calibrate(
         ),
         settled,
     )
+
+
+def _covered(problem: CardProblem) -> dict[str, object]:
+    """Temperatures that the polynomial of a card stands on: of these records, and of those that its card knows."""
+    if problem.instrument.polynomial is None:
+        return {}
+    known = problem.instrument.part("posterior").covered_degC or ()
+    every = [*(run.inner.profile.value for run in problem.runs), *(one.temperature for one in problem.tables)]
+    ends = [*known, *(float(end(T)) - zero_Celsius for T in every for end in (np.min, np.max))]
+    return {"covered_degC": [round(min(ends), 2), round(max(ends), 2)]}
 
 
 def _pose(

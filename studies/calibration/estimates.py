@@ -209,7 +209,7 @@ def posterior_card(
     covariance: Array,
     estimates: Sequence[Estimate],
     more: dict[str, float] | None = None,
-    levels: dict[str, float] | None = None,
+    levels: dict[str, object] | None = None,
 ) -> "Instrument":
     """Return the card with posterior values, widths, correlations and intervals; `more` are further values of it, `levels` of its runs."""
     count, pair = len(priors.values), priors.pair

@@ -3,11 +3,14 @@
 import os
 from typing import Literal
 
+import numpy as np
+
 from studies.cli.arguments import Card, Theory
 from studies.cli.output import answers
 from studies.errors import InputError
 from studies.files.writing import check_folder, write_text
 from studies.instrument.card import load_card
+from studies.resonator.law import beyond_records
 from studies.results import Result, Sentence, Table
 from studies.twin.fmu import name_of_input, write_fmu
 from studies.twin.plan import idle_input, input_starts, plan_twin, symbol
@@ -45,7 +48,10 @@ def twin(
     if fmu is None and c is None:
         raise InputError("nothing to do: give --fmu FILE.fmu, --c FOLDER, or both.")
     plan = plan_twin(load_card(card), boundary, theory)
-    sentences: list[Sentence | str] = []
+    beyond = beyond_records(
+        plan.instrument, np.array([plan.constants["LOWEST"], plan.constants["HIGHEST"]]), "this twin"
+    )
+    sentences: list[Sentence | str] = [Sentence(one, "warning") for one in beyond]
     compiled = size = None
     if c is not None:
         folder = check_folder(c)

@@ -212,7 +212,7 @@ def simulate_plan(card: Instrument, profiles: Sequence[str]) -> list[Record]:
         )
         for k, (profile, commands) in enumerate(schedules)
     ]
-    return [replace(run.record, path=f"planned run {k}") for k, run in enumerate(runs, 1)]
+    return [replace(run.told(), path=f"planned run {k}") for k, run in enumerate(runs, 1)]
 
 
 def stated_noises(card: Instrument, records: Sequence[Record]) -> dict[str, Noise]:

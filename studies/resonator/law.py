@@ -4,6 +4,10 @@ from dataclasses import replace
 from math import inf
 from typing import TYPE_CHECKING, cast
 
+import numpy as np
+
+from compensation.arrays import Array
+from shell.constants import zero_Celsius
 from shell.errors import ShellError
 from studies.errors import InputError, naming
 from studies.instrument.card import load_card
@@ -14,6 +18,7 @@ if TYPE_CHECKING:
     from shell.material import Mount
     from studies.instrument.card import Card, Instrument
 
+BEYOND = 1.0  # K by which a run may leave the records
 SLOPE_KEYS = {"youngs_modulus": "log_slope_per_K", "shear_modulus": "log_slope_per_K", "expansion": "value"}
 
 
@@ -69,6 +74,17 @@ def check_slope_known(instrument: "Instrument") -> None:
     """Refuse a material that is given at one temperature only: the slope of its frequency is not 0 but unknown."""
     if why := unknown_slope(instrument):
         raise InputError(f"{instrument.path} [material]: {why}")
+
+
+def beyond_records(instrument: "Instrument", temperatures: Array, what: str) -> tuple[str, ...]:
+    """Say by how much temperatures (K) leave those of the records that the polynomial of a card stands on; nothing where they do not."""
+    covered = instrument.part("posterior").covered_degC
+    if covered is None:
+        return ()
+    low, high = covered
+    by = max(low - float(np.min(temperatures)) + zero_Celsius, float(np.max(temperatures)) - zero_Celsius - high)
+    said = f"the records behind the polynomial of this card reach from {low:g} to {high:g} °C, and {what} goes {by:.0f} K beyond: its numbers there are a guess."
+    return (said,) if by > BEYOND else ()
 
 
 def moved_law(law: "FrequencyLaw", instrument: "Instrument") -> "FrequencyLaw":

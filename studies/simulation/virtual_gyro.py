@@ -3,6 +3,7 @@
 import datetime
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
+from warnings import warn
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from studies.effects import find_effect
 from studies.instrument.tables.noise import SILENT
 from studies.progress import tell
 from studies.record import Record, check_plausible
-from studies.resonator.law import unknown_slope
+from studies.resonator.law import beyond_records, unknown_slope
 from studies.simulation.chamber import check_profile
 from studies.simulation.drive import COLUMN, COMMANDS, RATE, Drive, drive_by_profile, rows_of
 from studies.simulation.loop import find_range_use, require_range, require_stable_loops, wave_of
@@ -50,6 +51,12 @@ class VirtualRun:
     record: Record
     prediction: Prediction
     warnings: tuple[str, ...] = ()
+
+    def told(self) -> Record:
+        """Return the record alone, once its warnings are said."""
+        for warning in self.warnings:
+            warn(warning, stacklevel=3)
+        return self.record
 
     @property
     def law(self) -> "FrequencyLaw":
@@ -127,7 +134,8 @@ def simulate_run(
         start=None if drive.moment is None else datetime.datetime.fromtimestamp(drive.moment, datetime.UTC),
         resolution={name: step for name, step in resolution.items() if step > 0},
     )
-    warnings = idle_effects(instrument, drive)
+    reached = prediction.columns["resonator_temperature_degC"] + zero_Celsius
+    warnings = idle_effects(instrument, drive) + beyond_records(instrument, reached, "this run")
     if why := unknown_slope(instrument):
         warnings += (f"the frequency follows no temperature: {why}",)
     return VirtualRun(record, prediction, warnings)

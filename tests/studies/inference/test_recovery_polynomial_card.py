@@ -1,5 +1,6 @@
 """A card of a polynomial law: simulated, made from records alone, calibrated, written and read."""
 
+import warnings
 from types import SimpleNamespace
 
 import numpy as np
@@ -12,9 +13,11 @@ from studies.errors import InputError
 from studies.inference.heat_path import with_lags
 from studies.inference.polynomial_card import _likeliest_lag, polynomial_card
 from studies.instrument.card import build_instrument, load_card, save_card
+from studies.planning.plan import simulate_plan
 from studies.record import read_record
 from studies.simulation.chamber import load_profile
 from studies.simulation.virtual_gyro import simulate_run
+from studies.workbench import simulate
 from thermal.lag import lag
 
 TRUE = {
@@ -57,12 +60,34 @@ def test_recovery_of_the_law_from_records_alone(tmp_path) -> None:
     found = calibrate(polynomial_card(records), records, profile=False, keep=False)
     save_card(found.instrument, tmp_path / "found.toml")
     again = load_card(tmp_path / "found.toml")
+    assert again.part("posterior").covered_degC == pytest.approx((-10.0, 50.0), abs=1.0)
     T = np.linspace(265.0, 320.0, 7)
     away = again.polynomial.frequency(T) - card.polynomial.frequency(T)
     assert np.abs(away).max() < 1e-6 * 4432.07
     for key, true in (("lag_s", 2000.0), ("chamber_lag_s", 600.0)):
         value = next(one for one in again.uncertain if one.name == f"law.{key}")
         assert abs(value.value - true) < 4 * value.sd + 1e-3 * true
+
+
+@pytest.mark.parametrize(("words", "by"), [("step 20 -10 2h", None), ("soak -80 1h", 70), ("step 20 155 9h", 105)])
+def test_contract_a_run_beyond_the_records_of_a_polynomial_card_says_so_once(tmp_path, ask, capsys, words, by) -> None:
+    """A saved card went 105 K beyond the records that it stands on without a word."""
+    card = build_instrument({**TRUE, "posterior": {"covered_degC": [-10.0, 50.0]}})
+    run = simulate_run(card, load_profile(words), 0.1, noise=False)
+    said = [one for one in run.warnings if "records behind" in one]
+    assert len(said) == (by is not None)
+    assert all(f"from -10 to 50 °C, and this run goes {by} K beyond" in one for one in said)
+    path = str(tmp_path / "own.toml")
+    save_card(card, path)
+    told = ask(["simulate", path, words, "--row", "60", "--out", str(tmp_path / "run.csv")])
+    assert [one for one in told["warnings"] if "records behind" in one] == said
+    with warnings.catch_warnings(record=True) as heard:
+        warnings.simplefilter("always")
+        simulate(path, words, row=60)
+        simulate_plan(card, [words])
+    assert [str(one.message) for one in heard] == 2 * said
+    assert main(["twin", path, "--c", str(tmp_path / "twin")]) == 0
+    assert "this twin goes 120 K beyond" in capsys.readouterr().out
 
 
 def test_contract_a_card_has_one_law() -> None:
