@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 import scipy
+from numpy.typing import ArrayLike
 
 from compensation.arrays import Array
 from studies.record.one_law import Course, parabola
@@ -41,10 +42,10 @@ def find_lags(
     return float(one), float(other)
 
 
-def slope_behind(runs: Sequence[Course]) -> tuple[tuple[float, float], float, float]:
-    """Return the lags (s), the slope of the frequency at the mean of the resonator's temperature, and its standard error.
+def slope_behind(runs: Sequence[Course]) -> tuple[tuple[float, float], list[tuple[float, float]], float, float]:
+    """Return the lags (s), those without each of the parts of the runs, the slope of the frequency at the mean of the resonator's temperature, and its standard error.
 
-    The error is the jackknife's over parts of the runs, the lags found anew without each of them: what the lags leave is no noise.
+    The error is the jackknife's over the parts, the lags found anew without each of them: what the lags leave is no noise.
     """
     f = np.concatenate([run.output for run in runs])
 
@@ -54,6 +55,12 @@ def slope_behind(runs: Sequence[Course]) -> tuple[tuple[float, float], float, fl
 
     lags = find_lags(runs)
     part = np.arange(f.size) * PARTS // f.size
-    without = np.array([slope(find_lags(runs, keep, lags), keep) for keep in (part != one for one in range(PARTS))])
-    error = np.sqrt((PARTS - 1) / PARTS * np.sum((without - without.mean()) ** 2))
-    return lags, slope(lags, np.ones(f.size, dtype=bool)), float(error)
+    kept = [part != one for one in range(PARTS)]
+    without = [find_lags(runs, keep, lags) for keep in kept]
+    error = jackknife([slope(own, keep) for own, keep in zip(without, kept, strict=True)])
+    return lags, without, slope(lags, np.ones(f.size, dtype=bool)), float(error)
+
+
+def jackknife(values: Sequence[ArrayLike]) -> Array:
+    """Return the standard error of what was found without each of the parts, along the first axis."""
+    return np.asarray(np.sqrt((len(values) - 1.0) * np.var(values, axis=0)))

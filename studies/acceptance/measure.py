@@ -11,12 +11,12 @@ import scipy
 from compensation.arrays import Array
 from compensation.decimation import average_blocks
 from compensation.linearity import measure_nonlinearity, same_rate
-from compensation.noise_regression import fit_coloured
+from compensation.noise_regression import ColouredFit, fit_coloured
 from compensation.regression import LinearFit, fit_linear
 from compensation.ringdown.answer import Estimate
 from compensation.ringdown.trace import analyse_trace
 from compensation.stability import AllanDeviation, NoiseCoefficients
-from studies.acceptance.lags import MOST, PARTS, slope_behind
+from studies.acceptance.lags import MOST, PARTS, jackknife, slope_behind
 from studies.acceptance.runs import temperature_column
 from studies.errors import InputError, naming
 from studies.fits.ringdown import Decay
@@ -115,38 +115,41 @@ def measure_temperature(records: Sequence[Record], output: str) -> Found:
     followed = [_follow(record, whole / MOST) for record in records if "frequency_Hz" in record]
     paths = [record.path for record in records]
     found: Found = {}
-    lags: tuple[float, ...] = ()
+    lags, without = (0.0, 0.0), list[tuple[float, float]]()
     if followed:
-        lags, value, sd = slope_behind(followed)
+        lags, without, value, sd = slope_behind(followed)
         scale = 1e6 / float(np.mean(np.concatenate([run.output for run in followed])))
         found["frequency_temperature_slope_ppm_per_K"] = within(value, sd, paths, PARTS - 1, scale=scale)
-    columns: dict[str, list[Array]] = {"output": [], "temperature": [], "slope": []}
-    runs, start = [], 0
+    courses = []
     for record in records:
         if output in record:
-            column = _temperature_of(record)
-            blocks = average_blocks(record["time_s"], {"output": record[output], "T": record[column]}, BLOCK)
+            columns = {"output": record[output], "T": record[_temperature_of(record)]}
+            blocks = average_blocks(record["time_s"], columns, BLOCK)
             _check_length(record, blocks.time)
-            T = Course(blocks.time, blocks.columns["T"], blocks.columns["output"]).behind(lags)
-            columns["output"].append(blocks.columns["output"])
-            columns["temperature"].append(T)
-            columns["slope"].append(np.gradient(T, blocks.time))
-            runs.append(slice(start, start + len(T)))
-            start += len(T)
-    if runs:
-        y, T, slope = (np.concatenate(parts) for parts in columns.values())
-        offsets = np.zeros((len(y), len(runs)))
-        for k, rows in enumerate(runs):
-            offsets[rows, k] = 1.0
-        X = np.column_stack([offsets, T - T.mean(), slope])
+            courses.append(Course(blocks.time, blocks.columns["T"], blocks.columns["output"]))
+    if courses:
+        y = np.concatenate([run.output for run in courses])
+        ends = np.cumsum([0, *(len(run.time) for run in courses)])
+        runs = [slice(int(a), int(b)) for a, b in itertools.pairwise(ends)]
         names = [*(f"offset {k + 1}" for k in range(len(runs))), "temperature", "rate of temperature"]
-        with naming(", ".join(paths)):
-            fit = fit_coloured(X, y, names, runs)
-        b, sd_of, free = fit.regression.coefficients, fit.regression.standard_errors, max(len(y) - X.shape[1], 1)
-        found["bias_temperature_slope_deg_per_h_per_K"] = within(float(b[-2]), float(sd_of[-2]), paths, free)
-        found["bias_temperature_rate_deg_per_h_s_per_K"] = within(float(b[-1]), float(sd_of[-1]), paths, free)
-        left = fit.residuals - offsets @ np.array([fit.residuals[rows].mean() for rows in runs])
-        found["bias_temperature_residual_deg_per_h"] = _deviation(float(np.sqrt(np.mean(left**2))), free, paths)
+
+        def fit_behind(lags: Sequence[float]) -> ColouredFit:
+            followed = [run.behind(lags) for run in courses]
+            T = np.concatenate(followed)
+            slope = np.concatenate([np.gradient(own, run.time) for own, run in zip(followed, courses, strict=True)])
+            offsets = scipy.linalg.block_diag(*(np.ones((len(own), 1)) for own in followed))
+            with naming(", ".join(paths)):
+                return fit_coloured(np.column_stack([offsets, T - T.mean(), slope]), y, names, runs)
+
+        fit = fit_behind(lags)
+        b, free = fit.regression.coefficients[-2:], max(len(y) - len(names), 1)
+        by_lags = jackknife([fit_behind(own).regression.coefficients[-2:] for own in without]) if without else 0.0
+        sd_of = np.hypot(fit.regression.standard_errors[-2:], by_lags)
+        found["bias_temperature_slope_deg_per_h_per_K"] = within(float(b[0]), float(sd_of[0]), paths, free)
+        found["bias_temperature_rate_deg_per_h_s_per_K"] = within(float(b[1]), float(sd_of[1]), paths, free)
+        left = [fit.residuals[rows] - fit.residuals[rows].mean() for rows in runs]
+        size = float(np.sqrt(np.mean(np.concatenate(left) ** 2)))
+        found["bias_temperature_residual_deg_per_h"] = _deviation(size, free, paths)
     return found
 
 
