@@ -63,4 +63,4 @@ def slope_behind(runs: Sequence[Course]) -> tuple[tuple[float, float], list[tupl
 
 def jackknife(values: Sequence[ArrayLike]) -> Array:
     """Return the standard error of what was found without each of the parts, along the first axis."""
-    return np.asarray(np.sqrt((len(values) - 1.0) * np.var(values, axis=0)))
+    return np.asarray(np.sqrt((len(values) - 1.0) * np.var(np.asarray(values), axis=0)))
