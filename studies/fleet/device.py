@@ -25,7 +25,7 @@ from studies.simulation.variations import Variations, heats
 from studies.workbench import diagnose_records
 from thermal.profile import Profile
 
-SCHEMA = "hrg.fleet-device/3"
+SCHEMA = "hrg.fleet-device/4"
 USUAL, APART = 20.0, 5.0  # °C at which devices are compared without a common card, and kelvin to either side for slopes
 KNOWN, LITTLE = 0.5, 0.9
 """Standard deviation of a value, over that of its prior, below which its records tell it, and above which they say nothing."""
@@ -38,6 +38,7 @@ class Measured:
     value: float
     sd: float
     told: bool = True
+    open: float = 0.0  # standard deviation that the card leaves it; 0: not known
 
 
 @dataclass(frozen=True)
@@ -130,7 +131,7 @@ def measure(found: Inferred, temperature: float) -> dict[str, Measured]:
         if 0.0 < after < LITTLE**2 * before:  # the prior has its mean where u is 0
             variance = 1.0 / (1.0 / after - 1.0 / before)
             mean = value + float(J @ u) * variance / before
-            out[name] = Measured(mean, float(np.sqrt(variance)), after < KNOWN**2 * before)
+            out[name] = Measured(mean, float(np.sqrt(variance)), after < KNOWN**2 * before, before**0.5)
     return out
 
 

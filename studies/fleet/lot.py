@@ -11,7 +11,7 @@ import numpy as np
 from studies.fleet.comparison import Share, compare
 from studies.fleet.device import Answer, Measured, Standing, interval
 from studies.fleet.folder import Device
-from studies.fleet.population import FEWEST, Quantity
+from studies.fleet.population import FEWEST, Quantity, Scatters
 from studies.instrument.display import display_name, spell_parameter
 from studies.results import row_of
 
@@ -137,7 +137,8 @@ def _quantities(
             of[f"{share.effect}: {words}"] = own
     told = {n: own for n, own in of.items() if sum(one.told for one in own.values()) >= max(2.0, TOLD * len(answers))}
     looks = sum(len(own) for own in told.values() if len(own) >= FEWEST)
-    return tuple(Quantity(name, own, max(looks, 1), batches) for name, own in told.items())
+    scatters = Scatters(told)
+    return tuple(Quantity(name, own, max(looks, 1), batches, scatters) for name, own in told.items())
 
 
 def _shares(answers: Mapping[str, Answer], batches: Mapping[str, str]) -> tuple[Share, ...]:

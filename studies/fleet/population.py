@@ -7,6 +7,10 @@ the restricted likelihood (Patterson & Thompson 1971, Biometrika 58, 545), with 
 others predict of a device is Student's t of n − 1 degrees of freedom (Jeffreys). In general it is the mean over τ of
 N(μ, τ² + s_d² + 1/Σw), and likewise for the mean of a batch. A chance counts as many times as there were devices, or batches, and values
 to look at.
+
+Of a few devices that is too little: of five one has to be 20 scatters away. But a lot has many values, and ln τ of each, over what the
+card leaves it, is like those of the others: N(m, v²), with m and v as likely as the other values of the other devices make them (variances
+of many quantities from few samples each: Smyth 2004, Stat. Appl. Genet. Mol. Biol. 3, 3). Where they are unlike, v is wide and Student's t stays.
 """
 
 from collections.abc import Iterable, Mapping
@@ -22,6 +26,8 @@ from studies.fleet.device import Measured
 # Scatters that are tried, in parts of the range of the values: three may stand close by chance.
 GRID = np.geomspace(1e-3, 1e3, 100)
 CHANCE = 0.01  # chance, with all looks counted, below which a device or a batch is odd
+CENTRES, WIDTHS = np.linspace(np.log(1e-5), np.log(1e2), 50), np.array([0.25, 0.5, 1.0, 1.5, 2.0, 3.0])
+"""Values of m and v that are tried."""
 FEWEST = 4  # devices from which on values tell who is odd
 CLEAR = 2.0  # scatter of the others, beyond which a batch is more than another batch
 
@@ -39,18 +45,18 @@ class Population:
     known: Array
 
     @classmethod
-    def of(cls, value: Array, sd: Array) -> "Population":
-        """Fit a population."""
-        most = float(np.ptp(value)) + float(sd.max())
-        scatters = most * GRID
+    def of(cls, value: Array, sd: Array, prior: Array | None = None) -> "Population":
+        """Fit a population; `prior` weighs the scatters of its grid."""
+        scatters = _grid(value, sd)
         total = scatters[:, None] ** 2 + sd**2
         known = (1.0 / total).sum(axis=1)
         means = (value / total).sum(axis=1) / known
         deviance = np.log(total).sum(axis=1) + np.log(known) + ((value - means[:, None]) ** 2 / total).sum(axis=1)
-        weights = np.exp(-0.5 * (deviance - deviance.min())) * scatters / (scatters + float(np.median(sd)))
-        weights /= weights.sum()
+        prior = scatters / (scatters + float(np.median(sd))) if prior is None else prior
+        weights = np.exp(-0.5 * (deviance - deviance.min())) * prior
         k = int(np.argmin(deviance))
         scatter = float(scatters[k]) if k else 0.0
+        weights /= max(weights.sum(), 1e-300)
         return cls(float(means[k]), float(known[k] ** -0.5), scatter, scatters, weights, means, known)
 
     def surprise(self, value: Array, sd: Array) -> float:
@@ -61,6 +67,48 @@ class Population:
         return float(self.weights @ (2.0 * scipy.special.ndtr(-far)))
 
 
+def _grid(value: Array, sd: Array) -> Array:
+    return np.asarray((float(np.ptp(value)) + float(sd.max())) * GRID)
+
+
+def _usual(scatters: Array, scale: float) -> Array:
+    """Return how likely the scatters of a grid are for every m and v, (300, grid): the ends stand for all beyond."""
+    middle = 0.5 * (np.log(scatters[1:]) + np.log(scatters[:-1])) - np.log(scale)
+    below = scipy.special.ndtr((middle - CENTRES[:, None, None]) / WIDTHS[:, None])
+    return np.diff(below.reshape(-1, len(middle)), prepend=0.0, append=1.0)
+
+
+@dataclass(frozen=True)
+class Scatters:
+    """What the values of a lot say of each other's scatter."""
+
+    of: Mapping[str, Mapping[str, Measured]]  # name -> serial -> Measured
+    known: dict[str, dict[str, Array]] = field(default_factory=dict, init=False, compare=False)
+
+    def scale(self, name: str) -> float:
+        """Return what the card leaves a value, 0 where that is not known."""
+        return float(np.median([one.open for one in self.of[name].values()]))
+
+    def prior(self, name: str, serial: str, value: Array, sd: Array) -> Array | None:
+        """Return the prior of a value's scatter, by other values of other devices than one; None without one."""
+        if self.scale(name) <= 0.0:
+            return None
+        if serial not in self.known:
+            self.known[serial] = {n: own for n in self.of if (own := self._evidence(n, serial)) is not None}
+        likely = sum((own for n, own in self.known[serial].items() if n != name), np.zeros(CENTRES.size * WIDTHS.size))
+        weights = np.exp(likely - likely.max())
+        return np.asarray(weights @ _usual(_grid(value, sd), self.scale(name)) / weights.sum())
+
+    def _evidence(self, name: str, without: str) -> Array | None:
+        """Log likelihood of every m and v by one value."""
+        own = [one for serial, one in self.of[name].items() if serial != without]
+        if len(own) < FEWEST - 1 or self.scale(name) <= 0.0:
+            return None
+        value, sd = np.array([one.value for one in own]), np.array([one.sd for one in own])
+        flat = Population.of(value, sd, np.ones_like(GRID))
+        return np.asarray(np.log(_usual(flat.scatters, self.scale(name)) @ flat.weights + 1e-300))
+
+
 @dataclass(frozen=True)
 class Quantity:
     """One value over the lot."""
@@ -69,6 +117,7 @@ class Quantity:
     of: Mapping[str, Measured]  # serial -> Measured
     looks: int  # devices times values that were looked at
     batches: Mapping[str, str] = field(default_factory=dict)  # serial -> batch
+    scatters: Scatters | None = None  # of all values of the lot
 
     def among(self, serials: Iterable[str]) -> Population:
         """Return the population of some devices."""
@@ -121,14 +170,17 @@ class Quantity:
         found: dict[str, float] = {}
         chances: dict[str, float] = {}
         while len(rest := self._usual(found)) >= FEWEST:
-            chances = {
-                s: self.among([o for o in rest if o != s]).surprise(*self._arrays([s])) * self.looks for s in rest
-            }
+            chances = {s: self._chance(s, [o for o in rest if o != s]) for s in rest}
             worst = min(rest, key=lambda s: chances[s])
             if chances[worst] >= CHANCE:
                 break
             found[worst] = chances.pop(worst)
         return found, chances
+
+    def _chance(self, serial: str, others: list[str]) -> float:
+        known = self._arrays(others)
+        prior = None if self.scatters is None else self.scatters.prior(self.name, serial, *known)
+        return Population.of(*known, prior).surprise(*self._arrays([serial])) * self.looks
 
     def _usual(self, odd: Mapping[str, float]) -> list[str]:
         return [s for s in self.of if s not in odd and self.batches.get(s, "") not in self.bad_batches]
