@@ -4,7 +4,7 @@ import re
 from collections.abc import Mapping, Sequence
 
 from studies.importing.look import as_number
-from studies.importing.meaning import BRACKETED, Meaning, find_unit
+from studies.importing.meaning import BRACKETED, Meaning, read_unit
 from studies.importing.units import split_nominal, units_of
 from studies.schema.keys import spell_value
 
@@ -28,7 +28,7 @@ def draft_column(
 ) -> list[str]:
     """Return the entry of a column with a meaning, and what must be checked in it."""
     target = meaning.target
-    units, stated = units_of(target), find_unit(target, hint)
+    units, (stated, factor) = units_of(target), read_unit(target, hint)
     unit = stated or next(iter(units))
     remark = remark or ("" if stated else "    # CHECK: the name states no unit")
     middle = sorted(numbers)[len(numbers) // 2]
@@ -37,7 +37,10 @@ def draft_column(
     if target.endswith("_degC") and unit == "degC" and 200 < middle < 500:
         unit, remark = "K", "    # CHECK: the values look like kelvin"
     lines.append(f'unit = "{unit}"{remark}')
-    if target.endswith("_degC") and abs(middle) >= 500:
+    if factor != 1.0:
+        either = "    # CHECK: the name states a factor, by which the reading is to be multiplied, or was"
+        lines.append(f"scale = {factor!r}" + ("    # CHECK: the factor that the name states" if factor else either))
+    if target.endswith("_degC") and abs(middle) >= 500 and factor == 1.0:
         lines += [
             "scale = 1.0     # CHECK: the values look like raw counts; reading × scale + offset is the temperature",
             "offset = 0.0    # CHECK",

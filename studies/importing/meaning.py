@@ -43,6 +43,17 @@ UNIT_WORDS: tuple[tuple[str, str], ...] = (
     (r"counts?\b", "counts"),
 )
 """Units that are described rather than spelled; the first that fits is taken."""
+RAISED = str.maketrans({**dict(zip("⁰¹²³⁴⁵⁶⁷⁸⁹⁻", "0123456789-", strict=True)), "−": "-"})
+POWERS = re.compile(r"\b10\s*(?:\^|\*\*|(?=[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]))\s*([-+−⁻\d⁰¹²³⁴⁵⁶⁷⁸⁹]+)")
+_NUMBER = r"(1/\d+|\d+(?:\.\d+)?(?:e[+-]?\d+)?)"
+NUMBER = re.compile(rf"\s*(?:[x×*·]\s*)?{_NUMBER}\s*(?=$|[^\W\d]|°)", re.IGNORECASE)
+"""A number at the beginning of a unit."""
+BEHIND = re.compile(
+    rf"(?:\s*/|\s+in|,|\s(?=\d\S*e[+-]?\d))\s*({_NUMBER[1:-1]}(?:\s*[^\W\d][^\s\])]*)?)\s*$", re.IGNORECASE
+)
+TIMES = re.compile(r"(?<=[^\s\[(])\s*[x×*·]\s*(?:\d+(?:\.\d+)?e[+-]?\d+|0\.0*1|1000*)\b", re.IGNORECASE)
+MANY = {"k": 1e3, "thousand": 1e3, "thousands": 1e3, "m": 1e6, "mio": 1e6, "million": 1e6, "millions": 1e6}
+"""Words that stand for a factor where a number has no unit."""
 BRACKETED = r"[\[(]\s*([^\])]{1,24}?)\s*[\])]"
 AXIS = re.compile(r"^(.*?)([xyz])((?:[^a-z].*)?)$", re.IGNORECASE)
 
@@ -80,15 +91,38 @@ def find_meanings(hints: Mapping[str, str], taken: Sequence[str] = (), group: st
 
 def find_unit(target: str, hint: str) -> str | None:
     """Return the unit that a name states, of those from which the column can be made."""
+    return read_unit(target, hint)[0]
+
+
+def read_unit(target: str, hint: str) -> tuple[str | None, float]:
+    """Return the unit that a name states, and the factor before it, as in "[1e6]", "(10 kHz)" or "/ 1e-9"; 0 of one that may go either way, as in "x1e6"."""
     units = units_of(target)
     if hint.strip().lower() == target.lower():
-        return next(iter(units))
-    stated = re.findall(BRACKETED, hint)
-    words = re.split(r"[\s_]+", re.sub(BRACKETED, " ", hint).strip())
-    texts = stated[-1:] or [" ".join(words[k:]) for k in range(len(words))]
-    spelled = (find_spelling(target, split_nominal(text)[0]) for text in texts)
+        return next(iter(units)), 1.0
+    hint = BEHIND.sub(r" [\1]", POWERS.sub(r"1e\1", hint).translate(RAISED))
+    either_way = TIMES.search(hint)
+    hint = hint if either_way is None else hint[: either_way.start()] + hint[either_way.end() :]
+    stated = re.findall(BRACKETED, hint)[-1:]
+    bare = re.sub(BRACKETED, " ", hint).strip()
+    words = re.split(r"[\s_]+", bare)
+    number = NUMBER.match(stated[0]) if stated else None
+    text = stated[0][number.end() :] if stated and number else "".join(stated)
+    many = MANY if "Q" in units else {}
+    if number and not text and not re.search(r"[e./]|\d{3}", number[1], re.IGNORECASE):
+        number, text = None, stated[0]  # that of a channel
+    factor = _value(number[1]) if number else many.get(text.lower(), 1.0)
+    if factor != 1.0 and text.lower() in ("", *many):
+        hint, stated, factor = bare, [], factor * (many.get(text.lower(), 1.0) if number else 1.0)
+    texts = [text] if stated else [*(" ".join(words[k:]) for k in range(len(words))), bare.rpartition("/")[2]]
+    spelled = next(filter(None, (find_spelling(target, split_nominal(one)[0]) for one in texts)), None)
     described = (unit for pattern, unit in UNIT_WORDS if unit in units and re.search(pattern, hint.lower()))
-    return next(filter(None, (*spelled, *described)), None)
+    unit = spelled or next(described, None)
+    return unit, 0.0 if either_way is not None else 1.0 if stated and spelled is None else factor
+
+
+def _value(number: str) -> float:
+    over, _, under = number.partition("/")
+    return float(over) / float(under or 1)
 
 
 def _bids(hint: str, group: str = "") -> dict[str, int]:
@@ -111,7 +145,8 @@ def _unit_fits(target: str, hint: str) -> bool | None:
     """Tell whether the stated unit can belong to a column of the record; None where none is stated."""
     stated = re.findall(BRACKETED, hint)
     if stated:
-        return find_unit(target, f"[{stated[-1]}]") is not None or find_unit(target, hint.lower()) == "period-counts"
+        unit, factor = read_unit(target, hint)
+        return find_unit(target, f"[{stated[-1]}]") is not None or unit == "period-counts" or factor != 1.0
     return True if find_unit(target, hint) is not None else None
 
 

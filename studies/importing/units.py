@@ -85,7 +85,12 @@ _BY_ENDING: Mapping[str, Mapping[str, Unit]] = {
     "_dBm": {"dBm": _SAME},
     "_dB": {"dB": _SAME},
     "_W": {"W": _SAME, "mW": _times(1e-3, "x / 1000"), "uW": _times(1e-6, "x / 1e6")},
-    "inverse_q": {"1/Q": _SAME, "Q": _over(1.0, "1 / x"), "ppm": _times(1e-6, "x / 1e6")},
+    "inverse_q": {
+        "1/Q": _SAME,
+        "Q": _over(1.0, "1 / x"),
+        "ppm": _times(1e-6, "x / 1e6"),
+        "ppb": _times(1e-9, "x / 1e9"),
+    },
 }
 UNITS = "; ".join(", ".join(units) for units in _BY_ENDING.values())
 

@@ -255,7 +255,8 @@ def test_every_unit_of_every_column_is_right(target):
         "mdeg/h": 15e3, "mrad/s": np.deg2rad(15.0) / 3.6, "urad/s": np.deg2rad(15.0) / 3.6e-3, "mK": 298150.0, "mHz": 4430e3,
         "rpm": 15.0 / 3600 / 6, "V": 0.25, "mV": 250.0, "uV": 250e3, "kV": 0.25e-3,
         "deg": 45.0, "rad": np.pi / 4, "turns": 0.125, "counts": 17.0, "1/Q": 1e-7, "Q": 1e7, "dBm": -7.0, "dB": -7.0, "W": 2e-4, "mW": 0.2, "uW": 200.0,
-        "ppm": 0.1 if target == "inverse_q" else 1e6 * (4430.0 / 4400.0 - 1), "ppb": 1e9 * (4430.0 / 4400.0 - 1),
+        "ppm": 0.1 if target == "inverse_q" else 1e6 * (4430.0 / 4400.0 - 1),
+        "ppb": 100.0 if target == "inverse_q" else 1e9 * (4430.0 / 4400.0 - 1),
     }  # fmt: skip
     settings = {"clock_Hz": 10e6, "periods": 1000.0, "gate_s": 10.0, "nominal_Hz": 4400.0}
     found = []
@@ -623,11 +624,34 @@ def test_units_as_people_write_them(tmp_path, target, unit, reading, value):
         ("rate [µrad/s]", 'unit = "urad/s"'),
         ("Temperature [mK]", 'unit = "mK"'),
         ("rate [nrad/s]", '# to = "..."\n# unit'),  # a size that nobody knows is no rad/s
+        ("1/Q (ppb)", 'unit = "ppb"'),
+        ("f/kHz", 'unit = "kHz"'),
+        ("T/°C", 'unit = "degC"'),
+        ("Q x1e6", 'unit = "Q"\nscale = 0.0    # CHECK'),  # either way: 0 is refused
+        ("1/Q ×10^9", 'unit = "1/Q"\nscale = 0.0    # CHECK'),
+        ("f [Hz*1000]", 'unit = "Hz"\nscale = 0.0    # CHECK'),
+        ("Temp [2]", '# to = "..."\n# unit'),  # of a channel
+        ("frequency [Hz] 2", 'unit = "Hz"\n'),
     ],
 )
 def test_a_draft_takes_the_unit_in_brackets_with_its_prefix(tmp_path, name, drafted):
     (tmp_path / "a.csv").write_text(f"time_s,{name}\n" + "".join(f"{k},{3 + k % 7}.5\n" for k in range(30)))
     assert drafted in draft_map([str(tmp_path / "a.csv")]).text
+
+
+@pytest.mark.parametrize(
+    ("name", "column", "value"),
+    [
+        *((name, "inverse_q", 1 / 3.5e6) for name in ("Q [1e6]", "Q (×10^6)", "Q / 1e6", "Q in 1e6", "Q [Mio]", "Q 1e6")),
+        *((name, "inverse_q", 3.5e-9) for name in ("1/Q [1e-9]", "1/Q (10⁻⁹)", "1/Q / 10^-9", "1/Q [ppb]")),
+        ("f [10 kHz]", "frequency_Hz", 35e3), ("f / 1e3 Hz", "frequency_Hz", 3500.0), ("bias [0.01 °/h]", "bias_deg_per_h", 0.035),
+        ("T [100 K]", "housing_temperature_degC", 350 - 273.15), ("drive amplitude (100 mV)", "drive_amplitude_V", 0.35),
+    ],
+)  # fmt: skip
+def test_a_factor_in_a_heading_is_read(tmp_path, name, column, value):
+    """Once "Q / 1e6" became 1/Q = 0.3, and "Q [1e6]" nothing."""
+    (tmp_path / "a.csv").write_text(f"time_s;{name}\n" + "".join(f"{k};3.5\n" for k in range(30)))
+    assert draft_and_import(tmp_path / "a.csv", tmp_path)[column][0] == pytest.approx(value, rel=1e-12)
 
 
 @pytest.mark.parametrize(
