@@ -12,7 +12,10 @@ REGULAR = 1e-3  # largest departure from an even grid, as a part of the mean ste
 
 def read_columns(**columns: ArrayLike) -> list[NDArray[np.float64]]:
     """Return the named columns as arrays of floats, all finite and of one length."""
-    arrays = [np.asarray(values, dtype=float) for values in columns.values()]
+    try:
+        arrays = [np.atleast_1d(np.asarray(values, dtype=float)) for values in columns.values()]
+    except (TypeError, ValueError):
+        raise CompensationError(f"{' and '.join(columns)} must be columns of numbers.") from None
     for name, values in zip(columns, arrays, strict=True):
         if values.ndim != 1 or len(values) != len(arrays[0]):
             raise CompensationError(f"'{name}' has shape {values.shape}, but there are {len(arrays[0])} rows.")

@@ -25,7 +25,10 @@ class TransferFunction:
 
     def __post_init__(self) -> None:
         for name in ("numerator", "denominator"):
-            coefficients = np.trim_zeros(np.asarray(getattr(self, name), dtype=complex), "f")
+            try:
+                coefficients = np.trim_zeros(np.atleast_1d(np.asarray(getattr(self, name), dtype=complex)), "f")
+            except (TypeError, ValueError):
+                raise CompensationError(f"the {name} of a transfer function takes numbers.") from None
             if not np.all(np.isfinite(coefficients)):
                 raise CompensationError(f"the {name} of a transfer function has a coefficient that is not finite.")
             object.__setattr__(self, name, tuple(coefficients.tolist()) or (0j,))

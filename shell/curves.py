@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from shell.errors import ShellError, mm
+from shell.errors import ShellError, require_numbers, mm
 from shell.quadrature import Array, gauss
 
 Point = tuple[float, float]
@@ -85,6 +85,11 @@ class Line(Curve):
     end: Point
 
     def __post_init__(self) -> None:
+        for end in (self.start, self.end):
+            require_numbers(
+                "Line, from (r, z) to (r, z),",
+                *(end if isinstance(end, list | tuple) and len(end) == 2 else [end, None]),
+            )
         if not hypot(self.end[0] - self.start[0], self.end[1] - self.start[1]) > 0:
             raise ShellError(f"a line of the meridian has no length: both ends are at {self.start} m.")
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from shell.errors import ShellError
+from shell.errors import ShellError, require_numbers
 from shell.kernel import StrainTable, energy_weights, lame
 from shell.quadrature import Array
 
@@ -27,6 +27,7 @@ class Elastic:
     rho: float
 
     def __post_init__(self) -> None:
+        require_numbers("Elastic", self.E, self.nu, self.rho)
         if not self.E > 0:
             raise ShellError(f"Young's modulus must be positive, not {self.E:g} Pa.")
         if not -1 < self.nu < 0.5:

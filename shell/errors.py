@@ -16,6 +16,13 @@ class FoldedCells(ShellError):
     """A solid part whose cells would overlap."""
 
 
+def require_numbers(of: str, *values: object) -> None:
+    """Refuse what is no number, before it is compared with one."""
+    for value in values:
+        if isinstance(value, str) or not hasattr(value, "__float__"):
+            raise ShellError(f"{of} takes numbers, not {type(value).__name__}.")
+
+
 def mm(length: float) -> str:
     """A length (m) as the drawings and cards have it, for a message."""
     return f"{1e3 * length:.6g} mm"

@@ -16,7 +16,7 @@ from numpy.polynomial.legendre import legder, legval
 from numpy.typing import ArrayLike
 
 from shell.curves import Curve, scaled
-from shell.errors import ShellError, mm
+from shell.errors import ShellError, mm, require_numbers
 from shell.quadrature import Array, gauss
 
 Support: TypeAlias = Literal["free", "clamped-pole", "clamped-rim", "stem", "clamped-face"]
@@ -37,6 +37,7 @@ class Stem:
     def __post_init__(self) -> None:
         if self.side not in ("inner", "outer", "both"):
             raise ShellError(f"the side of a stem is inner, outer or both, not {self.side!r}.")
+        require_numbers("Stem", self.radius, self.fillet)
         if not self.radius > 0:
             raise ShellError(f"the stem radius must be positive, not {mm(self.radius)}.")
         if not self.fillet >= 0:
@@ -104,6 +105,10 @@ class Resonator:
     _starts: tuple[float, ...] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
+        if not isinstance(self.segments, list | tuple) or not all(hasattr(one, "length") for one in self.segments):
+            raise ShellError(
+                "a resonator takes the lines and arcs of its meridian, such as hemisphere(...) puts together."
+            )
         lengths = [segment.length for segment in self.segments]
         object.__setattr__(self, "_starts", tuple(np.concatenate([[0.0], np.cumsum(lengths)]).tolist()))
         _check_chain(self)

@@ -37,7 +37,10 @@ class Profile:
     value: NDArray[np.float64]  # array (N,), temperature in kelvin, or power in watt
 
     def __post_init__(self) -> None:
-        time, value = np.array(self.time, dtype=float), np.array(self.value, dtype=float)
+        try:
+            time, value = np.array(self.time, dtype=float), np.array(self.value, dtype=float)
+        except (TypeError, ValueError):
+            raise ThermalError("a profile takes numbers: times (s) and as many values.") from None
         if time.ndim != 1 or time.shape != value.shape or time.size < 2:
             raise ThermalError("a profile needs two or more times and as many values.")
         if not (np.isfinite(time).all() and np.isfinite(value).all()):

@@ -3,6 +3,7 @@
 import datetime
 import importlib
 import inspect
+import pickle
 import subprocess
 import sys
 from dataclasses import replace
@@ -18,8 +19,10 @@ import shell
 import shell.derivation
 import studies
 import studies.papers
+import studies.public
 import thermal
 from studies.cli import main
+from studies.errors import UNUSABLE_INPUT
 from studies.files.columns import read_columns
 from studies.record import TABLE_COLUMNS, read_record
 
@@ -138,6 +141,39 @@ def test_contract_what_is_no_file_card_or_run_is_refused_with_words(given):
     assert studies.law_of("free-dome").frequency(293.15) == studies.law_of(card).frequency(293.15)
     model = studies.read_model(given[1])
     assert studies.emit_c(model) == studies.emit_c(str(given[1]))
+
+
+def public_calls():
+    """Every public name that is called, but errors, with how many arguments it needs."""
+    names = [(name, getattr(studies.public, name)) for name in dir(studies.public)]
+    calls = [(name, one) for name, one in names if callable(one) and not name.endswith("Error")]
+    for name, one in calls:
+        kinds = [p for p in inspect.signature(one).parameters.values() if p.default is p.empty]
+        more = [p.name for p in kinds if p.kind is p.KEYWORD_ONLY]
+        yield name, one, sum(p.kind in (p.POSITIONAL_ONLY, p.POSITIONAL_OR_KEYWORD) for p in kinds), more
+
+
+@pytest.mark.parametrize("wrong", ["x", None, object(), {"a": 1}], ids=lambda one: type(one).__name__)
+@pytest.mark.parametrize(
+    ("name", "call", "count", "more"), list(public_calls()), ids=lambda one: one if isinstance(one, str) else ""
+)
+def test_contract_a_wrong_first_argument_of_any_public_name_is_told(
+    name, call, count, more, wrong, tmp_path, monkeypatch
+):
+    """`hrg.find_split("x")` ended in an AttributeError. Plain tables of data (nodes, modes) keep what they are given."""
+    monkeypatch.chdir(tmp_path)
+    try:
+        made = call(wrong, *[1.0] * (count - 1), **dict.fromkeys(more, 1.0))
+    except UNUSABLE_INPUT as error:
+        assert len(str(error).split()) > 4  # a sentence
+    else:
+        assert inspect.isclass(call)
+        assert isinstance(made, call)
+
+
+def test_a_public_name_is_pickled_and_keeps_its_signature():
+    assert pickle.loads(pickle.dumps(studies.public.find_split)) is studies.public.find_split
+    assert inspect.signature(studies.public.simulate) == inspect.signature(studies.simulate)
 
 
 def test_records_show_themselves_shortly_and_as_tables_and_pictures():
