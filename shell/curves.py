@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from shell.errors import ShellError, require_numbers, mm
+from shell.errors import ShellError, mm, require_numbers
 from shell.quadrature import Array, gauss
 
 Point = tuple[float, float]
