@@ -24,9 +24,10 @@ from studies.calibration.remarks import warn
 from studies.calibration.settled import SettledComparison, compare_settled
 from studies.errors import InputError
 from studies.instrument.display import display_name
-from studies.record import Record, repeats, with_bias
+from studies.record import Record, with_bias
 from studies.record.one_gyro import records_of_one_gyro
 from studies.record.plausible import check_card_frequency
+from studies.record.repeated import repeats
 from studies.simulation.variations import JUMP, SHIFT
 
 if TYPE_CHECKING:

@@ -14,6 +14,7 @@ from compensation.arrays import Array
 from studies.design.goals import HELD, Goals, Scalar, lay_goals, step
 from studies.design.interpolant import Interpolant, interpolate
 from studies.design.task import Task
+from studies.design.whole_steps import WholeSteps
 from studies.errors import InputError
 from studies.sweeps.search import Explorer
 
@@ -33,7 +34,6 @@ NEAR = 6.0  # half widths within which designs make the interpolant of a trust r
 PENALTY = 30.0  # of the excess over limits, in spreads, against the objective's
 GAIN = 1e-5  # of an objective's spread: less is none
 ASIDE = 0.05  # step of a parameter that is not free, in parts of its range
-MOST_CORNERS = 256  # of the grid of steps about a design
 
 
 class Search:
@@ -43,9 +43,10 @@ class Search:
         self.task, self.explorer = task, explorer
         self.low = np.array([p.low for p in task.study.parameters])
         self.width = np.array([p.high - p.low for p in task.study.parameters])
-        self.steps = np.array([one.step or 0.0 for one in task.keys.parameter])
         self.start = (task.start - self.low) / self.width
         self.rng = np.random.default_rng(task.keys.search.seed)
+        sizes = np.array([one.step or 0.0 for one in task.keys.parameter])
+        self.steps = WholeSteps(self.low, self.width, sizes, task.free)
         self.x = np.empty((0, len(self.low)))  # designs that have values, in parts of the ranges
         self.values = np.empty((0, len(task.columns)))
         self.seen: dict[bytes, Array | None] = {}  # every design looked at, in order, with its values
@@ -187,16 +188,16 @@ class Search:
 
     def settle(self, scalar: Scalar, best: int) -> int:
         """Return the best design whose parameters are whole steps, where the task asks for steps."""
-        if not self.steps.any():
+        if not self.steps.sizes.any():
             return best
         for _ in range(SETTLING):
             surface = self.local(self.x[best], FINE)
             x = self.x[best]
-            if not self._is_settled(x):
+            if not self.steps.are_met(x):
                 _, x = self._step(surface, scalar, x, *self._box(x, FINE))
-            judged = [(self._judge(surface, scalar, one), one) for one in self._corners(x)]
+            judged = [(self._judge(surface, scalar, one), one) for one in self.steps.about(x, self.rng)]
             self.look([one for _, one in sorted(judged, key=lambda pair: pair[0])[:TOGETHER]])
-            found = next((k for k in self.rank(scalar) if self._is_settled(self.x[k])), best)
+            found = next((k for k in self.rank(scalar) if self.steps.are_met(self.x[k])), best)
             if found == best:
                 break
             best = found
@@ -287,29 +288,3 @@ class Search:
     def _is_plain(self) -> NDArray[np.bool_]:
         """Return which designs have everything that is not free where it belongs."""
         return np.asarray((self.x[:, self.task.free :] == self.start[self.task.free :]).all(axis=1))
-
-    def _corners(self, x: Array) -> list[Array]:
-        """Return the designs of whole steps about one: of a settled one its neighbours, of another the corners around."""
-        choices: list[list[float]] = []
-        settled = self._is_settled(x)
-        for k in range(len(x)):
-            value = self.low[k] + x[k] * self.width[k]
-            if k >= self.task.free or not self.steps[k]:
-                choices.append([value])
-                continue
-            inside = self.low[k] - 1e-9 * self.width[k], self.low[k] + (1 + 1e-9) * self.width[k]
-            whole = value / self.steps[k]
-            near = (round(whole) - 1, round(whole), round(whole) + 1) if settled else (np.floor(whole), np.ceil(whole))
-            found = [float(n * self.steps[k]) for n in near if inside[0] <= n * self.steps[k] <= inside[1]]
-            choices.append(found or [value])
-        count = int(np.prod([len(one) for one in choices]))
-        grid = range(count) if count <= MOST_CORNERS else self.rng.choice(count, MOST_CORNERS, replace=False)
-        shape = tuple(len(one) for one in choices)
-        rows = [[one[i] for one, i in zip(choices, np.unravel_index(int(k), shape), strict=True)] for k in grid]
-        return [(np.array(row) - self.low) / self.width for row in rows]
-
-    def _is_settled(self, x: Array) -> bool:
-        free, steps = self.task.free, self.steps
-        values = (self.low + x * self.width)[:free]
-        off = np.abs(values - np.round(values / np.where(steps > 0, steps, 1.0)) * steps)
-        return bool((off[steps > 0] < 1e-9 * self.width[:free][steps > 0]).all())

@@ -7,8 +7,9 @@ import numpy as np
 
 from compensation.noise import white_rms
 from studies.errors import InputError
-from studies.record import Record, drop_repeats
+from studies.record import Record
 from studies.record.one_law import ANY_PATH, Course, Followed, Law, course_of, likeliest
+from studies.record.repeated import drop_repeats
 from studies.record.rest import DRIVING, check_record, without_stuck
 
 FREQUENCY, BIAS, RATE = "frequency_Hz", "bias_deg_per_h", "measured_rate_deg_per_s"

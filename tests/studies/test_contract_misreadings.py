@@ -15,8 +15,9 @@ from studies.fits.bias import study_bias
 from studies.fits.thermal import fit_thermal_constants
 from studies.inference.records import make_ready
 from studies.instrument.card import load_card, save_card
-from studies.record import Record, drop_repeats, read_record
+from studies.record import Record, read_record
 from studies.record.one_gyro import records_of_one_gyro
+from studies.record.repeated import drop_repeats
 from studies.record.rest import check_record
 from studies.resonator.law import law_of
 from studies.simulation.chamber import load_profile
