@@ -35,10 +35,14 @@ def test_limits_twins_share_the_likelihood_and_impossible_readings_have_no_assig
     assert assign(np.array([0.5]), np.full(1, 1e-3), [[0, 1, 2]], g, J) == []
 
 
+@pytest.fixture(scope="module")
+def from_file():
+    return studies.calibrate(*CARD)
+
+
 @pytest.mark.slow
-def test_recovery_of_modulus_and_wall_with_a_mode_of_unknown_harmonic():
-    card = load_card(CARD[0])
-    found = invert(card, read_modes(str(CARD[1])))
+def test_recovery_of_modulus_and_wall_with_a_mode_of_unknown_harmonic(from_file):
+    found, card = from_file, load_card(CARD[0])
     assert [(m.harmonic, m.index) for m in found.fit.modes] == [(2, 0), (3, 0), (0, 0)]
     assert decided(found)
     assert not found.warnings
@@ -110,14 +114,16 @@ def test_contract_a_mode_stands_once_and_alone(tmp_path, refuse):
     assert "alone" in refuse(["calibrate", str(CARD[0]), str(path), str(run)])
 
 
-def test_contract_from_python_as_from_the_command_line():
-    """A table of modes by path or of pandas; the result is short, and a table of values."""
-    path = CARD[1]
-    one = studies.calibrate(CARD[0], path)
-    same = studies.calibrate(CARD[0], pd.read_csv(path, comment="#"))
+@pytest.mark.slow
+def test_contract_from_python_as_from_the_command_line(from_file, monkeypatch):
+    """A table of modes by path or of pandas is the same table; the result is short, and a table of values."""
+    path, one = CARD[1], from_file
     assert repr(one).startswith("ModeCalibration(")
     assert len(repr(one)) < 120
-    assert same.to_frame().equals(one.to_frame())
+    monkeypatch.setattr("studies.inversion.invert.invert", lambda card, readings, *_: readings)
+    same = studies.calibrate(CARD[0], pd.read_csv(path, comment="#"))
+    for name in ("harmonic", "index", "frequency", "sd", "temperature"):
+        np.testing.assert_array_equal(getattr(same, name), getattr(one.readings, name))
     assert one.to_frame().loc["resonator.thickness_mm", "told_by"] == "data"
     with pytest.raises(InputError, match="alone"):
         studies.calibrate(CARD[0], path, path)

@@ -13,8 +13,9 @@ from studies.twin.plan import plan_twin
 from studies.twin.source import CORE, PROGRAM, sources
 from thermal.profile import Profile
 
-STRICT = ("-std=c11", "-Wall", "-Wextra", "-Werror", "-O1")
-SANITIZED = (*STRICT, "-O0", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
+STRICT = ("-std=c11", "-Wall", "-Wextra", "-Werror")
+OPTIMISED = (*STRICT, "-O2")
+SANITIZED = (*STRICT, "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
 CC = shutil.which("cc")
 needs_compiler = pytest.mark.skipif(CC is None, reason="no C compiler (cc) is on the path")
 

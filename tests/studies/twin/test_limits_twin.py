@@ -16,8 +16,8 @@ from studies.simulation.chamber import load_drive
 from studies.twin.plan import plan_twin
 from studies.twin.source import exposed
 from tests.studies.twin.building import (
+    OPTIMISED,
     SANITIZED,
-    STRICT,
     compile_twin,
     needs_compiler,
     run_twin,
@@ -63,7 +63,7 @@ def test_limits_shipped_card_over_ten_hours(card, folder):
     """A step, a ramp and soaks, ten hours in rows of 12 s: every column to 1e-9 of its largest value."""
     instrument = load_card(card)
     profile = write_profile(folder / "ten.csv", TEN_HOURS)
-    found = run_twin(compile_twin(instrument, folder / card, (*STRICT, "-O2")), profile, 12.0)
+    found = run_twin(compile_twin(instrument, folder / card, OPTIMISED), profile, 12.0)
     chamber = Profile(np.array(TEN_HOURS["time_s"]), 273.15 + np.array(TEN_HOURS["chamber_temperature_degC"]))
     expected = simulated(instrument, chamber, 12.0)
     assert set(expected) < set(found)
@@ -92,35 +92,45 @@ def programs():
     return [*thermal, *([one for one in row if one] for row in zip_longest(*columns))]
 
 
+DATED = (
+    (("clock-drift", "frequency_Hz"), ("ageing", "bias_deg_per_h"), ("leak", "inverse_q")),
+    (("periodic", "bias_deg_per_h"),),
+)
+"""Effects with a date that share a program, each alone in its column."""
+
+
+def test_every_effect_with_a_date_is_tried():
+    assert {name for row in DATED for name, _ in row} == {name for name, effect in library().items() if effect.dated}
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("name", [name for name, effect in sorted(library().items()) if effect.dated])
-def test_limits_effect_with_a_date(name, bare, folder):
+@pytest.mark.parametrize("effects", DATED, ids=lambda one: "+".join(name for name, _ in one))
+def test_limits_effect_with_a_date(effects, bare, folder):
     """A profile's '# start' places the run in time: what has a date goes on from it; without a start, or before the date, it begins."""
-    effect = library()[name]
-    entry = one_effect(name, effect.responses[0]) | {"since": "2026-03-01T12:00:00"}
-    if name == "periodic":
-        entry["restarts_each_run"] = 0.0
-    instrument = load_card("free-dome").with_table("effect", [entry])
-    program = compile_twin(instrument, folder / "dated", (*STRICT, "-O0"))
-    profile, column = folder / "dated.csv", effect.responses[0]
-    first = None
-    spellings = ("2026-03-04 23:30+05:45", "2026-04-01T00:00:00Z", "2028-02-29") if name == "ageing" else ()
+    entries = [one_effect(*one) | {"since": "2026-03-01T12:00:00"} for one in effects]
+    for entry in entries:
+        entry |= {"restarts_each_run": 0.0} if entry["name"] == "periodic" else {}
+    instrument = load_card("free-dome").with_table("effect", entries)
+    program = compile_twin(instrument, folder / "dated")
+    profile, first = folder / "dated.csv", None
+    spellings = ("2026-03-04 23:30+05:45", "2026-04-01T00:00:00Z", "2028-02-29") if len(effects) > 1 else ()
     for start in ("", "2026-02-01T12:00:00", "2026-03-05T18:00:07.25", *spellings):
         write_profile(profile, RAMPS)
         profile.write_text((f"# start: {start}\n" if start else "") + profile.read_text())
         found, expected = run_twin(program, profile, 2.0), simulated(instrument, profile, 2.0)
         first = expected if first is None else first
-        moved = np.abs(expected[column] - first[column]).max() / np.abs(bare[column]).max()
-        assert (moved > 1e-8) == (start > "2026-03"), start
-        assert worst(found, expected)[column] < 1e-9, start
+        for _, column in effects:
+            moved = np.abs(expected[column] - first[column]).max() / np.abs(bare[column]).max()
+            assert (moved > 1e-8) == (start > "2026-03"), (start, column)
+            assert worst(found, expected)[column] < 1e-9, (start, column)
         assert read_record(program.parent / "record.csv").moment == load_drive(str(profile), rate=0.5).moment
     profile.write_text("# start: yesterday\n" + profile.read_text())
     done = subprocess.run([program, profile, folder / "no.csv"], capture_output=True, text=True, check=False)
     assert (done.returncode, "'# start' is no ISO 8601 time" in done.stderr) == (2, True)
 
 
-BY_DIFFERENCES = {"clock-offset": 1e-7, "rate-frequency": 1e-9, "rate-bias": 1e-9}
-"""The simulation and the twin take these rates as differences between rows, the one of both sides, the other of what has been."""
+BY_DIFFERENCES = {"clock-offset": 1e-7}
+"""The simulation and the twin take this rate as a difference between rows, the one of both sides, the other of what has been."""
 
 
 @pytest.fixture(scope="module")
@@ -134,7 +144,7 @@ def test_limits_effect(effects, bare, folder):
     """Every effect of the library, alone in its column, with all its coefficients, through ramps with moving commands."""
     instrument = load_card("free-dome").with_table("effect", [one_effect(*one) for one in effects])
     profile = folder / "ramps.csv"
-    found = run_twin(compile_twin(instrument, folder / "effect", (*STRICT, "-O0")), profile, 2.0)
+    found = run_twin(compile_twin(instrument, folder / "effect"), profile, 2.0)
     expected = simulated(instrument, profile, 2.0)
     errors = worst(found, expected)
     for name, response in effects:
@@ -160,7 +170,7 @@ def test_limits_wave_that_turns_freely(precession, control, folder):
     """Whole angle with every error of the electronics, ten hours, at a rate and by its command: up to fifty turns."""
     loop = {**ERRORS, "mode": "whole-angle", "self_precession_deg_per_s": precession, "quadrature_control": control}
     instrument = load_card("hrg-30mm-loops").with_table("loop", loop)
-    program = compile_twin(instrument, folder / "free", (*STRICT, "-O2"))
+    program = compile_twin(instrument, folder / "free")
     ten = TEN_HOURS | {"time_s": [0.0, 600.0, *TEN_HOURS["time_s"][2:]]}
     rate = {"rate_deg_per_s": [0.0, 0.01, -0.01, 0.02, 0.0]}
     for columns, row in ((ten, 12.0), (ten | rate, 12.0), ({k: RAMPS[k] for k in (*ten, *rate)}, 2.0)):
