@@ -167,13 +167,7 @@ class _Course:
         along, across = means[0], complex(command, 0.0 if self.stiff else means[1])
         if self.ideal:
             return along, across
-        seen = self.measured(psi)
-        c, s = math.cos(seen), math.sin(seen)
-        x, y = c * along - s * across, s * along + c * across
-        (xx, xy), (yx, yy) = self.drive
-        x, y = xx * x + xy * y, yx * x + yy * y
-        c, s = math.cos(psi), math.sin(psi)
-        return c * x + s * y, c * y - s * x
+        return _through(self.drive, along, across, self.measured(psi), psi)
 
     def turn(self, row: int, fraction: float, psi: float, means: Means) -> float:
         """ψ̇ (rad/s)."""
@@ -200,10 +194,17 @@ class _Course:
         """What the pick-offs add to amplitude, phase and quadrature."""
         if self.ideal:
             return np.zeros(4)
-        seen = self.measured(psi)
-        (xx, xy), (yx, yy) = self.pickoff
-        c, s = math.cos(psi), math.sin(psi)
-        x, y = xx * c + xy * s, yx * c + yy * s
-        c, s = math.cos(seen), math.sin(seen)
-        along, across = c * x + s * y, c * y - s * x
+        along, across = _through(self.pickoff, 1.0, 0.0, psi, self.measured(psi))
         return np.array([along.real - 1, along.imag, 0.0, across.imag])
+
+
+def _through(
+    channels: list[list[complex]], along: complex, across: complex, at: float, to: float
+) -> tuple[complex, complex]:
+    """What parts along and across an angle become in channels, along and across another angle."""
+    (xx, xy), (yx, yy) = channels
+    c, s = math.cos(at), math.sin(at)
+    x, y = c * along - s * across, s * along + c * across
+    x, y = xx * x + xy * y, yx * x + yy * y
+    c, s = math.cos(to), math.sin(to)
+    return c * x + s * y, c * y - s * x

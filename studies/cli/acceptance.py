@@ -161,9 +161,9 @@ def _drift(found: Acceptance) -> list[Figure | Sentence]:
 
     def draw() -> Drawing:
         with style.figure(height=3.6, x="averaging time τ (s)", y="Allan deviation (°/h)") as (made, axes):
-            style.draw_allan(axes, allan, style.BLUE, "overlapping Allan deviation, 90 % interval")
-            tau = np.geomspace(allan.tau[first], allan.tau[-1], 100)
-            axes.loglog(tau, noise.deviation(tau), "--", color=style.VERMILION, label="fit N, B, K")
+            style.draw_allan(
+                axes, allan, style.BLUE, "overlapping Allan deviation, 90 % interval; dashed: N, B, K", noise
+            )
             return made
 
     caption = "Allan deviation of the longest drift record."

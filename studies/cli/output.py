@@ -66,7 +66,7 @@ def answers(
                     from studies.results.page import render_result
 
                     with Stages("the page"):
-                        write_text(report, render_result(result))
+                        write_text(report, render_result(result.page() if result.page else result))
                     say(f"report: {report}")
                 if json:
                     print_json(result.payload | ({"report": report} if "report" in result.payload and page else {}))

@@ -23,10 +23,7 @@ SOLVERS = {"full": "each solved in full", "family": "interpolated between full s
 STATUS = ("state", "cases", "done", "failed", "seconds_each", "runs")
 
 
-Page = Annotated[str | None, Parameter(help="Write a page (HTML).")]
-
-
-@answers("hrg.study-status/1, with --dry-run hrg.study-estimate/1", page=False)
+@answers("hrg.study-status/1, with --dry-run hrg.study-estimate/1")
 def run(
     spec: str,
     *,
@@ -38,7 +35,6 @@ def run(
     retry_failed: bool = False,
     dry_run: bool = False,
     quiet: Quiet = False,
-    report: Page = None,
 ) -> Result:
     """Run or resume a parametric study. Finished cases are kept and never computed again.
 
@@ -70,7 +66,6 @@ def run(
         raise InputError("--workers and --scheduler cannot be combined: give one of them.")
     if out is None and not dry_run:
         raise InputError("--out is missing: name the folder for the study.")
-    _check_page(report)
     study = read_study(spec, card)
     if dry_run:
         check_functions(study, allow_python)
@@ -80,9 +75,7 @@ def run(
         estimate = estimate_study(study, workers)
         payload = {"schema": "hrg.study-estimate/1", **vars(estimate)}
         fails = f"The nominal design fails: {estimate.nominal_fails}" if estimate.nominal_fails else None
-        told = Result(payload, f"Estimate of {study.name}", "", [_estimate_words(estimate), fails])
-        _write_page(told, report)
-        return told
+        return Result(payload, f"Estimate of {study.name}", "", [_estimate_words(estimate), fails])
     with resumable(out, "cases"):
         results = run_study(
             spec, out, card=card, workers=workers, scheduler=scheduler, allow_python=allow_python,
@@ -96,11 +89,8 @@ def run(
         f"No tolerances were found: {one['failed']}" if "failed" in one else tolerance_table(results, one)
         for one in searches
     ]
-    parts = [done, _reasons(results), *tolerances]
-    if report is not None:
-        _write_page(_found(results), report)
-        say(f"report: {report}")
-    return Result(found, f"Study {study.name}", "What was computed.", parts, 4 if failed else 0)
+    parts, title = [done, _reasons(results), *tolerances], f"Study {study.name}"
+    return Result(found, title, "What was computed.", parts, 4 if failed else 0, page=lambda: _found(results))
 
 
 @answers("hrg.study-status/1")
@@ -123,11 +113,12 @@ def report(folder: Folder, *, report: Annotated[str | None, Parameter(name=("--r
     Args:
         report: The page; default: report.html in the folder.
     """
-    results = open_results(folder)
-    _check_page(report)
-    page = str(report or Path(folder) / "report.html")
+    from studies.results.page import render_result
+
+    results, page = open_results(folder), str(report or Path(folder) / "report.html")
+    check_ending("--report", page, "a report is an HTML page", ".html", ".htm")
     found = _found(results)
-    _write_page(found, page)
+    write_text(page, render_result(found))
     _say_unfinished(results, folder)
     told = f"report on {_done(results)} cases: {page}\n"
     return replace(found, payload={**found.payload, "report": page}, printed=told)
@@ -155,23 +146,11 @@ def export(folder: Folder, *, out: str | None = None, part_rows: Annotated[int, 
     return Result(payload, "Export", "", [f"{_done(results)} cases: {path}; units: {units}"])
 
 
-def _check_page(path: str | None) -> None:
-    if path is not None:
-        check_ending("--report", path, "a report is an HTML page", ".html", ".htm")
-
-
 def _found(results: Results) -> Result:
     from studies.reports.sweep import study_result
 
     say("writing the page, with mode shapes if the study has modes ...")
     return study_result(results)
-
-
-def _write_page(result: Result, path: str | None) -> None:
-    from studies.results.page import render_result
-
-    if path is not None:
-        write_text(path, render_result(result))
 
 
 def _done(results: Results) -> str:

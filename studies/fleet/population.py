@@ -26,7 +26,7 @@ from studies.fleet.device import Measured
 # Scatters that are tried, in parts of the range of the values: three may stand close by chance.
 GRID = np.geomspace(1e-3, 1e3, 100)
 CHANCE = 0.01  # chance, with all looks counted, below which a device or a batch is odd
-CENTRES, WIDTHS = np.linspace(np.log(1e-5), np.log(1e2), 50), np.array([0.25, 0.5, 1.0, 1.5, 2.0, 3.0])
+CENTRES, WIDTHS = np.linspace(np.log(1e-5), np.log(1e2), 33), np.array([0.35, 0.7, 1.4, 2.8])
 """Values of m and v that are tried."""
 FEWEST = 4  # devices from which on values tell who is odd
 CLEAR = 2.0  # scatter of the others, beyond which a batch is more than another batch
@@ -72,7 +72,7 @@ def _grid(value: Array, sd: Array) -> Array:
 
 
 def _usual(scatters: Array, scale: float) -> Array:
-    """Return how likely the scatters of a grid are for every m and v, (300, grid): the ends stand for all beyond."""
+    """Return how likely the scatters of a grid are for every m and v, (centres × widths, grid): the ends stand for all beyond."""
     middle = 0.5 * (np.log(scatters[1:]) + np.log(scatters[:-1])) - np.log(scale)
     below = scipy.special.ndtr((middle - CENTRES[:, None, None]) / WIDTHS[:, None])
     return np.diff(below.reshape(-1, len(middle)), prepend=0.0, append=1.0)

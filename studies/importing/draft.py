@@ -96,7 +96,9 @@ def _group(paths: Sequence[str]) -> list[list[str]]:
 
 def _continues(paths: Sequence[str]) -> bool:
     """Tell whether the times of one file go on in the other; what the draft leaves to be filled matters to no time."""
-    draft = [line.replace("= 0.0    # CHECK", "= 1.0    # CHECK") for line in _draft_file(paths[0], ())[0]]
+    draft = [
+        line.replace("= 0.0    # CHECK", "= 1.0    # CHECK") for line in _draft_look(paths[0], look_at(paths[0]), ())[0]
+    ]
     try:
         file = _load_text(draft)
         return file.sample_period is None and bool(read_series(paths, file))
@@ -112,7 +114,7 @@ def _load_text(lines: Sequence[str]) -> FileMap:
 def _find_offsets(paths: Sequence[str], files: list[list[str]]) -> list[str]:
     """Offer the offset between the first file's clock and each other's, where their columns share enough."""
     try:
-        series = [read_series([path], _load_text(_draft_file(path, ())[0])) for path in paths]
+        series = [read_series([path], _load_text(_draft_look(path, look_at(path), ())[0])) for path in paths]
         shifts = [shift_between(series[0], other) for other in series]
     except InputError:  # the draft is not complete yet: nothing can be compared
         return []
@@ -201,10 +203,6 @@ def _describe_notation(path: str, look: Look) -> list[str]:
 
 def _lines_above(look: Look) -> list[str]:
     return [" ".join(row) for row in look.rows[: look.data if look.header is None else look.header]]
-
-
-def _draft_file(path: str, taken: Sequence[str]) -> tuple[list[str], list[str], list[str]]:
-    return _draft_look(path, look_at(path), taken)
 
 
 def _draft_look(path: str, look: Look, taken: Sequence[str]) -> tuple[list[str], list[str], list[str]]:

@@ -228,6 +228,7 @@ class Result:
     status: int = 0  # the exit status, where it is not 0
     printed: str | None = None  # what the terminal shows instead of the parts, such as code or LaTeX
     sources: Sequence[str] = field(default=())
+    page: "Callable[[], Result] | None" = None  # what the page shows instead, made only when it is written
 
     @property
     def chapters(self) -> list[Chapter]:

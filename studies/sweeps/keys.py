@@ -17,6 +17,7 @@ else:
 
 SCHEMA = "hrg.study/1"
 MOST_CASES = 20_000_000
+MOST_CORNERS = 6  # parameters up to which every corner of a box is looked at
 DRAWN = ("latin-hypercube", "sobol", "sensitivity")
 POWERS = ("sobol", "sensitivity")
 

@@ -14,14 +14,13 @@ from studies.sweeps.definition import Study, StudyParameter
 from studies.sweeps.design import draw, nominal_row
 from studies.sweeps.engine import BATCH_VECTORISED, compute
 from studies.sweeps.evaluate import WorkPlan
-from studies.sweeps.keys import Search, ToleranceSearch, WorstCase
+from studies.sweeps.keys import MOST_CORNERS, Search, ToleranceSearch, WorstCase
 from studies.sweeps.store import Store
 from studies.sweeps.tolerance import place_limits
 from studies.sweeps.workers import Workers
 
 STEP = 1e-2  # of a range, for differences: large against the solver's noise
 MOST_FACTORS = 20  # factors of the tolerances that are tried
-MOST_CORNERS = 6  # parameters up to which every corner of the box is computed
 
 
 class SearchFailed(RuntimeError):

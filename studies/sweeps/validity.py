@@ -8,9 +8,9 @@ from shell.constants import zero_Celsius
 from studies.errors import UNUSABLE_INPUT, InputError
 from studies.sweeps.definition import Study
 from studies.sweeps.design import nominal_design
+from studies.sweeps.keys import MOST_CORNERS
 from studies.sweeps.parameters import TEMPERATURE, set_parameters
 
-MOST_CORNERS = 6  # parameters up to which all corners of the box are looked at
 SAMPLES = ("latin-hypercube", "sobol")
 
 
