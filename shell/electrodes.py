@@ -8,7 +8,8 @@ derivative is a spring of negative stiffness, -ε₀ V²/g³ per area, which low
 for each orientation of the mode (shell.imperfection.pair). For a full ring of electrodes this is δ(ω²)/ω² =
 -ε₀ V²/(g³ ρ h ω²) times the mode factor h ∫ w² dA / ∫ |u|² dV. The waves of the gap enter through 1/g³, all orders of it. The frequency
 is the root, f √(1 + δ(ω²)/ω²): exact where the springs leave the shape of the mode, which on a shell moves it by less than 1e-2 (δ(ω²)/ω²)².
-The stress by the static pull, ½ ε₀ V²/g² per area, is left out: as that of a pressure on a ring, 1.5 g/R of the softening of n = 2.
+The stress by the static pull, ½ ε₀ V²/g² per area, and the field's curvature between round faces are left out: of the softening of a ring's
+n = 2 they take 1.5 g/R and give back 0.5 g/R (less where the electrodes stand around it), far less than a gap's own uncertainty makes.
 """
 
 from collections.abc import Sequence

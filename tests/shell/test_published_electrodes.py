@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scipy.linalg import eigh
 
+from shell.curves import Line
 from shell.elastic import Elastic, find_constants
 from shell.electrodes import VACUUM, Electrode, Electrodes, reach, ring_of_electrodes, trim_voltages
 from shell.errors import ShellError
@@ -14,6 +15,7 @@ from shell.imperfection import Pair, wave
 from shell.imperfection.block import condense
 from shell.meridian import hemisphere
 from shell.modes import solve_modes
+from shell.resonator import Resonator
 from shell.sparse import assemble_elements
 
 SILICA = Elastic(72.7e9, 0.17, 2203.0)
@@ -56,6 +58,42 @@ def test_a_thin_dome_feels_its_mode_factor_of_rayleighs_solution():
         shift = Electrodes(Pair(mode), ring_of_electrodes(1, 1.0, 0.01), 100e-6).soften().shift
         found.append(shift / uniform_softening(mode.frequency, 2203.0, ratio * R, 100e-6, 0.01))
     assert 2 * found[1] - found[0] == pytest.approx(expected, rel=1e-3)
+
+
+def squares_of_a_ring(volts, gap, h, width):
+    """ω² of the n = 2 mode of an elastic ring in a coaxial electrode: curvatures of its energy with exact geometry, stretched by the pull."""
+    theta, I = 2 * pi * np.arange(64) / 64, width * h**3 / 12
+
+    def energy(a, w, v):
+        r, turned = R + a + w * np.cos(2 * theta), 1 + 2 * v / R * np.cos(2 * theta)
+        dr, ddr, bent = -2 * w * np.sin(2 * theta), -4 * w * np.cos(2 * theta), -4 * v / R * np.sin(2 * theta)
+        length = np.hypot(dr, r * turned)
+        curvature = (dr * (2 * dr * turned + r * bent) - r * turned * (ddr - r * turned**2)) / length**3
+        stretch, bend = length / R - 1, (curvature * length - 1) / R
+        elastic = 2 * pi * R * np.mean(0.5 * SILICA.E * (width * h * stretch**2 + I * bend**2))
+        return elastic - 0.5 * volts**2 * VACUUM * width * 2 * pi * np.mean(
+            turned / np.log1p((R + gap - r) / (r + h / 2))
+        )
+
+    a, d = 0.0, 1e-9
+    for _ in range(6):
+        below, here, above = (energy(a + side * d, 0, 0) for side in (-1, 0, 1))
+        a -= d * (above - below) / 2 / (above - 2 * here + below)
+    d, rest = 2e-6, energy(a, 0, 0)
+    mixed = sum(s * t * energy(a, s * d, t * d) for s in (-1, 1) for t in (-1, 1)) / 4
+    w, v = (sum(energy(a, *(s * d * one)) for s in (-1, 1)) - 2 * rest for one in np.eye(2))
+    return float(np.linalg.eigvalsh([[w, mixed], [mixed, v]])[0]) / d**2 / (SILICA.rho * width * h * pi * R)
+
+
+def test_limits_what_the_static_pull_and_the_round_field_take_of_the_softening_is_one_gap_over_radius():
+    """The stress of the pull takes 1.5 g/R, the curvature of the field gives 0.5 g/R back: the springs alone are so much too soft."""
+    h, width, gap, volts = 0.15e-3, 1e-3, 300e-6, 30.0
+    ring = Resonator((Line((R, 0.0), (R, width)),), ((0.0, h), (1.0, h)))
+    (mode,) = solve_modes(ring, SILICA, 2)
+    electrodes = Electrodes(Pair(mode), ring_of_electrodes(1, 1.0, volts), gap, face="outer")
+    true, plain = (squares_of_a_ring(one, gap, h, width) for one in (volts, 0.0))
+    springs = electrodes.mean * (2 * pi * mode.frequency) ** 2
+    assert (springs / (true - plain) - 1) / (gap / R) == pytest.approx(1.0, abs=0.2)
 
 
 @pytest.mark.parametrize("first", [0.0, 0.6])
