@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from studies.cli import main
+from studies.effects import find_effect
 from studies.instrument.card import load_card
 from tests.compensation.two_oscillators import Gyro, noisy
 from tests.golden.answers import CASES
@@ -69,8 +70,12 @@ def test_the_first_block_holds_the_two_commands():
 
 @pytest.mark.slow
 def test_commands_of_the_first_hour_run_in_order(folder, monkeypatch, capsys):
-    """But for those whose words have a golden answer, or are asked by `test_contract_derive`; sliders have tests of their own."""
+    """But for those whose words have a golden answer, or are asked by `test_contract_derive`; sliders have tests of their own.
+
+    A plan is of two effects: that of all is a golden answer.
+    """
     monkeypatch.chdir(folder)
+    two = {name: find_effect(name) for name in ("second-lag", "jump")}
     monkeypatch.setattr("studies.reports.live.live_blocks", lambda *_: [])
     assert len(COMMANDS) > 20
     known = {case["words"] for case in CASES.values()} | {"derive --code c"}
@@ -79,7 +84,10 @@ def test_commands_of_the_first_hour_run_in_order(folder, monkeypatch, capsys):
         assert program == "hrg"
         if words[:1] == ["optimise"] or shlex.join(words) in known:
             continue  # tests/studies/design runs this task
-        status = main(words)
+        with monkeypatch.context() as patch:
+            if "--plan" in words:
+                patch.setattr("studies.inference.signatures.library", lambda: two)
+            status = main(words)
         said, told = capsys.readouterr()
         if status == 3 and "OpenGL" in told:
             continue

@@ -11,6 +11,8 @@ from studies.instrument.card import load_card
 from studies.record import Record
 from studies.workbench import diagnose_records
 
+pytestmark = pytest.mark.slow
+
 
 def _run(offset, random):
     return Record(
@@ -22,7 +24,6 @@ def _run(offset, random):
     )
 
 
-@pytest.mark.slow
 def test_what_a_card_states_of_its_turn_ons_is_no_contradiction():
     """Runs that scatter as stated are of one device; one that lies sixteen times as far is asked about, card or no card."""
     random, offsets = np.random.default_rng(5), (-0.4, 0.2, 0.6)
@@ -49,14 +50,12 @@ def _diagnose(levels, stated, drift=0.0):
     return diagnose_records(records, card).verdict
 
 
-@pytest.mark.slow
 def test_one_turn_on_beyond_what_is_stated_is_no_ageing():
     far = _diagnose((-0.1, 0.2, 9.1, -0.3), 0.3)
     assert (far.verdict, far.causes) == ("adequate", ())
     assert "run2.csv: its bias lies +9" in far.responses["bias_deg_per_h"].remark
 
 
-@pytest.mark.slow
 def test_a_bias_that_rises_from_run_to_run_is_ageing_where_turn_ons_are_stated():
     old = _diagnose((0.0, 0.1, -0.1, 0.1), 0.1, 2.0)
     assert [cause.effect for cause in old.causes] == ["ageing"]

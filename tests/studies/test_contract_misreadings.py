@@ -286,8 +286,9 @@ def with_another():
     ],
     ids=["degF", "degF of one", "sign", "exchanged", "bias sign", "per day"],
 )
-@pytest.mark.parametrize("work", [lambda runs: make_ready(runs), lambda runs: records_of_one_gyro(runs, print)])
-@pytest.mark.parametrize("k", [0, 1, 2])
+@pytest.mark.parametrize(
+    ("work", "k"), [(make_ready, 1), *((lambda runs: records_of_one_gyro(runs, print), k) for k in range(3))]
+)
 def test_one_run_read_otherwise_than_the_others_is_named(runs, work, read, said, k):
     """A diagnosis named a second lag, a hysteresis or an ageing; a fit left the run out unsaid."""
     with pytest.raises(InputError, match=f"run{k}.csv: .*{said}"):

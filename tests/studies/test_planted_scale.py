@@ -317,10 +317,16 @@ def test_settled_rows():
 
 
 @pytest.mark.parametrize(
-    ("files", "words"), [([1, 2], "of several rates"), ([0, 1, 1], "both runs at rest"), ([], "DATA is missing")]
+    ("files", "more", "words"),
+    [
+        ([1, 2], [], "of several rates"),
+        ([0, 1, 1], [], "both runs at rest"),
+        ([], [], "DATA is missing"),
+        ([0, 1, 2], ["--cutoff", "200"], "200 Hz is impossible"),
+    ],
 )
-def test_missing_runs_are_named(records, files, words, refuse):
-    assert words in refuse(["fit", "scale", *(records[i] for i in files)])
+def test_missing_runs_and_an_impossible_cut_off_are_named(records, files, more, words, refuse):
+    assert words in refuse(["fit", "scale", *(records[i] for i in files), *more])
 
 
 @pytest.mark.parametrize("files", [[0], [0, 1], [0, 2]])
@@ -357,10 +363,6 @@ def test_a_rate_table_over_temperature_is_enough(tmp_path, ask):
     found = ask(["fit", "scale", str(path)])
     assert found["undetermined"] == []
     assert found["error_held_out_deg_per_s"] < 0.1 * found["error_before_deg_per_s"]
-
-
-def test_impossible_cut_off_is_refused(records, refuse):
-    assert "200 Hz is impossible" in refuse(["fit", "scale", *records, "--cutoff", "200"])
 
 
 def test_the_command_compensates_a_record_of_raw_counts(records, fitted, tmp_path, ask):

@@ -9,8 +9,8 @@ from tests.sketches import coarsen
 
 @pytest.fixture
 def coarser(monkeypatch):
-    """A diagnosis takes so few means of a run as show what is asserted."""
-    coarsen(monkeypatch, 120)
+    """A diagnosis takes as few means of a run as the batch of campaigns."""
+    coarsen(monkeypatch, 60)
 
 
 @pytest.fixture

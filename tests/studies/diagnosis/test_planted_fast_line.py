@@ -9,6 +9,8 @@ from studies.inference.diagnosis import blocks_of
 from studies.record import Record
 from studies.workbench import diagnose_records
 
+pytestmark = pytest.mark.slow
+
 ROWS, SAMPLING, LAG, NOISE = 2880, 5.0, 900.0, 4e-4  # rows a run, s, s, Hz
 
 
@@ -37,7 +39,6 @@ def amplitude(cause):
     return np.hypot(cause.parameters["sine_Hz"].value, cause.parameters["cosine_Hz"].value)
 
 
-@pytest.mark.slow
 def test_without_a_line_the_blocks_are_the_usual_ones_and_what_is_left_decides():
     campaign = a_campaign(60.0, size=0.0)
     assert blocks_of(campaign) == blocks_of(a_campaign(17.0)) == 200
@@ -52,7 +53,6 @@ def test_without_a_line_the_blocks_are_the_usual_ones_and_what_is_left_decides()
     assert states == ["adequate", "not-identifiable", "not-identifiable", "unexplained"]
 
 
-@pytest.mark.slow
 def test_a_line_of_less_than_two_steps_is_named_on_a_finer_grid():
     campaign = a_campaign(60.0)
     assert ROWS * SAMPLING / blocks_of(campaign) <= 60.0 / 2.5
@@ -63,7 +63,6 @@ def test_a_line_of_less_than_two_steps_is_named_on_a_finer_grid():
     assert verdict.responses["frequency_Hz"].noise == pytest.approx(NOISE, rel=0.05)
 
 
-@pytest.mark.slow
 def test_a_line_that_no_grid_resolves_is_said_to_be_there():
     """Means over a block show nothing of it: fitted, the record is as good as noise, and its noise is 2.3 times too large."""
     verdict = diagnose_records(a_campaign(17.0)).verdict
@@ -74,7 +73,6 @@ def test_a_line_that_no_grid_resolves_is_said_to_be_there():
     assert "a part of at most 1.3 h" in verdict.next_experiment
 
 
-@pytest.mark.slow
 def test_a_shorter_stretch_resolves_it():
     """A row is then a step, a reading at a moment: the amplitude is that of the line, not that of its means."""
     verdict = diagnose_records(a_campaign(17.0, runs=1, rows=900)).verdict

@@ -20,6 +20,8 @@ from thermal.network import Boundary, Conductor, Node, Radiator, assemble
 from thermal.profile import Profile, parse_profile
 from thermal.radiative import integrate
 
+pytestmark = pytest.mark.slow
+
 STEP, RUN, PAUSE = 60.0, 9000.0, 2400.0  # s
 SLOW, SHARE, NOISE = 15000.0, 0.08, 1e-3  # s, –, Hz
 LEVELS = ((55.0, -5.0), (-15.0, 50.0))
@@ -56,7 +58,7 @@ def follow(housing, tau, share):
     return out
 
 
-@pytest.mark.slow
+@pytest.mark.usefixtures("coarser")
 @pytest.mark.parametrize("seed", [0, 1])
 def test_a_late_thermometer_is_named_beside_radiation_and_a_second_lag(seed):
     """Late by a minute, it was told as mounting stress or a second lag: a late sensor was tried only where the gyro is ahead of it."""
@@ -77,7 +79,7 @@ def test_a_late_thermometer_is_named_beside_radiation_and_a_second_lag(seed):
     assert {"radiation", "thermometer-lag"} <= set(named)
 
 
-@pytest.mark.slow
+@pytest.mark.usefixtures("coarser")
 def test_a_slow_mass_that_the_runs_before_have_warmed_is_one_cause(only):
     """The second path starts every run with what it has kept; it was once called mounting stress, ageing and a jump."""
     only("second-lag", "mounting-stress", "ageing", "jump")
@@ -103,7 +105,6 @@ def a_resonator_behind(housing_words, follow):
     return Record(columns, path="run.csv", sha256="0")
 
 
-@pytest.mark.slow
 def test_radiation_takes_the_form_of_its_own_size():
     """A lump with 40 % of its conductance by radiation over 100 K."""
 
@@ -143,7 +144,6 @@ def a_run_through_a_dip(card):
     return [Record({name: record[name] for name in kept}, path="run.csv", sha256="1")]
 
 
-@pytest.mark.slow
 @pytest.mark.usefixtures("fine")
 def test_a_narrow_dip_that_is_crossed_once_is_not_called_a_jump(only):
     """A first look at a grid of dips sees less than half of what it sees of a jump: a hop is sharp and lies between its shapes."""
@@ -176,7 +176,7 @@ def judge(records):
     return diagnose_records(records).verdict
 
 
-@pytest.mark.slow
+@pytest.mark.usefixtures("coarser")
 def test_runs_that_lie_apart_are_not_adequate_and_start_times_would_show_why(only):
     only("ageing", "jump", "clock-drift")
     verdict = judge(runs([0.0, 0.05, -0.03]))
@@ -191,7 +191,6 @@ def test_runs_that_lie_apart_are_not_adequate_and_start_times_would_show_why(onl
     assert "start times" not in timed.remark
 
 
-@pytest.mark.slow
 def test_a_bias_that_differs_from_run_to_run_is_adequate_as_turn_on_and_what_else_it_may_be_is_said():
     rng, records = np.random.default_rng(5), []
     for k, offset in enumerate((0.0, 4.0)):
@@ -204,7 +203,6 @@ def test_a_bias_that_differs_from_run_to_run_is_adequate_as_turn_on_and_what_els
     assert "turn-on" in result.remark
 
 
-@pytest.mark.slow
 def test_inseparable_pair_gets_a_measurement_and_no_run():
     rng = np.random.default_rng(11)
     records = []
@@ -235,7 +233,6 @@ def one_lag(k, late=0.0, by_rate=0.0):
     return Record({name: values[::10] for name, values in columns.items()}, path=f"run{k}.csv", sha256=str(k))
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("hidden", "said"),
     [
@@ -277,7 +274,6 @@ def lumps_of_silica(words, seed, base=(200.0, 0.25), capacity=60.0, stem=0.05, s
     return Record(columns, path=f"run{seed}.csv", sha256=str(seed))
 
 
-@pytest.mark.slow
 @pytest.mark.usefixtures("fine")
 def test_a_healthy_gyro_of_several_lumps_is_followed_to_its_noise_and_its_card_predicts_an_unseen_run():
     """Lags in series, whose lumps take no heat, left 60 times the noise; two runs left the level of the bias open by 10 °/h."""
@@ -292,7 +288,6 @@ def test_a_healthy_gyro_of_several_lumps_is_followed_to_its_noise_and_its_card_p
         assert np.sqrt(np.mean((told[name] - unseen[name]) ** 2)) < 1.5 * noise
 
 
-@pytest.mark.slow
 @pytest.mark.usefixtures("coarser")
 def test_a_light_shell_whose_capacity_grows_is_followed_to_its_noise_and_gets_no_effect():
     """The search for a heat path once ended where straight lines had no more to take: 6 mHz were left, and two effects named."""
@@ -313,7 +308,6 @@ LUMPS = {
 }  # fmt: skip
 
 
-@pytest.mark.slow
 @pytest.mark.usefixtures("coarser")
 def test_two_lumps_behind_noisy_thermometers_are_diagnosed(only):
     """One lag in the small noise of two was led to a housing below 0 K, and the records, which are healthy, were refused."""
@@ -333,7 +327,7 @@ def test_two_lumps_behind_noisy_thermometers_are_diagnosed(only):
     assert verdict.responses["frequency_Hz"].extended[0] == pytest.approx(2e-3, rel=0.15)
 
 
-@pytest.mark.slow
+@pytest.mark.usefixtures("coarser")
 def test_plain_lags_in_series_that_radiate_along_are_told_with_their_one_share():
     """The cause asked a path without a direct share for it, and the diagnosis ended in a fault."""
     law = LUMPS["law"] | {"lag_s": 1500.0, "second_lag_s": 400.0, "radiated_share": 0.4}
@@ -347,7 +341,6 @@ def test_plain_lags_in_series_that_radiate_along_are_told_with_their_one_share()
     assert "direct_share" not in named["radiation"]
 
 
-@pytest.mark.slow
 @pytest.mark.usefixtures("coarser")
 def test_a_chamber_logged_by_another_clock_in_one_run_is_found():
     """30 s in one of three runs whose rows are 20 s apart: the chamber moves smoothly, so its clock is known better than its rows."""
@@ -365,7 +358,6 @@ def test_a_chamber_logged_by_another_clock_in_one_run_is_found():
     assert cause.parameters["run"].value == 2.0
 
 
-@pytest.mark.slow
 def test_what_rounding_leaves_is_no_structure():
     """A bias that follows the temperature, read in steps far above its noise: it was unexplained, or had a cross-damping."""
     step, noise = 0.25, 0.005

@@ -35,12 +35,20 @@ def frequencies(runs, *besides):
     return [replace(run, columns={k: v for k, v in run.columns.items() if k not in left_out}) for run in runs]
 
 
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(autouse=True)
+def few(coarser):
+    """Few means, but where a test asks for all (`fine`)."""
+
+
 @pytest.fixture(scope="module")
 def shipped():
-    return load_card("hrg-30mm")
+    """A shell of ten cells, in what is simulated as in what is fitted."""
+    return load_card("hrg-30mm").with_values({"thermal.cells": 10})
 
 
-@pytest.mark.slow
 def test_a_virtual_record_of_the_card_is_adequate(shipped):
     """With a bias by rate too: a card's own k4 was once left in the record and named rate-bias."""
     stated = shipped.with_table("bias", {"k1_deg_per_h_per_Hz": 0.2, "k4_deg_per_h_s_per_Hz": 300.0})
@@ -49,7 +57,6 @@ def test_a_virtual_record_of_the_card_is_adequate(shipped):
     assert max(abs(shift.shift_sd) for shift in verdict.calibration) < 1.0
 
 
-@pytest.mark.slow
 def test_a_set_point_that_the_air_follows_late_is_no_second_lag(shipped, only):
     """A minute between set point and housing was read as a slow sensor, carried into the frequency and mended by a second lag."""
     only("second-lag", "thermometer-lag")
@@ -61,7 +68,6 @@ def test_a_set_point_that_the_air_follows_late_is_no_second_lag(shipped, only):
     assert APART in verdict.notes
 
 
-@pytest.mark.slow
 def test_what_a_loss_peak_does_to_the_bias_is_no_second_cause(only):
     """Anisotropy of damping makes bias of 1/Q (Lynch 1995): a peak of the one was once named cross-damping in the other too."""
     card = load_card("cvg-25mm")
@@ -77,7 +83,6 @@ def test_what_a_loss_peak_does_to_the_bias_is_no_second_cause(only):
     assert carried == pytest.approx(largest, rel=0.2)
 
 
-@pytest.mark.slow
 @pytest.mark.usefixtures("fine")
 def test_an_effect_is_not_taken_for_values_far_from_the_card(only):
     """A gradient's dT/dt was once fitted as eleven standard deviations of the housing's lag, with other causes to mend it."""
@@ -90,8 +95,6 @@ def test_an_effect_is_not_taken_for_values_far_from_the_card(only):
     assert {cause.kind for cause in verdict.causes} == {"physics"}
 
 
-@pytest.mark.slow
-@pytest.mark.usefixtures("coarser")
 def test_what_leads_in_straight_lines_is_not_taken_before_its_rivals_are_followed(only):
     """A gradient's dT/dt of a device far from its card, its housing not measured: two values of the card were named, and the rest was unexplained."""
     card = load_card("cvg-25mm")
@@ -107,7 +110,6 @@ def test_what_leads_in_straight_lines_is_not_taken_before_its_rivals_are_followe
 WAYS = ("cycle 20 -10 40 1 30min 1", "step 20 35 2h then ramp 35 0 1 then soak 0 90min")
 
 
-@pytest.mark.slow
 def test_a_mass_that_the_card_lacks_is_no_other_value(shipped):
     """Six joules per kelvin beside the base were told as mounting stress and five wrong values: they left no slow noise that asked for another lag."""
     mass = {"second_mass_J_per_K": 6.0, "second_mass_conductance_W_per_K": 0.004}
@@ -116,8 +118,6 @@ def test_a_mass_that_the_card_lacks_is_no_other_value(shipped):
     assert [(cause.kind, cause.effect) for cause in verdict.causes] == [("physics", "second-lag")]
 
 
-@pytest.mark.slow
-@pytest.mark.usefixtures("coarser")
 def test_a_dip_is_one_cause_in_frequency_and_loss(shipped, only):
     """In drawn devices a dip of 1/Q far above its noise spared ever more rows of 1/Q once that of the frequency was left out, which then seemed idle.
 
@@ -151,7 +151,6 @@ def driven(card, seed=0):
     return frequencies(runs)
 
 
-@pytest.mark.slow
 def test_a_strong_effect_leaves_the_values_alone(only):
     """Beside an amplitude-frequency effect of a hundred times the noise, priors of the first fit's scale let three values go far."""
     card = load_card("bvg-bell")
@@ -161,7 +160,6 @@ def test_a_strong_effect_leaves_the_values_alone(only):
     assert max(abs(shift.shift_sd) for shift in verdict.calibration) < 2.0
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("seed", [2, 3])
 def test_bursts_of_outliers_beside_an_effect_are_no_jump(seed, only):
     """What stood out was settled before the effect was known: bursts that hid beside it were then named as jumps and dips."""
@@ -177,8 +175,6 @@ def test_bursts_of_outliers_beside_an_effect_are_no_jump(seed, only):
     assert [(cause.kind, cause.effect) for cause in causes] == [("physics", "amplitude-frequency")]
 
 
-@pytest.mark.slow
-@pytest.mark.usefixtures("coarser")
 def test_a_wrong_value_is_named_as_one(shipped, only):
     """The glass stiffens with temperature by four standard deviations of its law more than the card says; what could look like it contends."""
     only("curvature", "thermometer-scale", "mounting-stress", "second-lag", "radiation")
@@ -194,8 +190,6 @@ def test_a_wrong_value_is_named_as_one(shipped, only):
     assert frequency["shipped_rms"] > 20.0 * frequency["baseline"]["residual_rms"]
 
 
-@pytest.mark.slow
-@pytest.mark.usefixtures("coarser")
 @pytest.mark.parametrize(
     "cases", PACKS, ids=lambda cases: ", ".join(f"{name} {column[0]}" for name, column, _ in cases)
 )
@@ -208,7 +202,6 @@ def test_hidden_effects_are_named_saved_and_predict_an_unseen_chamber_profile(ca
         assert left < 1.1 or found.errors[response] < DEVIATIONS, (response, found.after, found.stated)
 
 
-@pytest.mark.slow
 def test_a_second_mass_on_the_base_is_named_with_its_size_and_predicts_an_unseen_run(shipped, only):
     """Four of a stranger's were named mounting-stress, with heat values out by a factor of two: no form of one lag more is exact behind a shell."""
     only("second-lag", "mounting-stress", "hysteresis")
@@ -225,7 +218,6 @@ def test_a_second_mass_on_the_base_is_named_with_its_size_and_predicts_an_unseen
     assert np.hypot(np.sqrt(np.mean((truth - told) ** 2)), noise) < 1.1 * noise
 
 
-@pytest.mark.slow
 def test_what_has_not_converged_is_no_card(shipped, tmp_path, capsys, monkeypatch, only):
     """Two steps do not reach what the records say: the answer is given, the card is not written."""
     only("rate-bias")
@@ -240,7 +232,6 @@ def test_what_has_not_converged_is_no_card(shipped, tmp_path, capsys, monkeypatc
     assert not (tmp_path / "out.toml").exists()
 
 
-@pytest.mark.slow
 def test_slow_noise_of_a_loss_of_which_the_card_states_none_is_noise():
     """A card has no key for it: a walk of 1/Q of three times its white noise left a healthy gyro unexplained."""
     card, random = load_card("hrg-30mm"), np.random.default_rng(1)
@@ -254,7 +245,6 @@ def test_slow_noise_of_a_loss_of_which_the_card_states_none_is_noise():
     assert not [cause for cause in found.causes if cause.response == "inverse_q"]
 
 
-@pytest.mark.slow
 def test_the_likeliest_of_many_forms_is_no_doubt():
     """Of 40 healthy gyros this one left the most, an evidence of 9.8: the likeliest of ten forms in noise alone."""
     card = load_card("bvg-bell")

@@ -28,7 +28,12 @@ LARGER = {"cross-damping": 40.0}
 """The same of what shows at the ends of the range, where the unseen profile hardly is."""
 DEVIATIONS = 1.96
 """An error is within so many of its standard deviations in 95 of 100 draws of the noise; of several independent ones, in more."""
-CARD_SAYS = {"bias.k1_deg_per_h_per_Hz": 0.5, "bias.damping_anisotropy": 0.0, "noise.bias_turn_on_deg_per_h": 0.02}
+CARD_SAYS = {
+    "thermal.cells": 10,
+    "bias.k1_deg_per_h_per_Hz": 0.5,
+    "bias.damping_anisotropy": 0.0,
+    "noise.bias_turn_on_deg_per_h": 0.02,
+}
 """The bias follows the temperature, without a second cause; offsets of turn-on of a tenth of the noise, beside which a drift of the bias
 from run to run is told."""
 COMMANDED = {
@@ -107,7 +112,7 @@ def recover(cases):
             own = {key: value * size if key in keys else value for key, value in shape.items()}
             return {"name": effect.name, "response": response, **own}
 
-        for _ in range(3):
+        for _ in range(3 if effect.thermal else 1):  # of the others the response goes with the size
             one = card.with_table("effect", [table(size)])
             runs = [0] if effect.once else [0, 1]
             added = rms([simulate(one, k)[response] - bare[k][response] for k in runs])

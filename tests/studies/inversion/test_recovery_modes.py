@@ -94,24 +94,23 @@ def test_contract_a_bad_row_is_named(tmp_path, rows, words):
         assert word in str(caught.value)
 
 
-def test_contract_a_table_without_its_harmonics_is_told_so(tmp_path, refuse):
-    path = tmp_path / "modes.csv"
-    path.write_text("frequency_Hz,sd_Hz\n4500,0.5\n")
-    assert "the column 'harmonic' is missing" in refuse(["calibrate", str(CARD[0]), str(path)])
+RUN = "time_s,housing_temperature_degC,frequency_Hz\n0,20,4500\n1,20,4500\n"
 
 
-def test_contract_exchanged_columns_are_named(tmp_path, refuse):
-    path = tmp_path / "modes.csv"
-    path.write_text("index,harmonic,frequency_Hz\n2,0,4600\n3,0,11927\n4,0,21402\n")
-    assert "harmonic and index are exchanged" in refuse(["calibrate", "free-dome", str(path)])
-
-
-def test_contract_a_mode_stands_once_and_alone(tmp_path, refuse):
-    path, run = tmp_path / "modes.csv", tmp_path / "run.csv"
-    path.write_text("harmonic,index,frequency_Hz\n2,0,4500\n2,0,4501\n")
-    run.write_text("time_s,housing_temperature_degC,frequency_Hz\n0,20,4500\n1,20,4500\n")
-    assert "twice" in refuse(["calibrate", str(CARD[0]), str(path)])
-    assert "alone" in refuse(["calibrate", str(CARD[0]), str(path), str(run)])
+@pytest.mark.parametrize(
+    ("card", "words", "tables"),
+    [
+        (CARD[0], "the column 'harmonic' is missing", ["frequency_Hz,sd_Hz\n4500,0.5\n"]),
+        ("free-dome", "harmonic and index are exchanged", ["index,harmonic,frequency_Hz\n2,0,4600\n3,0,11927\n4,0,21402\n"]),
+        (CARD[0], "twice", ["harmonic,index,frequency_Hz\n2,0,4500\n2,0,4501\n"]),
+        (CARD[0], "alone", ["harmonic,index,frequency_Hz\n2,0,4500\n", RUN]),
+    ],
+)  # fmt: skip
+def test_contract_a_table_that_cannot_be_used_is_refused(tmp_path, refuse, card, words, tables):
+    paths = [tmp_path / f"{k}.csv" for k in range(len(tables))]
+    for path, text in zip(paths, tables, strict=True):
+        path.write_text(text)
+    assert words in refuse(["calibrate", card, *paths])
 
 
 @pytest.mark.slow
