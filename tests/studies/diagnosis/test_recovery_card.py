@@ -110,14 +110,6 @@ def test_what_leads_in_straight_lines_is_not_taken_before_its_rivals_are_followe
 WAYS = ("cycle 20 -10 40 1 30min 1", "step 20 35 2h then ramp 35 0 1 then soak 0 90min")
 
 
-def test_a_mass_that_the_card_lacks_is_no_other_value(shipped):
-    """Six joules per kelvin beside the base were told as mounting stress and five wrong values: they left no slow noise that asked for another lag."""
-    mass = {"second_mass_J_per_K": 6.0, "second_mass_conductance_W_per_K": 0.004}
-    device = shipped.with_table("thermal", {**shipped.content["thermal"], **mass})
-    verdict = diagnose_records(frequencies(simulated(device, *WAYS)), shipped).verdict
-    assert [(cause.kind, cause.effect) for cause in verdict.causes] == [("physics", "second-lag")]
-
-
 def test_a_dip_is_one_cause_in_frequency_and_loss(shipped, only):
     """In drawn devices a dip of 1/Q far above its noise spared ever more rows of 1/Q once that of the frequency was left out, which then seemed idle.
 
@@ -160,13 +152,12 @@ def test_a_strong_effect_leaves_the_values_alone(only):
     assert max(abs(shift.shift_sd) for shift in verdict.calibration) < 2.0
 
 
-@pytest.mark.parametrize("seed", [2, 3])
-def test_bursts_of_outliers_beside_an_effect_are_no_jump(seed, only):
+def test_bursts_of_outliers_beside_an_effect_are_no_jump(only):
     """What stood out was settled before the effect was known: bursts that hid beside it were then named as jumps and dips."""
     card = load_card("bvg-bell")
     only("amplitude-frequency", "jump", "activity-dip", "ageing")
-    rng, runs = np.random.default_rng(seed), []
-    for run in driven(card, seed):
+    rng, runs = np.random.default_rng(2), []
+    for run in driven(card, 2):
         f = run["frequency_Hz"].copy()
         for at in rng.integers(20, len(f) - 20, 2):
             f[at : at + rng.integers(2, 9)] += rng.choice([-0.02, 0.02])
@@ -202,15 +193,16 @@ def test_hidden_effects_are_named_saved_and_predict_an_unseen_chamber_profile(ca
         assert left < 1.1 or found.errors[response] < DEVIATIONS, (response, found.after, found.stated)
 
 
-def test_a_second_mass_on_the_base_is_named_with_its_size_and_predicts_an_unseen_run(shipped, only):
-    """Four of a stranger's were named mounting-stress, with heat values out by a factor of two: no form of one lag more is exact behind a shell."""
-    only("second-lag", "mounting-stress", "hysteresis")
-    mass = {"second_mass_J_per_K": 5.0, "second_mass_conductance_W_per_K": 0.002}
+def test_a_second_mass_on_the_base_is_named_with_its_size_and_predicts_an_unseen_run(shipped):
+    """Six joules per kelvin beside the base were told as mounting stress and five wrong values, or with heat values out by a factor of two:
+    they left no slow noise that asked for another lag, and no form of one lag more is exact behind a shell."""
+    mass = {"second_mass_J_per_K": 6.0, "second_mass_conductance_W_per_K": 0.004}
     heavier = shipped.with_table("thermal", {**shipped.content["thermal"], **mass})
-    found = diagnose_records(frequencies(simulated(heavier, *PROFILES)), shipped)
+    found = diagnose_records(frequencies(simulated(heavier, *WAYS)), shipped)
     (cause,) = found.verdict.causes
-    assert (cause.effect, cause.equivalent, found.verdict.verdict) == ("second-lag", (), "explained")
-    for name, truth in {**mass, "second_time_constant_s": 2500.0}.items():
+    named = (cause.kind, cause.effect, cause.equivalent, found.verdict.verdict)
+    assert named == ("physics", "second-lag", (), "explained")
+    for name, truth in {**mass, "second_time_constant_s": 1500.0}.items():
         assert abs(cause.parameters[name].value - truth) < 3.0 * cause.parameters[name].sd, name
     assert max(abs(shift.shift_sd) for shift in found.verdict.calibration) < 1.0
     cards, noise = (heavier, extend(found).instrument), found.verdict.responses["frequency_Hz"].noise
