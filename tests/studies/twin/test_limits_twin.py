@@ -1,7 +1,6 @@
 """The C twin against the simulation that it stands for: shipped cards, every effect, drives, noise, sanitizers."""
 
 import subprocess
-from itertools import zip_longest
 from pathlib import Path
 
 import numpy as np
@@ -83,13 +82,14 @@ def one_effect(name, response):
 
 
 def programs():
-    """Effects that share a compiled program: a thermal one alone, of the others one for each response, alone in its column."""
+    """Effects that share a compiled program: a thermal one alone, of the others three in every column, where their errors add."""
     effects, responses = sorted(library().items()), ("frequency_Hz", "bias_deg_per_h", "inverse_q")
     thermal = [[(name, response)] for name, effect in effects if effect.thermal for response in effect.responses]
     columns = [
         [(name, r) for name, effect in effects if not effect.thermal and r in effect.responses] for r in responses
     ]
-    return [*thermal, *([one for one in row if one] for row in zip_longest(*columns))]
+    longest = max(map(len, columns))
+    return [*thermal, *([one for column in columns for one in column[k : k + 3]] for k in range(0, longest, 3))]
 
 
 DATED = (
@@ -135,28 +135,24 @@ BY_DIFFERENCES = {"clock-offset": 1e-7}
 
 @pytest.fixture(scope="module")
 def bare(folder):
-    return simulated(load_card("free-dome"), write_profile(folder / "ramps.csv", RAMPS), 2.0)
+    return simulated(load_card("free-dome"), write_profile(folder / "ramps.csv", RAMPS), 20.0)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("effects", programs(), ids=lambda one: "+".join(name for name, _ in one))
 def test_limits_effect(effects, bare, folder):
-    """Every effect of the library, alone in its column, with all its coefficients, through ramps with moving commands."""
-    instrument = load_card("free-dome").with_table("effect", [one_effect(*one) for one in effects])
-    profile = folder / "ramps.csv"
+    """Every effect of the library with all its coefficients, of which each moves its column, through ramps with moving commands."""
+    card, profile = load_card("free-dome"), folder / "ramps.csv"
+    instrument = card.with_table("effect", [one_effect(*one) for one in effects])
     found = run_twin(compile_twin(instrument, folder / "effect"), profile, 2.0)
-    expected = simulated(instrument, profile, 2.0)
-    errors = worst(found, expected)
+    errors = worst(found, simulated(instrument, profile, 2.0))
+    allowed = max(BY_DIFFERENCES.get(name, 1e-9) for name, _ in effects)
+    assert {column: error for column, error in errors.items() if error > allowed} == {}
     for name, response in effects:
+        alone = simulated(card.with_table("effect", [one_effect(name, response)]), profile, 20.0)
         columns = bare if library()[name].thermal else (response,)
-        moved = max(np.abs(expected[column] - bare[column]).max() / np.abs(bare[column]).max() for column in columns)
+        moved = max(np.abs(alone[column] - bare[column]).max() / np.abs(bare[column]).max() for column in columns)
         assert moved > 1e-8 or name == "jump", name
-        allowed = BY_DIFFERENCES.get(name, 1e-9)
-        assert {column: errors[column] for column in columns if errors.get(column, 0.0) > allowed} == {}, name
-    rest = set(errors) - {response for _, response in effects}
-    assert (
-        library()[effects[0][0]].thermal or {column: errors[column] for column in rest if errors[column] > 1e-9} == {}
-    )
 
 
 ERRORS = {f"{side}_{key}": 0.01 for side in ("pickoff", "drive") for key in ("gain_ratio", "phase_deg", "skew_mrad")}
