@@ -23,7 +23,6 @@ from studies.calibration.problem import CardProblem, State, wide_law
 from studies.calibration.remarks import warn
 from studies.calibration.settled import SettledComparison, compare_settled
 from studies.errors import InputError
-from studies.instrument.display import display_name
 from studies.record import Record, with_bias
 from studies.record.one_gyro import records_of_one_gyro
 from studies.record.plausible import check_card_frequency
@@ -34,7 +33,6 @@ if TYPE_CHECKING:
     from studies.instrument.card import Instrument
 
 Progress = Callable[[str], None]
-EXCLUDED = 6.0  # prior standard deviations that no value of a right card is away
 
 
 @dataclass(frozen=True)
@@ -85,14 +83,8 @@ class Calibration(OfEstimates):
             return "the fit did not converge. Keep more values fixed (--exact), or leave out the run that differs most"
         if all(one.told_by == "prior" for one in self.estimates):
             return "the data determine none of the card's values"
-        far = [
-            f"{display_name(one.parameter)} ({one.parameter})" for one in self.estimates if abs(one.shift_sd) > EXCLUDED
-        ]
-        if far:
-            return (
-                f"{', '.join(far)} would have to move by more than {EXCLUDED:g} of the card's standard deviations. Give the value that"
-                " may be wrong a tolerance in the card, or check that the data are of this gyro"
-            )
+        if self.excluded:
+            return f"{self.excluded}. Give the value that may be wrong a tolerance in the card, or check that the data are of this gyro"
         return None
 
 

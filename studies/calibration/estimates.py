@@ -12,6 +12,7 @@ from studies.calibration.fit import CardFit, whitened
 from studies.calibration.priors import Priors, from_standard, to_standard
 from studies.calibration.valley import find_bend, follow
 from studies.calibration.wave import Polar
+from studies.instrument.display import display_name
 from studies.instrument.uncertain import UncertainValue
 from studies.results.shown import Shown
 
@@ -25,6 +26,7 @@ NONLINEAR = ("thermal.", "noise.", "effect.", "resonator.")
 BENT = 0.25  # relative departure of the objective at the ends of an interval from its parabola, beyond which it is profiled
 TOLD = 0.5  # posterior over prior width up to which the data has said what the value is
 SILENT = 0.95  # and from which it stayed at its prior
+EXCLUDED = 6.0  # prior standard deviations that no value of a right card is away
 INSEPARABLE = 0.9  # correlation, of two values that share what is known of them
 
 
@@ -46,6 +48,17 @@ class Estimate:
     bound: str | None  # "low" or "high" where the value has reached a hard bound
     interval: str  # "profile" where the interval follows the likelihood's curvature
 
+    @classmethod
+    def of(
+        cls, value: UncertainValue, number: float, shift: float, sd: float, ends: Sequence[float],
+        bound: str | None = None, interval: str = "normal", width: float | None = None,
+    ) -> "Estimate":  # fmt: skip
+        """Make one of how far the value moved, its standard deviation and the ends of its interval, in coordinates of unit prior variance."""
+        low, high = (float(np.clip(from_standard(value, end), value.low, value.high)) for end in ends)
+        scale = value.sd * (number / value.value if value.logarithmic else 1.0)
+        span = min(low, number), max(high, number)
+        return cls(value.name, value.unit, value.value, number, *span, sd * scale, shift, width or sd, bound, interval)
+
     @property
     def told_by(self) -> str:
         """Who says so: the data, the prior, or both."""
@@ -62,6 +75,13 @@ class OfEstimates(Shown):
         """How many of the values the data determine, in words."""
         told = sum(one.told_by == "data" for one in self.estimates)
         return f"{told} of {len(self.estimates)} values determined by the data"
+
+    @property
+    def excluded(self) -> str:
+        """Which values are where the card all but excludes them, in words; empty where none is."""
+        far = [one.parameter for one in self.estimates if abs(one.shift_sd) > EXCLUDED]
+        named = ", ".join(f"{display_name(name)} ({name})" for name in far)
+        return named and f"{named} would have to move by more than {EXCLUDED:g} of the card's standard deviations"
 
     def to_frame(self) -> "DataFrame":
         """Return one row an uncertain value, best known first: card, value, interval, shift, width, told by."""
@@ -95,24 +115,7 @@ def estimate(fit: CardFit, profile: bool = True) -> tuple[Estimate, ...]:
         if bend is not None and kind == "normal" and max(abs(bend.low[k]), abs(bend.high[k])) > BENT * sd:
             ends, kind = (ends[0] + float(bend.low[k]), ends[1] + float(bend.high[k])), "profile"
             wide = float(bend.sd[k])
-        low, high = (float(np.clip(from_standard(value, end), value.low, value.high)) for end in ends)
-        number = at[value.name]
-        width = number * sd * value.sd / value.value if value.logarithmic else sd * value.sd
-        found.append(
-            Estimate(
-                value.name,
-                value.unit,
-                value.value,
-                number,
-                min(low, number),
-                max(high, number),
-                width,
-                float(z[k]),
-                wide,
-                bounds[k],
-                kind,
-            )
-        )
+        found.append(Estimate.of(value, at[value.name], float(z[k]), sd, ends, bounds[k], kind, wide))
     return tuple(found)
 
 
@@ -133,8 +136,7 @@ def over_the_wave(priors: Priors, point: Array, covariance: Array) -> tuple[dict
 
 def _told_polar(value: UncertainValue, one: Polar, seen: bool) -> Estimate:
     if not seen:
-        low, high = (float(np.clip(from_standard(value, z), value.low, value.high)) for z in (-NINETY, NINETY))
-        return Estimate(value.name, value.unit, value.value, value.value, low, high, value.sd, 0.0, 1.0, None, "normal")
+        return Estimate.of(value, value.value, 0.0, 1.0, (-NINETY, NINETY))
     sd = one.width * value.sd * (one.value / value.value if value.logarithmic else 1.0)
     shift = to_standard(value, one.value)
     return Estimate(

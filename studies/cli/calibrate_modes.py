@@ -12,7 +12,7 @@ import numpy as np
 from studies.cli.output import keep_card
 from studies.instrument.card import Instrument
 from studies.instrument.display import display_name
-from studies.inversion.invert import EXCLUDED, ModeCalibration, decided, invert
+from studies.inversion.invert import ModeCalibration, decided, invert
 from studies.inversion.readings import read_modes
 from studies.progress import Told
 from studies.reports.calibration import KEY, VALUE, VALUES, WIDTHS, best_known_first
@@ -68,11 +68,7 @@ def unsaved(found: ModeCalibration) -> str:
         return "the fit did not converge"
     if not decided(found):
         return "the assignment of a reading is not decided. Give its harmonic, or measure more modes"
-    far = [one.parameter for one in found.estimates if abs(one.shift_sd) > EXCLUDED]
-    if far:
-        named = ", ".join(f"{display_name(name)} ({name})" for name in far)
-        return f"{named} would have to move by more than {EXCLUDED:g} of the card's standard deviations"
-    return ""
+    return found.excluded
 
 
 def _payload(found: ModeCalibration, save: str | None) -> dict[str, Any]:

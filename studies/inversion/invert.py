@@ -16,7 +16,7 @@ import scipy
 from compensation.arrays import Array
 from compensation.constants import NINETY
 from studies.calibration.estimates import Estimate, OfEstimates, find_groups, posterior_card
-from studies.calibration.priors import Priors, check_exact, from_standard, gather_priors
+from studies.calibration.priors import Priors, check_exact, gather_priors
 from studies.errors import InputError
 from studies.instrument.card import Instrument
 from studies.inversion.assignment import assign
@@ -31,7 +31,6 @@ ABOVE = 1.15  # frequency of the highest candidate over the highest reading
 OTHER = 0.4  # of ln f, beyond which a reading is of another mode than is said
 NEAR, FAR, MOST_STEPS = 0.02, 0.02, 12  # posterior and prior standard deviations, Gauss-Newton steps
 RIVALS, UNLIKELY = 4, 20.0  # assignments that are fitted, and their cost above the best's
-EXCLUDED = 6.0  # prior standard deviations that no value of a right card is away
 UNDECIDED = 0.05  # probability of other assignments from which a reading's is not decided
 DOUBTED = 1e-3  # probability of so large a misfit, below which the intervals are widened by it
 
@@ -191,20 +190,10 @@ def _fit(model: ModeModel, modes: Sequence[Which], y: Array, relative: Array, J:
 def _estimates(priors: Priors, u: Array, covariance: Array) -> tuple[Estimate, ...]:
     z, at, bounds = priors.standard(u), priors.at(u), priors.bound(u)
     widths = np.sqrt(np.diag(priors.covariance(covariance)))
-    found = []
-    for k, value in enumerate(priors.values):
-        number, width = at[value.name], float(widths[k])
-        low, high = (
-            float(np.clip(from_standard(value, z[k] + side * NINETY * width), value.low, value.high))
-            for side in (-1.0, 1.0)
-        )
-        sd = width * value.sd * (number / value.value if value.logarithmic else 1.0)
-        found.append(
-            Estimate(
-                value.name, value.unit, value.value, number, low, high, sd, float(z[k]), width, bounds[k], "normal"
-            )
-        )
-    return tuple(found)
+    return tuple(
+        Estimate.of(value, at[value.name], float(own), float(sd), (own - NINETY * sd, own + NINETY * sd), bound)
+        for value, own, sd, bound in zip(priors.values, z, widths, bounds, strict=True)
+    )
 
 
 def _next_modes(model: ModeModel, fit: ModeFit, covariance: Array, readings: ModeReadings) -> tuple[NextMode, ...]:
