@@ -20,9 +20,9 @@ from numpy.typing import ArrayLike
 
 from thermal.constants import Stefan_Boltzmann
 from thermal.errors import ThermalError
+from thermal.lag import scan
 from thermal.network import Array, Network, linearise
 from thermal.profile import Profile
-from thermal.recurrence import scan
 from thermal.relaxation import Relaxation, find_relaxation
 from thermal.steady import MOST_ROWS, find_corners, initial_state
 from thermal.transient import Transient, propagate

@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from thermal.errors import ThermalError
+from thermal.lag import scan
 from thermal.network import Array, Network
 from thermal.profile import Profile
-from thermal.recurrence import scan
 from thermal.relaxation import find_relaxation
 from thermal.steady import boundary_forcing, find_corners, initial_state
 

@@ -12,13 +12,13 @@ import numpy as np
 import scipy
 
 from compensation.arrays import Array
-from compensation.memory import follow_lag
 from compensation.noise import white_rms
 from shell.constants import zero_Celsius
 from studies.calibration.noise_levels import LASTING
 from studies.calibration.observed import ObservedRun, SettledTable, observe
 from studies.instrument.card import SCHEMA, Instrument, build_instrument
 from studies.record import Record
+from thermal.lag import lag
 
 LAGS = np.geomspace(30.0, 3e4, 40)
 """Lags, s, among which one is looked for."""
@@ -126,7 +126,7 @@ def _followed(runs: Sequence[ObservedRun], column: str, tau: float, x0: float) -
     members = [run for run in runs if column in run.responses]
     for k, run in enumerate(members):
         blocks, t = run.responses[column], run.inner.time
-        follows = follow_lag(run.inner.profile.at(t), np.diff(t), tau) - x0
+        follows = lag(t, run.inner.profile.at(t), tau) - x0
         own = np.zeros((len(blocks.value), len(members)))
         own[:, k] = blocks.average(np.exp(-(t - t[0]) / tau))
         value.append(blocks.value)

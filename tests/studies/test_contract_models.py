@@ -14,7 +14,7 @@ from studies.models import Model, ModelSource, compensate, emit_c, format_model,
 from studies.models.kinds.frequency import evaluate, find_temperature, save_frequency
 from studies.record import Record, read_record, write_record
 from tests.compiled import compile_c
-from tests.lags import lag
+from thermal.lag import lag
 
 T = np.linspace(-20, 40, 7)
 F = 4424.9 + 0.3716 * T - 9.7e-4 * T**2 + 1.5e-5 * T**3 + 0.01 * np.cos(5 * T)

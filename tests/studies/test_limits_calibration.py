@@ -27,7 +27,7 @@ from studies.simulation.noise import bias_noise, frequency_noise
 from studies.simulation.prediction import law_for, predict
 from studies.simulation.variations import LAG
 from studies.simulation.virtual_gyro import simulate_run
-from tests.lags import lag
+from thermal.lag import lag
 from thermal.profile import Profile
 
 LEVEL = {"bias_white_deg_per_rt_h": 0.0, "bias_flicker_deg_per_h": 0.0, "bias_walk_deg_per_h_per_rt_h": 0.0}

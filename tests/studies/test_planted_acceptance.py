@@ -9,7 +9,7 @@ import pytest
 from studies.acceptance.measure import measure_scale, measure_temperature
 from studies.cli import main
 from studies.record import Record, read_record, write_record
-from tests.lags import lag
+from thermal.lag import lag
 
 TRUTH = {
     "warm_up_time_s": 400 * np.log(20),  # 20 e^{-t/400} reaches 1 deg/h

@@ -15,7 +15,7 @@ from studies.instrument.card import load_card
 from studies.record import Record, write_record
 from studies.resonator.law import law_of
 from studies.simulation.virtual_gyro import simulate_run
-from tests.lags import lag
+from thermal.lag import lag
 from thermal.network import Boundary, Conductor, Node, Radiator, assemble
 from thermal.profile import Profile, parse_profile
 from thermal.radiative import integrate

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from thermal.errors import ThermalError
+from thermal.lag import lag
 from thermal.network import Boundary, Conductor, Node, Radiator, Source, assemble, linearise
 from thermal.profile import Profile, constant, parse_profile
 from thermal.radiative import integrate
@@ -81,6 +82,8 @@ IMPOSSIBLE = {
     ).require_within(213.15, 423.15, "fused silica"),
     "above 0 K": lambda: find_steady_state(NETWORK, {"chamber": -20.0}),
     "above 0 K, not at -10 K": lambda: linearise(NETWORK, -10.0),
+    "must increase from row to row": lambda: lag([0.0, 1.0, 1.0], [300.0, 300.0, 300.0], 10.0),
+    "time constant must be positive": lambda: lag([0.0, 1.0], [300.0, 300.0], 0.0),
 }
 
 

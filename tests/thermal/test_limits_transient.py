@@ -6,12 +6,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.constants import Stefan_Boltzmann
 
-from compensation.memory import follow_lag
 from thermal import sweeping
+from thermal.lag import lag, scan
 from thermal.network import Boundary, Conductor, Node, Radiator, Source, assemble, linearise
 from thermal.profile import Profile, constant, parse_profile
 from thermal.radiative import integrate, simulate
-from thermal.recurrence import scan
 from thermal.sweeping import sweep
 from thermal.transient import check_energy, propagate
 
@@ -135,7 +134,7 @@ def test_lag_is_the_one_node_network():
     t = np.linspace(0.0, 5000.0, 301)
     T = 293.15 + np.sin(t / 700.0) - 1e-3 * t
     by_network = propagate(assemble(LUMP), {"b": Profile(t, T)}, initial=[280.0]).node("n", t)
-    assert follow_lag(T, np.diff(t), 2000.0, 280.0) == pytest.approx(by_network, rel=1e-13)
+    assert lag(t, T, 2000.0, initial=280.0) == pytest.approx(by_network, rel=1e-13)
 
 
 def test_scan_is_the_same_with_even_and_uneven_rows():
@@ -143,10 +142,10 @@ def test_scan_is_the_same_with_even_and_uneven_rows():
     t = np.sort(rng.uniform(0.0, 5000.0, 400))
     T = np.interp(t, [0.0, 2000.0, 5000.0], [290.0, 280.0, 300.0])
     even = np.linspace(0.0, 5000.0, 5001)
-    uneven = follow_lag(T, np.diff(t), 900.0, 290.0)
-    smooth = follow_lag(np.interp(even, [0.0, 2000.0, 5000.0], [290.0, 280.0, 300.0]), 1.0, 900.0, 290.0)
+    uneven = lag(t, T, 900.0, initial=290.0)
+    smooth = lag(even, np.interp(even, [0.0, 2000.0, 5000.0], [290.0, 280.0, 300.0]), 900.0, initial=290.0)
     start = np.interp(t[0], even, smooth)
-    assert follow_lag(T, np.diff(t), 900.0, float(start))[-1] == pytest.approx(np.interp(t[-1], even, smooth), abs=2e-2)
+    assert lag(t, T, 900.0, initial=start)[-1] == pytest.approx(np.interp(t[-1], even, smooth), abs=2e-2)
     assert uneven.shape == t.shape
     decay = np.full((50, 2), 0.9)
     forced = rng.normal(size=(50, 2))

@@ -7,8 +7,8 @@ from scipy.signal import lfilter
 from studies.inference.lack_of_fit import generic_bank, look
 from studies.record import Record
 from studies.workbench import diagnose_records
-from tests.lags import lag
 from tests.studies.diagnosis.bench import searched
+from thermal.lag import lag
 
 NOISE, TAU, FINE = 3e-4, 800.0, 1.0
 

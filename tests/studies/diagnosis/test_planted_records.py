@@ -14,8 +14,8 @@ from studies.record import Record
 from studies.simulation.drive import drive_by_profile, drive_by_record, rows_of
 from studies.simulation.virtual_gyro import simulate_run
 from studies.workbench import diagnose_records
-from tests.lags import lag
 from tests.studies.diagnosis.bench import searched
+from thermal.lag import lag
 from thermal.network import Boundary, Conductor, Node, Radiator, assemble
 from thermal.profile import Profile, parse_profile
 from thermal.radiative import integrate

@@ -18,7 +18,7 @@ from studies.record import read_record
 from studies.simulation.chamber import load_profile
 from studies.simulation.virtual_gyro import simulate_run
 from studies.workbench import simulate
-from tests.lags import lag
+from thermal.lag import lag
 
 TRUE = {
     "schema": "hrg.card/1",
