@@ -5,6 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
+from compensation.frequency import fit_frequency
 from studies.calibration.calibrate import calibrate
 from studies.errors import InputError
 from studies.instrument.card import load_card
@@ -16,6 +17,8 @@ from studies.simulation.chamber import load_profile
 from studies.simulation.virtual_gyro import simulate_run
 from studies.workbench import diagnose_records
 
+T = np.linspace(-20, 40, 7)
+MODEL = save_frequency(fit_frequency(T, 4424.9 + 0.3716 * T, 1), (), "test")
 QUESTION = "is this a record of that gyro\\? If it is, "
 
 
@@ -31,18 +34,19 @@ def record(card):
     return dataclasses.replace(made.with_columns({"frequency_Hz": made["frequency_Hz"] * 5000 / 4432}), path="run.csv")
 
 
-def test_calibrate_and_diagnose_ask(card, record):
-    with pytest.raises(
-        InputError, match="run.csv: frequency_Hz is near .* the card hrg-30mm resonates at 4432.*" + QUESTION
-    ):
-        calibrate(card, [record])
-    with pytest.raises(
-        InputError,
-        match="run.csv: frequency_Hz is near .*"
-        + QUESTION
-        + "give a dimension an uncertainty that covers the difference",
-    ):
-        diagnose_records([record], card)
+@pytest.mark.parametrize(
+    ("work", "of", "mend"),
+    [
+        (lambda card, run: calibrate(card, [run]), "the card hrg-30mm resonates at 4432", ""),
+        (lambda card, run: diagnose_records([run], card), "", "give a dimension an uncertainty that covers the difference"),
+        (lambda _, run: compensate(MODEL, run), "", "fit a model to its own records"),
+        (lambda _, run: find_temperature(MODEL, run["frequency_Hz"], "run.csv"), "", ""),
+    ],
+    ids=["calibrate", "diagnose", "compensate", "temperature"],
+)  # fmt: skip
+def test_they_ask(card, record, work, of, mend):
+    with pytest.raises(InputError, match=f"run.csv: frequency_Hz is near .*{of}.*{QUESTION}{mend}"):
+        work(card, record)
 
 
 def test_what_the_card_says_is_uncertain_confirms(card, record):
@@ -52,16 +56,6 @@ def test_what_the_card_says_is_uncertain_confirms(card, record):
     check_card_frequency(card, np.array([np.nan]), "run.csv")
 
 
-def test_compensate_and_temperature_ask(record):
-    from compensation.frequency import fit_frequency
-
-    T = np.linspace(-20, 40, 7)
-    model = save_frequency(fit_frequency(T, 4424.9 + 0.3716 * T, 1), (), "test")
-    with pytest.raises(
-        InputError, match="run.csv: frequency_Hz is near .*" + QUESTION + "fit a model to its own records"
-    ):
-        compensate(model, record)
-    with pytest.raises(InputError, match="run.csv: frequency_Hz is near .*" + QUESTION):
-        find_temperature(model, record["frequency_Hz"], "run.csv")
+def test_a_models_own_record_is_compensated():
     own = Record({"time_s": T, "housing_temperature_degC": T / 2, "frequency_Hz": 4424.9 + 0.1858 * T})
-    assert compensate(model, own)["compensated_frequency_Hz"] == pytest.approx(4424.9, abs=1e-3)
+    assert compensate(MODEL, own)["compensated_frequency_Hz"] == pytest.approx(4424.9, abs=1e-3)

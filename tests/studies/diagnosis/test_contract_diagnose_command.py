@@ -61,20 +61,24 @@ def test_units_off_by_a_thousand_are_named(campaign, refuse, tmp_path, column, f
     assert "b.csv" in said
 
 
-def test_missing_columns_are_named(campaign, refuse, tmp_path):
-    records, _ = campaign
-    cold = columns_of(records[0])
-    del cold["housing_temperature_degC"]
-    assert "housing_temperature_degC" in refuse(["diagnose", save(tmp_path, cold)])
-    dumb = {key: records[0].columns[key] for key in ("time_s", "housing_temperature_degC")}
-    assert "frequency_Hz" in refuse(["diagnose", save(tmp_path, dumb)])
+UNUSABLE = {
+    "no thermometer": (lambda c: c.pop("housing_temperature_degC"), "housing_temperature_degC"),
+    "no response": (lambda c: [c.pop(name) for name in ("frequency_Hz", "bias_deg_per_h", "inverse_q")], "frequency_Hz"),
+    "two rows": (lambda c: c.update({k: v[:2] for k, v in c.items()}), "too little for a diagnosis: frequency_Hz: "),
+    "ten rows": (lambda c: c.update({k: v[:10] for k, v in c.items()}), "too little for a diagnosis: frequency_Hz: "),
+    "nothing moves": (
+        lambda c: [c.pop("bias_deg_per_h"), c.pop("inverse_q"), c.update(frequency_Hz=np.full(c["time_s"].shape, 5000.0))],
+        "frequency_Hz: constant. Record more digits",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", UNUSABLE)
+def test_a_record_that_tells_nothing_is_refused(campaign, refuse, tmp_path, kind):
+    columns, (spoil, words) = columns_of(campaign[0][0]), UNUSABLE[kind]
+    spoil(columns)
+    assert words in refuse(["diagnose", save(tmp_path, columns)])
     refuse(["diagnose"])
-
-
-@pytest.mark.parametrize("rows", [2, 10])
-def test_few_rows_decide_nothing(campaign, refuse, tmp_path, rows):
-    few = {key: values[:rows] for key, values in campaign[0][0].columns.items()}
-    assert "too little for a diagnosis: frequency_Hz: " in refuse(["diagnose", save(tmp_path, few)])
 
 
 @pytest.mark.slow
@@ -103,12 +107,6 @@ def test_constant_temperature_is_adequate_and_says_what_cannot_show(ask, tmp_pat
     found = ask(["diagnose", save(tmp_path, columns)])
     assert found["verdict"] == "adequate"  # nothing beyond noise, and what could not show is said
     assert "K only" in found["responses"]["frequency_Hz"]["remark"]
-
-
-def test_a_response_that_stands_still_asks_for_more_digits(refuse, tmp_path):
-    time = np.arange(0.0, 20000.0, 20.0)
-    columns = {"time_s": time, "housing_temperature_degC": time / 1000.0, "frequency_Hz": np.full(time.shape, 5000.0)}
-    assert "frequency_Hz: constant. Record more digits" in refuse(["diagnose", save(tmp_path, columns)])
 
 
 @pytest.mark.parametrize("kind", ["run", "table"])
