@@ -32,7 +32,6 @@ def test_a_voltage_that_swings_about_its_mean_softens_and_never_stiffens(softeni
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("fine")
 def test_a_bias_alone_with_a_term_in_the_rate_finds_its_lag(only):
     """Without the effect no lag at all seems the best: the temperature comes forward as the rate does."""
     only("rate-bias", "curvature", "hysteresis", "cross-damping", "mounting-stress", "thermometer-lag")

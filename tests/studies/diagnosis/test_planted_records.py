@@ -143,7 +143,6 @@ def a_run_through_a_dip(card):
     return [Record({name: record[name] for name in kept}, path="run.csv", sha256="1")]
 
 
-@pytest.mark.usefixtures("fine")
 def test_a_narrow_dip_that_is_crossed_once_is_not_called_a_jump(only):
     """A first look at a grid of dips sees less than half of what it sees of a jump: a hop is sharp and lies between its shapes."""
     card = load_card("cvg-25mm")
