@@ -21,8 +21,9 @@ import scipy
 
 from shell.elastic import Elastic
 from shell.errors import ShellError
+from shell.points import MeridianPoints
 from shell.quadrature import Array, gauss, legendre
-from shell.resonator import MeridianPoints, Resonator
+from shell.resonator import Resonator
 
 ORDER = 32  # Gauss points on each smooth piece of the meridian
 N = 2  # the harmonic of the paper's pattern

@@ -11,8 +11,8 @@ from shell.cells import in_order
 from shell.errors import ShellError
 from shell.kernel import Orders
 from shell.patches import Part, Patch
+from shell.points import MeridianPoints
 from shell.quadrature import Array, legendre, lobatto, nodal, values_to_hierarchic
-from shell.resonator import MeridianPoints
 from shell.sparse import Index, Rows
 
 

@@ -9,7 +9,8 @@ from shell.blocks import Solid
 from shell.errors import ShellError
 from shell.layout import SMOOTH_JOINT
 from shell.patches import Cell, Patch, along, box, narrowed, rings, shrinking, straight, whole
-from shell.resonator import MeridianPoints, Resonator
+from shell.points import MeridianPoints
+from shell.resonator import Resonator
 
 Spot = tuple[float, float]
 
