@@ -9,6 +9,8 @@ from compensation.samples import robust_spread
 REACH = 3
 NEIGHBOURS = 2 * REACH + 1
 SPIKE, ALONE = 6.0, 4.0
+JUDGED = 16  # third differences beside readings that stay to an end
+TURNS, STEPS = 4, 5.0  # of their sign, and of the readings, from which on those are noise
 STUCK = 20  # readings in a row that are alike, where those beside them mostly differ, make a sensor that is stuck
 
 
@@ -39,20 +41,47 @@ def find_step(readings: Array) -> float:
 
 
 def find_stuck(values: Array) -> NDArray[np.bool_]:
-    """Mark readings (m,) of a stuck sensor: `STUCK` or more alike, of whose neighbours on either side at least half differ."""
-    marked, rows = np.zeros(len(values), dtype=bool), np.flatnonzero(np.isfinite(values))
+    """Mark readings (m,) of a stuck sensor: `STUCK` or more alike, of whose neighbours on either side at least half differ, or that noise leads to at an end."""
+    marked, rows = find_stuck_at_ends(values), np.flatnonzero(np.isfinite(values))
     if len(rows) < 3 * STUCK:
         return marked
     moves = np.concatenate([[0], np.cumsum(np.diff(values[rows]) != 0)])  # number of changes up to each reading
-    starts = np.flatnonzero(np.diff(moves, prepend=-1))
-    ends = np.append(starts[1:], len(rows))
-    long = ends - starts >= STUCK
-    for begin, end in zip(starts[long].tolist(), ends[long].tolist(), strict=True):
+    starts, ends = _alike(values[rows])
+    for begin, end in zip(starts.tolist(), ends.tolist(), strict=True):
         before, after = max(begin - STUCK, 0), min(end - 1 + STUCK, len(rows) - 1)
         changes = (moves[begin] - moves[before], moves[after] - moves[end - 1])
         if all(2 * n >= STUCK for n in changes):
             marked[rows[begin:end]] = True
     return marked
+
+
+def find_stuck_at_ends(values: Array) -> NDArray[np.bool_]:
+    """Mark readings (m,) alike, `STUCK` or more, from the first on or up to the last, beside which the others have noise: what settles has none, or goes on with it."""
+    marked, rows = np.zeros(len(values), dtype=bool), np.flatnonzero(np.isfinite(values))
+    if len(rows) < 2 * STUCK:
+        return marked
+    known = values[rows]
+    starts, ends = _alike(known)
+    for begin, end in zip(starts.tolist(), ends.tolist(), strict=True):
+        others = known[end:] if begin == 0 else known[:begin][::-1]
+        if (begin == 0) != (end == len(rows)) and _is_noisy(others[: JUDGED + 3], find_step(known)):
+            marked[rows[begin:end]] = True
+    return marked
+
+
+def _alike(known: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Return where `STUCK` or more readings in a row that are alike begin, and where they end."""
+    starts = np.flatnonzero(np.diff(known, prepend=np.nan) != 0)
+    ends = np.append(starts[1:], len(known))
+    long = ends - starts >= STUCK
+    return starts[long], ends[long]
+
+
+def _is_noisy(beside: Array, step: float) -> bool:
+    """Whether third differences are far above the rounding and turn their sign, as those of a bend do not."""
+    third = np.diff(beside, 3)
+    turns = np.count_nonzero(third[1:] * third[:-1] < 0)
+    return third.size == JUDGED and turns >= TURNS and float(np.median(np.abs(third))) >= STEPS * step
 
 
 def find_dropouts(values: Array) -> NDArray[np.bool_]:

@@ -2,24 +2,36 @@
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
+from itertools import combinations
 
 import numpy as np
 
 from compensation.noise import white_rms
 from studies.errors import InputError
 from studies.record import Record
-from studies.record.one_law import ANY_PATH, Course, Followed, Law, course_of, likeliest
+from studies.record.one_law import ANY_PATH, LEVELLED, Course, Followed, Law, course_of, likeliest
 from studies.record.repeated import drop_repeats
 from studies.record.rest import DRIVING, check_record, without_stuck
 
 FREQUENCY, BIAS, RATE = "frequency_Hz", "bias_deg_per_h", "measured_rate_deg_per_s"
 ONE_GYRO, STEEPEST = 5e-3, 3e-4  # relative, and 1/K: what one gyro does from run to run, and over temperature at most
+TIMES = {
+    "by 2: a counter of half periods, or a divider": 2.0,
+    "by 1000: one is in kHz": 1e3,
+    "by 2 π: one is in rad/s": 2.0 * np.pi,
+}
 UNITS = {"°/s": 3600.0, "°/day": 1 / 24, "rad/s": 3600.0 * 180.0 / np.pi, "m°/h": 1e-3}  # °/h in each
 AS_NOISE, AS_CHANGES = 2.0, 4.0  # times by which noise and changes may differ from what a unit makes of another run's
 WELL = 0.01  # of an output's changes (rms): where one law leaves no more, all runs are read alike
 CLEAR = 2.0  # times white noise (squares) that it must leave besides
 OTHERWISE = 0.4  # of what one law leaves (rms): left with one run read otherwise; of 210 campaigns by others none had less than 0.7
 ALONE, FAR = 0.1, 5e-5  # of the same: left with a run apart; and by how much of the frequency it is then
+APART, NEXT = (
+    0.25,
+    2.0,
+)  # likewise by a law of any heat path, which leaves less; and times as much with any other run apart
+FARTHER = 3e-4  # of the frequency, from which on that law tells: jumps and ageing are less
+HOURS = (1, -1, 2, -2)  # by which clocks of two loggers differ: summer time, time zones
 BEND = 0.1  # of the changes of a frequency: a temperature in another unit would bend its law to its needs
 LAW, ONE = replace(ANY_PATH, bend=BEND), Law(bend=BEND)
 
@@ -28,10 +40,12 @@ def records_of_one_gyro(records: Sequence[Record], say: Callable[[str], None]) -
     """Return the records that a command may take together, and say what is left out or doubted."""
     kept, said = drop_repeats(records)
     said += filter(None, map(check_record, kept))
+    kept = [without_stuck(record) for record in kept]
     check_one_gyro(kept)
     check_one_unit(kept)
     check_one_sign(kept)
     check_one_reading(kept)
+    check_one_clock(kept)
     if (odd := run_apart(kept)) is not None:
         k, away = odd
         said.append(
@@ -40,7 +54,7 @@ def records_of_one_gyro(records: Sequence[Record], say: Callable[[str], None]) -
         )
     for sentence in said:
         say(sentence)
-    return [without_stuck(record) for record in kept]
+    return kept
 
 
 def check_one_gyro(records: Sequence[Record]) -> None:
@@ -54,15 +68,21 @@ def check_one_gyro(records: Sequence[Record]) -> None:
             )
             level, warm = float(np.median(f[known])), float(np.median(T)) if T.size else np.nan
             levels.append((level, warm, float(np.ptp(f[known])) / level, record.path or "a record"))
-    for near, warm, span, path in levels:
-        for other, warmth, spanned, first in levels:
-            moved = STEEPEST * abs(warm - warmth)
-            if abs(float(np.log(near / other))) > ONE_GYRO + (moved if np.isfinite(moved) else span + spanned):
-                at, there = (f" at {T:.3g} °C" if np.isfinite(T) else "" for T in (warm, warmth))
-                raise InputError(
-                    f"{path}: frequency_Hz is about {near:.6g} Hz{at}, in {first} about {other:.6g} Hz{there}:"
-                    " no gyro changes so much. The records are of different gyros, or one is in another unit: give those of one."
-                )
+    usual = float(np.median([level for level, *_ in levels])) if levels else np.nan
+    for one, other in combinations(levels, 2):
+        moved = STEEPEST * abs(one[1] - other[1])
+        allowed = ONE_GYRO + (moved if np.isfinite(moved) else one[2] + other[2])
+        apart = abs(float(np.log(one[0] / other[0])))
+        if apart > allowed:
+            (odd, warm, _, path), (level, warmth, _, first) = sorted(
+                (one, other), key=lambda own: -abs(float(np.log(own[0] / usual)))
+            )
+            at, there = (f" at {T:.3g} °C" if np.isfinite(T) else "" for T in (warm, warmth))
+            words = next((words for words, times in TIMES.items() if abs(abs(np.log(times)) - apart) < allowed), "")
+            raise InputError(
+                f"{path}: frequency_Hz is about {odd:.6g} Hz{at}, in {first} about {level:.6g} Hz{there}:"
+                f" no gyro changes so much{words and f' ({words})'}. The records are of different gyros, or one is in another unit: give those of one."
+            )
 
 
 def check_one_unit(records: Sequence[Record]) -> None:
@@ -130,14 +150,50 @@ def check_one_reading(records: Sequence[Record]) -> None:
             )
 
 
+def check_one_clock(records: Sequence[Record]) -> None:
+    """Refuse a run whose temperature and frequency were logged by clocks that are hours apart."""
+    drive = _drive_of(records)
+    members, runs = _courses(records, drive, FREQUENCY)
+    if len(runs) < 2:
+        return
+    moved = [
+        (k, hours, one)
+        for hours in HOURS
+        for k, run in enumerate(runs)
+        if (one := run.earlier(3600.0 * hours)) is not None
+    ]
+    tried = [likeliest([*runs[:k], one, *runs[k + 1 :]], LAW) for k, _, one in moved]
+    best = _better(runs, likeliest(runs, LAW), tried, APART) if tried else None
+    if best is not None and _alone(
+        [one for one, (k, *_) in zip(tried, moved, strict=True) if k != moved[best][0]], tried[best]
+    ):
+        k, hours, _ = moved[best]
+        raise InputError(
+            f"{_path(records, members[k])}: {drive} is {abs(hours)} h {'behind' if hours > 0 else 'ahead of'} {FREQUENCY}:"
+            " moved so, one law holds in all runs. Were they logged by two clocks? Move one of the columns in time, or leave the record out."
+        )
+
+
 def run_apart(records: Sequence[Record]) -> tuple[int, float] | None:
     """Return which record lies far from the law of the others, and by how many Hz; None where none does."""
     members, runs = _courses(records, _drive_of(records), FREQUENCY)
     if len(runs) < 2:
         return None
-    k = _better(runs, likeliest(runs, ONE), (likeliest(runs, ONE, [k]) for k in range(len(runs))), ALONE, 0.0)
-    away = 0.0 if k is None else likeliest(runs, ONE, [k]).apart
-    return (members[k], away) if k is not None and abs(away) > FAR * runs[k].output.mean() else None
+    for law, part, far in ((ONE, ALONE, FAR), (LEVELLED, APART, FARTHER)):
+        alone = [likeliest(runs, law, [k]) for k in range(len(runs))]
+        k = _better(runs, likeliest(runs, law), alone, part, 0.0)
+        if (
+            k is not None
+            and abs(alone[k].apart) > far * runs[k].output.mean()
+            and (law is ONE or _alone(alone[:k] + alone[k + 1 :], alone[k]))
+        ):
+            return members[k], alone[k].apart
+    return None
+
+
+def _alone(others: Sequence[Followed], best: Followed) -> bool:
+    """Whether no other model comes near to the best one."""
+    return all(NEXT * best.left < one.left for one in others)
 
 
 def _drive_of(records: Sequence[Record]) -> str:

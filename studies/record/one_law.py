@@ -30,13 +30,23 @@ class Course:
             found = follow_lag(found, np.diff(self.time), lag)
         return found
 
+    def earlier(self, by: float) -> "Course | None":
+        """Return the course with what is followed read later by `by` s, as if it had been logged so late; None where too little is left."""
+        then = self.time + by
+        both = (then >= self.time[0]) & (then <= self.time[-1])
+        if np.count_nonzero(both) < max(FEWEST, self.time.size // 3):
+            return None
+        time = self.time[both]
+        return Course(time - time[0], np.interp(then[both], self.time, self.drive), self.output[both])
+
 
 @dataclass(frozen=True)
 class Law:
-    """Further lags (s) of a law, and what its bend makes at most at one standard deviation of what is followed, of the changes of the output."""
+    """Further lags (s) of a law, what its bend makes at most at one standard deviation of what is followed, of the changes of the output, and its longest lag (s)."""
 
     further: tuple[float, ...] = ()
     bend: float = np.inf
+    longest: float = np.inf
 
 
 @dataclass(frozen=True, order=True)
@@ -49,6 +59,9 @@ class Followed:
 
 
 ONE_LAG = Law()
+LEVELLED = Law(
+    tuple(np.logspace(2.2, 3.6, 5).tolist()), longest=5000.0
+)  # longer ones, and the start that fades with them, are levels of the runs
 ANY_PATH = Law(tuple(np.logspace(2.0, 4.6, 5).tolist()))  # what these lags do together is near to any heat path's work
 
 
@@ -90,10 +103,10 @@ def follow(runs: Sequence[Course], lag: float, law: Law = ONE_LAG, apart: Sequen
 
 def likeliest(runs: Sequence[Course], law: Law = ONE_LAG, apart: Sequence[int] = ()) -> Followed:
     """Return what a law leaves with the lag that leaves least."""
-    best = min(follow(runs, lag, law, apart) for lag in LAGS)
+    best = min(follow(runs, lag, law, apart) for lag in LAGS if lag <= law.longest)
     if not best.lag:
         return best
-    ends = np.log(best.lag / NEAR), np.log(best.lag * NEAR)
+    ends = np.log(best.lag / NEAR), np.log(min(best.lag * NEAR, law.longest))
     found = scipy.optimize.minimize_scalar(
         lambda u: follow(runs, float(np.exp(u)), law, apart).left,
         bounds=ends,

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from compensation.arrays import Array
 from compensation.cross_damping import RestRun
 from compensation.decimation import average_blocks
-from compensation.spikes import find_spikes, find_stuck
+from compensation.spikes import find_spikes, find_stuck, find_stuck_at_ends
 from studies.errors import InputError
 from studies.record import OUTPUTS, Record
 from studies.record.one_law import course_of, follow
@@ -99,8 +99,9 @@ def check_record(record: Record) -> str:
 
 
 def stuck_rows(record: Record) -> dict[str, NDArray[np.bool_]]:
-    """Return output -> rows in which it holds one reading where the readings beside it differ; a temperature may well be held."""
+    """Return output -> rows in which it holds one reading where the readings beside it differ; a temperature may well be held, but not to the end after noise."""
     found = {name: find_stuck(record[name]) for name in OUTPUTS if name in record}
+    found |= {name: find_stuck_at_ends(record[name]) for name in TEMPERATURES[:1] if name in record}
     return {name: rows for name, rows in found.items() if rows.any()}
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from compensation.spikes import find_spikes
+from compensation.spikes import find_spikes, find_stuck, find_stuck_at_ends
 
 ROWS = np.arange(600.0)
 SHAPES = {
@@ -66,3 +66,33 @@ def test_gaussian_noise_has_next_to_none():
     """Six robust deviations of the distance, about seven of the noise, are passed by 1e-11 of Gaussian rows."""
     found = sum(int(find_spikes(np.random.default_rng(k).standard_normal(600)).sum()) for k in range(100))
     assert found <= 1
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+@pytest.mark.parametrize("step", [1e-4, 1e-3])
+def test_readings_that_stand_still_at_an_end_after_noise_are_stuck(shape, step):
+    span = np.ptp(SHAPES[shape])
+    noise = 20.0 * step * span * np.random.default_rng(1).standard_normal(ROWS.size)
+    own = np.round((SHAPES[shape] + noise) / (step * span)) * step * span
+    assert not find_stuck(own).any()
+    ended, begun = own.copy(), own.copy()
+    ended[350:], begun[:350] = ended[350], begun[349]
+    assert np.flatnonzero(find_stuck(ended)).tolist() == list(range(350, 600))
+    assert np.flatnonzero(find_stuck_at_ends(begun)).tolist() == list(range(350))
+
+
+@pytest.mark.parametrize("rows", [0.05, 0.3, 1.0, 3.0])
+@pytest.mark.parametrize("step", [1e-6, 1e-2])
+def test_what_settles_is_held_or_stands_still_at_its_rounding_is_not_stuck(rows, step):
+    """A step, a cooling, a ramp to a set point and back: without noise, or with less than is recorded."""
+    t = ROWS * rows
+    for own in (
+        np.exp(-t),
+        1.0 - (1.0 + t) * np.exp(-t),
+        np.minimum(ROWS / 100.0, 1.0),
+        np.maximum(2.0 - ROWS / 200.0, 0.0),
+    ):
+        for noise in (0.0, 0.3 * step):
+            recorded = np.round((own + noise * np.random.default_rng(2).standard_normal(ROWS.size)) / step) * step
+            assert not find_stuck_at_ends(recorded).any()
+            assert not find_stuck_at_ends(recorded[::-1]).any()
