@@ -81,7 +81,7 @@ def _is_noisy(beside: Array, step: float) -> bool:
     """Whether third differences are far above the rounding and turn their sign, as those of a bend do not."""
     third = np.diff(beside, 3)
     turns = np.count_nonzero(third[1:] * third[:-1] < 0)
-    return third.size == JUDGED and turns >= TURNS and float(np.median(np.abs(third))) >= STEPS * step
+    return bool(third.size == JUDGED and turns >= TURNS and np.median(np.abs(third)) >= STEPS * step)
 
 
 def find_dropouts(values: Array) -> NDArray[np.bool_]:

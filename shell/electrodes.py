@@ -204,6 +204,7 @@ class Electrodes:
         return position, area, w
 
 
+ROUNDING = 1e-9  # of what all electrodes do together: nothing
 LIGHT = 1e-6  # weight of the voltages beside that of the split they null
 
 
@@ -231,8 +232,9 @@ def trim_voltages(electrodes: Electrodes, z: complex, limit: float) -> Trim:
     if float(np.hypot(*(effect @ sought.x - aim))) > 1e-6 * float(np.hypot(*aim)):
         hertz = electrodes.pair.mode.frequency
         raise ShellError(
-            f"{limit:g} V on these electrodes null a split of at most {hertz * reach(electrodes, limit):.3g} Hz in any direction, "
-            f"not {hertz * abs(z):.4g} Hz: raise the voltage, narrow the gap, or trim by mass first."
+            f"{limit:g} V on these electrodes null a split of at most {hertz * along(electrodes, z, limit):.3g} Hz along this axis "
+            f"({hertz * reach(electrodes, limit):.3g} Hz along any), not {hertz * abs(z):.4g} Hz: raise the voltage, narrow the gap, "
+            "set more or other electrodes, or trim by mass first."
         )
     squares = np.maximum(np.asarray(sought.x), 0.0) * limit**2
     shift = shift_of(electrodes.mean + means @ squares) - shift_of(electrodes.mean)
@@ -244,4 +246,17 @@ def reach(electrodes: Electrodes, limit: float) -> float:
     _, waves = electrodes.per_square_volt
     normals = np.exp(1j * (np.angle(waves)[:, None] + np.array([-pi / 2, pi / 2]))).ravel()
     support: Array = np.maximum((waves[:, None] * np.conj(normals)).real, 0.0).sum(axis=0)
-    return float(support.min()) * limit**2
+    whole = float(np.abs(waves).sum())
+    return float(support.min()) * limit**2 if support.min() > ROUNDING * whole else 0.0
+
+
+def along(electrodes: Electrodes, z: complex, limit: float) -> float:
+    """The largest relative split along the axis of z that voltages up to a limit (V) can null: 0 <= x_j <= V² with Σ x_j z_j = -t z/|z|, t most."""
+    from scipy.optimize import linprog
+
+    _, waves = electrodes.per_square_volt
+    scale, turned = float(np.abs(waves).max()), -waves * np.conj(z) / abs(z)
+    bounds = [(0.0, 1.0)] * len(waves)
+    best = linprog(-turned.real / scale, A_eq=[turned.imag / scale], b_eq=[0.0], bounds=bounds)
+    most = -float(best.fun or 0.0)
+    return most * scale * limit**2 if most > ROUNDING * len(waves) else 0.0

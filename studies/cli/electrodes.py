@@ -1,6 +1,7 @@
 """`hrg electrodes`: what the card's electrodes do to a pair, and the trim voltages that null a split."""
 
 import math
+from contextlib import suppress
 from math import isinf
 from typing import Annotated, Any
 
@@ -8,6 +9,7 @@ import numpy as np
 
 from shell.constants import zero_Celsius
 from shell.electrodes import reach, trim_voltages
+from shell.errors import ShellError
 from shell.modes import solve_modes
 from studies.cli.arguments import COUNT, POSITIVE, Card, Harmonic, Temperature, open_card
 from studies.cli.output import answers
@@ -53,9 +55,12 @@ def electrodes(
         else:
             z = whole.split.squares[1]
         factor, most = charged.pull_in, reach(charged, limit)
-        # the card's own split only where it can be nulled
-        asked = split is not None or (whole.split.resolved and abs(z) <= most)
-        trim = trim_voltages(charged, z, limit) if asked else None
+        trim = None
+        if split is not None:
+            trim = trim_voltages(charged, z, limit)
+        elif whole.split.resolved:
+            with suppress(ShellError):  # the card's own split only where it can be nulled
+                trim = trim_voltages(charged, z, limit)
     nulled = trim and {
         "voltages_V": trim.voltages, "left_Hz": abs(trim.left) * mode.frequency, "shift_ppm": 1e6 * trim.shift
     }  # fmt: skip
@@ -76,12 +81,14 @@ def electrodes(
         payload,
         f"Electrodes of {instrument.name}",
         f"Effect of the electrodes on the pair n = {harmonic} at {mode.frequency:.3f} Hz and {T - zero_Celsius:g} °C.",
-        _parts(payload, abs(z) * mode.frequency, own.resolved, keys),
+        _parts(
+            payload, abs(z) * mode.frequency if split is not None or whole.split.resolved else 0.0, own.resolved, keys
+        ),
     )
 
 
 def _parts(payload: dict[str, Any], split: float, resolved: bool, keys: ElectrodeKeys) -> list[Part]:
-    """What people read; `split` in Hz is the one to be nulled; `resolved` says whether the voltages make one."""
+    """What people read; `split` in Hz is the one to be nulled, 0 for none; `resolved` says whether the voltages make one."""
     factor, limit, trim = payload["pull_in_factor"], payload["limit_V"], payload["trim"]
     where = f"{payload['frequency_Hz']:.3f} Hz at {payload['temperature_degC']:g} °C"
     quantities = (
@@ -97,7 +104,7 @@ def _parts(payload: dict[str, Any], split: float, resolved: bool, keys: Electrod
     )
     if trim is None:
         words = f"{limit:g} V cannot null the card's split of {1e3 * split:.4g} mHz; see hrg trim."
-        return [head, Sentence(words, "warning") if split > payload["reach_Hz"] else None]
+        return [head, Sentence(words, "warning") if split else None]
     step = 360 / keys.count
     voltages = [
         {"electrode": k, "azimuth": keys.azimuth_deg + step * k, "voltage": v}

@@ -321,9 +321,16 @@ def test_electrodes_null_the_cards_split_and_say_how_far_they_reach(tmp_path, as
         f"[electrodes]\ngap_um = 50.0\ntrim_V = [{volts}]\n",
     )
     assert split_of(mended).split.hertz < 1e-8
-    assert "in any direction, not 50 Hz" in refuse(
+    assert "Hz along any), not 50 Hz" in refuse(
         ["electrodes", str(tmp_path / "card.toml"), "--split", "50", "--axis", "3"]
     )
+    loaded(
+        tmp_path,
+        "[electrodes]\ngap_um = 80.0\ncount = 8\nvoltage_V = 150.0\ntrim_V = [0.0, 60.0, 0.0, 60.0, 0.0, 60.0, 0.0, 60.0]\n",
+    )
+    one_axis = ask(["electrodes", str(tmp_path / "card.toml")])  # it said that 100 V cannot
+    assert one_axis["reach_Hz"] == 0.0
+    assert one_axis["trim"]["voltages_V"][::2] == pytest.approx([60.0] * 4, abs=1e-3)
     loaded(tmp_path)
     assert "no table [electrodes]" in refuse(["electrodes", str(tmp_path / "card.toml")])
 
