@@ -106,10 +106,14 @@ def stuck_rows(record: Record) -> dict[str, NDArray[np.bool_]]:
 
 
 def without_stuck(record: Record) -> Record:
-    """Return a record without its stuck readings."""
+    """Return a record without its stuck readings, and without outputs where the housing's stand still: nothing drives them there."""
     stuck = stuck_rows(record)
     if not stuck:
         return record
+    undriven = stuck.get(TEMPERATURES[0])
+    if undriven is not None:
+        none = np.zeros(len(record), dtype=bool)
+        stuck |= {name: undriven | stuck.get(name, none) for name in OUTPUTS if name in record}
     return record.with_columns({name: np.where(rows, np.nan, record[name]) for name, rows in stuck.items()})
 
 
