@@ -6,17 +6,16 @@ by finite volumes: cells of constant temperature, joined by the exact resistance
 middles. The cells are nodes of a network, so that every solver of networks solves the field as well.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from thermal.errors import ThermalError
-from thermal.network import Array, Conductor, Node, Part, Radiator
+from thermal.network import Array, Capacity, Conductor, Node, Part, Radiator
 
 Along = Callable[[Array], Array]
-Capacity = float | Callable[[float], float]
 POINTS, WEIGHTS = np.polynomial.legendre.leggauss(12)
 
 
@@ -83,9 +82,9 @@ def lump(cells: MeridianCells) -> MeridianCells:
 
 def describe_meridian(
     cells: MeridianCells, root: str, volumetric_capacity: Capacity, conductivity: float, root_resistance: float = 0.0,
-    exchange: float = 0.0, surroundings: str = "",
+    exchange: Mapping[str, float] | None = None,
 ) -> list[Part]:  # fmt: skip
-    """Return the parts "shell-1" (joined to `root`) … "shell-N" (at the rim); `exchange` is the radiating area per middle surface, both faces."""
+    """Return the parts "shell-1" (joined to `root`) … "shell-N" (at the rim); `exchange` is the radiating area per middle surface, both faces, by what they face."""
     names = cell_names(cells.count)
     parts: list[Part] = [
         Node(name, scale(volumetric_capacity, float(volume))) for name, volume in zip(names, cells.volume, strict=True)
@@ -94,8 +93,8 @@ def describe_meridian(
     resistance[0] += root_resistance
     ends = zip([root, *names[:-1]], names, resistance, strict=True)
     parts += [Conductor(one, other, 1 / float(R)) for one, other, R in ends]
-    if exchange:
-        parts += [Radiator(name, surroundings, exchange * float(A)) for name, A in zip(names, cells.area, strict=True)]
+    for faced, share in (exchange or {}).items():
+        parts += [Radiator(name, faced, share * float(A)) for name, A in zip(names, cells.area, strict=True) if share]
     return parts
 
 

@@ -16,19 +16,26 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from thermal.constants import Stefan_Boltzmann
+from thermal.constants import Stefan_Boltzmann, zero_Celsius
 from thermal.errors import ThermalError
 from thermal.profile import Profile
 
 Array = NDArray[np.float64]
+Capacity = float | Callable[[Any], Any]
+"""Heat capacity, a number or a callable of temperature (K), of arrays too."""
+
+
+def growing(at_20_degC: float, slope: float) -> Capacity:
+    """Return a heat capacity that grows by a relative `slope` (1/K)."""
+    return (lambda T: at_20_degC * np.exp(slope * (T - zero_Celsius - 20.0))) if slope else at_20_degC
 
 
 @dataclass(frozen=True)
 class Node:
-    """A lumped mass at one temperature; `capacity` in J/K, a number or a callable of temperature (K), of arrays too."""
+    """A lumped mass at one temperature; `capacity` in J/K."""
 
     name: str
-    capacity: float | Callable[[Any], Any]
+    capacity: Capacity
 
     def capacity_at(self, temperature: float) -> float:
         """Heat capacity (J/K) at a temperature (K)."""

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from thermal.errors import ThermalError
-from thermal.meridian import Capacity, MeridianCells, cell_names, describe_meridian, scale
-from thermal.network import Array, Boundary, Conductor, Node, Part, Radiator, Source
+from thermal.meridian import MeridianCells, cell_names, describe_meridian, scale
+from thermal.network import Array, Boundary, Capacity, Conductor, Node, Part, Radiator, Source
 
 
 @dataclass(frozen=True)
@@ -27,11 +27,12 @@ class HeatPath:
     # effective emissivity between each face of the shell and what it faces, 1/(1/ε₁ + 1/ε₂ − 1) of parallel faces;
     # decided by the metal film
     emissivity: float
-    base_capacity: float  # base_capacity, housing_capacity: J/K
+    base_capacity: Capacity  # base_capacity, housing_capacity: J/K
     housing_capacity: float
     mount_conductance: float  # base to housing, W/K
     mount_exchange: float  # base to housing, exchange area in m²
     chamber_conductance: float  # housing to chamber, W/K
+    housing_share: float = 0.0  # of the shell's radiation, with the housing, not with the base
     drive_power: float = 0.0  # heat of the vibration, W, spread evenly over the shell's volume
     second_mass: float = 0.0  # J/K, of a part that hangs on the base
     second_mass_conductance: float = 0.0  # base to that part, W/K
@@ -49,8 +50,8 @@ def describe_shell_and_stem(path: HeatPath) -> list[Part]:
     half_resistance = path.stem_length / 2 / (path.conductivity * section)
     stem = scale(path.volumetric_capacity, section * path.stem_length)
     shell = describe_meridian(
-        path.cells, "stem", path.volumetric_capacity, path.conductivity, root_resistance=half_resistance,
-        exchange=2 * path.emissivity, surroundings="base",
+        path.cells, "stem", path.volumetric_capacity, path.conductivity, half_resistance,
+        {"base": 2 * path.emissivity * (1 - path.housing_share), "housing": 2 * path.emissivity * path.housing_share},
     )  # fmt: skip
     return [Node("stem", stem), Conductor("base", "stem", 1 / half_resistance), *shell]
 

@@ -17,6 +17,7 @@ NAMES = {
     "base_radiated_share": ("Radiated share between housing and base", ""),
     "capacity_ratio": ("Heat capacity of the resonator over that of the base", ""),
     "capacity_slope_per_K": ("Relative slope of the resonator's heat capacity", "1/K"),
+    "base_capacity_slope_per_K": ("Relative slope of the heat capacity between", "1/K"),
     "sensor_time_constant": ("Time constant of the housing's sensor", "s"),
     "delay": ("Delay of the frequency behind the sensor, besides", "s"),
     "offset": ("Frequency at the reference temperature", "Hz"),

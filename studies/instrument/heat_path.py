@@ -29,6 +29,7 @@ def build_heat_path(
     thermal: "Thermal", resonator: "Resonator", material: "Material", reference: float, where: str
 ) -> "HeatPath":
     """Build the heat path at a reference temperature (K); `where` is "file [thermal]", for messages."""
+    from thermal.network import growing
     from thermal.resonator import HeatPath
 
     radius, length = _stem_size(thermal, resonator)
@@ -40,7 +41,8 @@ def build_heat_path(
             stem_radius=radius,
             stem_length=length,
             emissivity=thermal.film_emissivity,
-            base_capacity=thermal.base_heat_capacity_J_per_K,
+            housing_share=thermal.film_housing_share,
+            base_capacity=growing(thermal.base_heat_capacity_J_per_K, thermal.base_capacity_slope_per_K),
             housing_capacity=thermal.housing_heat_capacity_J_per_K,
             mount_conductance=thermal.mount_conductance_W_per_K,
             mount_exchange=1e-4 * thermal.mount_exchange_cm2,

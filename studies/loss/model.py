@@ -114,7 +114,9 @@ def loss_model(
 def _thermoelastic(instrument: Instrument, vibration: Vibration, heat: Callable[[float], Heat]) -> LossCause:
     T0, material = instrument.reference_temperature, instrument.material
     prior = dict(zip(material.prior.names, material.prior.sd, strict=True))
-    thermal = {one.name: one.sd / one.value for one in instrument.uncertain if one.name.startswith("thermal.")}
+    thermal = {
+        one.name: one.sd / one.value for one in instrument.uncertain if one.name.startswith("thermal.") and one.value
+    }
     expansion = float(prior.get("expansion.value", 0.0)) / abs(float(material.value("expansion", T0)) or 1.0)
     capacity = thermal.get("thermal.heat_capacity_J_per_kg_K", 0.0)
     relative = expansion, capacity, thermal.get("thermal.conductivity_W_per_m_K", 0.0)

@@ -63,7 +63,7 @@ def lags_in_series(law: "PolynomialLaw", radiation: bool = True) -> Network:
         capacity *= law.capacity_ratio if name == cell and before != "housing" else NO_LOAD
         along, past = law.radiated_shares(name == cell) if radiation else (0.0, 0.0)
         parts += [
-            Node(name, law.capacity(capacity) if name == cell else capacity),
+            Node(name, law.capacity(capacity, name == cell)),
             Conductor(before, name, (1.0 - along - past) * capacity / lag),
         ]
         area = capacity / lag / (4.0 * Stefan_Boltzmann * AROUND**3)
@@ -82,7 +82,7 @@ def with_sensor(network: Network, time_constant: float) -> Network:
 
 def build_shell_and_stem(instrument: "Instrument") -> Network:
     """Build shell and stem alone, on the boundary "base"."""
-    return assemble([Boundary("base"), *describe_shell_and_stem(instrument.heat_path)])
+    return assemble([Boundary("base"), *describe_shell_and_stem(replace(instrument.heat_path, housing_share=0.0))])
 
 
 def slowest_lag(network: Network, temperature: float) -> float:

@@ -3,7 +3,6 @@
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,15 +10,14 @@ import numpy as np
 from compensation.arrays import Array
 from shell.constants import zero_Celsius
 from studies.effects import find_effect
-from studies.effects.effect import spell_out
+from studies.effects.effect import AROUND, spell_out
 from studies.errors import InputError
 from studies.instrument.registry import possible_keys
 from studies.instrument.units import unit_of
 from studies.resonator.splitting import mean_changes, reference_split
 from studies.simulation.heat_path import SENSOR, behind_housing, build_network, slowest_lag, with_sensor
 from studies.simulation.response import observed_rows
-from thermal.meridian import cell_names
-from thermal.network import assemble
+from thermal.network import assemble, growing
 from thermal.resonator import describe_resonator
 
 if TYPE_CHECKING:
@@ -32,7 +30,13 @@ if TYPE_CHECKING:
     from thermal.network import Network
 
 TABLES = ("thermal", "loss", "bias", "noise", "loop")
-FIXED = ("thermal.cells", "thermal.stem_radius_mm", "thermal.stem_length_mm")
+FIXED = (
+    "thermal.film_housing_share",
+    "thermal.base_capacity_slope_per_K",
+    "thermal.cells",
+    "thermal.stem_radius_mm",
+    "thermal.stem_length_mm",
+)
 """Numbers of those tables that have become part of the network."""
 OF_LOOPS = ("gain", "phase_d", "phase_deg", "skew", "misalignment", "split", "axis", "per_Hz", "range", "headroom")
 """Parts of the names of those keys of [loop] that act on settled loops."""
@@ -89,9 +93,8 @@ class Plan:
     @property
     def key_of(self) -> dict[str, str]:
         """The parameter that scales a capacity, link or radiator, by its name; of shell and stem, by "shell"."""
-        if (law := self.instrument.polynomial) is not None:
-            own = {cell_names(1)[0]: "thermal.heat_capacity_J_per_kg_K"} if law.capacity_slope else {}
-            return dict.fromkeys(("radiated", "conducted", "shell"), ONE) | own
+        if self.instrument.polynomial is not None:
+            return dict.fromkeys(("radiated", "conducted", "shell"), ONE)
         return {
             "housing": "thermal.housing_heat_capacity_J_per_K",
             SENSOR: "thermal.housing_heat_capacity_J_per_K",
@@ -154,7 +157,7 @@ def _shell_and_mount(instrument: "Instrument", parameters: dict[str, float]) -> 
         volumetric_capacity=density,
         conductivity=1.0,
         emissivity=1.0,
-        base_capacity=1.0,
+        base_capacity=growing(1.0, instrument.thermal.base_capacity_slope_per_K),
         housing_capacity=1.0,
         mount_conductance=1.0,
         mount_exchange=1e-4,
@@ -204,14 +207,9 @@ def _splines(instrument: "Instrument", law: "FrequencyLaw") -> "dict[str, CubicS
     from studies.loss.damping_law import NODE_STEP, damping_law
 
     found: dict[str, CubicSpline] = {}
-    if (own := instrument.polynomial) is not None:
-        capacity = own.capacity(1.0)
-    else:
-        varies = callable(instrument.heat_path.volumetric_capacity)
-        capacity = partial(instrument.material.value, "heat_capacity") if varies else 1.0
-    if callable(capacity):
+    if instrument.polynomial is None and callable(instrument.heat_path.volumetric_capacity):
         T = np.arange(law.lowest, law.highest + CAPACITY_STEP, CAPACITY_STEP)
-        found["heat_capacity"] = CubicSpline(T, capacity(T))
+        found["heat_capacity"] = CubicSpline(T, instrument.material.value("heat_capacity", T))
     damping = damping_law(instrument, law.lowest, law.highest)
     if damping is not None:
         T = np.linspace(law.lowest, law.highest, 4 * math.ceil((law.highest - law.lowest) / NODE_STEP))
@@ -253,6 +251,7 @@ def _constants(instrument: "Instrument", law: "FrequencyLaw", boundary: "Boundar
     lag = slowest_lag(build_network(instrument, boundary=boundary), T0) if instrument.effects else 1.0
     return {
         "REFERENCE": T0,
+        "AROUND": AROUND,
         "REFERENCE_FREQUENCY": float(law.frequency(T0)),
         "LOWEST": law.lowest,
         "HIGHEST": law.highest,

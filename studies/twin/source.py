@@ -14,7 +14,7 @@ from studies.simulation.heat_path import LEAST_LAG, SENSOR, SENSOR_SHARE
 from studies.simulation.virtual_gyro import COMMAND_DIGITS, DIGITS
 from studies.twin.plan import EFFECTS, MEMORY, PAST, PRECESSION, START, Plan, input_starts
 from thermal.constants import Stefan_Boltzmann
-from thermal.network import Conductor, Radiator
+from thermal.network import Conductor, Node, Radiator
 
 if TYPE_CHECKING:
     from scipy.interpolate import CubicSpline
@@ -103,8 +103,9 @@ def card_body(plan: Plan) -> str:
         parameter = order.index(keys.get(own, keys[kind]))
         return f"{{{place[part.one]}, {place[part.other]}, {parameter}, {_number(value)}}}"
 
-    def capacity(name: str, value: float) -> str:
-        return f"{{{order.index(keys.get(name, keys['shell']))}, {_number(value)}}}"
+    def capacity(node: Node) -> str:
+        here, warmer = (node.capacity_at(T) for T in (AROUND, AROUND + 1.0))
+        return f"{{{order.index(keys.get(node.name, keys['shell']))}, {_number(here)}, {_number(math.log(warmer / here))}}}"
 
     power = network.power(0.0)
     effects = [
@@ -134,7 +135,7 @@ def card_body(plan: Plan) -> str:
             "TwinCapacity",
             "twin_capacities",
             "TWIN_NODES",
-            [capacity(n.name, n.capacity_at(AROUND)) for n in network.nodes],
+            [capacity(node) for node in network.nodes],
         ),
         _table("double", "twin_power_shares", "TWIN_NODES", [_number(v) for v in power]),
         _table("double", "twin_rows", "5][TWIN_NODES", [_braced([_number(v) for v in row]) for row in plan.rows]),

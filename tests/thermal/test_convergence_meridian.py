@@ -31,7 +31,7 @@ def dome(count):
 
 
 def rates(cells, exchange=0.0):
-    parts = describe_meridian(cells, "base", RHO_C, K, exchange=exchange, surroundings="base")
+    parts = describe_meridian(cells, "base", RHO_C, K, exchange={"base": exchange})
     return 1 / find_relaxation(assemble([Boundary("base"), *parts]), 293.15).time_constants
 
 

@@ -5,13 +5,13 @@
 
 from the housing, T_h, to the resonator, T_r: one lag, unless `second_lag_s` and `third_lag_s` are given; T₀ = 20 °C. Of the heat exchange
 ρ is radiated, `radiated_share` of the resonator's and `base_radiated_share` (the same unless given) of that between; δ, `direct_share`, is the part of the
-resonator's radiation that is with the housing, 0 between. c = exp(`capacity_slope_per_K` (T_r − T₀)), 1 between. The lump before the
-resonator gives what the resonator takes, by `capacity_ratio`; no other takes heat from the one before it.
+resonator's radiation that is with the housing, 0 between. c_j = exp(s_j (T_j − T₀)) with s `capacity_slope_per_K` of the resonator and
+`base_capacity_slope_per_K` between. The lump before the resonator gives what the resonator takes, by `capacity_ratio`; no other takes
+heat from the one before it.
 
 It stands in place of `[resonator]`, `[material]` and `[thermal]`.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Annotated
 
@@ -19,10 +19,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from compensation.arrays import Array
-from shell.constants import zero_Celsius
 from shell.errors import ShellError
 from studies.instrument.registry import CardPlace, CardTable
 from studies.schema.keys import Keys, Note, number
+from thermal.network import Capacity, growing
 
 BETWEEN = ("base", "stem")  # what lies between the housing and the resonator where there are two lags and more
 NO_LOAD = 1e-8  # ratio of heat capacities of lumps that take no heat from what they follow
@@ -44,6 +44,7 @@ class LawKeys(Keys, frozen=True, kw_only=True):
     base_radiated_share: Annotated[float, number("of the heat exchange of the lags between at 20 °C", least=-0.5, most=0.95, sd=0.3)] | None = None  # fmt: skip
     capacity_ratio: Annotated[float, number("heat capacity of the resonator over that of the lump before it", above=0.0, most=10.0, sd=0.3)] | None = None  # fmt: skip
     capacity_slope_per_K: Annotated[float, number("relative, of the resonator's heat capacity; about 2e-3 of fused silica", least=-5e-3, most=5e-3, sd=1e-3)] | None = None  # fmt: skip
+    base_capacity_slope_per_K: Annotated[float, number("the same of what lies between; 2e-3 of silica, 0.5e-3 of metals", least=-5e-3, most=5e-3, sd=1e-3)] | None = None  # fmt: skip
     chamber_lag_s: Annotated[float, number("of the housing behind its chamber", above=0.0, relative_sd=1.0)] = 600.0
     delay_s: Annotated[
         float,
@@ -73,7 +74,9 @@ class PolynomialLaw:
     direct_share: float  # of that with the housing
     base_radiated_share: float  # of what lies between
     capacity_ratio: float  # of the resonator to the lump before it
-    capacity_slope: float  # relative, of the resonator, 1/K
+    # relative, 1/K
+    capacity_slope: float  # of the resonator
+    base_capacity_slope: float  # of what lies between
     # chamber_lag, delay: s
     chamber_lag: float
     delay: float = 0.0
@@ -112,11 +115,9 @@ class PolynomialLaw:
             return self.base_radiated_share, 0.0
         return self.radiated_share * (1.0 - self.direct_share), self.radiated_share * self.direct_share
 
-    def capacity(self, at_20_degC: float) -> float | Callable[[Array], Array]:
-        """Return the heat capacity of the resonator, a number or over temperature (K)."""
-        if self.capacity_slope == 0.0:
-            return at_20_degC
-        return lambda T: at_20_degC * np.exp(self.capacity_slope * (T - zero_Celsius - 20.0))
+    def capacity(self, at_20_degC: float, last: bool) -> Capacity:
+        """Return the heat capacity of the resonator, or of a lump between."""
+        return growing(at_20_degC, self.capacity_slope if last else self.base_capacity_slope)
 
     @property
     def absent(self) -> tuple[str, ...]:
@@ -162,6 +163,7 @@ def build(keys: LawKeys, place: CardPlace) -> PolynomialLaw | None:
         keys.radiated_share or 0.0 if keys.base_radiated_share is None else keys.base_radiated_share,
         keys.capacity_ratio or NO_LOAD,
         keys.capacity_slope_per_K or 0.0,
+        keys.base_capacity_slope_per_K or 0.0,
         keys.chamber_lag_s,
         keys.delay_s,
         keys.bias_bend,

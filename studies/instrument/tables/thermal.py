@@ -13,7 +13,9 @@ class Thermal(Keys, frozen=True, kw_only=True):
     """Constants of the heat path; what is None follows from geometry and material."""
 
     film_emissivity: Annotated[float, number("effective, of each face of the shell; bare metal film 0.03, silica 0.8", least=0.0, most=1.0, relative_sd=1.0)] = 0.03  # fmt: skip
+    film_housing_share: Annotated[float, number("of the shell's radiation, with the housing, past the base", least=0.0, most=1.0, sd=0.3)] = 0.0  # fmt: skip
     base_heat_capacity_J_per_K: Annotated[float, number("with electrodes: 34 g of silica", above=0.0, relative_sd=0.5)] = 25.0  # fmt: skip
+    base_capacity_slope_per_K: Annotated[float, number("relative, of that about 20 °C; 2e-3 of silica, 0.5e-3 of metals", least=-5e-3, most=5e-3, sd=1e-3)] = 0.0  # fmt: skip
     housing_heat_capacity_J_per_K: Annotated[float, number("about 150 g of steel", above=0.0, relative_sd=0.5)] = 70.0
     chamber_conductance_W_per_K: Annotated[float, number("air, 10 W/(m² K) on 100 cm²", above=0.0, relative_sd=0.5)] = 0.1  # fmt: skip
     mount_conductance_W_per_K: Annotated[

@@ -22,9 +22,11 @@ double twin_spline(const TwinSpline *s, double x, double *slope) {
 }
 
 static double capacity(const Twin *w, int i, double T) {
-    if (twin_capacities[i].parameter == P_thermal_heat_capacity_J_per_kg_K && twin_heat_capacity.count)
-        return twin_capacities[i].factor * twin_spline(&twin_heat_capacity, TWIN_LINEAR ? TWIN_REFERENCE : T, NULL);
-    return twin_capacities[i].factor * w->p[twin_capacities[i].parameter];
+    const TwinCapacity *own = twin_capacities + i;
+    if (TWIN_LINEAR) T = TWIN_REFERENCE;
+    if (own->parameter == P_thermal_heat_capacity_J_per_kg_K && twin_heat_capacity.count)
+        return own->factor * twin_spline(&twin_heat_capacity, T, NULL);
+    return own->factor * w->p[own->parameter] * (own->slope != 0 ? exp(own->slope * (T - TWIN_AROUND)) : 1);
 }
 
 static double node(const double *T, double boundary, int i) { return i < N ? T[i] : boundary; }

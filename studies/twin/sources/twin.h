@@ -21,7 +21,7 @@ enum { TARGET_TEMPERATURE, TARGET_FREQUENCY, TARGET_BIAS, TARGET_LOSS, TARGETS }
 enum { FLICKER_TIMES = 18, TWIN_TERMS = 5, TWIN_SAID = 4 };
 
 typedef struct { int one, other, parameter; double factor; } TwinLink; /* conductance or exchange area = p * factor */
-typedef struct { int parameter; double factor; } TwinCapacity;         /* p * factor; of shell and stem over T besides */
+typedef struct { int parameter; double factor, slope; } TwinCapacity;  /* p * factor, slope (1/K) about 20 degC; of shell and stem over T */
 typedef struct { int kind, target, memory, shape, weights; double since; } TwinEffect; /* places in the memory and, of shape and weights, in p; its date, s since 1970 */
 typedef struct { double first, step; int count; const double *coefficients; } TwinSpline; /* 4 rows, highest power first */
 

@@ -246,6 +246,7 @@ direct_share = {direct}
 base_radiated_share = 0.2
 capacity_ratio = 0.2
 capacity_slope_per_K = 2e-3
+base_capacity_slope_per_K = 6e-4
 chamber_lag_s = 500.0
 delay_s = {delay}
 bias_bend = 0.3
