@@ -24,6 +24,7 @@ from studies.diagnosis.response import SeenResponse
 from studies.inference.causes import only_apart, with_levels
 from studies.inference.heat_path import (
     FREQUENCY,
+    LAGS,
     WORTH,
     HeatPath,
     effects_would_bring,
@@ -243,9 +244,11 @@ def _with_heat_path(whole: CardFit, found: CardFit, progress: Report) -> tuple[H
         path = find_heat_path(found, None if bring > WORTH else 1, progress)
     if path is None or not path.departs:
         return (None, *own.outcome())
-    progress(f"effects beside a heat path with {path.lags} time constants")
-    there, grown = Pursuit(path.fit, progress).outcome()
-    score = there.fair(grown.final) + path.housing + path.price
+    score, path, there, grown = _beside(path, progress)
+    if not given and path.lags < len(LAGS) and any(term.response == FREQUENCY for term in grown.final.terms):
+        # an effect may do what a lag does: a longer path has to be beaten with effects beside it
+        longer = _beside(find_heat_path(found, len(LAGS), progress), progress)
+        score, path, there, grown = longer if longer[0] > score + WORTH else (score, path, there, grown)
     gain, plain = score - evidence_of(found), own.search.settle((), found.noise)
     if with_levels(own.search, plain, FREQUENCY).score - plain.score > gain + MARGIN:
         return (None, *own.outcome())
@@ -254,6 +257,13 @@ def _with_heat_path(whole: CardFit, found: CardFit, progress: Report) -> tuple[H
     if lead < MARGIN + given * FURTHER * sum(t.brought for t in outcome.final.terms if t.response == FREQUENCY):
         return None, search, outcome
     return replace(path, evidence=gain, lead=lead), there, grown
+
+
+def _beside(path: HeatPath, progress: Report) -> tuple[float, HeatPath, Search, Outcome]:
+    """Search for effects beside a longer heat path; first what both score."""
+    progress(f"effects beside a heat path with {path.lags} time constants")
+    search, outcome = Pursuit(path.fit, progress).outcome()
+    return search.fair(outcome.final) + path.housing + path.price, path, search, outcome
 
 
 def _without_effects(

@@ -184,9 +184,7 @@ def find_heat_path(
             path = max(path, late, key=lambda one: one.evidence)
         if best is None or path.evidence > best.evidence + WORTH * (path.lags - best.lags):
             best = path
-            followed = slow_share(path.fit) < FOLLOWED or (
-                number == 1 and lags_would_bring(_linearised(path.fit)) < WORTH
-            )
+            followed = lags_would_bring(_linearised(path.fit)) < WORTH
     assert best is not None
     if whole.responses == lean.responses or not best.departs:
         return best
