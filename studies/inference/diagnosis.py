@@ -193,7 +193,7 @@ def infer(
         if card.polynomial is None and path is None and np.abs(found.away).max(initial=0.0) > FAR:
             # values may have gone far to do what an effect does: look from the card as shipped too
             progress("again from the card's own values")
-            pursuit = Pursuit(at_point(found, np.zeros(problem.count)), progress)
+            pursuit = Pursuit(set_housing_apart(at_point(whole, np.zeros(whole.problem.count))), progress)
             again = pursuit.outcome(search.fair(outcome.final) - BEATEN)
             search, outcome = max((again, (search, outcome)), key=lambda found: found[0].fair(found[1].final))
         # one lag in its own noise: in that of a longer path its straight lines lead out of the world
