@@ -25,13 +25,12 @@ FREQUENCY = "frequency_Hz"
 LAGS = ("lag_s", "second_lag_s", "third_lag_s")
 DIRECT, DELAY = "law.direct_share", "law.delay_s"
 PATHS = (
-    ((1.0,), False),
-    ((0.7, 0.3), False),
-    ((0.7, 0.3), True),
-    ((0.3, 0.7), True),
-    ((0.65, 0.05, 0.3), True),
+    ([(1.0,)], False),
+    ([(0.7, 0.3)], False),
+    ([(0.7, 0.3), (0.3, 0.7)], True),
+    ([(0.65, 0.05, 0.3)], True),
 )
-"""Lags in series over the one lag that stood for them, where their priors are centred, and whether they have what `OF_LUMPS` says."""
+"""Lags in series over the one lag that stood for them, in the orders where their priors may be centred, and whether they have what `OF_LUMPS` says."""
 LAG_WIDTH = 0.7
 """Standard deviation of the logarithm of each."""
 RADIATED = {"value": 0.3, "sd": 0.3}
@@ -41,7 +40,7 @@ OF_LUMPS = {
     "base_radiated_share": {"value": 0.2, "sd": 0.2},
     "capacity_ratio": {"value": 0.1, "sd": 0.1},
     "capacity_slope_per_K": {"value": 1e-3, "sd": 1e-3},
-    "base_capacity_slope_per_K": {"value": 7e-4, "sd": 7e-4},
+    "base_capacity_slope_per_K": {"value": 5e-4, "sd": 5e-4},
 }
 """The same of what lumps have besides, where plain lags in series leave slow noise."""
 SENSOR, LATENESS = LAG, {"value": 5.0, "sd": 20.0}
@@ -144,15 +143,18 @@ def with_second_mass(
     return path if gain + path.price > 0.0 else None
 
 
-def with_lags(card: Instrument, lags: Sequence[float], lumps: bool, late: bool = False) -> Instrument:
-    """Return a polynomial card with such lags (s) in series, and radiation; if `lumps`, with all that lumps have, and a cubic law; a sensor may be `late`."""
+def with_lags(card: Instrument, lags: Sequence[float], lumps: bool) -> Instrument:
+    """Return a polynomial card with such lags (s) in series, and radiation; if `lumps`, with all that lumps have, and a cubic law."""
     law = dict(card.content["law"])
     law |= {key: {"value": lag, "sd": LAG_WIDTH * lag} for key, lag in zip(LAGS, lags, strict=False)}
     law |= {"radiated_share": dict(RADIATED)} | (OF_LUMPS if lumps else {})
     law |= cubic_of(card) if lumps else {}
-    if late:
-        card = card.with_table("noise", {**card.content.get("noise", {}), "housing_lag_s": dict(LATENESS)})
     return card.with_table("law", law)
+
+
+def with_late_sensor(card: Instrument) -> Instrument:
+    """Return a card whose sensor of the housing may be late."""
+    return card.with_table("noise", {**card.content.get("noise", {}), "housing_lag_s": dict(LATENESS)})
 
 
 def cubic_of(card: Instrument) -> dict[str, Any]:
@@ -171,20 +173,21 @@ def find_heat_path(
     lag = whole.priors.at(baseline.point[: len(whole.priors.values)])["law.lag_s"]
     best: HeatPath | None = None
     followed = False
-    for parts, lumps in PATHS:
-        number, own = len(parts), [part * lag for part in parts]
+    for orders, lumps in PATHS:
+        number = len(orders[0])
         if lags not in (None, number) or followed:
             continue
         words = f"a heat path with {number} {'lag' if number == 1 else 'lags in series'} and radiation"
         progress(words)
-        path = _calibrated(lean, with_lags(whole.instrument, own, lumps))
+        cards = [with_lags(whole.instrument, [part * lag for part in parts], lumps) for parts in orders]
+        path = max((_calibrated(lean, card) for card in cards), key=lambda one: one.evidence)
         if is_ahead(path.fit) or slow_share(path.fit) > FOLLOWED:
             progress(f"{words}, its sensor late")
-            late = _calibrated(lean, with_lags(whole.instrument, own, lumps, True))
-            path = max(path, late, key=lambda one: one.evidence)
+            path = max(path, _calibrated(lean, with_late_sensor(path.card)), key=lambda one: one.evidence)
         if best is None or path.evidence > best.evidence + WORTH * (path.lags - best.lags):
             best = path
-            followed = lags_would_bring(_linearised(path.fit)) < WORTH
+            still = number == 1 or slow_share(path.fit) < FOLLOWED
+            followed = still and lags_would_bring(_linearised(path.fit)) < WORTH
     assert best is not None
     if whole.responses == lean.responses or not best.departs:
         return best

@@ -117,7 +117,8 @@ def test_a_dip_is_one_cause_in_frequency_and_loss(shipped, only):
     """
     only("activity-dip", "loss-peak", "jump", "hysteresis")
     rng = np.random.default_rng(0)
-    drawn = {one.name: one.draw(rng) for one in shipped.uncertain if one.name.startswith(("thermal.", "material."))}
+    known = [one for one in shipped.uncertain if one.name.startswith(("thermal.", "material.")) and one.value]
+    drawn = {one.name: one.draw(rng) for one in known}
     dip = {"name": "activity-dip", "temperature_degC": 14.0, "width_K": 0.7}
     dips = [{**dip, "response": "frequency_Hz", "pull_Hz": 0.0126}, {**dip, "response": "inverse_q", "pull_1": 1e-6}]
     runs = simulated(shipped.with_values(drawn).with_table("effect", dips), *WAYS)

@@ -215,7 +215,7 @@ def test_a_term_whose_size_is_impossible_alone_leaves_the_model_without_terms(se
     """A negative radiated share, say; its log evidence is −∞, and rivals measured from there once lost their probability."""
     effect, response = next(one for one in search.signatures.applicable() if one[0].name == "second-lag")
     term = search.term(effect, response, (3e4,), members=(0,))
-    target = {name: own - term.columns[name][:, 0] for name, own in search.linear.target.items()}
+    target = {name: own - 3.0 * term.columns[name][:, 0] for name, own in search.linear.target.items()}
     against = Search(replace(search.linear, target=target), search.signatures, search.noise, bank=[])
     plain = against.settle((), search.noise)
     assert against.settle((term,), search.noise).evidence == -np.inf

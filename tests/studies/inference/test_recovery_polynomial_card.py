@@ -10,7 +10,7 @@ from compensation.noise import white_rms
 from studies.calibration.calibrate import calibrate
 from studies.cli import main
 from studies.errors import InputError
-from studies.inference.heat_path import with_lags
+from studies.inference.heat_path import with_lags, with_late_sensor
 from studies.inference.polynomial_card import _likeliest_lag, polynomial_card
 from studies.instrument.card import build_instrument, load_card, save_card
 from studies.planning.plan import simulate_plan
@@ -47,7 +47,7 @@ def test_limits_one_lag_behind_the_housing() -> None:
 def test_contract_a_longer_heat_path_keeps_what_a_card_of_bare_numbers_says(law) -> None:
     own = {"f0_Hz": 4432.07, "a1_per_K": {"value": 8.1e-5, "sd": 1e-5}, **law}
     card = build_instrument({"schema": "hrg.card/1", "name": "bare", "law": own})
-    longer = with_lags(card, [1000.0, 500.0], True, True)
+    longer = with_late_sensor(with_lags(card, [1000.0, 500.0], True))
     assert longer.polynomial.lags == (1000.0, 500.0)
     assert longer.polynomial.coefficients == (8.1e-5, 0.0, law.get("a3_per_K3", {"value": 0.0})["value"])
 
