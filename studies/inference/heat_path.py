@@ -40,7 +40,7 @@ OF_LUMPS = {
     "base_radiated_share": {"value": 0.2, "sd": 0.2},
     "capacity_ratio": {"value": 0.1, "sd": 0.1},
     "capacity_slope_per_K": {"value": 1e-3, "sd": 1e-3},
-    "base_capacity_slope_per_K": {"value": 5e-4, "sd": 5e-4},
+    "base_capacity_slope_per_K": {"value": 0.0, "sd": 1e-3},
 }
 """The same of what lumps have besides, where plain lags in series leave slow noise."""
 SENSOR, LATENESS = LAG, {"value": 5.0, "sd": 20.0}

@@ -16,7 +16,7 @@ from studies.record import Record, write_record
 from studies.resonator.law import law_of
 from studies.simulation.virtual_gyro import simulate_run
 from thermal.lag import lag
-from thermal.network import Boundary, Conductor, Node, Radiator, assemble
+from thermal.network import Boundary, Conductor, Node, Radiator, assemble, growing
 from thermal.profile import Profile, parse_profile
 from thermal.radiative import integrate
 
@@ -140,7 +140,8 @@ def test_the_radiated_share_of_lumps_is_found(taus, past, late):
     for k, tau in enumerate(taus):  # each too small to load the one before
         g, name = 1e-6**k / tau, f"lump {k}"
         radiated = 0.0 if past and k < len(taus) - 1 else 0.4
-        parts += [Node(name, 1e-6**k), Conductor(before, name, (1.0 - radiated) * g)]
+        capacity = growing(1e-6**k, (5e-4, 1.5e-3)[k]) if past else 1.0  # of metal and of silica
+        parts += [Node(name, capacity), Conductor(before, name, (1.0 - radiated) * g)]
         if radiated:
             parts.append(Radiator("housing" if past else before, name, radiated * g / (4 * Stefan_Boltzmann * ROOM**3)))
         before = name
@@ -149,12 +150,14 @@ def test_the_radiated_share_of_lumps_is_found(taus, past, late):
     found = fit_thermal_constants([record(t, read, T_r, sensor=0.0)]).estimates
     assert f"time_constant_{len(taus) + 1}" not in found
     assert not late or found["sensor_time_constant"].value == pytest.approx(late, abs=1.0)
-    named = sorted((found[f"time_constant_{k}"].value for k in range(1, len(taus) + 1)), reverse=True)
-    assert named == pytest.approx(taus, rel=0.04 if late else 0.02)  # beside the sensor less is known of the faster one
+    named = sorted((found[f"time_constant_{k}"] for k in range(1, len(taus) + 1)), key=lambda one: -one.value)
+    # beside capacities that may go with temperature less is known, and the intervals say so
+    assert [one.value for one in named] == pytest.approx(taus, rel=0.04 if past else 0.02)
+    assert all(one.low < tau < one.high for one, tau in zip(named, taus, strict=True))
     if past:  # beside a load and a capacity that may go with temperature less is known
         for name, truth in (("radiated_share", 0.4), ("direct_share", 1.0), ("base_radiated_share", 0.0)):
             assert found[name].low <= truth < found[name].high
-            assert late or found[name].value == pytest.approx(truth, abs=0.05)
+            assert late or found[name].high - found[name].low < 0.2
     else:
         assert found["radiated_share"].value == pytest.approx(0.4, abs=0.008)
 

@@ -44,7 +44,7 @@ class LawKeys(Keys, frozen=True, kw_only=True):
     base_radiated_share: Annotated[float, number("of the heat exchange of the lags between at 20 °C", least=-0.5, most=0.95, sd=0.3)] | None = None  # fmt: skip
     capacity_ratio: Annotated[float, number("heat capacity of the resonator over that of the lump before it", above=0.0, most=10.0, sd=0.3)] | None = None  # fmt: skip
     capacity_slope_per_K: Annotated[float, number("relative, of the resonator's heat capacity; about 2e-3 of fused silica", least=-5e-3, most=5e-3, sd=1e-3)] | None = None  # fmt: skip
-    base_capacity_slope_per_K: Annotated[float, number("the same of what lies between; 2e-3 of silica, 0.5e-3 of metals", least=0.0, most=5e-3, relative_sd=1.0)] | None = None  # fmt: skip
+    base_capacity_slope_per_K: Annotated[float, number("the same of what lies between; 2e-3 of silica, 0.5e-3 of metals", least=-5e-3, most=5e-3, sd=1e-3)] | None = None  # fmt: skip
     chamber_lag_s: Annotated[float, number("of the housing behind its chamber", above=0.0, relative_sd=1.0)] = 600.0
     delay_s: Annotated[
         float,
