@@ -50,6 +50,7 @@ def _cause(found: Inferred, k: int) -> Cause:
     for rival in outcome.rivals[k]:
         name = rival.terms[-1].effect.name
         best[name] = max(best.get(name, -np.inf), rival.score)
+    best = best or {term.effect.name: found.final.score}  # whatever might stand there was given up
     members, probability = weigh(list(best), list(best.values()), outcome.without[k].score, found.unknown[k])
     left = found.left[term.response]
     if left.significant and 0.0 < left.share < CONSTANTS["believed"]:
