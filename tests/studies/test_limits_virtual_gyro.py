@@ -299,3 +299,18 @@ def test_rounding_rounds():
     assert quantise(np.array([4432.0749, 4432.0751]), 0.01) == pytest.approx([4432.07, 4432.08])
     values = np.array([0.123456789])
     assert quantise(values, 0.0) is values
+
+
+def test_what_the_shell_radiates_past_its_base_and_a_base_whose_capacity_grows():
+    """A share of the same exchange goes to the housing; the base holds e^(slope · 10 K) more heat at 30 °C."""
+    plain, own = load_card("hrg-30mm"), {"thermal.film_housing_share": 0.3, "thermal.base_capacity_slope_per_K": 1e-3}
+    whole, parted = build_network(plain), build_network(plain.with_values(own))
+    area = {
+        faced: sum(r.exchange_area for r in parted.radiators if r.one != "housing" and r.other == faced)
+        for faced in ("base", "housing")
+    }
+    total = sum(r.exchange_area for r in whole.radiators if r.other == "base" and r.one != "housing")
+    assert [area["base"], area["housing"]] == pytest.approx([0.7 * total, 0.3 * total], rel=1e-12)
+    base = parted.nodes[parted.index("base")]
+    assert base.capacity_at(293.15) == pytest.approx(25.0, rel=1e-12)
+    assert base.capacity_at(303.15) == pytest.approx(25.0 * np.exp(1e-2), rel=1e-12)

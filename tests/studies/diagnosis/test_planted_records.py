@@ -293,7 +293,7 @@ def test_a_healthy_gyro_of_several_lumps_is_followed_to_its_noise_and_its_card_p
     for name, noise in (("frequency_Hz", 2e-3), ("bias_deg_per_h", 0.02)):
         stated = 2.0 * np.sqrt(np.mean(width[name] ** 2))
         assert np.sqrt(np.mean((run.record[name] - unseen[name]) ** 2)) < np.hypot(1.1 * noise, stated)
-        assert stated < 0.8 * noise or name == "frequency_Hz" and stated < 1.5 * noise
+        assert stated < 0.8 * noise or (name == "frequency_Hz" and stated < 1.5 * noise)
 
 
 @pytest.mark.usefixtures("coarser")

@@ -210,7 +210,8 @@ def test_limits_everything_at_once(folder):
             .with_table("loop", {**ERRORS, "quadrature_control": control})
             .with_table("bias", bias)
         )
-        instrument = instrument.with_table("thermal", {"radiation": radiates, "drive_power_mW": 2.0, "cells": 8})
+        heat = {"drive_power_mW": 2.0, "cells": 8, "base_capacity_slope_per_K": 1.5e-3, "film_housing_share": 0.4}
+        instrument = instrument.with_table("thermal", {"radiation": radiates, **heat})
         found = run_twin(compile_twin(instrument, folder / control), profile, 2.0)
         expected = simulated(instrument, profile, 2.0)
         assert {name: error for name, error in worst(found, expected).items() if error > 1e-9} == {}, control
