@@ -46,16 +46,21 @@ def keep_agreeing(found: CardFit) -> CardFit:
 
 
 def _hold(found: CardFit, held: Sequence[int]) -> CardFit:
-    """Solve for the coordinates u whose values `held` are the card's, in the noise of the fit."""
+    """Solve for the coordinates u whose values `held` are the card's, in the noise of the fit; what leaves its bounds is held at them."""
     problem, priors = found.problem, found.problem.priors
-    root = scipy.linalg.block_diag(priors.root, np.eye(problem.count - len(priors.values)))[list(held)]
-    fixed, ways = np.linalg.lstsq(root, priors.shipped[list(held)], rcond=None)[0], scipy.linalg.null_space(root)
-    state = found.state
+    rows = scipy.linalg.block_diag(priors.root, np.eye(problem.count - len(priors.values)))[list(held)]
+    values, state, (low, high) = priors.shipped[list(held)], found.state, problem.ends
     for _ in range(STEPS):
         J, r = whitened(problem, state, found.noise, found.rows)
-        target = np.concatenate([r + J @ (state.point - fixed), -fixed])
-        sizes = np.linalg.lstsq(np.vstack([J @ ways, ways]), target, rcond=None)[0]
-        state = problem.evaluate(np.clip(fixed + ways @ sizes, *problem.ends))
+        beyond = np.ones(0, dtype=bool)
+        while beyond.any() or not beyond.size:
+            fixed, ways = np.linalg.lstsq(rows, values, rcond=None)[0], scipy.linalg.null_space(rows)
+            target = np.concatenate([r + J @ (state.point - fixed), -fixed])
+            point = fixed + ways @ np.linalg.lstsq(np.vstack([J @ ways, ways]), target, rcond=None)[0]
+            inside = np.clip(point, low, high)
+            beyond = np.abs(point - inside) > ZERO
+            rows, values = np.vstack([rows, np.eye(problem.count)[beyond]]), np.append(values, inside[beyond])
+        state = problem.evaluate(inside)
     return replace(found, state=state, covariance=covariance_at(problem, state, found.noise, found.rows))
 
 

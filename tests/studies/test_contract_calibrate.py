@@ -33,10 +33,10 @@ def test_tables_are_for_people(tmp_path, capsys, ask):
     assert "Values, best known first" in out
     assert "Settled frequency" in out
     text = page.read_text(encoding="utf-8")
-    assert "24 stay at their prior; none moved" in text
+    assert "26 stay at their prior; none moved" in text
     assert "Allan" not in text
     assert "block averages" not in text
-    assert "Values that the data do not depend on <small>(19 rows)" in text
+    assert "Values that the data do not depend on <small>(21 rows)" in text
     left = ask(["diagnose", "studies/papers/hrg_table1.csv", "--card", "hrg-30mm"])["responses"]["frequency_Hz"][
         "shipped_rms"
     ]

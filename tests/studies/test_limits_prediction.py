@@ -16,6 +16,7 @@ from thermal.profile import parse_profile
 PROFILE = parse_profile("step 20 -10 1h then ramp -10 35 1")
 TIME = np.arange(0.0, PROFILE.end, 20.0)
 BENT = {
+    "thermal.film_housing_share": 0.02,
     "bias.k1_deg_per_h_per_Hz": 0.3,
     "bias.k2_deg_per_h_per_Hz2": 0.01,
     "bias.k4_deg_per_h_s_per_Hz": 50.0,
