@@ -11,6 +11,7 @@ from shell.corner import find_kinks, lay_clamped_edge, lay_clamped_face, lay_cor
 from shell.errors import ShellError, mm
 from shell.kernel import Section, shell_table
 from shell.layout import OTHERS, Chain, End, Level, lay_chain
+from shell.points import MiddleSurface
 from shell.quadrature import Array, at_gauss, gauss, nodal
 from shell.resonator import Resonator
 from shell.root import lay_root
@@ -182,7 +183,7 @@ def _hold_end(rows: Rows, end: End, tie: Tie, n: int) -> None:
 
 def sections(resonator: Resonator, chain: Chain, xi: Array, weights: Array) -> Section:
     """The middle surface at ξ of every element of a chain."""
-    names = ("r", "z", "tangent_r", "tangent_z", "curvature", "thickness", "thickness_slope", "position")
+    names = tuple(MiddleSurface.__dataclass_fields__)
     breaks, segments = np.array(chain.breaks), np.array(chain.segments)
     halves = np.diff(breaks) / 2
     s = (breaks[:-1] + halves)[:, None] + halves[:, None] * xi

@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from shell.points import MiddleSurface
 from shell.quadrature import Array, Basis, legendre
 
 SHEAR_CORRECTION = 5 / 6
@@ -65,19 +66,11 @@ class StrainTable:
 
 
 @dataclass(frozen=True, eq=False)
-class Section:
+class Section(MiddleSurface):
     """The middle surface at stations: arrays (elements, stations) and the factor ds/dξ."""
 
-    r: Array
-    z: Array
-    tangent_r: Array
-    tangent_z: Array
-    curvature: Array
-    thickness: Array
-    thickness_slope: Array
     ds: Array
     weight: Array
-    position: Array
 
 
 def shell_table(section: Section, n: int, through: Orders, eta: tuple[Array, Array], along: Basis) -> StrainTable:
@@ -204,7 +197,7 @@ def _tall(per_station: Array) -> NDArray[np.float64]:
 
 def _frame(section: Section, points: Array) -> tuple[Array, Array, Array, Array, Array]:
     """t_r, κ, n_r of the middle surface, and A = 1 + κ ζ and ρ = r + ζ n_r at heights η."""
-    t_r, kappa, n_r = _tall(section.tangent_r), _tall(section.curvature), _tall(-section.tangent_z)
+    t_r, kappa, n_r = _tall(section.tangent_r), _tall(section.curvature), _tall(section.normal_r)
     zeta = _tall(section.thickness) * points[:, None, None] / 2
     return t_r, kappa, n_r, 1 + kappa * zeta, _tall(section.r) + n_r * zeta
 

@@ -1,4 +1,4 @@
-"""Samples of the middle surface of a resonator, and points at heights over them."""
+"""The middle surface of a resonator: samples of it, and points at heights over them."""
 
 from dataclasses import dataclass
 
@@ -9,11 +9,10 @@ from shell.quadrature import Array
 
 
 @dataclass(frozen=True)
-class MeridianPoints:
-    """Samples of the middle surface, m and 1/m: `position` 0 ... 1 (rim), `normal_r / r` the second curvature, slope dh/ds."""
+class MiddleSurface:
+    """Places of the middle surface, m and 1/m: `position` 0 ... 1 (rim), `normal_r / r` the second curvature, slope dh/ds."""
 
     position: Array
-    arc_length: Array
     r: Array
     z: Array
     tangent_r: Array
@@ -31,6 +30,13 @@ class MeridianPoints:
     def normal_z(self) -> Array:
         """Axial component of the unit normal."""
         return self.tangent_r
+
+
+@dataclass(frozen=True)
+class MeridianPoints(MiddleSurface):
+    """Samples of it along the meridian, m."""
+
+    arc_length: Array
 
     def along_face(self, eta: float) -> tuple[Array, Array]:
         """Change of r and z at a height η per arc length of the middle surface, (1 + κ ζ) t + η h'/2 n."""

@@ -22,8 +22,8 @@ from shell.quadrature import Array, gauss
 
 Support: TypeAlias = Literal["free", "clamped-pole", "clamped-rim", "stem", "clamped-face"]
 FaceName: TypeAlias = Literal["inner", "outer"]
-LONGEST_STEM = 100.0  # stem lengths over its radius that are meshed as a solid
 FLAT = 1e-9  # |∫ r dz| over length and radius below which a meridian is that of a flat disc
+LONGEST_STEM = 100.0  # stem lengths over its radius that are meshed as a solid
 
 
 @dataclass(frozen=True)
@@ -182,7 +182,7 @@ class Resonator:
         curvature = (t_z * jet.ddr - t_r * jet.ddz) / speed / speed  # the square of a tiny speed would vanish
         middle = (self._starts[segment] + self._starts[segment + 1]) / 2
         thickness, slope = self._thickness_near(s, middle)
-        return MeridianPoints(s / self.length, s, jet.r, jet.z, t_r, t_z, curvature, thickness, slope)
+        return MeridianPoints(s / self.length, jet.r, jet.z, t_r, t_z, curvature, thickness, slope, s)
 
     def _thickness_near(self, s: Array, inside: float) -> tuple[Array, Array]:
         """Thickness and slope; at a step of the profile the side on which `inside` lies counts."""

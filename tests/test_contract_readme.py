@@ -10,6 +10,7 @@ import pytest
 
 from studies.cli import main
 from studies.effects import find_effect
+from studies.inference import signatures
 from studies.instrument.card import load_card
 from tests.compensation.two_oscillators import Gyro, noisy
 from tests.golden.answers import CASES
@@ -86,7 +87,7 @@ def test_commands_of_the_first_hour_run_in_order(folder, monkeypatch, capsys):
             continue  # tests/studies/design runs this task
         with monkeypatch.context() as patch:
             if "--plan" in words:
-                patch.setattr("studies.inference.signatures.library", lambda: two)
+                patch.setattr(signatures, "library", lambda: two)
             status = main(words)
         said, told = capsys.readouterr()
         if status == 3 and "OpenGL" in told:

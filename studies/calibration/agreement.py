@@ -52,13 +52,14 @@ def _hold(found: CardFit, held: Sequence[int]) -> CardFit:
     values, state, (low, high) = priors.shipped[list(held)], found.state, problem.ends
     for _ in range(STEPS):
         J, r = whitened(problem, state, found.noise, found.rows)
-        beyond = np.ones(0, dtype=bool)
-        while beyond.any() or not beyond.size:
+        while True:
             fixed, ways = np.linalg.lstsq(rows, values, rcond=None)[0], scipy.linalg.null_space(rows)
             target = np.concatenate([r + J @ (state.point - fixed), -fixed])
             point = fixed + ways @ np.linalg.lstsq(np.vstack([J @ ways, ways]), target, rcond=None)[0]
             inside = np.clip(point, low, high)
             beyond = np.abs(point - inside) > ZERO
+            if not beyond.any():
+                break
             rows, values = np.vstack([rows, np.eye(problem.count)[beyond]]), np.append(values, inside[beyond])
         state = problem.evaluate(inside)
     return replace(found, state=state, covariance=covariance_at(problem, state, found.noise, found.rows))

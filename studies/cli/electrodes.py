@@ -1,7 +1,6 @@
 """`hrg electrodes`: what the card's electrodes do to a pair, and the trim voltages that null a split."""
 
 import math
-from contextlib import suppress
 from math import isinf
 from typing import Annotated, Any
 
@@ -55,12 +54,13 @@ def electrodes(
         else:
             z = whole.split.squares[1]
         factor, most = charged.pull_in, reach(charged, limit)
-        trim = None
-        if split is not None:
-            trim = trim_voltages(charged, z, limit)
-        elif whole.split.resolved:
-            with suppress(ShellError):  # the card's own split only where it can be nulled
-                trim = trim_voltages(charged, z, limit)
+        asked = split is not None or whole.split.resolved
+        try:
+            trim = trim_voltages(charged, z, limit) if asked else None
+        except ShellError:
+            if split is not None:
+                raise
+            trim = None  # the card's own split only where it can be nulled
     nulled = trim and {
         "voltages_V": trim.voltages, "left_Hz": abs(trim.left) * mode.frequency, "shift_ppm": 1e6 * trim.shift
     }  # fmt: skip
@@ -81,9 +81,7 @@ def electrodes(
         payload,
         f"Electrodes of {instrument.name}",
         f"Effect of the electrodes on the pair n = {harmonic} at {mode.frequency:.3f} Hz and {T - zero_Celsius:g} °C.",
-        _parts(
-            payload, abs(z) * mode.frequency if split is not None or whole.split.resolved else 0.0, own.resolved, keys
-        ),
+        _parts(payload, abs(z) * mode.frequency if asked else 0.0, own.resolved, keys),
     )
 
 

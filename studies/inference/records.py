@@ -10,7 +10,7 @@ from compensation.spikes import find_spikes
 from studies.calibration.observed import LEAST_ROWS, RESPONSES
 from studies.errors import InputError
 from studies.record import Record, place_in_time, with_bias
-from studies.record.one_gyro import records_of_one_gyro, run_apart
+from studies.record.one_gyro import run_apart, runs_of_one_gyro
 from studies.record.rest import LEAST_SPIKE
 from studies.simulation.drive import COMMAND_COLUMNS, RATE
 
@@ -46,12 +46,12 @@ def make_ready(given: Sequence[Record]) -> Campaign:
     check_units(given)
     check_device(given)
     notes: list[str] = []
-    kept = records_of_one_gyro(given, notes.append)
-    odd = run_apart(kept)
+    kept, odd = runs_of_one_gyro(given, notes.append)
+    one_apart = odd is not None
     if odd is not None and len(kept) > 2:
-        notes.append(f"{kept[odd[0]].path or f'run {odd[0] + 1}'} is left out of the diagnosis.")
-        del kept[odd[0]]
-        odd = run_apart(kept)
+        notes.append(f"{kept[odd].path or f'run {odd + 1}'} is left out of the diagnosis.")
+        del kept[odd]
+        one_apart = run_apart(kept) is not None
     tables = [_columns(record, source) for record in kept]
     outliers = sum(_remove_outliers(table) for table in tables)
     skipped = _unusable(kept, tables)
@@ -91,7 +91,7 @@ def make_ready(given: Sequence[Record]) -> Campaign:
         skipped,
         tuple(notes),
         timed,
-        odd is not None,
+        one_apart,
     )
 
 

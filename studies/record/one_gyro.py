@@ -26,10 +26,8 @@ WELL = 0.01  # of an output's changes (rms): where one law leaves no more, all r
 CLEAR = 2.0  # times white noise (squares) that it must leave besides
 OTHERWISE = 0.4  # of what one law leaves (rms): left with one run read otherwise; of 210 campaigns by others none had less than 0.7
 ALONE, FAR = 0.1, 5e-5  # of the same: left with a run apart; and by how much of the frequency it is then
-APART, NEXT = (
-    0.25,
-    2.0,
-)  # likewise by a law of any heat path, which leaves less; and times as much with any other run apart
+APART, NEXT = 0.25, 2.0
+"""Likewise by a law of any heat path, which leaves less; and times as much with any other run apart."""
 FARTHER = 3e-4  # of the frequency, from which on that law tells: jumps and ageing are less
 HOURS = (1, -1, 2, -2)  # by which clocks of two loggers differ: summer time, time zones
 BEND = 0.1  # of the changes of a frequency: a temperature in another unit would bend its law to its needs
@@ -38,6 +36,11 @@ LAW, ONE = replace(ANY_PATH, bend=BEND), Law(bend=BEND)
 
 def records_of_one_gyro(records: Sequence[Record], say: Callable[[str], None]) -> list[Record]:
     """Return the records that a command may take together, and say what is left out or doubted."""
+    return runs_of_one_gyro(records, say)[0]
+
+
+def runs_of_one_gyro(records: Sequence[Record], say: Callable[[str], None]) -> tuple[list[Record], int | None]:
+    """Return the same, and which of them lies apart from the law of the others."""
     kept, said = drop_repeats(records)
     said += filter(None, map(check_record, kept))
     kept = [without_stuck(record) for record in kept]
@@ -54,7 +57,7 @@ def records_of_one_gyro(records: Sequence[Record], say: Callable[[str], None]) -
         )
     for sentence in said:
         say(sentence)
-    return kept
+    return kept, odd and odd[0]
 
 
 def check_one_gyro(records: Sequence[Record]) -> None:

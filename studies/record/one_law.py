@@ -59,9 +59,8 @@ class Followed:
 
 
 ONE_LAG = Law()
-LEVELLED = Law(
-    tuple(np.logspace(2.2, 3.6, 5).tolist()), longest=5000.0
-)  # longer ones, and the start that fades with them, are levels of the runs
+LEVELLED = Law(tuple(np.logspace(2.2, 3.6, 5).tolist()), longest=5000.0)
+"""With longer lags, and starts that fade with them, runs would have levels of their own."""
 ANY_PATH = Law(tuple(np.logspace(2.0, 4.6, 5).tolist()))  # what these lags do together is near to any heat path's work
 
 

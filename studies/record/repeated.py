@@ -10,10 +10,8 @@ from studies.record import OUTPUTS, Record, place_in_time
 
 REPEATED = 0.5  # part of the rows of a record that stand in another of the same run
 PICKED = 500  # rows that are compared
-ALIKE, AS_LARGE = (
-    0.9,
-    0.02,
-)  # correlation of the noise of two columns, and ln of its sizes: of another gyro it is scaled
+ALIKE, AS_LARGE = 0.9, 0.02
+"""Correlation of the noise of two columns, and ln of its sizes: of another gyro it is scaled."""
 FEWEST_ALIKE, MOST_ALIKE = 50, 20_000  # rows that show it
 
 
