@@ -134,7 +134,7 @@ def measure_temperature(records: Sequence[Record], output: str) -> Found:
         names = [*(f"offset {k + 1}" for k in range(len(runs))), "temperature", "rate of temperature"]
 
         def fit_behind(lags: Sequence[float]) -> ColouredFit:
-            followed = [run.behind(lags) for run in courses]
+            followed = [run.behind(*lags) for run in courses]
             T = np.concatenate(followed)
             slope = np.concatenate([np.gradient(own, run.time) for own, run in zip(followed, courses, strict=True)])
             offsets = scipy.linalg.block_diag(*(np.ones((len(own), 1)) for own in followed))

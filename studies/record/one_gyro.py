@@ -165,8 +165,11 @@ def check_one_clock(records: Sequence[Record]) -> None:
         for k, run in enumerate(runs)
         if (one := run.earlier(3600.0 * hours)) is not None
     ]
+    as_read = likeliest(runs, LAW)
+    if not moved or _holds_well(runs, as_read):
+        return
     tried = [likeliest([*runs[:k], one, *runs[k + 1 :]], LAW) for k, _, one in moved]
-    best = _better(runs, likeliest(runs, LAW), tried, APART) if tried else None
+    best = _better(runs, as_read, tried, APART)
     if best is not None and _alone(
         [one for one, (k, *_) in zip(tried, moved, strict=True) if k != moved[best][0]], tried[best]
     ):
@@ -183,8 +186,11 @@ def run_apart(records: Sequence[Record]) -> tuple[int, float] | None:
     if len(runs) < 2:
         return None
     for law, part, far in ((ONE, ALONE, FAR), (LEVELLED, APART, FARTHER)):
+        as_read = likeliest(runs, law)
+        if _holds_well(runs, as_read, 0.0):
+            continue
         alone = [likeliest(runs, law, [k]) for k in range(len(runs))]
-        k = _better(runs, likeliest(runs, law), alone, part, 0.0)
+        k = _better(runs, as_read, alone, part, 0.0)
         if (
             k is not None
             and abs(alone[k].apart) > far * runs[k].output.mean()
@@ -208,13 +214,23 @@ def _put_in(runs: Sequence[Course], others: Sequence[Course]) -> list[list[Cours
     return [[*runs[:k], other, *runs[k + 1 :]] for k, other in enumerate(others)]
 
 
+def _white(runs: Sequence[Course]) -> float:
+    return white_rms(*(run.output for run in runs)) ** 2
+
+
+def _holds_well(runs: Sequence[Course], as_read: Followed, well: float = WELL) -> bool:
+    """Whether one law leaves hardly more than white noise, or than a small part of the changes."""
+    changes = float(np.std(np.concatenate([run.output for run in runs])))
+    return as_read.left**2 < max(CLEAR * _white(runs), (well * changes) ** 2)
+
+
 def _better(
     runs: Sequence[Course], as_read: Followed, tried: Iterable[Followed], part: float = OTHERWISE, well: float = WELL
 ) -> int | None:
     """Return which of some models leaves so small a part of what one law leaves, if that does not hold well; white noise apart. None where none does."""
-    white = white_rms(*(run.output for run in runs)) ** 2
-    if as_read.left**2 < max(CLEAR * white, (well * float(np.std(np.concatenate([run.output for run in runs])))) ** 2):
+    if _holds_well(runs, as_read, well):
         return None
+    white = _white(runs)
     left = [one.left**2 - white for one in tried]
     k = int(np.argmin(left))
     return k if left[k] < part**2 * (as_read.left**2 - white) else None

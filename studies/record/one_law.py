@@ -1,7 +1,7 @@
 """An output of some runs by one law of what it follows with a lag: y = c₀ + c₁ x + c₂ x² + sᵣ e^(−t/τ) in run r, τ ẋ + x = T; with further lags, Σ cⱼ xⱼ too."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import scipy
@@ -22,13 +22,16 @@ class Course:
     time: Array
     drive: Array
     output: Array
+    _behind: dict[tuple[float, ...], Array] = field(default_factory=dict, init=False, repr=False, compare=False)
 
-    def behind(self, lags: Sequence[float]) -> Array:
-        """Return what is followed behind lags (s) in series, settled at the start."""
-        found = self.drive
-        for lag in lags:
-            found = follow_lag(found, np.diff(self.time), lag)
-        return found
+    def behind(self, *lags: float) -> Array:
+        """Return what is followed behind lags (s) in series, settled at the start; each once, since every law tries the same lags."""
+        if lags not in self._behind:
+            found = self.drive
+            for lag in lags:
+                found = follow_lag(found, np.diff(self.time), lag)
+            self._behind[lags] = found
+        return self._behind[lags]
 
     def earlier(self, by: float) -> "Course | None":
         """Return the course with what is followed read later by `by` s, as if it had been logged so late; None where too little is left."""
@@ -77,7 +80,7 @@ def course_of(record: Record, drive: str, output: str, runs: int = 1) -> Course 
 
 def parabola(runs: Sequence[Course], lags: Sequence[float]) -> Array:
     """Return the columns of a bend and a slope about the mean of what is followed behind lags in series, a level, and what each start was off by."""
-    x = np.concatenate([run.behind(lags) for run in runs])
+    x = np.concatenate([run.behind(*lags) for run in runs])
     x = x - x.mean()
     slowest = max(lags)
     faded = np.concatenate([np.exp((run.time[0] - run.time) / slowest) if slowest else 0.0 * run.time for run in runs])
@@ -89,7 +92,7 @@ def parabola(runs: Sequence[Course], lags: Sequence[float]) -> Array:
 def follow(runs: Sequence[Course], lag: float, law: Law = ONE_LAG, apart: Sequence[int] = ()) -> Followed:
     """Return what a law leaves with one lag, where some runs have levels of their own."""
     X, y = parabola(runs, [lag]), np.concatenate([run.output for run in runs])
-    more = [np.concatenate([run.behind([tau]) for run in runs]) for tau in law.further]
+    more = [np.concatenate([run.behind(tau) for run in runs]) for tau in law.further]
     X = np.column_stack([X, *(one - one.mean() for one in more), *(_rows_of(runs, k) for k in apart)])
     y = y - y.mean()
     found = _solve(X, y)
