@@ -10,6 +10,7 @@ their standard deviations and correlations.
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -90,7 +91,13 @@ class WavePrior:
         return np.asarray(turn * self.moments[1:])
 
     def posterior(self, information: Array, mean: Array, prior: Array) -> WavePosterior:
-        """Length and axis, from the data's information (2, 2) on (x, y) and the mean that it has beside that of a normal prior."""
+        """Length and axis, from the data's information (2, 2) on (x, y) and the mean that it has beside that of a normal prior; once of what is asked again, as where no data tell of either."""
+        return self._posterior(*(part.tobytes() for part in (information, mean, prior)))
+
+    @lru_cache(maxsize=16)  # noqa: B019  of priors, which are few
+    def _posterior(self, *given: bytes) -> WavePosterior:
+        information, mean, prior = (np.frombuffer(part).reshape(-1, 2) for part in given)
+        mean = mean[0]
         pull = (information + prior) @ mean
         strength, ways = np.linalg.eigh(information)
         told = strength > 1.0
