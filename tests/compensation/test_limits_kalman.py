@@ -6,14 +6,7 @@ from filterpy.kalman import KalmanFilter
 
 from compensation.demodulated import relate_rate_to_measured_rate
 from compensation.errors import CompensationError
-from compensation.kalman import (
-    LinearModel,
-    expect_mean_nis,
-    model_gyro,
-    noise_of_estimate,
-    run_filter,
-    settle,
-)
+from compensation.kalman import LinearModel, expect_mean_nis, model_gyro, noise_of_estimate, run_filter, settle
 from compensation.spectral import rate_spectrum, white_spectrum
 from compensation.wiener import design_wiener_filter
 

@@ -80,8 +80,7 @@ def test_every_error_of_the_electronics_against_the_carrier(electronics, within)
 
 
 @pytest.mark.parametrize(
-    ("precession", "electronics"),
-    [(0.5, ERRORS), (-0.5, ERRORS), pytest.param(0.5, STIFF, marks=pytest.mark.slow)],
+    ("precession", "electronics"), [(0.5, ERRORS), (-0.5, ERRORS), pytest.param(0.5, STIFF, marks=pytest.mark.slow)]
 )
 def test_a_turning_wave_with_every_error_against_the_carrier(precession, electronics):
     """Whole angle at Q = 1000: what damping and electronics do to the angle, some 0.1 rad, within 2 % of the carrier."""

@@ -44,11 +44,7 @@ def make_runs(generator, noise, rows=4000, dwell=200):
         counts = counts + noise / 0.0242 * generator.standard_normal(len(rate))
         return BellRun(STEP * np.arange(len(rate)), counts, temperature, rate)
 
-    return (
-        run(plateaus, np.full(len(plateaus), 25.0)),
-        run(np.zeros(rows), sweep),
-        run(np.full(rows, 300.0), sweep),
-    )
+    return (run(plateaus, np.full(len(plateaus), 25.0)), run(np.zeros(rows), sweep), run(np.full(rows, 300.0), sweep))
 
 
 def fit_planted(seed, noise=0.06):

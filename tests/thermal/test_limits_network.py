@@ -8,23 +8,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.constants import Stefan_Boltzmann
 
+from tests.thermal.test_limits_transient import RADIATIVE
 from thermal.network import Boundary, Conductor, Network, Node, Radiator, Source, assemble, linearise
 from thermal.relaxation import find_relaxation, time_constant_sensitivities
 from thermal.steady import find_steady_state
 
-GYRO = (
-    Boundary("chamber"),
-    Node("housing", 70.0),
-    Node("base", 25.0),
-    Node("shell", 2.0),
-    Conductor("chamber", "housing", 0.1),
-    Conductor("housing", "base", 0.012),
-    Conductor("base", "shell", 1.5e-3),
-    Radiator("housing", "base", 1e-3),
-    Radiator("base", "shell", 8e-5),
-    Source("shell", 2e-3),
-    Source("housing", 0.3),
-)
+GYRO = (*RADIATIVE, Source("shell", 2e-3), Source("housing", 0.3))
 
 
 def test_two_node_eigenvalues_are_the_roots_of_the_quadratic():

@@ -6,14 +6,7 @@ import numpy as np
 import pytest
 
 from shell.elastic import Elastic
-from shell.imperfection import (
-    CoupledHarmonics,
-    Imperfection,
-    Pair,
-    PointMass,
-    find_split,
-    wave,
-)
+from shell.imperfection import CoupledHarmonics, Imperfection, Pair, PointMass, find_split, wave
 from shell.meridian import hemisphere
 from shell.modes import solve_modes
 from shell.resonator import Stem

@@ -5,14 +5,7 @@ from math import log
 import pytest
 
 from shell.elastic import Elastic
-from shell.imperfection import (
-    CoupledHarmonics,
-    Imperfection,
-    Pair,
-    PointMass,
-    find_split,
-    wave,
-)
+from shell.imperfection import CoupledHarmonics, Imperfection, Pair, PointMass, find_split, wave
 from shell.inertia import weigh
 from shell.meridian import hemisphere
 from shell.modes import solve_modes

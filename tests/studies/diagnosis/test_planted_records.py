@@ -238,10 +238,7 @@ def one_lag(k, late=0.0, by_rate=0.0):
 
 @pytest.mark.parametrize(
     ("hidden", "runs", "said"),
-    [
-        ({"late": 60.0}, (0, 1), {"thermometer-lag"}),
-        ({"by_rate": 40.0}, (1,), {"rate-frequency", "mounting-stress"}),
-    ],
+    [({"late": 60.0}, (0, 1), {"thermometer-lag"}), ({"by_rate": 40.0}, (1,), {"rate-frequency", "mounting-stress"})],
     ids=["a late thermometer", "a frequency that follows the rate"],
 )
 def test_a_resonator_ahead_of_its_thermometer_has_a_late_one_or_follows_the_rate(hidden, runs, said, only):
