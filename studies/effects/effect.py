@@ -102,6 +102,8 @@ class Effect:
     # beforehand. One, without parameters, unless given.
     grid: Callable[[Span, str], Sequence[tuple[float, ...]]] = lambda span, response: [()]
     acts_on: str = "response"  # "temperature" or "response"
+    # callable shape -> places of columns: What any law has too, so that no fit looks for it; a card may state it.
+    of_law: Callable[[Shape], tuple[int, ...]] = lambda shape: ()
     card_key: str = ""  # value of a card that takes its place in a heat path of several lags
     needs: tuple[str, ...] = ()  # drives (fields of `States`) that must be measured and must vary
     # mapping from response to names: Effects that no record of that response alone can tell from this one, whatever
@@ -151,6 +153,10 @@ class Effect:
     def spread(self) -> Array:
         """Prior standard deviations of all columns over the effect's size."""
         return np.array([value for coefficient in self.coefficients for value in coefficient.spread])
+
+    def members(self, shape: Shape) -> tuple[int, ...]:
+        """Return the places of the columns that a fit looks for."""
+        return tuple(int(k) for k in np.flatnonzero(self.spread > 0) if k not in self.of_law(shape))
 
     def coefficient_names(self, response: str) -> tuple[str, ...]:
         """Return the names of the coefficients with the unit of `response` filled in."""

@@ -118,7 +118,7 @@ def fit_thermal_constants(
     progress("one lag")
 
     def find(law: dict[str, Any]) -> HeatPath:
-        return find_heat_path(fit(build_problem(card.with_table("law", law), campaign.records)), lags, progress)
+        return find_heat_path(fit(build_problem(card.with_table("law", law), campaign.records)), lags, {}, progress)
 
     path = find(law | {"delay_s": {"value": 0.0, "sd": 0.0}})
     share, error = path.value(SHARE)

@@ -237,17 +237,18 @@ def infer(
 def _with_heat_path(whole: CardFit, found: CardFit, progress: Report) -> tuple[HeatPath | None, Search, Outcome]:
     """Search beside the path of the card, or one lag, and where that leaves slow noise of which other lags would take something, strains the card's values, or the sensor is late, beside a longer one; the likelier heat path stays."""
     own, given, path = Pursuit(found, progress), whole.problem.instrument.polynomial is None, None
+    tried: dict[tuple[int, bool], HeatPath] = {}
     bring = lags_would_bring(own.search) if slow_share(found) > SUSPICIOUS else -np.inf
     if given and (is_strained(found) or (bring > WORTH and bring > effects_would_bring(own.search))):
         path = with_second_mass(whole, found, progress)
     elif not given and (bring > WORTH or is_ahead(found)):
-        path = find_heat_path(found, None if bring > WORTH else 1, progress)
+        path = find_heat_path(found, None if bring > WORTH else 1, tried, progress)
     if path is None or not path.departs:
         return (None, *own.outcome())
     score, path, there, grown = _beside(path, progress)
     if not given and path.lags < len(LAGS) and any(term.response == FREQUENCY for term in grown.final.terms):
         # an effect may do what a lag does: a longer path has to be beaten with effects beside it
-        longer = _beside(find_heat_path(found, len(LAGS), progress), progress)
+        longer = _beside(find_heat_path(found, len(LAGS), tried, progress), progress)
         score, path, there, grown = longer if longer[0] > score + WORTH else (score, path, there, grown)
     gain, plain = score - evidence_of(found), own.search.settle((), found.noise)
     if with_levels(own.search, plain, FREQUENCY).score - plain.score > gain + MARGIN:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from compensation.arrays import Array
+from shell.constants import zero_Celsius
 from studies.diagnosis.verdict import Interval
 from studies.effects import Effect, Parameter
 from studies.inference.causes import parameters_of
@@ -14,11 +15,16 @@ from studies.inference.diagnosis import Inference
 from studies.inference.heat_path import MASS
 from studies.inference.model import Term
 from studies.record import Record
+from studies.simulation.drive import COLUMN
 from studies.simulation.noise import noise_keys
 
 if TYPE_CHECKING:
     from studies.calibration.calibrate import Calibration
 
+FROM_RUN = "from_run"
+"""The run from which on a thermometer is another one."""
+BEYOND, READINGS = 20.0, 4001
+"""Kelvin beyond the readings, and places, at which its error is computed."""
 WIDER = 3.0
 """Of what a diagnosis knows of an effect, the prior with which a calibration finds it anew beside all other values."""
 
@@ -51,6 +57,8 @@ def entry_of(found: Inference, k: int) -> dict[str, Any]:
     values[list(term.members)] = background.coefficients(k)[0][: len(term.members)]
     values = np.minimum(values, np.concatenate([np.full(len(own.spread), own.most) for own in effect.coefficients]))
     numbers: dict[str, Any] = {p.name: float(value) for p, value in zip(effect.shape, term.shape, strict=True)}
+    if FROM_RUN in numbers:  # what is simulated comes after
+        numbers[FROM_RUN] = 0.0
     if effect.sees_heat:  # the fit knew the temperature with it; a simulation has to solve for it
         numbers[effect.shape[0].name] = float(np.clip(values[0], 0.0, 1.0))
     numbers |= {key: shortest(value) for key, value in effect.numbers(values, term.response).items() if np.any(value)}
@@ -88,13 +96,15 @@ def shortest(value: float | list[float]) -> float | list[float]:
 
 
 def without_events(found: Inference) -> list[Record]:
-    """Return the records as they would be had what happens once happened before them all: a jump that stays is there from the start."""
+    """Return the records as they would be had what happens once happened before them all: a jump that stays is there from the start, a thermometer was exchanged before."""
     problem, records = found.search.linear.problem, found.campaign.records
     out = list(records)
     for k, part in enumerate(problem.parts):
         columns: dict[str, Array] = {}
         record, time = records[part.run], problem.runs[part.run].inner.time
         for term, values in zip(found.final.terms, found.numbers.coefficients, strict=True):
+            if FROM_RUN in (parameter.name for parameter in term.effect.shape):
+                columns |= _read_anew(found, term, values, k)
             if not term.effect.once:
                 continue
             for name, change in found.model.change(term, values, k).items():
@@ -102,6 +112,19 @@ def without_events(found: Inference) -> list[Record]:
                 own += _last(found, term, values, name) - np.interp(record["time_s"], time, change)
         out[part.run] = record.with_columns(columns) if columns else record
     return out
+
+
+def _read_anew(found: Inference, term: Term, values: Array, k: int) -> dict[str, Array]:
+    """Return what a thermometer that came later would have read in a run before it: s of T = s + e(s)."""
+    states, drive = found.search.signatures.paths[k].states, found.search.signatures.paths[k].prediction.drive
+    if states.run >= term.shape[0]:
+        return {}
+    name = COLUMN[drive.boundary]
+    T = found.campaign.records[found.search.linear.problem.parts[k].run][name] + zero_Celsius
+    s = np.linspace(np.nanmin(T) - BEYOND, np.nanmax(T) + BEYOND, READINGS)
+    later = replace(states, run=int(term.shape[0]), time=s, housing=s, tau=0.0)
+    error = term.effect.columns(later, term.shape, term.response)[:, list(term.members)] @ values
+    return {name: np.interp(T, s + error, s) - zero_Celsius}
 
 
 def _last(found: Inference, term: Term, values: Array, name: str) -> float:

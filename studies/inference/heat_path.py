@@ -165,9 +165,9 @@ def cubic_of(card: Instrument) -> dict[str, Any]:
 
 
 def find_heat_path(
-    baseline: CardFit, lags: int | None = None, progress: Callable[[str], None] = lambda _: None
+    baseline: CardFit, lags: int | None, tried: dict[tuple[int, bool], HeatPath], progress: Callable[[str], None] = lambda _: None
 ) -> HeatPath:
-    """Return the path of so many lags, else the likeliest one by the frequency, each further lag paid for, of a gyro calibrated with one."""
+    """Return the path of so many lags, else the likeliest one by the frequency, each further lag paid for, of a gyro calibrated with one; what was `tried` is kept there."""
     whole = baseline.problem
     lean = replace(whole, runs=tuple(run.explaining((FREQUENCY,)) for run in whole.runs))
     lag = whole.priors.at(baseline.point[: len(whole.priors.values)])["law.lag_s"]
@@ -178,12 +178,15 @@ def find_heat_path(
         if lags not in (None, number) or followed:
             continue
         words = f"a heat path with {number} {'lag' if number == 1 else 'lags in series'} and radiation"
-        progress(words)
         cards = [with_lags(whole.instrument, [part * lag for part in parts], lumps) for parts in orders]
-        path = max((_calibrated(lean, card) for card in cards), key=lambda one: one.evidence)
-        if is_ahead(path.fit) or slow_share(path.fit) > FOLLOWED:
-            progress(f"{words}, its sensor late")
-            path = max(path, _calibrated(lean, with_late_sensor(path.card)), key=lambda one: one.evidence)
+        path = tried.get((number, lumps)) if lags else None
+        if path is None:
+            progress(words)
+            path = max((_calibrated(lean, card) for card in cards), key=lambda one: one.evidence)
+            if is_ahead(path.fit) or slow_share(path.fit) > FOLLOWED:
+                progress(f"{words}, its sensor late")
+                path = max(path, _calibrated(lean, with_late_sensor(path.card)), key=lambda one: one.evidence)
+            tried[number, lumps] = path
         if best is None or path.evidence > best.evidence + WORTH * (path.lags - best.lags):
             best = path
             still = number == 1 or slow_share(path.fit) < FOLLOWED

@@ -116,6 +116,7 @@ class Search:
             for name in (one for one in responses if shape in scanned[one]):
                 own = [run[first[name]] for run in runs]
                 there = np.any([run.any(axis=1) for run in own], axis=0)
+                there &= np.isin(first[name], effect.members(shape))
                 members = tuple(k for k, seen in zip(first[name], there, strict=True) if seen)
                 if members:
                     columns = self.signatures.made_of(np.hstack([run[there] for run in own]).T, effect, name)
@@ -140,7 +141,7 @@ class Search:
         members: tuple[int, ...] = (),
     ) -> Term:
         """Return a term with some members of the effect, or all that have a prior."""
-        members = members or tuple(int(k) for k in np.flatnonzero(effect.spread > 0))
+        members = members or effect.members(shape)
         starts = self.signatures.remembers(effect, shape)
         columns = self.signatures.of_term(effect, shape, response, members, starts)
         unit = self.unit(effect, response, members)

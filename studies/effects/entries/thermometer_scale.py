@@ -10,18 +10,12 @@ from studies.effects.states import States, lag
 def columns(states: States, shape: Shape, response: str) -> Array:
     """The true housing temperature is T_s + Σ e_k x^k, k = 2, 3, 4, x = T_s − T₀ in units of 10 K; it then passes the lag.
 
-    A sensor that was exchanged or wired anew has it from one run on, with another slope, e₁, and zero, e₀: those of a
-    sensor that stays are part of the law.
+    A sensor that was exchanged or wired anew has it from one run on, with another slope, e₁, and zero, e₀.
     """
     (begin,) = shape
-    if states.run < begin:
-        return np.zeros((states.time.size, 5))
     x = (states.housing - states.reference) / 10.0
-    powers = (2, 3, 4, 1, 0)
-    parts = [lag(x**power, states.step, states.tau) for power in powers]
-    if not begin:
-        parts[3] = parts[4] = np.zeros_like(x)
-    return np.stack(parts, axis=1)
+    parts = [lag(x**power, states.step, states.tau) for power in (2, 3, 4, 1, 0)]
+    return np.stack(parts, axis=1) * float(states.run >= begin)
 
 
 def grid(span: Span, response: str) -> list[tuple[float, ...]]:
@@ -49,6 +43,7 @@ EFFECT = Effect(
     sizes={"frequency_Hz": 0.3},
     shape=(Parameter("from_run", 0.0, 1e4, "first run with this error, counted from 0", False, True),),
     acts_on="temperature",
+    of_law=lambda shape: () if shape[0] else (3, 4),  # slope and zero of a sensor that stays
     steady=steady,
     steady_grid=lambda low, high: [(3.0,), (4.0,)],
     steady_words="thermometer error up to order {0:.0f}",

@@ -67,8 +67,8 @@ double twin_effect(Twin *w, const TwinEffect *e, const TwinInput *in, double h, 
     }
     case E_thermometer_scale:
         if (s[0] > 0) return 0.0;
-        for (int k = 0; k < 3; ++k) y += a[k] * lag(m + 3 * k, pow((housing - TWIN_REFERENCE) / 10, k + 2), h, tau);
-        return y;
+        for (int k = 0; k < 4; ++k) y += a[k] * lag(m + 3 * k, pow((housing - TWIN_REFERENCE) / 10, k < 3 ? k + 2 : 1), h, tau);
+        return y + a[4];
     case E_thermometer_lag: return a[0] * (housing - lag(m, housing, h, tau)) / tau;
     case E_self_heating: return in->given[IN_AMPLITUDE] ? a[0] * lag(m, amplitude, h, tau) : 0.0;
     case E_radiation:

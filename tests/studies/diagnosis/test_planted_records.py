@@ -252,6 +252,33 @@ def test_a_resonator_ahead_of_its_thermometer_has_a_late_one_or_follows_the_rate
         assert cause.parameters["sensor_time_constant_s"].value == pytest.approx(60.0, abs=3.0)
 
 
+def exchanged(k, new):
+    """A run whose thermometer, where it is a `new` one, reads s where T = s + 0.8 K + 0.03 (s − 20) + 5e-4 (s − 20)²/K."""
+    time, noise = np.arange(0.0, 6 * 3600.0, 30.0), np.random.default_rng(k)
+    T = lag(time, 20.0 + 28.0 * np.clip(np.sin(2 * np.pi * time / (9000.0 + 2500.0 * k) + k), -0.7, 0.7), 500.0)
+    x = lag(time, T, 1200.0) - 20.0
+    readings = np.linspace(-60.0, 90.0, 3001)
+    y = readings - 20.0
+    read = np.interp(T, readings + new * (0.8 + 0.03 * y + 5e-4 * y**2), readings)
+    columns = {"time_s": time, "housing_temperature_degC": read + 1e-3 * noise.standard_normal(time.size)}
+    columns["frequency_Hz"] = 6200.0 * (1.0 + 7e-5 * x - 8e-8 * x**2) + 2e-3 * noise.standard_normal(time.size)
+    return Record(columns, path=f"run{k}.csv", sha256=str(k))
+
+
+def test_the_card_of_a_gyro_whose_thermometer_was_exchanged_predicts_a_run_with_the_new_one(only):
+    """It was saved as of the second run, and missing in a run that is simulated alone: 17 times the noise."""
+    only("thermometer-scale", "curvature", "second-lag")
+    found = diagnose_records([exchanged(0, False), exchanged(1, True), exchanged(2, True)])
+    (cause,) = found.verdict.causes
+    assert cause.effect == "thermometer-scale" and cause.parameters["from_run"].value == 2
+    y, zero = found.card.reference_temperature - 293.15, cause.parameters["zero_K"]
+    assert zero.low < 0.8 + 0.03 * y + 5e-4 * y**2 < zero.high
+    unseen = exchanged(3, True)
+    run = simulate_run(extend(found).instrument, drive_by_record(unseen), noise=False)
+    left = run.record["frequency_Hz"] - unseen["frequency_Hz"]
+    assert np.sqrt(np.mean(left[120:] ** 2)) < 1.1 * 2e-3  # after an hour: how it began is not recorded
+
+
 def lumps_of_silica(words, seed, base=(200.0, 0.25), capacity=60.0, stem=0.05, seen=2e-3, growth=1.8e-3):
     """A record of a base and a shell of fused silica that loads it, hung on a thin stem and radiating to the housing, by the implicit integrator (J/K, W/K, m²)."""
     parts = [
