@@ -23,6 +23,7 @@ from studies.diagnosis.constants import CONSTANTS
 from studies.diagnosis.response import SeenResponse
 from studies.inference.causes import only_apart, with_levels
 from studies.inference.heat_path import (
+    FOLLOWED,
     FREQUENCY,
     LAGS,
     WORTH,
@@ -239,12 +240,19 @@ def _with_heat_path(whole: CardFit, found: CardFit, progress: Report) -> tuple[H
     own, given, path = Pursuit(found, progress), whole.problem.instrument.polynomial is None, None
     tried: dict[tuple[int, bool], HeatPath] = {}
     bring = lags_would_bring(own.search) if slow_share(found) > SUSPICIOUS else -np.inf
+    ended = None
+    if not given and bring > WORTH and effects_would_bring(own.search) > bring:
+        # an effect may do more than any lag, and then leave nothing to lags
+        search, outcome = ended = own.outcome()
+        there = search.linear.rows[FREQUENCY].slow_share(outcome.final.noise[FREQUENCY])
+        if there < FOLLOWED and lags_would_bring(search, outcome.final) < 0.0:
+            return None, search, outcome
     if given and (is_strained(found) or (bring > WORTH and bring > effects_would_bring(own.search))):
         path = with_second_mass(whole, found, progress)
     elif not given and (bring > WORTH or is_ahead(found)):
         path = find_heat_path(found, None if bring > WORTH else 1, tried, progress)
     if path is None or not path.departs:
-        return (None, *own.outcome())
+        return (None, *(ended or own.outcome()))
     score, path, there, grown = _beside(path, progress)
     if not given and path.lags < len(LAGS) and any(term.response == FREQUENCY for term in grown.final.terms):
         # an effect may do what a lag does: a longer path has to be beaten with effects beside it
@@ -252,8 +260,8 @@ def _with_heat_path(whole: CardFit, found: CardFit, progress: Report) -> tuple[H
         score, path, there, grown = longer if longer[0] > score + WORTH else (score, path, there, grown)
     gain, plain = score - evidence_of(found), own.search.settle((), found.noise)
     if with_levels(own.search, plain, FREQUENCY).score - plain.score > gain + MARGIN:
-        return (None, *own.outcome())
-    search, outcome = own.outcome(-np.inf if given else score - BEATEN)
+        return (None, *(ended or own.outcome()))
+    search, outcome = ended or own.outcome(-np.inf if given else score - BEATEN)
     lead = score - search.fair(outcome.final)
     if lead < MARGIN + given * FURTHER * sum(t.brought for t in outcome.final.terms if t.response == FREQUENCY):
         return None, search, outcome

@@ -223,9 +223,9 @@ def is_strained(found: CardFit) -> bool:
     return bool(away @ away > scipy.special.chdtri(max(own.sum(), 1), STRAINED))
 
 
-def lags_would_bring(search: Search) -> float:
-    """Log evidence that lags of any lengths and shares would bring in a linearised campaign: a heat path of any form, to first order."""
-    return _best(search, search.shapes_of([(any_lags(search.signatures.span), FREQUENCY)]))
+def lags_would_bring(search: Search, beside: Hypothesis | None = None) -> float:
+    """Log evidence that lags of any lengths and shares would bring in a linearised campaign, or beside effects: a heat path of any form, to first order."""
+    return _best(search, search.shapes_of([(any_lags(search.signatures.span), FREQUENCY)]), beside)
 
 
 def effects_would_bring(search: Search) -> float:
@@ -234,8 +234,9 @@ def effects_would_bring(search: Search) -> float:
     return _best(search, [own for own in search.bank if own.response == FREQUENCY and own.effect.card_key != lag])
 
 
-def _best(search: Search, bank: Sequence[Shapes]) -> float:
-    return max((one.gain for one in search.scan(Hypothesis((), search.noise, 0.0), bank)), default=-np.inf)
+def _best(search: Search, bank: Sequence[Shapes], beside: Hypothesis | None = None) -> float:
+    now = beside or Hypothesis((), search.noise, 0.0)
+    return max((one.gain for one in search.scan(now, bank)), default=-np.inf)
 
 
 def slow_share(found: CardFit, name: str = FREQUENCY) -> float:
