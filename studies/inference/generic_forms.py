@@ -165,3 +165,11 @@ BUMP = replace(
     shape=(Parameter("centre", 0.0, 1e4, "centre", False, True), Parameter("width", 0.0, 1e4, "width", True, True)),
     grid=_bumps,
 )
+
+
+def _no_form(states: States, shape: Sequence[float], response: str) -> Array:
+    """Nothing that a state tells: its path is read from the rows."""
+    return np.zeros((states.time.size, 1))
+
+
+SWITCH = _generic("time: switching between two levels", _no_form, [1.0])

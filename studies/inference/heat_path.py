@@ -165,7 +165,10 @@ def cubic_of(card: Instrument) -> dict[str, Any]:
 
 
 def find_heat_path(
-    baseline: CardFit, lags: int | None, tried: dict[tuple[int, bool], HeatPath], progress: Callable[[str], None] = lambda _: None
+    baseline: CardFit,
+    lags: int | None,
+    tried: dict[tuple[int, bool], HeatPath],
+    progress: Callable[[str], None] = lambda _: None,
 ) -> HeatPath:
     """Return the path of so many lags, else the likeliest one by the frequency, each further lag paid for, of a gyro calibrated with one; what was `tried` is kept there."""
     whole = baseline.problem

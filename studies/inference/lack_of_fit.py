@@ -5,16 +5,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from compensation.arrays import Array
 from compensation.lines import Line
 from compensation.spikes import find_step
 from studies.calibration.problem import CardProblem
 from studies.diagnosis.constants import CONSTANTS
 from studies.diagnosis.verdict import spell_structure
-from studies.inference.generic_forms import BUMP, STEP, generic_forms
+from studies.inference.generic_forms import BUMP, STEP, SWITCH, generic_forms
 from studies.inference.held_out import Model, Rows
 from studies.inference.model import Background, Term
 from studies.inference.search import LESS, SUSPICIOUS, Hypothesis, Search, Shapes
-from studies.inference.sharp import brief_events, fast_line, intermittent, recurring, tails_of
+from studies.inference.sharp import brief_events, fast_line, intermittent, recurring, switching, tails_of
 
 ENOUGH = CONSTANTS["margin"] - CONSTANTS["log_prior_unknown"]
 """Log evidence from which on structure is no chance."""
@@ -88,6 +89,9 @@ def look(
         fitful = intermittent([white[place] for place in level.slices])
         if fitful > evidence:
             word, evidence = "time: an intermittent oscillation", fitful
+        switches = _switching(search, final, name, rest)
+        if switches > evidence:
+            word, evidence = SWITCH.name, switches
         fast = _line(search, name, rows.get(name))
         if fast is not None and fast.evidence > evidence:
             word = f"time: a line of {fast.period:.3g} s, too fast for steps of {_step(search, name):.3g} s"
@@ -115,6 +119,17 @@ def _instead_of_noise(search: Search, bank: Sequence[Shapes], final: Hypothesis,
     forms = [own for own in bank if own.response == name and not own.effect.by_clock]
     seen = search.scan(final, forms, less=LESS[:1])[:1]
     return search.settle((*final.terms, seen[0].term), seen[0].noise, [name]) if seen else None
+
+
+def _switching(search: Search, final: Hypothesis, name: str, rest: Array) -> float:
+    """Log evidence of a level that switches to another one and back, in noise of its own, over slow noise alone: of the likeliest path, so no more than that."""
+    found = switching([rest[place] for place in search.linear.rows[name].slices])
+    if found is None:
+        return -np.inf
+    path, chance = found
+    unit = np.array([search.signatures.size(SWITCH, name)])
+    term = Term(SWITCH, name, (), {name: path[:, None]}, (0,), unit, price=0.0)
+    return search.settle((*final.terms, term), final.noise, [name]).evidence - final.evidence + chance
 
 
 def _share(search: Search, name: str, before: Background, own: Background, generic: Term) -> float:

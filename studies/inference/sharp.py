@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 import scipy
+from numpy.typing import NDArray
 
 from compensation.arrays import Array
 from compensation.lines import Line, find_line
@@ -54,6 +55,50 @@ FEWEST_CELLS = 6
 """Of each length at least so many: of fewer the mean is no measure."""
 UNEVEN = 2.5
 """Factor by which the spectrum of noise may differ from that of the kinds of wander."""
+
+
+def switching(runs: Sequence[Array]) -> tuple[Array, float] | None:
+    """Return rows that switch between two levels, ±½, and ln p of their switches (random telegraph noise); None where there are no two levels.
+
+    The likeliest path (Viterbi) for levels, an offset of each run, white noise and a chance to switch that are those of the path itself.
+    """
+    rows = np.concatenate(runs)
+    levels, chance, variance = np.percentile(rows, (20.0, 80.0)), 0.05, float(np.var(rows)) / 4.0
+    for _ in range(SWITCHINGS):
+        paths = [_likeliest(own, levels, variance, chance) for own in runs]
+        path = np.concatenate(paths)
+        if not 0 < path.sum() < path.size:
+            return None
+        runs = [own - np.mean(own - levels[on.astype(int)]) for own, on in zip(runs, paths, strict=True)]
+        rows = np.concatenate(runs)
+        levels = np.array([rows[~path].mean(), rows[path].mean()])
+        variance = float(np.mean((rows - levels[path.astype(int)]) ** 2))
+        switches = sum(int(np.sum(own[1:] != own[:-1])) for own in paths)
+        chance = (switches + 1.0) / (rows.size + 2.0)
+    if levels[1] - levels[0] < APART * variance**0.5:
+        return None
+    stays = rows.size - len(runs) - switches
+    return path - 0.5, float(switches * np.log(chance) + stays * np.log1p(-chance) - len(runs) * np.log(2.0))
+
+
+def _likeliest(rows: Array, levels: Array, variance: float, chance: float) -> NDArray[np.bool_]:
+    """Which of the rows of a run are on the second level."""
+    cost = (rows[:, None] - levels) ** 2 / (2.0 * variance)
+    dear, cheap = -float(np.log(chance)), -float(np.log1p(-chance))
+    from_other = np.zeros(cost.shape, dtype=bool)
+    a, b = cost[0].tolist()
+    for k, (first, second) in enumerate(cost[1:].tolist(), 1):
+        from_other[k] = b + dear < a + cheap, a + dear < b + cheap
+        a, b = min(a + cheap, b + dear) + first, min(b + cheap, a + dear) + second
+    path = np.empty(len(rows), dtype=bool)
+    path[-1] = b < a
+    for k in range(len(rows) - 1, 0, -1):
+        path[k - 1] = path[k] ^ from_other[k, int(path[k])]
+    return path
+
+
+SWITCHINGS, APART = 12, 1.5
+"""Rounds in which the levels are found; least distance of the levels, over what is left about them."""
 
 
 def brief_events(rows: Array, heaviest: float) -> float:
