@@ -205,14 +205,12 @@ def infer(
         calibrated, blocks = plain.residuals(Kept(found.point, ())), found.state.residual
         progress("held-out rows")
         named = bool(outcome.final.terms)
-        outcome, held, rows = _confirmed(search, outcome, plain, (calibrated, blocks), path is not None)
+        longer = None if path is None else _model_of(path.fit)
+        outcome, held, rows = _confirmed(search, outcome, plain, (calibrated, blocks), longer)
         if named and not outcome.final.terms:  # the values are those of the card, or of the longer path, alone again
-            if path is None:
-                search, outcome = _without_effects(plain.linear, paths, alone, progress)
-            else:
-                there = Signatures.at(path.fit.problem, path.fit.point)
-                search, outcome = _without_effects(Linear.of(path.fit), there, path.fit.noise, progress)
-                outcome, held, rows = _confirmed(search, outcome, plain, (calibrated, blocks), True)
+            search, outcome = _without_effects(longer or plain, progress)
+            if longer is not None:
+                outcome, held, rows = _confirmed(search, outcome, plain, (calibrated, blocks), longer)
         if path is None or not _worse(*held[FREQUENCY]):
             break
         progress("again without the longer heat path, which predicts unseen rows no better")
@@ -224,7 +222,7 @@ def infer(
     for name in search.linear.responses:
         without, levelled = (with_levels(search, one, name) for one in (without, levelled))
     bank = generic_bank(search)
-    left = look(search, bank, without if path is None else plain, levelled, rows)
+    left = look(search, bank, without, levelled, rows)
     unknown = []
     for base in outcome.without:
         seen = search.scan(base, bank)
@@ -241,7 +239,7 @@ def _with_heat_path(whole: CardFit, found: CardFit, progress: Report) -> tuple[H
     tried: dict[tuple[int, bool], HeatPath] = {}
     bring = lags_would_bring(own.search) if slow_share(found) > SUSPICIOUS else -np.inf
     ended = None
-    if not given and bring > WORTH and effects_would_bring(own.search) > bring:
+    if not (given or is_ahead(found)) and bring > WORTH and effects_would_bring(own.search) > bring:
         # an effect may do more than any lag, and then leave nothing to lags
         search, outcome = ended = own.outcome()
         there = search.linear.rows[FREQUENCY].slow_share(outcome.final.noise[FREQUENCY])
@@ -275,36 +273,42 @@ def _beside(path: HeatPath, progress: Report) -> tuple[float, HeatPath, Search, 
     return search.fair(outcome.final) + path.housing + path.price, path, search, outcome
 
 
-def _without_effects(
-    linear: Linear, paths: Signatures, noise: Mapping[str, Noise], progress: Report
-) -> tuple[Search, Outcome]:
+def _model_of(found: CardFit) -> Model:
+    """A card without effects, about its most probable values."""
+    return Model(Linear.of(found), Signatures.at(found.problem, found.point), (), found.noise)
+
+
+def _without_effects(alone: Model, progress: Report) -> tuple[Search, Outcome]:
     """Return a search that has found nothing, about the values of a card alone."""
-    search = Search(linear, paths, noise, progress=progress)
+    search = Search(alone.linear, alone.signatures, alone.noise, progress=progress)
     none, _ = search.grow(most=0)
     return search, Outcome(none, none, (), ())
 
 
-def _confirmed(search: Search, outcome: Outcome, plain: Model, calibrated: Left, longer: bool) -> Confirmed:
-    """Leave out faint causes of no definite size, and those whose model predicts unseen rows no better than the card alone, the weakest first; none, where a `longer` heat path predicts better only beside them."""
+def _confirmed(search: Search, outcome: Outcome, plain: Model, calibrated: Left, longer: Model | None) -> Confirmed:
+    """Leave out faint causes of no definite size, and those whose model predicts unseen rows no better than the card alone, or a `longer` heat path alone, the weakest first; none, where that predicts better only beside them."""
     events = any(term.effect.event for term in outcome.final.terms)
     by_record = len(search.linear.problem.runs) > 1 and not events
-    alone = calibrated if longer else _left_by(plain) or calibrated
-    before = HeldOut(plain, alone[0], by_record)
+    alone = (_left_by(longer or plain)) or calibrated
+    before = HeldOut(plain, calibrated[0] if longer else alone[0], by_record)
+    beside_path = HeldOut(longer, alone[0], by_record) if longer else before
     given_up: set[tuple[str, str]] = set()
     better: list[tuple[float, int, Confirmed]] = []
     while True:
         final = outcome.final
         beside = Background(search.linear, final.terms, final.noise)
         model = Model(search.linear, search.signatures, final.terms, final.noise)
-        more = bool(final.terms) or longer
+        more = bool(final.terms) or longer is not None
         told = _left_by(model) if more else alone
         rows, blocks = told or alone
-        held = before.beside(HeldOut(model, rows, by_record) if more else before)
+        after = HeldOut(model, rows, by_record) if more else before
+        held = before.beside(after)
+        gained = held if longer is None else beside_path.beside(after)
         weak = [
             k
             for k, name in enumerate(term.response for term in final.terms)
             if told is None
-            or _worse(*held[name])
+            or _worse(*gained[name])
             or beside.size(name, blocks) > beside.size(name, alone[1])
             or (final.score - outcome.without[k].score < FAINT and not beside.sized(k))
             or is_rounding(search.linear.problem, name, alone[0][name])
