@@ -26,6 +26,7 @@ from thermal.errors import ThermalError
 MOST_STEPS = 30
 CLOSE = 0.05  # fall of the objective that a step still promises: a move of 0.2 standard deviations in any direction
 NEAR = 1.0  # the same, where no step makes the fit better: what differences and rounding leave
+LITTLE = 0.02  # part of the fall so far, below which a descent ends: tails took half of its steps
 SETTLED_NOISE = 1.0  # the same, below which the noise is not estimated anew
 PATIENCE = 5  # steps that leave no less, after which the noise only rises: promises are not kept
 LESS = 0.2  # of the logarithm of what is left, all responses together: a step that leaves less
@@ -146,8 +147,9 @@ def covariance_at(problem: Problem, state: State, noise: Mapping[str, Noise], ro
 
 
 def descend(problem: Problem, state: State, noise: Mapping[str, Noise], rows: Mapping[str, NoiseRows]) -> State:
-    """Step in given noise as long as the objective falls by `NEAR`: straight lines lead the rest of the way."""
+    """Step in given noise as long as the objective falls by `NEAR`, and by a `LITTLE` of what it has fallen: straight lines lead the rest of the way."""
     radius, left = LONGEST_STEP, objective(problem, state, noise, rows)
+    begun = left
     for _ in range(MOST_STEPS):
         linear = _Linear.of(problem, state, noise, rows)
         if linear.fall(linear.step(np.inf)[0]) < NEAR:
@@ -156,7 +158,7 @@ def descend(problem: Problem, state: State, noise: Mapping[str, Noise], rows: Ma
         if reached is None:
             break
         before, left, state = left, objective(problem, reached, noise, rows), reached
-        if before - left < NEAR:
+        if before - left < max(NEAR, LITTLE * (begun - left)):
             break
     return state
 

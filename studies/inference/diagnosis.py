@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from compensation.arrays import Array
-from compensation.noise import Noise, white_rms
+from compensation.noise import white_rms
 from shell.constants import zero_Celsius
 from studies.calibration.apart import fit_explained
 from studies.calibration.fit import CardFit, at_point
@@ -43,7 +43,7 @@ from studies.inference.lack_of_fit import generic_bank, is_rounding, look
 from studies.inference.model import Background, Linear
 from studies.inference.pursuit import Pursuit
 from studies.inference.records import Campaign
-from studies.inference.search import FURTHER, MARGIN, SUSPICIOUS, Outcome, Search
+from studies.inference.search import FURTHER, MARGIN, SUSPICIOUS, Hypothesis, Outcome, Search
 from studies.inference.sharp import RESOLVED, fast_line, longest_resolved
 from studies.inference.signatures import Signatures
 from studies.inference.verdict import judge
@@ -242,8 +242,8 @@ def _with_heat_path(whole: CardFit, found: CardFit, progress: Report) -> tuple[H
     if not (given or is_ahead(found)) and bring > WORTH and effects_would_bring(own.search) > bring:
         # an effect may do more than any lag, and then leave nothing to lags
         search, outcome = ended = own.outcome()
-        there = search.linear.rows[FREQUENCY].slow_share(outcome.final.noise[FREQUENCY])
-        if there < FOLLOWED and lags_would_bring(search, outcome.final) < 0.0:
+        slow = search.linear.rows[FREQUENCY].slow_share(outcome.final.noise[FREQUENCY])
+        if slow < FOLLOWED and lags_would_bring(search, outcome.final) < 0.0:
             return None, search, outcome
     if given and (is_strained(found) or (bring > WORTH and bring > effects_would_bring(own.search))):
         path = with_second_mass(whole, found, progress)
@@ -251,14 +251,19 @@ def _with_heat_path(whole: CardFit, found: CardFit, progress: Report) -> tuple[H
         path = find_heat_path(found, None if bring > WORTH else 1, tried, progress)
     if path is None or not path.departs:
         return (None, *(ended or own.outcome()))
-    score, path, there, grown = _beside(path, progress)
-    if not given and path.lags < len(LAGS) and any(term.response == FREQUENCY for term in grown.final.terms):
+    score, path, pursuit, begun = _beside(path, progress)
+    suspicious = slow_share(path.fit) > SUSPICIOUS or any(term.response == FREQUENCY for term in begun[1].terms)
+    if not given and path.lags < len(LAGS) and suspicious:
         # an effect may do what a lag does: a longer path has to be beaten with effects beside it
         longer = _beside(find_heat_path(found, len(LAGS), tried, progress), progress)
-        score, path, there, grown = longer if longer[0] > score + WORTH else (score, path, there, grown)
+        score, path, pursuit, begun = longer if longer[0] > score + WORTH else (score, path, pursuit, begun)
+    there, grown = pursuit.ended(*begun)
+    score = _score(path, there, grown.final)
     gain, plain = score - evidence_of(found), own.search.settle((), found.noise)
     if with_levels(own.search, plain, FREQUENCY).score - plain.score > gain + MARGIN:
         return (None, *(ended or own.outcome()))
+    if not (given or ended) and own.search.fair(plain) + own.most(plain) < score - BEATEN:
+        ended = own.search, Outcome(plain, plain, (), ())
     search, outcome = ended or own.outcome(-np.inf if given else score - BEATEN)
     lead = score - search.fair(outcome.final)
     if lead < MARGIN + given * FURTHER * sum(t.brought for t in outcome.final.terms if t.response == FREQUENCY):
@@ -266,11 +271,17 @@ def _with_heat_path(whole: CardFit, found: CardFit, progress: Report) -> tuple[H
     return replace(path, evidence=gain, lead=lead), there, grown
 
 
-def _beside(path: HeatPath, progress: Report) -> tuple[float, HeatPath, Search, Outcome]:
-    """Search for effects beside a longer heat path; first what both score."""
+def _beside(path: HeatPath, progress: Report) -> tuple[float, HeatPath, Pursuit, tuple[Hypothesis, Hypothesis]]:
+    """Begin to search for effects beside a longer heat path; first what both score."""
     progress(f"effects beside a heat path with {path.lags} time constants")
-    search, outcome = Pursuit(path.fit, progress).outcome()
-    return search.fair(outcome.final) + path.housing + path.price, path, search, outcome
+    pursuit = Pursuit(path.fit, progress)
+    begun = pursuit.begun()
+    return _score(path, pursuit.search, begun[1]), path, pursuit, begun
+
+
+def _score(path: HeatPath, search: Search, final: Hypothesis) -> float:
+    """Log posterior of effects beside a heat path, and of that."""
+    return search.fair(final) + path.housing + path.price
 
 
 def _model_of(found: CardFit) -> Model:

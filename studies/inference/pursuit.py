@@ -51,15 +51,21 @@ class Pursuit:
     def outcome(self, least: float = -np.inf) -> tuple[Search, Outcome]:
         """Return the last search and what it found; given up below a `least` score."""
         self.least = least
-        plain, final = self._begun()
-        if self._beaten(final):
-            return self.search, Outcome(plain, final, (), ())
+        plain, final = self.begun()
+        return (self.search, Outcome(plain, final, (), ())) if self._beaten(final) else self.ended(plain, final)
+
+    def most(self, plain: Hypothesis) -> float:
+        """Return what effects can bring at most, by straight lines: as many as there may be, each as much as the best."""
+        return MOST_TERMS * max((one.gain for one in self.first.scan(plain)), default=0.0)
+
+    def ended(self, plain: Hypothesis, final: Hypothesis) -> tuple[Search, Outcome]:
+        """Go on from what has begun to the end."""
         if self.start.problem.instrument.polynomial is not None:
             plain, final = self._elsewhere(plain, final)
         plain, final = self._without_needless(plain, final)
         return self.search, self.search.compare(plain, final)
 
-    def _begun(self) -> tuple[Hypothesis, Hypothesis]:
+    def begun(self) -> tuple[Hypothesis, Hypothesis]:
         """Grow from nothing; where straight lines do not reach what comes first beside a card, the likeliest that may come first are followed to values of their own."""
         plain, final = self.search.grow(near=self._near)
         if self.start.problem.instrument.polynomial is None and len(final.terms) == 1 and not self._near(final):

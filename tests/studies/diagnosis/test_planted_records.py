@@ -270,7 +270,7 @@ def test_the_card_of_a_gyro_whose_thermometer_was_exchanged_predicts_a_run_with_
     only("thermometer-scale", "curvature", "second-lag")
     found = diagnose_records([exchanged(0, False), exchanged(1, True), exchanged(2, True)])
     (cause,) = found.verdict.causes
-    assert cause.effect == "thermometer-scale" and cause.parameters["from_run"].value == 2
+    assert (cause.effect, cause.parameters["from_run"].value) == ("thermometer-scale", 2)
     y, zero = found.card.reference_temperature - 293.15, cause.parameters["zero_K"]
     assert zero.low < 0.8 + 0.03 * y + 5e-4 * y**2 < zero.high
     unseen = exchanged(3, True)
