@@ -62,8 +62,10 @@ def switching(runs: Sequence[Array]) -> tuple[Array, float] | None:
 
     The likeliest path (Viterbi) for levels, an offset of each run, white noise and a chance to switch that are those of the path itself.
     """
+    runs = [own - own.mean() for own in runs]
     rows = np.concatenate(runs)
-    levels, chance, variance = np.percentile(rows, (20.0, 80.0)), 0.05, float(np.var(rows)) / 4.0
+    levels: Array = np.percentile(rows, (20.0, 80.0))
+    chance, variance = 0.05, float(np.var(rows)) / 4.0
     for _ in range(SWITCHINGS):
         paths = [_likeliest(own, levels, variance, chance) for own in runs]
         path = np.concatenate(paths)
@@ -78,7 +80,9 @@ def switching(runs: Sequence[Array]) -> tuple[Array, float] | None:
     if levels[1] - levels[0] < APART * variance**0.5:
         return None
     stays = rows.size - len(runs) - switches
-    return path - 0.5, float(switches * np.log(chance) + stays * np.log1p(-chance) - len(runs) * np.log(2.0))
+    return np.asarray(path - 0.5), float(
+        switches * np.log(chance) + stays * np.log1p(-chance) - len(runs) * np.log(2.0)
+    )
 
 
 def _likeliest(rows: Array, levels: Array, variance: float, chance: float) -> NDArray[np.bool_]:

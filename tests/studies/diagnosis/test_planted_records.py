@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.constants import Stefan_Boltzmann, zero_Celsius
 
+from compensation.noise import Noise
 from studies.calibration.ahead import spread_of_prediction
 from studies.inference.extension import extend
 from studies.inference.model import Background
@@ -204,6 +205,26 @@ def test_a_bias_that_differs_from_run_to_run_is_adequate_as_turn_on_and_what_els
     assert result.verdict == "adequate"
     assert "lie 2 °/h (rms) apart" in result.remark
     assert "turn-on" in result.remark
+
+
+@pytest.mark.usefixtures("fine")
+@pytest.mark.parametrize(("step", "verdict"), [(1.0, "unexplained"), (0.0, "adequate")])
+def test_telegraph_noise_is_two_levels_and_flicker_is_none(step, verdict):
+    """A trapped charge that hops once an hour was called slow noise, and the bias adequate."""
+    rng, records = np.random.default_rng(4), []
+    for k in range(3):
+        time = np.arange(0.0, 7 * 3600.0, 20.0)
+        hops = np.searchsorted(np.cumsum(rng.exponential(3600.0, 100)), time) % 2
+        noise = Noise(white=2.2, flicker=0.06).draw(time.size, 0.05, rng)
+        housing = lag(
+            time, 20.0 + 25.0 * np.clip(np.sin(2 * np.pi * time / (9000.0 + 4000.0 * k) + k), -0.6, 0.6), 500.0
+        )
+        bias = 3.0 + 0.05 * lag(time, housing, 1500.0) + step * hops + noise
+        columns = {"time_s": time, "housing_temperature_degC": housing, "bias_deg_per_h": bias}
+        records.append(Record(columns, path=f"run{k}.csv", sha256=str(k)))
+    result = judge(records).responses["bias_deg_per_h"]
+    assert result.verdict == verdict
+    assert (result.left_over_input == "time: switching between two levels") == bool(step)
 
 
 def test_inseparable_pair_gets_a_measurement_and_no_run():

@@ -16,7 +16,7 @@ from studies.inference.model import SCALES, Background, Linear, solve_posterior
 from studies.inference.polynomial_card import polynomial_card
 from studies.inference.pursuit import Pursuit
 from studies.inference.search import Search
-from studies.inference.sharp import recurring
+from studies.inference.sharp import recurring, switching
 from studies.inference.signatures import Signatures
 from studies.instrument.card import load_card
 from studies.simulation.chamber import load_profile
@@ -247,3 +247,17 @@ def test_outliers_that_recur_side_by_side_are_events():
         alone = np.zeros(800)
         alone[np.random.default_rng(seed).choice(400, 12, replace=False) * 2] = 1.0
         assert recurring([alone]) == -np.inf
+
+
+def test_two_levels_are_found_and_their_switches_cost_what_a_chain_gives():
+    """In white noise of half their distance: all rows but a few; ln p of n switches in N rows by the chain's own chance. Levels of white noise cost more than they leave less."""
+    rng = np.random.default_rng(4)
+    path = [np.repeat([0.0, 1.0, 0.0, 1.0], [70, 40, 60, 80]), np.repeat([1.0, 0.0], [120, 130])]
+    found, chance = switching([own + rng.normal(0.0, 0.5, own.size) + 3.0 * k for k, own in enumerate(path)])
+    assert np.mean(found + 0.5 == np.concatenate(path)) > 0.98
+    p = 5.0 / 502.0  # of Laplace
+    assert chance == pytest.approx(4 * np.log(p) + 494 * np.log1p(-p) - 2 * np.log(2.0))
+    rows = rng.normal(0.0, 1.0, 500)
+    split, cost = switching([rows])
+    left = np.var(rows) - np.cov(rows, split, bias=True)[0, 1] ** 2 / np.var(split)
+    assert cost < -250 * np.log(np.var(rows) / left)
