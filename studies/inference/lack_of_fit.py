@@ -88,7 +88,8 @@ def look(
         fitful = intermittent([white[place] for place in level.slices])
         if fitful > evidence:
             word, evidence = "time: an intermittent oscillation", fitful
-        switches = _switching(search, final, name, rest)
+        # levels between which a form of an input goes would be two as well
+        switches = _switching(search, final, name, rest) if smooth <= ENOUGH else -np.inf
         if switches > evidence:
             word, evidence = SWITCH.name, switches
         fast = _line(search, name, rows.get(name))
