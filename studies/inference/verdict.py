@@ -113,8 +113,10 @@ def next_step(
                     f"The {word} has a line of {line.period:.3g} s: diagnose a part of at most {longest_resolved(line.period) / 3600:.2g} h,"
                     " where it is resolved, or record its spectrum."
                 )
-            return (
-                f"The {word} has {spell_structure(result.left_over_input)} that no known effect explains: repeat a run unchanged to see"
-                " whether it recurs, then vary that input alone."
+            by_time = result.left_over_input.startswith("time")
+            return f"The {word} has {spell_structure(result.left_over_input)} that no known effect explains: " + (
+                "hold temperature and drives constant for a run; what goes on there is not due to them."
+                if by_time
+                else "repeat a run unchanged to see whether it recurs, then vary that input alone."
             )
     return None
