@@ -156,8 +156,9 @@ class Variations:
             step = STEP * (abs(value) or 1.0)
             return value, (-step / 2, step / 2)
         step = STEP * (min(found.sd, abs(found.value)) if found.logarithmic else found.sd)
-        ends = np.clip(found.value + np.array([-step / 2, step / 2]), found.low, found.high) - found.value
-        return found.value, (float(ends[0]), float(ends[1]))
+        # half way to a bound at most: some bounds are no values themselves
+        low, high = (found.low - found.value) / 2, (found.high - found.value) / 2
+        return found.value, (max(-step / 2, low), min(step / 2, high))
 
 
 def _number(instrument: "Instrument", name: str) -> float:

@@ -8,8 +8,10 @@ import pytest
 from studies.errors import InputError
 from studies.instrument.card import load_card
 from studies.record import Record
+from studies.resonator.law import law_of
 from studies.simulation.drive import drive_by_profile, drive_by_record
 from studies.simulation.prediction import law_for, predict
+from studies.simulation.variations import Variations
 from studies.simulation.virtual_gyro import simulate_run
 from thermal.profile import parse_profile
 
@@ -179,3 +181,13 @@ def test_a_run_without_a_drive_and_an_unknown_start_are_refused(card, drive):
         replace(drive, initial={"shell": 1.0})
     with pytest.raises(InputError, match="the card has no number"):
         predict(card, drive, ["thermal.mass"])
+
+
+def test_a_value_beside_a_bound_that_is_none_itself_is_moved_within_it():
+    """A conductance of which little is known, close to 0: diagnosis ended as its lower neighbour was 0, which no card may have."""
+    thermal = {"second_mass_J_per_K": 5.0, "second_mass_conductance_W_per_K": {"value": 1e-6, "sd": 1e-2}}
+    card = load_card("free-dome").with_table("thermal", thermal)
+    key = "thermal.second_mass_conductance_W_per_K"
+    below, above = Variations(card, law_of(card, theory="rayleigh"), [key]).sides(key)
+    assert 0.0 < below.instrument.keys("thermal").second_mass_conductance_W_per_K < 1e-6
+    assert above.distance > -below.distance > 0.0
