@@ -25,7 +25,7 @@ FREQUENCY = "frequency_Hz"
 LAGS = ("lag_s", "second_lag_s", "third_lag_s")
 DIRECT, DELAY = "law.direct_share", "law.delay_s"
 PATHS = (
-    ([(1.0,)], False),
+    ([(1.0,)], True),
     ([(0.7, 0.3)], False),
     ([(0.7, 0.3), (0.3, 0.7)], True),
     ([(0.65, 0.05, 0.3)], True),
@@ -42,7 +42,8 @@ OF_LUMPS = {
     "capacity_slope_per_K": {"value": 1e-3, "sd": 1e-3},
     "base_capacity_slope_per_K": {"value": 0.0, "sd": 1e-3},
 }
-"""The same of what lumps have besides, where plain lags in series leave slow noise."""
+"""The same of what lumps have besides, where plain lags in series leave slow noise; all but `OF_ONE` only where there are several."""
+OF_ONE = "capacity_slope_per_K"
 SENSOR, LATENESS = LAG, {"value": 5.0, "sd": 20.0}
 """The sensor of the housing, and what is known of its lag (s) where the resonator is ahead of it."""
 MASS = ("thermal.second_mass_J_per_K", "thermal.second_mass_conductance_W_per_K")
@@ -144,10 +145,11 @@ def with_second_mass(
 
 
 def with_lags(card: Instrument, lags: Sequence[float], lumps: bool) -> Instrument:
-    """Return a polynomial card with such lags (s) in series, and radiation; if `lumps`, with all that lumps have, and a cubic law."""
+    """Return a polynomial card with such lags (s) in series, and radiation; if `lumps`, with all that so many lumps have, and a cubic law."""
     law = dict(card.content["law"])
     law |= {key: {"value": lag, "sd": LAG_WIDTH * lag} for key, lag in zip(LAGS, lags, strict=False)}
-    law |= {"radiated_share": dict(RADIATED)} | (OF_LUMPS if lumps else {})
+    law |= {"radiated_share": dict(RADIATED)}
+    law |= {key: dict(known) for key, known in OF_LUMPS.items() if lumps and (len(lags) > 1 or key == OF_ONE)}
     law |= cubic_of(card) if lumps else {}
     return card.with_table("law", law)
 
