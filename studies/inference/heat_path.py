@@ -25,7 +25,7 @@ FREQUENCY = "frequency_Hz"
 LAGS = ("lag_s", "second_lag_s", "third_lag_s")
 DIRECT, DELAY = "law.direct_share", "law.delay_s"
 PATHS = (
-    ([(1.0,)], True),
+    ([(1.0,)], False),
     ([(0.7, 0.3)], False),
     ([(0.7, 0.3), (0.3, 0.7)], True),
     ([(0.65, 0.05, 0.3)], True),
@@ -188,6 +188,9 @@ def find_heat_path(
         if path is None:
             progress(words)
             path = max((_calibrated(lean, card) for card in cards), key=lambda one: one.evidence)
+            if number == 1 and lags is None and slow_share(path.fit) > FOLLOWED:
+                grows = _calibrated(lean, with_lags(whole.instrument, [lag], True))
+                path = grows if grows.evidence > path.evidence + WORTH else path
             if is_ahead(path.fit) or slow_share(path.fit) > FOLLOWED:
                 progress(f"{words}, its sensor late")
                 path = max(path, _calibrated(lean, with_late_sensor(path.card)), key=lambda one: one.evidence)
