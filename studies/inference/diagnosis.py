@@ -222,7 +222,7 @@ def infer(
     for name in search.linear.responses:
         without, levelled = (with_levels(search, one, name) for one in (without, levelled))
     bank = generic_bank(search)
-    left = look(search, bank, without, levelled, rows)
+    left = look(search, bank, without if path is None else plain, levelled, rows)
     unknown = []
     for base in outcome.without:
         seen = search.scan(base, bank)

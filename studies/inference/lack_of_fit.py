@@ -12,7 +12,7 @@ from studies.calibration.problem import CardProblem
 from studies.diagnosis.constants import CONSTANTS
 from studies.diagnosis.verdict import spell_structure
 from studies.inference.generic_forms import BUMP, STEP, SWITCH, generic_forms
-from studies.inference.held_out import Rows
+from studies.inference.held_out import Model, Rows
 from studies.inference.model import Background, Term
 from studies.inference.search import LESS, SUSPICIOUS, Hypothesis, Search, Shapes
 from studies.inference.sharp import brief_events, fast_line, intermittent, recurring, switching, tails_of
@@ -62,12 +62,13 @@ def generic_bank(search: Search) -> list[Shapes]:
 
 
 def look(
-    search: Search, bank: Sequence[Shapes], plain: Hypothesis, final: Hypothesis, rows: Mapping[str, Rows]
+    search: Search, bank: Sequence[Shapes], plain: "Hypothesis | Model", final: Hypothesis, rows: Mapping[str, Rows]
 ) -> dict[str, Leftover]:
-    """Return what a model leaves of every response, on `rows` of the records, beside one without effects behind the same heat path."""
+    """Return what a model leaves of every response, on `rows` of the records; `plain` has no effects, or another heat path."""
     seen = search.scan(final, bank, less=())
     own = Background(search.linear, final.terms, final.noise)
-    before = Background(search.linear, plain.terms, final.noise)
+    longer = isinstance(plain, Model)
+    before = Background(plain.linear if isinstance(plain, Model) else search.linear, plain.terms, final.noise)
     found = {}
     for name in search.linear.responses:
         mine = [one for one in seen if one.term.response == name]
@@ -97,8 +98,8 @@ def look(
             word = f"time: a line of {fast.period:.3g} s, too fast for steps of {_step(search, name):.3g} s"
             evidence, line = fast.evidence, fast
         named = [term for term in final.terms if term.response == name or term.effect.thermal]
-        share = _share(search, name, before, own, best.term) if named else 0.0
-        if evidence > smooth and named:
+        share = _share(search, name, before, own, best.term) if named or longer else 0.0
+        if evidence > smooth and (named or longer):
             gained = max(own.evidence - before.evidence, 0.0)
             share = min(share, gained / max(gained + evidence, 1e-9))
         if name in rows and is_rounding(search.linear.problem, name, rows[name]):

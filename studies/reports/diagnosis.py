@@ -125,7 +125,7 @@ def response_table(verdict: Verdict) -> Table:
     )
     note += " Noise: the residual that no model removes; white: from row to row, coloured: within a run."
     note += (
-        " Explained: share of the structure, that of the heat path apart, which the causes remove."
+        " Explained: share of the structure that the causes remove."
         if any(row["explained_share"] is not None for row in rows)
         else ""
     )
