@@ -300,7 +300,7 @@ def _confirmed(search: Search, outcome: Outcome, plain: Model, calibrated: Left,
     """Leave out faint causes of no definite size, and those whose model predicts unseen rows no better than the card alone, or a `longer` heat path alone, the weakest first; none, where that predicts better only beside them."""
     events = any(term.effect.event for term in outcome.final.terms)
     by_record = len(search.linear.problem.runs) > 1 and not events
-    alone = (_left_by(longer or plain)) or calibrated
+    alone = _left_by(longer or plain) or calibrated
     before = HeldOut(plain, calibrated[0] if longer else alone[0], by_record)
     beside_path = HeldOut(longer, alone[0], by_record) if longer else before
     given_up: set[tuple[str, str]] = set()

@@ -128,8 +128,7 @@ def _switching(search: Search, final: Hypothesis, name: str, rest: Array) -> flo
     if found is None:
         return -np.inf
     path, chance = found
-    unit = np.array([search.signatures.size(SWITCH, name)])
-    term = Term(SWITCH, name, (), {name: path[:, None]}, (0,), unit, price=0.0)
+    term = Term(SWITCH, name, (), {name: path[:, None]}, (0,), search.unit(SWITCH, name, (0,)), price=0.0)
     return search.settle((*final.terms, term), final.noise, [name]).evidence - final.evidence + chance
 
 

@@ -116,7 +116,8 @@ class Search:
             for name in (one for one in responses if shape in scanned[one]):
                 own = [run[first[name]] for run in runs]
                 there = np.any([run.any(axis=1) for run in own], axis=0)
-                there &= np.isin(first[name], effect.members(shape))
+                if taken := effect.of_law(shape):
+                    there &= ~np.isin(first[name], taken)
                 members = tuple(k for k, seen in zip(first[name], there, strict=True) if seen)
                 if members:
                     columns = self.signatures.made_of(np.hstack([run[there] for run in own]).T, effect, name)

@@ -127,13 +127,13 @@ def test_two_lags_in_series_are_found_and_a_second_is_not_made_up():
 @pytest.mark.usefixtures("fine")
 @pytest.mark.parametrize(
     ("taus", "past", "late"),
-    [((1500.0,), False, 0.0), ((1500.0, 400.0), True, 60.0)],
-    ids=["one lump", "past the lump between, behind a late sensor"],
+    [((1500.0,), False, 0.0), ((1500.0, 400.0), True, 0.0), ((1500.0, 400.0), True, 60.0)],
+    ids=["one lump", "past the lump between", "behind a late sensor"],
 )
 def test_the_radiated_share_of_lumps_is_found(taus, past, late):
     """Lumps in a row with 40 % of their conductance by radiation at 20 °C over 100 K, by the implicit integrator.
 
-    Or the last alone radiates, to the housing, which a sensor of 60 s reads: a shell that does not see its base.
+    Or the last alone radiates, to the housing: a shell that does not see its base; the housing may be read by a sensor of 60 s.
     """
     t, T_h = housing("step 20 -40 3h then step -40 60 3h")
     parts, before = [Boundary("housing")], "housing"
