@@ -1,7 +1,7 @@
 """Most probable values: Gauss–Newton steps in coloured noise that is estimated beside them.
 
 Noise levels are at first those of the whole residual, then those of highest marginal likelihood
-(`compensation.noise_rows`), at last of each response given the others. With rows whitened by it, (JᵀJ + 1) Δ = Jᵀ r −
+(`compensation.noise_estimate`), at last of each response given the others. With rows whitened by it, (JᵀJ + 1) Δ = Jᵀ r −
 u, damped until the step keeps its promise, then bent as the valley bends. Blocks beyond 5 standard deviations get the
 variance that they show.
 """

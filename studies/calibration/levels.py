@@ -13,7 +13,8 @@ import scipy
 
 from compensation.arrays import Array
 from compensation.noise import Noise
-from compensation.noise_rows import LEAST, MOST, STATED_SPREAD, NoiseRows
+from compensation.noise_estimate import LEAST, MOST, STATED_SPREAD
+from compensation.noise_rows import NoiseRows
 from studies.calibration.ahead import BIAS
 from studies.calibration.fit import CardFit, covariance_at, fit
 from studies.calibration.ladder import usual_mean

@@ -9,7 +9,8 @@ import scipy
 
 from compensation.arrays import Array
 from compensation.noise import Noise
-from compensation.noise_rows import KINDS, NoiseRows, estimate_noise
+from compensation.noise_estimate import estimate_noise
+from compensation.noise_rows import KINDS, NoiseRows
 from compensation.samples import robust_spread
 from studies.calibration.observed import SETTLED
 from studies.calibration.problem import CardProblem, State

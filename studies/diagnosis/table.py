@@ -20,7 +20,8 @@ from studies.diagnosis.constants import CONSTANTS
 from studies.diagnosis.table_forms import cause_of, each_once, rms, weigh_forms
 from studies.diagnosis.verdict import ResponseResult, Shift, Verdict, doubted, wrong_values
 from studies.errors import InputError
-from studies.inference.model import Background, Linear
+from studies.inference.background import Background
+from studies.inference.linear import Linear
 from studies.inference.polynomial_card import settled_card
 from studies.inference.verdict import shifts_of
 from studies.instrument.card import load_card

@@ -14,7 +14,8 @@ from studies.calibration.problem import SOAK
 from studies.diagnosis.constants import CONSTANTS
 from studies.diagnosis.verdict import Cause, Interval, weigh
 from studies.effects import Effect, library
-from studies.inference.model import SCALES, Background, Linear, Term
+from studies.inference.background import Background
+from studies.inference.linear import SCALES, Linear, Term
 
 WHITES = 8
 """White noises from rounding to scatter."""

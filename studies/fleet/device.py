@@ -12,9 +12,10 @@ from shell.constants import zero_Celsius
 from studies.calibration.observed import RESPONSES
 from studies.errors import InputError
 from studies.fleet.folder import Device
+from studies.inference.background import Background
 from studies.inference.diagnosis import Inference
 from studies.inference.inferred import Inferred
-from studies.inference.model import PRICE, Background, Term
+from studies.inference.linear import PRICE, Term
 from studies.instrument.card import load_card
 from studies.instrument.units import unit_of
 from studies.record import read_record

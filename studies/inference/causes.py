@@ -13,12 +13,14 @@ from studies.diagnosis.constants import CONSTANTS
 from studies.diagnosis.verdict import Cause, Interval, same_cause, weigh
 from studies.effects import library
 from studies.effects.effect import UNITS
+from studies.inference.background import Background
 from studies.inference.generic_forms import offsets
 from studies.inference.heat_path import DIRECT, LAGS, MASS, SENSOR
+from studies.inference.hypothesis import Hypothesis, Outcome
 from studies.inference.inferred import Inferred
-from studies.inference.model import Background, Term
+from studies.inference.linear import Term
 from studies.inference.records import REFERENCE, settle
-from studies.inference.search import MARGIN, Hypothesis, Outcome, Search
+from studies.inference.search import MARGIN, Search
 from studies.inference.signatures import SHARE, Signatures
 
 DELAY = "law.delay_s"
@@ -240,7 +242,7 @@ def with_levels(search: Search, now: Hypothesis, name: str) -> Hypothesis:
     if len(problem.runs) == 1 or has_levels(problem, name):
         return now
     form = offsets(len(problem.runs))
-    bank = search.shapes_of([(form, name)])
+    bank = search.signatures.shapes_of([(form, name)])
     tried = [search.settle((*now.terms, one.term), one.noise, [name]) for one in search.scan(now, bank)]
     best = max(tried, key=lambda one: one.score, default=now)
     return best if best.score > now.score + MARGIN else now

@@ -4,7 +4,7 @@ Where effects are found, the card's values are linearised anew at the most proba
 again.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -21,7 +21,8 @@ from studies.calibration.priors import gather_priors
 from studies.calibration.problem import CardProblem, wide_law
 from studies.diagnosis.constants import CONSTANTS
 from studies.diagnosis.response import SeenResponse
-from studies.inference.causes import only_apart, with_levels
+from studies.inference.causes import with_levels
+from studies.inference.confirmed import confirm, is_worse
 from studies.inference.heat_path import (
     FOLLOWED,
     FREQUENCY,
@@ -36,14 +37,15 @@ from studies.inference.heat_path import (
     slow_share,
     with_second_mass,
 )
-from studies.inference.held_out import HeldOut, Kept, Model, Rows
 from studies.inference.housing import evidence_of, set_housing_apart
+from studies.inference.hypothesis import Hypothesis, Outcome
 from studies.inference.inferred import Inferred
-from studies.inference.lack_of_fit import generic_bank, is_rounding, look
-from studies.inference.model import Background, Linear
+from studies.inference.lack_of_fit import generic_bank, look
+from studies.inference.linear import Linear
+from studies.inference.predicted import Kept, Model
 from studies.inference.pursuit import Pursuit
 from studies.inference.records import Campaign
-from studies.inference.search import FURTHER, MARGIN, SUSPICIOUS, Hypothesis, Outcome, Search
+from studies.inference.search import FURTHER, MARGIN, SUSPICIOUS, Search
 from studies.inference.sharp import RESOLVED, fast_line, longest_resolved
 from studies.inference.signatures import Signatures
 from studies.inference.verdict import judge
@@ -59,16 +61,10 @@ if TYPE_CHECKING:
     from studies.planning.next_run import Advice
 
 Report = Callable[[str], None]
-Left = tuple[dict[str, Rows], Mapping[str, Array]]
-"""What a model leaves of the rows of every response, and of its blocks."""
-Confirmed = tuple[Outcome, dict[str, tuple[float | None, float | None]], dict[str, Rows]]
-"""What is named, what is left of rows that were held out before and after, and of those that were seen."""
 BLOCKS, BLOCKS_OF_RUN = 800, (100, 400)
 """Block averages of a campaign, and fewest and most of a run."""
 FAR = 2.0
 """The same, beyond which the search begins from the card's own values too."""
-FAINT = 60.0
-"""Log evidence up to which a cause whose definite coefficients may all be 0 is not named: of 13 such names on 127 judged campaigns all 7 below were wrong, 4 of 6 above right."""
 BEATEN = 100.0
 """Log evidence behind another search, from which on one is given up."""
 
@@ -206,12 +202,12 @@ def infer(
         progress("held-out rows")
         named = bool(outcome.final.terms)
         longer = None if path is None else _model_of(path.fit)
-        outcome, held, rows = _confirmed(search, outcome, plain, (calibrated, blocks), longer)
+        outcome, held, rows = confirm(search, outcome, plain, (calibrated, blocks), longer)
         if named and not outcome.final.terms:  # the values are those of the card, or of the longer path, alone again
             search, outcome = _without_effects(longer or plain, progress)
             if longer is not None:
-                outcome, held, rows = _confirmed(search, outcome, plain, (calibrated, blocks), longer)
-        if path is None or not _worse(*held[FREQUENCY]):
+                outcome, held, rows = confirm(search, outcome, plain, (calibrated, blocks), longer)
+        if path is None or not is_worse(*held[FREQUENCY]):
             break
         progress("again without the longer heat path, which predicts unseen rows no better")
         path, (search, outcome) = None, Pursuit(found, progress).outcome()
@@ -294,84 +290,3 @@ def _without_effects(alone: Model, progress: Report) -> tuple[Search, Outcome]:
     search = Search(alone.linear, alone.signatures, alone.noise, progress=progress)
     none, _ = search.grow(most=0)
     return search, Outcome(none, none, (), ())
-
-
-def _confirmed(search: Search, outcome: Outcome, plain: Model, calibrated: Left, longer: Model | None) -> Confirmed:
-    """Leave out faint causes of no definite size, and those whose model predicts unseen rows no better than the card alone, or a `longer` heat path alone, the weakest first; none, where that predicts better only beside them."""
-    events = any(term.effect.event for term in outcome.final.terms)
-    by_record = len(search.linear.problem.runs) > 1 and not events
-    alone = _left_by(longer or plain) or calibrated
-    before = HeldOut(plain, calibrated[0] if longer else alone[0], by_record)
-    beside_path = HeldOut(longer, alone[0], by_record) if longer else before
-    given_up: set[tuple[str, str]] = set()
-    better: list[tuple[float, int, Confirmed]] = []
-    while True:
-        final = outcome.final
-        beside = Background(search.linear, final.terms, final.noise)
-        model = Model(search.linear, search.signatures, final.terms, final.noise)
-        more = bool(final.terms) or longer is not None
-        told = _left_by(model) if more else alone
-        rows, blocks = told or alone
-        after = HeldOut(model, rows, by_record) if more else before
-        held = before.beside(after)
-        gained = held if longer is None else beside_path.beside(after)
-        weak = [
-            k
-            for k, name in enumerate(term.response for term in final.terms)
-            if told is None
-            or _worse(*gained[name])
-            or beside.size(name, blocks) > beside.size(name, alone[1])
-            or (final.score - outcome.without[k].score < FAINT and not beside.sized(k))
-            or is_rounding(search.linear.problem, name, alone[0][name])
-            or only_apart(search, outcome, k)
-        ]
-        if longer and told is not None and not _worse(*held[FREQUENCY]):
-            better.append((held[FREQUENCY][1] or np.inf, len(better), (outcome, held, rows)))
-        if not weak:
-            return min(better)[2] if better and _worse(*held[FREQUENCY]) else (outcome, held, rows)
-        gone = min(weak, key=lambda k: final.score - outcome.without[k].score)
-        given_up.add(final.terms[gone].key)
-        outcome = _in_place(search, outcome, gone, given_up) or _left_out(search, outcome, gone)
-
-
-def _left_by(model: Model) -> Left | None:
-    """What a model leaves of the records' rows and of their blocks; None where its straight lines end and there is no prediction."""
-    numbers = model.numbers
-    if numbers is None:
-        return None
-    there = model.signatures.there(numbers.point)
-    return model.residuals(numbers, there), model.left(numbers, there)
-
-
-def _in_place(search: Search, outcome: Outcome, gone: int, given_up: set[tuple[str, str]]) -> Outcome | None:
-    """Put the likeliest effect of a definite size in the place of a faint one without; what was given up is no rival of it."""
-    base = outcome.without[gone]
-    if outcome.final.score - base.score >= FAINT:
-        return None
-    for one in outcome.rivals[gone]:
-        own = one.terms[-1]
-        if own.key in given_up or one.score - base.score < search.needed(own, base.terms):
-            continue
-        if Background(search.linear, one.terms, one.noise).sized(len(one.terms) - 1):
-            found = search.compare(outcome.plain, search.grow(one.terms, noise=one.noise, most=0)[1])
-            rivals = (tuple(h for h in own if h.terms[-1].key not in given_up) for own in found.rivals)
-            return replace(found, rivals=tuple(rivals))
-    return None
-
-
-def _left_out(search: Search, outcome: Outcome, gone: int) -> Outcome:
-    terms = tuple(term for k, term in enumerate(outcome.final.terms) if k != gone)
-    final = search.settle(terms, outcome.final.noise) if terms else outcome.plain
-    without, rivals = [], []
-    for k in range(len(outcome.final.terms)):
-        if k != gone:
-            others = tuple(t for j, t in enumerate(outcome.final.terms) if j not in (k, gone))
-            base = search.beside(others, outcome.plain, outcome.final.noise)
-            drop = outcome.without[k].score - base.score
-            without.append(base)
-            rivals.append(tuple(replace(h, evidence=h.evidence - drop) for h in outcome.rivals[k]))
-    return Outcome(outcome.plain, final, tuple(rivals), tuple(without))
-
-
-def _worse(before: float | None, after: float | None) -> bool:
-    return before is not None and after is not None and after >= before

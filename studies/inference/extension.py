@@ -13,7 +13,7 @@ from studies.effects import Effect, Parameter
 from studies.inference.causes import parameters_of
 from studies.inference.diagnosis import Inference
 from studies.inference.heat_path import MASS
-from studies.inference.model import Term
+from studies.inference.linear import Term
 from studies.record import Record
 from studies.simulation.drive import COLUMN
 from studies.simulation.noise import noise_keys

@@ -14,8 +14,9 @@ from studies.calibration.problem import CardProblem
 from studies.diagnosis.verdict import Interval
 from studies.inference.generic_forms import any_lags
 from studies.inference.housing import evidence_of, set_housing_apart
-from studies.inference.model import PRICE, Linear
-from studies.inference.search import Hypothesis, Search, Shapes
+from studies.inference.hypothesis import Hypothesis
+from studies.inference.linear import PRICE, Linear, Shapes
+from studies.inference.search import Search
 from studies.inference.signatures import SHARE, Signatures
 from studies.instrument.card import Instrument
 from studies.simulation.heat_path import build_network, slowest_lag
@@ -233,7 +234,7 @@ def is_strained(found: CardFit) -> bool:
 
 def lags_would_bring(search: Search, beside: Hypothesis | None = None) -> float:
     """Log evidence that lags of any lengths and shares would bring in a linearised campaign, or beside effects: a heat path of any form, to first order."""
-    return _best(search, search.shapes_of([(any_lags(search.signatures.span), FREQUENCY)]), beside)
+    return _best(search, search.signatures.shapes_of([(any_lags(search.signatures.span), FREQUENCY)]), beside)
 
 
 def effects_would_bring(search: Search) -> float:

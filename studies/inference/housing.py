@@ -7,7 +7,8 @@ import numpy as np
 from studies.calibration.fit import CardFit
 from studies.calibration.observed import HOUSING, RESPONSES
 from studies.calibration.problem import State
-from studies.inference.model import Background, Linear
+from studies.inference.background import Background
+from studies.inference.linear import Linear
 
 
 def set_housing_apart(found: CardFit) -> CardFit:

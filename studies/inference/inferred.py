@@ -5,12 +5,13 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from studies.calibration.fit import CardFit
+from studies.inference.background import Background
 from studies.inference.heat_path import HeatPath
-from studies.inference.held_out import Kept, Model, Rows
+from studies.inference.hypothesis import Hypothesis, Outcome
 from studies.inference.lack_of_fit import Leftover
-from studies.inference.model import Background
+from studies.inference.predicted import Kept, Model, Rows
 from studies.inference.records import CLEAR, Campaign, drift_of
-from studies.inference.search import Hypothesis, Outcome, Search
+from studies.inference.search import Search
 from studies.instrument.card import Instrument
 
 

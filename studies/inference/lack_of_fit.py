@@ -11,10 +11,12 @@ from compensation.spikes import find_step
 from studies.calibration.problem import CardProblem
 from studies.diagnosis.constants import CONSTANTS
 from studies.diagnosis.verdict import spell_structure
+from studies.inference.background import Background
 from studies.inference.generic_forms import BUMP, STEP, SWITCH, generic_forms
-from studies.inference.held_out import Model, Rows
-from studies.inference.model import Background, Term
-from studies.inference.search import LESS, SUSPICIOUS, Hypothesis, Search, Shapes
+from studies.inference.hypothesis import Hypothesis
+from studies.inference.linear import Shapes, Term
+from studies.inference.predicted import Model, Rows
+from studies.inference.search import LESS, SUSPICIOUS, Search
 from studies.inference.sharp import brief_events, fast_line, intermittent, recurring, switching, tails_of
 
 ENOUGH = CONSTANTS["margin"] - CONSTANTS["log_prior_unknown"]
@@ -58,7 +60,7 @@ def generic_bank(search: Search) -> list[Shapes]:
     """Return the columns of the generic forms."""
     signatures = search.signatures
     forms = [*generic_forms(signatures.span, [path.states for path in signatures.paths]), BUMP, STEP]
-    return search.shapes_of(signatures.applicable({form.name: form for form in forms}))
+    return search.signatures.shapes_of(signatures.applicable({form.name: form for form in forms}))
 
 
 def look(
@@ -128,7 +130,7 @@ def _switching(search: Search, final: Hypothesis, name: str, rest: Array) -> flo
     if found is None:
         return -np.inf
     path, chance = found
-    term = Term(SWITCH, name, (), {name: path[:, None]}, (0,), search.unit(SWITCH, name, (0,)), price=0.0)
+    term = Term(SWITCH, name, (), {name: path[:, None]}, (0,), search.signatures.unit(SWITCH, name, (0,)), price=0.0)
     return search.settle((*final.terms, term), final.noise, [name]).evidence - final.evidence + chance
 
 

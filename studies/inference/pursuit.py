@@ -8,10 +8,11 @@ import numpy as np
 from compensation.arrays import Array
 from compensation.noise import Noise
 from studies.calibration.fit import IMPOSSIBLE, CardFit
-from studies.inference.held_out import STRAYED, Model
-from studies.inference.model import Linear, Term
+from studies.inference.hypothesis import Hypothesis, Outcome
+from studies.inference.linear import Linear, Shapes, Term
+from studies.inference.predicted import STRAYED, Model
 from studies.inference.relinearise import relinearise
-from studies.inference.search import MOST_TERMS, Hypothesis, Outcome, Search, Shapes
+from studies.inference.search import MOST_TERMS, Search
 from studies.inference.signatures import Signatures
 
 AGAIN, SETTLING = 7, 4

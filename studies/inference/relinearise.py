@@ -16,7 +16,7 @@ from compensation.noise_rows import NoiseRows
 from studies.calibration.fit import CardFit, descend
 from studies.calibration.problem import State
 from studies.effects.states import States
-from studies.inference.model import TOLD, Linear, Term, solve_posterior, split
+from studies.inference.linear import TOLD, Linear, Term, solve_posterior, split
 from studies.inference.signatures import Signatures
 from studies.simulation.drive import COLUMN, Boundary
 from studies.simulation.heat_path import build_network, slowest_lag

@@ -1,22 +1,20 @@
 """Search over effects: the model of all responses grows by the effect that adds most evidence, as long as that pays its price."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from copy import copy
-from dataclasses import dataclass, replace
-from itertools import groupby
+from dataclasses import replace
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from compensation.arrays import Array
 from compensation.noise import Noise, white_rms
-from studies.effects import Effect
-from studies.inference.model import PRICE, Background, Linear, Term, estimate_noise_of
-from studies.inference.shapes import chosen, leading, polish
+from studies.inference.background import Background, estimate_noise_of
+from studies.inference.hypothesis import Hypothesis, Outcome, Seen
+from studies.inference.linear import PRICE, Linear, Shapes, Term
+from studies.inference.shapes import polish
 from studies.inference.signatures import Signatures
 
-Columns = Mapping[str, NDArray[np.floating]]
 LESS = (0.1, 0.01)
 """Of the slow noise of a response: what an effect has been taken for until it is named."""
 MOST_TERMS, CONTENDERS = 4, 5
@@ -34,54 +32,6 @@ SUSPICIOUS, SUSPECTS = 3.0, 2
 Report = Callable[[str], None]
 
 
-@dataclass(frozen=True)
-class Shapes:
-    """All shapes of an effect with the same members: the columns that are scanned."""
-
-    effect: Effect
-    response: str
-    shapes: tuple[tuple[float, ...], ...]
-    members: tuple[int, ...]
-    columns: Columns
-    """response -> (M, H, k)"""
-    count: int
-    """Shapes of the whole grid."""
-
-
-@dataclass(frozen=True)
-class Seen:
-    """What a scan sees of one effect: log evidence over all shapes, the best of them, its scale, and the noise beside it."""
-
-    gain: float
-    best: float
-    term: Term
-    noise: Mapping[str, Noise]
-
-
-@dataclass(frozen=True)
-class Hypothesis:
-    """A model with its noise; `score` is its log posterior up to a constant."""
-
-    terms: tuple[Term, ...]
-    noise: Mapping[str, Noise]
-    evidence: float
-
-    @property
-    def score(self) -> float:
-        """Log evidence and the prices of the terms."""
-        return self.evidence + sum(term.price for term in self.terms)
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """The model without effects, the best one, and for each of its terms the rivals that could stand there, best first."""
-
-    plain: Hypothesis
-    final: Hypothesis
-    rivals: tuple[tuple[Hypothesis, ...], ...]
-    without: tuple[Hypothesis, ...]
-
-
 class Search:
     """The search in one linearised campaign."""
 
@@ -94,65 +44,14 @@ class Search:
         progress: Report = lambda _: None,
     ) -> None:
         self.linear, self.signatures, self.noise, self.progress = linear, signatures, noise, progress
-        self.bank = self.shapes_of(signatures.applicable()) if bank is None else bank
+        self.bank = self.signatures.shapes_of(signatures.applicable()) if bank is None else bank
         self.first: list[tuple[float, Hypothesis]] = []  # what may come first, with its gain, as `grow` weighed it
-
-    def shapes_of(self, effects: Iterable[tuple[Effect, str]]) -> list[Shapes]:
-        """Return the columns of all shapes of some effects, in seven digits: whatever leads is computed anew."""
-        found = []
-        for _, pairs in groupby(effects, lambda one: id(one[0]) if one[0].alike else one):
-            (effect, *_), responses = zip(*pairs, strict=True)
-            found += self._shapes(effect, responses)
-        return found
-
-    def _shapes(self, effect: Effect, responses: Sequence[str]) -> list[Shapes]:
-        """Return those of one effect, whose columns are the same of these responses."""
-        grids = {name: [tuple(shape) for shape in effect.grid(self.signatures.span, name)] for name in responses}
-        scanned = {name: dict.fromkeys(chosen(effect, grid)) for name, grid in grids.items()}
-        first = {name: leading(effect, len(grid)) for name, grid in grids.items()}
-        groups: dict[tuple[str, tuple[int, ...]], list[tuple[tuple[float, ...], Columns]]] = {}
-        for shape in dict.fromkeys(shape for shapes in scanned.values() for shape in shapes):
-            runs = [effect.columns(one, shape, responses[0]).T for one in self.signatures.states]
-            for name in (one for one in responses if shape in scanned[one]):
-                own = [run[first[name]] for run in runs]
-                there = np.any([run.any(axis=1) for run in own], axis=0)
-                if taken := effect.of_law(shape):
-                    there &= ~np.isin(first[name], taken)
-                members = tuple(k for k, seen in zip(first[name], there, strict=True) if seen)
-                if members:
-                    columns = self.signatures.made_of(np.hstack([run[there] for run in own]).T, effect, name)
-                    kept = {n: X.astype(np.float32) for n, X in columns.items()}
-                    groups.setdefault((name, members), []).append((shape, kept))
-        found = []
-        for (name, members), made in sorted(groups.items(), key=lambda one: responses.index(one[0][0])):
-            stacked = {n: np.stack([columns[n] for _, columns in made], axis=1) for n in made[0][1]}
-            found.append(Shapes(effect, name, tuple(shape for shape, _ in made), members, stacked, len(grids[name])))
-        return found
-
-    def unit(self, effect: Effect, response: str, members: Sequence[int]) -> Array:
-        """Prior standard deviations of members in a strong case."""
-        return np.asarray(effect.spread[list(members)] * self.signatures.size(effect, response))
-
-    def term(
-        self,
-        effect: Effect,
-        response: str,
-        shape: tuple[float, ...],
-        price: float = PRICE,
-        members: tuple[int, ...] = (),
-    ) -> Term:
-        """Return a term with some members of the effect, or all that have a prior."""
-        members = members or effect.members(shape)
-        starts = self.signatures.remembers(effect, shape)
-        columns = self.signatures.of_term(effect, shape, response, members, starts)
-        unit = self.unit(effect, response, members)
-        if starts:
-            unit = np.append(unit, np.full(len(self.linear.problem.runs), unit[0]))
-        return Term(effect, response, shape, columns, members, unit, 1.0, price)
 
     def gains(self, beside: Background, own: Shapes) -> Array:
         """Return what an effect adds to the evidence beside a model, for each of SCALES and of its shapes."""
-        units = np.broadcast_to(self.unit(own.effect, own.response, own.members), (len(own.shapes), len(own.members)))
+        units = np.broadcast_to(
+            self.signatures.unit(own.effect, own.response, own.members), (len(own.shapes), len(own.members))
+        )
         return beside.gains(own.columns, units, own.effect)
 
     def scan(self, now: Hypothesis, bank: Sequence[Shapes] | None = None, less: Sequence[float] = LESS) -> list[Seen]:
@@ -181,7 +80,7 @@ class Search:
             top, own, k, noise = max(shapes.values(), key=lambda value: value[0])
             # chosen shapes stand for the whole grid
             total = float(scipy.special.logsumexp(gains) - np.log(len(gains)))
-            term = self.term(own.effect, own.response, own.shapes[k], PRICE + min(total - top, 0.0))
+            term = self.signatures.term(own.effect, own.response, own.shapes[k], PRICE + min(total - top, 0.0))
             out.append(Seen(total, top, term, noise))
         return sorted(out, key=lambda seen: -seen.gain)
 
@@ -201,12 +100,7 @@ class Search:
 
     def polish(self, beside: Background, term: Term, anew: bool = True) -> Term:
         """Return a term whose shape is where the evidence is largest; not `anew`, near the one that it has."""
-        return polish(self.moved, self.signatures.span, beside, term, anew)
-
-    def moved(self, term: Term, shape: tuple[float, ...]) -> Term:
-        """Return a term with another shape."""
-        own = self.term(term.effect, term.response, shape, term.price, term.members)
-        return replace(own, scale=term.scale, bend=term.bend)
+        return polish(self.signatures.moved, self.signatures.span, beside, term, anew)
 
     def contenders(self, now: Hypothesis, less: Sequence[float] = LESS) -> list[Hypothesis]:
         """Return the models with one effect more, best first: each with shape, noise and size of its own where it is near enough."""
@@ -238,7 +132,7 @@ class Search:
         plain = now = Hypothesis((), own, Background(self.linear, (), own).evidence)
         for term in before:
             beside = Background(self.linear, now.terms, noise or now.noise)
-            here = self.polish(beside, self.moved(term, term.shape), anew=False)
+            here = self.polish(beside, self.signatures.moved(term, term.shape), anew=False)
             now = _credited(self.settle((*now.terms, here), noise or now.noise), now)
         plain, now = self._without_idle(plain, now)
         for _ in range(most):  # a term may leave when another one comes
@@ -261,7 +155,7 @@ class Search:
                 continue
             others = (*now.terms[:k], *now.terms[k + 1 :])
             beside, found = Background(self.linear, others, now.noise), []
-            for own in self.shapes_of([(term.effect, term.response)]):
+            for own in self.signatures.shapes_of([(term.effect, term.response)]):
                 if 0 in own.members:
                     first = own.members.index(0)
                     columns = {name: one[:, :, first : first + 1] for name, one in own.columns.items()}
@@ -269,7 +163,7 @@ class Search:
                     found.append((float(gain.max()), own.shapes[int(np.argmax(gain))]))
             if not found:
                 continue
-            one = self.polish(beside, self.term(term.effect, term.response, max(found)[1], term.price, (0,)))
+            one = self.polish(beside, self.signatures.term(term.effect, term.response, max(found)[1], term.price, (0,)))
             there = self._with(now, k, replace(beside.with_term(one)[0], brought=term.brought))
             now = there if there.score > now.score + SURE else now
         return now
@@ -286,7 +180,7 @@ class Search:
                     break
             for _ in range(FORMS if term.effect.sees_heat else 0):  # its form is that of its own size
                 size = float(np.clip(Background(self.linear, now.terms, now.noise).coefficients(k)[0][0], 0.0, 1.0))
-                now = self._with(now, k, self.moved(now.terms[k], (size, *now.terms[k].shape[1:])))
+                now = self._with(now, k, self.signatures.moved(now.terms[k], (size, *now.terms[k].shape[1:])))
         return now
 
     def _with(self, now: Hypothesis, k: int, term: Term) -> Hypothesis:
@@ -325,7 +219,7 @@ class Search:
                     tried.append((float(gain.max()), own, int(np.argmax(gain))))
             best: dict[str, tuple[Term, ...]] = {}
             for _, own, k in sorted(tried, key=lambda one: -one[0]):
-                best.setdefault(own.effect.name, (*now.terms, self.term(own.effect, name, own.shapes[k])))
+                best.setdefault(own.effect.name, (*now.terms, self.signatures.term(own.effect, name, own.shapes[k])))
             found += [(terms, noise) for terms in (now.terms, *list(best.values())[:SUSPECTS])]
         return found
 

@@ -7,7 +7,8 @@ import scipy
 
 from compensation.arrays import Array
 from studies.effects import Effect, Parameter, Span
-from studies.inference.model import Background, Term
+from studies.inference.background import Background
+from studies.inference.linear import Term
 
 Moved = Callable[[Term, tuple[float, ...]], Term]
 """A term with another shape."""

@@ -23,10 +23,10 @@ from studies.diagnosis.verdict import (
     wrong_values,
 )
 from studies.effects import find_effect
+from studies.inference.background import Background
 from studies.inference.causes import candidates_of, causes_of
 from studies.inference.heat_path import FREQUENCY, MASS
 from studies.inference.inferred import Inferred
-from studies.inference.model import Background
 from studies.inference.records import Campaign
 from studies.inference.responses import is_slow, result_of
 from studies.inference.sharp import longest_resolved

@@ -12,10 +12,12 @@ from compensation.noise_rows import Whitener
 from studies.calibration.observed import RESPONSES, ObservedRun, observe
 from studies.calibration.problem import CardProblem
 from studies.effects.states import remembered
+from studies.inference.background import Background
+from studies.inference.hypothesis import Hypothesis
 from studies.inference.inferred import Inferred
-from studies.inference.model import Background, Term
-from studies.inference.search import Hypothesis
-from studies.inference.signatures import Signatures, trace
+from studies.inference.linear import Term
+from studies.inference.paths import trace
+from studies.inference.signatures import Signatures
 from studies.planning.programme import Programme
 from studies.resonator.law import law_of
 from studies.simulation.drive import COMMANDS, drive_by_schedule

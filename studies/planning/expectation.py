@@ -22,8 +22,9 @@ from compensation.arrays import Array
 from studies.diagnosis.constants import CONSTANTS
 from studies.diagnosis.verdict import temper_of
 from studies.effects import Effect
-from studies.inference.model import PRICE, SCALES, Background
-from studies.inference.search import MARGIN, Search, Shapes
+from studies.inference.background import Background
+from studies.inference.linear import PRICE, SCALES, Shapes
+from studies.inference.search import MARGIN, Search
 from studies.inference.shapes import MOST_SHAPES
 
 Key = tuple[str, str]
@@ -77,14 +78,14 @@ def hide(search: Search, group: Sequence[Shapes], rng: np.random.Generator) -> H
     definite = int(np.argmax(effect.spread == 1.0)) if np.any(effect.spread == 1.0) else int(np.argmax(effect.spread))
     columns: dict[str, list[Array]] = {}
     for own, h in chosen:
-        weight = rng.standard_normal(len(own.members)) * search.unit(effect, response, own.members)
+        weight = rng.standard_normal(len(own.members)) * search.signatures.unit(effect, response, own.members)
         at = (
             own.members.index(definite) if definite in own.members else int(np.argmax(effect.spread[list(own.members)]))
         )
-        weight[at] = search.unit(effect, response, own.members)[at]
+        weight[at] = search.signatures.unit(effect, response, own.members)[at]
         for name, X in own.columns.items():
             columns.setdefault(name, []).append(X[:, h] @ weight)
-    unit = float(search.unit(effect, response, [definite])[0])
+    unit = float(search.signatures.unit(effect, response, [definite])[0])
     names = [n for n, c in zip(effect.coefficient_names(response), effect.coefficients, strict=True) for _ in c.spread]
     return Hidden(effect, response, {n: np.stack(own, axis=1) for n, own in columns.items()}, unit, names[definite])
 
@@ -107,7 +108,7 @@ class Expectation:
         self._explained: dict[Key, list[tuple[Array, ...]]] = {}
         for own in search.bank:
             units = np.broadcast_to(
-                search.unit(own.effect, own.response, own.members), (len(own.shapes), len(own.members))
+                search.signatures.unit(own.effect, own.response, own.members), (len(own.shapes), len(own.members))
             )
             values, _, along = beside.against(own.columns, units, left)
             seen = SCALES[:, None, None] ** 2 / (1.0 + SCALES[:, None, None] ** 2 * values)  # (S, H, k)

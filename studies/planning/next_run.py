@@ -21,9 +21,10 @@ from shell.material import spell
 from studies.diagnosis.constants import CONSTANTS
 from studies.diagnosis.verdict import Verdict, spell_structure
 from studies.effects import find_effect, library
+from studies.inference.background import Background
+from studies.inference.hypothesis import Hypothesis
 from studies.inference.inferred import Inferred
-from studies.inference.model import SCALES, Background, Term
-from studies.inference.search import Hypothesis
+from studies.inference.linear import SCALES, Term
 from studies.planning.candidate import Candidate, Known, simulate_candidates, unabsorbed
 from studies.planning.chamber import Chamber
 from studies.planning.programme import BY_INPUT, NextRun, Programme, candidates

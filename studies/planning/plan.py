@@ -11,9 +11,10 @@ from compensation.noise import Noise
 from shell.constants import zero_Celsius
 from studies.effects import find_effect, library
 from studies.errors import InputError
+from studies.inference.background import Background
 from studies.inference.diagnosis import build_problem
-from studies.inference.model import SCALES, Background, Linear
-from studies.inference.search import Search, Shapes
+from studies.inference.linear import SCALES, Linear, Shapes
+from studies.inference.search import Search
 from studies.inference.signatures import Signatures
 from studies.instrument.card import Instrument
 from studies.planning.chamber import Chamber, limited

@@ -10,7 +10,8 @@ from scipy.stats import chi2
 
 from compensation.errors import CompensationError
 from compensation.noise import Noise
-from compensation.noise_rows import KINDS, NoiseRows, estimate_noise
+from compensation.noise_estimate import estimate_noise
+from compensation.noise_rows import KINDS, NoiseRows
 
 Array = NDArray[np.float64]
 GAPPED = np.cumsum(np.concatenate([np.full(60, 80.0), [4000.0], np.full(50, 130.0)]))

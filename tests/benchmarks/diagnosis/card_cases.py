@@ -13,8 +13,9 @@ import numpy as np
 from compensation.noise import Noise
 from studies.effects import library
 from studies.errors import InputError
+from studies.inference.background import Background
 from studies.inference.diagnosis import build_problem
-from studies.inference.model import SCALES, Background, Linear
+from studies.inference.linear import SCALES, Linear
 from studies.inference.signatures import Signatures
 from studies.instrument.card import Instrument, load_card
 from studies.simulation.chamber import load_drive

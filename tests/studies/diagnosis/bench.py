@@ -7,7 +7,7 @@ from scipy.signal import lfilter
 
 from studies.calibration.fit import fit
 from studies.inference.diagnosis import build_problem
-from studies.inference.model import Linear
+from studies.inference.linear import Linear
 from studies.inference.polynomial_card import polynomial_card
 from studies.inference.search import Search
 from studies.inference.signatures import Signatures
@@ -71,5 +71,5 @@ def searched(records, *named):
     """Return the search beside the polynomial card of records, its bank of the named effects alone, and the model without effects."""
     found = fit(build_problem(polynomial_card(records), records))
     search = Search(Linear.of(found), Signatures.at(found.problem, found.point), found.noise, bank=[])
-    search.bank = search.shapes_of((e, r) for e, r in search.signatures.applicable() if e.name in named)
+    search.bank = search.signatures.shapes_of((e, r) for e, r in search.signatures.applicable() if e.name in named)
     return search, search.settle((), found.noise)

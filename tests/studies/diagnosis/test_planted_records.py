@@ -8,8 +8,8 @@ from scipy.constants import Stefan_Boltzmann, zero_Celsius
 
 from compensation.noise import Noise
 from studies.calibration.ahead import spread_of_prediction
+from studies.inference.background import Background
 from studies.inference.extension import extend
-from studies.inference.model import Background
 from studies.instrument.card import build_instrument, load_card
 from studies.planning.chamber import Chamber
 from studies.record import Record

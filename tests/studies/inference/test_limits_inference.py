@@ -9,11 +9,13 @@ import scipy
 
 from compensation.noise import Noise
 from studies.calibration.fit import fit
+from studies.inference.background import Background
 from studies.inference.causes import parameters_of
 from studies.inference.diagnosis import build_problem
-from studies.inference.held_out import Kept, Model
-from studies.inference.model import SCALES, Background, Linear, solve_posterior
+from studies.inference.held_out import HeldOut
+from studies.inference.linear import SCALES, Linear, solve_posterior
 from studies.inference.polynomial_card import polynomial_card
+from studies.inference.predicted import Kept, Model
 from studies.inference.pursuit import Pursuit
 from studies.inference.search import Search
 from studies.inference.sharp import recurring, switching
@@ -62,7 +64,7 @@ def test_evidence_of_a_term_is_that_of_a_dense_gaussian(search):
     linear, noise = search.linear, search.noise
     _, effect = next((k, e) for k, (e, r) in enumerate(search.signatures.applicable()) if e.name == "curvature")
     grid = effect.grid(search.signatures.span, "frequency_Hz")
-    term = replace(search.term(effect, "frequency_Hz", tuple(grid[0])), scale=float(SCALES[5]))
+    term = replace(search.signatures.term(effect, "frequency_Hz", tuple(grid[0])), scale=float(SCALES[5]))
     beside = Background(linear, (), noise)
     gain = beside.gains({n: X[:, None, :] for n, X in term.columns.items()}, term.unit[None], term.effect)[5, 0]
 
@@ -118,7 +120,7 @@ def test_a_family_whose_first_member_may_be_nothing_says_what_all_make_together(
     """Sizes with 0 in their intervals were printed of a hysteresis that is sure."""
     effect = next(e for e, r in search.signatures.applicable() if (e.name, r) == ("hysteresis", "frequency_Hz"))
     shape = tuple(effect.grid(search.signatures.span, "frequency_Hz")[12])
-    term = search.term(effect, "frequency_Hz", shape, members=(0, 3))
+    term = search.signatures.term(effect, "frequency_Hz", shape, members=(0, 3))
     planted = 2e-2 * term.columns["frequency_Hz"][:, 1]
     target = {name: np.zeros_like(own) for name, own in search.linear.target.items()} | {"frequency_Hz": planted}
     background = Background(replace(search.linear, target=target), (term,), search.noise)
@@ -144,7 +146,7 @@ def test_rows_held_out_are_those_of_a_refit_to_the_other_records(search):
         mean[open_] = np.linalg.lstsq(np.vstack(rows), np.concatenate(targets), rcond=None)[0]
     model = Model(linear, search.signatures, (), noise)
     refitted, seen = model.residuals(Kept(mean, ())), model.residuals(model.kept(model.mean()))
-    unseen, whole = model.held_out(True, seen), seen["frequency_Hz"].residual[1]
+    unseen, whole = HeldOut(model, seen, by_record=True).left, seen["frequency_Hz"].residual[1]
     assert np.abs(whole).max() < 0.2 * np.abs(refitted["frequency_Hz"].residual[1]).min()
     for name in linear.responses:
         rest = refitted[name].residual[1]
@@ -183,9 +185,8 @@ def test_numbers_are_not_sought_where_straight_lines_lead_astray(search, monkeyp
 def test_a_block_whose_gaps_leave_no_row_for_the_fit_is_not_held_out(search):
     paths, span = search.signatures.paths, replace(search.signatures.span, tau=1e6)
     model = Model(search.linear, SimpleNamespace(span=span, paths=paths), (), search.noise)
-    unseen = model.held_out(
-        False, Model(search.linear, search.signatures, (), search.noise).residuals(model.kept(model.mean()))
-    )
+    seen = Model(search.linear, search.signatures, (), search.noise).residuals(model.kept(model.mean()))
+    unseen = HeldOut(model, seen, by_record=False).left
     assert {one.beside(one) for one in unseen.values()} == {(None, None)}
 
 
@@ -201,7 +202,7 @@ def test_a_search_whose_effects_fall_away_ends_where_the_values_are_likeliest_wi
         plain, _ = grow(self, most=0)
         effect, response = next(own for own in self.signatures.applicable() if own[0].name == "thermometer-scale")
         lasting = self is pursuit.first and "most" not in more
-        return plain, self.settle((self.term(effect, response, (0.0,)),), plain.noise) if lasting else plain
+        return plain, self.settle((self.signatures.term(effect, response, (0.0,)),), plain.noise) if lasting else plain
 
     monkeypatch.setattr(Search, "grow", first_one_then_none)
     monkeypatch.setattr(Pursuit, "_holds", lambda self, final: False)
@@ -214,7 +215,7 @@ def test_a_search_whose_effects_fall_away_ends_where_the_values_are_likeliest_wi
 def test_a_term_whose_size_is_impossible_alone_leaves_the_model_without_terms(search):
     """A negative radiated share, say; its log evidence is −∞, and rivals measured from there once lost their probability."""
     effect, response = next(one for one in search.signatures.applicable() if one[0].name == "second-lag")
-    term = search.term(effect, response, (3e4,), members=(0,))
+    term = search.signatures.term(effect, response, (3e4,), members=(0,))
     target = {name: own - 3.0 * term.columns[name][:, 0] for name, own in search.linear.target.items()}
     against = Search(replace(search.linear, target=target), search.signatures, search.noise, bank=[])
     plain = against.settle((), search.noise)

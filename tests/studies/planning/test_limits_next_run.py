@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 from studies.inference.diagnosis import build_problem
-from studies.inference.model import Linear
+from studies.inference.hypothesis import Hypothesis
+from studies.inference.linear import Linear
 from studies.inference.polynomial_card import polynomial_card
-from studies.inference.search import Hypothesis, Search
+from studies.inference.search import Search
 from studies.inference.signatures import Signatures
 from studies.instrument.card import load_card
 from studies.planning.candidate import Known, simulate_candidates, unabsorbed
@@ -76,7 +77,7 @@ def test_a_card_made_from_records_simulates_what_could_come_next(found):
 def rival(found, name, size):
     effect = next(e for e, r in found.search.signatures.applicable() if e.name == name and r == "frequency_Hz")
     grid = effect.grid(found.search.signatures.span, "frequency_Hz")
-    term = found.search.term(effect, "frequency_Hz", tuple(grid[len(grid) // 2]))
+    term = found.search.signatures.term(effect, "frequency_Hz", tuple(grid[len(grid) // 2]))
     return replace(found.final, terms=(replace(term, scale=size),))
 
 

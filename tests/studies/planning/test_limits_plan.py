@@ -9,8 +9,9 @@ from scipy.special import logsumexp
 from studies.diagnosis.constants import CONSTANTS
 from studies.diagnosis.verdict import temper_of
 from studies.errors import InputError
+from studies.inference.background import Background
 from studies.inference.diagnosis import build_problem
-from studies.inference.model import PRICE, SCALES, Background, Linear
+from studies.inference.linear import PRICE, SCALES, Linear
 from studies.inference.search import MARGIN, Search
 from studies.inference.signatures import Signatures
 from studies.instrument.card import load_card
@@ -35,7 +36,7 @@ def hidden():
     linear, noise = Linear(problem, problem.rows, zero, state.slope), stated_noises(card, records)
     search = Search(linear, Signatures.at(problem, state.point), noise, bank=[])
     few = [(e, r) for e, r in search.signatures.applicable() if e.name in FEW and r == "frequency_Hz"]
-    search.bank = search.shapes_of(few)
+    search.bank = search.signatures.shapes_of(few)
     rng = np.random.default_rng(3)
     groups = [[own for own in search.bank if own.effect is e] for e, _ in few]
     own = [hide(search, group, rng) for group in groups]
@@ -53,7 +54,9 @@ def drawn_scores(search, beside, signal, draws, rng):
     left, _, _ = beside.left_of(targets)
     found = {}
     for own in search.bank:
-        units = np.broadcast_to(search.unit(own.effect, own.response, own.members), (len(own.shapes), len(own.members)))
+        units = np.broadcast_to(
+            search.signatures.unit(own.effect, own.response, own.members), (len(own.shapes), len(own.members))
+        )
         values, _, along = beside.against(own.columns, units, left)
         for scale in SCALES**2:
             fall = 0.5 * np.log1p(scale * values).sum(axis=1)[:, None]
