@@ -31,7 +31,7 @@ APART, NEXT = 0.25, 2.0
 FARTHER = 3e-4  # of the frequency, from which on that law tells: jumps and ageing are less
 HOURS = (1, -1, 2, -2)  # by which clocks of two loggers differ: summer time, time zones
 BEND = 0.1  # of the changes of a frequency: a temperature in another unit would bend its law to its needs
-LAW, ONE = replace(ANY_PATH, bend=BEND), Law(bend=BEND)
+LAW, ONE, CUBIC = replace(ANY_PATH, bend=BEND), Law(bend=BEND), replace(ANY_PATH, cubic=True)
 
 
 def records_of_one_gyro(records: Sequence[Record], say: Callable[[str], None]) -> list[Record]:
@@ -119,7 +119,7 @@ def check_one_sign(records: Sequence[Record]) -> None:
         if len(runs) > 1:
             levels = range(1, len(runs))
             turned = _put_in(runs, [replace(run, output=-run.output) for run in runs])
-            k = _better(runs, likeliest(runs, ANY_PATH, levels), (likeliest(one, ANY_PATH, levels) for one in turned))
+            k = _better(runs, likeliest(runs, CUBIC, levels), (likeliest(one, CUBIC, levels) for one in turned))
             if k is not None:
                 which = [_path(records, one) for one in (members if len(runs) == 2 else members[k : k + 1])]
                 raise InputError(

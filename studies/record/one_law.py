@@ -45,11 +45,12 @@ class Course:
 
 @dataclass(frozen=True)
 class Law:
-    """Further lags (s) of a law, what its bend makes at most at one standard deviation of what is followed, of the changes of the output, and its longest lag (s)."""
+    """Further lags (s) of a law, what its bend makes at most at one standard deviation of what is followed, of the changes of the output, its longest lag (s), and whether it is a cubic."""
 
     further: tuple[float, ...] = ()
     bend: float = np.inf
     longest: float = np.inf
+    cubic: bool = False
 
 
 @dataclass(frozen=True, order=True)
@@ -93,7 +94,14 @@ def follow(runs: Sequence[Course], lag: float, law: Law = ONE_LAG, apart: Sequen
     """Return what a law leaves with one lag, where some runs have levels of their own."""
     X, y = parabola(runs, [lag]), np.concatenate([run.output for run in runs])
     more = [np.concatenate([run.behind(tau) for run in runs]) for tau in law.further]
-    X = np.column_stack([X, *(one - one.mean() for one in more), *(_rows_of(runs, k) for k in apart)])
+    X = np.column_stack(
+        [
+            X,
+            *([X[:, 1] ** 3] if law.cubic else []),
+            *(one - one.mean() for one in more),
+            *(_rows_of(runs, k) for k in apart),
+        ]
+    )
     y = y - y.mean()
     found = _solve(X, y)
     most = law.bend * float(y.std()) / max(float(X[:, 1].var()), 1e-300)

@@ -314,6 +314,23 @@ def test_a_diagnosis_leaves_out_a_run_that_lies_apart(with_another):
     assert make_ready(with_another(1)[:2]).numbers == (1, 2)  # which of two is the other gyro?
 
 
+def test_a_bias_that_falls_on_the_cold_side_and_rises_on_the_hot_one_has_one_sign():
+    """A parabola once let the turned run of this gyro pass, and refused a healthy one of another with a hot run and two cold ones."""
+    rng, runs = np.random.default_rng(5), []
+    for k, (begin, end) in enumerate([(24.0, 53.0), (24.0, -22.0), (23.0, -11.0)]):
+        time = np.arange(0.0, 18000.0, 20.0)
+        housing = np.interp(time, [0.0, 9000.0, 18000.0], [begin, end, begin])
+        x = follow_lag(housing, np.diff(time), 900.0) - 9.0
+        bias = 2.3 + 0.05 * k - 0.145 * x + 0.0037 * x**2 + 4.2e-5 * x**3 + 0.006 * rng.standard_normal(time.size)
+        frequency = 4426.0 * (1.0 + 8.5e-5 * x) + 1e-3 * rng.standard_normal(time.size)
+        columns = {"time_s": time, "housing_temperature_degC": housing, "frequency_Hz": frequency}
+        runs.append(Record(columns | {"bias_deg_per_h": bias}, path=f"run_{k}.csv"))
+    assert len(records_of_one_gyro(runs, print)) == 3
+    turned = [spoilt(runs[0], bias_deg_per_h=lambda b: -b), *runs[1:]]
+    with pytest.raises(InputError, match=r"run_0.csv: bias_deg_per_h has the opposite sign"):
+        records_of_one_gyro(turned, print)
+
+
 def test_stuck_readings_are_left_out(runs):
     own = runs[1]["frequency_Hz"].copy()
     own[60:120] = own[60]
