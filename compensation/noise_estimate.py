@@ -7,6 +7,7 @@ import numpy as np
 from compensation.arrays import Array
 from compensation.noise import Noise
 from compensation.noise_rows import KINDS, NoiseRows
+from compensation.noise_within import within
 
 Seen = tuple[float, Array, Array]
 """−2 ln L at a point, its slopes and curvature."""
@@ -30,23 +31,24 @@ def estimate_noise(
     rows: NoiseRows, target: Array, columns: Array | None = None, precision: Array | None = None,
     kinds: Sequence[str] = KINDS, near: Noise | None = None, stated: Noise | None = None,
 ) -> Noise:  # fmt: skip
-    """Estimate the levels of the noise by its marginal likelihood.
+    """Estimate the levels of the noise by its marginal likelihood: of coarse rows, and of what they say within these (`compensation.noise_within`).
 
     `target` (M,) are residuals of all runs, `columns` (M, p) what else is unknown, of prior `precision`; `kinds`:
     "white" (always), "flicker", "walk", "offset"; `near`: where to begin; `stated`: slow levels known to a factor of 3.
     """
-    X = np.zeros((rows.count, 0)) if columns is None else columns
+    fine = np.zeros((rows.count, 0)) if columns is None else columns
+    X, y, coarse = rows.means(fine), rows.means(target), rows.coarse
     size = np.linalg.norm(X, axis=0)
     size[size == 0] = 1.0
     lam = np.zeros(X.shape[1]) if precision is None else precision
     X, lam = X / size, lam / size**2
-    free_part = np.linalg.lstsq(np.vstack([X, np.diag(np.sqrt(lam))]), np.append(target, np.zeros(len(lam))))[0]
-    rest = target - X @ free_part
-    step = np.concatenate([np.diff(rest[s]) for s in rows.slices])
+    free_part = np.linalg.lstsq(np.vstack([X, np.diag(np.sqrt(lam))]), np.append(y, np.zeros(len(lam))))[0]
+    rest, inner = y - X @ free_part, within(rows, target - fine @ (free_part / size))
+    step = np.concatenate([np.diff(rest[s]) for s in coarse.slices])
     spread = float(np.median(np.abs(step))) / 0.954 if step.size else 0.0
     spread = max(spread, 1e-14 * float(np.abs(target).max()), 1e-300)
     free = [kind for kind in KINDS[1:] if kind in kinds and (kind != "offset" or len(rows.times) > 1)]
-    root, unit = float(np.sqrt(rows.span)), rows.slow_units
+    root, unit = float(np.sqrt(coarse.span)), coarse.slow_units
 
     def levels(x: Array) -> Noise:
         white = float(spread * np.exp(x[0]))
@@ -60,12 +62,14 @@ def estimate_noise(
     def objective(x: Array) -> tuple[float, Array, Array]:
         noise = levels(x)
         try:
-            total, slopes, curvature = rows.deviance(rest, X, lam, noise, -free_part)
+            seen = [coarse.deviance(rest, X, lam, noise, -free_part), *(one.deviance(noise) for one in inner)]
         except np.linalg.LinAlgError:  # levels so far apart that rounding decides
             return np.inf, x, np.eye(len(x))
+        total = sum(one for one, _, _ in seen)
+        slopes, curvature = (np.sum(own, axis=0) for own in list(zip(*seen, strict=True))[1:])
         bend = curvature[np.ix_(places, places)] + np.diag(2 * np.maximum(slopes[places], 0.0))  # Σ goes with θ²
         slope, bend = slopes[places] @ along, along.T @ bend @ along
-        for k, (surprise, spread, absolute) in enumerate(_surprises(rows, noise, free, stated), 1):
+        for k, (surprise, spread, absolute) in enumerate(_surprises(coarse, noise, free, stated), 1):
             way = (along if absolute else np.eye(len(x)))[k] / spread
             total, slope, bend = total + surprise**2, slope + 2 * surprise * way, bend + 2 * np.outer(way, way)
         return total, slope, bend

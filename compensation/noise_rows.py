@@ -86,10 +86,14 @@ class NoiseRows:
         return F, W - begin
 
     @cached_property
+    def together(self) -> tuple[int, ...]:
+        """How many rows of each run make a coarse one."""
+        return tuple(-(-len(t) // COARSE) for t in self.times)
+
+    @cached_property
     def _starts(self) -> tuple[tuple[NDArray[np.intp], ...], "NoiseRows"]:
         """Rows at which the coarse rows of each run begin, and these: weighted means of neighbours."""
-        every = [-(-len(t) // COARSE) for t in self.times]
-        starts = tuple(np.arange(0, len(t), k) for t, k in zip(self.times, every, strict=True))
+        starts = tuple(np.arange(0, len(t), k) for t, k in zip(self.times, self.together, strict=True))
         rows = zip(self.times, self.spans, self.stretch, starts, strict=True)
         spans = tuple(np.add.reduceat(w, at) for w, at in zip(self.spans, starts, strict=True))
         means = [(np.add.reduceat(w * t, at), np.add.reduceat(w * s, at)) for t, w, s, at in rows]

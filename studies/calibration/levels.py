@@ -42,14 +42,15 @@ def with_level_spread(found: CardFit) -> CardFit:
 
 def _level_spread(found: CardFit, name: str) -> float:
     """Return the standard deviation that a prediction of a response should have for the level of its run; 0 where one run shows none."""
-    rows = found.rows[name].coarse
+    rows = found.rows[name]
     if len(rows.times) < 2 or not has_levels(found.problem, name):
         return 0.0
     noise, problem = found.noise, found.problem
     target = {one: found.state.residual[one] + found.state.slope[one] @ found.point for one in problem.responses}
     left, columns = beside_others(problem, found.rows, target, found.state.slope, noise, name)
     stated = stated_noise(problem.instrument.noise, name)
-    return level_of_further_run(rows, left, columns, noise[name], 0.0 if stated is None else stated.offset)
+    means = rows.means(left), rows.means(columns)
+    return level_of_further_run(rows.coarse, *means, noise[name], 0.0 if stated is None else stated.offset)
 
 
 def level_of_further_run(rows: NoiseRows, target: Array, columns: Array, noise: Noise, stated: float = 0.0) -> float:

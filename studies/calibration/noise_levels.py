@@ -28,8 +28,7 @@ def residual_noise(
     problem: CardProblem, rows: Mapping[str, NoiseRows], state: State, near: Mapping[str, Noise]
 ) -> dict[str, Noise]:
     """Noise that the residuals would be as they are, looked for `near` another: far from the values, a straight line promises what no step keeps."""
-    means = {n: rows[n].means(state.residual[n]) for n in problem.responses}
-    return {n: _levels(problem, rows[n].coarse, n, own, near=near.get(n)) for n, own in means.items()}
+    return {n: _levels(problem, rows[n], n, state.residual[n], near=near.get(n)) for n in problem.responses}
 
 
 def marginal_noise(
@@ -62,7 +61,7 @@ def estimate_levels(
     found = dict(noise)
     for name in names:
         left, columns = beside_others(problem, rows, target, slopes, found, name, known)
-        found[name] = _levels(problem, rows[name].coarse, name, left, columns, found.get(name))
+        found[name] = _levels(problem, rows[name], name, left, columns, found.get(name))
     return found
 
 
@@ -75,19 +74,20 @@ def beside_others(
     name: str,
     known: Array | None = None,
 ) -> tuple[Array, Array]:
-    """Coarse rows of a response and columns of unit prior, of all that the other responses leave unknown."""
+    """Rows of a response and columns of unit prior, of all that the other responses leave unknown and coarse rows see."""
     count = slopes[name].shape[1]
     told = [other for other in problem.responses if other != name and other in noise]
     white = [rows[n].whiten(np.column_stack([slopes[n], target[n]]), noise[n]) for n in told]
     white += [] if known is None else [known]
     triangle = np.linalg.qr(np.vstack([np.eye(count, count + 1), *white])).R[:count]
     R, move = triangle[:, :-1], scipy.linalg.solve_triangular(triangle[:, :-1], triangle[:, -1])
-    J, left = rows[name].means(slopes[name]), rows[name].means(target[name])
+    left = target[name] - slopes[name] @ move
     # Rotated coordinates of unit prior are of unit prior again; those that the rows do not see are left out.
-    U, S, _ = np.linalg.svd(scipy.linalg.solve_triangular(R, J.T, trans="T").T, full_matrices=False)
-    left = left - J @ move
-    seen = S > UNSEEN * float(np.median(np.abs(np.diff(left - U @ (U.T @ left)))))
-    return left, U[:, seen] * S[seen]
+    J = scipy.linalg.solve_triangular(R, slopes[name].T, trans="T").T
+    U, S, turn = np.linalg.svd(rows[name].means(J), full_matrices=False)
+    means = rows[name].means(left)
+    seen = S > UNSEEN * float(np.median(np.abs(np.diff(means - U @ (U.T @ means)))))
+    return left, J @ turn[seen].T
 
 
 def _levels(

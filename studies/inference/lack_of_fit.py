@@ -1,12 +1,13 @@
 """Lack of fit: what no named effect explains, seen by generic forms of every input, by what is sharp in time and by fast lines."""
 
 from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from compensation.arrays import Array
 from compensation.lines import Line
+from compensation.noise_rows import cholesky
 from compensation.spikes import find_step
 from studies.calibration.problem import CardProblem
 from studies.diagnosis.constants import CONSTANTS
@@ -22,6 +23,8 @@ from studies.inference.sharp import brief_events, fast_line, intermittent, recur
 ENOUGH = CONSTANTS["margin"] - CONSTANTS["log_prior_unknown"]
 """Log evidence from which on structure is no chance."""
 
+DRAWS = 8
+"""Of noise alone, none of which may show as much switching: flicker far above the white noise of rows once did, with evidence of 72."""
 REPEATED, ROUNDING = 0.5, 1.3
 """Part of the readings that are as the one before, from which on they are rounded to more than their noise; the rms of that, in its own parts."""
 
@@ -92,7 +95,7 @@ def look(
         if fitful > evidence:
             word, evidence = "time: an intermittent oscillation", fitful
         # levels between which a form of an input goes would be two as well
-        switches = _switching(search, final, name, rest) if smooth <= ENOUGH else -np.inf
+        switches = _switching(search, final, name) if smooth <= ENOUGH else -np.inf
         if switches > evidence:
             word, evidence = SWITCH.name, switches
         fast = _line(search, name, rows.get(name))
@@ -124,14 +127,35 @@ def _instead_of_noise(search: Search, bank: Sequence[Shapes], final: Hypothesis,
     return search.settle((*final.terms, seen[0].term), seen[0].noise, [name]) if seen else None
 
 
-def _switching(search: Search, final: Hypothesis, name: str, rest: Array) -> float:
-    """Log evidence of a level that switches to another one and back, in noise of its own, over slow noise alone: of the likeliest path, so no more than that."""
+def _switching(search: Search, final: Hypothesis, name: str) -> float:
+    """Log evidence of a level that switches to another one and back, in noise of its own, over slow noise alone, less the most that this noise itself shows in some draws."""
+    found = _by_path(search, final, name)
+    if found > ENOUGH:
+        found -= max(0.0, *(_by_path(*_drawn(search, final, name, seed), name) for seed in range(DRAWS)))
+    return found
+
+
+def _by_path(search: Search, final: Hypothesis, name: str) -> float:
+    """The same of the likeliest path of levels, as likely as it is."""
+    rest = Background(search.linear, final.terms, final.noise).residual(name)
     found = switching([rest[place] for place in search.linear.rows[name].slices])
     if found is None:
         return -np.inf
     path, chance = found
-    term = Term(SWITCH, name, (), {name: path[:, None]}, (0,), search.signatures.unit(SWITCH, name, (0,)), price=0.0)
+    unit = search.signatures.unit(SWITCH, name, (0,))
+    term = Term(SWITCH, name, (), {name: path[:, None]}, (0,), unit, price=0.0)
     return search.settle((*final.terms, term), final.noise, [name]).evidence - final.evidence + chance
+
+
+def _drawn(search: Search, final: Hypothesis, name: str, seed: int) -> tuple[Search, Hypothesis]:
+    """A search where noise is drawn in the place of what a model leaves of a response, and that model there."""
+    there, rows, rng = copy(search), search.linear.rows[name], np.random.default_rng(seed)
+    drawn = [
+        cholesky(rows.covariance(k, final.noise[name])) @ rng.standard_normal(len(t)) for k, t in enumerate(rows.times)
+    ]
+    told = search.linear.target[name] - Background(search.linear, final.terms, final.noise).residual(name)
+    there.linear = replace(search.linear, target={**search.linear.target, name: told + np.concatenate(drawn)})
+    return there, there.settle(final.terms, final.noise, [name])
 
 
 def _share(search: Search, name: str, before: Background, own: Background, generic: Term) -> float:

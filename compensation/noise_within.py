@@ -1,0 +1,63 @@
+"""What rows say of noise within the coarse rows that they are averaged to: differences of neighbours, which the means have lost.
+
+Of G groups of k even rows the k − 1 contrasts d of each are normal with C = θ_w² 1/span + θ_f² QᵀFQ + θ_k² QᵀWQ, Q the orthonormal contrasts:
+
+    −2 ln L = G ln|C| + tr C⁻¹S,   S = Σ d dᵀ,
+
+groups taken as independent of each other and of their means, as what is slow hardly differs within them.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import scipy
+
+from compensation.arrays import Array
+from compensation.noise import Noise, flicker, random_walk
+from compensation.noise_rows import KINDS, NoiseRows
+
+EVEN = 1e-3
+"""Part of a span by which rows may be uneven."""
+
+
+@dataclass(frozen=True)
+class Within:
+    """Groups of as many even rows: how many, the products S of their contrasts, and the covariance of these by a level of 1 of each of `KINDS`."""
+
+    count: int
+    products: Array
+    by_level: Array
+
+    def deviance(self, noise: Noise) -> tuple[float, Array, Array]:
+        """Return −2 ln L (see the module), its slopes by ln θ of the levels, and their expected curvature."""
+        squares = np.array([getattr(noise, kind) for kind in KINDS]) ** 2
+        inverse = np.linalg.inv(np.tensordot(squares, self.by_level, 1))
+        ways = 2.0 * squares[:, None, None] * (inverse @ self.by_level)  # C⁻¹ ∂C/∂ln θ
+        told = inverse @ self.products
+        slopes = self.count * np.trace(ways, axis1=1, axis2=2) - np.einsum("aij,ji->a", ways, told)
+        curvature = self.count * np.einsum("aij,bji->ab", ways, ways)
+        return float(np.trace(told) - self.count * np.linalg.slogdet(inverse)[1]), slopes, curvature
+
+
+def within(rows: NoiseRows, rest: Array) -> list[Within]:
+    """Return what residuals (M,) say within the coarse rows, by groups of equal rows; outliers and gaps are left out."""
+    found: dict[tuple[int, float], Array] = {}
+    for own, t, spans, stretch, k in zip(rows.slices, rows.times, rows.spans, rows.stretch, rows.together, strict=True):
+        if k == 1:
+            continue
+        whole = len(t) // k * k
+        T, wide, more, y = (one[:whole].reshape(-1, k) for one in (t, spans, stretch, rest[own]))
+        usual = float(np.median(wide))
+        even = (np.abs(np.diff(T) - usual).max(1) < EVEN * usual) & (np.abs(wide - usual).max(1) < EVEN * usual)
+        kept = y[even & (more == 1.0).all(1)]
+        key = k, round(usual, 3)
+        found[key] = np.vstack([found[key], kept]) if key in found else kept
+    return [_within(kept, span) for (_, span), kept in found.items() if len(kept)]
+
+
+def _within(groups: Array, span: float) -> Within:
+    k = groups.shape[1]
+    Q, at, wide = scipy.linalg.helmert(k).T, span * np.arange(k, dtype=np.float64), np.full(k, span, np.float64)
+    by_level: Sequence[Array] = (np.eye(k) / span, flicker(at, wide), random_walk(at, wide), np.zeros((k, k)))
+    return Within(len(groups), Q.T @ groups.T @ groups @ Q, np.array([Q.T @ own @ Q for own in by_level]))
