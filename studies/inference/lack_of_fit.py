@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from compensation.arrays import Array
 from compensation.lines import Line
-from compensation.noise_rows import cholesky
 from compensation.spikes import find_step
 from studies.calibration.problem import CardProblem
 from studies.diagnosis.constants import CONSTANTS
@@ -24,7 +24,7 @@ ENOUGH = CONSTANTS["margin"] - CONSTANTS["log_prior_unknown"]
 """Log evidence from which on structure is no chance."""
 
 DRAWS = 8
-"""Of noise alone, none of which may show as much switching: flicker far above the white noise of rows once did, with evidence of 72."""
+"""Of normal noise, none of which may show as much switching: noise that keeps its level for some rows is no telegraph."""
 REPEATED, ROUNDING = 0.5, 1.3
 """Part of the readings that are as the one before, from which on they are rounded to more than their noise; the rms of that, in its own parts."""
 
@@ -128,7 +128,7 @@ def _instead_of_noise(search: Search, bank: Sequence[Shapes], final: Hypothesis,
 
 
 def _switching(search: Search, final: Hypothesis, name: str) -> float:
-    """Log evidence of a level that switches to another one and back, in noise of its own, over slow noise alone, less the most that this noise itself shows in some draws."""
+    """Log evidence of a level that switches to another one and back, in noise of its own, over slow noise alone, less the most that normal noise of the same spectrum shows in some draws."""
     found = _by_path(search, final, name)
     if found > ENOUGH:
         found -= max(0.0, *(_by_path(*_drawn(search, final, name, seed), name) for seed in range(DRAWS)))
@@ -148,14 +148,21 @@ def _by_path(search: Search, final: Hypothesis, name: str) -> float:
 
 
 def _drawn(search: Search, final: Hypothesis, name: str, seed: int) -> tuple[Search, Hypothesis]:
-    """A search where noise is drawn in the place of what a model leaves of a response, and that model there."""
-    there, rows, rng = copy(search), search.linear.rows[name], np.random.default_rng(seed)
-    drawn = [
-        cholesky(rows.covariance(k, final.noise[name])) @ rng.standard_normal(len(t)) for k, t in enumerate(rows.times)
-    ]
-    told = search.linear.target[name] - Background(search.linear, final.terms, final.noise).residual(name)
-    there.linear = replace(search.linear, target={**search.linear.target, name: told + np.concatenate(drawn)})
+    """A search where what a model leaves of a response is normal noise of the same spectrum (phases by chance), and that model there."""
+    there, rng = copy(search), np.random.default_rng(seed)
+    rest = Background(search.linear, final.terms, final.noise).residual(name)
+    noise = np.concatenate([_any_phase(rest[place], rng) for place in search.linear.rows[name].slices])
+    there.linear = replace(
+        search.linear, target={**search.linear.target, name: search.linear.target[name] - rest + noise}
+    )
     return there, there.settle(final.terms, final.noise, [name])
+
+
+def _any_phase(rest: Array, rng: np.random.Generator) -> Array:
+    spectrum = np.fft.rfft(rest)
+    turned = np.abs(spectrum) * np.exp(2j * np.pi * rng.random(len(spectrum)))
+    turned[0] = spectrum[0]
+    return np.asarray(np.fft.irfft(turned, len(rest)))
 
 
 def _share(search: Search, name: str, before: Background, own: Background, generic: Term) -> float:
