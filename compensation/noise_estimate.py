@@ -43,7 +43,9 @@ def estimate_noise(
     lam = np.zeros(X.shape[1]) if precision is None else precision
     X, lam = X / size, lam / size**2
     free_part = np.linalg.lstsq(np.vstack([X, np.diag(np.sqrt(lam))]), np.append(y, np.zeros(len(lam))))[0]
-    rest, inner = y - X @ free_part, within(rows, target - fine @ (free_part / size))
+    rest = y - X @ free_part
+    weight = 1.0 / np.sqrt(np.concatenate(coarse.stretch))
+    inner = within(rows, target - fine @ (np.linalg.lstsq(weight[:, None] * X, weight * y)[0] / size))
     step = np.concatenate([np.diff(rest[s]) for s in coarse.slices])
     spread = float(np.median(np.abs(step))) / 0.954 if step.size else 0.0
     spread = max(spread, 1e-14 * float(np.abs(target).max()), 1e-300)
