@@ -53,8 +53,10 @@ def _cause(found: Inferred, k: int) -> Cause:
         name = rival.terms[-1].effect.name
         best[name] = max(best.get(name, -np.inf), rival.score)
     best = best or {term.effect.name: found.final.score}  # whatever might stand there was given up
-    members, probability = weigh(list(best), list(best.values()), outcome.without[k].score, found.unknown[k])
     left = found.left[term.response]
+    explains = left.significant and left.share >= CONSTANTS["share_explained"]  # what rests is told beside it
+    unknown = -np.inf if explains else found.unknown[k]
+    members, probability = weigh(list(best), list(best.values()), outcome.without[k].score, unknown)
     if left.significant and 0.0 < left.share < CONSTANTS["believed"]:
         probability *= left.share  # whatever made the larger rest may have made this too
     exact = term.effect.equivalents.get(term.response, ())
