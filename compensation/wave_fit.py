@@ -35,6 +35,7 @@ from compensation.split_columns import Conflict, Told, join_columns, polar
 LEAST_TURN = 2 * np.pi  # least span of x (rad): one period of what is looked for
 LEAKS = ("leak", "leak cos", "leak sin")
 LEAST_CONTRAST = 0.05  # least spread of the turn rate over its largest: below it, turning both ways is missing
+SENSE = 0.1  # by which a turn may differ from what the applied rate makes, to be known as that
 FEW, ODD = 30, 6.0  # rows whose turns may be unknowns, and robust standard deviations that make one so
 LEAST_SPIKE = 1e-3  # of a column's span, by which a spike stands out
 UNEVEN = np.array([0.005, 1e-3])  # usual standard deviations of gain ratio and skew (rad) of pick-offs and drives
@@ -88,6 +89,7 @@ def fit_whole_angle(
     seen = _Turn(x)
     command = harmonic * turn_rate / step - coupling * indicated[:-1]
     known = np.broadcast_to(np.asarray(applied, dtype=float), t.shape)[:-1]
+    _check_sense(harmonic * turn_rate / step, coupling * known)
     turns = [values for values in (command, known) if np.ptp(values) > LEAST_CONTRAST * np.max(np.abs(values))]
     leaks = [command, command * seen.cosine, command * seen.sine] if both_ways and turns and turns[0] is command else []
     # In one direction what a commanded turn leaks through uneven gains is not told from the splits.
@@ -160,6 +162,14 @@ def fit_whole_angle(
         {name: stated(one) for name, one in alone.items()}, tuple(conflicts),
         {name: np.flatnonzero(rows) for name, rows in bad.items() if rows.any()},
     )  # fmt: skip
+
+
+def _check_sense(turn: NDArray[np.float64], pushed: NDArray[np.float64]) -> None:
+    """Refuse a wave that turns (1/s) by what the applied rate makes of it, but in the opposite sense."""
+    turn, pushed = turn - turn.mean(), pushed - pushed.mean()
+    along, sizes = float(turn @ pushed), (float(np.linalg.norm(turn)), float(np.linalg.norm(pushed)))
+    if sizes[1] and abs(along / sizes[1] ** 2 + 1.0) < SENSE and along < -(1.0 - SENSE) * sizes[0] * sizes[1]:
+        raise CompensationError("the wave turns against the applied rate, by the Bryan factor: a positive rate must turn the angle positively. Change the sign of the angle, or of applied and measured rate.")  # fmt: skip
 
 
 def _widen(estimates: dict[str, tuple[float, float]], harmonic: int, coupling: float) -> dict[str, tuple[float, float]]:

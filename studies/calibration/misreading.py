@@ -39,6 +39,8 @@ AGAINST = 0.5
 """The same of a reading that agrees, where the other one leaves more than there was: a sign is told by less."""
 LIKELY, STARTED, STEPS = 3.0, 2.0, 4
 """Standard deviations up to which a departure is likely; changes by which a frequency may start elsewhere; steps to the likeliest values."""
+CLOSELY, CERTAIN = 0.02, 2.0
+"""Part of a frequency's changes up to which a reading agrees with the very card, and departures that then speak for it: by chance, few gyros would."""
 CLEAR = 20.0
 """Times its own noise by which a frequency must change before it says how a temperature is to be read."""
 SECONDS = 3600.0
@@ -75,7 +77,8 @@ def _check_temperatures(instrument: "Instrument", record: "Record", as_read: "Le
         other = _left(instrument, read_so, whole)[FREQUENCY][0]
         agrees = other < min((AGAINST if left > changes else FOLLOWED) * changes, left / 3)
         needed = _needed(instrument, read_so, changes, whole) if agrees else np.inf
-        if needed < LIKELY**2 < _needed(instrument, record, changes, whole) - needed:
+        enough = CERTAIN if other < CLOSELY * changes else LIKELY
+        if needed < LIKELY**2 and _needed(instrument, record, changes, whole) - needed > enough**2:
             right = columns[COLUMN["housing"] if COLUMN["housing"] in names else names[0]]
             wrong = [one for one in names if _apart(columns[one], right) <= _apart(record[one], right)]
             reversed_too = ", or frequency_Hz if its changes are reversed" if words == REVERSED else ""

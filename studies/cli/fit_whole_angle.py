@@ -62,7 +62,8 @@ def fit_whole_angle(
 
     The record needs time_s, pattern_angle_deg (unwrapped) and bias_deg_per_h or measured_rate_deg_per_s (the indicated rate
     less the commanded precession). It may have inverse_q (drive effort), frequency_Hz, quadrature_V, and rate_deg_per_s if a
-    rate was applied. Each row holds means over its duration. Precess the wave in both directions: one direction does not determine
+    rate was applied. A positive rate turns the angle positively, by the Bryan factor times the rate; where azimuth and rate are
+    counted by the same hand the wave lags behind the shell, so change the sign of one. Each row holds means over its duration. Precess the wave in both directions: one direction does not determine
     the gain ratio. The phase error is that of the whole path; the gain ratio of the drives is taken from the card. Columns are
     also fitted alone: where they contradict each other, what they share is not estimated, and no card is saved.
 
