@@ -12,6 +12,7 @@ from studies.cli.output import answers, resumable
 from studies.design.answer import Answer
 from studies.design.run import CARD, TABLE, best_instrument
 from studies.design.run import optimise as find_best
+from studies.design.task import shown
 from studies.reports import style
 from studies.reports.digits import plain
 from studies.reports.scenes import moving_mode, show_mode
@@ -81,7 +82,7 @@ def _front(found: Answer) -> list[dict[str, Any]]:
     names = found.task.study.names[: found.task.free]
     return [
         dict(zip(names, design.tolist(), strict=False))
-        | {column: float(values[found.place(column)]) for column in found.task.wanted}
+        | {column: shown(column, values[found.place(column)]) for column in found.task.wanted}
         for design, values in zip(found.front, found.front_values, strict=True)
         if len(found.task.keys.objective) > 1
     ]

@@ -9,7 +9,7 @@ from pathlib import Path
 from studies.errors import InputError
 from studies.importing.channels import Group, is_container, open_channels, sort_groups
 from studies.importing.raw import decode, name_columns, read_filled, split_line
-from studies.importing.sheets import EXCEL, read_sheet
+from studies.importing.sheets import EXCEL, list_sheets, read_sheet
 
 SEEN = 2000  # lines that are looked at
 HEAD = 1 << 24  # bytes
@@ -74,7 +74,10 @@ def look_at(path: str) -> Look:
         # of two lines with a cell for every column the second one holds the units
         header = named[-2] if len(named) > 1 and _is_unit_line(rows[named[-1]]) else named[-1] if named else None
     if first is None or width < 2:
-        raise InputError(f"{path}: no table with rows of two numbers or more was found; write the map by hand.")
+        where, mend = "", "write the map by hand"
+        if excel:
+            where, mend = f" on the first of its sheets {', '.join(list_sheets(path))}", f'{mend}, with sheet = "…"'
+        raise InputError(f"{path}: no table with rows of two numbers or more was found{where}; {mend}.")
     last = _last_line(rows[first], end, total, decimal)
     kind = "excel" if excel else "text"
     return Look(encoding, separator, rows[:last], header, first, decimal, kind, last=last)

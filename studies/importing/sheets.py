@@ -36,6 +36,11 @@ def read_sheet(path: str | Path, sheet: str | None) -> list[list[str]]:
         raise InputError(f"{path}: not an Excel workbook that can be read ({shorten(str(error))}).") from None
 
 
+def list_sheets(path: str | Path) -> list[str]:
+    """Return the names of the sheets of a workbook that can be read."""
+    return list(importlib.import_module("openpyxl").load_workbook(path, read_only=True).sheetnames)
+
+
 def _cell_text(value: object) -> str:
     if value is None:
         return ""

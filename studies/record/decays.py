@@ -19,6 +19,7 @@ from studies.errors import InputError, naming
 from studies.files.columns import read_columns, read_header
 from studies.files.reading import read_bytes
 from studies.fits.ringdown import Decay
+from studies.record import COLUMNS as RUN
 from studies.record import POWERS, Record, check_plausible, write_record
 
 TEMPERATURE, AMPLITUDE = "housing_temperature_degC", "vibration_amplitude_V"
@@ -49,6 +50,8 @@ def is_table(path: str | Path) -> bool:
 
 def read_table(path: str | Path) -> Decays:
     """Read a table of decays."""
+    if others := sorted(set(read_header(path)) & set(RUN) - set(COLUMNS)):
+        raise InputError(f"{path}: the column {others[0]} is one of a run, and this command takes free decays: give a run to hrg calibrate or hrg diagnose; of a table of decays leave it out.")  # fmt: skip
     table = read_columns(path, COLUMNS)
     check_plausible(table.values, table.place)
     if "time_s" in table.values:

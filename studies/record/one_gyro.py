@@ -90,7 +90,7 @@ def check_one_gyro(records: Sequence[Record]) -> None:
 
 def check_one_unit(records: Sequence[Record]) -> None:
     """Refuse a bias whose noise (of a row of 1 s) and changes are in one record those of the others in another unit."""
-    sizes, records = [], [record for record in records if BIAS in record]
+    sizes, records = [], [record for record in records if BIAS in record and len(record) > 1]
     for record in records:
         known = record[BIAS][np.isfinite(record[BIAS])]
         white = white_rms(known)

@@ -200,6 +200,20 @@ def test_one_way_leaves_gain_ratio_open_and_says_so(gain):
     assert slow.undetermined[0].startswith("damping split and axis")
 
 
+def test_a_wave_that_turns_against_the_applied_rate_is_refused_with_the_sign_that_mends_it():
+    """It once had a damping split of a fortieth of the true one, in an interval of a sixth of that."""
+    time, k, harmonic = np.arange(0.0, 14400.0, 2.0), 0.27, 2
+    rate = np.radians(0.2) * np.where(time < 7200.0, 1.0, -1.0)
+    angle = np.zeros(time.size)
+    for i in range(time.size - 1):
+        angle[i + 1] = angle[i] + 2.0 * (k * rate[i] + 1e-5 * np.sin(4 * (angle[i] - 0.35)))
+    own = np.append(np.diff(angle), angle[-1] - angle[-2]) / 2.0 / k
+    found = fit_whole_angle(time, angle, own, coupling=harmonic * k, applied=rate)
+    assert found.estimates["damping_split"].value == pytest.approx(4e-5, rel=0.01)
+    with pytest.raises(CompensationError, match="turns against the applied rate"):
+        fit_whole_angle(time, -angle, own, coupling=harmonic * k, applied=rate)
+
+
 def test_a_wave_that_hardly_turned_is_refused():
     time = np.arange(0.0, 100.0)
     with pytest.raises(CompensationError, match=r"the wave precesses by only 10°; the fit needs 90°"):

@@ -338,6 +338,17 @@ def test_excel_without_openpyxl_says_how_to_get_it(tmp_path, monkeypatch, capsys
     assert "Traceback" not in capsys.readouterr().err
 
 
+def test_a_workbook_that_begins_with_a_cover_names_its_sheets(tmp_path):
+    openpyxl = pytest.importorskip("openpyxl", reason="the optional extra 'excel' is not installed")
+    book = openpyxl.Workbook()
+    book.active.title = "Info"
+    book.active.append(["made by", "the chamber"])
+    book.create_sheet("Daten").append([1.0, 2.0, 3.0])
+    book.save(tmp_path / "raw.xlsx")
+    with pytest.raises(InputError, match='first of its sheets Info, Daten; write the map by hand, with sheet = "…"'):
+        draft_map([str(tmp_path / "raw.xlsx")])
+
+
 def test_an_excel_workbook(tmp_path):
     openpyxl = pytest.importorskip("openpyxl", reason="the optional extra 'excel' is not installed")
     book = openpyxl.Workbook()

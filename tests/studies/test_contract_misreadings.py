@@ -59,6 +59,14 @@ def test_temperatures_that_are_something_else_are_named(read, said, card, record
         calibrate(card, [with_temperatures(record, read)])
 
 
+def test_one_cooling_in_fahrenheit_that_the_very_card_follows_is_refused(card):
+    """A card was saved with a modulus whose slope was 3.6 standard deviations off; 2.4 of the steepness would do."""
+    made = simulate_run(card, load_profile("step 20 -20 5h"), 1 / 60, 3).record
+    run = with_temperatures(dataclasses.replace(made, path="run.csv"), lambda T: 1.8 * T + 32.0)
+    with pytest.raises(InputError, match=r"run.csv: frequency_Hz does not follow the temperatures .* read in °F"):
+        check_readings(card, [run])
+
+
 @pytest.mark.slow
 def test_temperatures_in_fahrenheit_beyond_the_law_are_named_and_not_its_range(card, record):
     far = with_temperatures(record, lambda T: 1.8 * (T + 60.0) + 32.0)

@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 from studies.cli import main
+from studies.errors import InputError
 from studies.fits.ringdown import read_decay
 from studies.instrument.card import load_card
+from studies.record.decays import read_table
 from tests.benchmarks.hands.decays import make
 from tests.compensation.two_oscillators import Gyro, noisy
 from tests.tables import write_columns
@@ -232,3 +234,12 @@ def test_decays_of_an_independent_generator_are_named_and_fitted(tmp_path, kind,
         if truth is not None and not (kind == "drift" and name in ("frequency_1_Hz", "frequency_2_Hz", "frequency_Hz")):
             away = (truth - e.value + 45) % 90 - 45 if name.endswith("axis_deg") else truth - e.value
             assert 1.5 * e.low - 0.5 * e.high < e.value + away < 1.5 * e.high - 0.5 * e.low, name
+
+
+def test_a_run_is_no_table_of_decays(tmp_path):
+    path = tmp_path / "run.csv"
+    path.write_text("time_s,chamber_temperature_degC,frequency_Hz\n0,20,4430\n1,20,4430\n")
+    with pytest.raises(
+        InputError, match="chamber_temperature_degC is one of a run, and this command takes free decays"
+    ):
+        read_table(path)
