@@ -12,6 +12,7 @@ from compensation.errors import CompensationError
 from compensation.noise import Noise
 from compensation.noise_estimate import estimate_noise
 from compensation.noise_rows import KINDS, NoiseRows
+from compensation.noise_within import within
 
 Array = NDArray[np.float64]
 GAPPED = np.cumsum(np.concatenate([np.full(60, 80.0), [4000.0], np.full(50, 130.0)]))
@@ -73,6 +74,44 @@ def test_tests_at_the_estimated_noise_keep_their_level():
         coefficient = covariance @ W[:, :3].T @ W[:, 3]
         beyond += coefficient[1] ** 2 / covariance[1, 1] > chi2.ppf(0.95, 1)
     assert beyond <= 8  # of 60; 3 expected
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_levels_of_many_rows_are_those_of_all_of_them(seed, monkeypatch):
+    """From coarse rows alone, white noise was up to half off and −2 ln L up to 34 above its least."""
+    generator, t = np.random.default_rng(seed), 40.0 * np.arange(401.0)
+    rows, true = NoiseRows.of([t]), Noise(0.002, 0.0002, 1e-5)
+    X = np.vander((t - t.mean()) / t.std(), 4)
+    r = draw(rows, true, generator) + 1e3 * X @ [1.0, -2.0, 3.0, 4.0]
+    found = estimate_noise(rows, r, X)
+    monkeypatch.setattr("compensation.noise_rows.COARSE", 1000)
+    whole = NoiseRows.of([t])
+    best = estimate_noise(whole, r, X)
+    assert found.white == pytest.approx(true.white, rel=0.25)
+    beyond = [whole.deviance(r, X, np.zeros(4), one)[0] for one in (found, best)]
+    assert beyond[0] < beyond[1] + 3.0
+
+
+def test_what_is_within_coarse_rows_is_the_likelihood_of_their_contrasts():
+    """Of groups of three even rows, an outlier's and a gap's left out: exact where groups are independent, slopes its differences."""
+    generator = np.random.default_rng(3)
+    t = np.cumsum(np.full(400, 5.0) + 100.0 * (np.arange(400) == 151))
+    stretch = np.where(np.arange(400) == 30, 50.0, 1.0)
+    rows = replace(NoiseRows.of([t], [np.full(400, 5.0)]), stretch=(stretch,))
+    noise, r = Noise(1.0, 0.5, 0.1), generator.standard_normal(400)
+    (own,) = within(rows, r)
+    kept = [k for k in range(0, 399, 3) if k not in (30, 150)]
+    assert own.count == len(kept)
+    Q = np.array([[1.0, -1.0, 0.0], [1.0, 1.0, -2.0]]) / np.sqrt([[2.0], [6.0]])
+    C = Q @ NoiseRows.of([t[:3]], [np.full(3, 5.0)]).covariance(0, noise) @ Q.T
+    d = np.array([Q @ r[k : k + 3] for k in kept])
+    exact = len(kept) * np.linalg.slogdet(C)[1] + np.sum(d @ np.linalg.inv(C) * d)
+    total, slopes, _ = own.deviance(noise)
+    assert total == pytest.approx(exact, rel=1e-9)
+    for kind, slope in zip(KINDS, slopes, strict=True):
+        ends = (own.deviance(replace(noise, **{kind: getattr(noise, kind) * np.exp(e)}))[0] for e in (-1e-5, 1e-5))
+        low, high = ends
+        assert slope == pytest.approx((high - low) / 2e-5, rel=1e-5, abs=1e-6)
 
 
 def test_a_prior_narrows_and_its_absence_is_restricted_likelihood():

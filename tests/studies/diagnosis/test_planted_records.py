@@ -4,6 +4,7 @@ import datetime
 
 import numpy as np
 import pytest
+import scipy
 from scipy.constants import Stefan_Boltzmann, zero_Celsius
 
 from compensation.noise import Noise
@@ -225,6 +226,24 @@ def test_telegraph_noise_is_two_levels_and_flicker_is_none(step, verdict):
     result = judge(records).responses["bias_deg_per_h"]
     assert result.verdict == verdict
     assert (result.left_over_input == "time: switching between two levels") == bool(step)
+
+
+@pytest.mark.usefixtures("fine")
+def test_noise_that_keeps_its_level_for_minutes_is_no_telegraph():
+    """Correlated noise was called a level that switches, with evidence of 78."""
+    rng, records = np.random.default_rng(2), []
+    for k in range(2):
+        time = np.arange(0.0, 7 * 3600.0, 20.0)
+        wave = np.clip(np.sin(2 * np.pi * time / (9000.0 + 4000.0 * k) + k), -0.6, 0.6)
+        housing = lag(time, 20.0 + 25.0 * wave, 500.0)
+        kept, drawn = np.exp(-20.0 / 100.0), rng.standard_normal(time.size)
+        drawn[1:] *= np.sqrt(1.0 - kept**2)
+        markov = scipy.signal.lfilter([1.0], [1.0, -kept], drawn)
+        noise = 0.05 * markov + 0.01 * rng.standard_normal(time.size)
+        columns = {"time_s": time, "housing_temperature_degC": housing}
+        columns["bias_deg_per_h"] = 3.0 + 0.05 * lag(time, housing, 1500.0) + noise
+        records.append(Record(columns, path=f"run{k}.csv", sha256=str(k)))
+    assert judge(records).responses["bias_deg_per_h"].verdict == "adequate"
 
 
 def test_inseparable_pair_gets_a_measurement_and_no_run():
