@@ -14,10 +14,8 @@ Seen = tuple[float, Array, Array]
 LEAST, MOST = -7.0, 8.0  # ln of the rms of slow noise within a run over that of a row's white noise
 WHITE = -0.3  # ln of white noise over the scatter of neighbouring rows, where the search begins
 TOO_QUIET = 1.0  # ln by which white noise below that is odd
-USUAL, SPREAD = (
-    -1.0,
-    3.0,
-)  # weak prior of the same, which keeps a level that the rows say nothing about from running away
+USUAL, SPREAD = -1.0, 3.0
+"""Weak prior of the same: it keeps a level that the rows say nothing about from running away."""
 STATED_SPREAD = 0.7  # the same about ln of a level that is stated: a factor of 2
 LONGEST, CLOSE = 3.0, 1e-3  # of a step in ln of a level, and fall of −2 ln L that the last one promises
 MOST_STEPS, MOST_HALVINGS = 50, 12
