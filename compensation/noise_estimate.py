@@ -3,6 +3,7 @@
 from collections.abc import Callable, Sequence
 
 import numpy as np
+import scipy
 
 from compensation.arrays import Array
 from compensation.noise import Noise
@@ -42,8 +43,13 @@ def estimate_noise(
     X, lam = X / size, lam / size**2
     free_part = np.linalg.lstsq(np.vstack([X, np.diag(np.sqrt(lam))]), np.append(y, np.zeros(len(lam))))[0]
     rest = y - X @ free_part
-    weight = 1.0 / np.sqrt(np.concatenate(coarse.stretch))
-    inner = within(rows, target - fine @ (np.linalg.lstsq(weight[:, None] * X, weight * y)[0] / size))
+    inner = []
+    if max(rows.together) > 1:  # all rows say what is unknown: a jump within a coarse row leaves no trace in its mean
+        own = 1.0 / np.sqrt(np.concatenate(rows.stretch))
+        free_of_prior = scipy.linalg.lstsq(
+            own[:, None] * fine, own * target, lapack_driver="gelsy", check_finite=False
+        )[0]
+        inner = within(rows, target - fine @ free_of_prior)
     step = np.concatenate([np.diff(rest[s]) for s in coarse.slices])
     spread = float(np.median(np.abs(step))) / 0.954 if step.size else 0.0
     spread = max(spread, 1e-14 * float(np.abs(target).max()), 1e-300)

@@ -220,8 +220,8 @@ def infer(
     bank = generic_bank(search)
     left = look(search, bank, without if path is None else plain, levelled, rows)
     unknown = []
-    for base in outcome.without:
-        seen = search.scan(base, bank)
+    for term, base in zip(outcome.final.terms, outcome.without, strict=True):
+        seen = (one for one in search.scan(base, bank) if one.term.response in term.columns)
         best = max((one.gain for one in seen), default=-np.inf)
         unknown.append(base.score + best + CONSTANTS["log_prior_unknown"] - outcome.final.score)
     return Inference(
