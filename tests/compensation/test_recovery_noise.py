@@ -92,6 +92,15 @@ def test_levels_of_many_rows_are_those_of_all_of_them(seed, monkeypatch):
     assert beyond[0] < beyond[1] + 3.0
 
 
+def test_what_only_the_rows_within_a_coarse_one_tell_of_is_no_noise():
+    """A jump whose time is free leaves no trace in a mean over it, and was taken for white noise."""
+    generator, t = np.random.default_rng(1), 40.0 * np.arange(401.0)
+    rows, jump = NoiseRows.of([t]), np.zeros((401, 1))
+    jump[30:32, 0] = 1.0, -1.0
+    found = estimate_noise(rows, draw(rows, Noise(2.0), generator) + 50.0 * jump[:, 0], jump)
+    assert found.white == pytest.approx(2.0, rel=0.1)
+
+
 def test_what_is_within_coarse_rows_is_the_likelihood_of_their_contrasts():
     """Of groups of three even rows, an outlier's and a gap's left out: exact where groups are independent, slopes its differences."""
     generator = np.random.default_rng(3)
