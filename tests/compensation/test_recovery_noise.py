@@ -78,7 +78,7 @@ def test_tests_at_the_estimated_noise_keep_their_level():
 
 @pytest.mark.parametrize("seed", range(6))
 def test_levels_of_many_rows_are_those_of_all_of_them(seed, monkeypatch):
-    """From coarse rows alone, white noise was up to half off and −2 ln L up to 34 above its least."""
+    """From coarse rows alone, white noise was up to half off and −2 ln L up to 36 above its least."""
     generator, t = np.random.default_rng(seed), 40.0 * np.arange(401.0)
     rows, true = NoiseRows.of([t]), Noise(0.002, 0.0002, 1e-5)
     X = np.vander((t - t.mean()) / t.std(), 4)
