@@ -52,9 +52,15 @@ def shown(column: str, value: float | None, digits: int = 3) -> str:
 
 
 def headline(verdict: Verdict) -> str:
-    """Return the verdict in one or two sentences."""
+    """Return the verdict in a sentence, the causes in another, and in a third what they leave that noise does not."""
     causes = "; ".join(map(name_cause, verdict.causes))
-    return f"{_sentence(verdict)} {causes[0].upper()}{causes[1:]}." if causes else _sentence(verdict)
+    left = "; ".join(
+        f"{spell_structure(one.left_over_input)} in {spoken(name)}"
+        for name, one in verdict.responses.items()
+        if causes and one.left_over == "structure" and one.verdict != "unexplained"
+    )
+    named = f" {causes[0].upper()}{causes[1:]}." if causes else ""
+    return _sentence(verdict) + named + (left and f" Still left: {left}.")
 
 
 def _sentence(verdict: Verdict) -> str:

@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
+from studies.diagnosis.verdict import Cause, ResponseResult, Verdict
 from studies.record import Record, write_record
+from studies.reports.diagnosis import headline
 from tests.studies.diagnosis.bench import BACK, CYCLE, STAIRS, Bench
 
 
@@ -118,3 +120,13 @@ def test_temperatures_beyond_the_material_law_are_named(campaign, refuse, tmp_pa
     else:
         cold = {"temperature_degC": np.linspace(-90.0, 20.0, 8), "frequency_Hz": np.linspace(4400.0, 4432.0, 8)}
     assert "outside the range" in refuse(["diagnose", save(tmp_path, cold), "--card", "hrg-30mm"])
+
+
+@pytest.mark.parametrize(
+    ("left", "end"),
+    [("structure", "Still left: structure in temperature in the bias."), ("none", "(probability 0.80).")],
+)
+def test_the_headline_says_what_the_causes_leave(left, end):
+    cause = Cause("jump", "bias_deg_per_h", 0.8, (), {}, 50.0)
+    result = ResponseResult("explained", 0.1, (1.0, 1.0), (0.2, 0.2), left, "temperature", 40.0, 0.95)
+    assert headline(Verdict("explained", (cause,), {"bias_deg_per_h": result}, None, ())).endswith(end)
