@@ -45,11 +45,13 @@ def estimate_noise(
     rest = y - X @ free_part
     inner = []
     if max(rows.together) > 1:  # all rows say what is unknown: a jump within a coarse row leaves no trace in its mean
-        own = 1.0 / np.sqrt(np.concatenate(rows.stretch))
-        free_of_prior = scipy.linalg.lstsq(
-            own[:, None] * fine, own * target, lapack_driver="gelsy", check_finite=False
-        )[0]
-        inner = within(rows, target - fine @ free_of_prior)
+        own, runs = (
+            1.0 / np.sqrt(np.concatenate(rows.stretch)),
+            np.repeat(np.eye(len(rows.times)), list(map(len, rows.times)), 0),
+        )
+        design = np.column_stack([fine, runs])  # whatever level each run has
+        best = scipy.linalg.lstsq(own[:, None] * design, own * target, lapack_driver="gelsy", check_finite=False)[0]
+        inner = within(rows, target - design @ best)
     step = np.concatenate([np.diff(rest[s]) for s in coarse.slices])
     spread = float(np.median(np.abs(step))) / 0.954 if step.size else 0.0
     spread = max(spread, 1e-14 * float(np.abs(target).max()), 1e-300)
