@@ -3,7 +3,6 @@
 from collections.abc import Callable, Sequence
 
 import numpy as np
-import scipy
 
 from compensation.arrays import Array
 from compensation.noise import Noise
@@ -42,16 +41,7 @@ def estimate_noise(
     lam = np.zeros(X.shape[1]) if precision is None else precision
     X, lam = X / size, lam / size**2
     free_part = np.linalg.lstsq(np.vstack([X, np.diag(np.sqrt(lam))]), np.append(y, np.zeros(len(lam))))[0]
-    rest = y - X @ free_part
-    inner = []
-    if max(rows.together) > 1:  # all rows say what is unknown: a jump within a coarse row leaves no trace in its mean
-        own, runs = (
-            1.0 / np.sqrt(np.concatenate(rows.stretch)),
-            np.repeat(np.eye(len(rows.times)), list(map(len, rows.times)), 0),
-        )
-        design = np.column_stack([fine, runs])  # whatever level each run has
-        best = scipy.linalg.lstsq(own[:, None] * design, own * target, lapack_driver="gelsy", check_finite=False)[0]
-        inner = within(rows, target - design @ best)
+    rest, inner = y - X @ free_part, within(rows, target, fine)
     step = np.concatenate([np.diff(rest[s]) for s in coarse.slices])
     spread = float(np.median(np.abs(step))) / 0.954 if step.size else 0.0
     spread = max(spread, 1e-14 * float(np.abs(target).max()), 1e-300)

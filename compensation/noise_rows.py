@@ -1,4 +1,4 @@
-"""Likelihood of noise in the rows of several runs: whitening, and levels by restricted likelihood with a prior.
+"""Likelihood of noise in the rows of several runs: whitening, and the restricted likelihood of levels (found in `compensation.noise_estimate`).
 
 Levels of r ~ N(0, Σ + X Λ⁻¹ Xᵀ), Σ the covariance of `noise.Noise`, X the columns of what else is unknown and Λ the precision of
 its prior, 0 for none, are those of the highest marginal likelihood

@@ -40,9 +40,11 @@ class Within:
         return float(np.trace(told) - self.count * np.linalg.slogdet(inverse)[1]), slopes, curvature
 
 
-def within(rows: NoiseRows, rest: Array) -> list[Within]:
-    """Return what residuals (M,) say within the coarse rows, by groups of equal rows; outliers and gaps are left out."""
-    found: dict[tuple[int, float], Array] = {}
+def within(rows: NoiseRows, target: Array, columns: Array) -> list[Within]:
+    """Return what a target (M,) says within the coarse rows beside columns (M, p), by groups of equal rows; outliers and gaps are left out."""
+    if max(rows.together) == 1:
+        return []
+    rest, found = _left(rows, target, columns), dict[tuple[int, float], Array]()
     for own, t, spans, stretch, k in zip(rows.slices, rows.times, rows.spans, rows.stretch, rows.together, strict=True):
         if k == 1:
             continue
@@ -54,6 +56,15 @@ def within(rows: NoiseRows, rest: Array) -> list[Within]:
         key = k, round(usual, 3)
         found[key] = np.vstack([found[key], kept]) if key in found else kept
     return [_within(kept, span) for (_, span), kept in found.items() if len(kept)]
+
+
+def _left(rows: NoiseRows, target: Array, columns: Array) -> Array:
+    """What columns and a level of each run leave of all rows: of a jump within a coarse row its mean knows nothing."""
+    weight = 1.0 / np.sqrt(np.concatenate(rows.stretch))
+    runs = np.repeat(np.eye(len(rows.times)), [len(t) for t in rows.times], axis=0)
+    design = np.column_stack([columns, runs])
+    best = scipy.linalg.lstsq(weight[:, None] * design, weight * target, lapack_driver="gelsy", check_finite=False)[0]
+    return np.asarray(target - design @ best)
 
 
 def _within(groups: Array, span: float) -> Within:

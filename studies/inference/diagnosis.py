@@ -221,8 +221,8 @@ def infer(
     left = look(search, bank, without if path is None else plain, levelled, rows)
     unknown = []
     for term, base in zip(outcome.final.terms, outcome.without, strict=True):
-        seen = (one for one in search.scan(base, bank) if one.term.response in term.columns)
-        best = max((one.gain for one in seen), default=-np.inf)
+        forms = [own for own in bank if own.response in term.columns]
+        best = max((one.gain for one in search.scan(base, forms)), default=-np.inf)
         unknown.append(base.score + best + CONSTANTS["log_prior_unknown"] - outcome.final.score)
     return Inference(
         card, found, search, outcome, left, shipped, calibrated, rows, held, tuple(unknown), campaign, path

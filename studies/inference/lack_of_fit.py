@@ -95,7 +95,7 @@ def look(
         if fitful > evidence:
             word, evidence = "time: an intermittent oscillation", fitful
         # levels between which a form of an input goes would be two as well
-        switches = _switching(search, final, name) if smooth <= ENOUGH else -np.inf
+        switches = _switching(search, final, name, rest) if smooth <= ENOUGH else -np.inf
         if switches > evidence:
             word, evidence = SWITCH.name, switches
         fast = _line(search, name, rows.get(name))
@@ -127,17 +127,16 @@ def _instead_of_noise(search: Search, bank: Sequence[Shapes], final: Hypothesis,
     return search.settle((*final.terms, seen[0].term), seen[0].noise, [name]) if seen else None
 
 
-def _switching(search: Search, final: Hypothesis, name: str) -> float:
+def _switching(search: Search, final: Hypothesis, name: str, rest: Array) -> float:
     """Log evidence of a level that switches to another one and back, in noise of its own, over slow noise alone, less the most that normal noise of the same spectrum shows in some draws."""
-    found = _by_path(search, final, name)
+    found = _by_path(search, final, name, rest)
     if found > ENOUGH:
-        found -= max(0.0, *(_by_path(*_drawn(search, final, name, seed), name) for seed in range(DRAWS)))
+        found -= max(0.0, *(_of_noise(search, final, name, rest, seed) for seed in range(DRAWS)))
     return found
 
 
-def _by_path(search: Search, final: Hypothesis, name: str) -> float:
+def _by_path(search: Search, final: Hypothesis, name: str, rest: Array) -> float:
     """The same of the likeliest path of levels, as likely as it is."""
-    rest = Background(search.linear, final.terms, final.noise).residual(name)
     found = switching([rest[place] for place in search.linear.rows[name].slices])
     if found is None:
         return -np.inf
@@ -147,15 +146,15 @@ def _by_path(search: Search, final: Hypothesis, name: str) -> float:
     return search.settle((*final.terms, term), final.noise, [name]).evidence - final.evidence + chance
 
 
-def _drawn(search: Search, final: Hypothesis, name: str, seed: int) -> tuple[Search, Hypothesis]:
-    """A search where what a model leaves of a response is normal noise of the same spectrum (phases by chance), and that model there."""
+def _of_noise(search: Search, final: Hypothesis, name: str, rest: Array, seed: int) -> float:
+    """The same where what the model leaves is normal noise of its spectrum: phases by chance."""
     there, rng = copy(search), np.random.default_rng(seed)
-    rest = Background(search.linear, final.terms, final.noise).residual(name)
     noise = np.concatenate([_any_phase(rest[place], rng) for place in search.linear.rows[name].slices])
     there.linear = replace(
         search.linear, target={**search.linear.target, name: search.linear.target[name] - rest + noise}
     )
-    return there, there.settle(final.terms, final.noise, [name])
+    own = there.settle(final.terms, final.noise, [name])
+    return _by_path(there, own, name, Background(there.linear, own.terms, own.noise).residual(name))
 
 
 def _any_phase(rest: Array, rng: np.random.Generator) -> Array:

@@ -108,7 +108,7 @@ def test_what_is_within_coarse_rows_is_the_likelihood_of_their_contrasts():
     stretch = np.where(np.arange(400) == 30, 50.0, 1.0)
     rows = replace(NoiseRows.of([t], [np.full(400, 5.0)]), stretch=(stretch,))
     noise, r = Noise(1.0, 0.5, 0.1), generator.standard_normal(400)
-    (own,) = within(rows, r)
+    (own,) = within(rows, r, np.zeros((400, 0)))
     kept = [k for k in range(0, 399, 3) if k not in (30, 150)]
     assert own.count == len(kept)
     Q = np.array([[1.0, -1.0, 0.0], [1.0, 1.0, -2.0]]) / np.sqrt([[2.0], [6.0]])
