@@ -89,7 +89,7 @@ def test_rough_step_of_two_plateaus_passes_both_means():
 @pytest.mark.slow
 def test_intervals_cover():
     """95 % intervals of every step, given the steps before it, hold what noise-free data would give."""
-    runs, held = 100, {"rough": np.zeros(2), "bias": np.zeros(3), "rate": np.zeros(3), "temperature": np.zeros(3)}
+    runs, held = 50, {"rough": np.zeros(2), "bias": np.zeros(3), "rate": np.zeros(3), "temperature": np.zeros(3)}
     clean = make_runs(np.random.default_rng(0), 0.0, 600, 30)
     clean_null, clean_scale, _ = fit_rough(clean[0])
     for seed in range(runs):
@@ -114,7 +114,7 @@ def test_intervals_cover():
 @pytest.mark.slow
 def test_intervals_allow_for_a_bias_that_wanders():
     """With a random walk of 0.003 °/s a row, white-noise intervals of the bias would hold in a fifth of the records."""
-    runs, held, naive = 80, np.zeros(3), np.zeros(3)
+    runs, held, naive = 40, np.zeros(3), np.zeros(3)
     _, rest, _ = make_runs(np.random.default_rng(0), 0.0, 600, 30)
     rough = PRINTED.scale * (rest.output - PRINTED.null)
     truth = fit_bias(rest.temperature, rough).coefficients

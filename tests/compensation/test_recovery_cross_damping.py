@@ -92,8 +92,8 @@ def test_noise_free_record_gives_the_planted_coefficients():
 @pytest.mark.slow
 @pytest.mark.parametrize("walk", [0.0, 0.05])
 def test_intervals_cover(walk):
-    """95 % intervals hold the planted coefficient in 95 % of 100 records, within 4 sigma, also when the bias wanders."""
-    runs, held = 100, np.zeros(4)
+    """95 % intervals hold the planted coefficient in 95 % of 60 records, within 4 sigma, also when the bias wanders."""
+    runs, held = 60, np.zeros(4)
     for seed in range(runs):
         draw = wandering(np.random.default_rng(seed), walk)
         time, rate, temperature, planted = record(draw, noise=0.5 * DEG_PER_H, step=60.0)

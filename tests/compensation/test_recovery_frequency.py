@@ -20,7 +20,7 @@ def reading(rng, noise=0.02):
 def test_intervals_of_coefficients_and_temperature_cover_the_truth():
     rng = np.random.default_rng(11)
     inside = np.zeros(5)
-    runs = 400
+    runs = 200
     for _ in range(runs):
         fit = fit_frequency(T, reading(rng))
         t = stats.t.ppf(0.95, fit.regression.degrees_of_freedom)

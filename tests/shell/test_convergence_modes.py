@@ -69,7 +69,7 @@ def random_corner(rng: np.random.Generator) -> tuple[Resonator, Elastic, int]:
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("design", "theory", "count"),
-    [(random_design, "solid", 20), (random_corner, "solid", 10), (random_design, "shell", 15)],
+    [(random_design, "solid", 8), (random_corner, "solid", 6), (random_design, "shell", 8)],
 )
 def test_error_estimate_is_true_for_random_designs(
     design: Callable[[np.random.Generator], tuple[Resonator, Elastic, int]], theory: Theory, count: int

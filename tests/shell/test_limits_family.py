@@ -94,7 +94,7 @@ def solve(build, family, values, nu):
 @pytest.mark.slow
 def test_errors_stay_below_the_stated_ones(built):
     build, family = built
-    values, nu = draw(family, 4, 3, 11)
+    values, nu = draw(family, 2, 2, 11)
     found = family.evaluate(values, nu=nu, E=E, rho=RHO)
     for k, (v, n) in enumerate(zip(values, nu, strict=True)):
         mode = solve(build, family, v, n)

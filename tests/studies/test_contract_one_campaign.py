@@ -42,8 +42,7 @@ def test_runs_of_one_gyro_raise_no_doubt(runs):
     assert all(one is own for one, own in zip(kept, runs, strict=True))
 
 
-@pytest.mark.parametrize("apart", [-17.0, -2.8, 5.0])
-@pytest.mark.parametrize("k", [0, 2, 3])
+@pytest.mark.parametrize(("k", "apart"), [(0, -2.8), (2, -17.0), (3, 5.0)])
 def test_a_run_of_another_gyro_is_named_behind_any_heat_path(runs, k, apart):
     """One lag left more than these differ by: a diagnosis named a second lag, radiation and a mounting stress of 10 days."""
     _, said = said_of(put(runs, k, lambda run: run.with_columns({FREQUENCY: run[FREQUENCY] + apart})))
@@ -67,8 +66,7 @@ def late(run, hours):
     return dataclasses.replace(run, columns=columns | {"time_s": columns["time_s"] - columns["time_s"][0]})
 
 
-@pytest.mark.parametrize(("hours", "said"), [(1, "1 h behind"), (-1, "1 h ahead of")])
-@pytest.mark.parametrize("k", [1, 2])
+@pytest.mark.parametrize(("k", "hours", "said"), [(1, 1, "1 h behind"), (2, -1, "1 h ahead of")])
 def test_temperatures_of_a_clock_an_hour_off_are_named(runs, k, hours, said):
     """Such a run was a second lag and radiation, with a noise of 0.8 Hz."""
     with pytest.raises(InputError, match=rf"run{k}\.csv: {HOUSING} is {said} {FREQUENCY}: moved so, one law holds"):

@@ -117,14 +117,14 @@ def test_pure_noise_gains_nothing(tmp_path, capsys):
     time, temperature = make_profile()
     generator, ratios = np.random.default_rng(7), []
     for walk in (0.0, 0.05):
-        for _ in range(12):
+        for _ in range(8):
             white = generator.standard_normal(len(time))
             rate = DEG_PER_H * (white + walk * np.cumsum(generator.standard_normal(len(time))))
             study = study_cross_damping([RestRun(time, rate, temperature)], k=3e4, zeta=5e-5)
             ratios.append(study.held_out.rows.ratio)
-    assert np.median(ratios[:12]) < 1
-    assert np.median(ratios[12:]) < 1
-    assert np.max(ratios[:12]) < 1.01
+    assert np.median(ratios[:8]) < 1
+    assert np.median(ratios[8:]) < 1
+    assert np.max(ratios[:8]) < 1.01
     noise = write(tmp_path / "noise.csv", RestRun(time, DEG_PER_H * generator.standard_normal(len(time)), temperature))
     assert main(["fit", "cross-damping", noise, *GIVEN]) == 0
     assert "does not improve" in capsys.readouterr().out
@@ -133,7 +133,7 @@ def test_pure_noise_gains_nothing(tmp_path, capsys):
 @pytest.mark.slow
 def test_paper_twin():
     """What figure 2's twin gives is near the printed eight times, worse with lag and noise; nothing was tuned for it."""
-    twin = reproduce_cross_damping(seeds=6)
+    twin = reproduce_cross_damping(seeds=3)
     low, middle, high = twin.spread
     assert low <= middle <= high
     assert 4 < middle < 16

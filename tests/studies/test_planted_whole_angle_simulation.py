@@ -47,7 +47,7 @@ def test_the_pattern_turns_with_the_applied_rate(tmp_path, capsys):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("rate", "factor"), [(400.0, 1.0), (120.0, 1.0), (20.0, 0.0)])
+@pytest.mark.parametrize(("rate", "factor"), [(120.0, 1.0), (20.0, 0.0)])
 def test_a_slow_wave_locks_and_a_fast_one_turns_at_the_root_of_the_squares(tmp_path, rate, factor):
     """θ̇ = k (Ω + Ω_d sin 4(θ - θ_τ)), Ω_d = Δ(1/τ)/(4 k): k √(Ω² - Ω_d²) on average, and nothing below Ω_d."""
     degrees = rate / 3600

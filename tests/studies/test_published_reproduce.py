@@ -18,6 +18,7 @@ def folder(tmp_path_factory):
     out = tmp_path_factory.mktemp("report")
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("studies.cli.reproduce.GYROS", 2)
+        patch.setattr("studies.reports.gyro_papers.MAP_POINTS", 7)
         assert main(["reproduce", "--out", str(out)]) == 0
     return out
 

@@ -8,7 +8,7 @@ from studies.papers.bias_twin import COOLING, draw_tables, run_gyro, study_twin
 
 @pytest.fixture(scope="module")
 def twins():
-    return [study_twin(seed) for seed in range(5)]
+    return [study_twin(seed) for seed in range(3)]
 
 
 @pytest.mark.slow

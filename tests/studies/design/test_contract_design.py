@@ -38,7 +38,7 @@ column = "frequency_n2_Hz"
 low = 5000.0
 high = 5100.0
 """
-FEW = '\n[[quantity]]\nname = "mode-separation"\nhighest = 1\neach = 1\n[search]\nstarts = 1\nevaluations = 32\n'
+FEW = '\n[[quantity]]\nname = "mode-separation"\nhighest = 1\neach = 1\ntolerance = 1e-3\n[search]\nstarts = 1\nevaluations = 32\n'
 
 
 def write(folder, text=TASK):
@@ -150,7 +150,11 @@ def test_recovery_dome_at_8_khz(tmp_path):
     text = shipped_tasks()["dome-8khz"].read_text(encoding="utf-8")
     first, _, rest = text.partition('[[objective]]\ncolumn = "tcf_n2')
     rest = rest[rest.index("[[constraint]]") :]
-    task = write(tmp_path, first + rest.replace("starts = 2\nfront = 2", "starts = 1\nevaluations = 10"))
+    few = {"starts = 2\nfront = 2": "starts = 1\nevaluations = 10", "highest = 3\neach = 2": "highest = 1\neach = 1"}
+    few["[[quantity]]"] = '[[quantity]]\ntheory = "shell"'
+    for old, new in few.items():
+        rest = rest.replace(old, new)
+    task = write(tmp_path, first + rest)
     found = optimise(task, tmp_path / "dome", workers=1)
     after = dict(zip(found.task.columns, found.after, strict=True))
     before = dict(zip(found.task.columns, found.before, strict=True))
@@ -177,7 +181,8 @@ def test_recovery_light_cylinder(tmp_path):
 @pytest.mark.slow
 def test_recovery_robust_dome(tmp_path, monkeypatch):
     """Limits are kept with their margins by full solves, something holds the objective back, and no design seen is better."""
-    task = write(tmp_path, shipped_tasks()["robust-dome"].read_text(encoding="utf-8") + FEW)
+    text = shipped_tasks()["robust-dome"].read_text(encoding="utf-8") + '[[quantity]]\nname = "frequency"\ntheory = "shell"\n'
+    task = write(tmp_path, text + FEW.replace("highest", 'theory = "shell"\nhighest'))
     monkeypatch.setattr("studies.design.answer.DRAWN", 4)
     found = optimise(task, workers=1)
     assert found.verified == pytest.approx(found.after, rel=1e-9)

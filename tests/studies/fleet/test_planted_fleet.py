@@ -191,11 +191,11 @@ def test_odd_devices_and_a_bad_batch_are_named_and_left_out_of_mean_and_scatter(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("count", "spread", "least"), [(5, 0.3, 12), (5, 0.7, 7), (8, 0.7, 16)])
+@pytest.mark.parametrize(("count", "spread", "least"), [(5, 0.3, 6), (5, 0.7, 4), (8, 0.7, 8)])
 def test_one_of_a_few_devices_is_odd_by_what_all_values_say_of_scatter(count, spread, least):
     """Of five devices one that was 12 scatters away was never odd: four may stand close by chance, in one value; in eighteen they do not."""
     rng, alarms, found = np.random.default_rng(count), 0, 0
-    for _ in range(20):
+    for _ in range(10):
         open_, errors = np.exp(2.0 * rng.standard_normal(18)), np.exp(rng.uniform(np.log(1e-4), np.log(0.3), 18))
         scatter = 0.05 * np.exp(spread * rng.standard_normal(18))
         values = np.hypot(scatter, errors) * rng.standard_normal((count, 18))
@@ -209,7 +209,7 @@ def test_one_of_a_few_devices_is_odd_by_what_all_values_say_of_scatter(count, sp
             named = [s for name, own in of.items() for s in Quantity(name, own, 18 * count, {}, scatters).odd]
             found += odd and "G0" in named
             alarms += not odd and bool(named)
-    assert alarms <= 2  # 0.2 are expected
+    assert alarms <= 1  # 0.1 are expected
     assert found >= least
 
 

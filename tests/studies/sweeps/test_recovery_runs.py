@@ -82,7 +82,7 @@ def test_many_kills_lose_nothing_kept_and_leave_no_process(tmp_path, functions, 
     rng = np.random.default_rng(11)
     kept: dict[int, bytes] = {}
     kills = 0
-    while kills < 3:
+    while kills < 2:
         goal = len(kept) + int(rng.integers(1, 30))
         process = start(*command, HRG_TEST_LOG=str(log), HRG_TEST_UNTIL=str((goal + out) / cases))
         wait_for(
