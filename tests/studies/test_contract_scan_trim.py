@@ -58,26 +58,29 @@ def test_a_plan_is_one_object_a_table_for_the_machine_and_a_page(tmp_path, ask):
 
 @pytest.mark.slow
 def test_scan_refuses_what_it_cannot_use(faces, tmp_path, refuse):
+    def said(*words):
+        return refuse(["scan", "free-dome", *words, "--theory", "shell"])
+
     points = np.loadtxt(faces["outer"])
     wrong = tmp_path / "wrong.asc"
     np.savetxt(wrong, 1e3 * points)
-    assert "µm read as mm" in refuse(["scan", "free-dome", "none", wrong])
-    assert "exchange the files" in refuse(["scan", "free-dome", faces["outer"], faces["inner"]])
+    assert "µm read as mm" in said("none", wrong)
+    assert "exchange the files" in said(faces["outer"], faces["inner"])
     np.savetxt(wrong, points[np.abs(np.arctan2(points[:, 1], points[:, 0])) > 0.6])
-    assert "gaps between the points are too large" in refuse(["scan", "free-dome", "none", wrong, "--harmonic", 2])
+    assert "gaps between the points are too large" in said("none", wrong, "--harmonic", 2)
     np.savetxt(wrong, points * [1.0, 1.15, 1.0])
-    assert "do not fit the face" in refuse(["scan", "free-dome", "none", wrong, "--harmonic", 2])
+    assert "do not fit the face" in said("none", wrong, "--harmonic", 2)
     shifted = tmp_path / "shifted.asc"
     np.savetxt(shifted, np.loadtxt(faces["inner"]) + np.array([3.0, 0.0, 2.0]))
-    assert "--frames own" in refuse(["scan", "free-dome", shifted, faces["outer"], "--frames", "common"])
-    assert "mm as m" in refuse(["scan", "free-dome", "none", faces["outer"], "--unit", "m"])
+    assert "--frames own" in said(shifted, faces["outer"], "--frames", "common")
+    assert "mm as m" in said("none", faces["outer"], "--unit", "m")
     wrong.write_text("x y z\n1 2 three\n")
-    assert "not a table of x y z" in refuse(["scan", "free-dome", "none", wrong])
+    assert "not a table of x y z" in said("none", wrong)
     wrong.write_text("# nothing\n")
-    assert "has no points" in refuse(["scan", "free-dome", "none", wrong])
-    assert "--highest" in refuse(["scan", "free-dome", faces["inner"], "--harmonic", 7])
-    assert " points of " in (said := refuse(["scan", "free-dome", faces["inner"], "--highest", 100000]))
-    assert 12 < int(said.partition("allow up to ")[2].partition(";")[0]) < 144
+    assert "has no points" in said("none", wrong)
+    assert "--highest" in said(faces["inner"], "--harmonic", 7)
+    assert " points of " in (told := said(faces["inner"], "--highest", 100000))
+    assert 12 < int(told.partition("allow up to ")[2].partition(";")[0]) < 144
 
 
 def test_a_table_of_departures_must_close_the_circle(tmp_path, refuse, ask):

@@ -181,7 +181,10 @@ def test_recovery_light_cylinder(tmp_path):
 @pytest.mark.slow
 def test_recovery_robust_dome(tmp_path, monkeypatch):
     """Limits are kept with their margins by full solves, something holds the objective back, and no design seen is better."""
-    text = shipped_tasks()["robust-dome"].read_text(encoding="utf-8") + '[[quantity]]\nname = "frequency"\ntheory = "shell"\n'
+    text = (
+        shipped_tasks()["robust-dome"].read_text(encoding="utf-8")
+        + '[[quantity]]\nname = "frequency"\ntheory = "shell"\n'
+    )
     task = write(tmp_path, text + FEW.replace("highest", 'theory = "shell"\nhighest'))
     monkeypatch.setattr("studies.design.answer.DRAWN", 4)
     found = optimise(task, workers=1)

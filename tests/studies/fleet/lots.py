@@ -50,10 +50,11 @@ def make_lot(
     runs: Sequence[str] = (RUN,),
     columns: Sequence[str] = KEPT,
     row: float = 60.0,
+    card: str = CARD,
 ) -> Lot:
     """Write a lot of `count` devices: those of numbers `odd` are odd in turn, those of numbers `bad` are the bad batch."""
-    card, rng = load_card(CARD), np.random.default_rng(seed)
-    priors = gather_priors(card)
+    drawn_from, rng = load_card(card), np.random.default_rng(seed)
+    priors = gather_priors(drawn_from)
     p = len(priors.values)
     mean = 0.5 * rng.standard_normal(p)
     serials, batches = [], {}
@@ -65,7 +66,7 @@ def make_lot(
         if k in bad:
             values |= {name: times * values[name] for name, times in BAD.items()}
         said = ODD[list(odd).index(k) % len(ODD)] if k in odd else {}
-        gyro = _gyro(card, values, said, priors)
+        gyro = _gyro(drawn_from, values, said, priors)
         (folder / serial).mkdir(parents=True)
         for number, words in enumerate(runs):
             record = simulate_run(gyro, load_profile(words), 1.0 / row, 1000 * seed + 10 * k + number).record

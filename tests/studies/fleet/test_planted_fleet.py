@@ -14,6 +14,7 @@ from studies.fleet.folder import Device, read_lot
 from studies.fleet.lot import gather
 from studies.fleet.population import Population, Quantity, Scatters
 from studies.fleet.run import run_lot
+from studies.instrument.card import load_card, save_card
 from studies.reports import fleet as parts
 from studies.sweeps.workers import Workers
 from tests.studies.fleet.lots import make_lot
@@ -226,8 +227,10 @@ def test_a_device_of_another_design_is_put_aside():
 
 @pytest.mark.slow
 def test_the_odd_device_and_the_bad_batch_of_a_small_lot(tmp_path):
-    planted = make_lot(tmp_path, 8, [1], [5, 6, 7], seed=2, batch_size=5, columns=(*QUICK, "inverse_q"), row=180.0)
-    lot = run_lot(read_lot(str(tmp_path), "hrg-30mm"))
+    card, folder = str(tmp_path / "card.toml"), tmp_path / "lot"
+    save_card(load_card("hrg-30mm").with_values({"thermal.cells": 10}), card)
+    planted = make_lot(folder, 8, [1], [5, 6, 7], 2, 5, columns=(*QUICK, "inverse_q"), row=180.0, card=card)
+    lot = run_lot(read_lot(str(folder), card))
     assert tuple(lot.odd) == planted.odd
     assert set(lot.bad_batches) == {planted.batch}
     assert not lot.shares
