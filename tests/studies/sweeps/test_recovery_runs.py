@@ -160,7 +160,8 @@ def test_failures_keep_their_reason_and_do_not_stop_the_rest(tmp_path, functions
     for part in ("one is not welcome", "time limit of 3 s", "ended its process", "not a finite number", "not a number"):
         assert part in reasons
     assert [status for _, status, _ in sorted(rows_of(tmp_path / "out"))] == ["ok", *["failed"] * 5, "ok"]
-    again = hrg("study", "run", spec, "--out", tmp_path / "out", "--allow-python", "--report", tmp_path / "run.html")
+    words = ("--workers", 1, "--allow-python", "--report", tmp_path / "run.html")
+    again = hrg("study", "run", spec, "--out", tmp_path / "out", *words)
     assert again.returncode == 4
     page = hrg("study", "report", tmp_path / "out")
     assert page.returncode == 0, page.stderr
@@ -343,7 +344,7 @@ def test_a_script_without_a_guard_is_told_and_keeps_no_result(tmp_path, function
 def test_failed_cases_are_computed_again_when_asked(tmp_path, functions, hrg):
     spec = tmp_path / "spec.toml"
     spec.write_text(spec_of("square", 'method = "grid"', 'name = "user.x"\nvalues = [1, 2, 3]'))
-    run = ("study", "run", spec, "--out", tmp_path / "out", "--allow-python", "--json")
+    run = ("study", "run", spec, "--out", tmp_path / "out", "--workers", 1, "--allow-python", "--json")
     assert hrg(*run).returncode == 0
     nothing = np.full((1, 1), math.nan)
     with claim_store(tmp_path / "out") as store:
@@ -374,8 +375,7 @@ def test_modules_of_the_working_directory_are_not_run_by_workers(tmp_path, monke
 def test_other_versions_on_resuming_are_said(tmp_path, functions, hrg):
     spec = tmp_path / "square.toml"
     spec.write_text(spec_of("square", 'method = "grid"', 'name = "user.x"\nvalues = [1, 2, 3]'))
-    run = ("study", "run", spec, "--out", tmp_path / "out", "--allow-python")
-    assert "computed with" not in hrg(*run).stderr
+    run = ("study", "run", spec, "--out", tmp_path / "out", "--workers", 1, "--allow-python")
     assert "computed with" not in hrg(*run).stderr
     with claim_store(tmp_path / "out") as store:
         store.begin_run(json.loads(json.dumps(store.runs[-1]["provenance"]).replace(np.__version__, "1.0.0")))
@@ -389,7 +389,7 @@ def test_too_much_memory_fails_its_case(tmp_path, hrg):
     (tmp_path / "functions.py").write_text(body)
     spec = tmp_path / "glutton.toml"
     spec.write_text(spec_of("glutton", 'method = "grid"', 'name = "user.x"\nvalues = [2, 3]'))
-    done = hrg("study", "run", spec, "--out", tmp_path / "out", "--allow-python", "--json")
+    done = hrg("study", "run", spec, "--out", tmp_path / "out", "--workers", 1, "--allow-python", "--json")
     found = json.loads(done.stdout)
     assert found["failed"] == 2, done.stdout
     assert "MemoryError" in found["reasons"][0]["reason"]
