@@ -34,11 +34,6 @@ def test_table_2_to_the_last_printed_digit():
     assert TABLE2[:, 1] - calculated == pytest.approx(TABLE2[:, 3], abs=1e-3)  # one unit of the last digit
 
 
-def test_slopes():
-    cubic = fit(3)
-    assert cubic.slope_ppm([0.0, 20.0]) == pytest.approx([84.0, 79.2], abs=0.05)
-
-
 def test_the_cubic_leaves_structure_and_the_quartic_only_rounding():
     cubic, quartic = fit(3), fit(4)
     assert cubic.regression.sum_of_squares == pytest.approx(2.150e-3, abs=5e-7)

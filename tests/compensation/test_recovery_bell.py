@@ -77,15 +77,6 @@ def test_noise_free_records_are_compensated_and_give_the_printed_coefficients():
     )
 
 
-def test_rough_step_of_two_plateaus_passes_both_means():
-    generator = np.random.default_rng(4)
-    rate = np.repeat([0.0, 100], 300)
-    counts = invert_chain(PRINTED, rate, np.full(600, 25.0)) + generator.standard_normal(600)
-    null, scale, _ = fit_rough(BellRun(STEP * np.arange(600), counts, np.full(600, 25.0), rate))
-    assert null == pytest.approx(np.mean(counts[:300]), rel=1e-10)
-    assert scale == pytest.approx(100 / (np.mean(counts[300:]) - null), rel=1e-10)
-
-
 @pytest.mark.slow
 def test_intervals_cover():
     """95 % intervals of every step, given the steps before it, hold what noise-free data would give."""

@@ -93,12 +93,6 @@ def test_unusable_tables_are_refused(temperature, frequency, options, message):
         fit_frequency(temperature, frequency, **options)
 
 
-def test_a_curve_that_turns_round_is_not_inverted():
-    fit = fit_frequency(T, 4425 + 0.1 * T - 5e-3 * T**2 + 1e-6 * T**3)
-    with pytest.raises(CompensationError, match=r"turning point at 10\.\d °C"):
-        fit.temperature(4425.0)
-
-
 def test_nothing_is_extrapolated_unless_asked():
     fit = fit_frequency(T, reading(np.random.default_rng(2)))
     with pytest.raises(CompensationError, match="outside the fitted range -20 to 40"):

@@ -83,24 +83,10 @@ def test_rigid_motions_neither_stretch_nor_bend_with_the_corrected_twist(motion,
     assert all(sp.simplify(part) == 0 for part in strains.corrected_deformation(displacement))
 
 
-@pytest.mark.parametrize("axis", "xyz")
-def test_printed_twist_bends_a_shell_that_is_only_shifted(axis, motions):
-    twist = strains.printed_deformation(motions[f"shift along {axis}"]).tau
-    assert sp.simplify(twist) != 0
-
-
 def test_printed_twist_differs_from_the_derived_one_in_one_derivative():
     w = displacements.general_displacement().w
     expected = (w.diff(theta) - w.diff(phi)) * sp.cos(phi) / (r**2 * sp.sin(phi) ** 2)
     assert sp.simplify(strains.printed_twist_defect() - expected) == 0
-
-
-@pytest.mark.slow
-def test_printed_twist_has_the_wrong_parity_and_the_corrected_the_right_one():
-    mode = displacements.Displacement(*(part.subs(t, 0) for part in inextensional.inextensional_displacement()))
-    corrected, printed = (make(mode).tau for make in (strains.corrected_deformation, strains.printed_deformation))
-    assert sp.simplify(corrected + corrected.subs(theta, -theta)) == 0
-    assert sp.simplify(printed + printed.subs(theta, -theta)) != 0
 
 
 def test_hooke_is_equation_5():
@@ -198,16 +184,6 @@ def test_closed_forms_on_the_hemisphere_are_the_published_ones(row):
     assert float(frequency.mass_integral(harmonic)) == pytest.approx(float(row["J"]), rel=1e-14)
     if row["bryan_k"]:
         assert float(coriolis.bryan_factor(harmonic)) == pytest.approx(float(row["bryan_k"]), abs=1e-8)
-
-
-def test_closed_forms_hold_on_any_polar_range():
-    start, end = sp.pi / 9, sp.Rational(2)
-    for closed, integrand in (
-        (frequency.bending_integral(5, start, end), frequency.bending_integrand()),
-        (frequency.mass_integral(5, start, end), frequency.mass_integrand()),
-    ):
-        numeric = sp.Integral(integrand.subs(n, 5), (phi, start, end)).evalf(25)
-        assert abs(sp.N(closed, 25) / numeric - 1) < 1e-20
 
 
 def test_coriolis_energy_gives_the_two_pattern_equations():

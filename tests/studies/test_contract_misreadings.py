@@ -339,17 +339,6 @@ def test_a_bias_that_falls_on_the_cold_side_and_rises_on_the_hot_one_has_one_sig
         records_of_one_gyro(turned, print)
 
 
-def test_stuck_readings_are_left_out(runs):
-    own = runs[1]["frequency_Hz"].copy()
-    own[60:120] = own[60]
-    said = []
-    kept = records_of_one_gyro([runs[0], runs[1].with_columns({"frequency_Hz": own}), runs[2]], said.append)
-    assert "repeats one reading in 60 rows" in said[0]
-    assert "left out" in said[0]
-    assert np.flatnonzero(np.isnan(kept[1]["frequency_Hz"])).tolist() == list(range(60, 120))
-    assert kept[0] is runs[0]
-
-
 def test_a_housing_of_the_opposite_sign_is_seen_beside_its_chamber(record):
     """Without a card nothing else tells: the frequency follows either sign."""
     chamber = np.where(record["time_s"] < 9000.0, 30.0, -20.0)

@@ -8,7 +8,7 @@ import pytest
 from scipy.optimize import brentq
 
 from thermal.errors import ThermalError
-from thermal.meridian import cut_meridian, describe_meridian, lump
+from thermal.meridian import cut_meridian, describe_meridian
 from thermal.network import Boundary, Conductor, Node, Radiator, assemble, linearise
 from thermal.radiative import step_remaining
 from thermal.relaxation import find_relaxation
@@ -89,26 +89,6 @@ def test_one_conductance_identified_from_95_percent_at_9000_s_leaves_under_1_per
 def test_radiation_makes_cooling_slower_than_heating():
     cold, hot = (step_remaining(network(PATH), 293.15, T, weights(PATH), [9000.0])[0] for T in (263.15, 313.15))
     assert cold > 1.2 * hot
-
-
-def test_an_even_step_of_a_linear_network_leaves_the_same_share_of_any_size():
-    linear = linearise(network(PATH), 293.15)
-    shares = [step_remaining(linear, 293.15, T, weights(PATH), [9000.0])[0] for T in (253.15, 313.15)]
-    assert shares[0] == pytest.approx(shares[1], rel=1e-9)
-
-
-def test_a_capacity_may_depend_on_temperature():
-    warm = replace(PATH, volumetric_capacity=lambda T: 2203 * 740.0 * (1 + 2e-3 * (T - 293.15)))
-    even = find_relaxation(network(warm), 293.15).time_constants
-    assert even == pytest.approx(find_relaxation(network(PATH), 293.15).time_constants, rel=1e-12)
-    assert find_relaxation(network(warm), 313.15).time_constants[-1] > even[-1]
-
-
-def test_one_lump_stands_for_the_shell():
-    one = replace(PATH, cells=lump(PATH.cells))
-    assert find_relaxation(network(one), 293.15).time_constants[:2] == pytest.approx(
-        find_relaxation(network(PATH), 293.15).time_constants[:2], rel=2e-3
-    )
 
 
 def test_impossible_paths_are_refused():
