@@ -17,6 +17,11 @@ FORMATS = {"parquet": "parquet", "mat": "mat", "tdms": "tdms", "mf4": "mf4", "hd
 LIBRARIES = {"parquet": "pyarrow.parquet", "tdms": "nptdms", "mf4": "asammdf", "hdf5": "h5py"}
 
 
+@pytest.fixture(autouse=True)
+def here(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+
+
 @pytest.fixture(scope="module")
 def record():
     rng = np.random.default_rng(7)
@@ -34,27 +39,31 @@ def record():
     return Record(columns, instrument="hrg-30mm", source="a test")
 
 
+def imported(name):
+    """The record of a file by the map that is drafted of it."""
+    Path("map.toml").unlink(missing_ok=True)
+    assert main(["import", name, "--draft", "map.toml"]) == 0
+    assert main(["import", name, "--map", "map.toml", "--out", "run_of_it.csv"]) == 0
+    return read_record("run_of_it.csv")
+
+
 def same(one, two):
     return all(np.array_equal(one.columns[key], two.columns[key], equal_nan=True) for key in one.columns)
 
 
 @pytest.mark.parametrize("kind", FORMATS)
-def test_contract_a_record_comes_back_from_every_format_to_the_last_digit(kind, record, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
+def test_contract_a_record_comes_back_from_every_format_to_the_last_digit(kind, record):
     write_record(record, "run.csv")
     out = f"run.{FORMATS[kind]}"
     assert main(["export", "run.csv", "--to", kind, "--out", out]) == 0
-    assert main(["import", out, "--draft", "map.toml"]) == 0
-    assert main(["import", out, "--map", "map.toml", "--out", "back.csv"]) == 0
-    back = read_record("back.csv")
+    back = imported(out)
     assert set(back.columns) == set(record.columns)
     assert same(record, back)
 
 
 @pytest.mark.parametrize("kind", ["mat", "tdms", "hdf5", "mf4"])
-def test_contract_the_start_of_a_record_comes_back_as_is_said(kind, record, tmp_path, monkeypatch, capsys):
+def test_contract_the_start_of_a_record_comes_back_as_is_said(kind, record, capsys):
     """A file without a dated clock loses it, once without a word; what the map then needs is told."""
-    monkeypatch.chdir(tmp_path)
     moment = datetime.datetime(2026, 3, 3, 8, 0, 5, tzinfo=datetime.UTC)
     write_record(replace(record, start=moment), "run.csv")
     out = f"run.{FORMATS[kind]}"
@@ -69,8 +78,7 @@ def test_contract_the_start_of_a_record_comes_back_as_is_said(kind, record, tmp_
     assert read_record("back.csv").start == moment
 
 
-def test_contract_a_parquet_record_is_accepted_where_a_csv_is(record, tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
+def test_contract_a_parquet_record_is_accepted_where_a_csv_is(record, capsys):
     write_record(record, "run.parquet")
     again = read_record("run.parquet")
     assert same(record, again)
@@ -89,8 +97,7 @@ def tdms(path, **groups):
             writer.write_segment([nptdms.ChannelObject(group, *channel) for channel in channels])
 
 
-def test_contract_channels_of_two_rates_are_averaged_onto_the_slow_clock(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
+def test_contract_channels_of_two_rates_are_averaged_onto_the_slow_clock():
     fast, slow = np.arange(1000.0), np.linspace(20, 30, 100)
     start = {"wf_start_time": np.datetime64("2026-03-01T12:00:00"), "wf_start_offset": 0.0}
     tdms(
@@ -98,12 +105,9 @@ def test_contract_channels_of_two_rates_are_averaged_onto_the_slow_clock(tmp_pat
         Fast=[("f res", 4000 + fast, {"unit_string": "Hz", "wf_increment": 0.1, **start})],
         Slow=[("T housing", slow + 273.15, {"unit_string": "K", "wf_increment": 1.0, **start})],
     )
-    assert main(["import", "run.tdms", "--draft", "map.toml"]) == 0
-    text = Path("map.toml").read_text()
+    run, text = imported("run.tdms"), Path("map.toml").read_text()
     assert "same_file = true" in text
     assert "[Hz]: 1000 rows, 0.1 s apart" in text
-    assert main(["import", "run.tdms", "--map", "map.toml", "--out", "run.csv"]) == 0
-    run = read_record("run.csv")
     assert run["housing_temperature_degC"] == pytest.approx(slow, abs=1e-9)
     # a mean takes the samples from half a step before to half a step after
     assert run["frequency_Hz"][1:-1] == pytest.approx(4000 + 10 * np.arange(1, 99) - 0.5)
@@ -111,37 +115,24 @@ def test_contract_channels_of_two_rates_are_averaged_onto_the_slow_clock(tmp_pat
     assert any("resampled: mean" in note for note in run.comments)
 
 
-def test_contract_time_stamps_are_the_clock_of_their_group(tmp_path, monkeypatch):
+def test_contract_time_stamps_are_the_clock_of_their_group():
     arrow, parquet = pytest.importorskip("pyarrow"), pytest.importorskip("pyarrow.parquet")
-    monkeypatch.chdir(tmp_path)
     stamps = np.datetime64("2026-03-01T12:00:00.5", "us") + np.arange(0, 5_000_000, 500_000).astype("timedelta64[us]")
     housing = np.linspace(20, 21, 10)
     tdms("a.tdms", G=[("when", stamps), ("T housing", housing, {"unit_string": "degC"})])
     parquet.write_table(arrow.table({"when": arrow.array(stamps), "T housing": housing}), "a.parquet")
     zoned = arrow.array(stamps).cast(arrow.timestamp("us", tz="UTC"))
     parquet.write_table(arrow.table({"when": zoned, "T housing": housing}), "b.parquet")
-    tdms(
-        "b.tdms",
-        G=[
-            (
-                "T housing",
-                housing,
-                {"wf_increment": 0.5, "wf_start_offset": 0.5, "wf_start_time": stamps[0] - np.timedelta64(500, "ms")},
-            )
-        ],
-    )
+    wave = {"wf_increment": 0.5, "wf_start_offset": 0.5, "wf_start_time": stamps[0] - np.timedelta64(500, "ms")}
+    tdms("b.tdms", G=[("T housing", housing, wave)])
     for name, start in (("a.tdms", "+00:00"), ("a.parquet", ""), ("b.parquet", "+00:00"), ("b.tdms", "+00:00")):
-        Path("map.toml").unlink(missing_ok=True)
-        assert main(["import", name, "--draft", "map.toml"]) == 0
+        run = imported(name)
         assert 'time_format = "own"' in Path("map.toml").read_text()
-        assert main(["import", name, "--map", "map.toml", "--out", "run.csv"]) == 0
-        run = read_record("run.csv")
         assert run["time_s"] == pytest.approx(np.arange(10) / 2, abs=1e-9)
         assert run.start.isoformat() == f"2026-03-01T12:00:00.500000{start}"
 
 
-def test_contract_a_channel_without_a_clock_asks_for_one(tmp_path, monkeypatch, refuse):
-    monkeypatch.chdir(tmp_path)
+def test_contract_a_channel_without_a_clock_asks_for_one(refuse):
     tdms("run.tdms", G=[("f", 4000 + np.cos(np.arange(50.0)), {"unit_string": "Hz"})])
     assert main(["import", "run.tdms", "--draft", "map.toml"]) == 0
     assert "sample_period_s = 0.0    # CHECK" in Path("map.toml").read_text()
@@ -154,8 +145,7 @@ def test_contract_a_channel_without_a_clock_asks_for_one(tmp_path, monkeypatch, 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", FORMATS)
-def test_contract_damaged_files_are_refused_in_a_sentence(kind, record, tmp_path, monkeypatch, capfd):
-    monkeypatch.chdir(tmp_path)
+def test_contract_damaged_files_are_refused_in_a_sentence(kind, record, capfd):
     write_record(record, "run.csv")
     name = f"run.{FORMATS[kind]}"
     assert main(["export", "run.csv", "--to", kind, "--out", name]) == 0
@@ -195,8 +185,7 @@ def test_contract_a_file_on_which_the_hdf5_library_hangs_or_crashes_is_refused(p
 
 
 @pytest.mark.parametrize("kind", LIBRARIES)
-def test_contract_a_missing_library_names_the_extra(kind, tmp_path, monkeypatch, capsys, record):
-    monkeypatch.chdir(tmp_path)
+def test_contract_a_missing_library_names_the_extra(kind, monkeypatch, capsys, record):
     Path(f"run.{FORMATS[kind]}").write_bytes(b"something")
     monkeypatch.setitem(sys.modules, LIBRARIES[kind], None)
     assert main(["import", f"run.{FORMATS[kind]}", "--draft", "map.toml"]) == 3
@@ -206,11 +195,10 @@ def test_contract_a_missing_library_names_the_extra(kind, tmp_path, monkeypatch,
     assert not Path(f"out.{FORMATS[kind]}").exists()
 
 
-def test_contract_objects_are_never_opened(tmp_path, monkeypatch, refuse):
+def test_contract_objects_are_never_opened(refuse):
     from scipy.io import savemat
 
     h5py = pytest.importorskip("h5py")
-    monkeypatch.chdir(tmp_path)
     with h5py.File("run.h5", "w") as file:
         file.create_dataset("words", data=["a", "b"], dtype=h5py.string_dtype())
     assert "holds objects" in refuse(["import", "run.h5", "--draft", "map.toml"])
@@ -218,11 +206,10 @@ def test_contract_objects_are_never_opened(tmp_path, monkeypatch, refuse):
     assert "holds objects" in refuse(["import", "run.mat", "--draft", "map.toml"])
 
 
-def test_contract_a_class_of_matlab_is_refused_by_name(tmp_path, monkeypatch, refuse):
+def test_contract_a_class_of_matlab_is_refused_by_name(monkeypatch, refuse):
     from scipy.io import loadmat, savemat
     from scipy.io.matlab import MatlabOpaque
 
-    monkeypatch.chdir(tmp_path)
     savemat("run.mat", {"t": np.arange(9.0), "T_housing": np.linspace(20, 21, 9)})
     opaque = np.zeros(1, dtype=[("s0", "O"), ("arr", "O")]).view(MatlabOpaque)
     monkeypatch.setattr("scipy.io.loadmat", lambda *given, **named: {**loadmat(*given, **named), "when": opaque})
@@ -234,9 +221,8 @@ def test_contract_a_class_of_matlab_is_refused_by_name(tmp_path, monkeypatch, re
     )
 
 
-def test_contract_a_matlab_7_3_file_and_matrices_are_channels(tmp_path, monkeypatch):
+def test_contract_a_matlab_7_3_file_and_matrices_are_channels():
     h5py = pytest.importorskip("h5py")
-    monkeypatch.chdir(tmp_path)
     time, housing = np.arange(30.0), np.linspace(20, 21, 30)
     with h5py.File("run.mat", "w", userblock_size=512) as file:
         for name, data in (("t", time[None, :]), ("T_housing", housing[:, None]), ("fs", np.array([[2.0]]))):
@@ -244,9 +230,7 @@ def test_contract_a_matlab_7_3_file_and_matrices_are_channels(tmp_path, monkeypa
     raw = bytearray(Path("run.mat").read_bytes())
     raw[:19] = b"MATLAB 7.3 MAT-file"
     Path("run.mat").write_bytes(bytes(raw))
-    assert main(["import", "run.mat", "--draft", "map.toml"]) == 0
-    assert main(["import", "run.mat", "--map", "map.toml", "--out", "run.csv"]) == 0
-    assert read_record("run.csv")["housing_temperature_degC"] == pytest.approx(housing, rel=1e-15)
+    assert imported("run.mat")["housing_temperature_degC"] == pytest.approx(housing, rel=1e-15)
 
 
 MAP = """schema = "hrg.map/1"
@@ -266,8 +250,7 @@ def raw(path, time, values):
     )
 
 
-def test_contract_files_that_overlap_are_joined_where_they_agree(tmp_path, monkeypatch, capsys, refuse):
-    monkeypatch.chdir(tmp_path)
+def test_contract_files_that_overlap_are_joined_where_they_agree(capsys, refuse):
     Path("map.toml").write_text(MAP)
     time = np.arange(100.0)
     f = 4000 + np.round(np.random.default_rng(0).standard_normal(100), 6)
@@ -286,8 +269,7 @@ def test_contract_files_that_overlap_are_joined_where_they_agree(tmp_path, monke
     )
 
 
-def test_contract_doubtful_readings_are_offered_as_missing_and_never_changed(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
+def test_contract_doubtful_readings_are_offered_as_missing_and_never_changed(capsys):
     f = 4000 + np.round(np.random.default_rng(0).standard_normal(300), 6)
     f[100], f[200:230] = 4100.0, f[200]
     raw("one.csv", np.arange(300.0), f)

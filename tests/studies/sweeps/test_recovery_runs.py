@@ -43,6 +43,12 @@ def write_slow(folder: Path, cases: int) -> Path:
     return spec
 
 
+def written(folder: Path, *given: str, **more: float) -> Path:
+    """A study as a file."""
+    (folder / "spec.toml").write_text(spec_of(*given, **more))
+    return folder / "spec.toml"
+
+
 def wait_for(condition, seconds=600.0):
     until = time.monotonic() + seconds
     while not condition():
@@ -176,8 +182,7 @@ def test_a_function_that_was_killed_is_tried_again_and_its_case_is_lost_and_not_
 ):
     """As the kernel does when memory runs out: once is chance; twice, the next run tries again."""
     monkeypatch.chdir(tmp_path)
-    spec = tmp_path / "unlucky.toml"
-    spec.write_text(spec_of("unlucky", 'method = "grid"', 'name = "user.x"\nvalues = [0, 1, 2]'))
+    spec = written(tmp_path, "unlucky", 'method = "grid"', 'name = "user.x"\nvalues = [0, 1, 2]')
     with contextlib.closing(run_study(spec, tmp_path / "out", workers=1, allow_python=True)) as results:
         assert results.store.counts() == {"ok": 2, "lost": 1}
         assert "SIGTERM" in results.remarks[2]
@@ -186,9 +191,8 @@ def test_a_function_that_was_killed_is_tried_again_and_its_case_is_lost_and_not_
 
 @pytest.mark.slow
 def test_a_design_that_kills_its_worker_is_found_and_the_rest_is_computed(tmp_path, functions, hrg):
-    spec = tmp_path / "murder.toml"
-    spec.write_text(
-        spec_of("murderer", 'method = "grid"\nbatch = 4', 'name = "user.x"\nvalues = [0, 1, 2, 3, 4, 5, 6, 7]')
+    spec = written(
+        tmp_path, "murderer", 'method = "grid"\nbatch = 4', 'name = "user.x"\nvalues = [0, 1, 2, 3, 4, 5, 6, 7]'
     )
     done = hrg("study", "run", spec, "--out", tmp_path / "out", "--workers", 2, "--allow-python", "--json")
     assert done.returncode == 4, done.stderr
@@ -199,8 +203,7 @@ def test_a_design_that_kills_its_worker_is_found_and_the_rest_is_computed(tmp_pa
 
 
 def test_python_needs_to_be_allowed_and_must_exist(tmp_path, functions, hrg):
-    spec = tmp_path / "square.toml"
-    spec.write_text(spec_of("square", 'method = "grid"', 'name = "user.x"\nvalues = [1, 2]'))
+    spec = written(tmp_path, "square", 'method = "grid"', 'name = "user.x"\nvalues = [1, 2]')
     refused = hrg("study", "run", spec, "--out", tmp_path / "out")
     assert refused.returncode == 2
     assert "--allow-python" in refused.stderr
@@ -244,8 +247,7 @@ def test_changed_spec_card_or_function_is_refused_with_what_changed(tmp_path, fu
 )
 def test_a_store_that_is_damaged_is_refused_and_mended_by_a_run(spoil, tmp_path, functions):
     """Without the block that says what the study is, all cases are there: such a store once stayed refused for ever."""
-    spec = tmp_path / "square.toml"
-    spec.write_text(spec_of("square", 'method = "grid"', 'name = "user.x"\nlow = 0\nhigh = 1\ncount = 40'))
+    spec = written(tmp_path, "square", 'method = "grid"', 'name = "user.x"\nlow = 0\nhigh = 1\ncount = 40')
     run_study(spec, tmp_path / "out", workers=1, allow_python=True).close()
     store = tmp_path / "out" / "study.store"
     store.write_bytes(spoil(store.read_bytes()))
@@ -259,8 +261,7 @@ def test_a_store_that_is_damaged_is_refused_and_mended_by_a_run(spoil, tmp_path,
 
 @pytest.mark.slow
 def test_a_torn_store_holds_what_was_whole(tmp_path, functions, capsys, ask):
-    spec = tmp_path / "square.toml"
-    spec.write_text(spec_of("square", 'method = "grid"', 'name = "user.x"\nlow = 0\nhigh = 1\ncount = 400'))
+    spec = written(tmp_path, "square", 'method = "grid"', 'name = "user.x"\nlow = 0\nhigh = 1\ncount = 400')
     run_study(spec, tmp_path / "out", workers=1, allow_python=True).close()
     path = tmp_path / "out" / "study.store"
     whole = path.read_bytes()
@@ -286,8 +287,7 @@ def test_a_torn_store_holds_what_was_whole(tmp_path, functions, capsys, ask):
 
 @pytest.mark.slow
 def test_full_disk_keeps_what_was_written_and_says_so(tmp_path, functions, hrg):
-    spec = tmp_path / "square.toml"
-    spec.write_text(spec_of("square", 'method = "grid"\nbatch = 20', 'name = "user.x"\nlow = 0\nhigh = 1\ncount = 600'))
+    spec = written(tmp_path, "square", 'method = "grid"\nbatch = 20', 'name = "user.x"\nlow = 0\nhigh = 1\ncount = 600')
     words = words_of("study", "run", str(spec), "--out", str(tmp_path / "out"), "--workers", "1", "--allow-python")
     limit = "import resource, os, sys; resource.setrlimit(resource.RLIMIT_FSIZE, (12_000, 12_000)); os.execv(sys.argv[1], sys.argv[1:])"
     command = [sys.executable, "-c", limit, *words]
@@ -302,8 +302,7 @@ def test_full_disk_keeps_what_was_written_and_says_so(tmp_path, functions, hrg):
 
 
 def test_folder_that_cannot_be_made_and_folder_without_study(tmp_path, functions, hrg):
-    spec = tmp_path / "square.toml"
-    spec.write_text(spec_of("square", 'method = "grid"', 'name = "user.x"\nvalues = [1]'))
+    spec = written(tmp_path, "square", 'method = "grid"', 'name = "user.x"\nvalues = [1]')
     (tmp_path / "file").write_text("")
     done = hrg("study", "run", spec, "--out", tmp_path / "file" / "out", "--allow-python")
     assert done.returncode == 2
@@ -335,8 +334,7 @@ def test_a_script_without_a_guard_is_told_and_keeps_no_result(tmp_path, function
 
 @pytest.mark.slow
 def test_failed_cases_are_computed_again_when_asked(tmp_path, functions, hrg):
-    spec = tmp_path / "spec.toml"
-    spec.write_text(spec_of("square", 'method = "grid"', 'name = "user.x"\nvalues = [1, 2, 3]'))
+    spec = written(tmp_path, "square", 'method = "grid"', 'name = "user.x"\nvalues = [1, 2, 3]')
     run = ("study", "run", spec, "--out", tmp_path / "out", "--workers", 1, "--allow-python", "--json")
     assert hrg(*run).returncode == 0
     nothing = np.full((1, 1), math.nan)
@@ -366,8 +364,7 @@ def test_modules_of_the_working_directory_are_not_run_by_workers(tmp_path, monke
 
 @pytest.mark.slow
 def test_other_versions_on_resuming_are_said(tmp_path, functions, hrg):
-    spec = tmp_path / "square.toml"
-    spec.write_text(spec_of("square", 'method = "grid"', 'name = "user.x"\nvalues = [1, 2, 3]'))
+    spec = written(tmp_path, "square", 'method = "grid"', 'name = "user.x"\nvalues = [1, 2, 3]')
     run = ("study", "run", spec, "--out", tmp_path / "out", "--workers", 1, "--allow-python")
     assert "computed with" not in hrg(*run).stderr
     with claim_store(tmp_path / "out") as store:
@@ -380,8 +377,7 @@ def test_too_much_memory_fails_its_case(tmp_path, hrg):
     """A function that asks for 64 GB fails."""
     body = "def glutton(instrument, parameters):\n    return len(bytearray(64 * 1024**3))\n"
     (tmp_path / "functions.py").write_text(body)
-    spec = tmp_path / "glutton.toml"
-    spec.write_text(spec_of("glutton", 'method = "grid"', 'name = "user.x"\nvalues = [2, 3]'))
+    spec = written(tmp_path, "glutton", 'method = "grid"', 'name = "user.x"\nvalues = [2, 3]')
     done = hrg("study", "run", spec, "--out", tmp_path / "out", "--workers", 1, "--allow-python", "--json")
     found = json.loads(done.stdout)
     assert found["failed"] == 2, done.stdout
