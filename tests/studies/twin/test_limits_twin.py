@@ -81,15 +81,18 @@ def one_effect(name, response):
     return {"name": name, "response": response, **shape, **weights}
 
 
+BY_DIFFERENCES = {"clock-offset": 1e-7}
+"""The simulation and the twin take this rate as a difference between rows, the one of both sides, the other of what has been."""
+
+
 def programs():
-    """Effects that share a compiled program: a thermal one alone, of the others three in every column, where their errors add."""
+    """Effects that share a compiled program, where their errors add: of the heat path three, of the others five in every column."""
     effects, responses = sorted(library().items()), ("frequency_Hz", "bias_deg_per_h", "inverse_q")
-    thermal = [[(name, response)] for name, effect in effects if effect.thermal for response in effect.responses]
-    columns = [
-        [(name, r) for name, effect in effects if not effect.thermal and r in effect.responses] for r in responses
-    ]
-    longest = max(map(len, columns))
-    return [*thermal, *([one for column in columns for one in column[k : k + 3]] for k in range(0, longest, 3))]
+    thermal = [(name, r) for name, e in effects if e.thermal and name not in BY_DIFFERENCES for r in e.responses]
+    columns = [[(name, r) for name, e in effects if not e.thermal and r in e.responses] for r in responses]
+    alone = [[(name, r)] for name in BY_DIFFERENCES for r in library()[name].responses]
+    shared = [[one for column in columns for one in column[k : k + 5]] for k in range(0, max(map(len, columns)), 5)]
+    return [*alone, *(thermal[k : k + 3] for k in range(0, len(thermal), 3)), *shared]
 
 
 DATED = (
@@ -127,10 +130,6 @@ def test_limits_effect_with_a_date(effects, bare, folder):
     profile.write_text("# start: yesterday\n" + profile.read_text())
     done = subprocess.run([program, profile, folder / "no.csv"], capture_output=True, text=True, check=False)
     assert (done.returncode, "'# start' is no ISO 8601 time" in done.stderr) == (2, True)
-
-
-BY_DIFFERENCES = {"clock-offset": 1e-7}
-"""The simulation and the twin take this rate as a difference between rows, the one of both sides, the other of what has been."""
 
 
 @pytest.fixture(scope="module")
