@@ -138,8 +138,8 @@ def test_quantisation_is_the_noise_that_is_said():
     """Rounded samples and commands of the carrier against white noise of step²/12 in the averaged loop."""
     wave = from_quality(FREQUENCY, 1e3)
     electronics = Electronics(noise=LoopNoise(pickoff=3e-5, adc_step=2e-3))
-    true = simulate_carrier(wave, electronics, FAST, 20.0, generator=np.random.default_rng(1)).rate[1000:]
-    time = SAMPLE * np.arange(10000)
+    true = simulate_carrier(wave, electronics, FAST, 12.0, generator=np.random.default_rng(1)).rate[1000:]
+    time = SAMPLE * np.arange(6000)
     said = simulate_rebalance(
         wave, electronics, replace(FAST, delay=1.5 * SAMPLE), time, generator=np.random.default_rng(2)
     ).rate

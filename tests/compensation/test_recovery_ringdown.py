@@ -228,11 +228,11 @@ def test_recovery_of_a_decay_of_few_blocks():
 @pytest.mark.slow
 @pytest.mark.parametrize("plateau", [0.0, 5.0])
 def test_a_trace_of_power_gives_the_decay_that_its_noise_allows(plateau):
-    """Amplitude without phase, additive complex noise, a drive on for 5 s: the interval holds 1/τ, but for four of 12 traces."""
+    """Amplitude without phase, additive complex noise, a drive on for 5 s: the interval holds 1/τ, but for two of 8 traces."""
     random = np.random.default_rng(9)
     t = np.arange(0.0, 90.0, 0.05)
     inside = 0
-    for _ in range(12):
+    for _ in range(8):
         tau = random.uniform(8, 20)
         clean = np.where(t < plateau, 3.0, np.exp(-(t - plateau) / tau)) + 0j
         found = analyse_trace(t, np.abs(noisy(clean, 0.02, random)))
@@ -240,14 +240,14 @@ def test_a_trace_of_power_gives_the_decay_that_its_noise_allows(plateau):
         rate = found.estimates["decay_per_s"]
         assert abs(rate.value - 1 / tau) < 4.5 * rate.sd
         inside += rate.low <= 1 / tau <= rate.high
-    assert inside >= 8
+    assert inside >= 6
 
 
 @pytest.mark.slow
 def test_a_spectrum_gives_frequency_and_q_with_intervals_that_hold():
-    """Averaged periodograms of Lorentzian lines on a background: 24 spectra, two values of each."""
+    """Averaged periodograms of Lorentzian lines on a background: 16 spectra, two values of each."""
     random, inside, scores = np.random.default_rng(12), [], []
-    for _ in range(24):
+    for _ in range(16):
         f0, q = 7000.0 + random.uniform(-1, 1), 10 ** random.uniform(3, 4.5)
         f = np.linspace(7000 - 20 * 7000 / q, 7000 + 20 * 7000 / q, 401)
         f0 = 7000 + random.uniform(-5, 5) * 7000 / q
@@ -359,10 +359,10 @@ def test_a_line_at_half_the_sampling_rate_is_refused():
 @pytest.mark.slow
 @pytest.mark.parametrize("looks", [1, 30, None])
 def test_recovery_of_a_decay_into_the_noise_floor(looks):
-    """Power of signal and complex noise, averaged over looks, or a still floor with a scatter of the reading: 1/τ of 12 traces, none off."""
+    """Power of signal and complex noise, averaged over looks, or a still floor with a scatter of the reading: 1/τ of 8 traces, none off."""
     random, time = np.random.default_rng(3), np.linspace(0.0, 2000.0, 2000)
     scores, held = [], 0
-    for _ in range(12):
+    for _ in range(8):
         tau, floor = random.uniform(300, 600), 10 ** random.uniform(-4.5, -2)
         signal = np.exp(-time / tau)
         noise = np.sqrt(floor / 2) * (
@@ -377,7 +377,7 @@ def test_recovery_of_a_decay_into_the_noise_floor(looks):
         assert found.noise[0] == pytest.approx(np.sqrt(floor), rel=0.5)
     assert abs(np.mean(scores)) < 0.9
     assert np.max(np.abs(scores)) < 3.5
-    assert held >= 8
+    assert held >= 6
 
 
 @pytest.mark.slow
@@ -441,7 +441,7 @@ def test_a_pattern_that_turns_is_no_interference(rate):
 def test_an_alias_whose_frequency_is_given_gives_the_resonator():
     """1013 Hz samples of 3000 Hz hold it at 39 Hz, where blocks of eight periods are a part of the beat; above half of the sampling rate it was refused."""
     scores, held = [], []
-    for seed in range(4):
+    for seed in range(2):
         random = np.random.default_rng(seed)
         gyro = Gyro(3000.4, 2999.6, 4.9e4, 5.1e4, random.uniform(0, 1.5), random.uniform(0, 1.5))
         time = np.arange(16_000) / 1013
