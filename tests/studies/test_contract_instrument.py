@@ -29,7 +29,6 @@ LAG = {"name": "second-lag", "weight": 0.1, "second_time_constant_s": 2000.0}
         ({"thermal": {"cells": {"value": 3, "relativ_sd": 1}}}, "did you mean 'relative_sd'"),
         ({"effect": [LAG | {"second_time_constant_s": 1.0}]}, "second_time_constant_s must be at least 20, not 1."),
         ({"effect": [LAG | {"response": "bias_deg_per_h"}]}, "response = 'bias_deg_per_h' is unknown"),
-        ({"resonator": HRG["resonator"] | {"thickness_mm": [[0, 1], [2, 1]]}}, "thickness_mm.1.0 must be at most 1"),
         ({"resonator": {"shape": "meridian", "thickness_mm": 1, "segment": [{"kind": "line", "from_mm": [1, 0]}]}},
          "[[resonator.segment]] number 1: the key 'to_mm' is missing; add it."),
         ({"thermal": {"cells": {"value": 3}}}, "cells: its uncertainty is missing; give sd, relative_sd, or low and high."),

@@ -20,6 +20,7 @@ def card(tmp_path):
     return write
 
 
+@pytest.mark.slow
 def test_schema_and_record(card, tmp_path, ask):
     path = card("misalignment_mrad = 0.5\nvibration_um = 1.0\nmodal_mass_mg = 500.0\n")
     out = tmp_path / "run.csv"

@@ -11,6 +11,7 @@ from studies.record.one_gyro import records_of_one_gyro
 from studies.simulation.chamber import load_profile
 from studies.simulation.virtual_gyro import simulate_run
 
+pytestmark = pytest.mark.slow
 CAMPAIGN = (
     "ramp 25 -15 1 then soak -15 2h",
     "ramp -15 40 1 then soak 40 2h",

@@ -72,6 +72,7 @@ def test_loops_without_errors_hold_the_drift_of_the_parts() -> None:
     assert there.bias.damping_axis_deg == pytest.approx(10.0, abs=0.5)
 
 
+@pytest.mark.slow
 def test_a_run_through_the_loops_takes_the_anisotropy_at_its_temperature(tmp_path, capsys) -> None:
     """The peak at 60 °C damps all patterns alike: Δ(1/τ) is the film's alone, as hrg simulate has it, and no share of 1/Q."""
     card, out = tmp_path / "card.toml", [str(tmp_path / f"{k}.csv") for k in range(2)]

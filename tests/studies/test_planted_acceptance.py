@@ -211,6 +211,7 @@ def test_a_record_that_shows_no_test_is_named(folder, tmp_path, capsys):
     assert found["verdict"] == "incomplete"
 
 
+@pytest.mark.slow
 def test_records_of_two_gyros_or_modes_are_refused(folder, tmp_path, capsys):
     """A run at n = 3 beside one at n = 2 once gave 11 500 ppm/K."""
     cycle = read_record(folder / "cycle.csv")

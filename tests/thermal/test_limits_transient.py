@@ -70,6 +70,7 @@ def test_exact_and_integrated_agree_for_a_linear_network():
     assert np.abs(fine - exact).max() < 1e-6
 
 
+@pytest.mark.slow
 def test_radiation_tends_to_its_linearisation_quadratically():
     network = assemble(RADIATIVE)
     linear = linearise(network, 293.15)
@@ -120,6 +121,7 @@ def test_a_profile_with_many_rows_is_integrated_through_its_jump():
     assert steps.at(t) == pytest.approx(exact.at(t), abs=1e-4)
 
 
+@pytest.mark.slow
 @settings(max_examples=25, deadline=None, derandomize=True)
 @given(st.lists(st.floats(230.0, 340.0), min_size=3, max_size=8), st.floats(200.0, 350.0))
 def test_no_temperature_leaves_the_range_of_boundary_and_start(values, first):

@@ -142,6 +142,7 @@ class Filling(io.BytesIO):
         return super().write(memoryview(content)[: self.room - self.tell()])
 
 
+@pytest.mark.slow
 def test_a_disk_that_fills_at_any_byte_keeps_what_was_whole(tmp_path):
     file, whole = make(tmp_path, 24, 8)
     for room in range(0, len(file), 7):
