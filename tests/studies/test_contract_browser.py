@@ -88,27 +88,12 @@ def difference(one, two):
     return float(abs(picture(one) - picture(two)).mean())
 
 
-HEAD = [
-    "quantity",
-    "unit",
-    "card",
-    "calibrated",
-    "90 % interval",
-    "shift (sd)",
-    "width",
-    "determined by",
-    "key of the card",
-]
-NUMBERS = ["1.0000e-7", "1.00000e-7", "9.9966e-8 … 1.00052e-7", "+0.00", "0.000", "data and prior"]
-ROWS = [
-    ["1/Q at the reference temperature", "J/(kg K)", *NUMBERS, "loss.inverse_q_at_reference"],
-    [
-        "temperature curvature of the shear modulus",
-        "1/K²",
-        *NUMBERS,
-        "material.deviation.shear_modulus.log_curvature_per_K2",
-    ],
-]
+HEAD = ["quantity", "unit", "card", "calibrated", "90 % interval", "shift (sd)", "width", "determined by",
+        "key of the card"]  # fmt: skip
+NUMBERS = "1.0000e-7|1.00000e-7|9.9966e-8 … 1.00052e-7|+0.00|0.000|data and prior"
+CURVATURE = "temperature curvature of the shear modulus|1/K²", "material.deviation.shear_modulus.log_curvature_per_K2"
+LOSS = "1/Q at the reference temperature|J/(kg K)", "loss.inverse_q_at_reference"
+ROWS = [f"{named}|{NUMBERS}|{key}".split("|") for named, key in (LOSS, CURVATURE)]
 
 
 @pytest.fixture(scope="module")

@@ -229,7 +229,7 @@ def test_a_device_of_another_design_is_put_aside():
 def test_the_odd_device_and_the_bad_batch_of_a_small_lot(tmp_path):
     card, folder = str(tmp_path / "card.toml"), tmp_path / "lot"
     save_card(load_card("hrg-30mm").with_values({"thermal.cells": 10}), card)
-    planted = make_lot(folder, 8, [1], [5, 6, 7], 2, 5, columns=(*QUICK, "inverse_q"), row=180.0, card=card)
+    planted = make_lot(folder, 7, [1], [4, 5, 6], 2, 4, columns=(*QUICK, "inverse_q"), row=180.0, card=card)
     lot = run_lot(read_lot(str(folder), card))
     assert tuple(lot.odd) == planted.odd
     assert set(lot.bad_batches) == {planted.batch}
