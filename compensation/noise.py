@@ -1,4 +1,4 @@
-"""Noise of a gyro's output: white, flicker, a random walk and an offset of each turn-on (IEEE Std 952, annex C).
+"""Noise of a gyro's output: white, flicker, a random walk, an offset of each turn-on and correlated noise (IEEE Std 952, annex C).
 
 A row is the mean over its span Δ about its time t; runs are independent. With N (`white`), a (`flicker`) and K (`walk`),
 
@@ -28,27 +28,29 @@ FLICKER_TIMES = np.asarray(60.0 * 4.0 ** np.arange(-11, 7), dtype=np.float64)  #
 SLOW_TIMES = 7
 """How many of them are a minute and longer: flicker noise of a = 1 has this variance in rows of some seconds to minutes."""
 FORGOTTEN = 40.0  # correlation times after which nothing is left to double precision
+STEP = 1e-4  # in the ln of a correlation time, for slopes
 BRIEF = 50.0  # correlation times in a span beyond which a row remembers its neighbours only
 
 
 @dataclass(frozen=True)
 class Noise:
-    """Levels in the unit of a signal: Allan deviation of the white part at 1 s, flat part, walk in 1 s, and offsets of runs."""
+    """Levels in the unit of a signal: Allan deviation of the white part at 1 s, flat part, walk in 1 s, offsets of runs, rms of correlated noise and its time (s)."""
 
     white: float = 0.0
     flicker: float = 0.0
     walk: float = 0.0
     offset: float = 0.0
+    markov: float = 0.0
+    markov_time: float = 0.0
 
     def allan_variance(self, tau: ArrayLike) -> Array:
-        """Return the Allan variance at averaging times τ (s); Gauss–Markov: (2/x) (1 − (3 − 4 e⁻ˣ + e⁻²ˣ)/(2x)), IEEE Std 952 eq. C.17."""
+        """Return the Allan variance at averaging times τ (s)."""
         t = np.asarray(tau, dtype=np.float64)
         total = self.white**2 / t + self.walk**2 * t / 3.0
         if self.flicker:
-            x = t[..., None] / FLICKER_TIMES
-            bracket = 4.0 * np.expm1(-x) - np.expm1(-2.0 * x)  # −(3 − 4 e⁻ˣ + e⁻²ˣ)
-            exact = 2.0 / x * (1.0 + bracket / (2.0 * x))
-            total = total + self.flicker**2 * np.where(x < 1e-4, x * (2.0 / 3.0 - x / 2.0), exact).sum(axis=-1)
+            total = total + self.flicker**2 * _allan_of_gauss_markov(t[..., None] / FLICKER_TIMES).sum(axis=-1)
+        if self.markov:
+            total = total + self.markov**2 * _allan_of_gauss_markov(t / self.markov_time)
         return np.asarray(total)
 
     def covariance(self, times: Array, spans: ArrayLike) -> Array:
@@ -59,6 +61,8 @@ class Noise:
             total += self.flicker**2 * flicker(times, spans)
         if self.walk:
             total += self.walk**2 * random_walk(times, spans)
+        if self.markov:
+            total += self.markov**2 * gauss_markov(times, spans, self.markov_time)
         if self.white:
             total[np.diag_indices_from(total)] += self.white**2 / spans
         return total
@@ -68,13 +72,15 @@ class Noise:
         span = 1.0 / rate
         slow = np.zeros(count)
         if self.flicker:
-            slow += self.flicker * _draw_flicker(count, span, generator)
+            slow += self.flicker * _draw_gauss_markov(count, span, FLICKER_TIMES, generator)
         if self.walk:
             slow += self.walk * math.sqrt(span) * _draw_walk(count, generator)
         if self.white:
             slow += self.white / math.sqrt(span) * generator.standard_normal(count)
         if self.offset:
             slow += self.offset * generator.standard_normal()
+        if self.markov:
+            slow += self.markov * _draw_gauss_markov(count, span, np.array([self.markov_time]), generator)
         return slow
 
 
@@ -87,6 +93,12 @@ def gauss_markov(times: Array, spans: ArrayLike, tau: float) -> Array:
     out = np.exp(-np.maximum(apart, 0.0) / tau) * np.outer(g, g)
     out[np.diag_indices_from(out)] = variance_of_mean(near)
     return np.asarray(out)
+
+
+def gauss_markov_slope(times: Array, spans: ArrayLike, tau: float) -> Array:
+    """Return the slope of that covariance by ln τ, by central differences."""
+    shorter, longer = (gauss_markov(times, spans, tau * math.exp(way * STEP)) for way in (-1, 1))
+    return (longer - shorter) / (2 * STEP)
 
 
 def flicker(times: Array, spans: ArrayLike) -> Array:
@@ -136,9 +148,15 @@ def _mean_of_decay(x: Array) -> Array:
     return np.asarray(-np.expm1(-x) / x)
 
 
-def _draw_flicker(count: int, span: float, generator: np.random.Generator) -> Array:
-    """Draw flicker noise of flat part 1 by circulant embedding (Dietrich & Newsam 1997, SIAM J. Sci. Comput. 18, 1088)."""
-    x = span / FLICKER_TIMES
+def _allan_of_gauss_markov(x: Array) -> Array:
+    """Allan variance at x of its correlation times of variance 1, (2/x) (1 − (3 − 4 e⁻ˣ + e⁻²ˣ)/(2x)): IEEE Std 952 eq. C.17."""
+    bracket = 4.0 * np.expm1(-x) - np.expm1(-2.0 * x)  # −(3 − 4 e⁻ˣ + e⁻²ˣ)
+    return np.asarray(np.where(x < 1e-4, x * (2.0 / 3.0 - x / 2.0), 2.0 / x * (1.0 + bracket / (2.0 * x))))
+
+
+def _draw_gauss_markov(count: int, span: float, times: Array, generator: np.random.Generator) -> Array:
+    """Draw the sum of processes of these correlation times and variance 1 by circulant embedding (Dietrich & Newsam 1997, SIAM J. Sci. Comput. 18, 1088)."""
+    x = span / times
     lag = np.arange(count + 1.0)
     r = np.zeros(count + 1)
     for one, g in zip(x, _mean_of_decay(x), strict=True):

@@ -1,13 +1,14 @@
 """Levels of noise by restricted likelihood with a weak prior (`compensation.noise_rows`): Newton's steps from several starts."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from compensation.arrays import Array
 from compensation.noise import Noise
-from compensation.noise_rows import KINDS, NoiseRows
-from compensation.noise_within import within
+from compensation.noise_rows import KINDS, UNKNOWNS, NoiseRows
+from compensation.noise_within import Within, within
 
 Seen = tuple[float, Array, Array]
 """−2 ln L at a point, its slopes and curvature."""
@@ -22,6 +23,11 @@ MOST_STEPS, MOST_HALVINGS = 50, 12
 LOUD = 1.0  # ln of slow noise within a run over that of a row, beyond which its kinds are searched each for itself
 STOOD = 0.1
 """Fall of −2 ln L up to which a search has ended where it began: every kind was searched when that was found."""
+PRICE = 5.0
+"""Of correlated noise, in log evidence: two more unknowns, and few records have it."""
+QUIET = -1.2  # ln of slow noise within a run over that of a row, below which it is not looked for
+PART = 60.0  # of a run, its time where the search begins
+HOPE = 5.0  # times what a step promises is still hoped for
 PURE = 0.02  # of it, within which it is of one kind
 
 
@@ -32,7 +38,7 @@ def estimate_noise(
     """Estimate the levels of the noise by its marginal likelihood: of coarse rows, and of what they say within these (`compensation.noise_within`).
 
     `target` (M,) are residuals of all runs, `columns` (M, p) what else is unknown, of prior `precision`; `kinds`:
-    "white" (always), "flicker", "walk", "offset"; `near`: where to begin; `stated`: slow levels known to a factor of 3.
+    "white" (always), "flicker", "walk", "offset", "markov"; `near`: where to begin; `stated`: slow levels known to a factor of 3.
     """
     fine = np.zeros((rows.count, 0)) if columns is None else columns
     X, y, coarse = rows.means(fine), rows.means(target), rows.coarse
@@ -45,63 +51,114 @@ def estimate_noise(
     step = np.concatenate([np.diff(rest[s]) for s in coarse.slices])
     spread = float(np.median(np.abs(step))) / 0.954 if step.size else 0.0
     spread = max(spread, 1e-14 * float(np.abs(target).max()), 1e-300)
-    free = [kind for kind in KINDS[1:] if kind in kinds and (kind != "offset" or len(rows.times) > 1)]
-    root, unit = float(np.sqrt(coarse.span)), coarse.slow_units
-
-    def levels(x: Array) -> Noise:
-        white = float(spread * np.exp(x[0]))
-        slow = {kind: white * unit[kind] * float(np.exp(one)) for kind, one in zip(free, x[1:], strict=True)}
-        return Noise(white * root, **slow)
-
-    places = [0, *(KINDS.index(kind) for kind in free)]
-    along = np.eye(len(places))
-    along[:, 0] = 1.0  # slow levels are over the white one
-
-    def objective(x: Array) -> tuple[float, Array, Array]:
-        noise = levels(x)
-        try:
-            seen = [coarse.deviance(rest, X, lam, noise, -free_part), *(one.deviance(noise) for one in inner)]
-        except np.linalg.LinAlgError:  # levels so far apart that rounding decides
-            return np.inf, x, np.eye(len(x))
-        total = sum(one for one, _, _ in seen)
-        slopes, curvature = (np.sum(own, axis=0) for own in list(zip(*seen, strict=True))[1:])
-        bend = curvature[np.ix_(places, places)] + np.diag(2 * np.maximum(slopes[places], 0.0))  # Σ goes with θ²
-        slope, bend = slopes[places] @ along, along.T @ bend @ along
-        for k, (surprise, spread, absolute) in enumerate(_surprises(coarse, noise, free, stated), 1):
-            way = (along if absolute else np.eye(len(x)))[k] / spread
-            total, slope, bend = total + surprise**2, slope + 2 * surprise * way, bend + 2 * np.outer(way, way)
-        return total, slope, bend
+    free = tuple(k for k in KINDS[1:-1] if k in kinds and (k != "offset" or len(rows.times) > 1))
+    plain = _Levels(coarse, rest, X, lam, -free_part, inner, spread, free, stated)
 
     first = usual = np.array([WHITE, *[USUAL] * len(free)])
     if near is not None and near.white > 0:
-        white = near.white / root
-        slow = [max(getattr(near, kind) / unit[kind] / white, float(np.exp(LEAST))) for kind in free]
-        first = np.log([white / spread, *slow])
-        first[1:] = np.clip(first[1:], LEAST, MOST)
-    low, high = (np.array([end, *[slow] * len(free)]) for end, slow in ((-12.0, LEAST), (12.0, MOST)))
-
-    begin = objective(first)
-    found = _newton(objective, first, begin, low, high)
-    if near is None or begin[0] - found[0] > STOOD:
+        first = plain.place(near)
+    begin = plain(first)
+    found = _newton(plain, first, begin)
+    moved = near is None or begin[0] - found[0] > STOOD
+    if moved:
         for start in _other_slow(found[1], free):  # what is slow may be of another kind than where the search ended
-            there = objective(start)
+            there = plain(start)
             if start.max() > LOUD or there[0] < found[0]:
-                found = min(found, _newton(objective, start, there, low, high), key=lambda one: one[0])
+                found = min(found, _newton(plain, start, there), key=lambda one: one[0])
     if found[1][0] < WHITE - TOO_QUIET:  # slow noise that stands for the scatter of rows may only be a lesser optimum
-        found = min(found, _newton(objective, usual, objective(usual), low, high), key=lambda one: one[0])
-    return levels(found[1])
+        found = min(found, _newton(plain, usual, plain(usual)), key=lambda one: one[0])
+    if "markov" not in kinds:
+        return plain.noise(found[1])
+    return _with_correlated(plain, found, near, moved)
 
 
-def _newton(objective: Callable[[Array], Seen], x: Array, seen: Seen, low: Array, high: Array) -> tuple[float, Array]:
-    """Return the least value between bounds, and where, by Newton's steps from what is seen at x, halved until they lower it."""
+def _with_correlated(plain: "_Levels", found: tuple[float, Array], near: Noise | None, moved: bool) -> Noise:
+    """Return the noise with a Gauss–Markov part where that is worth its price."""
+    own = replace(plain, free=(*plain.free, "markov", "markov_time"))
+    slow, longest = _slow_rms(found[1][1:]), max(float(np.ptp(t)) for t in plain.rows.times)
+    if near is not None and near.markov:
+        start = own.place(near)
+    elif moved and slow > QUIET:
+        loud = slow + found[1][0] - WHITE
+        start = np.array([WHITE, *[USUAL - SPREAD] * len(plain.free), loud, np.log(longest / PART)])
+    else:
+        return plain.noise(found[1])
+    best = _newton(own, start, own(start), found[0])
+    return own.noise(best[1]) if best[0] < found[0] else plain.noise(found[1])
+
+
+@dataclass(frozen=True)
+class _Levels:
+    """What rows say of unknown levels: ln of the white noise over `spread`, of the rms of each other kind within a run over that of a row's white noise, and of the time of correlated noise in s."""
+
+    rows: NoiseRows
+    rest: Array
+    columns: Array
+    precision: Array
+    mean: Array
+    inner: Sequence[Within]
+    spread: float
+    free: tuple[str, ...]
+    stated: Noise | None
+
+    def noise(self, x: Array) -> Noise:
+        white = float(self.spread * np.exp(x[0]))
+        unit = {**{kind: white * own for kind, own in self.rows.slow_units.items()}, "markov_time": 1.0}
+        slow = {kind: unit[kind] * float(np.exp(one)) for kind, one in zip(self.free, x[1:], strict=True)}
+        return Noise(white * float(np.sqrt(self.rows.span)), **slow)
+
+    def place(self, noise: Noise) -> Array:
+        """Return where the levels of a noise are."""
+        white = noise.white / float(np.sqrt(self.rows.span))
+        unit = {**{kind: white * own for kind, own in self.rows.slow_units.items()}, "markov_time": 1.0}
+        slow = [max(getattr(noise, kind) / unit[kind], 1e-300) for kind in self.free]
+        return np.clip(np.log([white / self.spread, *slow]), *self.ends)
+
+    @property
+    def ends(self) -> tuple[Array, Array]:
+        """Ends between which the levels are looked for; correlated noise of the time of a row is white, of a run a walk."""
+        longest = max(float(np.ptp(t)) for t in self.rows.times)
+        times = {"markov_time": (np.log(self.rows.span), np.log(longest))}
+        ends = [(-12.0, 12.0), *(times.get(kind, (LEAST, MOST)) for kind in self.free)]
+        low, high = np.array(ends).T
+        return low, high
+
+    def likelihood(self, noise: Noise) -> Seen:
+        """Return −2 ln L of the rows and of what is within them, with slopes and curvature by ln of every kind."""
+        seen = [self.rows.deviance(self.rest, self.columns, self.precision, noise, self.mean)]
+        seen += [one.deviance(noise) for one in self.inner]
+        value, slopes, curvature = (np.sum(own, axis=0) for own in zip(*seen, strict=True))
+        return float(value), slopes, curvature
+
+    def __call__(self, x: Array) -> Seen:
+        noise = self.noise(x)
+        try:
+            total, slopes, curvature = self.likelihood(noise)
+        except np.linalg.LinAlgError:  # levels so far apart that rounding decides
+            return np.inf, x, np.eye(len(x))
+        places = [0, *(UNKNOWNS.index(kind) for kind in self.free)]
+        along = np.eye(len(places))
+        along[:, 0] = [kind != "markov_time" for kind in ("white", *self.free)]  # slow levels are over the white one
+        bend = curvature[np.ix_(places, places)] + np.diag(2 * np.maximum(slopes[places], 0.0))  # Σ goes with θ²
+        slope, bend = slopes[places] @ along, along.T @ bend @ along
+        levels = [kind for kind in self.free if kind in KINDS]
+        for k, (surprise, spread, absolute) in enumerate(_surprises(self.rows, noise, levels, self.stated), 1):
+            way = (along if absolute else np.eye(len(x)))[k] / spread
+            total, slope, bend = total + surprise**2, slope + 2 * surprise * way, bend + 2 * np.outer(way, way)
+        return total + 2.0 * PRICE * bool(noise.markov), slope, bend
+
+
+def _newton(objective: _Levels, x: Array, seen: Seen, below: float = np.inf) -> tuple[float, Array]:
+    """Return the least value between bounds, and where, by Newton's steps from what is seen at x, halved until they lower it; ended early where it would not come `below`."""
     value, slope, bend = seen
+    low, high = objective.ends
     for _ in range(MOST_STEPS):
         free = ~(((x <= low) & (slope > 0)) | ((x >= high) & (slope < 0)))
         step = np.zeros_like(x)
         step[free] = -np.linalg.solve(bend[np.ix_(free, free)] + 1e-9 * np.eye(free.sum()), slope[free])
         step *= min(1.0, LONGEST / max(np.abs(step).max(), 1e-300))
         promised = -(slope @ step + 0.5 * step @ bend @ step)
-        if promised < CLOSE:
+        if promised < CLOSE or value - HOPE * promised > below:
             break
         for _ in range(MOST_HALVINGS):
             tried = np.clip(x + step, low, high)
@@ -120,7 +177,7 @@ def _other_slow(x: Array, free: Sequence[str]) -> list[Array]:
     kinds = [k for k, kind in enumerate(free, 1) if kind != "offset"]
     if len(kinds) < 2:
         return []
-    total = 0.5 * float(np.logaddexp.reduce(2.0 * x[kinds]))
+    total = _slow_rms(x[kinds])
     starts = []
     for k in kinds:
         if x[k] < total - PURE:
@@ -132,10 +189,16 @@ def _other_slow(x: Array, free: Sequence[str]) -> list[Array]:
     return starts
 
 
+def _slow_rms(x: Array) -> float:
+    """Return ln of the rms of all slow noise within a run from those of its kinds."""
+    return 0.5 * float(np.logaddexp.reduce(2.0 * x))
+
+
 def log_prior(rows: NoiseRows, noise: Noise, stated: Noise | None = None) -> float:
     """Return the log of the weak prior of the slow levels that are there."""
     free = [kind for kind in KINDS[1:] if getattr(noise, kind) > 0]
-    return -0.5 * sum(surprise**2 for surprise, _, _ in _surprises(rows, noise, free, stated))
+    surprises = _surprises(rows, noise, free, stated)
+    return -0.5 * sum(surprise**2 for surprise, _, _ in surprises) - PRICE * bool(noise.markov)
 
 
 def _surprises(

@@ -20,11 +20,12 @@ from numpy.typing import NDArray
 
 from compensation.arrays import Array
 from compensation.errors import CompensationError
-from compensation.noise import SLOW_TIMES, Noise, flicker, random_walk
+from compensation.noise import SLOW_TIMES, Noise, flicker, gauss_markov, gauss_markov_slope, random_walk
 
 KEPT = 4  # roots of the covariance of rows
 COARSE = 150  # most rows of a run from which noise is estimated in a model with many unknowns
-KINDS = ("white", "flicker", "walk", "offset")
+KINDS = ("white", "flicker", "walk", "offset", "markov")
+UNKNOWNS = (*KINDS, "markov_time")
 
 
 @dataclass(frozen=True)
@@ -122,18 +123,20 @@ class NoiseRows:
     def slow_units(self) -> dict[str, float]:
         """Slow levels whose rms in a run is about 1."""
         seconds = max(max(float(np.ptp(t)) for t in self.times), 1e-6)
-        return {"flicker": SLOW_TIMES**-0.5, "walk": seconds**-0.5, "offset": 1.0}
+        return {"flicker": SLOW_TIMES**-0.5, "walk": seconds**-0.5, "offset": 1.0, "markov": 1.0}
 
     def slow_share(self, noise: Noise) -> float:
         """Return the rms of slow noise within a usual run over the white noise of a row."""
         unit = self.slow_units
-        slow = np.hypot(noise.flicker / unit["flicker"], noise.walk / unit["walk"] / 6**0.5)
-        return float(slow / max(noise.white / self.span**0.5, 1e-300))
+        slow = np.array([noise.flicker / unit["flicker"], noise.walk / unit["walk"] / 6**0.5, noise.markov])
+        return float(np.linalg.norm(slow) / max(noise.white / self.span**0.5, 1e-300))
 
     def covariance(self, run: int, noise: Noise) -> Array:
         """Covariance of the rows of one run."""
         F, W = next((F, W) for F, W, runs in self._groups if run in runs)
         total: Array = noise.flicker**2 * F + noise.walk**2 * W + noise.offset**2
+        if noise.markov:
+            total += noise.markov**2 * gauss_markov(self.times[run], self.spans[run], noise.markov_time)
         np.einsum("ii->i", total)[:] += noise.white**2 * self.stretch[run] / self.spans[run]
         return total
 
@@ -177,7 +180,7 @@ class NoiseRows:
     def deviance(
         self, target: Array, columns: Array, precision: Array, noise: Noise, mean: Array | None = None
     ) -> tuple[float, Array, Array]:
-        """Return −2 ln L (see the module) of residuals (M,) beside columns (M, p) of prior precision and mean, its slopes by ln θ of the levels `KINDS`, and their curvature.
+        """Return −2 ln L (see the module) of residuals (M,) beside columns (M, p) of prior precision and mean, its slopes by ln θ of the `UNKNOWNS`, and their curvature.
 
         With Σ_θ = θ ∂Σ/∂θ, V⁻¹ = Σ⁻¹ − U Uᵀ, U = Σ⁻¹ X C, C Cᵀ = (Λ + XᵀΣ⁻¹X)⁻¹, and v = Σ⁻¹ times what is left: tr V⁻¹Σ_θ − vᵀΣ_θ v,
         and vᵀΣ_θ V⁻¹ Σ_φ v, the mean of observed and expected information (Johnson & Thompson 1995, J. Dairy Sci. 78, 449).
@@ -193,22 +196,40 @@ class NoiseRows:
         rest = r - X @ found
         total += float(rest @ rest + (found - about) @ (precision * (found - about)))
         total += 2 * float(np.log(np.diag(root)).sum())
-        both, slopes, moved = np.column_stack([beside, rest]), np.zeros(len(KINDS)), np.zeros((len(rest), len(KINDS)))
-        levels = 2 * np.array([noise.white, noise.flicker, noise.walk, noise.offset]) ** 2
+        both, slopes, moved = (
+            np.column_stack([beside, rest]),
+            np.zeros(len(UNKNOWNS)),
+            np.zeros((len(rest), len(UNKNOWNS))),
+        )
+        levels = level_slopes(noise)
         for (K, runs), (F, W, _) in zip(whitener.roots, self._groups, strict=True):
             S = len(runs) * scipy.linalg.lapack.dlauum(K, lower=1)[0]  # of V⁻¹ − v vᵀ the lower half
             wide = self.stretch[runs[0]] / self.spans[runs[0]]
+            M, turned = self._correlated(runs[0], noise)
             for run in runs:
                 U = multiply_lower(K, both[self.slices[run]], transposed=True)
                 S = scipy.linalg.blas.dsyrk(-1.0, U, beta=1.0, c=S, lower=1)
                 v = U[:, -1]
-                own = np.column_stack([wide * v, F @ v, W @ v, np.full(len(v), v.sum())])
+                own = np.column_stack([wide * v, F @ v, W @ v, np.full(len(v), v.sum()), M @ v, turned @ v])
                 moved[self.slices[run]] = multiply_lower(K, own * levels)
             diagonal = S.diagonal()
-            by_kind = diagonal @ wide, *(2 * np.vdot(S, own) - diagonal @ own.diagonal() for own in (F, W))
-            slopes += levels * np.array([*by_kind, 2 * S.sum() - diagonal.sum()])
+            f, w, m, t = (2 * np.vdot(S, own) - diagonal @ own.diagonal() for own in (F, W, M, turned))
+            slopes += levels * np.array([diagonal @ wide, f, w, 2 * S.sum() - diagonal.sum(), m, t])
         told = beside.T @ moved
         return total, slopes, moved.T @ moved - told.T @ told
+
+    def _correlated(self, run: int, noise: Noise) -> tuple[Array, Array]:
+        """Covariance of the rows of a run by correlated noise of rms 1, and its slope by ln of its time."""
+        if not noise.markov:
+            return (np.zeros((len(self.times[run]), len(self.times[run]))),) * 2
+        own = self.times[run], self.spans[run], noise.markov_time
+        return gauss_markov(*own), gauss_markov_slope(*own)
+
+
+def level_slopes(noise: Noise) -> Array:
+    """Return what the covariance of each of `UNKNOWNS` at a level of 1 is multiplied by in the slope by its ln."""
+    squares = np.array([getattr(noise, kind) for kind in KINDS]) ** 2
+    return np.append(2 * squares, squares[-1])
 
 
 @lru_cache(maxsize=32)

@@ -1,6 +1,6 @@
 """What rows say of noise within the coarse rows that they are averaged to: differences of neighbours, which the means have lost.
 
-Of G groups of k even rows the k − 1 contrasts d of each are normal with C = θ_w² 1/span + θ_f² QᵀFQ + θ_k² QᵀWQ, Q the orthonormal contrasts:
+Of G groups of k even rows the k − 1 contrasts d of each are normal with C = Σ θ² QᵀAQ of the covariances A of every kind, Q the orthonormal contrasts:
 
     −2 ln L = G ln|C| + tr C⁻¹S,   S = Σ d dᵀ,
 
@@ -9,13 +9,14 @@ groups taken as independent of each other and of their means, as what is slow ha
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 import scipy
 
 from compensation.arrays import Array
-from compensation.noise import Noise, flicker, random_walk
-from compensation.noise_rows import KINDS, NoiseRows
+from compensation.noise import Noise, flicker, gauss_markov, gauss_markov_slope, random_walk
+from compensation.noise_rows import KINDS, NoiseRows, level_slopes
 
 EVEN = 1e-3
 """Part of a span by which rows may be uneven."""
@@ -23,17 +24,20 @@ EVEN = 1e-3
 
 @dataclass(frozen=True)
 class Within:
-    """Groups of as many even rows: how many, the products S of their contrasts, and the covariance of these by a level of 1 of each of `KINDS`."""
+    """Groups of as many even rows of a span (s): how many, the products S of their contrasts, and the covariance of these by a level of 1 of each of `KINDS` but the last."""
 
     count: int
+    span: float
     products: Array
     by_level: Array
 
     def deviance(self, noise: Noise) -> tuple[float, Array, Array]:
-        """Return −2 ln L (see the module), its slopes by ln θ of the levels, and their expected curvature."""
+        """Return −2 ln L (see the module), its slopes by ln θ of the `UNKNOWNS`, and their expected curvature."""
         squares = np.array([getattr(noise, kind) for kind in KINDS]) ** 2
-        inverse = np.linalg.inv(np.tensordot(squares, self.by_level, 1))
-        ways = 2.0 * squares[:, None, None] * (inverse @ self.by_level)  # C⁻¹ ∂C/∂ln θ
+        correlated = _correlated(len(self.products) + 1, self.span, noise.markov_time)
+        by_level = np.concatenate([self.by_level, correlated])
+        inverse = np.linalg.inv(np.tensordot(squares, by_level[:-1], 1))
+        ways = level_slopes(noise)[:, None, None] * (inverse @ by_level)  # C⁻¹ ∂C/∂ln θ
         told = inverse @ self.products
         slopes = self.count * np.trace(ways, axis1=1, axis2=2) - np.einsum("aij,ji->a", ways, told)
         curvature = self.count * np.einsum("aij,bji->ab", ways, ways)
@@ -69,6 +73,25 @@ def _left(rows: NoiseRows, target: Array, columns: Array) -> Array:
 
 def _within(groups: Array, span: float) -> Within:
     k = groups.shape[1]
-    Q, at, wide = scipy.linalg.helmert(k).T, span * np.arange(k, dtype=np.float64), np.full(k, span, np.float64)
+    Q, (at, wide) = _contrasts(k), _even(k, span)
     by_level: Sequence[Array] = (np.eye(k) / span, flicker(at, wide), random_walk(at, wide), np.zeros((k, k)))
-    return Within(len(groups), Q.T @ groups.T @ groups @ Q, np.array([Q.T @ own @ Q for own in by_level]))
+    products = Q.T @ groups.T @ groups @ Q
+    return Within(len(groups), span, products, np.array([Q.T @ own @ Q for own in by_level]))
+
+
+@lru_cache(maxsize=64)
+def _correlated(k: int, span: float, tau: float) -> Array:
+    """Covariance of the contrasts of k rows of a Gauss–Markov process of variance 1, and its slope by ln τ; 0 of none."""
+    if not tau:
+        return np.zeros((2, k - 1, k - 1))
+    Q, rows = _contrasts(k), (*_even(k, span), tau)
+    return np.array([Q.T @ own(*rows) @ Q for own in (gauss_markov, gauss_markov_slope)])
+
+
+def _contrasts(k: int) -> Array:
+    return np.asarray(scipy.linalg.helmert(k).T)
+
+
+def _even(k: int, span: float) -> tuple[Array, Array]:
+    """Return times and spans of k even rows."""
+    return span * np.arange(k, dtype=np.float64), np.full(k, span, np.float64)

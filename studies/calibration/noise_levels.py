@@ -98,10 +98,10 @@ def _levels(
     columns: Array | None = None,
     near: Noise | None = None,
 ) -> Noise:
-    kinds = ("white",) if name == SETTLED else KINDS if has_levels(problem, name) else KINDS[:-1]
+    kinds = [kind for kind in KINDS if kind != "offset" or has_levels(problem, name)]
     precision = None if columns is None else np.ones(columns.shape[1])
     stated = None if columns is None else stated_noise(problem.instrument.noise, name)
-    noise = estimate_noise(rows, target, columns, precision, kinds, near, stated)
+    noise = estimate_noise(rows, target, columns, precision, ["white"] if name == SETTLED else kinds, near, stated)
     if name == SETTLED:  # a reading is not better than its last digit, and a level or a slope is no noise
         least, most = (max(getattr(table, end) for table in problem.tables) for end in ("rounding", "scatter"))
         return replace(noise, white=float(np.clip(noise.white, least, most)))

@@ -236,6 +236,7 @@ class Search:
                     white=white,
                     flicker=own.flicker * max(part, 0.1),
                     walk=own.walk * part,
+                    markov=own.markov * part,
                     offset=own.offset * max(part, 0.1),
                 )
                 found.append((name, {**now.noise, name: less}))
