@@ -26,7 +26,8 @@ STOOD = 0.1
 PRICE = 5.0
 """Of correlated noise, in log evidence: two more unknowns, and few records have it."""
 QUIET = -1.2  # ln of slow noise within a run over that of a row, below which it is not looked for
-PART = 60.0  # of a run, its time where the search begins
+LESS, PART = 1.0, 60.0
+"""Where its search begins: ln of its rms below all slow noise, for a walk's grows over a run, and its time in parts of a run."""
 HOPE = 5.0  # times what a step promises is still hoped for
 PURE = 0.02  # of it, within which it is of one kind
 
@@ -79,7 +80,7 @@ def _with_correlated(plain: "_Levels", found: tuple[float, Array], near: Noise |
     if near is not None and near.markov:
         start = own.place(near)
     elif moved and slow > QUIET:
-        loud = slow + found[1][0] - WHITE
+        loud = slow + found[1][0] - WHITE - LESS
         start = np.array([WHITE, *[USUAL - SPREAD] * len(plain.free), loud, np.log(longest / PART)])
     else:
         return plain.noise(found[1])

@@ -12,7 +12,8 @@ KINDS = {
     "white": Noise(white=2.0),
     "flicker": Noise(flicker=0.5),
     "walk": Noise(walk=0.1),
-    "all": Noise(2.0, 0.5, 0.02),
+    "markov": Noise(markov=0.5, markov_time=3.0),
+    "all": Noise(2.0, 0.5, 0.02, 0.0, 1.0, 20.0),
 }
 
 
@@ -36,7 +37,7 @@ def test_the_allan_variance_of_draws_is_that_of_the_levels(kind, rate):
 @pytest.mark.slow
 def test_draws_have_the_covariance_of_the_levels():
     """Whitened by it, 8000 runs of 30 rows have the unit matrix: eigenvalues of a sample's are within (1 ± √(30/8000))²."""
-    noise, times = Noise(2.0, 0.5, 0.05, 0.7), 20.0 * np.arange(30)
+    noise, times = Noise(2.0, 0.5, 0.05, 0.7, 0.4, 90.0), 20.0 * np.arange(30)
     generator = np.random.default_rng(5)
     drawn = np.array([noise.draw(30, 0.05, generator) for _ in range(8000)])
     L = np.linalg.cholesky(noise.covariance(times, 20.0))
@@ -62,7 +63,7 @@ def test_means_have_the_mean_of_the_covariance_of_what_they_are_means_of(covaria
 
 def test_the_allan_variance_follows_from_the_covariance_of_two_neighbours():
     """σ²(τ) = ½ var(y₂ − y₁) of two means over τ side by side."""
-    noise = Noise(2.0, 0.5, 0.03, 1.0)
+    noise = Noise(2.0, 0.5, 0.03, 1.0, 0.7, 20.0)
     for tau in (1e-4, 0.1, 10.0, 1e3, 1e5):
         C = noise.covariance(np.array([0.5, 1.5]) * tau, tau)
         assert noise.allan_variance(tau) == pytest.approx((C[0, 0] + C[1, 1] - 2 * C[0, 1]) / 2, rel=1e-7)

@@ -11,7 +11,7 @@ from scipy.stats import chi2
 from compensation.errors import CompensationError
 from compensation.noise import Noise
 from compensation.noise_estimate import estimate_noise
-from compensation.noise_rows import KINDS, NoiseRows
+from compensation.noise_rows import UNKNOWNS, NoiseRows
 from compensation.noise_within import within
 
 Array = NDArray[np.float64]
@@ -107,7 +107,7 @@ def test_what_is_within_coarse_rows_is_the_likelihood_of_their_contrasts():
     t = np.cumsum(np.full(400, 5.0) + 100.0 * (np.arange(400) == 151))
     stretch = np.where(np.arange(400) == 30, 50.0, 1.0)
     rows = replace(NoiseRows.of([t], [np.full(400, 5.0)]), stretch=(stretch,))
-    noise, r = Noise(1.0, 0.5, 0.1), generator.standard_normal(400)
+    noise, r = Noise(1.0, 0.5, 0.1, 0.0, 0.6, 7.0), generator.standard_normal(400)
     (own,) = within(rows, r, np.zeros((400, 0)))
     kept = [k for k in range(0, 399, 3) if k not in (30, 150)]
     assert own.count == len(kept)
@@ -117,7 +117,7 @@ def test_what_is_within_coarse_rows_is_the_likelihood_of_their_contrasts():
     exact = len(kept) * np.linalg.slogdet(C)[1] + np.sum(d @ np.linalg.inv(C) * d)
     total, slopes, _ = own.deviance(noise)
     assert total == pytest.approx(exact, rel=1e-9)
-    for kind, slope in zip(KINDS, slopes, strict=True):
+    for kind, slope in zip(UNKNOWNS, slopes, strict=True):
         ends = (own.deviance(replace(noise, **{kind: getattr(noise, kind) * np.exp(e)}))[0] for e in (-1e-5, 1e-5))
         low, high = ends
         assert slope == pytest.approx((high - low) / 2e-5, rel=1e-5, abs=1e-6)
@@ -141,14 +141,14 @@ def test_slopes_of_the_likelihood_are_its_differences():
     generator = np.random.default_rng(4)
     rows = NoiseRows.of([EVEN[:60], EVEN[:60], np.sort(generator.uniform(0.0, 3000.0, 50))])
     r, X = generator.standard_normal(170), generator.standard_normal((170, 3))
-    noise, prior = Noise(3.0, 0.4, 0.02, 0.3), (np.full(3, 0.7), np.full(3, 0.3))
+    noise, prior = Noise(3.0, 0.4, 0.02, 0.3, 0.5, 200.0), (np.full(3, 0.7), np.full(3, 0.3))
 
     def at(level: str, e: float) -> float:
         moved = replace(noise, **{level: getattr(noise, level) * np.exp(e)})
         return rows.deviance(r, X, prior[0], moved, prior[1])[0]
 
     _, slopes, curvature = rows.deviance(r, X, prior[0], noise, prior[1])
-    for level, slope in zip(KINDS, slopes, strict=True):
+    for level, slope in zip(UNKNOWNS, slopes, strict=True):
         assert slope == pytest.approx((at(level, 1e-4) - at(level, -1e-4)) / 2e-4, rel=1e-6, abs=1e-6)
 
     def dense(one):
@@ -156,8 +156,23 @@ def test_slopes_of_the_likelihood_are_its_differences():
 
     P = np.linalg.inv(dense(noise) + X @ np.diag(1 / prior[0]) @ X.T)
     v = P @ (r - X @ prior[1])
-    moved = [2 * dense(replace(Noise(0.0), **{kind: getattr(noise, kind)})) @ v for kind in KINDS]
+    ends = [[dense(replace(noise, **{k: getattr(noise, k) * np.exp(e)})) for e in (1e-4, -1e-4)] for k in UNKNOWNS]
+    moved = [(high - low) / 2e-4 @ v for high, low in ends]
     assert curvature == pytest.approx(np.array([[a @ P @ b for b in moved] for a in moved]), rel=1e-6)
+
+
+@pytest.mark.parametrize("time", [300.0, 600.0])
+def test_correlated_noise_is_told_with_its_time_and_healthy_noise_has_none(time):
+    """Rows of 96 s, 4 runs: rms and time within three of their sampling errors, √(2τ/T) and as much over again; none in 12 draws of the usual kinds."""
+    generator, rows = np.random.default_rng(7), NoiseRows.of([EVEN] * 4)
+    error = np.sqrt(2 * time / (4 * EVEN[-1]))
+    for _ in range(3):
+        found = estimate_noise(rows, draw(rows, Noise(2.0, offset=0.3, markov=1.0, markov_time=time), generator))
+        assert abs(np.log(found.markov)) < 3 * error
+        assert abs(np.log(found.markov_time / time)) < 6 * error
+        assert found.flicker < 0.2
+    usual = (Noise(2.0), Noise(2.0, 0.3), Noise(2.0, 0.05, 0.005), Noise(1.0, 0.5))
+    assert not any(estimate_noise(rows, draw(rows, own, generator)).markov for own in usual * 3)
 
 
 def test_the_unit_of_the_signal_does_not_matter():
