@@ -35,7 +35,7 @@ def twin(
     """Write the virtual gyro of a card as an FMU for co-simulation, or as C11.
 
     The heat path, the frequency law, bias, 1/Q, effects, settled loops and noise are those of hrg simulate; without noise the
-    numbers are the same to 1e-9 (terms of ḟ of the bias, where an effect warms the resonator, to some 1e-5 with rows of 1 s: both take its rate between rows). Noise has the levels of [noise]: white, flicker as a sum of first-order processes, random walk.
+    numbers are the same to 1e-9 (terms of ḟ of the bias, where an effect warms the resonator, to some 1e-5 with rows of 1 s: both take its rate between rows). Noise has the levels of [noise]: white, flicker as a sum of first-order processes, random walk, correlated.
     An effect with a date (since) goes on from it: the C program takes the profile's '# start', the FMU its parameter start_s, in s since 1970 (UTC).
     Parameters are named as in the card; shape, material laws, the number of cells, and [law] with its lags are fixed when the twin is written.
 

@@ -32,7 +32,7 @@ VALUES = (
 KEY = Column("parameter", "key of the card", where="page")
 RESIDUALS = "response | unit | as_shipped: as given .3 | calibrated: calibrated .3 | noise: noise .3 | run_offset: run offset .2 | outliers"
 PREDICTED = "response | unit | source: predicted from | as_shipped: as given .3 | calibrated: calibrated .3 | stated: expected error .3 | noise: noise .3"
-LEVELS = "response | unit | white: white .3 | flicker: flicker .3 | walk: walk .3 | offset: offset .3"
+LEVELS = "response | unit | white: white .3 | flicker: flicker .3 | walk: walk .3 | offset: offset .3 | markov: correlated .3 | time: correlation time (s) .3"
 OFFSETS = "Rms of block averages about the mean of each run; run offset: rms of these means after the calibration."
 DRIVEN = "The measured housing drives the other responses where there is one."
 ROWS = "Settled frequency: rms residual over the rows of the tables; noise: the scatter of these rows about the calibrated card."
@@ -78,7 +78,12 @@ def calibration_parts(found: Calibration, payload: Mapping[str, Any]) -> list[Ch
     runs = set(found.ladder) - {SETTLED}
     notes = [*([OFFSETS, DRIVEN] if runs else []), *([ROWS] if SETTLED in found.ladder else [])]
     levels = [
-        _scaled(name, {"white": n.white, "flicker": n.flicker, "walk": 60.0 * n.walk, "offset": n.offset})
+        _scaled(
+            name,
+            {"white": n.white, "flicker": n.flicker, "walk": 60.0 * n.walk, "offset": n.offset}
+            | ({"markov": n.markov} if n.markov else {}),
+        )
+        | ({"time": n.markov_time} if n.markov else {})
         for name, n in found.fit.noise.items()
         if name in runs
     ]
@@ -100,7 +105,7 @@ def calibration_parts(found: Calibration, payload: Mapping[str, Any]) -> list[Ch
         ]),
         Chapter("Residuals over time, and noise" if runs else "Residuals over temperature", [
             Figure(lambda: residual_figure(found), "Measured minus predicted after the calibration" + ("; block averages, one colour for each run." if runs else ".")),
-            Table("Noise levels", levels, LEVELS, "White: Allan deviation at 1 s. Flicker: flat part of the Allan deviation. Walk: standard deviation of the change in 1 h. Offset: standard deviation from run to run.", "page"),
+            Table("Noise levels", levels, LEVELS, "White: Allan deviation at 1 s. Flicker: flat part of the Allan deviation. Walk: standard deviation of the change in 1 h. Offset: standard deviation from run to run. Correlated: rms of Gauss–Markov noise, where there is some.", "page"),
         ]),
     ]  # fmt: skip
 

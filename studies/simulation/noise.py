@@ -15,7 +15,13 @@ if TYPE_CHECKING:
 
 def frequency_noise(noise: "NoiseKeys") -> Noise:
     """Noise of the frequency, Hz."""
-    return Noise(noise.frequency_white_Hz, noise.frequency_flicker_Hz, noise.frequency_walk_Hz)
+    return Noise(
+        noise.frequency_white_Hz,
+        noise.frequency_flicker_Hz,
+        noise.frequency_walk_Hz,
+        markov=noise.frequency_markov_Hz,
+        markov_time=noise.frequency_markov_s,
+    )
 
 
 def bias_noise(noise: "NoiseKeys") -> Noise:
@@ -25,6 +31,8 @@ def bias_noise(noise: "NoiseKeys") -> Noise:
         noise.bias_flicker_deg_per_h,
         noise.bias_walk_deg_per_h_per_rt_h / 60.0,
         noise.bias_turn_on_deg_per_h,
+        noise.bias_markov_deg_per_h,
+        noise.bias_markov_s,
     )
 
 
@@ -33,12 +41,14 @@ def noise_keys(noise: "Mapping[str, Noise]", loss: float) -> dict[str, float]:
     keys: dict[str, float] = {}
     if own := noise.get("frequency_Hz"):
         keys |= {"frequency_white_Hz": own.white, "frequency_flicker_Hz": own.flicker, "frequency_walk_Hz": own.walk}
+        keys |= {"frequency_markov_Hz": own.markov} | ({"frequency_markov_s": own.markov_time} if own.markov else {})
     if own := noise.get("bias_deg_per_h"):
         keys |= {
             "bias_white_deg_per_rt_h": own.white / 60.0,
             "bias_flicker_deg_per_h": own.flicker,
             "bias_walk_deg_per_h_per_rt_h": own.walk * 60.0,
-        }
+            "bias_markov_deg_per_h": own.markov,
+        } | ({"bias_markov_s": own.markov_time} if own.markov else {})
     if own := noise.get("inverse_q"):
         keys["inverse_q_white"] = own.white / loss
     return keys

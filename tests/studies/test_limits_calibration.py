@@ -319,7 +319,8 @@ def test_a_gyro_whose_frequency_and_housing_stand_still_was_at_rest():
 
 def test_the_noise_that_a_card_states_has_the_covariance_that_a_calibration_expects():
     """Mean squares of what drawn frequency noise changes by within 10 min to 3 h, against the stated levels' covariance."""
-    noise = NoiseKeys(frequency_white_Hz=0.0, frequency_flicker_Hz=3e-4, frequency_walk_Hz=2e-6)
+    noise = NoiseKeys(frequency_white_Hz=0.0, frequency_flicker_Hz=3e-4, frequency_walk_Hz=2e-6,
+                      frequency_markov_Hz=5e-4, frequency_markov_s=900.0)  # fmt: skip
     stated = stated_noise(noise, "frequency_Hz")
     lags = np.array([10, 30, 90, 180])
     drawn = [frequency_noise(noise).draw(1000, 1 / 60, np.random.default_rng(seed)) for seed in range(60)]

@@ -191,28 +191,34 @@ double twin_normal(Twin *w) {
     return x * r;
 }
 
-/* One row, the mean over a span: white; flicker as Gauss-Markov processes of 60 s * 4^k, k = -11 ... 6, each drawn exactly
- * (its end and its mean together); a walk from 0; an offset of the run. */
-double twin_draw(Twin *w, TwinNoise *noise, double white, double flicker, double walk, double offset, double span) {
-    double sum = white / sqrt(span) * twin_normal(w);
+/* The mean over the next x correlation times of a Gauss-Markov process of variance 1, drawn exactly with its end. */
+static double next_mean(Twin *w, double *state, double x) {
+    const double g = -expm1(-x) / x, decay = exp(-x);
+    const double whole = x < 1e-3 ? 1 - x / 3 + x * x / 12 - x * x * x / 60 : 2 * (x + expm1(-x)) / (x * x);
+    const double end = sqrt(-expm1(-2 * x)), shared = g * (1 - decay) / end, e = twin_normal(w);
+    const double mean = g * *state + shared * e + sqrt(fmax(whole - g * g - shared * shared, 0.0)) * twin_normal(w);
+    *state = decay * *state + end * e;
+    return mean;
+}
+
+/* One row, the mean over a span: white; flicker as Gauss-Markov processes of 60 s * 4^k, k = -11 ... 6; a walk from 0;
+ * an offset of the run; correlated noise. */
+double twin_draw(Twin *w, TwinNoise *noise, TwinLevels level, double span) {
+    double sum = level.white / sqrt(span) * twin_normal(w);
     if (!noise->begun) {
-        for (int k = 0; k < FLICKER_TIMES; ++k) noise->markov[k] = twin_normal(w);
+        for (int k = 0; k < FLICKER_TIMES; ++k) noise->flicker[k] = twin_normal(w);
         noise->walk = 0.0;
         noise->offset = twin_normal(w);
+        noise->markov = level.markov > 0 ? twin_normal(w) : 0.0;
         noise->begun = 1;
     }
-    for (int k = 0; k < FLICKER_TIMES && flicker > 0; ++k) {
-        const double x = span / (60 * pow(4.0, k - 11)), g = -expm1(-x) / x, decay = exp(-x);
-        const double whole = x < 1e-3 ? 1 - x / 3 + x * x / 12 - x * x * x / 60 : 2 * (x + expm1(-x)) / (x * x);
-        const double end = sqrt(-expm1(-2 * x)), shared = g * (1 - decay) / end, e = twin_normal(w);
-        const double mean = g * noise->markov[k] + shared * e + sqrt(fmax(whole - g * g - shared * shared, 0.0)) * twin_normal(w);
-        noise->markov[k] = decay * noise->markov[k] + end * e;
-        sum += flicker * mean;
-    }
-    if (walk > 0) { /* half a step's change is in its mean, and 1/12 beside it */
+    for (int k = 0; k < FLICKER_TIMES && level.flicker > 0; ++k)
+        sum += level.flicker * next_mean(w, &noise->flicker[k], span / (60 * pow(4.0, k - 11)));
+    if (level.walk > 0) { /* half a step's change is in its mean, and 1/12 beside it */
         const double e = twin_normal(w);
-        sum += walk * sqrt(span) * (noise->walk + e / 2 + twin_normal(w) / sqrt(12.0));
+        sum += level.walk * sqrt(span) * (noise->walk + e / 2 + twin_normal(w) / sqrt(12.0));
         noise->walk += e;
     }
-    return sum + offset * noise->offset;
+    if (level.markov > 0) sum += level.markov * next_mean(w, &noise->markov, span / level.markov_time);
+    return sum + level.offset * noise->offset;
 }

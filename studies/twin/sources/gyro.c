@@ -34,10 +34,14 @@ static void observe(Twin *w, double span) {
         const double white = p[P_noise_housing_white_K] / sqrt(span) * twin_normal(w);
         out[OUT_housing_temperature_degC] = rounded(read + white, p[P_noise_housing_resolution_degC]);
     }
-    out[OUT_frequency_Hz] = rounded(out[OUT_frequency_Hz] + twin_draw(w, &w->of_frequency, p[P_noise_frequency_white_Hz],
-        p[P_noise_frequency_flicker_Hz], p[P_noise_frequency_walk_Hz], 0.0, span), p[P_noise_frequency_resolution_Hz]);
-    const double wander = twin_draw(w, &w->of_bias, 60 * p[P_noise_bias_white_deg_per_rt_h], p[P_noise_bias_flicker_deg_per_h],
-        p[P_noise_bias_walk_deg_per_h_per_rt_h] / 60, p[P_noise_bias_turn_on_deg_per_h], span);
+    const TwinLevels of_frequency = {p[P_noise_frequency_white_Hz], p[P_noise_frequency_flicker_Hz], p[P_noise_frequency_walk_Hz],
+        0.0, p[P_noise_frequency_markov_Hz], p[P_noise_frequency_markov_s]};
+    const TwinLevels of_bias = {60 * p[P_noise_bias_white_deg_per_rt_h], p[P_noise_bias_flicker_deg_per_h],
+        p[P_noise_bias_walk_deg_per_h_per_rt_h] / 60, p[P_noise_bias_turn_on_deg_per_h], p[P_noise_bias_markov_deg_per_h],
+        p[P_noise_bias_markov_s]};
+    out[OUT_frequency_Hz] = rounded(out[OUT_frequency_Hz] + twin_draw(w, &w->of_frequency, of_frequency, span),
+        p[P_noise_frequency_resolution_Hz]);
+    const double wander = twin_draw(w, &w->of_bias, of_bias, span);
     out[OUT_bias_deg_per_h] = rounded(out[OUT_bias_deg_per_h] + wander, p[P_noise_bias_resolution_deg_per_h]);
     out[OUT_inverse_q] *= 1 + p[P_noise_inverse_q_white] / sqrt(span) * twin_normal(w);
 #if TWIN_LOOPS

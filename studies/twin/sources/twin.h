@@ -28,7 +28,8 @@ typedef struct { double first, step; int count; const double *coefficients; } Tw
 /* deg/s, V, V, V, deg, deg/s; a command that is not given does not act; the azimuth, and the precession of a free wave, are the card's. */
 typedef struct { double value[TWIN_COMMANDS]; int given[TWIN_COMMANDS]; } TwinInput;
 
-typedef struct { double markov[FLICKER_TIMES], walk, offset; int begun; } TwinNoise;
+typedef struct { double flicker[FLICKER_TIMES], walk, offset, markov; int begun; } TwinNoise;
+typedef struct { double white, flicker, walk, offset, markov, markov_time; } TwinLevels;
 
 typedef struct { double re, im; } TwinComplex;
 typedef struct { double rate; TwinComplex drift[TWIN_TERMS]; } TwinTurning; /* at a row: rad/s, and the rate that azimuths feign */
@@ -94,7 +95,7 @@ void twin_settle_loops(Twin *twin, double frequency, double loss, const double *
 void twin_warming(const Twin *twin, double *rate);
 double twin_spline(const TwinSpline *spline, double x, double *slope);
 double twin_normal(Twin *twin);
-double twin_draw(Twin *twin, TwinNoise *noise, double white, double flicker, double walk, double offset, double span);
+double twin_draw(Twin *twin, TwinNoise *noise, TwinLevels level, double span);
 int twin_solve(int n, double *matrix, double *right);
 void twin_modes(int n, double *matrix, double *vectors);
 

@@ -1,6 +1,7 @@
 """The C twin against the simulation that it stands for: shipped cards, every effect, drives, noise, sanitizers."""
 
 import subprocess
+from dataclasses import astuple
 from pathlib import Path
 
 import numpy as np
@@ -370,7 +371,7 @@ def draw(folder):
     program = compile_twin(load_card("free-dome"), folder / "draws", main=str(HERE / "draw.c"))
 
     def make(noise, span):
-        words = map(repr, (noise.white, noise.flicker, noise.walk, noise.offset, span))
+        words = map(repr, (*astuple(noise), span))
         said = subprocess.run([program, *words, "64", "4096"], check=True, capture_output=True, text=True).stdout
         return np.array(said.split(), float).reshape(64, 4096)
 
@@ -380,8 +381,8 @@ def draw(folder):
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "noise",
-    [Noise(flicker=1.0), Noise(walk=1.0), Noise(0.3, 0.5, 0.02)],
-    ids=["flicker", "walk", "all"],
+    [Noise(flicker=1.0), Noise(walk=1.0), Noise(markov=1.0, markov_time=40.0), Noise(0.3, 0.5, 0.02)],
+    ids=["flicker", "walk", "markov", "all"],
 )
 def test_limits_allan_variance_of_the_draws(noise, draw):
     """Rows of 2 s against the closed-form Allan variance; 5 standard errors of their scatter."""
