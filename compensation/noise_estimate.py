@@ -76,12 +76,12 @@ def estimate_noise(
 def _with_correlated(plain: "_Levels", found: tuple[float, Array], near: Noise | None, moved: bool) -> Noise:
     """Return the noise with a Gauss–Markov part where that is worth its price."""
     own = replace(plain, free=(*plain.free, "markov", "markov_time"))
-    slow, longest = _slow_rms(found[1][1:]), max(float(np.ptp(t)) for t in plain.rows.times)
+    slow = _slow_rms(found[1][[k for k, kind in enumerate(plain.free, 1) if kind != "offset"]])
     if near is not None and near.markov:
         start = own.place(near)
     elif moved and slow > QUIET:
         loud = slow + found[1][0] - WHITE - LESS
-        start = np.array([WHITE, *[USUAL - SPREAD] * len(plain.free), loud, np.log(longest / PART)])
+        start = np.array([WHITE, *[USUAL - SPREAD] * len(plain.free), loud, own.ends[1][-1] - np.log(PART)])
     else:
         return plain.noise(found[1])
     best = _newton(own, start, own(start), found[0])
@@ -104,16 +104,19 @@ class _Levels:
 
     def noise(self, x: Array) -> Noise:
         white = float(self.spread * np.exp(x[0]))
-        unit = {**{kind: white * own for kind, own in self.rows.slow_units.items()}, "markov_time": 1.0}
-        slow = {kind: unit[kind] * float(np.exp(one)) for kind, one in zip(self.free, x[1:], strict=True)}
+        slow = dict(zip(self.free, (self._units(white) * np.exp(x[1:])).tolist(), strict=True))
         return Noise(white * float(np.sqrt(self.rows.span)), **slow)
 
     def place(self, noise: Noise) -> Array:
         """Return where the levels of a noise are."""
         white = noise.white / float(np.sqrt(self.rows.span))
-        unit = {**{kind: white * own for kind, own in self.rows.slow_units.items()}, "markov_time": 1.0}
-        slow = [max(getattr(noise, kind) / unit[kind], 1e-300) for kind in self.free]
-        return np.clip(np.log([white / self.spread, *slow]), *self.ends)
+        slow = np.array([getattr(noise, kind) for kind in self.free]) / self._units(white)
+        return np.clip(np.log(np.maximum([white / self.spread, *slow], 1e-300)), *self.ends)
+
+    def _units(self, white: float) -> Array:
+        """Levels that are as loud within a run as white noise of a row, and a time of 1 s."""
+        slow = self.rows.slow_units
+        return np.array([white * slow[kind] if kind in slow else 1.0 for kind in self.free])
 
     @property
     def ends(self) -> tuple[Array, Array]:
