@@ -1,6 +1,6 @@
-"""Allan deviation of a rate output with confidence, and the noise coefficients N, B, K read off it by a fit.
+"""Allan deviation of a rate output with confidence, and the noise coefficients N, B, K read off it by a fit, with correlated noise where these miss the curve.
 
-σ²(τ) = N²/τ + (2 ln 2/π) B² + K² τ/3: angle random walk N, bias instability B (flat part over √(2 ln 2/π) = 0.664)
+σ²(τ) = N²/τ + (2 ln 2/π) B² + K² τ/3 (+ a Gauss–Markov part, `compensation.noise`): angle random walk N, bias instability B (flat part over √(2 ln 2/π) = 0.664)
 and rate random walk K, IEEE Std 952. With the output in °/h and τ in s, N is in °/h·√s (divide by 60 for °/√h) and
 K in °/h/√s (multiply by 60 for °/h/√h). Equivalent degrees of freedom after Riley, NIST SP 1065, section 5.4.1.
 """
@@ -21,6 +21,8 @@ from compensation.errors import CompensationError
 from compensation.noise import FLAT, Noise
 
 UNITS = (Noise(white=1.0), Noise(flicker=FLAT), Noise(walk=1.0))  # N, B and K of 1
+MISSED = 2.0  # misfit from which on correlated noise is tried, and below which it explains the curve
+PER_OCTAVE = 2  # of its times that are tried
 NoiseKind = Literal["phase", "white", "flicker", "random walk"]
 # Slope of log σ against log τ: quantisation, angle random walk, bias instability, rate random walk.
 SLOPES: dict[NoiseKind, float] = {"phase": -1.0, "white": -0.5, "flicker": 0.0, "random walk": 0.5}
@@ -49,7 +51,8 @@ class AllanDeviation:
 class NoiseCoefficients:
     """N, B, K of σ²(τ) = N²/τ + 0.664² B² + K² τ/3 and their standard uncertainties, of a 0 the size that could hide.
 
-    `misfit`: rms of (measured/fitted variance − 1) over √(2/EDF), about 1 when the three kinds explain the curve.
+    `misfit`: rms of (measured/fitted variance − 1) over √(2/EDF), about 1 when these kinds explain the curve; `markov` and
+    `markov_time`: rms and correlation time (s) of correlated noise, 0 where the curve does not need it.
     """
 
     N: float
@@ -59,14 +62,16 @@ class NoiseCoefficients:
     B_uncertainty: float
     K_uncertainty: float
     misfit: float
+    markov: float = 0.0
+    markov_time: float = 0.0
 
     @property
     def noise(self) -> Noise:
         """The levels of a noise with these coefficients, in the signal's unit and s."""
-        return Noise(self.N, FLAT * self.B, self.K)
+        return Noise(self.N, FLAT * self.B, self.K, markov=self.markov, markov_time=self.markov_time)
 
     def deviation(self, tau: ArrayLike) -> Array:
-        """Return the Allan deviation of these three noises at τ (s)."""
+        """Return the Allan deviation of these noises at τ (s)."""
         return np.asarray(np.sqrt(self.noise.allan_variance(tau)))
 
 
@@ -125,11 +130,21 @@ def equivalent_freedom(noise: NoiseKind, n: int, m: int) -> float:
 
 
 def fit_noise(allan: AllanDeviation) -> NoiseCoefficients:
-    """Fit N, B, K by non-negative least squares on σ²/σ²_fit, weights EDF/2; errors know shared samples and grow with the misfit."""
+    """Fit N, B, K, and correlated noise where they miss the curve: errors know shared samples and grow with the misfit."""
     if allan.tau.size < 5:
         raise CompensationError(f"fitting N, B and K needs five values of τ or more, not {allan.tau.size}; record longer.")  # fmt: skip
-    A, variance = np.stack([one.allan_variance(allan.tau) for one in UNITS], axis=-1), allan.deviation**2
-    fitted, c = variance, np.zeros(3)
+    found = _fit(allan, UNITS)
+    if found.misfit > MISSED:
+        times = 2.0 ** np.arange(np.log2(allan.tau[0]), np.log2(allan.tau[-1]), 1 / PER_OCTAVE)
+        more = min((_fit(allan, (*UNITS, Noise(markov=1.0, markov_time=T))) for T in times.tolist()), key=lambda one: one.misfit)  # fmt: skip
+        found = more if more.misfit < MISSED else found
+    return found
+
+
+def _fit(allan: AllanDeviation, units: Sequence[Noise]) -> NoiseCoefficients:
+    """Fit levels of noises by non-negative least squares on σ²/σ²_fit, weights EDF/2."""
+    A, variance = np.stack([one.allan_variance(allan.tau) for one in units], axis=-1), allan.deviation**2
+    fitted, c = variance, np.zeros(len(units))
     for _ in range(50):
         weight = np.sqrt(allan.degrees_of_freedom / 2) / fitted
         size = np.linalg.norm(A * weight[:, None], axis=0)
@@ -142,19 +157,24 @@ def fit_noise(allan: AllanDeviation) -> NoiseCoefficients:
     deviates = (variance / fitted - 1) * np.sqrt(allan.degrees_of_freedom / 2)
     misfit = float(np.sqrt(np.mean(deviates**2)))
     root = np.linalg.solve(R, Q.T)
-    errors = max(1.0, misfit) * np.sqrt(np.diag(root @ _correlation(allan, c) @ root.T))
+    time = units[-1].markov_time
+    errors = max(1.0, misfit) * np.sqrt(np.diag(root @ _correlation(allan, c, time) @ root.T))
     values = np.sqrt(c)
     # u(√c) = u(c) / (2 √c); where that linearisation fails, √u(c) bounds what may be hidden.
     uncertainties = np.minimum(errors / np.maximum(2 * values, 1e-150), np.sqrt(errors))
-    N, B, K = values.tolist()
-    N_uncertainty, B_uncertainty, K_uncertainty = uncertainties.tolist()
-    return NoiseCoefficients(N, B, K, N_uncertainty, B_uncertainty, K_uncertainty, misfit)
+    markov = float(values[3]) if time else 0.0
+    N, B, K = values[:3].tolist()
+    N_uncertainty, B_uncertainty, K_uncertainty = uncertainties[:3].tolist()
+    return NoiseCoefficients(
+        N, B, K, N_uncertainty, B_uncertainty, K_uncertainty, misfit, markov, time if markov else 0.0
+    )
 
 
-def _correlation(allan: AllanDeviation, c: Array) -> Array:
+def _correlation(allan: AllanDeviation, c: Array, time: float) -> Array:
     """Correlation of points that share samples, cov(σ²_i, σ²_j) ∝ ∫ S² |H_i|² |H_j|² df, |H|² = 2 sin⁴(πfτ)/(πfτ)²."""
     f = np.geomspace(0.02 / allan.tau[-1], 0.5 / allan.tau[0], 8000)
     S = 2 * c[0] + c[1] / (np.pi * f) + 2 * c[2] / (2 * np.pi * f) ** 2
+    S += 4 * c[3] * time / (1 + (2 * np.pi * f * time) ** 2) if time else 0.0
     angle = np.pi * np.outer(allan.tau, f)
     response = 2 * np.sin(angle) ** 4 / angle**2 * S * np.sqrt(np.gradient(f))
     covariance = response @ response.T

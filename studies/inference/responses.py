@@ -39,7 +39,11 @@ def result_of(found: Inferred, name: str, causes: Sequence[Cause]) -> ResponseRe
     share = (left.share if left.significant else 1.0) if terms else None
     slow = _slow(found, name)
     verdict, remark = _judge(found, name, terms, mine, values, slow, share)
-    remark = "; ".join(word for word in (remark, _delayed(found, name), _turned_on(found, name, verdict)) if word)
+    remark = "; ".join(
+        word
+        for word in (remark, _delayed(found, name), _correlated(found, name), _turned_on(found, name, verdict))
+        if word
+    )
     noise = min(value for value in (rows.rms, after if terms else before) if value is not None)
     white = white_rms(*rows.residual)
     return ResponseResult(
@@ -104,6 +108,17 @@ def _delayed(found: Inferred, name: str) -> str:
     return (
         f"it follows the temperature {abs(delay):.2g} s {'later' if delay > 0.0 else 'earlier'} than"
         f" {'one lag predicts' if found.path is None else 'its lags predict'}, as sensors and clocks may; a thermometer lag or a rate effect of this size looks the same"
+    )
+
+
+def _correlated(found: Inferred, name: str) -> str:
+    """Return the sentence on noise with a correlation time of its own."""
+    noise, response = found.final.noise[name], RESPONSES[name]
+    if not noise.markov:
+        return ""
+    return (
+        f"its noise is like correlated (Gauss–Markov) noise of {noise.markov * response.scale:.2g} {response.shown} (rms) and"
+        f" {noise.markov_time:.2g} s; what no recorded input tells of may look the same"
     )
 
 

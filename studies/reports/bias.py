@@ -215,7 +215,7 @@ def noise_table(study: BiasStudy) -> Table:
     hours, unit = study.output == "bias_deg_per_h", _unit(study.output)
     n_scale, k_scale, n_unit, k_unit = (1 / 60, 60.0, "°/√h", "°/h/√h") if hours else (1.0, 1.0, "°/√s", "°/s/√s")
 
-    columns: Head = [
+    columns: list[Column | str] = [
         "0: Output",
         Column(lambda row: _measured(row[1].noise.N * n_scale, row[1].noise.N_uncertainty * n_scale), "N", n_unit),
         Column(lambda row: _measured(row[1].noise.B, row[1].noise.B_uncertainty), "B", unit),
@@ -223,6 +223,8 @@ def noise_table(study: BiasStudy) -> Table:
         Column(lambda row: "{:.3g} ({:.3g} … {:.3g})".format(*row[1].allan.bias_instability), f"Minimum / {FLAT:.3f}, 90 %", unit),
         "1.noise.misfit: Misfit .1f",
     ]  # fmt: skip
+    if any(spectrum.noise.markov for spectrum in (study.before, study.after) if spectrum is not None):
+        columns += ["1.noise.markov: Correlated, rms .3", "1.noise.markov_time: its time (s) .2"]
     note = (
         f"Longest run, samples of {study.allan_step:g} s. A misfit well above 1 shows more than white noise, flicker noise and random"
         " walk, such as drift with temperature; the errors are increased accordingly."

@@ -34,12 +34,12 @@ COLUMNS_NOTE = "Missing values, gaps, spikes, stuck readings, dropouts to 0 and 
 NOISE = (
     Column("column", "Column", spell=display_name),
     "Unit | noise.white ± noise.white_sd: White, at 1 s | noise.flicker ± noise.flicker_sd: Flicker, flat part"
-    " | noise.walk ± noise.walk_sd: Random walk, in 1 s | noise.misfit: Misfit .2 | noise.instability_low …"
+    " | noise.walk ± noise.walk_sd: Random walk, in 1 s | noise.markov: Correlated, rms .2 | noise.markov_s: its time (s) .2 | noise.misfit: Misfit .2 | noise.instability_low …"
     " noise.instability_high: Minimum / 0.664 (bias instability), 90 % .3 | line.period_s: Period of a line (s) | line.rms: Its rms .2",
 )
 NOISE_NOTE = (
-    "White noise, flicker and random walk have the Allan deviations N/√τ, a flat part and K √(τ/3), fitted together. Where they do not explain"
-    " the curve (misfit above 3) or leave the white noise open, for example where temperature drives a column, only the white noise is given, from"
+    "White noise, flicker and random walk have the Allan deviations N/√τ, a flat part and K √(τ/3), fitted together; where these miss"
+    " the curve, correlated (Gauss–Markov) noise beside them. Where nothing explains the curve (misfit above 3) or the white noise stays open, for example where temperature drives a column, only the white noise is given, from"
     " second differences of the rows. Judge the others on a settled run."
 )
 USES = "Command | Gives | ready: Possible | Missing"
@@ -155,6 +155,8 @@ def tell(survey: Survey) -> dict[str, Any]:
                 noise, white="noise.white", white_sd="N_uncertainty", flicker="noise.flicker", flicker_sd=("B_uncertainty", FLAT),
                 walk="noise.walk", walk_sd="K_uncertainty",
             ) | {"instability": value, "instability_low": low, "instability_high": high, "confidence": CONFIDENCE}  # fmt: skip
+            if noise.markov:
+                levels |= {"markov": noise.markov, "markov_s": noise.markov_time}
             levels = levels if known else {"white": column.white}
             row["noise"] = {**levels, "misfit": noise.misfit}
         if column.line is not None:

@@ -104,3 +104,17 @@ def test_flicker_is_read_at_its_flat_part():
 def test_unusable_series_are_refused(rate, step, message):
     with pytest.raises(CompensationError, match=message):
         allan_deviation(rate, step)
+
+
+@pytest.mark.parametrize("time", [30.0, 300.0])
+def test_recovery_correlated_noise_is_read_off_the_curve_where_three_kinds_miss_it(time):
+    """N = 1, Gauss–Markov noise of rms 0.5 beside it, 60 000 rows of 1 s: level and time within 15 and 40 %; N, B and K alone never need it."""
+    for seed in range(3):
+        y = Noise(white=1.0, markov=0.5, markov_time=time).draw(60_000, 1.0, np.random.default_rng(seed))
+        found = fit_noise(allan_deviation(y, 1.0))
+        assert found.misfit < 2
+        assert found.N == pytest.approx(1.0, rel=0.03)
+        assert found.markov == pytest.approx(0.5, rel=0.15)
+        assert found.markov_time == pytest.approx(time, rel=0.4)
+        plain = Noise(1.0, 0.05, 0.003).draw(60_000, 1.0, np.random.default_rng(seed))
+        assert fit_noise(allan_deviation(plain, 1.0)).markov == 0.0
