@@ -60,8 +60,7 @@ def estimate_noise(
         first = plain.place(near)
     begin = plain(first)
     found = _newton(plain, first, begin)
-    moved = near is None or begin[0] - found[0] > STOOD
-    if moved:
+    if near is None or begin[0] - found[0] > STOOD:
         for start in _other_slow(found[1], free):  # what is slow may be of another kind than where the search ended
             there = plain(start)
             if start.max() > LOUD or there[0] < found[0]:
@@ -70,16 +69,16 @@ def estimate_noise(
         found = min(found, _newton(plain, usual, plain(usual)), key=lambda one: one[0])
     if "markov" not in kinds:
         return plain.noise(found[1])
-    return _with_correlated(plain, found, near, moved)
+    return _with_correlated(plain, found, near)
 
 
-def _with_correlated(plain: "_Levels", found: tuple[float, Array], near: Noise | None, moved: bool) -> Noise:
+def _with_correlated(plain: "_Levels", found: tuple[float, Array], near: Noise | None) -> Noise:
     """Return the noise with a Gauss–Markov part where that is worth its price."""
     own = replace(plain, free=(*plain.free, "markov", "markov_time"))
     slow = _slow_rms(found[1][[k for k, kind in enumerate(plain.free, 1) if kind != "offset"]])
     if near is not None and near.markov:
         start = own.place(near)
-    elif moved and slow > QUIET:
+    elif slow > QUIET:
         loud = slow + found[1][0] - WHITE - LESS
         start = np.array([WHITE, *[USUAL - SPREAD] * len(plain.free), loud, own.ends[1][-1] - np.log(PART)])
     else:

@@ -14,7 +14,7 @@ from studies.models.file import widen
 from studies.models.kinds.bias import OUTPUTS
 from studies.reports import style
 from studies.reports.digits import plain, raised, to_error, to_interval
-from studies.results import Column, Drawing, Facts, Figure, Head, Part, Sentence, Table, Where
+from studies.results import Column, Drawing, Facts, Figure, Part, Sentence, Table, Where
 
 SOURCES = (
     "Wang X. et al., Sensors 2012, 12, 6434 (the HRG paper), eqs. (19)–(22).",
