@@ -18,7 +18,7 @@ TOO_QUIET = 1.0  # ln by which white noise below that is odd
 USUAL, SPREAD = -1.0, 3.0
 """Weak prior of the same: it keeps a level that the rows say nothing about from running away."""
 STATED_SPREAD = 0.7  # the same about ln of a level that is stated: a factor of 2
-LONGEST, CLOSE = 3.0, 1e-3  # of a step in ln of a level, and fall of −2 ln L that the last one promises
+LONGEST, CLOSE = 3.0, 1e-5  # of a step in ln of a level, and fall of −2 ln L that the last one promises
 MOST_STEPS, MOST_HALVINGS = 50, 12
 LOUD = 1.0  # ln of slow noise within a run over that of a row, beyond which its kinds are searched each for itself
 STOOD = 0.1
