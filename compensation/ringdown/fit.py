@@ -91,8 +91,11 @@ class DecayFit:
 
     def draw(self, count: int, generator: np.random.Generator) -> Decay:
         """Draws of the rates from their normal distribution, each rate an array of them."""
-        mean = self.decay.vector(self.names)
-        draws: Any = generator.multivariate_normal(mean, self.covariance, count, method="eigh").T
+        sd = np.sqrt(np.diag(self.covariance))
+        root = np.linalg.cholesky(self.covariance / np.outer(sd, sd))  # unlike eigenvectors, it has no free signs
+        draws: Any = self.decay.vector(self.names)[:, None] + sd[:, None] * (
+            root @ generator.standard_normal((len(sd), count))
+        )
         return Decay(**dict(zip(self.names, draws, strict=True)))
 
 

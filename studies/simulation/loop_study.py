@@ -39,6 +39,7 @@ ERRORS = {
 }
 SHARED = ("bias.damping_axis_deg", "loop.frequency_axis_deg", "loop.frequency_split_mHz")
 """Values that several sources share."""
+ROUNDING = 1e-9  # of a difference of two variances, relative
 NOISES = ("pickoff", "adc_step", "dac_step", "drive", "thermal")
 SETTLING = 6.0
 """Of a loop after a jump, over its bandwidth (s Hz)."""
@@ -117,7 +118,7 @@ def study_loops(
         _close(instrument, wave, electronics, loops).require_stable()
         start = start_up(1 / decay, loops, headroom=loop.drive_headroom, offset=2 * np.pi * loop.start_offset_Hz)
         noise = {
-            name: (float(over[0]), walk / 60, float(np.sqrt(max((100 * over[1]) ** 2 - 100 * walk**2, 0.0) / 2)))
+            name: (float(over[0]), walk / 60, _angle_noise(walk, 100.0, float(over[1])))
             for name, (walk, over) in _noise(instrument, wave, electronics, loops, (1.0, 100.0)).items()
         }
     bias = _bias_of(instrument, frequency, inverse_q, bryan_factor)
@@ -239,6 +240,12 @@ def _noise(
             walk, spread = held.walk("rate"), np.array(_held_spread(held, seconds))
         found[label] = walk / wave.coupling * DEG_PER_H, spread / wave.coupling * DEG_PER_H
     return found
+
+
+def _angle_noise(walk: float, seconds: float, spread: float) -> float:
+    """Return the white noise Q of the angle (arcsec) that a walk leaves of the spread over so many seconds; 0 where only rounding is left."""
+    squared = (seconds * spread) ** 2 - seconds * walk**2
+    return float(np.sqrt(squared / 2)) if squared > ROUNDING * seconds * walk**2 else 0.0
 
 
 def _held_spread(loop: ClosedLoop, lengths: tuple[float, ...]) -> list[float]:
