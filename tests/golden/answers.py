@@ -94,11 +94,17 @@ def _is_estimate(one: dict[str, Any]) -> bool:
     return all(isinstance(one.get(key), float | int) for key in ENDS)
 
 
-def changed_lines(was: str, now: str) -> list[str]:
-    """Lines of two pages that differ in a word, or in a number by more than its last digits may from machine to machine."""
+def changed_lines(was: str, now: str, within: float = 5e-3) -> list[str]:
+    """Lines of two pages that differ in a word, or in a number by more than `within` and a unit of its last digit."""
 
     def number(text: str) -> float:
         return float(text.replace("−", "-"))
+
+    def near(x: str, y: str) -> bool:
+        unit = 10.0 ** -len(x.partition("e")[0].partition(".")[2]) * 10.0 ** int(
+            x.partition("e")[2].replace("−", "-") or 0
+        )
+        return abs(number(x) - number(y)) <= within * max(abs(number(x)), abs(number(y))) + 1.01 * unit * ("." in x)
 
     old, new = was.splitlines(), now.splitlines()
     found = [f"{len(old)} -> {len(new)} lines"] if len(old) != len(new) else []
@@ -106,8 +112,7 @@ def changed_lines(was: str, now: str) -> list[str]:
         if a == b:
             continue
         numbers = zip(NUMBER.findall(a), NUMBER.findall(b), strict=False)
-        near = all(abs(number(x) - number(y)) <= 5e-3 * max(abs(number(x)), abs(number(y))) for x, y in numbers)
-        if not near or NUMBER.sub("#", a) != NUMBER.sub("#", b):
+        if not all(near(x, y) for x, y in numbers) or NUMBER.sub("#", a) != NUMBER.sub("#", b):
             found.append(f"{a!r} -> {b!r}")
     return found
 
