@@ -11,6 +11,8 @@ NEIGHBOURS = 2 * REACH + 1
 SPIKE, ALONE = 6.0, 4.0
 JUDGED = 16  # third differences beside readings that stay to an end
 TURNS, STEPS = 4, 5.0  # of their sign, and of the readings, from which on those are noise
+ROUGH, SCATTERED = 2.5, 0.25
+"""Second difference in steps that rounding alone does not make (0, 1, 0 makes 2), and the part of them that noise has."""
 STUCK = 20  # readings in a row that are alike, where those beside them mostly differ, make a sensor that is stuck
 
 
@@ -41,16 +43,16 @@ def find_step(readings: Array) -> float:
 
 
 def find_stuck(values: Array) -> NDArray[np.bool_]:
-    """Mark readings (m,) of a stuck sensor: `STUCK` or more alike, of whose neighbours on either side at least half differ, or that noise leads to at an end."""
+    """Mark readings (m,) of a stuck sensor: `STUCK` or more alike, beside which the readings on either side scatter by more than their rounding, or that noise leads to at an end."""
     marked, rows = find_stuck_at_ends(values), np.flatnonzero(np.isfinite(values))
     if len(rows) < 3 * STUCK:
         return marked
-    moves = np.concatenate([[0], np.cumsum(np.diff(values[rows]) != 0)])  # number of changes up to each reading
-    starts, ends = _alike(values[rows])
+    known = values[rows]
+    least = ROUGH * find_step(known)
+    starts, ends = _alike(known)
     for begin, end in zip(starts.tolist(), ends.tolist(), strict=True):
-        before, after = max(begin - STUCK, 0), min(end - 1 + STUCK, len(rows) - 1)
-        changes = (moves[begin] - moves[before], moves[after] - moves[end - 1])
-        if all(2 * n >= STUCK for n in changes):
+        bends = (np.diff(known[max(begin - STUCK, 0) : begin], 2), np.diff(known[end : end + STUCK], 2))
+        if all(own.size and np.mean(np.abs(own) > least) >= SCATTERED for own in bends):
             marked[rows[begin:end]] = True
     return marked
 

@@ -97,14 +97,14 @@ def generic_forms(span: Span, runs: Sequence[States]) -> list[Effect]:
         _generic("history of the temperature", history, [1.0] * 8),
         replace(_generic("time", time, np.tile(1.0 / (1.0 + np.arange(TIME_ORDERS)), len(runs))), by_clock=True),
     ]
-    for field, word in (
-        ("voltage_squared", "voltage"),
-        ("amplitude_squared", "amplitude"),
-        ("quadrature", "quadrature"),
-        ("pattern_angle", "azimuth"),
+    for field, column in (
+        ("voltage_squared", "electrode_bias_V"),
+        ("amplitude_squared", "drive_amplitude_V"),
+        ("quadrature", "quadrature_V"),
+        ("pattern_angle", "pattern_angle_deg"),
     ):
         count = 16 if field != "pattern_angle" else 8
-        forms.append(_generic(word, drive(field), [1.0] * count, (field,)))
+        forms.append(_generic(column, drive(field), [1.0] * count, (field,)))
     return forms
 
 

@@ -106,7 +106,8 @@ def next_step(
             others = ", ".join(cause.equivalent)
             return f"To distinguish {cause.effect} from {others}: {find_effect(cause.effect).isolate}.{more}"
     for name, result in results.items():
-        if result.verdict == "unexplained":
+        doubtful = result.verdict == "not-identifiable" and bool(result.left_over_input)
+        if result.verdict == "unexplained" or doubtful:
             word, line = RESPONSES[name].word, lines.get(name)
             if line is not None:
                 return (
@@ -114,7 +115,8 @@ def next_step(
                     " where it is resolved, or record its spectrum."
                 )
             by_time = result.left_over_input.startswith("time")
-            return f"The {word} has {spell_structure(result.left_over_input)} that no known effect explains: " + (
+            has = ("has", "may have")[doubtful]
+            return f"The {word} {has} {spell_structure(result.left_over_input)} that no known effect explains: " + (
                 "hold temperature and drives constant for a run; what goes on there is not due to them."
                 if by_time
                 else "repeat a run unchanged to see whether it recurs, then vary that input alone."

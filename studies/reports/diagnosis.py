@@ -95,7 +95,7 @@ def cause_table(verdict: Verdict) -> Table:
             "cause": display_name(cause.effect) if cause.kind == "value" else cause.effect,
             "or": ", ".join(cause.equivalent),
             "response": NAMES[cause.response],
-            "peak": shown(cause.response, cause.peak),
+            "peak": "" if cause.kind == "value" else shown(cause.response, cause.peak),
             "probability": cause.probability,
         }
         for name, p in cause.parameters.items():
@@ -203,8 +203,18 @@ def _summary(cause: Cause) -> str:
 def _facts(verdict: Verdict) -> list[tuple[str, str, str]]:
     facts = [("Verdict", verdict.verdict.replace("-", " "), reason(verdict))]
     for cause in verdict.causes[:3]:
-        size = f"{shown(cause.response, cause.peak)} peak to peak in {spoken(cause.response)}"
-        facts.append(("Cause", " or ".join(cause.names), f"{size}; probability {cause.probability:.2f}"))
+        if cause.kind == "value":
+            (one,) = cause.parameters.values()
+            names, size = (
+                display_name(cause.effect),
+                f"{plain(one.value)} ({plain(one.low)} … {plain(one.high)}) in {cause.effect}",
+            )
+        else:
+            names, size = (
+                " or ".join(cause.names),
+                f"{shown(cause.response, cause.peak)} peak to peak in {spoken(cause.response)}",
+            )
+        facts.append(("Cause", names, f"{size}; probability {cause.probability:.2f}"))
     main = _main_response(verdict)
     if main is not None:
         result = verdict.responses[main]

@@ -96,3 +96,16 @@ def test_what_settles_is_held_or_stands_still_at_its_rounding_is_not_stuck(rows,
             recorded = np.round((own + noise * np.random.default_rng(2).standard_normal(ROWS.size)) / step) * step
             assert not find_stuck_at_ends(recorded).any()
             assert not find_stuck_at_ends(recorded[::-1]).any()
+
+
+@pytest.mark.parametrize("noise", [0.05, 0.2, 0.35, 0.6])
+def test_plateaus_of_coarse_digits_are_not_stuck_and_a_stuck_sensor_among_noise_or_on_a_ramp_is(noise):
+    """Soaks, ramps of parts of a step to several steps a row, and a bend, noise in steps of the last digit; a real hold of 40 rows on a ramp."""
+    t = np.arange(3000.0)
+    soaks = np.interp(t, [0, 500, 700, 1400, 1500, 2200, 3000], [0, 0, 90, 90, -200, -200, 35]) + 8 * np.sin(t / 300)
+    for seed in range(5):
+        draw = noise * np.random.default_rng(seed).standard_normal(t.size)
+        assert not find_stuck(np.round(soaks + draw)).any()
+    held = np.round(t + 3.0 * np.random.default_rng(1).standard_normal(t.size))
+    held[1000:1040] = held[1000]
+    assert np.flatnonzero(find_stuck(held)).tolist() == list(range(1000, 1040))

@@ -83,7 +83,7 @@ def test_every_effect_of_the_library_is_hidden_here():
 @pytest.mark.slow
 @pytest.mark.parametrize("place", range(len(CASES)), ids=[f"{kind}:{name}" for kind, name, _ in CASES])
 def test_an_answer_is_whole(place, folder):
-    """The verdict is that of the worst response, causes stand by falling evidence, values within their intervals, gains are those of held-out rows."""
+    """The verdict is that of the worst response, causes stand by falling evidence, values within their intervals, gains are those of held-out rows, and what is held out of an adequate response is left as what was seen, whatever hides in another."""
     found = answer(place, folder)
     assert not found["truth"]["faults"]
     judged = [one for one in found["responses"].values() if one["verdict"] is not None]
@@ -95,6 +95,8 @@ def test_an_answer_is_whole(place, folder):
         assert all(value["low"] <= value["value"] <= value["high"] for value in cause["parameters"].values())
     for one in judged:
         assert (one["extended"] is None) >= (one["verdict"] == "adequate")
+        if one["verdict"] == "adequate" and one["baseline"]["held_out_rms"] is not None:
+            assert one["baseline"]["held_out_rms"] < 2 * one["baseline"]["residual_rms"]
         if one["gain"] is not None:
             assert one["gain"] == pytest.approx(one["baseline"]["held_out_rms"] / one["extended"]["held_out_rms"])
 

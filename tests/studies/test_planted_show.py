@@ -137,10 +137,10 @@ def test_contract_what_is_named_possible_runs_and_what_is_missing_is_said(tmp_pa
 
 @pytest.mark.slow
 def test_contract_every_line_that_is_named_possible_runs(tmp_path, ask, monkeypatch):
-    """But for those that have a golden answer with the same words; fits to their first step, the diagnosis up to its search."""
+    """But for those that have a golden answer with the same words; fits to their second step, the diagnosis up to its search."""
     search = Mock(side_effect=InputError("as far as this"))
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("studies.calibration.fit.MOST_STEPS", 1)
+    monkeypatch.setattr("studies.calibration.fit.MOST_STEPS", 2)
     monkeypatch.setattr("studies.inference.diagnosis.infer", search)
     run = read_record(INPUTS / "run1.csv")
     write_record(replace(run, columns={name: own[::4] for name, own in run.columns.items()}), "run1.csv")
