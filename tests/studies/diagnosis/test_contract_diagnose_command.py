@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from studies.diagnosis.verdict import Cause, ResponseResult, Verdict
+from studies.inference.verdict import next_step
 from studies.record import Record, write_record
 from studies.reports.diagnosis import headline
 from tests.studies.diagnosis.bench import BACK, CYCLE, STAIRS, Bench
@@ -130,3 +131,13 @@ def test_the_headline_says_what_the_causes_leave(left, end):
     cause = Cause("jump", "bias_deg_per_h", 0.8, (), {}, 50.0)
     result = ResponseResult("explained", 0.1, (1.0, 1.0), (0.2, 0.2), left, "temperature", 40.0, 0.95)
     assert headline(Verdict("explained", (cause,), {"bias_deg_per_h": result}, None, ())).endswith(end)
+
+
+@pytest.mark.parametrize(("verdict", "has"), [("unexplained", "has"), ("not-identifiable", "may have")])
+def test_structure_in_a_drive_names_its_column_and_has_a_next_experiment(verdict, has):
+    result = ResponseResult(verdict, 0.1, (1.0, 1.0), None, "none", "electrode_bias_V", 20.0)
+    said = next_step((), {"inverse_q": result}, {})
+    assert said is not None
+    assert said.startswith(f"The 1/Q {has} structure in electrode_bias_V that no known effect explains: repeat a run")
+    adequate = ResponseResult("adequate", 0.1, (1.0, 1.0), None, "none")
+    assert next_step((), {"inverse_q": adequate}, {}) is None
