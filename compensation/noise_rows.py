@@ -24,6 +24,7 @@ from compensation.noise import SLOW_TIMES, Noise, flicker, gauss_markov, gauss_m
 
 KEPT = 4  # roots of the covariance of rows
 COARSE = 150  # most rows of a run from which noise is estimated in a model with many unknowns
+CLOSER = 3.0  # correlated noise follows structure with a third of the rms that flicker or a walk need (a quartic: 2.2 for 6.0)
 KINDS = ("white", "flicker", "walk", "offset", "markov")
 UNKNOWNS = (*KINDS, "markov_time")
 
@@ -126,9 +127,9 @@ class NoiseRows:
         return {"flicker": SLOW_TIMES**-0.5, "walk": seconds**-0.5, "offset": 1.0, "markov": 1.0}
 
     def slow_share(self, noise: Noise) -> float:
-        """Return the rms of slow noise within a usual run over the white noise of a row."""
+        """Return the rms of slow noise within a usual run over the white noise of a row, correlated noise `CLOSER` times."""
         unit = self.slow_units
-        slow = np.array([noise.flicker / unit["flicker"], noise.walk / unit["walk"] / 6**0.5, noise.markov])
+        slow = np.array([noise.flicker / unit["flicker"], noise.walk / unit["walk"] / 6**0.5, CLOSER * noise.markov])
         return float(np.linalg.norm(slow) / max(noise.white / self.span**0.5, 1e-300))
 
     def covariance(self, run: int, noise: Noise) -> Array:

@@ -98,7 +98,7 @@ def fit(problem: CardProblem, start: Array | None = None, progress: Progress = l
     rows = dict(problem.rows)
     noise: dict[str, Noise] = {}
     converged, straight, radius, step, size = False, False, LONGEST_STEP, 0, np.inf
-    least, waited = np.inf, 0
+    least, waited, correlated = np.inf, 0, False
     outliers = dict.fromkeys(problem.responses, 0)
     for step in range(1, MOST_STEPS + 1):
         left = sum(float(np.log(np.linalg.norm(state.residual[name]))) for name in problem.responses)
@@ -106,7 +106,7 @@ def fit(problem: CardProblem, start: Array | None = None, progress: Progress = l
         least = min(least, left)
         if size > SETTLED_NOISE:
             found = (
-                marginal_noise(problem, rows, state, noise, waited > PATIENCE)
+                marginal_noise(problem, rows, state, noise, waited > PATIENCE, correlated)
                 if straight
                 else residual_noise(problem, rows, state, noise)
             )
@@ -118,8 +118,11 @@ def fit(problem: CardProblem, start: Array | None = None, progress: Progress = l
         size = linear.fall(linear.step(np.inf)[0])
         progress(f"step {step}: −2 ln L decreases by about {size:.2g}")
         if size < CLOSE and straight and step > 2:
-            converged = True
-            break
+            if correlated:
+                converged = True
+                break
+            correlated, size = True, np.inf
+            continue
         reached, radius, whole = _advance(problem, state, linear, radius, noise, rows, size < NEAR)
         if reached is None:
             converged = size < NEAR and straight

@@ -28,18 +28,23 @@ def residual_noise(
     problem: CardProblem, rows: Mapping[str, NoiseRows], state: State, near: Mapping[str, Noise]
 ) -> dict[str, Noise]:
     """Noise that the residuals would be as they are, looked for `near` another: far from the values, a straight line promises what no step keeps."""
-    return {n: _levels(problem, rows[n], n, state.residual[n], near=near.get(n)) for n in problem.responses}
+    return {
+        n: _levels(problem, rows[n], n, state.residual[n], near=near.get(n), correlated=False)
+        for n in problem.responses
+    }
 
 
 def marginal_noise(
-    problem: CardProblem, rows: Mapping[str, NoiseRows], state: State, noise: Mapping[str, Noise], given: bool
-) -> dict[str, Noise]:
-    """Noise of highest marginal likelihood, each response's by itself or `given` the others'."""
+    problem: CardProblem, rows: Mapping[str, NoiseRows], state: State, noise: Mapping[str, Noise], given: bool,
+    correlated: bool,
+) -> dict[str, Noise]:  # fmt: skip
+    """Noise of highest marginal likelihood, each response's by itself or `given` the others'; `correlated` noise only near the end of a fit, for it follows what a wrong valley leaves."""
     target = {name: state.residual[name] + state.slope[name] @ state.point for name in problem.responses}
     if given:
-        return estimate_levels(problem, rows, target, state.slope, noise, problem.responses)
+        return estimate_levels(problem, rows, target, state.slope, noise, problem.responses, None, correlated)
     alone = (
-        estimate_levels(problem, rows, target, state.slope, {name: noise[name]}, [name]) for name in problem.responses
+        estimate_levels(problem, rows, target, state.slope, {name: noise[name]}, [name], None, correlated)
+        for name in problem.responses
     )
     return {name: level for one in alone for name, level in one.items()}
 
@@ -52,6 +57,7 @@ def estimate_levels(
     noise: Mapping[str, Noise],
     names: Sequence[str],
     known: Array | None = None,
+    correlated: bool = True,
 ) -> dict[str, Noise]:
     """Return the noise of highest marginal likelihood of some responses, each given the others'.
 
@@ -61,7 +67,7 @@ def estimate_levels(
     found = dict(noise)
     for name in names:
         left, columns = beside_others(problem, rows, target, slopes, found, name, known)
-        found[name] = _levels(problem, rows[name], name, left, columns, found.get(name))
+        found[name] = _levels(problem, rows[name], name, left, columns, found.get(name), correlated)
     return found
 
 
@@ -97,8 +103,10 @@ def _levels(
     target: Array,
     columns: Array | None = None,
     near: Noise | None = None,
+    correlated: bool = True,
 ) -> Noise:
-    kinds = [kind for kind in KINDS if kind != "offset" or has_levels(problem, name)]
+    left_out = {"offset": not has_levels(problem, name), "markov": not correlated}
+    kinds = [kind for kind in KINDS if not left_out.get(kind)]
     precision = None if columns is None else np.ones(columns.shape[1])
     stated = None if columns is None else stated_noise(problem.instrument.noise, name)
     noise = estimate_noise(rows, target, columns, precision, ["white"] if name == SETTLED else kinds, near, stated)

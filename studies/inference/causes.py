@@ -185,6 +185,9 @@ def _path_causes(found: Inferred) -> list[Cause]:
         return []
     name = found.search.linear.responses[0]
     path = replace(found.path, beside=(found.numbers.point, found.background.posterior[1]))
+    sure = (
+        path if path.departs else found.path
+    )  # what the path was taken for is named, though effects beside it blur it
     probability, evidence = 1.0 / (1.0 + float(np.exp(-path.lead))), 2.0 * path.evidence
     pairs = zip(found.plain[name].residual, found.rows[name].residual, strict=True)
     peak = float(np.ptp(np.concatenate([before - after for before, after in pairs])))
@@ -197,13 +200,14 @@ def _path_causes(found: Inferred) -> list[Cause]:
         causes.append(
             Cause(names[f"law.{LAGS[1]}"], name, probability, (), numbers, evidence, peak=peak, together=True)
         )
-    if path.radiates:
+    if sure.radiates:
         own = path.evidence_for(SHARE) if causes else evidence
         told = [key for key in (SHARE, DIRECT) if key in path.fit.problem.priors.names]  # plain lags have one share
         numbers = {key.removeprefix("law."): path.interval(key) for key in told}
         causes.append(Cause(names[SHARE], name, probability, (), numbers, own, peak=peak, together=True))
-    if path.is_late:
-        numbers, own = {"sensor_time_constant_s": path.interval(SENSOR)}, path.evidence_for(SENSOR)
+    if sure.is_late:
+        own = path.evidence_for(SENSOR) if causes else evidence
+        numbers = {"sensor_time_constant_s": path.interval(SENSOR)}
         causes.append(Cause(names[SENSOR], name, probability, (), numbers, own, peak=peak, together=True))
     return causes
 

@@ -108,7 +108,7 @@ def test_a_reference_clock_finds_a_drift_that_the_record_hides():
 @pytest.mark.slow
 @pytest.mark.usefixtures("coarser")
 def test_a_file_of_another_gyro_of_the_lot_is_said(only):
-    """One lag behind a housing that lags, and a run 3 Hz above the other: which of the two is right is not known, and what lags take of that is doubted."""
+    """One lag behind a housing that lags, and a run 3 Hz above the other: which of the two is right is not known, and no cause is believed for what lags take of that."""
     only("jump", "ageing")
     cool, warm = [(0, 25), (0.333, 25), (0.335, -15), (4, -15)], [(0, -15), (0.333, -15), (0.335, 40), (4, 40)]
     records = []
@@ -121,7 +121,7 @@ def test_a_file_of_another_gyro_of_the_lot_is_said(only):
         records.append(bench.record(k, housing_temperature_degC=housing, frequency_Hz=frequency + 3.0 * (k == 1)))
     verdict = told(records)
     assert any("frequency_Hz is +3 Hz from" in note or "frequency_Hz is -3 Hz from" in note for note in verdict.notes)
-    assert verdict.causes
+    assert verdict.verdict != "adequate"
     assert all(cause.probability < 0.5 for cause in verdict.causes)
 
 
