@@ -9,7 +9,6 @@ groups taken as independent of each other and of their means, as what is slow ha
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 import scipy
@@ -79,7 +78,6 @@ def _within(groups: Array, span: float) -> Within:
     return Within(len(groups), span, products, np.array([Q.T @ own @ Q for own in by_level]))
 
 
-@lru_cache(maxsize=64)
 def _correlated(k: int, span: float, tau: float) -> Array:
     """Covariance of the contrasts of k rows of a Gauss–Markov process of variance 1, and its slope by ln τ; 0 of none."""
     if not tau:

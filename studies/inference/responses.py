@@ -112,9 +112,9 @@ def _delayed(found: Inferred, name: str) -> str:
 
 
 def _correlated(found: Inferred, name: str) -> str:
-    """Return the sentence on noise with a correlation time of its own."""
-    noise, response = found.final.noise[name], RESPONSES[name]
-    if not noise.markov:
+    """Return the sentence on noise with a correlation time of its own that no card states."""
+    noise, response, stated = found.final.noise[name], RESPONSES[name], _stated(found, name)
+    if not noise.markov or (stated is not None and stated.markov):
         return ""
     return (
         f"its noise is like correlated (Gauss–Markov) noise of {noise.markov * response.scale:.2g} {response.shown} (rms) and"
