@@ -207,7 +207,7 @@ def _facts(verdict: Verdict) -> list[tuple[str, str, str]]:
             (one,) = cause.parameters.values()
             names, size = (
                 display_name(cause.effect),
-                f"{plain(one.value)} ({plain(one.low)} … {plain(one.high)}) in {cause.effect}",
+                f"{cause.effect} = {plain(one.value)} ({plain(one.low)} … {plain(one.high)})",
             )
         else:
             names, size = (
