@@ -148,7 +148,7 @@ class _Levels:
         for k, (surprise, spread, absolute) in enumerate(_surprises(self.rows, noise, levels, self.stated), 1):
             way = (along if absolute else np.eye(len(x)))[k] / spread
             total, slope, bend = total + surprise**2, slope + 2 * surprise * way, bend + 2 * np.outer(way, way)
-        return total + 2.0 * _price(noise, self.stated), slope, bend
+        return total + 2.0 * price_of(noise, self.stated), slope, bend
 
 
 def _newton(objective: _Levels, x: Array, seen: Seen, below: float = np.inf) -> tuple[float, Array]:
@@ -201,10 +201,10 @@ def log_prior(rows: NoiseRows, noise: Noise, stated: Noise | None = None) -> flo
     """Return the log of the weak prior of the slow levels that are there."""
     free = [kind for kind in KINDS[1:] if getattr(noise, kind) > 0]
     surprises = _surprises(rows, noise, free, stated)
-    return -0.5 * sum(surprise**2 for surprise, _, _ in surprises) - _price(noise, stated)
+    return -0.5 * sum(surprise**2 for surprise, _, _ in surprises) - price_of(noise, stated)
 
 
-def _price(noise: Noise, stated: Noise | None) -> float:
+def price_of(noise: Noise, stated: Noise | None) -> float:
     """Return the log odds against correlated noise: none where it is stated."""
     return PRICE if noise.markov and not (stated is not None and stated.markov) else 0.0
 

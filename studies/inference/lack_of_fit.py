@@ -8,6 +8,7 @@ import numpy as np
 
 from compensation.arrays import Array
 from compensation.lines import Line
+from compensation.noise_estimate import price_of
 from compensation.spikes import find_step
 from studies.calibration.problem import CardProblem
 from studies.diagnosis.constants import CONSTANTS
@@ -81,9 +82,11 @@ def look(
         word, smooth = best.term.effect.name, best.gain
         if search.linear.rows[name].slow_share(final.noise[name]) > SUSPICIOUS:
             instead = _instead_of_noise(search, bank, final, name)
-            if instead is not None and instead.evidence - final.evidence > smooth:
+            # the odds against correlated noise are no evidence of structure in its place
+            dearer = price_of(final.noise[name], search.linear.stated(name))
+            if instead is not None and instead.evidence - final.evidence - dearer > smooth:
                 best = replace(best, term=instead.terms[-1])
-                word, smooth = best.term.effect.name, instead.evidence - final.evidence
+                word, smooth = best.term.effect.name, instead.evidence - final.evidence - dearer
         evidence, line = smooth, None
         level, rest = search.linear.rows[name], own.residual(name)
         white = level.whiten(rest, final.noise[name])
