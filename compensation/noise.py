@@ -7,6 +7,7 @@ A row is the mean over its span Δ about its time t; runs are independent. With 
     flicker          Σ over T = 60 s · 4^k of Gauss–Markov processes of variance a² each: S(f) = a²/(2 ln 2 · f) within 0.4 %
     random walk      variance K² after 1 s, from 0 where the run begins
     offset           one draw for the whole run
+    correlated       a Gauss–Markov process of rms `markov` and correlation time `markov_time`
 
 The ladder of correlation times T goes from 14 µs to 68 h: what is faster than a row averages out, and what is slower than
 some ten hours is not told from an offset. A Gauss–Markov process of time T has between means over Δ and Δ′, d apart, the covariance

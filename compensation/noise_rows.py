@@ -197,12 +197,8 @@ class NoiseRows:
         rest = r - X @ found
         total += float(rest @ rest + (found - about) @ (precision * (found - about)))
         total += 2 * float(np.log(np.diag(root)).sum())
-        both, slopes, moved = (
-            np.column_stack([beside, rest]),
-            np.zeros(len(UNKNOWNS)),
-            np.zeros((len(rest), len(UNKNOWNS))),
-        )
-        levels = level_slopes(noise)
+        both, levels = np.column_stack([beside, rest]), level_slopes(noise)
+        slopes, moved = np.zeros(len(UNKNOWNS)), np.zeros((len(rest), len(UNKNOWNS)))
         for (K, runs), (F, W, _) in zip(whitener.roots, self._groups, strict=True):
             S = len(runs) * scipy.linalg.lapack.dlauum(K, lower=1)[0]  # of V⁻¹ − v vᵀ the lower half
             wide = self.stretch[runs[0]] / self.spans[runs[0]]

@@ -23,7 +23,7 @@ EVEN = 1e-3
 
 @dataclass(frozen=True)
 class Within:
-    """Groups of as many even rows of a span (s): how many, the products S of their contrasts, and the covariance of these by a level of 1 of each of `KINDS` but the last."""
+    """Groups of as many even rows of a span (s): how many, the products S of their contrasts, and the covariance of these by a level of 1 of each of `KINDS` but correlated noise."""
 
     count: int
     span: float

@@ -28,10 +28,8 @@ def residual_noise(
     problem: CardProblem, rows: Mapping[str, NoiseRows], state: State, near: Mapping[str, Noise]
 ) -> dict[str, Noise]:
     """Noise that the residuals would be as they are, looked for `near` another: far from the values, a straight line promises what no step keeps."""
-    return {
-        n: _levels(problem, rows[n], n, state.residual[n], near=near.get(n), correlated=False)
-        for n in problem.responses
-    }
+    left = state.residual
+    return {n: _levels(problem, rows[n], n, left[n], None, near.get(n), correlated=False) for n in problem.responses}
 
 
 def marginal_noise(
@@ -101,15 +99,15 @@ def _levels(
     rows: NoiseRows,
     name: str,
     target: Array,
-    columns: Array | None = None,
-    near: Noise | None = None,
-    correlated: bool = True,
+    columns: Array | None,
+    near: Noise | None,
+    correlated: bool,
 ) -> Noise:
     left_out = {"offset": not has_levels(problem, name), "markov": not correlated}
-    kinds = [kind for kind in KINDS if not left_out.get(kind)]
+    kinds = ["white"] if name == SETTLED else [kind for kind in KINDS if not left_out.get(kind)]
     precision = None if columns is None else np.ones(columns.shape[1])
     stated = None if columns is None else stated_noise(problem.instrument.noise, name)
-    noise = estimate_noise(rows, target, columns, precision, ["white"] if name == SETTLED else kinds, near, stated)
+    noise = estimate_noise(rows, target, columns, precision, kinds, near, stated)
     if name == SETTLED:  # a reading is not better than its last digit, and a level or a slope is no noise
         least, most = (max(getattr(table, end) for table in problem.tables) for end in ("rounding", "scatter"))
         return replace(noise, white=float(np.clip(noise.white, least, most)))

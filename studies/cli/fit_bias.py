@@ -108,16 +108,6 @@ def _spectrum(spectrum: Stability | None) -> dict[str, Any]:
     if spectrum is None:
         return {}
     curve = row_of(spectrum.allan, "deviation", "low", "high", "confidence", tau_s="tau")
-    levels = row_of(
-        spectrum.noise,
-        "N",
-        "N_uncertainty",
-        "B",
-        "B_uncertainty",
-        "K",
-        "K_uncertainty",
-        "misfit",
-        "markov",
-        markov_s="markov_time",
-    )
+    each = [f"{name}{end}" for name in "NBK" for end in ("", "_uncertainty")]
+    levels = row_of(spectrum.noise, *each, "misfit", "markov", markov_s="markov_time")
     return curve | levels | {"bias_instability": spectrum.allan.bias_instability[0]}

@@ -185,9 +185,8 @@ def _path_causes(found: Inferred) -> list[Cause]:
         return []
     name = found.search.linear.responses[0]
     path = replace(found.path, beside=(found.numbers.point, found.background.posterior[1]))
-    sure = (
-        path if path.departs else found.path
-    )  # what the path was taken for is named, though effects beside it blur it
+    # what the path was taken for is named, though effects beside it blur it
+    sure = path if path.departs else found.path
     probability, evidence = 1.0 / (1.0 + float(np.exp(-path.lead))), 2.0 * path.evidence
     pairs = zip(found.plain[name].residual, found.rows[name].residual, strict=True)
     peak = float(np.ptp(np.concatenate([before - after for before, after in pairs])))

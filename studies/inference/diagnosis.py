@@ -193,9 +193,8 @@ def infer(
             pursuit = Pursuit(set_housing_apart(at_point(whole, np.zeros(whole.problem.count))), progress)
             again = pursuit.outcome(search.fair(outcome.final) - BEATEN)
             search, outcome = max((again, (search, outcome)), key=lambda found: found[0].fair(found[1].final))
-        plain = _model_of(
-            found
-        )  # in its own noise: in that of a longer path, or about effects, its straight lines lead out of the world
+        # in its own noise: in that of a longer path, or beside effects, its straight lines lead out of the world
+        plain = _model_of(found)
         shipped = {name: rows.rms for name, rows in plain.residuals(Kept(np.zeros(problem.count), ())).items()}
         calibrated, blocks = plain.residuals(Kept(found.point, ())), found.state.residual
         progress("held-out rows")

@@ -83,10 +83,10 @@ def look(
         if search.linear.rows[name].slow_share(final.noise[name]) > SUSPICIOUS:
             instead = _instead_of_noise(search, bank, final, name)
             # the odds against correlated noise are no evidence of structure in its place
-            dearer = price_of(final.noise[name], search.linear.stated(name))
-            if instead is not None and instead.evidence - final.evidence - dearer > smooth:
+            less = final.evidence + price_of(final.noise[name], search.linear.stated(name))
+            if instead is not None and instead.evidence - less > smooth:
                 best = replace(best, term=instead.terms[-1])
-                word, smooth = best.term.effect.name, instead.evidence - final.evidence - dearer
+                word, smooth = best.term.effect.name, instead.evidence - less
         evidence, line = smooth, None
         level, rest = search.linear.rows[name], own.residual(name)
         white = level.whiten(rest, final.noise[name])

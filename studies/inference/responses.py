@@ -39,11 +39,8 @@ def result_of(found: Inferred, name: str, causes: Sequence[Cause]) -> ResponseRe
     share = (left.share if left.significant else 1.0) if terms else None
     slow = _slow(found, name)
     verdict, remark = _judge(found, name, terms, mine, values, slow, share)
-    remark = "; ".join(
-        word
-        for word in (remark, _delayed(found, name), _correlated(found, name), _turned_on(found, name, verdict))
-        if word
-    )
+    remarks = (remark, _delayed(found, name), _correlated(found, name), _turned_on(found, name, verdict))
+    remark = "; ".join(filter(None, remarks))
     noise = min(value for value in (rows.rms, after if terms else before) if value is not None)
     white = white_rms(*rows.residual)
     return ResponseResult(

@@ -78,15 +78,11 @@ def calibration_parts(found: Calibration, payload: Mapping[str, Any]) -> list[Ch
     runs = set(found.ladder) - {SETTLED}
     notes = [*([OFFSETS, DRIVEN] if runs else []), *([ROWS] if SETTLED in found.ladder else [])]
     levels = [
-        _scaled(
-            name,
-            {"white": n.white, "flicker": n.flicker, "walk": 60.0 * n.walk, "offset": n.offset}
-            | ({"markov": n.markov} if n.markov else {}),
-        )
-        | ({"time": n.markov_time} if n.markov else {})
+        _scaled(name, {"white": n.white, "flicker": n.flicker, "walk": 60.0 * n.walk, "offset": n.offset, "markov": n.markov or None})
+        | {"time": n.markov_time or None}
         for name, n in found.fit.noise.items()
         if name in runs
-    ]
+    ]  # fmt: skip
     groups = "; ".join(spell([display_name(name) for name in group]) for group in found.groups)
     return [
         Chapter("Fit of the card to the data", [

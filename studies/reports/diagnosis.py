@@ -203,17 +203,12 @@ def _summary(cause: Cause) -> str:
 def _facts(verdict: Verdict) -> list[tuple[str, str, str]]:
     facts = [("Verdict", verdict.verdict.replace("-", " "), reason(verdict))]
     for cause in verdict.causes[:3]:
+        names = " or ".join(cause.names)
+        size = f"{shown(cause.response, cause.peak)} peak to peak in {spoken(cause.response)}"
         if cause.kind == "value":
             (one,) = cause.parameters.values()
-            names, size = (
-                display_name(cause.effect),
-                f"{cause.effect} = {plain(one.value)} ({plain(one.low)} … {plain(one.high)})",
-            )
-        else:
-            names, size = (
-                " or ".join(cause.names),
-                f"{shown(cause.response, cause.peak)} peak to peak in {spoken(cause.response)}",
-            )
+            names = display_name(cause.effect)
+            size = f"{cause.effect} = {plain(one.value)} ({plain(one.low)} … {plain(one.high)})"
         facts.append(("Cause", names, f"{size}; probability {cause.probability:.2f}"))
     main = _main_response(verdict)
     if main is not None:

@@ -16,6 +16,7 @@ import sys
 import tempfile
 import tomllib
 from collections.abc import Iterator
+from decimal import Decimal
 from pathlib import Path
 from typing import Any
 
@@ -71,7 +72,7 @@ def differences(was: Any, now: Any, within: float = 2e-5, place: str = "") -> li
     if isinstance(was, dict) and isinstance(now, dict):
         if _is_estimate(was) and _is_estimate(now):
             width = was["high"] - was["low"]
-            near = {key for key in ENDS if abs(was.get(key, 0.0) - now.get(key, 0.0)) <= OF_WIDTH * width}
+            near = {key for key in ENDS if abs(was[key] - now[key]) <= OF_WIDTH * width}
             was, now = ({k: v for k, v in one.items() if k not in near} for one in (was, now))
         gone = [
             f"{place}.{key}: only in {'the file' if key in was else 'the answer'}" for key in was.keys() ^ now.keys()
@@ -101,9 +102,7 @@ def changed_lines(was: str, now: str, within: float = 5e-3) -> list[str]:
         return float(text.replace("−", "-"))
 
     def near(x: str, y: str) -> bool:
-        unit = 10.0 ** -len(x.partition("e")[0].partition(".")[2]) * 10.0 ** int(
-            x.partition("e")[2].replace("−", "-") or 0
-        )
+        unit = 10.0 ** int(Decimal(x.replace("−", "-")).as_tuple().exponent)
         return abs(number(x) - number(y)) <= within * max(abs(number(x)), abs(number(y))) + 1.01 * unit * ("." in x)
 
     old, new = was.splitlines(), now.splitlines()
