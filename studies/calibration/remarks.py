@@ -78,12 +78,9 @@ def _misfit(found: CardFit, ladder: Mapping[str, Rung]) -> list[str]:
         if name == SETTLED and NEIGHBOURS * (near := _near(found)) < most:
             usual, most = near, NEIGHBOURS * near
         if rung.calibrated > most:
-            own = found.noise[name]
-            like = (
-                f" It is like correlated noise of {own.markov:.2g}{_unit(name)} (rms) and {own.markov_time:.2g} s, which the card does not state."
-                if own.markov
-                else ""
-            )
+            own, like = found.noise[name], ""
+            if own.markov and not slow.markov:
+                like = f" It is like correlated noise of {own.markov:.2g}{_unit(name)} (rms) and {own.markov_time:.2g} s, which the card does not state."
             said.append(
                 f"poor fit in the {WORDS[name]}: residual {rung.calibrated:.2g}{_unit(name)} (rms), noise {usual:.2g}.{like} The calibrated values"
                 f" absorb part of this misfit; hrg diagnose --card looks for the missing effect."
