@@ -6,7 +6,7 @@ from typing import Literal
 
 from compensation.stability import AllanDeviation, NoiseCoefficients
 from studies.acceptance import measure
-from studies.acceptance.limits import ELSEWHERE, QUANTITIES, Limits, TestedQuantity
+from studies.acceptance.limits import QUANTITIES, Limits, TestedQuantity
 from studies.acceptance.measure import Found, Measured
 from studies.acceptance.runs import Test, sort_records
 from studies.acceptance.service import measure_life, measure_storage, measure_transfer
@@ -56,10 +56,9 @@ class JudgedQuantity:
 
 @dataclass(frozen=True)
 class Acceptance:
-    """All lines in the order of the standard, the tests that records cannot give, and what was done with every record."""
+    """All lines in the order of the standard, and what was done with every record."""
 
     lines: tuple[JudgedQuantity, ...]
-    elsewhere: tuple[tuple[str, str, str], ...]
     used: dict[str, str]
     band: float | None
     allan: AllanDeviation | None
@@ -105,4 +104,4 @@ def judge(
             used[record.path] = f"{test}, not used: only the first record of this test counts"
     used |= {decay.path: "run-down" for decay in decays}
     used |= {record.path: "no test: its columns fit none" for record in left}
-    return Acceptance(lines, ELSEWHERE, used, band, allan, noise)
+    return Acceptance(lines, used, band, allan, noise)

@@ -166,7 +166,9 @@ def _say_unused(unused: Sequence[str], words: Sequence[str]) -> str:
 
 
 def _see(words: Sequence[str]) -> str:
-    return f"See '{' '.join(['hrg', *_command_words(words), '--help'])}'."
+    """Return a hint that leads to the help of the command that the leading words name."""
+    named = next((words[:size] for size in (2, 1) if " ".join(words[:size]) in COMMANDS), [])
+    return f"See '{' '.join(['hrg', *named, '--help'])}'."
 
 
 def _spell(argument: "Argument | None") -> str:
@@ -179,14 +181,6 @@ def _spell(argument: "Argument | None") -> str:
 
 KINDS: dict[object, str] = {int: "a whole number", float: "a number", bool: "yes or no"}
 PROFILE_WORDS = ("soak", "step", "ramp", "staircase", "cycle")
-
-
-def _command_words(words: Sequence[str]) -> list[str]:
-    """Return the leading words that name a command, for a hint that leads to its help."""
-    for size in (2, 1):
-        if " ".join(words[:size]) in COMMANDS:
-            return list(words[:size])
-    return []
 
 
 def _complain(message: str, status: int, error: BaseException | None = None) -> int:

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from studies.acceptance.judgement import Acceptance, JudgedQuantity, judge
-from studies.acceptance.limits import SCHEMA, Limits
+from studies.acceptance.limits import ELSEWHERE, SCHEMA, Limits
 from studies.acceptance.measure import CONFIDENCE
 from studies.cli.arguments import Card, Records
 from studies.cli.output import answers, say
@@ -75,7 +75,7 @@ def acceptance(card: Card, *runs: Records, limits: str | None = None, output: st
     for line in lines:
         if line["limit"] is not None and line["needs"]:
             say(f"warning: {limits} limits {line['key']}, but no record gives it; it needs {line['needs']}.")
-    elsewhere = [{"section": s, "test": test, "needs": needs} for s, test, needs in found.elsewhere]
+    elsewhere = [{"section": s, "test": test, "needs": needs} for s, test, needs in ELSEWHERE]
     payload = {
         "card": instrument.name,
         **row_of(found, "verdict", records="used", warm_up_band_deg_per_h="band"),

@@ -26,7 +26,7 @@ from studies.sweeps.parameters import find_nominal
 from studies.sweeps.spec import read_study, shipped_specs
 
 
-def card(path: str, *, like: str = "hrg-30mm", name: str | None = None) -> int:
+def card(path: str, *, like: str = "hrg-30mm", name: str | None = None) -> None:
     """Write a card template: a copy of a built-in card, with all other optional tables as comments.
 
     Args:
@@ -45,7 +45,6 @@ def card(path: str, *, like: str = "hrg-30mm", name: str | None = None) -> int:
     write_text(path, "\n".join(lines) + "\n")
     check = "cards" if "law" in content else "modes"
     say(f"{path}: written as a copy of {like}. Edit it, then run: hrg {check} {quote(path)}")
-    return 0
 
 
 OTHER = Parameter(name="--card", help="The card: a built-in one, or a path relative to the file.")
@@ -53,27 +52,26 @@ OtherCard = Annotated[str | None, OTHER]
 NewFile = Annotated[str, Parameter(help="The file (TOML) to write; an existing one is not overwritten.")]
 
 
-def study(path: NewFile, *, like: str = "dimension-tolerance", card_: OtherCard = None) -> int:
+def study(path: NewFile, *, like: str = "dimension-tolerance", card_: OtherCard = None) -> None:
     """Write a template for the spec of a study.
 
     Args:
         like: A built-in study: frequency-over-temperature, dimension-tolerance, dimension-influence, split-tolerance.
     """
     text = _copy(like, shipped_specs(), card_, "study")
-    return _write(path, text, StudyKeys, read_study, "study", f"hrg study run {quote(path)} --dry-run")
+    _write(path, text, StudyKeys, read_study, "study", f"hrg study run {quote(path)} --dry-run")
 
 
-def design(path: NewFile, *, like: str | None = None, card_: OtherCard = None) -> int:
+def design(path: NewFile, *, like: str | None = None, card_: OtherCard = None) -> None:
     """Write a template of a task for hrg optimise.
 
     Args:
         like: A worked design: dome-8khz (default), light-cylinder, robust-dome; with --card by default a task for the wall
             and the radius of that card.
     """
-    text = (
-        _own_task(path, card_) if card_ and not like else _copy(like or "dome-8khz", shipped_tasks(), card_, "design")
-    )
-    return _write(path, text, DesignKeys, read_task, "design", f"hrg optimise {quote(path)} --out FOLDER")
+    own = card_ and not like
+    text = _own_task(path, card_) if own else _copy(like or "dome-8khz", shipped_tasks(), card_, "design")
+    _write(path, text, DesignKeys, read_task, "design", f"hrg optimise {quote(path)} --out FOLDER")
 
 
 def _own_task(path: str, card_: str) -> str:
@@ -111,7 +109,7 @@ def _copy(like: str, shipped: dict[str, Path], card_: str | None, kind: str) -> 
     return text.replace(old, new)
 
 
-def _write(path: str, text: str, keys: type[Keys], read: Callable[..., Any], kind: str, then: str) -> int:
+def _write(path: str, text: str, keys: type[Keys], read: Callable[..., Any], kind: str, then: str) -> None:
     """Write a file that fits its card, with all entries that it may have as comments."""
     _refuse_existing(path)
     form = [f"All entries of a {kind}, by example:", *write_form([(keys, "")])]
@@ -122,7 +120,6 @@ def _write(path: str, text: str, keys: type[Keys], read: Callable[..., Any], kin
         raise InputError(f"not written, since it does not fit the card: {error}") from None
     write_text(path, whole)
     say(f"{path}: written. Edit it, then run: {then}")
-    return 0
 
 
 def _refuse_existing(path: str) -> None:

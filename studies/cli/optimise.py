@@ -18,7 +18,6 @@ from studies.reports.digits import plain
 from studies.reports.scenes import moving_mode, show_mode
 from studies.reports.sweep_figures import column_label
 from studies.results import Blocks, Chapter, Column, Drawing, Facts, Figure, Result, Table, row_of
-from studies.results.page import Block
 
 
 @answers("hrg.optimise/1")
@@ -120,7 +119,8 @@ def _parts(found: Answer, payload: dict[str, Any]) -> list[Any]:
                " Only the magnitude of a separation counts; its sign shows on which side the nearest mode lies."),
             Figure(lambda: show_mode(best_instrument(found)).mode.plot(), "Section of the best design, at rest and at maximum displacement."),
         ]),
-        Chapter("About the best design", [Blocks(lambda: _live(found))]),
+        Chapter("About the best design", [Blocks(lambda: moving_mode(best_instrument(found),
+            names=[name for name in keys if name.startswith("resonator.")], derived=found.task.study.derived))]),
         Chapter("Constraints", [
             Table("Cost of the limits", payload["constraints"], [
                 Column(lambda row: named[row["column"]], "quantity"), "kind: bound | limit: limit .7 | value: value .7 | room: distance to the limit .3",
@@ -145,12 +145,6 @@ def _parts(found: Answer, payload: dict[str, Any]) -> list[Any]:
                 ("designs", "reason"), where="page"),
         ]),
     ]  # fmt: skip
-
-
-def _live(found: Answer) -> list[Block]:
-    study = found.task.study
-    names = [name for name in study.names[: found.task.free] if name.startswith("resonator.")]
-    return moving_mode(best_instrument(found), names=names, derived=study.derived)
 
 
 def _number(count: int, what: str) -> str:

@@ -69,7 +69,9 @@ def answers(
                         write_text(report, render_result(result.page() if result.page else result))
                     say(f"report: {report}")
                 if json:
-                    print_json(result.payload | ({"report": report} if "report" in result.payload and page else {}))
+                    sys.stdout.write(
+                        dump_json(result.payload | ({"report": report} if "report" in result.payload and page else {}))
+                    )
                 else:
                     print_result(result)
                 return int(result.status)
@@ -117,23 +119,23 @@ def keep_card(instrument: "Instrument", path: str | None, against: str | None = 
     """Save a card where a path was given and nothing speaks against it, say so, and return where it is."""
     from studies.instrument.card import save_card
 
-    return _keep(lambda: save_card(instrument, str(path)), kind, path, against)
+    if path is None:
+        return None
+    if against:
+        say(f"{path} not saved: {against}.")
+        return None
+    save_card(instrument, path)
+    say(f"{kind}: {path}")
+    return path
 
 
 def keep_model(model: "Model", path: str | None) -> None:
-    """Save a model likewise."""
+    """Save a model where a path was given, and say so."""
     from studies.models import write_model
 
-    _keep(lambda: write_model(model, str(path)), "model", path, "")
-
-
-def _keep(write: Callable[[], object], kind: str, path: str | None, against: str | None) -> str | None:
-    if path is None or against:
-        say(f"{path} not saved: {against}.") if path is not None else None
-        return None
-    write()
-    say(f"{kind}: {path}")
-    return path
+    if path is not None:
+        write_model(model, path)
+        say(f"model: {path}")
 
 
 def keep_record(record: "Record", path: str) -> None:
@@ -142,11 +144,6 @@ def keep_record(record: "Record", path: str) -> None:
 
     write_record(record, path)
     say(f"record: {path}")
-
-
-def print_json(payload: Mapping[str, Any]) -> None:
-    """Print one JSON object."""
-    sys.stdout.write(dump_json(payload))
 
 
 def dump_json(payload: Mapping[str, Any]) -> str:

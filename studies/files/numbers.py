@@ -26,7 +26,12 @@ ROWS_AT_ONCE = 200_000  # rows that are parsed at once, so that a large table co
 
 def parse_numbers(path: str | Path, start: int, names: list[str], first_line: int) -> tuple[Table, str]:
     """Return the columns of a table whose body starts at a place of the file, on its `first_line`, and the hash of the bytes."""
-    return parse_fast(path, start, names) or _parse_with_care(path, start, names, first_line)
+    if found := parse_fast(path, start, names):
+        return found
+    data = check_text(path, read_bytes(path))
+    if not _SOMETHING.search(data, start):
+        raise InputError(f"{path}: the table has a header but no rows; add one line per measurement.")
+    return _parse_by_line(path, data[start:].decode(), names, first_line), hashlib.sha256(data).hexdigest()
 
 
 def parse_fast(path: str | Path, start: int, names: Sequence[str]) -> tuple[Table, str] | None:
@@ -98,13 +103,6 @@ def _scan(file: IO[bytes], start: int, columns: int, separator: str, decimal: st
         last = portion
     rows += not last.endswith(b"\n")
     return None if is_empty or between != rows * (columns - 1) else (rows, body, sum_.hexdigest())
-
-
-def _parse_with_care(path: str | Path, start: int, names: list[str], first_line: int) -> tuple[Table, str]:
-    data = check_text(path, read_bytes(path))
-    if not _SOMETHING.search(data, start):
-        raise InputError(f"{path}: the table has a header but no rows; add one line per measurement.")
-    return _parse_by_line(path, data[start:].decode(), names, first_line), hashlib.sha256(data).hexdigest()
 
 
 def _parse_by_line(path: str | Path, body: str, names: list[str], first_line: int) -> Table:

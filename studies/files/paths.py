@@ -6,7 +6,6 @@ import tomllib
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from importlib.resources import files
-from itertools import chain
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -22,9 +21,8 @@ OUTPUTS = {
 }
 SHIPPED = ("cards", "sweeps/templates", "examples")
 STORE, STORE_FILES = "study.store", ("study.store", "lock")
-RECORDS = tuple(
-    f"{folder}*.{kind}" for folder in ("", "*/") for kind in ("csv", "parquet", "toml")
-)  # of a folder, or of a folder of folders
+# of a folder, or of a folder of folders
+RECORDS = tuple(f"{folder}*.{kind}" for folder in ("", "*/") for kind in ("csv", "parquet", "toml"))
 LONGEST_TOML = 2**22  # bytes
 
 _read: dict[object, str] = {}
@@ -50,18 +48,16 @@ def guarded(
         for word in words:
             for path in _read_with(word):
                 read.append(path)
-                _read.setdefault(
-                    _identity(path), word if _identity(path) == _identity(Path(word)) else f"{path} of {word}"
-                )
+                same = _identity(path) == _identity(Path(word))
+                _read.setdefault(_identity(path), word if same else f"{path} of {word}")
         seen: dict[object, str] = {}
         for name, value in outputs.items():
-            given = f"{OUTPUTS[name]} {value}"
-            _check_folder(Path(value), given)
-            more = (
-                (beside(value, one), f"{given} (which also writes {beside(value, one)})")
-                for one in endings.get(name, ())
-            )
-            for path, said in () if _is_special(Path(value)) else chain([(Path(value), given)], more):
+            given, target = f"{OUTPUTS[name]} {value}", Path(value)
+            if not target.parent.is_dir():
+                raise InputError(f"{given}: cannot be written: there is no folder '{target.parent}'; create it, or correct the path.")  # fmt: skip
+            also = [beside(value, ending) for ending in endings.get(name, ())]
+            written = [(target, given), *((path, f"{given} (which also writes {path})") for path in also)]
+            for path, said in written if not _is_special(target) else ():
                 _spare_read(path, said)
                 if seen.setdefault(_identity(path), said) != said:
                     raise InputError(f"{seen[_identity(path)]} and {said}: two outputs in one file; name two files.")
@@ -85,12 +81,6 @@ def _spare_read(path: Path, given: str) -> None:
     read = _read.get(_identity(path))
     if read is not None and path.is_file():
         raise InputError(f"{given}: the same command reads this file ({read}), and writing it would destroy it; choose another name.")  # fmt: skip
-
-
-def _check_folder(path: Path, given: str) -> None:
-    parent = path.parent
-    if not parent.is_dir():
-        raise InputError(f"{given}: cannot be written: there is no folder '{parent}'; create it, or correct the path.")
 
 
 def _words(value: object) -> Iterator[str]:

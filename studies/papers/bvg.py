@@ -97,9 +97,7 @@ class Claims:
     curvature_nonlinearity: float  # that the quadratic term of (35) makes over ±360 °/s
     mapped: tuple[float, float]  # what (35), and (35) with (36) at 25 °C, make of the printed −361.4 °/s
     noise_deviation: float  # (°/s) of samples that are white noise of the printed random walk before the filter
-    averaging: tuple[
-        tuple[float, float], ...
-    ]  # τ (s), factor by which the FIR filter lowers white noise's Allan deviation
+    averaging: tuple[tuple[float, float], ...]  # τ (s), factor by which the filter lowers white noise's Allan deviation
     cutoff_for_printed: float  # Hz, with which the order-50 filter lowers it at τ = 1 s by the printed ratio
 
 

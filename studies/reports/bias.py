@@ -87,15 +87,15 @@ def verdict(study: BiasStudy, method: Method) -> str:
 
 def doubts(study: BiasStudy) -> list[Sentence]:
     """Warn where the runs are too short to select terms by."""
-    found, lasts = [], sum(float(np.ptp(run.time)) + run.width for run in study.runs)
-    averages = int(lasts / AVERAGING)
-    if averages < FEW:
-        spread = 100 / math.sqrt(2 * max(averages - 1, 1))
-        found.append(
-            f"The data are short: {averages} averages of {AVERAGING:g} s. A standard deviation of so few is uncertain by {spread:.0f} %,"
-            f" and the selection of terms is unreliable; record {FEW * AVERAGING / 3600:.1f} h or more, over the full temperature range."
-        )
-    return [Sentence(text, "warning") for text in found]
+    averages = int(sum(float(np.ptp(run.time)) + run.width for run in study.runs) / AVERAGING)
+    if averages >= FEW:
+        return []
+    spread = 100 / math.sqrt(2 * max(averages - 1, 1))
+    text = (
+        f"The data are short: {averages} averages of {AVERAGING:g} s. A standard deviation of so few is uncertain by {spread:.0f} %,"
+        f" and the selection of terms is unreliable; record {FEW * AVERAGING / 3600:.1f} h or more, over the full temperature range."
+    )
+    return [Sentence(text, "warning")]
 
 
 def how_rows_were_made(study: BiasStudy) -> str:
@@ -114,16 +114,11 @@ def how_rows_were_made(study: BiasStudy) -> str:
 
 def memory_sentence(memory: Memory) -> str:
     """Say what stands between the thermometer and the bias, if anything does."""
-    parts = [f"a lag of {memory.lag:.4g} s"] if memory.lag else []
-    parts += (
-        [f"a hysteresis of half-width {memory.play:.3g} K, with three candidates of its own"] if memory.play else []
-    )
-    starts = ", ".join(f"{start:+g}" if start else "0" for start in memory.starts)
-    after = (
-        f" The runs start at {starts} half-widths from its middle; a compensated record at 0, so it is not compensated for the hysteresis until its temperature has once changed by {2 * memory.play:.3g} K."
-        if memory.play
-        else ""
-    )
+    parts, after = [f"a lag of {memory.lag:.4g} s"] if memory.lag else [], ""
+    if memory.play:
+        parts.append(f"a hysteresis of half-width {memory.play:.3g} K, with three candidates of its own")
+        starts = ", ".join(f"{start:+g}" if start else "0" for start in memory.starts)
+        after = f" The runs start at {starts} half-widths from its middle; a compensated record at 0, so it is not compensated for the hysteresis until its temperature has once changed by {2 * memory.play:.3g} K."
     return f" The temperature acts through {' and '.join(parts)}.{after}" if parts else ""
 
 

@@ -43,9 +43,7 @@ class Fields:
 
     polynomial: SparsePolynomial
     blocks: dict[str, int]  # how many numbers each has, by name
-    errors: dict[
-        str, float
-    ]  # of each: ln(1/Q), wave over its largest, ln f by the base, displacements over the largest
+    errors: dict[str, float]  # of each: ln(1/Q), wave over its largest, ln f by the base, displacements over largest
     losses: tuple[str, ...]  # names of the parts of 1/Q
     per_micrometre: bool  # whether the split is that of 1 µm of the wall's wave 2n, which splits by itself
     missing: tuple[str, ...]  # reasons

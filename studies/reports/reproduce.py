@@ -1,19 +1,19 @@
 """The page of `hrg reproduce`: the HRG paper from its own data, first principles beside it, and where they differ."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from compensation.frequency import fit_frequency
 from shell.constants import zero_Celsius
-from studies.diagnosis.table import TableDiagnosis
+from studies.diagnosis.table import TableDiagnosis, diagnose_table
+from studies.instrument.card import load_card
 from studies.papers import hrg
-from studies.papers.bias_twin import TwinFit, twin_chapters
+from studies.papers.bias_twin import study_twin, twin_chapters
 from studies.papers.hrg import FrequencyStudy, PhysicsComparison
-from studies.papers.settling import NETWORKS, ROOM_degC, SettlingStudy, settling_chapter
+from studies.papers.settling import NETWORKS, ROOM_degC, SettlingStudy, settling_chapter, study_settling
 from studies.papers.theories import theories_chapter
+from studies.progress import Told
 from studies.reports import gyro_papers, style
 from studies.reports.diagnosis import headline
 from studies.reports.diagnosis_table import table_parts
@@ -34,20 +34,7 @@ from studies.results import (
     rows_of,
 )
 
-
-@dataclass(frozen=True)
-class Reproduction:
-    """Everything that the page shows: the table, physics, its diagnosis, settling, bias twins, the other papers."""
-
-    study: FrequencyStudy
-    physics: PhysicsComparison
-    diagnosis: TableDiagnosis
-    settling: SettlingStudy
-    twins: Sequence[tuple[TwinFit, ...]]
-    gyro_chapters: Sequence[Chapter]
-    gyro_summary: dict[str, Any]
-
-
+GYROS = 12  # virtual ones of each paper
 SOURCES = (
     "Wang X. et al., Sensors 2012, 12, 6434–6446, doi:10.3390/s120506434: Table 1, Table 2, equations (8)–(18).",
     "Spinner S., J. Am. Ceram. Soc. 1962, abstract: G(T), E(T) and Poisson's ratio of vitreous silica.",
@@ -80,31 +67,43 @@ LEAD = (
 )
 
 
-def reproduce_result(parts: Reproduction) -> Result:
-    """Return the numbers and the whole page."""
-    study, physics = parts.study, parts.physics
-    shapes = Blocks(lambda: mode_blocks(physics.instrument))
+def reproduce_papers() -> tuple[FrequencyStudy, Result]:
+    """Recompute the papers; return the study of Table 1, and the numbers with the whole page."""
+    told = Told("reproduction")
+    told("modes over temperature and a first diagnosis of Table 1", 0.0)
+    instrument = load_card(hrg.CARD)
+    study = hrg.study_table(*hrg.printed_table1(), resolution=hrg.RESOLUTION)
+    physics = hrg.compare_physics(study, instrument)
+    diagnosis = diagnose_table(str(hrg.table1_path()))
+    told("settling after a temperature step (figure 3)", 0.1)
+    settling = study_settling(instrument)
+    told(f"{GYROS} virtual gyros: bias compensation (figure 6)", 0.2)
+    twins = [study_twin(seed) for seed in range(GYROS)]
+    told("the CVG and BVG papers", 0.5)
+    gyro_chapters, gyro_numbers = gyro_papers.reproduce_gyro_papers(GYROS)
+    told("writing the page", 0.9)
+    first = [part for chapter in table_parts(diagnosis) for part in chapter.parts if not isinstance(part, Facts)]
+    verdict = Sentence(headline(diagnosis.verdict), "warning")
     chapters = [
-        Chapter("Summary", [_facts(parts), *_short(parts)]),
-        _first_diagnosis(parts),
+        Chapter("Summary", [_facts(study, physics, diagnosis), *_short(study, physics, diagnosis)]),
+        Chapter("Differences between measurement and physics: a first diagnosis", [verdict, *first]),
         Chapter("Table 1 and figure 4: frequency over temperature", _table1(study)),
         Chapter("Table 2 and figure 5(a): temperature from frequency", [_table2(study), error_figure(study)]),
         Chapter("Order of the polynomial", [order_sentence(study), *order_parts(study)]),
         Chapter("First-principles prediction", _physics(physics, study)),
-        Chapter("Mode shape", [shapes]),
+        Chapter("Mode shape", [Blocks(lambda: mode_blocks(instrument))]),
         theories_chapter(),
-        settling_chapter(parts.settling),
-        Chapter("Figure 5(b): temperature from frequency during a step", [_step_inverse(parts.settling)]),
-        *twin_chapters(parts.twins),
-        *parts.gyro_chapters,
+        settling_chapter(settling),
+        Chapter("Figure 5(b): temperature from frequency during a step", [_step_inverse(settling)]),
+        *twin_chapters(twins),
+        *gyro_chapters,
     ]
-    sources = (*SOURCES, *gyro_papers.SOURCES)
-    return Result(_summarise(parts), "Four gyro papers, reproduced", LEAD, chapters, sources=sources)
+    numbers, sources = _summarise(study, physics, diagnosis) | gyro_numbers, (*SOURCES, *gyro_papers.SOURCES)
+    return study, Result(numbers, "Four gyro papers, reproduced", LEAD, chapters, sources=sources)
 
 
-def _summarise(parts: Reproduction) -> dict[str, Any]:
-    """Return the numbers of the page, schema `hrg.reproduce/1`."""
-    study, physics = parts.study, parts.physics
+def _summarise(study: FrequencyStudy, physics: PhysicsComparison, diagnosis: TableDiagnosis) -> dict[str, Any]:
+    """Return the numbers of the HRG paper, schema `hrg.reproduce/1`."""
     fit, better = study.fit, study.next_fit
     assert better is not None
     fitted = {"sum_of_squares_Hz2": "regression.sum_of_squares", "leave_one_out_Hz": "regression.leave_one_out_rms"}
@@ -132,17 +131,15 @@ def _summarise(parts: Reproduction) -> dict[str, Any]:
             "local_simulated": physics.slope_ppm[:-1].tolist(),
             "laws": {name: {"value": value, "uncertainty": u} for name, value, u in physics.laws},
         },
-        "law_imposed": {"residual_rms_Hz": parts.diagnosis.law_rms, **row_of(physics, **curvatures)},
-        "diagnosis_of_table1": parts.diagnosis.as_dict(),
+        "law_imposed": {"residual_rms_Hz": diagnosis.law_rms, **row_of(physics, **curvatures)},
+        "diagnosis_of_table1": diagnosis.as_dict(),
         "card": physics.instrument.name,
-        **parts.gyro_summary,
     }  # fmt: skip
 
 
-def _facts(parts: Reproduction) -> Facts:
-    study, physics = parts.study, parts.physics
+def _facts(study: FrequencyStudy, physics: PhysicsComparison, diagnosis: TableDiagnosis) -> Facts:
     measured, predicted, sd = float(study.fit.slope_ppm(20.0)), physics.slope_ppm[-1], physics.uncertainty_ppm[-1]
-    within, misfit = np.abs(study.error_degC).max(), 1e3 * parts.diagnosis.law_rms
+    within, misfit = np.abs(study.error_degC).max(), 1e3 * diagnosis.law_rms
     return Facts([
         ("Measured slope at 20 °C", f"{measured:.1f} ppm/°C", "cubic fitted to Table 1; the paper says about 80"),
         ("Predicted slope at 20 °C", f"{predicted:.0f} ± {sd:.0f} ppm/°C", "solid solver, default silica law"),
@@ -151,8 +148,7 @@ def _facts(parts: Reproduction) -> Facts:
     ])  # fmt: skip
 
 
-def _short(parts: Reproduction) -> list[Part]:
-    study, physics = parts.study, parts.physics
+def _short(study: FrequencyStudy, physics: PhysicsComparison, diagnosis: TableDiagnosis) -> list[Part]:
     better = study.next_fit
     assert better is not None
     farthest = float(np.max(np.abs(study.calculated_degC - hrg.printed_table2()[0])))
@@ -171,7 +167,7 @@ def _short(parts: Reproduction) -> list[Part]:
             f"Physics predicts the magnitude of the slope: at 20 °C the prediction is {abs(away):.1f} standard deviations"
             f" {'above' if away > 0 else 'below'} the measurement, and the published laws of fused silica range from"
             f" {min(slopes):.0f} to {max(slopes):.0f} ppm/°C. Physics does not determine the curvature. The measured curvature is"
-            f" {parts.diagnosis.curvature_ratio:.2f} times that of the default law, a parabola based on published statements about the"
+            f" {diagnosis.curvature_ratio:.2f} times that of the default law, a parabola based on published statements about the"
             " maximum near 1100 °C. The slope for silica also vanishes near −200 °C, so even the sign of the second derivative between"
             f" these temperatures is uncertain: the sources allow {physics.curvature_law:.2f} ± {physics.curvature_uncertainty:.2f}"
             f" ppm/°C², and the measured {physics.curvature_measured:.2f} ppm/°C² is {away_curvature:.1f} standard deviations away."
@@ -226,13 +222,6 @@ def _draw_slopes(physics: PhysicsComparison, study: FrequencyStudy) -> Drawing:
         axes.plot(T, total, color=style.BLUE, label="predicted, default law")
         axes.plot(T, study.local_slope_ppm, "o", color=style.BLACK, label="measured, neighbouring points")
         return made
-
-
-def _first_diagnosis(parts: Reproduction) -> Chapter:
-    """Return what `hrg diagnose` says of Table 1."""
-    shown = [part for chapter in table_parts(parts.diagnosis) for part in chapter.parts if not isinstance(part, Facts)]
-    verdict = Sentence(headline(parts.diagnosis.verdict), "warning")
-    return Chapter("Differences between measurement and physics: a first diagnosis", [verdict, *shown])
 
 
 def _step_inverse(settling: SettlingStudy) -> Figure:

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from math import degrees
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
@@ -34,6 +35,8 @@ LEGENDS = {
     "temperature": "temperature (°C)",
 }
 MICROMETRE = 1e-6
+ShellTemperature = Callable[[Array], Array]
+"""A temperature (°C) over the position 0 ... 1 along the meridian."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +75,7 @@ class ModeScene:
         departures = f", departures x {self.exaggeration:.0f}" if self.exaggeration > 1 else ""
         return f"{line}\nslower mode of a pair, the faster {self.split.frequencies[1]:.2f} Hz, split {1e3 * self.split.hertz:.4g} mHz{departures}"
 
-    def values(self, colour: Colour, field: "ShellTemperature | None" = None) -> Array:
+    def values(self, colour: Colour, field: ShellTemperature | None = None) -> Array:
         """Return the coloured quantity on every vertex, in the unit of its legend."""
         if colour == "displacement":
             return np.asarray(np.linalg.norm(self.surface.displacement, axis=1))
@@ -80,9 +83,9 @@ class ModeScene:
             return self.surface.energy * MICROMETRE**2
         if field is None:
             raise InputError("the colour 'temperature' needs a field along the meridian: give --field FIELD.csv.")
-        return np.interp(self.surface.position, field.position, field.temperature)
+        return field(self.surface.position)
 
-    def scene(self, colour: Colour = "displacement", field: "ShellTemperature | None" = None) -> Scene:
+    def scene(self, colour: Colour = "displacement", field: ShellTemperature | None = None) -> Scene:
         """Return the scene for `shell.render`."""
         axes, marks = None, ""
         if self.split is not None:
@@ -91,7 +94,7 @@ class ModeScene:
             axes, marks = draw_axes(self.surface, self.split.slow_axis), ", 0° and 90°: azimuth"
         return compose_scene(self.surface, self.values(colour, field), LEGENDS[colour], self.title + marks, axes)
 
-    def colours(self, colour: Colour = "displacement", field: "ShellTemperature | None" = None) -> NDArray[np.uint8]:
+    def colours(self, colour: Colour = "displacement", field: ShellTemperature | None = None) -> NDArray[np.uint8]:
         """Return the colour of every vertex (N, 4) as bytes, cividis between the smallest and the largest value."""
         import matplotlib as mpl
 
@@ -100,14 +103,6 @@ class ModeScene:
         span = (top - values.min()) or 1.0
         scaled = np.clip((values - values.min()) / span, 0, 1)
         return np.asarray(mpl.colormaps["cividis"](scaled, bytes=True), dtype=np.uint8)
-
-
-@dataclass(frozen=True, eq=False)
-class ShellTemperature:
-    """A temperature (°C) along the meridian, position 0 ... 1, linear between the points."""
-
-    position: Array
-    temperature: Array
 
 
 def show_mode(
@@ -163,7 +158,7 @@ def moving_mode(
 
 
 def read_field(path: str | Path) -> ShellTemperature:
-    """Read a temperature along the meridian: a table `position,temperature_degC` with rising positions."""
+    """Read a temperature along the meridian, linear between the rows of a table `position,temperature_degC` with rising positions."""
     from studies.files.columns import read_columns
 
     table = read_columns(path, FIELD_COLUMNS, required=FIELD_COLUMNS)
@@ -171,7 +166,7 @@ def read_field(path: str | Path) -> ShellTemperature:
     table.require(FIELD_COLUMNS, "a temperature field")
     if (np.diff(position) <= 0).any() or position[0] < 0 or position[-1] > 1:
         raise InputError(f"{path}: position must rise within 0 (start of the meridian) to 1 (rim).")
-    return ShellTemperature(position, temperature)
+    return partial(np.interp, xp=position, fp=temperature)
 
 
 THEORIES = {

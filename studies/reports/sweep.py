@@ -1,6 +1,7 @@
 """The page of a parametric study: what was asked, what came out, what matters, and where it comes from."""
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -22,7 +23,7 @@ from studies.reports.sweep_analysis import (
     tolerance_parts,
     yield_of,
 )
-from studies.results import Blocks, Chapter, Column, Facts, Part, Result, Sentence, Table
+from studies.results import Blocks, Chapter, Column, Facts, Figure, Part, Result, Sentence, Table
 from studies.sweeps.definition import StudyParameter
 from studies.sweeps.design import nominal_design
 from studies.sweeps.parameters import TEMPERATURE, set_parameters
@@ -174,9 +175,10 @@ def _pictures(results: Results) -> list[Part]:
         limits = []
     parts: list[Part] = []
     for column in main_columns(results):
-        n = results.numbers[column.name]
-        if np.isfinite(results.column(column.name)).sum() >= 20 and n["greatest"] > n["least"]:
-            parts.append(figures.spread_figure(results, column, limits))
+        n, count = results.numbers[column.name], int(np.isfinite(results.column(column.name)).sum())
+        if count >= 20 and n["greatest"] > n["least"]:
+            words, alt = f"Distribution of {column.label} over {count} designs.", f"Histogram of {column.label}."
+            parts.append(Figure(partial(figures.draw_spread, results, column, limits), words, alt))
         parts += figures.response_figures(results, column)
     return parts
 

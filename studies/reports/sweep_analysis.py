@@ -8,7 +8,7 @@ import numpy as np
 from studies.errors import InputError
 from studies.reports import sweep_figures as figures
 from studies.reports.digits import plain, to_numerical_error
-from studies.results import Column, Head, Part, Sentence, Table, row_of, rows_of
+from studies.results import Column, Figure, Head, Part, Sentence, Table, row_of, rows_of
 from studies.sweeps.quantity import Column as Output
 from studies.sweeps.results import Results
 from studies.sweeps.search import name_search
@@ -53,7 +53,7 @@ def _sobol(results: Results, column: Output) -> list[Part]:
     rows = rows_of({"parameter": [figures.label(p, "1") for p in found.parameters], **row_of(found, *names)})
     note = "A parameter whose total interval includes zero has no significant influence."
     table = Table(f"Sobol indices of {column.label}", rows, SOBOL, note, sortable=True)
-    return [table, figures.sobol_figure(found, column)]
+    return [table, Figure(lambda: figures.draw_sobol(found, column), "Sobol indices with 90 % intervals.")]
 
 
 def _slopes(results: Results, column: Output) -> list[Part]:
@@ -67,7 +67,8 @@ def _slopes(results: Results, column: Output) -> list[Part]:
     )
     note = "± includes curvature beyond the outer levels and the solver error; smaller slopes are not significant."
     table = Table(f"Slopes of {column.label} at the nominal design", found, columns, note, sortable=True)
-    return [table, figures.tornado_figure(found, column)]
+    caption = "Change from the nominal design at the ends of each parameter's range."
+    return [table, Figure(lambda: figures.draw_tornado(found, column), caption)]
 
 
 def _shares(results: Results, column: Output) -> list[Part]:

@@ -35,13 +35,6 @@ def first_figure(results: Results) -> Drawing:
     return _draw_response(results, column)
 
 
-def spread_figure(results: Results, column: Column, limits: list[RequirementLimits]) -> Figure:
-    """Return the histogram of a column, with the nominal design and the limits asked for."""
-    count = int(np.isfinite(results.column(column.name)).sum())
-    words = f"Distribution of {column.label} over {count} designs."
-    return Figure(lambda: _draw_spread(results, column, limits), words, f"Histogram of {column.label}.")
-
-
 def response_figures(results: Results, column: Column) -> list[Figure]:
     """Return a column against the parameters, where there is a number to draw it over."""
     if not _is_drawable(results, column):
@@ -50,17 +43,6 @@ def response_figures(results: Results, column: Column) -> list[Figure]:
     words = f"Map of {column.label}; failed designs are left blank." if mapped else f"{column.label} by parameter."
     alt = f"Map of {column.label} over two parameters." if mapped else f"{column.label} over each parameter."
     return [Figure(lambda: _draw_response(results, column), words, alt)]
-
-
-def sobol_figure(indices: SobolIndices, column: Column) -> Figure:
-    """Return first-order and total indices with their intervals."""
-    return Figure(lambda: _draw_sobol(indices, column), "Sobol indices with 90 % intervals.")
-
-
-def tornado_figure(slopes: list[LocalSlope], column: Column) -> Figure:
-    """Return what each parameter alone does to a column between the ends of its range."""
-    caption = "Change from the nominal design at the ends of each parameter's range."
-    return Figure(lambda: _draw_tornado(slopes, column), caption)
 
 
 def _numeric(results: Results) -> list[StudyParameter]:
@@ -76,7 +58,8 @@ def _is_map(results: Results) -> bool:
     return results.study.sampling.method == "grid" and len(_numeric(results)) == 2 == len(results.study.parameters)
 
 
-def _draw_spread(results: Results, column: Column, limits: list[RequirementLimits]) -> Drawing:
+def draw_spread(results: Results, column: Column, limits: list[RequirementLimits]) -> Drawing:
+    """Draw the histogram of a column, with the nominal design and the limits asked for."""
     y, n = results.column(column.name), results.numbers[column.name]
     count = int(np.isfinite(y).sum())
     bars, edges = np.histogram(y, min(60, max(5, int(np.sqrt(count)))), (n["least"], n["greatest"]))
@@ -141,7 +124,8 @@ def _draw_map(results: Results, column: Column) -> Drawing:
     return made
 
 
-def _draw_sobol(indices: SobolIndices, column: Column) -> Drawing:
+def draw_sobol(indices: SobolIndices, column: Column) -> Drawing:
+    """Draw first-order and total indices with their intervals."""
     at = np.arange(len(indices.parameters))
     with style.figure(height=1.2 + 0.45 * len(at), x=f"share of the variance of {column.label}") as (made, axes):
         for shift, name, colour, values, low, high in (
@@ -156,7 +140,8 @@ def _draw_sobol(indices: SobolIndices, column: Column) -> Drawing:
     return made
 
 
-def _draw_tornado(slopes: list[LocalSlope], column: Column) -> Drawing:
+def draw_tornado(slopes: list[LocalSlope], column: Column) -> Drawing:
+    """Draw what each parameter alone does to a column between the ends of its range."""
     ordered = sorted(slopes, key=lambda slope: abs(slope.swing))
     at = np.arange(len(ordered))
     with style.figure(height=1.2 + 0.4 * len(at), x=f"change of {column_label(column)}") as (made, axes):

@@ -44,13 +44,14 @@ def view_modes(
     size = resonator.size
     pairs = zip(modes, splits or [None] * len(modes), strict=True)
     described = [_describe(resonator, mode, size, split) for mode, split in pairs]
-    middle, reach = _bounds(resonator)
+    line = trace_outlines(resonator, size / SPACING)[0]
+    middle = float(line.z.max() + line.z.min()) / 2
     start, rim = resonator.at([0.0]), resonator.at([resonator.length])
     data = {
         "modes": described,
         "map": [[round(float(x), 4) for x in mpl.colormaps["cividis"](k / 15)[:3]] for k in range(16)],
         "middle": middle / size,
-        "reach": reach / size,
+        "reach": float(np.hypot(line.r, line.z - middle).max()) / size,
         "opens_up": bool(rim.z[0] > start.z[0]),
     }
     html = fill_template(
@@ -129,10 +130,3 @@ def _split_at_kinks(line: Outline) -> "list[tuple[Outline, Members]]":
     breaks = 1 + np.flatnonzero(abs(np.diff(heading)) > KINK)
     bounds = [0, *breaks.tolist(), len(closing) - 1]
     return [(line, closing[a : b + 1]) for a, b in pairwise(bounds)]
-
-
-def _bounds(resonator: Resonator) -> tuple[float, float]:
-    """Height of the middle of the resonator and the radius of the sphere around it, m."""
-    line = trace_outlines(resonator, resonator.size / SPACING)[0]
-    middle = float(line.z.max() + line.z.min()) / 2
-    return middle, float(np.hypot(line.r, line.z - middle).max())

@@ -7,14 +7,13 @@ column is added in one place.
 
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, fields, is_dataclass
+from dataclasses import dataclass, fields, is_dataclass
 from functools import reduce
 from math import isfinite
 from typing import Any, Literal
 
 from studies.reports.digits import plain, short_exponent, to_error, to_interval
 
-Payload = Mapping[str, Any]
 Key = str | Callable[[Any], Any]
 Head = str | Sequence["Column | str"]  # of a table; a text is (a part of) it: see `columns`
 Drawing = Any  # a matplotlib figure, by a name that does not load matplotlib
@@ -222,12 +221,11 @@ class Result:
     payload: dict[str, Any]  # the object for programs, with its `schema`; a key `report` gets the path of the page
     title: str  # of the page: a name, and one sentence of what it shows
     lead: str = ""
-    parts: Sequence[
-        Chapter | Part
-    ] = ()  # what people read, in reading order; parts before the first chapter stand under "Results"
+    # what people read, in reading order; parts before the first chapter stand under "Results"
+    parts: Sequence[Chapter | Part] = ()
     status: int = 0  # the exit status, where it is not 0
     printed: str | None = None  # what the terminal shows instead of the parts, such as code or LaTeX
-    sources: Sequence[str] = field(default=())
+    sources: Sequence[str] = ()
     page: "Callable[[], Result] | None" = None  # what the page shows instead, made only when it is written
 
     @property

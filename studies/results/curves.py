@@ -16,6 +16,8 @@ DIGITS = 6  # digits of the axis's range to which values are kept
 
 def read_curves(figure: Drawing, left: float, bottom: float, width: float, height: float) -> str:
     """Return the curves of a drawn figure as JSON for `curves.js`, of the part (inch) that the picture shows; empty where it has none."""
+    from matplotlib.collections import LineCollection, PathCollection, PolyCollection
+
     wide, high = figure.get_size_inches()
 
     def place(x: float, y: float, w: float, h: float) -> list[float]:
@@ -25,7 +27,8 @@ def read_curves(figure: Drawing, left: float, bottom: float, width: float, heigh
 
     plots = []
     for axes in figure.axes:
-        if axes.name != "rectilinear" or not axes.axison or axes.images or any(map(_is_surface, axes.collections)):
+        drawn = all(isinstance(one, LineCollection | PathCollection | PolyCollection) for one in axes.collections)
+        if axes.name != "rectilinear" or not axes.axison or axes.images or not drawn:
             continue
         x, y = _Axis(axes.xaxis), _Axis(axes.yaxis)
         series = [found for found in _series(axes, x, y) if found["x"]]
@@ -53,12 +56,6 @@ def read_curves(figure: Drawing, left: float, bottom: float, width: float, heigh
     if not plots or sum(len(one["x"]) for plot in plots for one in plot["series"]) > MOST:
         return ""
     return json.dumps(plots, separators=(",", ":"), ensure_ascii=False, allow_nan=False).replace("<", "\\u003c")
-
-
-def _is_surface(collection: Any) -> bool:
-    from matplotlib.collections import LineCollection, PathCollection, PolyCollection
-
-    return not isinstance(collection, LineCollection | PathCollection | PolyCollection)
 
 
 class _Axis:
@@ -89,6 +86,7 @@ def _plain(values: ArrayLike) -> list[float | None]:
 def _series(axes: Any, x: _Axis, y: _Axis) -> Iterator[dict[str, Any]]:
     """Yield the parts of axes: `kind` line, dots, or area; `across` where one direction is in parts of the axes ("x", "y")."""
     from matplotlib.collections import LineCollection, PathCollection
+    from matplotlib.colors import to_hex
 
     def make(kind: str, points: Array, of: Any, colour: Any, transform: Any) -> Iterator[dict[str, Any]]:
         inside = transform.contains_branch_seperately(axes.transData)
@@ -98,7 +96,8 @@ def _series(axes: Any, x: _Axis, y: _Axis) -> Iterator[dict[str, Any]]:
         name = str(of.get_label())
         named = "" if name.startswith("_") else " ".join(name.replace("$", "").split())
         across = "" if all(inside) else "y" if inside[0] else "x"
-        yield {"kind": kind, "name": named, "colour": _hex(colour), "across": across, "x": scaled[0], "y": scaled[1]}
+        paint = to_hex(colour, keep_alpha=True)
+        yield {"kind": kind, "name": named, "colour": paint, "across": across, "x": scaled[0], "y": scaled[1]}
 
     for line in axes.lines:
         if line.get_visible():
@@ -119,9 +118,3 @@ def _series(axes: Any, x: _Axis, y: _Axis) -> Iterator[dict[str, Any]]:
     for bar in axes.patches:
         corners = bar.get_patch_transform().transform(bar.get_path().vertices)
         yield from make("area", np.asarray(corners, dtype=float), bar, bar.get_facecolor(), bar.get_transform())
-
-
-def _hex(colour: Any) -> str:
-    from matplotlib.colors import to_hex
-
-    return str(to_hex(colour, keep_alpha=True))

@@ -22,6 +22,14 @@ DRAWN = ("latin-hypercube", "sobol", "sensitivity")
 POWERS = ("sobol", "sensitivity")
 
 
+Cases = Annotated[
+    int, number("of latin-hypercube, sobol and sensitivity; of the last two a power of two", least=1, most=MOST_CASES, example=1024)
+]  # fmt: skip
+Distribution = Annotated[
+    Literal["uniform", "normal", "triangular", "log-uniform"], says("uniform unless given", example="normal")
+]
+
+
 class Sampling(Keys, frozen=True, kw_only=True):
     """How designs are drawn."""
 
@@ -29,18 +37,7 @@ class Sampling(Keys, frozen=True, kw_only=True):
         Literal["grid", "list", "latin-hypercube", "sobol", "sensitivity", "one-at-a-time"],
         says("grid: all combinations; sensitivity: for Sobol indices; one-at-a-time: for slopes", example="sobol"),
     ]
-    stated_cases: (
-        Annotated[
-            int,
-            number(
-                "of latin-hypercube, sobol and sensitivity; of the last two a power of two",
-                least=1,
-                most=MOST_CASES,
-                example=1024,
-            ),
-        ]
-        | None
-    ) = msgspec.field(name="cases", default=None)
+    stated_cases: Cases | None = msgspec.field(name="cases", default=None)
     seed: Annotated[int, number("of what is drawn", least=0, most=2**63 - 1)] = 0
     batch: Annotated[int, number("cases computed and kept together; 8, or 16384 of a family", least=1, most=10**6, example=8)] | None = None  # fmt: skip
     solver: Annotated[Literal["auto", "full", "family"], says("family: interpolated between full solves, with its error; full: every design by the solver")] = "auto"  # fmt: skip
@@ -69,12 +66,7 @@ class ParameterKeys(Keys, frozen=True, kw_only=True):
     high: Annotated[float, number("with low", example=0.95)] | None = None
     values: Annotated[tuple[float | str, ...], says("instead, of grid and list", least=1, example=[0.85, 0.9, 0.95])] | None = None  # fmt: skip
     nominal: Annotated[float | str, says("the card's value unless given", example=0.9)] | None = None
-    stated_distribution: (
-        Annotated[
-            Literal["uniform", "normal", "triangular", "log-uniform"], says("uniform unless given", example="normal")
-        ]
-        | None
-    ) = msgspec.field(name="distribution", default=None)
+    stated_distribution: Distribution | None = msgspec.field(name="distribution", default=None)
     standard_deviation: Annotated[float, number("of a normal one", above=0.0, example=0.002)] | None = None
     count: Annotated[int, number("points of a grid from low to high", least=2, most=10**6, example=11)] | None = None
 

@@ -31,14 +31,10 @@ class Explorer:
     """Designs of a study, rows as in its design, computed when the store lacks them."""
 
     def __init__(
-        self,
-        study: Study,
-        plan: WorkPlan,
-        workers: Workers,
-        store: Store,
-        progress: Progress = Progress(),  # noqa: B008 that shows nothing
+        self, study: Study, plan: WorkPlan, workers: Workers, store: Store, progress: Progress | None = None
     ) -> None:
-        self.study, self.plan, self.workers, self.store, self.progress = study, plan, workers, store, progress
+        self.study, self.plan, self.workers, self.store = study, plan, workers, store
+        self.progress = progress or Progress()  # that shows nothing
         self.columns = [column.name for column in study.columns]
 
     def cases(self, designs: Array) -> list[Row]:

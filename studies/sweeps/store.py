@@ -46,9 +46,8 @@ class Store:
         self.findings: dict[str, Any] = {}  # outcomes of searches by name
         self._stretches: list[Stretch] = []
         self.done = np.zeros(0, dtype=bool)  # for every design whether it is computed
-        self.remarks: dict[
-            int, tuple[str, str]
-        ] = {}  # status and remark of cases that failed or were warned of, by place
+        # status and remark of cases that failed or were warned of, by place
+        self.remarks: dict[int, tuple[str, str]] = {}
         self._searched: dict[bytes, Row] = {}
         for block in self.file.scan():
             self._take(block.kind, block.at, block.content)

@@ -156,7 +156,7 @@ def run_tasks(
                         computed = True
                         yield task.parts, None
             except workers.gone as error:
-                raise say_gone(error) from error
+                raise MissingEnvironment(f"the workers are gone ({str(error) or 'connection lost'}); everything computed before is kept. Run the same command again to resume.") from error  # fmt: skip
             else:
                 computed = True
                 yield done.parts, found
@@ -165,11 +165,6 @@ def run_tasks(
 def cores() -> int:
     """Return the number of cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
-def say_gone(error: BaseException) -> MissingEnvironment:
-    """Return the error that tells that all workers are gone."""
-    return MissingEnvironment(f"the workers are gone ({str(error) or 'connection lost'}); everything computed before is kept. Run the same command again to resume.")  # fmt: skip
 
 
 def become_worker(parent: int) -> None:

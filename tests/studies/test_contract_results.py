@@ -8,7 +8,7 @@ from importlib import import_module
 import pytest
 
 from studies.cli import COMMANDS
-from studies.cli.output import answers, print_json
+from studies.cli.output import answers, dump_json
 from studies.results import Blocks, Chapter, Column, Facts, Figure, Result, Sentence, Table, columns, rows_of
 from studies.results.page import render_result
 from studies.results.terminal import print_result
@@ -105,8 +105,7 @@ def test_text_json_and_page_are_made_of_one_declaration(capsys):
     for absent in ("Nothing", "never seen", "only there", "Empty"):
         assert absent not in told
     assert not drawn  # pictures are made for the page only
-    print_json(result.payload)
-    assert json.loads(capsys.readouterr().out)["rows"][0] == {"x": 1.0, "y": "<b>", "z": None}
+    assert json.loads(dump_json(result.payload))["rows"][0] == {"x": 1.0, "y": "<b>", "z": None}
     page = render_result(result)
     assert drawn
     assert "A &lt;title&gt;" in page

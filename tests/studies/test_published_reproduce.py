@@ -17,7 +17,7 @@ def folder(tmp_path_factory):
     """With 2 virtual gyros instead of 12: what is asserted does not depend on how many (test_recovery_bias_twin has more)."""
     out = tmp_path_factory.mktemp("report")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("studies.cli.reproduce.GYROS", 2)
+        patch.setattr("studies.reports.reproduce.GYROS", 2)
         patch.setattr("studies.reports.gyro_papers.MAP_POINTS", 7)
         assert main(["reproduce", "--out", str(out)]) == 0
     return out
