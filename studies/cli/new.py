@@ -69,8 +69,10 @@ def design(path: NewFile, *, like: str | None = None, card_: OtherCard = None) -
         like: A worked design: dome-8khz (default), light-cylinder, robust-dome; with --card by default a task for the wall
             and the radius of that card.
     """
-    own = card_ and not like
-    text = _own_task(path, card_) if own else _copy(like or "dome-8khz", shipped_tasks(), card_, "design")
+    if card_ and not like:
+        text = _own_task(path, card_)
+    else:
+        text = _copy(like or "dome-8khz", shipped_tasks(), card_, "design")
     _write(path, text, DesignKeys, read_task, "design", f"hrg optimise {quote(path)} --out FOLDER")
 
 

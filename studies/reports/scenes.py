@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from math import degrees
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
@@ -166,7 +165,7 @@ def read_field(path: str | Path) -> ShellTemperature:
     table.require(FIELD_COLUMNS, "a temperature field")
     if (np.diff(position) <= 0).any() or position[0] < 0 or position[-1] > 1:
         raise InputError(f"{path}: position must rise within 0 (start of the meridian) to 1 (rim).")
-    return partial(np.interp, xp=position, fp=temperature)
+    return lambda at: np.interp(at, position, temperature)
 
 
 THEORIES = {

@@ -21,7 +21,7 @@ from studies.sweeps.sealed import SealedFile
 
 FILE = "study.store"
 SHOWN_CHANGES = 6
-FOLLOWING = ("design: ", "exact: ", "exact[")  # what of an identity follows from the rest, hashes and places of columns
+FOLLOWING = "design: "  # what of an identity follows from the rest, its hash
 
 
 class Stretch(NamedTuple):
@@ -141,8 +141,6 @@ class Store:
             changes = [one for one in changes if not one.startswith(FOLLOWING)] or changes
         elif self._of - {_name(now)}:  # what the study is was damaged, its cases were not
             changes = ["its card, its quantities or its designs"]
-        if self.study and self.study.get("repeats"):
-            changes.append("an earlier version computed its repeated designs once")
         if changes:
             shown = "; ".join(changes[:SHOWN_CHANGES])
             more = f"; and {len(changes) - SHOWN_CHANGES} more" if len(changes) > SHOWN_CHANGES else ""
