@@ -62,9 +62,8 @@ def choose_memory(prepare: Prepare) -> Memory:
         return memory
 
     def search(memory: Memory) -> Memory:
-        memory = refine(
-            memory, tuple(name for name in select(memory)[1] if not POWERS[name][1])
-        )  # else rates stand for a lag
+        still = tuple(name for name in select(memory)[1] if not POWERS[name][1])  # else rates stand for a lag
+        memory = refine(memory, still)
         for _ in range(ROUNDS):
             before, memory = memory, refine(memory, select(memory)[1])
             if np.allclose(

@@ -52,10 +52,8 @@ class HeldOutRows:
         return self.before / self.after
 
 
-@dataclass(frozen=True)
-class _Fold:
-    held_out: BiasRun
-    rest: list[BiasRun]
+Fold = tuple[BiasRun, list[BiasRun]]
+"""A run, or part of one, that is held out, and the rest."""
 
 
 def fit_bias(runs: Sequence[BiasRun], method: Method = "guarded", reference: float | None = None) -> BiasFit:
@@ -71,10 +69,10 @@ def score_held_out(runs: Sequence[BiasRun], method: Method = "guarded") -> HeldO
     """
     by_runs = len(runs) > 1
     folds, fits = [], []
-    for fold in _folds(runs, by_runs):
+    for held_out, rest in _folds(runs, by_runs):
         try:
-            fits.append(_select(fold.rest, method, None, by_runs=by_runs and len(runs) > 2))
-            folds.append(fold)
+            fits.append(_select(rest, method, None, by_runs=by_runs and len(runs) > 2))
+            folds.append((held_out, rest))
         except CompensationError:  # what is left without this part carries no fit
             continue
     return _pool(folds, fits, by_runs=by_runs)
@@ -117,9 +115,9 @@ def select_guarded(design: BiasDesign, theta: float) -> StepwiseSelection:
     return select_stepwise(constants, candidates, bias, design.names, PARENTS, shared=True)
 
 
-def _folds(pieces: Sequence[BiasRun], by_runs: bool) -> list[_Fold]:
+def _folds(pieces: Sequence[BiasRun], by_runs: bool) -> list[Fold]:
     if by_runs:
-        return [_Fold(run, [other for other in pieces if other is not run]) for run in pieces]
+        return [(run, [other for other in pieces if other is not run]) for run in pieces]
     length = max(1, sum(piece.time.size for piece in pieces) // BLOCKS)
     gap = thermal_constant(pieces)
     folds = []
@@ -132,7 +130,7 @@ def _folds(pieces: Sequence[BiasRun], by_runs: bool) -> list[_Fold]:
             rest = [part for part in around if part.time.size > 2 * len(TERMS)]
             rest += [other for other in pieces if other is not piece]
             if rest and sum(part.time.size for part in rest) > 4 * len(TERMS):
-                folds.append(_Fold(piece.part(slice(begin, end)), rest))
+                folds.append((piece.part(slice(begin, end)), rest))
     if not folds:
         raise NoHeldOut("the run is too short to hold a part of it out; record longer, or give several runs.")
     return folds
@@ -149,7 +147,7 @@ def score_path(runs: Sequence[BiasRun], selection: StepwiseSelection) -> tuple[f
     """Return the held-out sd of each model on a selection's path, its terms kept, over that of the constant alone."""
     by_runs = len(runs) > 1
     folds = _folds(runs, by_runs)
-    designs = [BiasDesign(fold.rest, float(runs[0].state[0])) for fold in folds]
+    designs = [BiasDesign(rest, float(runs[0].state[0])) for _, rest in folds]
     scores = []
     for step in (selection.start, *selection.steps):
         fits = [fit_terms(design, step.terms, theta=1.0) for design in designs]  # θ matters to no prediction
@@ -159,7 +157,7 @@ def score_path(runs: Sequence[BiasRun], selection: StepwiseSelection) -> tuple[f
 
 def score_runs(fit: BiasFit, runs: Sequence[BiasRun]) -> HeldOutRows:
     """Apply a fitted model to held-out runs, less each run's own mean, also to rows out of its range."""
-    return _pool([_Fold(run, []) for run in runs], [fit] * len(runs), by_runs=True, everywhere=True)
+    return _pool([(run, []) for run in runs], [fit] * len(runs), by_runs=True, everywhere=True)
 
 
 def bias_stability(run: BiasRun, bias: Array | None = None) -> float:
@@ -167,11 +165,10 @@ def bias_stability(run: BiasRun, bias: Array | None = None) -> float:
     return float(np.std(_averages(run.bias if bias is None else bias, run), ddof=1))
 
 
-def _pool(folds: Sequence[_Fold], fits: Sequence[BiasFit], *, by_runs: bool, everywhere: bool = False) -> HeldOutRows:
+def _pool(folds: Sequence[Fold], fits: Sequence[BiasFit], *, by_runs: bool, everywhere: bool = False) -> HeldOutRows:
     raw: list[Array] = []
     compensated: list[Array] = []
-    for fold, fit in zip(folds, fits, strict=True):
-        run = fold.held_out
+    for (run, _), fit in zip(folds, fits, strict=True):
         inside = within(run.state, fit.state_range) & within(run.rate, fit.rate_range) | everywhere
         left = fit.left(run)
         averages = [_averages(values[inside], run) for values in (run.bias, left)]
@@ -180,11 +177,11 @@ def _pool(folds: Sequence[_Fold], fits: Sequence[BiasFit], *, by_runs: bool, eve
             compensated.append(averages[1] - averages[1].mean())
     if not raw:
         raise NoHeldOut(
-            f"no held-out part lies inside the range of {folds[0].held_out.variable.name} and its rate in the rest; record two"
+            f"no held-out part lies inside the range of {folds[0][0].variable.name} and its rate in the rest; record two"
             " runs of each kind, such as two coolings and two warmings over the same temperatures, or cycles."
         )
     before, after = np.concatenate(raw), np.concatenate(compensated)
-    possible = sum(_averages(fold.held_out.bias, fold.held_out).size for fold in folds)
+    possible = sum(_averages(run.bias, run).size for run, _ in folds)
     return HeldOutRows(
         before=float(np.sqrt(np.mean(before**2))),
         after=float(np.sqrt(np.mean(after**2))),

@@ -133,16 +133,21 @@ def invert(curve: Callable[[Array], Array], span: tuple[float, float], frequency
             f"the frequency runs from {np.nanmin(frequency):.8g} to {np.nanmax(frequency):.8g} Hz and lies outside {low:.8g}"
             f" to {high:.8g} Hz ({span[0]:.1f} to {span[1]:.1f} °C), over which the curve was fitted, in {100 * np.mean(outside):.1f} % of the readings; calibrate over that range."
         )
+    found = np.full(frequency.shape, np.nan)
+    if np.any(known):
+        found[known] = _reach(curve, span, frequency[known])
+    return found
 
+
+def _reach(curve: Callable[[Array], Array], span: tuple[float, float] | tuple[Array, Array], frequency: Array) -> Array:
+    """Return where between two temperatures (°C) a curve has these frequencies (Hz), NaN where it is not found."""
     from scipy.optimize.elementwise import find_root
 
     def excess(T: Array, f: Array) -> Array:
         return curve(T) - f
 
-    found = np.full(frequency.shape, np.nan)
-    if np.any(known):
-        found[known] = find_root(excess, span, args=(frequency[known],)).x
-    return found
+    found = find_root(excess, span, args=(frequency,))
+    return np.where(found.success, found.x, np.nan)
 
 
 def fit_frequency(
@@ -198,11 +203,5 @@ def misreading_degC(one: FrequencyFit, other: FrequencyFit, temperature_degC: Ar
     """Return the error T' - T of the temperature that `one` reads from `other`: one(T') = other(T), NaN if not reached within its span."""
     T = np.asarray(temperature_degC, dtype=np.float64)
     reach = np.ptp(one.temperature_range_degC)
-
-    from scipy.optimize.elementwise import find_root
-
-    def excess(read: Array, f: Array) -> Array:
-        return one.frequency(read, extrapolate=True) - f
-
-    found = find_root(excess, (T - reach, T + reach), args=(other.frequency(T, extrapolate=True),))
-    return np.asarray(np.where(found.success, found.x, np.nan) - T)
+    read = _reach(one.polynomial.value, (T - reach, T + reach), other.polynomial.value(T))
+    return np.asarray(read - T)

@@ -180,9 +180,8 @@ class _Course:
         """What drives amplitude, phase and quadrature from their commands (1/s)."""
         (decay, drift, _, command), damped, detuned = self.values(row, fraction, psi)
         along, across = self.forces(psi, command, means)
-        coupled = -detuned.imag - (
-            means[1] if self.stiff else 0.0
-        )  # a stiffness couples the patterns against the split
+        # a stiffness couples the patterns against the split
+        coupled = -detuned.imag - (means[1] if self.stiff else 0.0)
         return np.array([
             -decay - damped.real + coupled * means[2] + along.real - means[0],
             drift + detuned.real - damped.imag * means[2] + along.imag,

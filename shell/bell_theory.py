@@ -68,9 +68,8 @@ class TwoPatternModel:
     mass: float  # m₀, kg
     coupling: float  # b, kg
     stiffness: float  # c₀, N/m
-    membrane_share: (
-        float  # part of the strain energy that goes into stretching the middle surface, 0 … 1; 0 if (17) were true
-    )
+    # part of the strain energy that goes into stretching the middle surface, 0 … 1; 0 if (17) were true
+    membrane_share: float
 
     @property
     def frequency(self) -> float:

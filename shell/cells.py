@@ -33,11 +33,6 @@ class CellTable:
     transverse_shear: float = 1.0
     plane_stress: bool = False
 
-    def part(self, cells: slice) -> "CellTable":
-        """The table of some of the cells."""
-        cut = {name: getattr(self, name)[cells] for name in ("gradients", "radius", "volume", "position")}
-        return replace(self, **cut)
-
     def strains(self, unknowns: Array) -> Array:
         """Strain (cells, 1, 6, points) of cell unknowns (cells, functions x 3)."""
         count, _, points, functions = self.gradients.shape

@@ -140,7 +140,8 @@ def lowest_pairs(factor: Factor, mass: Mass, count: int, accuracy: float) -> tup
     most = min(size, MOST + 4 * count)
     basis, heavy, answers = (np.empty((size, most), order="F") for _ in range(3))
     T = np.zeros((most, most))
-    block, used = _orthonormal(mass, _random(size, wide))[0], 0
+    start = np.random.default_rng(5).standard_normal((size, wide))  # has a share of every mode
+    block, used = _orthonormal(mass, start)[0], 0
     while True:
         first, used = used, used + block[0].shape[1]
         basis[:, first:used], heavy[:, first:used] = block
@@ -197,12 +198,6 @@ def _eigenpairs(matrix: Array) -> tuple[Array, Array]:
     if fault:
         raise ShellError("the eigenvalues of the subspace did not converge.")
     return np.asarray(values), np.asarray(vectors)
-
-
-@lru_cache(maxsize=16)
-def _random(size: int, width: int) -> Array:
-    """A start with a share of every mode, always the same."""
-    return np.random.default_rng(5).standard_normal((size, width))
 
 
 def _definite(factor: Array, fault: int) -> Array:

@@ -10,7 +10,7 @@ Components of strain, in order: three normal strains, then the engineering shear
 (s, θ, ζ) in the shell and (r, θ, z) in a cell.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,11 +34,6 @@ class StrainTable:
     position: Array  # (elements, stations), where on the meridian (0 ... 1) the material is to be taken
     transverse_shear: float = 1.0
     plane_stress: bool = False
-
-    def part(self, elements: slice) -> "StrainTable":
-        """The table of some of the elements."""
-        cut = {name: getattr(self, name)[elements] for name in ("strain", "displacement", "volume", "position")}
-        return replace(self, **cut)
 
     def strains(self, unknowns: Array) -> Array:
         """Strain (elements, stations, 6, points) of element unknowns (elements, size)."""

@@ -125,9 +125,8 @@ def _break(resonator: Resonator, firm: list[float], ends: tuple[End, End], n: in
             wanted += _layers(resonator, edge, inward, end)
     for joint in (s for s in resonator.joints if s in firm[1:-1]):
         wanted += [(w, joint + side * w) for side in (-1, 1) for w, _ in _layers(resonator, joint, side, "tied")]
-    for width, s in sorted(
-        wanted, key=lambda one: (float(f"{one[0]:.6g}"), -one[1])
-    ):  # of equal ones the outer first, whatever rounding says
+    # of equal ones the outer first, whatever rounding says
+    for width, s in sorted(wanted, key=lambda one: (float(f"{one[0]:.6g}"), -one[1])):
         if min(abs(s - other) for other in firm) > 0.4 * width and start < s < stop:
             firm = sorted([*firm, s])
     longest = level.longest * resonator.size * crowding(n)

@@ -82,9 +82,10 @@ class Material:
         """Return a property at temperatures in kelvin; E, G and nu are derived from the two that are stated."""
         T = self.check(temperature)
         if name in self.properties:
-            if name == "density":
-                return self.properties[name](T) * self._growth_since_density(T) ** -3
-            return self.properties[name](T)
+            found = self.properties[name](T)
+            if name == "density" and "expansion" in self.properties:  # lengths grow from where it is stated
+                found = found * self.growth(T, self.properties[name].numbers["at_degC"] + zero_Celsius) ** -3
+            return found
         if name not in ELASTIC:
             raise ShellError(self._lack(name))
         for other in ELASTIC:
@@ -194,11 +195,6 @@ class Material:
         properties = {name: replace(found, reference=reference) for name, found in properties.items()}
         crystal = None if set(given) & set(ELASTIC) else self.crystal
         return replace(self, properties=properties, reference=reference, crystal=crystal)
-
-    def _growth_since_density(self, T: NDArray[np.float64]) -> NDArray[np.float64]:
-        if "expansion" not in self.properties:
-            return np.ones_like(T)
-        return self.growth(T, self.properties["density"].numbers["at_degC"] + zero_Celsius)
 
     def _lack(self, name: str) -> str:
         return f"material '{self.name}', law '{self.law}': no source states its {spell([name])}; give it in the card or in a material file of your own."

@@ -157,21 +157,28 @@ def _turn(section: Pieces, around: int, size: float) -> Volume:
     theta = pi * np.arange(2 * around) / around
     spin = np.stack([np.cos(theta), np.sin(theta)], axis=1)
     spin[abs(spin) < 1e-15] = 0.0
-    rings = [
-        np.column_stack([r[k] * spin[: widths[k]], np.full(widths[k], z[k])]) for k in range(len(r))
-    ]  # a point of the axis stays one node
+    # a point of the axis stays one node
+    rings = [np.column_stack([r[k] * spin[: widths[k]], np.full(widths[k], z[k])]) for k in range(len(r))]
     # turned in their sense until the side on the axis is ξ = 0
     turns = np.array([3, 1, 0, 2])[np.argmax(axial, axis=0)[touching]]
-    wedges = np.array([np.rot90(quad, turn) for quad, turn in zip(quads[touching], turns, strict=True)])
-    lattice = _Lattice(first, on_axis, around)
+    wedges = np.array([np.rot90(quad, turn) for quad, turn in zip(quads[touching], turns, strict=True)], dtype=np.intp)
     edges = _held_edges(section, quads, on_axis)
     off = ~np.any(on_axis[edges], axis=1)
+
+    def elements(pieces: Index, order: str) -> Index:
+        """Elements (pieces x around, nodes) from numbers (pieces, ξ, η) of the section, in an order of places (ξ, η, θ)."""
+        i, j, k = np.array([[int(digit) for digit in place] for place in order.split()]).T
+        points = pieces[:, i, j]  # (pieces, nodes)
+        angle = (2 * np.arange(around)[:, None] + k) % (2 * around)  # (around, nodes)
+        numbers = first[points][:, None, :] + np.where(on_axis[points][:, None, :], 0, angle)
+        return np.asarray(numbers.reshape(-1, len(i)))
+
     return Volume(
         np.concatenate(rings),
-        lattice.elements(quads[~touching], HEXAHEDRON),
-        lattice.elements(wedges.reshape(-1, 3, 3), WEDGE),
-        lattice.elements(edges[off][:, :, None], "000 002 202 200 001 102 201 100 101"),
-        lattice.elements(edges[~off][:, :, None], "000 202 200 102 201 100"),
+        elements(quads[~touching], HEXAHEDRON),
+        elements(wedges.reshape(-1, 3, 3), WEDGE),
+        elements(edges[off][:, :, None], "000 002 202 200 001 102 201 100 101"),
+        elements(edges[~off][:, :, None], "000 202 200 102 201 100"),
     )
 
 
@@ -187,25 +194,6 @@ def _held_edges(section: Pieces, quads: Index, on_axis: NDArray[np.bool_]) -> In
     _, which, count = np.unique(ends, axis=0, return_inverse=True, return_counts=True)
     found = edges[(count[which.ravel()] == 1) & section.held[edges].all(axis=1) & ~on_axis[edges].all(axis=1)]
     return np.asarray(np.where(on_axis[found[:, 2]][:, None], found[:, ::-1], found))
-
-
-@dataclass(frozen=True, eq=False)
-class _Lattice:
-    """Node numbers of the turned section: `first` of each point of the section, one node where it lies on the axis."""
-
-    first: Index
-    on_axis: NDArray[np.bool_]
-    around: int
-
-    def elements(self, pieces: Index, order: str) -> Index:
-        """Elements (pieces x around, nodes) from numbers (pieces, ξ, η) of the section, in an order of places (ξ, η, θ)."""
-        i, j, k = np.array([[int(digit) for digit in place] for place in order.split()]).T
-        if not len(pieces):
-            return np.zeros((0, len(i)), dtype=np.intp)
-        points = pieces[:, i, j]  # (pieces, nodes)
-        angle = (2 * np.arange(self.around)[:, None] + k) % (2 * self.around)  # (around, nodes)
-        numbers = self.first[points][:, None, :] + np.where(self.on_axis[points][:, None, :], 0, angle)
-        return np.asarray(numbers.reshape(-1, len(i)))
 
 
 VolumeKind = Literal["vtu", "msh", "inp"]

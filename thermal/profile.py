@@ -141,14 +141,6 @@ def _append(points: Points, time: float, temperature: float) -> None:
     points.append((time, temperature))
 
 
-def _soak(temperature: float, duration: float) -> Points:
-    return [(0.0, temperature), (duration, temperature)]
-
-
-def _step(before: float, after: float, duration: float) -> Points:
-    return [(0.0, before), (0.0, after), (duration, after)]
-
-
 def _ramp(before: float, after: float, rate: float) -> Points:
     if before == after:
         raise ThermalError(f"a ramp from {before:g} to {after:g} °C changes nothing; use 'soak'.")
@@ -189,8 +181,11 @@ def _check_repeats(count: float, what: str) -> None:
 
 
 FORMS: dict[str, tuple[tuple[str, ...], Callable[..., Points]]] = {
-    "soak": (("T", "DURATION"), _soak),
-    "step": (("FROM", "TO", "DURATION"), _step),
+    "soak": (("T", "DURATION"), lambda level, duration: [(0.0, level), (duration, level)]),
+    "step": (
+        ("FROM", "TO", "DURATION"),
+        lambda before, after, duration: [(0.0, before), (0.0, after), (duration, after)],
+    ),
     "ramp": (("FROM", "TO", "RATE"), _ramp),
     "staircase": (("FROM", "TO", "STEP", "HOLD"), _staircase),
     "cycle": (("START", "FIRST", "SECOND", "RATE", "HOLD", "COUNT"), _cycle),

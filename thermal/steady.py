@@ -15,8 +15,11 @@ TOLERANCE = 1e-9  # relative size of the last Newton step; its error is the squa
 
 def find_steady_state(network: Network, boundaries: Mapping[str, float], time: float = 0.0) -> Array:
     """Solve q = L T + σ R T⁴ by Newton's method: temperatures (K) of nodes and boundaries, sources at `time` (s)."""
+    check_boundary_names(network, boundaries)
     n = network.count
-    held = boundary_vector(network, boundaries)
+    held = np.array([float(boundaries[boundary.name]) for boundary in network.boundaries])
+    if not (np.isfinite(held).all() and (held > 0).all()):
+        raise ThermalError("the temperature of a boundary must be above 0 K; temperatures here are in kelvin.")
     T = np.concatenate([np.full(n, held.mean()), held])
     power = network.power(time)
     for _ in range(NEWTON_STEPS):
@@ -26,16 +29,6 @@ def find_steady_state(network: Network, boundaries: Mapping[str, float], time: f
         if np.abs(step).max() < TOLERANCE * T.max():
             return T
     raise ThermalError(f"no steady state was found after {NEWTON_STEPS} Newton steps; look for a source whose heat the network cannot carry away.")  # fmt: skip
-
-
-def boundary_vector(network: Network, boundaries: Mapping[str, float]) -> Array:
-    """Temperatures (K) of the boundaries in the network's order; every boundary needs one, above 0 K."""
-    names = [boundary.name for boundary in network.boundaries]
-    check_boundary_names(network, boundaries)
-    held = np.array([float(boundaries[name]) for name in names])
-    if not (np.isfinite(held).all() and (held > 0).all()):
-        raise ThermalError("the temperature of a boundary must be above 0 K; temperatures here are in kelvin.")
-    return held
 
 
 def check_boundary_names(network: Network, boundaries: Mapping[str, object]) -> None:

@@ -21,11 +21,8 @@ PASSES = 3  # each takes the image out as the amplitudes of the one before chang
 WRITTEN = 0.75  # of the last digit by which the times of an even grid may be off: half of it, and the error of the line of all times
 FEWEST, APART = 12, 20  # samples of a block; steps from which a distance between samples is a gap
 ALONE = 0.7  # part of a block's samples above which what is left of the image e^{−2iωt} cannot be told from the wave
-SHORTEST = (
-    0.01,
-    0.1,
-    0.5,
-)  # parts of the distances between rows, of which the shortest that is a step of a grid is taken
+SHORTEST = (0.01, 0.1, 0.5)
+"""Parts of the distances between rows, of which the shortest that is a step of a grid is taken."""
 GRID = 0.2  # standard deviation of the distances (steps) on a grid; that of distances of any length is 0.29
 
 

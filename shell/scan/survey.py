@@ -45,15 +45,12 @@ class Face:
     motion: RigidMotion | None  # that aligned it
     span: tuple[float, float] | None = None  # polar angles of the ends of a dome whose tilt the shape does not tell
 
-    @property
-    def turns(self) -> "Callable[[Array, int], list[Complex]] | None":
-        """Change of c_m at positions per radian of turning a dome about x and about y; None where the shape tells its axis."""
-        return self._turns if self.span is not None else None
+    def _turns(self, span: tuple[float, float], position: Array, order: int) -> list[Complex]:
+        """Change of c_m at positions per radian of turning a dome about x and about y.
 
-    def _turns(self, position: Array, order: int) -> list[Complex]:
-        """A turn moves a point by dφ = -sin θ, sin φ dθ = -cos φ cos θ (about x), and cos θ, -cos φ sin θ (about y)."""
-        assert self.span is not None
-        first, last = self.span
+        A turn moves a point by dφ = -sin θ, sin φ dθ = -cos φ cos θ (about x), and cos θ, -cos φ sin θ (about y).
+        """
+        first, last = span
         phi = first + (last - first) * position
         m = np.arange(self.waves.highest + 1)
         theta = 2 * np.pi * np.arange(4 * self.waves.highest) / (4 * self.waves.highest)
@@ -86,9 +83,10 @@ class Face:
 
     def _weigh(self, position: Array, weight: Array, order: int) -> tuple[complex, Array]:
         found, covariance = self._combine(weight @ self.waves.along(position), order)
-        if self.turns is None or self.motion is None:
+        if self.span is None or self.motion is None:
             return found, covariance
-        parts = np.array([[z.real, z.imag] for z in (complex(weight @ turn) for turn in self.turns(position, order))])
+        turned = (complex(weight @ turn) for turn in self._turns(self.span, position, order))
+        parts = np.array([[z.real, z.imag] for z in turned])
         return found, covariance + self.motion.tilt_error**2 * parts.T @ parts
 
     def centred(self, rigid: Array) -> "Face":

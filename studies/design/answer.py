@@ -94,7 +94,11 @@ def answer(task: Task, explorer: Explorer, plan: WorkPlan) -> Answer:
     _refuse_infeasible(search, best)
     centre = search.x[best]
     front = _unbeaten(search, scalar, [*ends, best]) if count > 1 else [best]
-    foretold = _foretell(search, best)
+    x = search.x[best]
+    others = search.local(x, WIDE, without=best)(x[: search.task.free])[
+        0
+    ]  # what the interpolant through the others says
+    foretold = search.goals.uncount(others)
     prices = _prices(search, scalar, smooth)
     values = search.values[best]
     limits = tuple(
@@ -195,13 +199,6 @@ def _refuse_infeasible(search: Search, best: int) -> None:
         f"no design found meets all constraints. In the nearest one, {at}, {'; '.join(words)}.{bound} Relax one of these"
         " constraints or widen the bounds; the designs computed are kept."
     )
-
-
-def _foretell(search: Search, best: int) -> Array:
-    """Return what the interpolant through all the other designs about the best one says of it, in units of the columns."""
-    x = search.x[best]
-    z = search.local(x, WIDE, without=best)(x[: search.task.free])[0]
-    return search.goals.uncount(z)
 
 
 def _prices(search: Search, scalar: Scalar, best: int) -> list[float | None]:

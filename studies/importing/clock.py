@@ -3,7 +3,6 @@
 import datetime
 import zoneinfo
 from collections.abc import Callable
-from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -81,12 +80,10 @@ class Clock:
                     many = f"{self._nights} midnights passed: a day added at each"
                     self.notes.append("a midnight passed: a day added" if self._nights == 1 else many)
         zone = file.timezone if self.origin is not None and self.origin.tzinfo is None else None
-        if (
-            zone and self.form in SECONDS and self.origin is not None
-        ):  # a clock that counts seconds has a local start only
+        if zone and self.form in SECONDS and self.origin is not None:  # it has a local start only
             self.origin = _with_offset(self.origin, self.origin.replace(tzinfo=zoneinfo.ZoneInfo(zone)).utcoffset())
             zone = None
-        rate = file.clock_rate if file.sample_period is None else 0.0
+        rate = file.clock_rate_ppm * 1e-6 if file.sample_period is None else 0.0
         if not (zone or rate or file.clock_offset):
             return seconds
         placed, twice, origin, first = Stored(folder), 0, self.origin, None
@@ -97,7 +94,7 @@ class Clock:
                 # an hour that comes twice is looked at as a whole
                 while begin + part.size < len(seconds) and _utc_offsets(origin, part[-1:], zone)[1]:
                     part = seconds[begin : begin + part.size + PORTION]
-                part, first, some = place_in_zone(origin, part, zone, partial(_place, place, begin), first)
+                part, first, some = place_in_zone(origin, part, zone, place, begin, first)
                 twice += some
             begin += part.size
             part = part / (1 + rate) if rate else part
@@ -195,25 +192,21 @@ def _combine(start: datetime.datetime | None, clock: datetime.datetime) -> datet
 
 
 def place_in_zone(
-    origin: datetime.datetime, seconds: Array, zone: str, place: Callable[[int], str], first: float | None = None
+    origin: datetime.datetime, seconds: Array, zone: str, place: Callable[[int], str], begin: int, first: float | None
 ) -> tuple[Array, float | None, int]:
-    """Return true seconds (N,) after the origin, by how much that is ahead of UTC (`first`, else of the first row), and how many rows lie in an hour that comes twice."""
+    """Return true seconds (N,) of the rows from `begin` after the origin, by how much that is ahead of UTC (`first`, else of the first row), and how many rows lie in an hour that comes twice."""
     rows = np.flatnonzero(np.isfinite(seconds))
     ahead, doubtful = _utc_offsets(origin, seconds[rows], zone)
     skipped = np.flatnonzero(np.isnan(ahead))
     if len(skipped):
         raise InputError(
-            f"{place(int(rows[skipped[0]]))}: this time does not exist in {zone}, whose clocks skip that hour; a logger that"
+            f"{place(begin + int(rows[skipped[0]]))}: this time does not exist in {zone}, whose clocks skip that hour; a logger that"
             " stays on winter time needs a fixed zone, such as timezone = 'Etc/GMT-1' for one hour ahead of UTC."
         )
     true = seconds.copy()
     first = float(ahead[0]) if first is None and ahead.size else first
     true[rows] -= ahead - (first or 0.0)
     return true, first, doubtful
-
-
-def _place(place: Callable[[int], str], begin: int, row: int) -> str:
-    return place(begin + row)
 
 
 def _with_offset(origin: datetime.datetime, ahead: datetime.timedelta | None) -> datetime.datetime:

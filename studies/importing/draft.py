@@ -9,14 +9,13 @@ from dataclasses import dataclass
 
 from studies.errors import InputError
 from studies.files.given import shorten
-from studies.files.stored import Stored
 from studies.importing.channels import is_container, open_channels, sort_groups
 from studies.importing.draft_columns import comment_of, draft_column, draft_unknown, find_markers, guess_meanings
 from studies.importing.join import read_series, shift_between
 from studies.importing.look import Look, as_number, find_nominal, find_period, is_stamp, look_at, look_at_group, parting
 from studies.importing.mapping import NUMERIC_TIMES, SCHEMA, TABLE_TARGETS, FileMap, ImportMap
 from studies.importing.meaning import Meaning, find_meanings
-from studies.importing.offset import Offset, estimate_offset
+from studies.importing.offset import estimate_offset
 from studies.importing.resampling import ClockedFile
 from studies.importing.timing import TIME_WORDS, find_time
 from studies.schema.keys import spell_value
@@ -120,11 +119,12 @@ def _find_offsets(paths: Sequence[str], files: list[list[str]]) -> list[str]:
         return []
     notes, base = [], series[0]
     for written, path, other, shift in zip(files[1:], paths[1:], series[1:], shifts[1:], strict=True):
+        t1, t2 = base.time.thin(SEEN), other.time.thin(SEEN) + shift
         found = [
             (offset, one, two)
             for (one, _), y1 in base.columns.items()
             for (two, _), y2 in other.columns.items()
-            if (offset := _offset(base.time, y1, other.time, y2, shift, _one_unit(one, two))) is not None
+            if (offset := estimate_offset(t1, y1.thin(SEEN), t2, y2.thin(SEEN), _one_unit(one, two))) is not None
         ]
         if not found:
             continue
@@ -144,10 +144,6 @@ def _find_offsets(paths: Sequence[str], files: list[list[str]]) -> list[str]:
         ]
         notes.append(f"{path}: its clock seems to be off: add {said}, by {theirs} against {ours}; see the draft.")
     return notes
-
-
-def _offset(t1: Stored, y1: Stored, t2: Stored, y2: Stored, shift: float, alike: bool) -> Offset | None:
-    return estimate_offset(t1.thin(SEEN), y1.thin(SEEN), t2.thin(SEEN) + shift, y2.thin(SEEN), alike)
 
 
 def _source_of(series: ClockedFile, target: str) -> str:

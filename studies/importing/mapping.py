@@ -173,11 +173,6 @@ class FileMap(Keys, frozen=True, kw_only=True):
         """The first line with numbers."""
         return self.header_line + 1 if self.first_line is None else self.first_line
 
-    @property
-    def clock_rate(self) -> float:
-        """By how much its clock runs fast."""
-        return self.clock_rate_ppm * 1e-6
-
 
 class ImportMap(Keys, frozen=True, kw_only=True):
     """A whole map."""

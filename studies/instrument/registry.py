@@ -108,15 +108,14 @@ def _read_given(name: str, raw: Any, place: CardPlace) -> ReadTable:
     given = raw or {}
     own = [known_keys(describe(entry.keys), given) for entry in entries]
     for key in given:
-        if not any(key in keys for keys in own) and any(key in known_keys(describe(entry.keys)) for entry in entries):
+        if any(key in keys for keys in own):
+            continue
+        near = nearest(key, [k for keys in own for k in keys])
+        if any(key in known_keys(describe(entry.keys)) for entry in entries):
             tag = structs(describe(entries[0].keys))[0].tag_field
-            raise InputError(
-                f"{place.where}: unknown key '{key}'; {tag} = '{given.get(tag or '')}' has none{nearest(key, [k for keys in own for k in keys])}"
-            )
-        if not any(key in keys for keys in own) and (home := find_home(key)):
-            raise InputError(f"{place.where}: unknown key '{key}'{home}")
-        if not any(key in keys for keys in own) and len(entries) > 1:
-            raise InputError(f"{place.where}: unknown key '{key}'{nearest(key, [k for keys in own for k in keys])}")
+            raise InputError(f"{place.where}: unknown key '{key}'; {tag} = '{given.get(tag or '')}' has none{near}")
+        if (home := find_home(key)) or len(entries) > 1:
+            raise InputError(f"{place.where}: unknown key '{key}'{home or near}")
     read: list[Given] = []
     keys: dict[str, Any] = {}
     parts: dict[str, Any] = {}

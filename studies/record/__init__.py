@@ -43,11 +43,8 @@ RAW = tuple(f"pickoff_{part}_V" for part in PARTS)
 POLAR = tuple((f"amplitude_{part}_V", f"phase_{part}_deg") for part in PARTS)
 CARTESIAN = tuple((f"in_phase_{part}_V", f"out_of_phase_{part}_V") for part in PARTS)
 POWERS = ("power_dBm", "power_dB", "power_W")
-DECAYS = (
-    *RAW,
-    *(name for pair in (*POLAR, *CARTESIAN) for name in pair),
-    *POWERS,
-)  # of `hrg fit ringdown`, beside the time
+DECAYS = (*RAW, *(name for pair in (*POLAR, *CARTESIAN) for name in pair), *POWERS)
+"""Columns of `hrg fit ringdown`, beside the time."""
 OUTPUTS = ("frequency_Hz", "bias_deg_per_h", "measured_rate_deg_per_s", "output_counts", "inverse_q")
 LOWEST = 20.0  # Hz, of a resonator's table
 FAR = 0.7  # of ln f from the median of a table: a factor of two

@@ -77,13 +77,12 @@ def table_of(decays: Sequence[Decay]) -> Decays:
         TEMPERATURE: column([decay.notes.get("temperature_degC") for decay in decays]),
         "pressure_Pa": column([decay.notes.get("pressure_Pa") for decay in decays]),
     }
-    sds = {name: column([_sd(decay, name) for decay in decays]) for name in RESPONSES}
+    estimates = {
+        "frequency_Hz": [decay.estimates.get("frequency_Hz") for decay in decays],
+        "inverse_q": [decay.inverse_q for decay in decays],
+    }
+    sds = {name: column([0.0 if one is None else one.sd for one in found]) for name, found in estimates.items()}
     return Decays(columns, sds, first)
-
-
-def _sd(decay: Decay, name: str) -> float:
-    found = decay.inverse_q if name == "inverse_q" else decay.estimates.get(name)
-    return 0.0 if found is None else found.sd
 
 
 def fit_laws(decays: Decays) -> dict[str, Law]:

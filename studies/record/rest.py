@@ -22,10 +22,8 @@ DRIVING = (TEMPERATURES[0], TEMPERATURES[2], TEMPERATURES[1])
 BLOCKS = 100  # by which a rate is told
 FASTEST = 1.0  # K/s over a record, beyond which its time cannot be in seconds
 OPPOSITE = 15.0  # K between a chamber and the housing in it, from which on one of them may have the opposite sign, and
-FOLLOWS_NOT, STANDS = (
-    3.0,
-    10.0,
-)  # times less with the sign changed, where they move against each other and where one stands
+FOLLOWS_NOT, STANDS = 3.0, 10.0
+"""Times less with the sign changed, where they move against each other and where one stands."""
 AT_ONCE, LEAST_CHANGE, FASTER = 4, 5.0, 2.0  # rows in one direction, K and K/s, beyond which it is said of a housing
 DOUBTFUL, FAST, SLOWEST = 0.1, 0.15, 1e-4  # K/s held for a tenth of a record: 6 and 9 K/min, 0.36 K/h
 LEAST_SPREAD, LONG = 10.0, 1e6  # K that a record covers, and s it lasts, before a slow one is doubted

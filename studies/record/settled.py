@@ -74,7 +74,7 @@ def settled_table(soaks: Sequence[Soak], where: str, advice: str = "") -> tuple[
 
 def advise_hold(records: Sequence[Record], time_constant: float, tolerance: float) -> str:
     """Say how long to hold a temperature: the longest hold that had not settled needs τ ln(left/tolerance) more."""
-    holds = [(one, rows) for one in _judge(records, time_constant, tolerance) for rows in find_holds(one.seen.drive)]
+    holds = [(one, rows) for one in _judge(records, time_constant, tolerance) for rows in find_holds(one.drive)]
     # Slopes near the end of a hold know of what comes after it.
     whole = [(one, rows[: -one.reach]) for one, rows in holds if _is_whole(one.time, rows, one.reach)]
     if not whole:
@@ -94,12 +94,12 @@ def advise_hold(records: Sequence[Record], time_constant: float, tolerance: floa
 
 def _settling(one: "_Judged", rows: NDArray[np.intp], tolerance: float) -> tuple[float, float, float]:
     """Speed at the end of a hold (Hz/s), its time constant (s) and how long it should be held (s); infinite where none shows."""
-    t, f = one.time[rows], one.seen.frequency[rows]
+    t, f = one.time[rows], one.frequency[rows]
     speed = abs(float(_slopes(t, f, one.reach)[-1]))
     own = _time_constant(t[len(t) // 2 :], f[len(t) // 2 :])
     # The mean is that of the middle of its rows, the reach before their end; as much at the end of a hold sees what comes after.
     left = float(one.left[rows[-2 * one.reach :]].mean())
-    return speed, own, float(np.ptp(t)) + own * float(np.log(left / tolerance)) + LEAST + one.reach * one.seen.width
+    return speed, own, float(np.ptp(t)) + own * float(np.log(left / tolerance)) + LEAST + one.reach * one.width
 
 
 @dataclass(frozen=True)
@@ -116,17 +116,12 @@ class _Seen:
 
 
 @dataclass(frozen=True)
-class _Judged:
+class _Judged(_Seen):
     """What is left to settle (K) in every block, by a time constant (s), from slopes over `reach` blocks to either side."""
 
-    seen: _Seen
     left: Array
     time_constant: float
     reach: int
-
-    @property
-    def time(self) -> Array:
-        return self.seen.time
 
 
 def _judge(records: Sequence[Record], time_constant: float, tolerance: float) -> list[_Judged]:
@@ -177,41 +172,41 @@ def _judge_one(one: _Seen, time_constant: float, tolerance: float) -> _Judged:
     quiet = np.flatnonzero(noise <= UNSEEN * tolerance * np.sqrt(r * (r + 1) * (2 * r + 1) / 3))
     reach = int(r[quiet[0]]) if quiet.size else FARTHEST
     left = time_constant * np.maximum(np.abs(_slopes(t, T, reach)), np.abs(_slopes(t, f, reach)) / one.slope)
-    return _Judged(one, left, time_constant, reach)
+    return _Judged(**vars(one), left=left, time_constant=time_constant, reach=reach)
 
 
 def _soaks_of(one: _Judged, tolerance: float) -> list[Soak]:
-    t, T, f, left = one.time, one.seen.temperature, one.seen.frequency, one.left
+    t, T, f, left = one.time, one.temperature, one.frequency, one.left
     found = []
-    for rows in _stretches((left < tolerance) & (np.gradient(t) < 3 * one.seen.width), T, one.reach):
+    for rows in _stretches((left < tolerance) & (np.gradient(t) < 3 * one.width), T, one.reach):
         if t[rows[-1]] - t[rows[0]] >= LEAST:
             scatter = float(np.std(np.diff(f[rows]))) / np.sqrt(2.0 * len(rows))
-            uncertainty = float(np.hypot(scatter, one.seen.slope * left[rows].mean()))
+            uncertainty = float(np.hypot(scatter, one.slope * left[rows].mean()))
             ends, means = (float(t[rows[0]]), float(t[rows[-1]])), (float(T[rows].mean()), float(f[rows].mean()))
-            found.append(Soak(one.seen.path, *ends, *means, uncertainty, float(left[rows].max()), one.time_constant))
+            found.append(Soak(one.path, *ends, *means, uncertainty, float(left[rows].max()), one.time_constant))
     return found
 
 
 def _extrapolated(one: _Judged, soaks: Sequence[Soak], tolerance: float) -> list[Soak]:
     """Return the states that holds without a settled part would settle at, where their error is within the tolerance."""
     found = []
-    for rows in (rows[: -one.reach] for rows in find_holds(one.seen.drive)):
+    for rows in (rows[: -one.reach] for rows in find_holds(one.drive)):
         t = one.time[rows]
         settled = any(soak.start < t[-1] and soak.end > t[0] for soak in soaks) if len(rows) else True
         if settled or not _is_whole(one.time, rows, one.reach):
             continue
         half, third = (rows[-(len(rows) // part) :] for part in (2, 3))
-        early, late = (_asymptote(one.time[part], one.seen.frequency[part]) for part in (half, third))
+        early, late = (_asymptote(one.time[part], one.frequency[part]) for part in (half, third))
         if early is None or late is None:
             continue
         left = abs(late.left) * max(one.time_constant / late.time_constant, 1.0)
         error = float(np.linalg.norm([late.error, UNTRUE * left, early.value - late.value]))
-        if error > tolerance * one.seen.slope:
+        if error > tolerance * one.slope:
             continue
-        T = late.extrapolate(one.time[third], one.seen.temperature[third])
+        T = late.extrapolate(one.time[third], one.temperature[third])
         ends = float(one.time[third[0]]), float(one.time[third[-1]])
-        shares = error / one.seen.slope, late.time_constant, abs(late.left) / one.seen.slope
-        found.append(Soak(one.seen.path, *ends, T, late.value, error, *shares))
+        shares = error / one.slope, late.time_constant, abs(late.left) / one.slope
+        found.append(Soak(one.path, *ends, T, late.value, error, *shares))
     return found
 
 

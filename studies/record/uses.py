@@ -18,10 +18,8 @@ from studies.record import Record
 from studies.record.rest import TEMPERATURES, choose_column, gather_rest
 from studies.record.settled import advise_hold, find_soaks, settled_table
 
-GIVEN = {
-    "frequency_Hz": "--frequency HZ",
-    "inverse_q": "--quality Q",
-}  # that `fit cross-damping` takes where no record has it
+GIVEN = {"frequency_Hz": "--frequency HZ", "inverse_q": "--quality Q"}
+"""What `fit cross-damping` takes where no record has it."""
 OUTPUT = "bias_deg_per_h"  # that an acceptance test judges unless another is named
 LEAST_SPAN = 1.0  # K, of a temperature that changes
 STEP_SPAN = 10.0  # K, of a step or ramp that shows a time constant

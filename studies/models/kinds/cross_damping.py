@@ -86,16 +86,15 @@ def compensate(model: Model, record: Record, *, extrapolate: bool) -> dict[str, 
 def emit_c(model: Model) -> str:
     """Return `hrg_cross_damping_step(&state, T, dt)`, the error to subtract, in C99, with a table to test it."""
     model.check_output(OUTPUTS)
-    part, unit = _part(model), OUTPUTS[model.compensates]
-    pole = 2 * math.pi * model.number("frequency_Hz", above=0) * model.number("relative_damping", above=0)
-    gain = 2 * (2 * math.pi * model.number("frequency_Hz", above=0)) / model.number("g2", above=0) / unit
+    fit = load_cross_damping(model)
+    gain = 2 * fit.k / fit.g2 / OUTPUTS[model.compensates]
     code = write_c(
         "cross_damping",
-        polynomial=polynomial("hrg_cross_damping", "shift", part.values),
-        column=model.temperature_column, output=model.compensates, gain=repr(gain), pole=repr(pole),
-        reference=repr(model.number("calibration_temperature_degC")),
+        polynomial=polynomial("hrg_cross_damping", "shift", fit.coefficients.tolist()),
+        column=model.temperature_column, output=model.compensates, gain=repr(gain), pole=repr(fit.k * fit.zeta),
+        reference=repr(fit.calibration_temperature),
     )  # fmt: skip
-    return f"{head(model)}\n{code}{self_test(_test_rows(model), 'dt_s (0: settle), temperature_degC, expected', STEP)}"
+    return f"{head(model)}\n{code}{self_test(_test_rows(model, fit), 'dt_s (0: settle), temperature_degC, expected', STEP)}"
 
 
 STEP = """    static hrg_cross_damping_state state;
@@ -104,12 +103,11 @@ STEP = """    static hrg_cross_damping_state state;
     double expected = row[2];"""
 
 
-def _test_rows(model: Model) -> list[tuple[float, ...]]:
+def _test_rows(model: Model, fit: CrossDampingModel) -> list[tuple[float, ...]]:
     """A few uneven steps through the calibrated range, with what Python makes of them."""
     low, high = model.range_of(model.temperature_column)
     steps = np.array([0.0, *np.resize([1.0, 2.0, 4.0, 2.0, 0.5], 23)])
     temperature = np.round((low + high) / 2 + 0.45 * (high - low) * np.sin(0.5 * np.arange(24)), 9)
-    fit = load_cross_damping(model)
     error = fit.predict(np.cumsum(steps), temperature, extrapolate=True) / OUTPUTS[model.compensates]
     return list(zip(steps.tolist(), temperature.tolist(), error.tolist(), strict=True))
 

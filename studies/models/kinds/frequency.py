@@ -97,12 +97,12 @@ def emit_c(model: Model) -> str:
     low, high = model.range_of(VARIABLE)
     reference = model.number(REFERENCE)
     none = "\n   The curve has a turning point in this range: there is no inverse, *ok is always 0."
-    turns = "" if _is_monotonic(model) else none
+    monotonic = find_turn(partial(evaluate, model), (low, high)) is None
     code = write_c(
         "frequency",
         polynomial=polynomial("hrg_frequency_about", "shift", model.part("frequency").values),
-        lowest=f"{low:.9g}", highest=f"{high:.9g}", low=repr(low), high=repr(high), reference=repr(reference), turns=turns,
-        has_inverse=int(_is_monotonic(model)),
+        lowest=f"{low:.9g}", highest=f"{high:.9g}", low=repr(low), high=repr(high), reference=repr(reference),
+        turns="" if monotonic else none, has_inverse=int(monotonic),
     )  # fmt: skip
     return f"{head(model)}\n{code}{self_test(_test_rows(model), 'temperature_degC, frequency', STEP)}"
 
@@ -117,10 +117,6 @@ def _test_rows(model: Model) -> list[tuple[float, ...]]:
     low, high = model.range_of(VARIABLE)
     T = np.round(np.linspace(low, high, 13)[1:-1], 6)
     return list(zip(T.tolist(), evaluate(model, T).tolist(), strict=True))
-
-
-def _is_monotonic(model: Model) -> bool:
-    return find_turn(partial(evaluate, model), model.range_of(VARIABLE)) is None
 
 
 def _widen(fit: FrequencyFit) -> tuple[float, float]:
