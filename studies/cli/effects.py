@@ -9,6 +9,8 @@ from studies.instrument.tables.effect import keys_of
 from studies.results import Result, Sentence, Table, row_of
 from studies.schema.reference import list_keys
 
+KEYS = "name: key | unit | shown: default | bounds | kind: type | meaning"
+
 
 @answers("hrg.effects/2")
 def effects(name: str = "") -> Result:
@@ -42,11 +44,7 @@ def effects(name: str = "") -> Result:
         f"{effect.summary}.",
         [
             Sentence(f"{effect.name}: {effect.summary}.", where="terminal"),
-            Table(
-                "Keys of its [[effect]] table",
-                keys,
-                "name: key | unit | shown: default | bounds | kind: type | meaning",
-            ),
+            Table("Keys of its [[effect]] table", keys, KEYS),
             *(f"{label}: {words}." for label, words in said.items() if words),
         ],
     )

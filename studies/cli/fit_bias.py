@@ -70,13 +70,8 @@ def _payload(study: BiasStudy, method: Method, data: tuple[str, ...]) -> dict[st
     return {
         "data": data,
         **row_of(study, "output", over="column"),
-        **row_of(
-            study.runs[0],
-            lag_s="memory.lag",
-            play_half_width_degC="memory.play",
-            play_starts="memory.starts",
-            rate_lag_s="lag",
-        ),
+        **row_of(study.runs[0].memory, lag_s="lag", play_half_width_degC="play", play_starts="starts"),
+        "rate_lag_s": study.runs[0].lag,
         "lag_90_s": ends.get("lag"),
         "play_half_width_90_degC": ends.get("play"),
         "method": method,

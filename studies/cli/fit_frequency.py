@@ -58,10 +58,9 @@ def fit_frequency(
     slowest = max((soak.time_constant for soak in soaks), default=0.0)
     payload = {
         "table": table,
-        **row_of(
-            fit, "order", "reference_temperature_degC", "coefficients", "standard_errors", resolution_Hz="resolution"
-        ),
-        **row_of(fit, sum_of_squares_Hz2="regression.sum_of_squares", leave_one_out_Hz="regression.leave_one_out_rms"),
+        **row_of(fit, "order", "reference_temperature_degC", "coefficients", "standard_errors"),
+        "resolution_Hz": fit.resolution,
+        **row_of(fit.regression, sum_of_squares_Hz2="sum_of_squares", leave_one_out_Hz="leave_one_out_rms"),
         **row_of(study, "calculated_degC", "error_degC", recommended_order="orders.recommended"),
         **({"soaks": rows, "time_constant_s": slowest} if soaks else {}),
     }

@@ -53,13 +53,8 @@ def fit_scale(
     records = [read_record(path) for path in data]
     study = study_scale(records, None if no_filter else cutoff, order)
     sources = tuple(source_of(record) for record in records)
-    model = save_scale(
-        replace(study.chain, warming=study.warming),
-        study.output,
-        study.temperature_column,
-        sources,
-        "hrg-workbench, hrg fit scale",
-    )
+    chain = replace(study.chain, warming=study.warming)
+    model = save_scale(chain, study.output, study.temperature_column, sources, "hrg-workbench, hrg fit scale")
     keep_model(model, save)
     parts: dict[str, dict[str, dict[str, Any]]] = {
         part.name: {
@@ -70,10 +65,13 @@ def fit_scale(
     }
     payload: dict[str, Any] = {
         "records": list(data),
+        **row_of(study, "output", temperature="temperature_column", rows_left_out="left_out"),
         **row_of(
-            study, "output", temperature="temperature_column", rows_left_out="left_out", filter_delay_s="chain.delay"
+            study,
+            filter_delay_s="chain.delay",
+            error_before_deg_per_s="error_before",
+            error_held_out_deg_per_s="error_held_out",
         ),
-        **row_of(study, error_before_deg_per_s="error_before", error_held_out_deg_per_s="error_held_out"),
         "parts": parts,
         "steps": study.figures,
         "undetermined": [what for what, there in _undetermined(study)],
@@ -156,11 +154,8 @@ def _facts(study: ScaleStudy) -> Facts:
 def _undetermined(study: ScaleStudy) -> list[tuple[str, str]]:
     """Return the steps for which there is no run, and the record that would give each."""
     _, rest, turning = study.runs
-    steps = (
-        (rest, "bias over temperature", "at rest over temperature"),
-        (turning, "scale over temperature", "at one rate over temperature"),
-    )
-    return [(what, record) for run, what, record in steps if run is None]
+    found = [("bias over temperature", "at rest over temperature")] if rest is None else []
+    return found + ([("scale over temperature", "at one rate over temperature")] if turning is None else [])
 
 
 def _remarks(study: ScaleStudy) -> list[str | Sentence]:

@@ -77,6 +77,7 @@ def fit_thermal(
         for name, e in estimates.items()
     ]  # fmt: skip
     columns = f"Constant | shown in low … high: Value | low … high: {100 * confidence:g} % interval .0 | Unit"
+    note = f"Reference temperature {reference:.4g} °C; residual {found.residual_rms:.2g} Hz rms."
     tied = [[NAMES[name][0] for name in group] for group in found.undetermined if len(group) > 1]
     groups = (" and ".join(words[0].lower() + words[1:] for words in group) for group in tied)
     return Result(
@@ -84,12 +85,7 @@ def fit_thermal(
         "Thermal time constants",
         f"Lag of the resonator behind its housing in {', '.join(data)}.",
         [
-            Table(
-                "Thermal constants",
-                table,
-                columns,
-                f"Reference temperature {reference:.4g} °C; residual {found.residual_rms:.2g} Hz rms.",
-            ),
+            Table("Thermal constants", table, columns, note),
             *(Sentence(OPEN.format(words), "warning") for words in groups),
             *(Sentence(NEGATIVE.format(NAMES[name][0]), "warning") for name in found.negative),
             Sentence(MISFIT.format(found.slow), "warning") if found.slow > DRIFTS else None,

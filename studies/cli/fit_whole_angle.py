@@ -1,5 +1,6 @@
 """`hrg fit whole-angle`: splits, axes, gain ratio and phase error from a whole-angle run."""
 
+from functools import partial
 from math import degrees, isnan, pi
 from typing import Annotated, Literal, get_args
 
@@ -44,6 +45,7 @@ LATE: dict[str, float] = dict(zip(get_args(AngleAt), (0.0, 0.5, 1.0), strict=Tru
 RATE = "measured_rate_deg_per_s"
 OWN = ("loops", "simulated")  # sources of records that hrg wrote, angles at the start
 KEYS_OF_CARD = tuple(key for key, *_ in KEYS.values() if key != "bias.offset_deg_per_h")
+ALONE = "The damping that the rate tells depends on the phase error: on that of the estimates, else on 0."
 NO_SCALE = "note: quadrature_V is not used because its scale is unknown; give --quadrature-volts-per-hertz or a card with [loop]."
 
 
@@ -86,8 +88,8 @@ def fit_whole_angle(
         quadrature_volts_per_hertz = loop.quadrature_V_per_Hz
     if "quadrature_V" in record and quadrature_volts_per_hertz is None:
         say(NO_SCALE)
-    arguments = record, bryan_factor, quadrature_volts_per_hertz, instrument, confidence
-    found = _fit_record(*arguments, LATE[angle_at or "start"])
+    fit_at = partial(_fit_record, record, bryan_factor, quadrature_volts_per_hertz, instrument, confidence)
+    found = fit_at(LATE[angle_at or "start"])
     estimates = _in_card_units(found.estimates, found, record)
     names = COLUMNS | ({"rate": RATE} if RATE in record else {})
     wrong = any(not one.widened for one in found.conflicts)
@@ -100,25 +102,22 @@ def fit_whole_angle(
     payload |= {"undetermined": found.undetermined, "alone": alone, "contradictions": said, "left_out_s": left_out}
     rows = [_row(key, e) for key, e in estimates.items()]
     by_column = [_row(key, e) | {"column": name} for name, of in alone.items() for key, e in of.items()]
-    columns = f"Quantity | value ± sd: Value | low … high ± sd: {100 * confidence:g} % interval | Unit | key: Key of the card"  # fmt: skip
-    moved = "" if angle_at or record.source.startswith(OWN) else _moved_by_the_middle(arguments, estimates)
+    columns = f"Quantity | value ± sd: Value | low … high ± sd: {100 * confidence:g} % interval | Unit"
+    moved = ""
+    if not angle_at and not record.source.startswith(OWN):
+        middle = fit_at(LATE["middle"])
+        moved = _moved_by_the_middle(estimates, _in_card_units(middle.estimates, middle, record))
     return Result(
         payload,
         "Errors of a whole-angle gyro",
         f"Damping, splits, gains and phase error found in {run}.",
         [
             *(Sentence(sentence, "warning") for sentence in said),
-            Table("Estimates", rows, columns, "±: one standard deviation."),
+            Table("Estimates", rows, f"{columns} | key: Key of the card", "±: one standard deviation."),
             *(Sentence(f"Not determined: {sentence}.", "warning") for sentence in found.undetermined),
             *(Sentence(_left_out(name, times), "warning") for name, times in left_out.items()),
             moved and Sentence(moved, "warning"),
-            Table(
-                "Each column alone",
-                by_column,
-                f"column | {columns.rpartition(' | ')[0]}",
-                "The damping that the rate tells depends on the phase error: on that of the estimates, else on 0.",
-                "everywhere" if wrong else "page",
-            ),
+            Table("Each column alone", by_column, f"column | {columns}", ALONE, "everywhere" if wrong else "page"),
         ],
         status=2 * (saved != save),
     )
@@ -130,9 +129,8 @@ def _row(key: str, estimate: dict[str, float]) -> dict[str, str | float]:
 
 def _left_out(name: str, times: list[float]) -> str:
     some = ", ".join(f"{time:g}" for time in times[:3]) + ", …" * (len(times) > 3)
-    return (
-        f"{len(times)} row{'s' * (len(times) > 1)} of {name}, at {some} s: left out, contradicted by the rows beside."
-    )
+    rows = f"{len(times)} row{'s' * (len(times) > 1)} of {name}"
+    return f"{rows}, at {some} s: left out, contradicted by the rows beside."
 
 
 def _contradictions(found: WaveFit, names: dict[str, str]) -> list[str]:
@@ -157,11 +155,8 @@ def _contradictions(found: WaveFit, names: dict[str, str]) -> list[str]:
     return said
 
 
-def _moved_by_the_middle(
-    arguments: tuple[Record, float, float | None, Instrument | None, float], estimates: dict[str, dict[str, float]]
-) -> str:
-    """Say what would move by more than its error if the angles were those of the middle of the rows."""
-    other = _in_card_units((found := _fit_record(*arguments, LATE["middle"])).estimates, found, arguments[0])
+def _moved_by_the_middle(estimates: dict[str, dict[str, float]], other: dict[str, dict[str, float]]) -> str:
+    """Say what would move by more than its error if the angles were those of the middle of the rows: the `other` estimates."""
     moved = [(0.0, "", 0.0)]
     for key in estimates.keys() & other.keys():
         off = other[key]["value"] - estimates[key]["value"]
@@ -228,8 +223,7 @@ def _in_card_units(part: dict[str, Estimate], found: WaveFit, record: Record) ->
         if name == "decay":
             factor = 1 / (pi * float(np.median(record["frequency_Hz"])))
         elif name == "damping_split":
-            key, factor = (
-                (key, 1 / found.estimates["decay"].value) if "decay" in found.estimates else (SPLIT_PER_S, 1.0)
-            )
+            decay = found.estimates.get("decay")
+            key, factor = (key, 1 / decay.value) if decay else (SPLIT_PER_S, 1.0)
         estimates[key] = {end: getattr(e, end) * factor for end in ("value", "sd", "low", "high")}
     return estimates

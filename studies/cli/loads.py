@@ -197,12 +197,8 @@ def _facts(
     return [
         ("Largest stress", f"{worst:.3g} MPa", margin),
         ("Frequency per g along the axis", f"{per_g['axial_ppb']:+.3g} ppb", ""),
-        (
-            "Tilt of the rim per g across",
-            f"{abs(per_g['tilt_urad']):.3g} µrad",
-            f"shift {abs(per_g['rim_lateral_nm']):.3g} nm",
-        ),
-    ]
+        ("Tilt of the rim per g across", f"{abs(per_g['tilt_urad']):.3g} µrad", f"shift {abs(per_g['rim_lateral_nm']):.3g} nm"),
+    ]  # fmt: skip
 
 
 def _bias_words(instrument: Instrument, bias: dict[str, float] | None) -> str:

@@ -9,7 +9,7 @@ from shell.constants import zero_Celsius
 from shell.errors import ShellError
 from shell.material import Material, Prior, spell
 from shell.materials import read_materials
-from shell.property import PROPERTIES
+from shell.property import PROPERTIES, Property
 from studies.cli.arguments import Card, Harmonic
 from studies.cli.output import answers
 from studies.errors import InputError, naming, nearest
@@ -39,27 +39,23 @@ def materials(name: str = "", *, compare: bool = False, card: Card = "", harmoni
     if name and name not in table:
         raise InputError(f"unknown material '{name}'{nearest(name, table)}")
     laws = [law for key, laws in table.items() if name in ("", key) for law in laws.values()]
-    entries = [_describe(law) for law in laws]
+    entries, surfaces = [_describe(law) for law in laws], _surfaces(name)
     rows = [row | {key: spell(row[key]) or "—" for key in ("lacks", "unchecked")} for row in entries]
     columns = "name | law | range_degC.0 … range_degC.1: range (°C) g | lacks: not stated | unchecked: not checked | source"  # fmt: skip
     return Result(
-        {"materials": entries, "surfaces": _surfaces(name)},
+        {"materials": entries, "surfaces": surfaces},
         "Materials",
         "Materials and their published laws over temperature.",
         [
             Table("Materials", rows, columns, "The first law of a material is its default."),
             *(part for law in laws if name for part in _law_tables(law)),
-            Table(
-                "Surface loss",
-                _surfaces(name),
-                SURFACES,
-                "Depth times loss of the damaged layer; a card chooses with [loss] surface_treatment.",
-            ),
+            Table("Surface loss", surfaces, SURFACES, DAMAGED),
         ],
     )
 
 
 SURFACES = "treatment | depth_pm ± sd_pm: surface layer (pm) | source"
+DAMAGED = "Depth times loss of the damaged layer; a card chooses with [loss] surface_treatment."
 
 
 def _surfaces(name: str) -> list[dict[str, Any]]:
@@ -108,9 +104,7 @@ def _law_tables(law: Material) -> list[Table]:
             "property": key,
             "unit": PROPERTIES[key],
             "form": prop.form,
-            "numbers": ", ".join(
-                _with_error(k, v, prop.uncertainty.get(k, 0.0), PROPERTIES[key]) for k, v in prop.numbers.items()
-            ),
+            "numbers": ", ".join(_with_error(k, prop, PROPERTIES[key]) for k in prop.numbers),
             "source": "not checked against a source" if key in law.unchecked else prop.source or "source of the law",
         }
         for key, prop in law.properties.items()
@@ -127,8 +121,9 @@ def _law_tables(law: Material) -> list[Table]:
     ]
 
 
-def _with_error(name: str, value: Any, error: float, unit: str) -> str:
+def _with_error(name: str, of: Property, unit: str) -> str:
     """A number of a law with its standard deviation; moduli in GPa."""
+    value, error = of.numbers[name], of.uncertainty.get(name, 0.0)
     if not isinstance(value, float | int):
         return f"{name} = {value}"
     scale, words = (1e-9, " GPa") if unit == "Pa" and abs(value) > 1e6 else (1.0, "")

@@ -69,6 +69,7 @@ ENERGY = (
     f"{MODE} | energy_fractions.bending: bending ×100 .3f | energy_fractions.membrane: membrane ×100 .3f"
     " | energy_fractions.shear: transverse shear ×100 .3f | energy_fractions.root: root ×100 .3f | energy_fractions.stem: stem ×100 .3f"
 )
+ROOT = "Root: the solid joint of the shell with its stem or bottom, fillet included."
 DERIVED = "ν at constant E; ln r: all lengths except the wall thickness. Modal mass: for a maximum displacement of 1."
 
 
@@ -126,13 +127,7 @@ def modes(
             *_effect_tables(entries),
             *_all_orders(entries),
             Table("Derivatives of ln f", shown, SLOPES, DERIVED, where),
-            Table(
-                "Strain energy (%)",
-                shown,
-                ENERGY,
-                "Root: the solid joint of the shell with its stem or bottom, fillet included.",
-                where,
-            ),
+            Table("Strain energy (%)", shown, ENERGY, ROOT, where),
             live_chapter(instrument, operating, theory, lambda: _view(instrument, seen, T, theory)),
         ],
     )
@@ -225,9 +220,8 @@ def _effect_tables(modes: list[Entry]) -> list[Table]:
 
 def _view(instrument: Instrument, harmonics: list[int], T: float, theory: str) -> "list[Block]":
     drawn: Literal["solid", "shell"] = "solid" if theory == "solid" else "shell"
-    words = " Rayleigh's closed form gives the frequencies of the table, not these shapes."
-    remark = words if theory == "rayleigh" else ""
-    return view_blocks([show_mode(instrument, n, temperature=T, theory=drawn) for n in harmonics], remark)
+    words = " Rayleigh's closed form gives the frequencies of the table, not these shapes." * (theory == "rayleigh")
+    return view_blocks([show_mode(instrument, n, temperature=T, theory=drawn) for n in harmonics], words)
 
 
 def _note(theory: str, share: float) -> str:

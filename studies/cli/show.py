@@ -12,6 +12,8 @@ from studies.reports import survey as parts
 from studies.reports.digits import plain
 from studies.results import Facts, Result, Sentence, Table, row_of
 
+FAULTS = {"spikes": "spikes", "stuck readings": "stuck", "dropouts to 0": "zeros"}
+
 
 @answers("hrg.show/1")
 def show(*runs: Records) -> Result:
@@ -64,12 +66,8 @@ def _warnings(surveys: list[Survey]) -> list[Sentence]:
         f"{survey.record.path}, {display_name(column.name)}: {words}: {count}"
         for survey in surveys
         for column in survey.columns
-        for count, words in (
-            (column.spikes, "spikes"),
-            (column.stuck, "stuck readings"),
-            (column.zeros, "dropouts to 0"),
-        )
-        if count
+        for words, fault in FAULTS.items()
+        if (count := getattr(column, fault))
     ]
     mend = "They are still in the record; 'drop' in the map of hrg import turns them into missing values."
     return [Sentence(f"{'; '.join(found)}. {mend}", "warning")] if found else []

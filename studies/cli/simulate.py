@@ -18,6 +18,9 @@ DRIVES = (
     " are applied (rate_deg_per_s). Or a record: its housing temperature, or else its chamber temperature, is imposed at its rows."
 )
 
+UNCERTAINTY = "Uncertainty of the prediction (standard deviation, rms over the run)"
+SPREAD = "0: column | 1: standard deviation .3"
+
 
 @answers("hrg.simulate/1")
 def simulate(
@@ -69,6 +72,7 @@ def simulate(
         "spread": known,
         "warnings": run.warnings,
     }
+    solved = f"Frequency law: interpolation error {run.law.interpolation_error:.0e}, solver error {run.law.solver_error:.0e}, both relative."
     span = float(np.ptp(run.record["resonator_temperature_degC"]))
     length = run.record["time_s"][-1] - run.record["time_s"][0]
     return Result(
@@ -77,15 +81,9 @@ def simulate(
         f"Run through {profile}; the {summary['boundary']} temperature is imposed.",
         [
             f"{out}: {len(run.record)} rows over {length:g} s; the resonator's temperature varies by {span:.2f} K.",
-            f"Frequency law: interpolation error {run.law.interpolation_error:.0e}, solver error {run.law.solver_error:.0e}, both relative."
-            if instrument.polynomial is None
-            else None,
+            solved if instrument.polynomial is None else None,
             *(Sentence(one, "warning", "page") for one in run.warnings),
-            Table(
-                "Uncertainty of the prediction (standard deviation, rms over the run)",
-                [{"column": name, "sd": value} for name, value in (known or {}).items()],
-                "column | sd: standard deviation .3",
-            ),
+            Table(UNCERTAINTY, list((known or {}).items()), SPREAD),
             Figure(run.record.plot, "The columns of the record."),
         ],
     )

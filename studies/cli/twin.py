@@ -48,9 +48,8 @@ def twin(
     if fmu is None and c is None:
         raise InputError("nothing to do: give --fmu FILE.fmu, --c FOLDER, or both.")
     plan = plan_twin(load_card(card), boundary, theory)
-    beyond = beyond_records(
-        plan.instrument, np.array([plan.constants["LOWEST"], plan.constants["HIGHEST"]]), "this twin"
-    )
+    reach = np.array([plan.constants["LOWEST"], plan.constants["HIGHEST"]])
+    beyond = beyond_records(plan.instrument, reach, "this twin")
     sentences: list[Sentence | str] = [Sentence(one, "warning") for one in beyond]
     compiled = size = None
     if c is not None:

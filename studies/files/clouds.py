@@ -58,19 +58,10 @@ def _read_text(path: Path, first: str, skipped: int) -> Array:
     spaced = len(first.split()) >= 3 and not re.search(r",\s|\s,", first)
     separator = ";" if ";" in first else r"\s+" if spaced else ","
     form: dict[str, Any] = {"sep": separator, "decimal": "." if separator == "," else "," if "," in first else "."}
+    form |= {"skiprows": skipped, "header": None, "comment": "#", "usecols": [0, 1, 2], "dtype": float, "engine": "c"}
     kept = []
     try:
-        for part in pd.read_csv(
-            path,
-            **form,
-            skiprows=skipped,
-            header=None,
-            comment="#",
-            usecols=[0, 1, 2],
-            dtype=float,
-            chunksize=PORTION,
-            engine="c",
-        ):
+        for part in pd.read_csv(path, **form, chunksize=PORTION):
             values = part.to_numpy()
             kept.append(values[np.isfinite(values).all(axis=1)])
     except (ValueError, pd.errors.ParserError):

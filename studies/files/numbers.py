@@ -7,7 +7,7 @@ import io
 import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import IO, TypeAlias
+from typing import IO, Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -63,19 +63,9 @@ def parse_portions(
         import pandas as pd
 
         done = 0
-        with pd.read_csv(
-            file,
-            sep=separator,
-            decimal=decimal,
-            names=list(names),
-            header=None,
-            dtype="float64",
-            keep_default_na=False,
-            na_values=[""],
-            skip_blank_lines=False,
-            index_col=False,
-            chunksize=ROWS_AT_ONCE,
-        ) as parts:
+        form: dict[str, Any] = {"sep": separator, "decimal": decimal, "names": list(names), "header": None}
+        form |= {"keep_default_na": False, "na_values": [""], "skip_blank_lines": False, "index_col": False}
+        with pd.read_csv(file, **form, dtype="float64", chunksize=ROWS_AT_ONCE) as parts:
             for part in parts:
                 done += len(part)
                 tell(f"reading {path}", done / rows)

@@ -61,11 +61,8 @@ def simulate_runs(generator: np.random.Generator) -> tuple[BellRun, BellRun, Bel
         time = (STEP * np.arange(len(rate))).astype(np.float64)
         return BellRun(time, invert_chain(gyro, rate, temperature) + noise, temperature, rate)
 
-    return (
-        run(plateaus, np.full(len(plateaus), ROOM)),
-        run(np.zeros(len(sweep)), sweep),
-        run(np.full(len(sweep), 300.0), sweep),
-    )
+    rest, turning = np.zeros(len(sweep)), np.full(len(sweep), 300.0)
+    return run(plateaus, np.full(len(plateaus), ROOM)), run(rest, sweep), run(turning, sweep)
 
 
 @dataclass(frozen=True)
@@ -157,16 +154,14 @@ STEP_COLUMNS = (
 
 def bell_chapters(twin: BellTwin) -> list[Chapter]:
     """Return the chapters of the twin for the page of `hrg reproduce`."""
-    steps, claims = Figure(lambda: draw_steps(twin.chain, twin.runs), ERRORS), _claims_table(twin.claims)
+    steps = Figure(lambda: draw_steps(twin.chain, twin.runs), ERRORS)
+    tables = [steps_table(twin.held_out, "Held-out runs"), steps_table(twin.fitted, "Fitted runs")]
     alt = "Allan deviation over averaging time, three curves."
     allan = Figure(lambda: _draw_allan(twin.chain, twin.runs[1]), ALLAN, alt)
     title = "BVG equations (32)–(36): the compensation chain on a virtual gyro"
     return [
-        Chapter(
-            title,
-            [TWIN, steps_table(twin.held_out, "Held-out runs"), steps_table(twin.fitted, "Fitted runs"), steps, allan],
-        ),
-        Chapter("BVG: check of the published claims", [claims]),
+        Chapter(title, [TWIN, *tables, steps, allan]),
+        Chapter("BVG: check of the published claims", [_claims_table(twin.claims)]),
     ]
 
 

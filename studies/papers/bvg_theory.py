@@ -16,6 +16,7 @@ from shell.bell_theory import (
 from shell.curves import Arc
 from shell.damping.faces import shell_faces
 from shell.modes import solve_modes
+from shell.resonator import Resonator
 from studies.instrument.card import load_card
 from studies.results import Chapter, Column, Table
 
@@ -59,14 +60,13 @@ def compare_bell_theory() -> BellTheory:
     for name, pattern in patterns:
         model = two_pattern_model(resonator, elastic, pattern)
         rows.append(PatternRow(name, model.frequency, model.bryan_factor, model.membrane_share))
-    solved = []
-    for name, body in (
-        ("solid, on its stem", resonator),
-        ("solid, free", replace(resonator, support="free", stem=None)),
-    ):
+
+    def solve(name: str, body: Resonator) -> PatternRow:
         (mode,) = solve_modes(body, elastic)
-        solved.append(PatternRow(name, mode.frequency, mode.bryan_factor, mode.energy_fractions.membrane))
-    return BellTheory(instrument.name, tuple(rows), solved[0], solved[1])
+        return PatternRow(name, mode.frequency, mode.bryan_factor, mode.energy_fractions.membrane)
+
+    free = replace(resonator, support="free", stem=None)
+    return BellTheory(instrument.name, tuple(rows), solve("solid, on its stem", resonator), solve("solid, free", free))
 
 
 @dataclass(frozen=True)
@@ -97,12 +97,9 @@ def read_planted_rate(planted: float = 2.0) -> LoopReading:
         def slope(t: float, y: np.ndarray, gain: float = rebalance) -> list[float]:
             p, q, dp, dq = y
             coupling = 2 * planted * bell.b
-            return [
-                dp,
-                dq,
-                (coupling * dq - bell.c0 * p - bell.c1 * q) / bell.m0,
-                (-gain * dq - coupling * dp - bell.c0 * q - bell.c1 * p) / bell.m0,
-            ]
+            ddp = (coupling * dq - bell.c0 * p - bell.c1 * q) / bell.m0
+            ddq = (-gain * dq - coupling * dp - bell.c0 * q - bell.c1 * p) / bell.m0
+            return [dp, dq, ddp, ddq]
 
         start = [0.0, 0.0, omega * 1e-6, 0.0]
         y = solve_ivp(slope, (0, time[-1]), start, "DOP853", time, rtol=1e-10, atol=1e-16).y

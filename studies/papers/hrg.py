@@ -97,16 +97,7 @@ def study_table(
     T, f = temperature_degC[ascending], frequency[ascending]
     fit = fit_frequency(T, f, order, reference_temperature_degC, resolution)
     orders = compare_orders(T, f, order + 2, reference_temperature_degC, resolution)
-    at, slopes = local_slopes(T, f)
-    return FrequencyStudy(
-        temperature_degC=T,
-        frequency=f,
-        fit=fit,
-        orders=orders,
-        calculated_degC=fit.temperature(f),
-        local_degC=at,
-        local_slope_ppm=slopes,
-    )
+    return FrequencyStudy(T, f, fit, orders, fit.temperature(f), *local_slopes(T, f))
 
 
 def local_slopes(temperature_degC: Array, frequency: Array) -> tuple[Array, Array]:
@@ -132,16 +123,10 @@ def compare_physics(study: FrequencyStudy, instrument: Instrument) -> PhysicsCom
     moved, prior = law.derivatives(T), law.material.prior
     acting = [k for k, name in enumerate(prior.names) if name in moved]
     curvatures = np.array([curvature(moved[prior.names[k]]) for k in acting])
-    return PhysicsComparison(
-        instrument,
-        at,
-        law.parts(at),
-        law.slope_uncertainty(at),
-        laws,
-        curvature(np.log(study.frequency)),
-        curvature(law.logarithm(T)),
-        float(np.sqrt(curvatures @ prior.covariance[np.ix_(acting, acting)] @ curvatures)),
-    )
+    sd = float(np.sqrt(curvatures @ prior.covariance[np.ix_(acting, acting)] @ curvatures))
+    measured, predicted = curvature(np.log(study.frequency)), curvature(law.logarithm(T))
+    parts, uncertainty = law.parts(at), law.slope_uncertainty(at)
+    return PhysicsComparison(instrument, at, parts, uncertainty, laws, measured, predicted, sd)
 
 
 def _data(name: str) -> Path:

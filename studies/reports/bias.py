@@ -151,9 +151,8 @@ def path_table(judged: Judged, where: Where = "everywhere") -> Table:
 def coefficients_table(judged: Judged, output: str) -> Table:
     """Return the coefficients with the naive error and the one that respects the autocorrelation."""
     fit, rows = judged.fit, []
-    for name, value, error, naive in zip(
-        ("constant", *fit.terms), fit.coefficients, fit.standard_errors, fit.naive_errors, strict=True
-    ):
+    numbers = fit.coefficients, fit.standard_errors, fit.naive_errors
+    for name, value, error, naive in zip(("constant", *fit.terms), *numbers, strict=True):
         factor, words = _coefficient_unit(_unit(output), name, fit.variable)
         number = f"k{list(TERMS).index(name) + 1}" if name in TERMS else ""
         printed = "yes" if name in SELECTED_BY_THE_PAPER else "no"

@@ -47,11 +47,9 @@ def coefficients_table(study: FrequencyStudy) -> Table:
 
 def inverse_table(study: FrequencyStudy) -> Table:
     """Return the temperatures that the inverse of the fit gives."""
-    actual = np.round(study.temperature_degC, 3)
-    found = row_of(
-        study, "frequency", calculated="calculated_degC", error="error_degC", residual="fit.regression.residuals"
-    )
-    rows = rows_of({"actual": actual, **found})
+    found = row_of(study, "frequency", calculated="calculated_degC", error="error_degC")
+    actual, residual = np.round(study.temperature_degC, 3), study.fit.regression.residuals
+    rows = rows_of({**found, "actual": actual, "residual": residual})
     columns = "frequency: Frequency (Hz) .2f | actual: Actual (°C) g | calculated: Calculated (°C) .3f | error: Error (K) +.3f | residual: Fit residual (Hz) +.4f"
     return Table("Temperature from frequency", rows, columns, "Error: actual minus calculated temperature.")
 
@@ -99,13 +97,8 @@ def fit_figure(study: FrequencyStudy) -> Figure:
             upper.ticklabel_format(axis="y", useOffset=False)
             lower.axhline(0, color=style.BLACK, linewidth=0.8)
             for fit, colour, mark in _fits(study):
-                lower.plot(
-                    study.temperature_degC,
-                    1e3 * fit.regression.residuals,
-                    mark,
-                    color=colour,
-                    label=name_order(fit.order),
-                )
+                residual = 1e3 * fit.regression.residuals
+                lower.plot(study.temperature_degC, residual, mark, color=colour, label=name_order(fit.order))
             return made
 
     return Figure(draw, "Measured frequency, fitted curve and residuals.", "Frequency and residuals over temperature.")

@@ -41,10 +41,10 @@ def _summarise_damping(twin: cvg_cross_damping.CrossDampingTwin) -> dict[str, An
     return {
         "improvement_printed": cvg_cross_damping.PRINTED_IMPROVEMENT,
         **row_of(twin, improvement_training="study.training.rows.ratio", improvement_held_out="improvement.ratio"),
+        "improvement_over_seeds_5_50_95": twin.spread,
         **row_of(
-            twin, improvement_over_seeds_5_50_95="spread", by_lag_s="lags", by_random_walk_deg_per_sqrt_h="noises"
+            twin, by_lag_s="lags", by_random_walk_deg_per_sqrt_h="noises", improvement_by_lag_and_random_walk="table"
         ),
-        "improvement_by_lag_and_random_walk": twin.table,
     }
 
 
@@ -54,12 +54,8 @@ def _summarise_filters(study: cvg_filters.FilterStudy) -> dict[str, Any]:
         "wiener": [row_of(case, noise="name", **errors) for case in study.wiener],
         "figure5_noise_reduction": study.figure5.noise_before / study.figure5.noise_after,
         "figure6_noise_reduction": study.figure6.noise_before / study.figure6.noise_after,
-        **row_of(
-            study,
-            figure7_rms_error_rad_per_s="figure7.error_after",
-            kalman_mean_nis="mean_nis",
-            kalman_nis_band="nis_band",
-        ),
+        "figure7_rms_error_rad_per_s": study.figure7.error_after,
+        **row_of(study, kalman_mean_nis="mean_nis", kalman_nis_band="nis_band"),
     }
 
 

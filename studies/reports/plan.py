@@ -51,16 +51,17 @@ def _listed(key: str) -> Callable[[Mapping[str, Any]], str]:
     return lambda row: ", ".join(f"{name} {100 * share:.0f} %" for name, share in row.get(key, {}).items())
 
 
+def _smallest(row: Mapping[str, Any]) -> str:
+    return f"{row['coefficient']} = {plain(row['least']['value'], 2)}" if row.get("least") else ""
+
+
 def plan_table(plan: Plan) -> Table:
     """Return the prediction as a table, the effects that are identified at the smallest SNR first."""
     rows: list[dict[str, Any]] = [{**one.as_dict(), "shown": shown(one)} for one in plan.prospects]
     rows += [{"shown": name, "instead": {why: 1.0}, "why": why} for name, why in plan.invisible.items()]
     columns: Head = (
         "shown: hidden effect | least.snr: smallest SNR identified .2",
-        Column(
-            lambda row: f"{row['coefficient']} = {plain(row['least']['value'], 2)}" if row.get("least") else "",
-            "smallest size identified",
-        ),
+        Column(_smallest, "smallest size identified"),
         *(Column(_at(snr), f"at SNR {snr:g}", "%", ".0f", scale=100.0) for snr in SNRS),
         "least_alone.snr: smallest SNR identified alone .2",
         Column(_listed("as_set_with"), "in one set with, at the smallest size"),
