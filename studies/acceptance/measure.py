@@ -162,9 +162,8 @@ def _temperature_of(record: Record) -> str:
 
 def _check_length(record: Record, blocks: Array) -> None:
     if len(blocks) < 10:
-        raise InputError(
-            f"{record.path}: a test over temperature needs ten averages of {BLOCK:g} s or more; record longer."
-        )
+        need = f"a test over temperature needs ten averages of {BLOCK:g} s or more"
+        raise InputError(f"{record.path}: {need}; record longer.")
 
 
 def _follow(record: Record, width: float) -> Course:

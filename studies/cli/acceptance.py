@@ -20,7 +20,7 @@ from studies.record.uses import OUTPUT
 from studies.reports import style
 from studies.reports.digits import plain
 from studies.resonator.law import law_of
-from studies.results import Chapter, Column, Drawing, Facts, Figure, Part, Result, Sentence, Table, row_of
+from studies.results import Chapter, Column, Drawing, Fact, Facts, Figure, Part, Result, Sentence, Table, row_of
 from studies.schema.reader import read_file
 
 VERDICTS = {"pass": "all limits met", "fail": "a limit is not met", "incomplete": "not all limits could be judged"}
@@ -47,9 +47,8 @@ def acceptance(card: Card, *runs: Records, limits: str | None = None, output: st
     """
     instrument = load_card(card)
     free = [path for path in runs if is_decay(path)]
-    records = records_of_one_gyro(
-        [read_record(path) for path in runs if path not in free], lambda doubt: say(f"warning: {doubt}")
-    )
+    held = [read_record(path) for path in runs if path not in free]
+    records = records_of_one_gyro(held, lambda doubt: say(f"warning: {doubt}"))
     if output != OUTPUT and not any(output in record for record in records):
         known = {name for record in records for name in record.columns}
         raise InputError(f"--output {output}: no record has this column{nearest(output, known)}")
@@ -111,12 +110,8 @@ def acceptance(card: Card, *runs: Records, limits: str | None = None, output: st
 def _line(line: JudgedQuantity) -> dict[str, Any]:
     q, m = line.quantity, line.measured
     said = {"bound": "most" if q.upper else "least", "records": m.sources if m else (), "needs": None if m else q.needs}
-    return (
-        row_of(q, "key", "section", "unit")
-        | row_of(m, "value", "low", "high")
-        | row_of(line, "limit", "verdict")
-        | said
-    )
+    judged = row_of(m, "value", "low", "high") | row_of(line, "limit", "verdict")
+    return row_of(q, "key", "section", "unit") | judged | said
 
 
 def _shown(line: dict[str, Any], one: JudgedQuantity) -> dict[str, Any]:
@@ -129,7 +124,7 @@ def _shown(line: dict[str, Any], one: JudgedQuantity) -> dict[str, Any]:
     return shown | {"words": q.words, "shown_unit": unit, "shown_limit": limit, "limited": "yes" if limit else "no"}
 
 
-def _facts(found: Acceptance) -> list[tuple[str, str, str]]:
+def _facts(found: Acceptance) -> list[Fact]:
     judged = {kind: [one.quantity.words for one in found.lines if one.limit is not None and one.verdict == kind]
               for kind in ("pass", "fail", "undecided", "missing")}  # fmt: skip
     limited = sum(map(len, judged.values()))
@@ -161,10 +156,11 @@ def _drift(found: Acceptance) -> list[Figure | Sentence]:
 
     def draw() -> Drawing:
         with style.figure(height=3.6, x="averaging time τ (s)", y="Allan deviation (°/h)") as (made, axes):
-            style.draw_allan(
-                axes, allan, style.BLUE, "overlapping Allan deviation, 90 % interval; dashed: N, B, K", noise
-            )
+            style.draw_allan(axes, allan, style.BLUE, label, noise)
             return made
 
-    caption = "Allan deviation of the longest drift record."
+    caption, label = (
+        "Allan deviation of the longest drift record.",
+        "overlapping Allan deviation, 90 % interval; dashed: N, B, K",
+    )
     return [Figure(draw, caption, "Allan deviation over averaging time, both logarithmic."), Sentence(words)]

@@ -119,10 +119,8 @@ def _derive_dynamics(latex: bool, code: Literal["python", "c"] | None) -> Result
 
     lead = "Averaged equations of amplitude, quadrature, precession and phase of the standing wave."
     emitted = {"language": code, "text": emit_code(code)} if code else None
-    schema = {"schema": "hrg.derive-dynamics/1"}
-    return _answer(
-        schema, read_chain(_told(steps())), DYNAMICS_TITLE, latex, "Dynamics of the standing wave", lead, emitted
-    )
+    payload, chain = {"schema": "hrg.derive-dynamics/1"}, read_chain(_told(steps()))
+    return _answer(payload, chain, DYNAMICS_TITLE, latex, "Dynamics of the standing wave", lead, emitted)
 
 
 def _derive_bell(latex: bool) -> Result:
@@ -140,12 +138,8 @@ def _derive_bell(latex: bool) -> Result:
     head = "name: pattern | frequency: f (Hz) .6g | precession_factor: precession factor .5f | membrane_share: membrane share of the energy .3g"
     table = Table(title, [*theory.rows, theory.free, theory.solid], head)
     printed = Sentence(found.printed or "", "source", "terminal")
-    return replace(
-        found,
-        payload=found.payload | {"numbers": theory},
-        parts=[printed, Chapter("Against the solver", [table]), *found.parts],
-        printed=None,
-    )
+    parts = [printed, Chapter("Against the solver", [table]), *found.parts]
+    return replace(found, payload=found.payload | {"numbers": theory}, parts=parts, printed=None)
 
 
 def _answer(

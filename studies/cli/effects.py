@@ -66,16 +66,14 @@ def _words(effect: Effect) -> tuple[str, ...]:
 
 def parameters(effect: Effect) -> list[dict[str, Any]]:
     """Return every key of the effect's table as the reader of cards declares it, coefficients for each response."""
-    listed = [
-        (r, one) for r in effect.responses for one in list_keys(keys_of({"name": effect.name, "response": r}, ""))
-    ]
+    tables = {r: list(list_keys(keys_of({"name": effect.name, "response": r}, ""))) for r in effect.responses}
     rows: dict[str, dict[str, Any]] = {}
-    for response, row in listed:
-        of_all = sum(one["key"] == row["key"] for _, one in listed) == len(effect.responses)
-        meaning = row["meaning"] if of_all else f"with response = '{response}': {row['meaning']}"
-        rows[row["key"]] = row_of(row, "unit", "required", "default", "bounds", name="key", kind="type") | {
-            "meaning": meaning
-        }
+    for response, table in tables.items():
+        for row in table:
+            of_all = all(any(one["key"] == row["key"] for one in other) for other in tables.values())
+            meaning = row["meaning"] if of_all else f"with response = '{response}': {row['meaning']}"
+            said = row_of(row, "unit", "required", "default", "bounds", name="key", kind="type")
+            rows[row["key"]] = said | {"meaning": meaning}
     return list(rows.values())
 
 

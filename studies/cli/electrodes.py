@@ -97,9 +97,8 @@ def _parts(payload: dict[str, Any], split: float, resolved: bool, keys: Electrod
         ("pull-in safety factor of the voltages", "unlimited" if isinf(factor) else factor, ""),
         (f"largest split nulled by up to {limit:g} V, any axis", 1e3 * payload["reach_Hz"], "mHz"),
     )
-    head = Table(
-        f"{payload['card']}, n = {payload['harmonic']}, {where}", quantities, "0: quantity | 1: value | 2: unit"
-    )
+    title = f"{payload['card']}, n = {payload['harmonic']}, {where}"
+    head = Table(title, quantities, "0: quantity | 1: value | 2: unit")
     if trim is None:
         words = f"{limit:g} V cannot null the card's split of {1e3 * split:.4g} mHz; see hrg trim."
         return [head, Sentence(words, "warning") if split else None]

@@ -84,9 +84,8 @@ def _payload(study: BiasStudy, method: Method, data: tuple[str, ...]) -> dict[st
 
 def _judged(judged: Judged) -> dict[str, Any]:
     fit, held_out = judged.fit, judged.held_out
-    held = held_out and row_of(held_out, "before", "after", "gain", "coverage") | {
-        "of": "runs" if held_out.by_runs else "blocks"
-    }
+    of = {"of": "runs" if held_out and held_out.by_runs else "blocks"}
+    held = held_out and row_of(held_out, "before", "after", "gain", "coverage") | of
     return {
         **row_of(fit, "reference", "coefficients", "standard_errors", "theta", naive_standard_errors="naive_errors"),
         "terms": ["constant", *(name_term(name, fit.variable) for name in fit.terms)],

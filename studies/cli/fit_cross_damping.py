@@ -68,10 +68,8 @@ def fit_cross_damping(
         raise InputError(f"--calibration-temperature {calibration_temperature:g} °C: no gyro has this temperature; give one within the record, in °C.")  # fmt: skip
     gathered = gather_rest(records, OUTPUTS)
     with naming(", ".join(data)):
-        k, zeta = 2 * math.pi * carrier, 1 / (2 * quality)
-        study = study_cross_damping(
-            gathered.runs, k=k, zeta=zeta, calibration_temperature=calibration_temperature, order=order
-        )
+        gyro = {"k": 2 * math.pi * carrier, "zeta": 1 / (2 * quality)}
+        study = study_cross_damping(gathered.runs, **gyro, calibration_temperature=calibration_temperature, order=order)
     sources, made_by = tuple(map(source_of, records)), "hrg-workbench, hrg fit cross-damping"
     model = save_cross_damping(study.model, gathered.output, gathered.temperature_column, sources, made_by)
     keep_model(model, save)

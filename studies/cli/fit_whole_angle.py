@@ -149,9 +149,8 @@ def _contradictions(found: WaveFit, names: dict[str, str]) -> list[str]:
             mend = f"They would agree: reverse the sign of {names['angle'] if len(signs) > 1 else second}."
         elif first == "frequency_Hz":
             mend = f"They would agree: multiply {second} by {one.factor:.4g}, or divide --quadrature-volts-per-hertz by it."
-        said.append(
-            f"{first} and {second} contradict each other about the {one.split} split, which is not estimated. {mend}"
-        )
+        what = f"{first} and {second} contradict each other about the {one.split} split"
+        said.append(f"{what}, which is not estimated. {mend}")
     return said
 
 

@@ -25,7 +25,7 @@ from studies.cli.output import answers
 from studies.errors import InputError, naming
 from studies.instrument.card import Instrument
 from studies.resonator.loads import STANDARD_GRAVITY, bias_by_tilt, loads_of, shift_per_kelvin
-from studies.results import Facts, Result, Table, row_of
+from studies.results import Fact, Facts, Result, Table, row_of
 
 LINEAR = 0.1  # strain and relative shift of f: no solid bears so much (ideal strength E/10), nor is it a small change
 ABROAD = (
@@ -190,9 +190,7 @@ def _amplitudes(instrument: Instrument, harmonic: int, temperatures: np.ndarray[
     return rows
 
 
-def _facts(
-    worst: float, strength: float | None, safety: float | None, per_g: dict[str, float]
-) -> list[tuple[str, str, str]]:
+def _facts(worst: float, strength: float | None, safety: float | None, per_g: dict[str, float]) -> list[Fact]:
     margin = "no --strength given" if safety is None else f"safety {safety:.3g} of a strength of {strength:g} MPa"
     return [
         ("Largest stress", f"{worst:.3g} MPa", margin),

@@ -15,7 +15,7 @@ from studies.loss.model import LossModel, loss_model
 from studies.reports import style
 from studies.reports.digits import plain
 from studies.reports.scenes import live_chapter
-from studies.results import Chapter, Drawing, Facts, Figure, Result, Sentence, Table, row_of, rows_of
+from studies.results import Chapter, Drawing, Fact, Facts, Figure, Result, Sentence, Table, row_of, rows_of
 
 DEG = float(np.degrees(1))
 WALL = (
@@ -102,9 +102,8 @@ def _parts(
 ) -> list[Chapter]:
     degrees, around = payload["temperature_degC"], payload["anisotropy"]
     low, high = budget.interval
-    over = rows_of(
-        {"T": degrees, "q_low": 1 / high, "q_high": 1 / low, **row_of(budget, "inverse_q", "slope"), "q": payload["q"]}
-    )
+    q = {"q": payload["q"], "q_low": 1 / high, "q_high": 1 / low}
+    over = rows_of({"T": degrees, **q, **row_of(budget, "inverse_q", "slope")})
     rows = []
     for entry, part in zip(payload["parts"], budget.parts, strict=True):
         own, total, rest = part.inverse_q[at], budget.inverse_q[at], float(budget.without(part.name)[at])
@@ -153,7 +152,7 @@ def _parts(
     ]  # fmt: skip
 
 
-def _facts(budget: Budget, stated: StatedLoss | None, at: int, degrees: float) -> list[tuple[str, str, str]]:
+def _facts(budget: Budget, stated: StatedLoss | None, at: int, degrees: float) -> list[Fact]:
     low, high = (float(end[at]) for end in budget.interval)
     without = float(budget.without(budget.first.name)[at])
     gain = f"Q would be {plain(without)} without it" if np.isfinite(without) else "no other contribution is known"

@@ -11,12 +11,14 @@ from studies.files.reading import read_bytes
 from studies.instrument.card import Instrument
 
 READING_ERROR = 1e-4  # Hz
+Measured = tuple[int, float, float, float]
+"""A split: harmonic, size (Hz), azimuth (rad), reading error (Hz)."""
 
 
 def pair_splits(
     split: tuple[float, ...], axis: tuple[float, ...], harmonic: tuple[int, ...], error: float | None, card: Instrument
-) -> list[tuple[int, float, float, float]]:
-    """Return (harmonic, split in Hz, azimuth in rad, reading error in Hz) of the splits given as options, or of the card."""
+) -> list[Measured]:
+    """Return the splits given as options, or of the card."""
     if not split and not axis:
         own = card.content.get("imperfection", {}).get("split")
         if own is not None:
@@ -34,7 +36,7 @@ def pair_splits(
     return [(n, s, radians(a), error) for n, s, a in zip(harmonic, split, axis, strict=True)]
 
 
-def read_scan(path: str, harmonic: tuple[int, ...]) -> list[tuple[int, float, float, float]]:
+def read_scan(path: str, harmonic: tuple[int, ...]) -> list[Measured]:
     """Return the same of the splits of a scan."""
     entries: dict[int, tuple[float, float | None, float]] = {}
     found = []

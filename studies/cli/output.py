@@ -69,9 +69,8 @@ def answers(
                         write_text(report, render_result(result.page() if result.page else result))
                     say(f"report: {report}")
                 if json:
-                    sys.stdout.write(
-                        dump_json(result.payload | ({"report": report} if "report" in result.payload and page else {}))
-                    )
+                    named = {"report": report} if "report" in result.payload and page else {}
+                    sys.stdout.write(dump_json(result.payload | named))
                 else:
                     print_result(result)
                 return int(result.status)

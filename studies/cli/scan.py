@@ -17,7 +17,7 @@ from studies.instrument.card import Instrument, save_card
 from studies.reports.digits import plain, to_interval
 from studies.reports.style import BLUE, ORANGE, figure
 from studies.resonator.scan import Scan, scan_faces
-from studies.results import Chapter, Drawing, Facts, Figure, Result, Sentence, Table, row_of
+from studies.results import Chapter, Drawing, Fact, Facts, Figure, Result, Sentence, Table, row_of
 
 NONE = "none"
 TABLE = "-{}.csv"  # of a face, beside the saved card
@@ -124,7 +124,7 @@ def _significant(split: dict[str, Any]) -> dict[str, Any]:
     return split | {"split_Hz": {"value": limit, "low": None, "high": None}, "every_order": {}}
 
 
-def _facts(payload: dict[str, Any]) -> list[tuple[str, str, str]]:
+def _facts(payload: dict[str, Any]) -> list[Fact]:
     main = min(payload["splits"], key=lambda one: abs(one["harmonic"] - 2))
     split, low, high = to_interval(*(1e3 * main["split_Hz"][key] for key in ("value", "low", "high")))
     axis, noise = main["slow_axis_deg"], [1e3 * face["noise_um"] for face in payload["faces"].values()]

@@ -10,7 +10,7 @@ from studies.record.survey import Survey, survey_record
 from studies.record.uses import find_uses
 from studies.reports import survey as parts
 from studies.reports.digits import plain
-from studies.results import Facts, Result, Sentence, Table, row_of
+from studies.results import Fact, Facts, Result, Sentence, Table, row_of
 
 FAULTS = {"spikes": "spikes", "stuck readings": "stuck", "dropouts to 0": "zeros"}
 
@@ -50,7 +50,7 @@ def _title(names: list[str]) -> str:
     return f"Record{'s' * (len(names) > 1)} {', '.join(names[: 3 if more else 4])}{more}"
 
 
-def _facts(survey: Survey) -> list[tuple[str, str, str]]:
+def _facts(survey: Survey) -> list[Fact]:
     record, time = survey.record, survey.record["time_s"]
     even = "regular" if survey.even else "irregular or with gaps"
     about = " ".join(filter(None, (record.instrument, record.start.isoformat() if record.start else "")))

@@ -190,9 +190,8 @@ def _balance(known: Mapping[int, complex], plan: TrimPlan) -> str | None:
     """Return how much of the known imbalance the cuts leave."""
     if not known:
         return None
-    left = {
-        k: abs(plan.unbalance[k]) if abs(plan.unbalance[k]) > NEGLIGIBLE * abs(u) else 0.0 for k, u in known.items()
-    }
+    rest = {k: abs(plan.unbalance[k]) for k in known}
+    left = {k: rest[k] if rest[k] > NEGLIGIBLE * abs(u) else 0.0 for k, u in known.items()}
     parts = [f"k = {k}: {plain(1e9 * abs(u))} → {plain(1e9 * left[k])} µg" for k, u in known.items()]
     more = " These cuts can take no more: longer, wider or more cuts (teeth with a higher limit) correct the rest."
     return f"Mass imbalance before → after the cuts: {', '.join(parts)}.{more if any(left.values()) else ''}"

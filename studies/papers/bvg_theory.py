@@ -134,9 +134,8 @@ def _bell_with_elements() -> tuple[BellResonator, PiezoRing, float]:
     (mode,) = solve_modes(body, instrument.material.elastic(instrument.reference_temperature))
     lengths = [segment.length for segment in body.segments]
     top, height = lengths[0] / sum(lengths), ELEMENT_mm[0] * 1e-3 / sum(lengths)
-    along, around = (
-        one / mode.largest_displacement for one in shell_faces(mode.solution, body)[1].mean_stress(top, top + height)
-    )
+    stresses = shell_faces(mode.solution, body)[1].mean_stress(top, top + height)
+    along, around = (one / mode.largest_displacement for one in stresses)
     width, dome = ELEMENT_mm[1] * 1e-3, body.segments[0]
     assert isinstance(dome, Arc)
     ring = PiezoRing(along + around, D31_PZT5A, ELEMENT_mm[0] * width * 1e-3, width / dome.radius, AMPLIFIER_F)

@@ -150,10 +150,8 @@ def _filter_kalman(step: float, generator: np.random.Generator) -> tuple[Filtere
     noisy = output + np.sqrt(MEASUREMENT_NOISE) * generator.standard_normal(len(time))
     run = run_filter(model, noisy, np.zeros(2), np.eye(2))
     clean = run_filter(model, output, np.zeros(2), np.eye(2)).states
-    of_output, of_rate = (
-        Filtered(time, truth, output, noisy, run.states[:, i], clean[:, i]) for i, truth in enumerate((output, rate))
-    )
-    return of_output, of_rate, run.nis
+    of_output = Filtered(time, output, output, noisy, run.states[:, 0], clean[:, 0])
+    return of_output, Filtered(time, rate, output, noisy, run.states[:, 1], clean[:, 1]), run.nis
 
 
 PAPER = "Demodulated dynamics and optimal noise filtering for Coriolis vibratory gyroscopes"

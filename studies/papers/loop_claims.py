@@ -119,10 +119,11 @@ def _resolution(seed: int) -> Claim:
     precession = np.radians(0.5) * np.where(time < 900, 1.0, -1.0)
     drawn = np.random.default_rng(seed)
     run = simulate_whole_angle(wave, electronics, Loops(), time, precession=precession, generator=drawn)
-    fit = fit_whole_angle(
+    found = fit_whole_angle(
         time, run.angle, run.rate, coupling=wave.coupling, decay=run.decay, quadrature=run.quadrature
-    ).estimates["frequency_split"]
-    low, value, high = (1e3 * x / (2 * np.pi) for x in (fit.low, fit.value, fit.high))
+    )
+    split = found.estimates["frequency_split"]
+    low, value, high = (1e3 * x / (2 * np.pi) for x in (split.low, split.value, split.high))
     return Claim(
         f"the quadrature force under self-precession resolves {1e3 * RESOLVED_Hz:g} mHz",
         "Microsystems & Nanoengineering 2025, s41378-025-00872-z (abstract)",

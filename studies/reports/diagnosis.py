@@ -9,7 +9,7 @@ from studies.effects import find_effect
 from studies.instrument.display import display_name, spell_parameter
 from studies.reports import diagnosis_pictures as pictures
 from studies.reports.digits import plain
-from studies.results import Chapter, Facts, Figure, Part, Sentence, Table
+from studies.results import Chapter, Fact, Facts, Figure, Part, Sentence, Table
 
 if TYPE_CHECKING:
     from studies.inference.diagnosis import Inference
@@ -100,9 +100,8 @@ def cause_table(verdict: Verdict) -> Table:
         }
         for name, p in cause.parameters.items():
             words, factor = spell_parameter(name)
-            rows.append(
-                head | {"name": words, "value": factor * p.value, "low": factor * p.low, "high": factor * p.high}
-            )
+            size = {"value": factor * p.value, "low": factor * p.low, "high": factor * p.high}
+            rows.append(head | {"name": words} | size)
             head = {}
     note = "Peak to peak: change of the response in this record due to the cause. The saved card has all coefficients of a cause."
     return Table("Causes", rows, CAUSES, note)  # fmt: skip
@@ -125,16 +124,12 @@ def response_table(verdict: Verdict) -> Table:
             "left": ("perhaps " if one.left_over == "none" and one.left_over_input else "")
             + (spell_structure(one.left_over_input) if one.left_over_input else one.left_over),
         })  # fmt: skip
-    judged = any(row["baseline"] is not None for row in rows)
-    note = "Rms residuals." + (
-        " Baseline and with causes: on rows left out of the fit, where these can be predicted." if judged else ""
-    )
+    note = "Rms residuals."
+    if any(row["baseline"] is not None for row in rows):
+        note += " Baseline and with causes: on rows left out of the fit, where these can be predicted."
     note += " Noise: the residual that no model removes; white: from row to row, coloured: within a run."
-    note += (
-        " Explained: share of the structure that the causes remove."
-        if any(row["explained_share"] is not None for row in rows)
-        else ""
-    )
+    if any(row["explained_share"] is not None for row in rows):
+        note += " Explained: share of the structure that the causes remove."
     return Table("Responses", rows, RESULTS, note)
 
 
@@ -200,7 +195,7 @@ def _summary(cause: Cause) -> str:
     return f"{effect.summary}. To isolate it: {effect.isolate}. Source: {effect.source}."
 
 
-def _facts(verdict: Verdict) -> list[tuple[str, str, str]]:
+def _facts(verdict: Verdict) -> list[Fact]:
     facts = [("Verdict", verdict.verdict.replace("-", " "), reason(verdict))]
     for cause in verdict.causes[:3]:
         names = " or ".join(cause.names)
@@ -214,9 +209,8 @@ def _facts(verdict: Verdict) -> list[tuple[str, str, str]]:
     if main is not None:
         result = verdict.responses[main]
         if result.gain is not None:
-            facts.append(
-                ("Gain", f"{plain(result.gain)} times", f"smaller residual of {spoken(main)} on held-out rows")
-            )
+            remark = f"smaller residual of {spoken(main)} on held-out rows"
+            facts.append(("Gain", f"{plain(result.gain)} times", remark))
         facts.append(("Noise", shown(main, result.noise), f"rms residual of {spoken(main)} that no model removes"))
     return facts  # fmt: skip
 

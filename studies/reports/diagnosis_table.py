@@ -5,7 +5,7 @@ from studies.diagnosis.table import TableDiagnosis
 from studies.reports.diagnosis import headline, next_step, reason
 from studies.reports.digits import plain, to_error
 from studies.reports.style import BLACK, ORANGE, VERMILION, figure
-from studies.results import Chapter, Drawing, Facts, Figure, Sentence, Table
+from studies.results import Chapter, Drawing, Fact, Facts, Figure, Sentence, Table
 
 CANDIDATES = "0: candidate | 1: sum of squares (Hz²) .3 | 2: leave-one-out (Hz) .3 | 3: evidence .3"
 EVIDENCE = (
@@ -31,7 +31,7 @@ def table_parts(found: TableDiagnosis) -> list[Chapter]:
     ]  # fmt: skip
 
 
-def law_facts(found: TableDiagnosis) -> list[tuple[str, str, str]]:
+def law_facts(found: TableDiagnosis) -> list[Fact]:
     """Return the residual of the law, or the measured level and slope beside those of the card, to the digits of its uncertainty."""
     compared = found.verdict.details.get("settled")
     if compared is None:

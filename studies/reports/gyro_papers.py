@@ -42,9 +42,8 @@ def _summarise_damping(twin: cvg_cross_damping.CrossDampingTwin) -> dict[str, An
         "improvement_printed": cvg_cross_damping.PRINTED_IMPROVEMENT,
         **row_of(twin, improvement_training="study.training.rows.ratio", improvement_held_out="improvement.ratio"),
         "improvement_over_seeds_5_50_95": twin.spread,
-        **row_of(
-            twin, by_lag_s="lags", by_random_walk_deg_per_sqrt_h="noises", improvement_by_lag_and_random_walk="table"
-        ),
+        **row_of(twin, by_lag_s="lags", by_random_walk_deg_per_sqrt_h="noises"),
+        "improvement_by_lag_and_random_walk": twin.table,
     }
 
 

@@ -121,15 +121,13 @@ class Designs:
 
     def make(self, values: Array) -> Instrument:
         """Return the instrument of values of the axes."""
-        return set_parameters(
-            self.instrument, {a.name: float(v) for a, v in zip(self.axes, values, strict=True)}, self.derived
-        )
+        named = {axis.name: float(value) for axis, value in zip(self.axes, values, strict=True)}
+        return set_parameters(self.instrument, named, self.derived)
 
     def at_point(self, unit: Array) -> Instrument:
         """Return the instrument at a point of the cube -1 ... 1."""
-        return self.make(
-            np.array([(a.low + a.high + (a.high - a.low) * x) / 2 for a, x in zip(self.axes, unit, strict=True)])
-        )
+        low, high = np.array([(axis.low, axis.high) for axis in self.axes]).reshape(-1, 2).T
+        return self.make((low + high + (high - low) * unit) / 2)
 
 
 def _families(designs: Designs, harmonic: int, theory: Theory, T: Range) -> tuple[list[Family], list[str]]:

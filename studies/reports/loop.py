@@ -12,7 +12,7 @@ from studies.record import Record
 from studies.reports import style
 from studies.reports.columns import draw_columns
 from studies.reports.digits import plain, to_error
-from studies.results import Chapter, Column, Drawing, Facts, Figure, Sentence, Table
+from studies.results import Chapter, Column, Drawing, Fact, Facts, Figure, Sentence, Table
 from studies.simulation.loop_study import BiasSlope, LoopStudy, answer_steps, bias_around, noise_over
 
 LENGTHS = tuple(np.geomspace(0.01, 1e4, 25))
@@ -103,7 +103,7 @@ def _ranges(study: LoopStudy, payload: dict[str, Any]) -> list[dict[str, Any]]:
     return [{"loop": a, "actuator": b, "use": use[key] if use[key] > 1e-5 else "< 0.001"} for a, b, key in rows]
 
 
-def _facts(study: LoopStudy, payload: dict[str, Any]) -> list[tuple[str, str, str]]:
+def _facts(study: LoopStudy, payload: dict[str, Any]) -> list[Fact]:
     total, noise = study.sources[-1], payload["noise"]
     largest = max(study.sources[:-1], key=lambda one: one.sd).name
     single = [one for one in noise if one["source"] != "all"]

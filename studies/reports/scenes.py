@@ -197,7 +197,5 @@ def view_blocks(shown: Sequence[ModeScene], remark: str = "") -> "list[Block]":
     lobes = 2 * first.mode.harmonic
     alt = f"The resonator with its rim bent into {lobes} lobes, nodes between them."
     splits = [None if one.split is None else Drawn(one.split, one.imperfection, one.exaggeration) for one in shown]
-    view = view_modes(
-        first.resonator, [one.mode for one in shown], first.title, draw_still(first.scene()), alt, caption, splits
-    )
-    return [view]
+    modes, still = [one.mode for one in shown], draw_still(first.scene())
+    return [view_modes(first.resonator, modes, first.title, still, alt, caption, splits)]

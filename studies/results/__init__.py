@@ -169,11 +169,15 @@ class Table:
         return [title for title, _ in shown], [list(row) for row in zip(*(cells for _, cells in shown), strict=True)]
 
 
+Fact = tuple[str, str, str]
+"""Label, value, remark."""
+
+
 @dataclass(frozen=True)
 class Facts:
-    """A few numbers that carry the answer: (label, value, remark)."""
+    """A few numbers that carry the answer."""
 
-    facts: Sequence[tuple[str, str, str]]
+    facts: Sequence[Fact]
     where: Where = "everywhere"
 
 

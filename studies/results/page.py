@@ -156,16 +156,12 @@ def _cell(text: str) -> "Markup":
         text = re.sub(r"(?<=\de)([-−+]?)0+(?=\d)", r"\1", text)
         text = re.sub(r"(?<![\w.)\]-])-(?=\.?\d)|(?<=\de)-(?=\d)", "−", text)
     shown = escape(re.sub(r"(?<=\d)%", " %", text))
-    if (
-        text.endswith(".html") and "/" in text and ":" not in text and not text.startswith("/")
-    ):  # a page beside this one
+    if re.fullmatch(r"[^:/][^:]*/[^:]*\.html", text):  # a page beside this one
         return Markup('<a href="{}">{}</a>').format(quote(text), shown)
-    # a long key of a card may be divided after its dots and underscores, so that its column fits the page
-    return Markup(
-        re.sub(r"(?<=\w[._])(?=[^\W\d])", "<wbr>", shown)
-        if len(max(text.split(), key=len, default="")) > LONG_WORD
-        else shown
-    )
+    if max(map(len, text.split()), default=0) > LONG_WORD:
+        # a long key of a card may be divided after its dots and underscores, so that its column fits the page
+        return Markup(re.sub(r"(?<=\w[._])(?=[^\W\d])", "<wbr>", shown))
+    return shown
 
 
 def _worded(text: str) -> bool:

@@ -93,9 +93,8 @@ class Cluster(Workers):
             self.lonely = None
         elif self.lonely is None:
             self.lonely = now
-            warnings.warn(
-                f"{self.address}: the last worker has ended; waiting {PATIENCE:g} s for another.", stacklevel=2
-            )
+            ended = f"{self.address}: the last worker has ended; waiting {PATIENCE:g} s for another."
+            warnings.warn(ended, stacklevel=2)
         elif now - self.lonely > PATIENCE:
             raise MissingEnvironment(f"{self.address}: no worker is left; everything computed before is kept. Start workers, then run the same command again to resume.")  # fmt: skip
 

@@ -137,9 +137,8 @@ def _quantile(parameter: StudyParameter, p: Array) -> Array:
         return np.asarray(stats.triang.ppf(p, (middle - low) / (high - low), low, high - low))
     deviation = float(parameter.standard_deviation or 0.0)
     if parameter.bounded:
-        return np.asarray(
-            stats.truncnorm.ppf(p, (low - middle) / deviation, (high - middle) / deviation, middle, deviation)
-        )
+        ends = (low - middle) / deviation, (high - middle) / deviation
+        return np.asarray(stats.truncnorm.ppf(p, *ends, middle, deviation))
     return np.asarray(stats.norm.ppf(p, middle, deviation))
 
 

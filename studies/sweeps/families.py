@@ -145,12 +145,10 @@ def why_not(study: Study) -> str:
 
 def build_families(study: Study, design: Array, most: int = MOST_SOLVES) -> Families | str:
     """Build the families that a study asks for, or say why it must be computed design by design."""
-    reason = why_not(study)
-    if reason:
+    if reason := why_not(study):
         return reason
-    axes = [
-        Axis(p.name, *_range(study, design, k)) for k, p in enumerate(study.parameters) if p.name.startswith(DIMENSIONS)
-    ]
+    dimensions = [k for k, p in enumerate(study.parameters) if p.name.startswith(DIMENSIONS)]
+    axes = [Axis(study.parameters[k].name, *_range(study, design, k)) for k in dimensions]
 
     def build(values: Array) -> Resonator:
         named = {axis.name: float(value) for axis, value in zip(axes, values, strict=True)}

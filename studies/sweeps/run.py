@@ -164,16 +164,10 @@ def describe_study(store: Store, study: Study, identity: Mapping[str, Any], desi
     """Note in a store what it is of; InputError where it is of another study."""
     store.check_same(identity)
     instrument = study.instrument
-    store.describe(
-        {
-            "identity": identity,
-            "spec": study.content,
-            "spec_text": study.text,
-            "instrument": {name: getattr(instrument, name) for name in INSTRUMENT},
-            "folder": study.folder,
-            "cases": 0 if design is None else len(design),
-        }
-    )
+    spec = {"spec": study.content, "spec_text": study.text, "folder": study.folder}
+    kept = {name: getattr(instrument, name) for name in INSTRUMENT}
+    cases = 0 if design is None else len(design)
+    store.describe({"identity": identity, **spec, "instrument": kept, "cases": cases})
 
 
 def _is_finished(store: Store, study: Study, design: Array, sources: Mapping[str, str]) -> bool:

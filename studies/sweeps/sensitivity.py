@@ -163,7 +163,6 @@ def _complete(results: Results, column: str) -> Array:
     if lacking.size:
         words = [f"case {place} ({results.remark(place)})" for place in lacking[:SHOWN].tolist()]
         words += [f"and {lacking.size - SHOWN} more"] if lacking.size > SHOWN else []
-        raise InputError(
-            f"{lacking.size} of {len(y)} cases have no {column}(missing values are not filled in): {'; '.join(words)}. Correct the ranges, or the function, and run a new study."
-        )
+        what = f"{lacking.size} of {len(y)} cases have no {column}(missing values are not filled in)"
+        raise InputError(f"{what}: {'; '.join(words)}. Correct the ranges, or the function, and run a new study.")
     return y

@@ -41,9 +41,8 @@ def check_study(content: Mapping[str, Any], instrument: Instrument, where: str, 
     def numbered(table: str, members: Sequence[Any]) -> list[tuple[str, Any]]:
         return [(f"{where} [[{table}]] number {place}", one) for place, one in enumerate(members, 1)]
 
-    parameters = tuple(
-        _resolve(place, one, instrument, keys.sampling.method) for place, one in numbered("parameter", keys.parameter)
-    )
+    method, stated = keys.sampling.method, numbered("parameter", keys.parameter)
+    parameters = tuple(_resolve(place, one, instrument, method) for place, one in stated)
     names = [parameter.name for parameter in parameters]
     _refuse_twins(names, f"{where} [[parameter]]: the name")
     for place, derived in numbered("derived", keys.derived):
@@ -58,20 +57,12 @@ def check_study(content: Mapping[str, Any], instrument: Instrument, where: str, 
     for place, requirement in numbered("requirement", keys.requirement):
         _check_known(place, "column", [requirement.column], columns)
     numeric = [parameter.name for parameter in parameters if not isinstance(parameter.nominal, str)]
+    asked = tuple(_beside(one, folder) for one in keys.quantity)
+    searches = tuple(_check_search(place, one, columns, numeric) for place, one in numbered("search", keys.search))
     study = Study(
-        name=keys.name or Path(where).stem,
-        note=keys.note,
-        instrument=instrument,
-        sampling=keys.sampling,
-        parameters=parameters,
-        derived=keys.derived,
-        asked=tuple(_beside(one, folder) for one in keys.quantity),
-        requirements=keys.requirement,
-        searches=tuple(_check_search(place, one, columns, numeric) for place, one in numbered("search", keys.search)),
-        content=content,
-        text=text,
-        folder=folder,
-    )
+        keys.name or Path(where).stem, keys.note, instrument, keys.sampling, parameters, keys.derived, asked,
+        keys.requirement, searches, content, text, folder,
+    )  # fmt: skip
     check_nominal(study, where)
     if any(isinstance(search, ToleranceSearch) for search in study.searches):
         check_sample(study, where)

@@ -20,9 +20,8 @@ class CompensationResidual(HarmonicQuantity, frozen=True, kw_only=True, tag="com
 
     def __post_init__(self) -> None:
         if not self.to_degC > self.from_degC or self.points <= self.order + 1:
-            raise ValueError(
-                f"compensation-residual needs from_degC < to_degC and more than {self.order + 1} points, not {self.from_degC:g} to {self.to_degC:g} °C with {self.points}."
-            )
+            needs = f"compensation-residual needs from_degC < to_degC and more than {self.order + 1} points"
+            raise ValueError(f"{needs}, not {self.from_degC:g} to {self.to_degC:g} °C with {self.points}.")
 
     def list_columns(self) -> tuple[Column, ...]:
         words = f"polynomial of order {self.order}, {self.words}"
@@ -37,7 +36,5 @@ class CompensationResidual(HarmonicQuantity, frozen=True, kw_only=True, tag="com
         T = np.linspace(self.from_degC, self.to_degC, self.points)
         f = np.array([case.modes(self.harmonic, 1, self.theory, x + zero_Celsius)[0].frequency for x in T])
         fit = fit_frequency(T, f, self.order, float(np.mean(T)))
-        return (
-            Number(float(np.sqrt(np.mean(fit.regression.residuals**2)))),
-            Number(float(np.abs(fit.temperature(f) - T).max())),
-        )
+        residual, error = np.sqrt(np.mean(fit.regression.residuals**2)), np.abs(fit.temperature(f) - T).max()
+        return Number(float(residual)), Number(float(error))

@@ -31,8 +31,6 @@ class LoadsOfDesign(Quantity, frozen=True, kw_only=True, tag="loads"):
         shock = self.shock_g * STANDARD_GRAVITY
         directions: tuple[dict[Kind, float], ...] = ({"axial": shock}, {"axial": -shock}, {"lateral": shock})
         stresses = [*(loads.peak(one).worst for one in directions), loads.beam(shock, 0.0), loads.beam(0.0, shock)]
-        return (
-            Number(1e9 * STANDARD_GRAVITY * loads.shift("axial")),
-            Number(1e6 * STANDARD_GRAVITY * abs(loads.sag({"lateral": 1.0}).tilt)),
-            Number(1e-6 * max(stresses)),
-        )
+        shift, tilt = loads.shift("axial"), abs(loads.sag({"lateral": 1.0}).tilt)
+        found = 1e9 * STANDARD_GRAVITY * shift, 1e6 * STANDARD_GRAVITY * tilt, 1e-6 * max(stresses)
+        return tuple(Number(one) for one in found)

@@ -21,15 +21,11 @@ class ModeSeparation(ModeQuantity, frozen=True, kw_only=True, tag="mode-separati
 
     def list_columns(self) -> tuple[Column, ...]:
         stem = self.stem("separation")
-        each = [
-            Column(f"{stem}_of_n{n}_{k}", "Hz", f"distance of n = {n}, mode {k} from {self.words}")
-            for n, k in self._others
-        ]
         return (
             Column(stem, "Hz", f"distance of the nearest other mode from {self.words}"),
             Column(f"{stem}_nearest_harmonic", "1", f"harmonic of the mode nearest to {self.words}"),
-            *each,
-        )
+            *(Column(f"{stem}_of_n{n}_{k}", "Hz", f"distance of n = {n}, mode {k} from {self.words}") for n, k in self._others),
+        )  # fmt: skip
 
     def list_modes(self) -> "Iterable[tuple[int, int, float]]":
         """Return its own harmonic, and the others as exactly as asked."""

@@ -14,9 +14,8 @@ class ThermalTimeConstants(Quantity, frozen=True, kw_only=True, tag="thermal-tim
     temperature_degC: Temperature | None = None
 
     def list_columns(self) -> tuple[Column, ...]:
-        path = [
-            Column(f"time_constant_{k + 1}", "s", f"time constant {k + 1} of the heat path") for k in range(self.count)
-        ]
+        numbers = range(1, self.count + 1)
+        path = [Column(f"time_constant_{k}", "s", f"time constant {k} of the heat path") for k in numbers]
         return (*path, Column("time_constant_shell", "s", "slowest time constant of shell and stem alone"))
 
     def evaluate(self, case: Case) -> tuple[Number, ...]:
