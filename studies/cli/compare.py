@@ -5,6 +5,8 @@ from math import isfinite
 from studies.cli.output import answers
 from studies.errors import InputError
 from studies.files.given import shorten
+from studies.instrument.card import load_card
+from studies.resonator.comparison import compare as compare_designs
 from studies.results import Column, Result, Table, row_of
 
 
@@ -17,9 +19,6 @@ def compare(*card: str) -> Result:
     """
     if len(card) < 2:
         raise InputError("name two cards or more: hrg compare A.toml B.toml.")
-    from studies.instrument.card import load_card
-    from studies.resonator.comparison import compare as compare_designs
-
     found = compare_designs([load_card(one) for one in card])
     figures = [
         row_of(row[0], "name", "unit")

@@ -1,6 +1,6 @@
 """`hrg derive`: the symbolic derivation of the HRG paper's equations (1)–(15), for people and for design code."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from math import radians
 from typing import TYPE_CHECKING, Any, Literal
@@ -13,8 +13,6 @@ from studies.progress import tell
 from studies.results import Blocks, Chapter, Result, Sentence, Table
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from shell.derivation.chain import Row
     from studies.derivation import Step
 

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping
 from io import BytesIO
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any, Literal
+from typing import IO, Any, Literal
 
 from studies.cli.arguments import Out, Run
 from studies.cli.output import answers
@@ -11,10 +11,8 @@ from studies.errors import InputError
 from studies.files.reading import load_library
 from studies.files.writing import written_whole
 from studies.instrument.units import unit_of
+from studies.record import Record, read_record, write_record
 from studies.results import Result, Sentence
-
-if TYPE_CHECKING:
-    from studies.record import Record
 
 ENDINGS = {"csv": (".csv",), "parquet": (".parquet",), "mat": (".mat",), "tdms": (".tdms",), "mf4": (".mf4",), "hdf5": (".h5", ".hdf5")}  # fmt: skip
 
@@ -31,10 +29,12 @@ def export(run: Run, *, to: Literal["parquet", "mat", "tdms", "csv", "mf4", "hdf
     """
     if Path(out).suffix.lower() not in ENDINGS[to]:
         raise InputError(f"--out {out}: give a name that ends in {ENDINGS[to][0]} for --to {to}.")
-    from studies.record import read_record
-
     record = read_record(run)
-    export_record(record, to, out)
+    if to in WRITERS:
+        with written_whole(out) as file:
+            WRITERS[to](record, file)
+    else:
+        write_record(record, out)
     payload = {"record": run, "to": to, "out": out, "rows": len(record), "columns": list(record.columns)}  # fmt: skip
     parts = [Sentence(f"{out}: {len(record):,} rows of {', '.join(record.columns)}.")]
     if record.start is not None and to in UNDATED:
@@ -46,22 +46,11 @@ def export(run: Run, *, to: Literal["parquet", "mat", "tdms", "csv", "mf4", "hdf
 GROUP = "record"
 
 
-def export_record(record: "Record", kind: str, path: str) -> None:
-    """Write a record in another format, whole or not at all; MissingEnvironment where the library that writes it is not installed."""
-    from studies.record import write_record
-
-    if kind in ("csv", "parquet"):
-        write_record(record, path)
-        return
-    with written_whole(path) as file:
-        WRITERS[kind](record, file)
-
-
 def _unit(name: str) -> str:
     return "s" if name == "time_s" else unit_of(name).removeprefix("1")
 
 
-def write_matlab(record: "Record", file: IO[bytes]) -> None:
+def write_matlab(record: Record, file: IO[bytes]) -> None:
     """A .mat file (version 5): a column vector for each column, and `notes`."""
     from scipy.io import savemat
 
@@ -71,7 +60,7 @@ def write_matlab(record: "Record", file: IO[bytes]) -> None:
     file.write(made.getvalue())
 
 
-def write_tdms(record: "Record", file: IO[bytes]) -> None:
+def write_tdms(record: Record, file: IO[bytes]) -> None:
     """A TDMS file: one group with a channel for each column."""
     nptdms = load_library("nptdms", "--to tdms", "TDMS")
     about = {"instrument": record.instrument, "source": record.source, "notes": "\n".join(record.notes)}
@@ -80,7 +69,7 @@ def write_tdms(record: "Record", file: IO[bytes]) -> None:
         writer.write_segment([nptdms.RootObject(about), nptdms.GroupObject(GROUP), *channels])
 
 
-def write_hdf5(record: "Record", file: IO[bytes]) -> None:
+def write_hdf5(record: Record, file: IO[bytes]) -> None:
     """An HDF5 file: a dataset for each column."""
     h5py = load_library("h5py", "--to hdf5", "HDF5")
     with h5py.File(file, "w") as out:
@@ -89,7 +78,7 @@ def write_hdf5(record: "Record", file: IO[bytes]) -> None:
             out.create_dataset(name, data=values, compression="gzip").attrs["unit"] = _unit(name)
 
 
-def write_mdf(record: "Record", file: IO[bytes]) -> None:
+def write_mdf(record: Record, file: IO[bytes]) -> None:
     """An MDF 4 file: one group, with the time as its master."""
     asammdf = load_library("asammdf", "--to mf4", "MDF")
     time = record["time_s"]
@@ -107,7 +96,7 @@ def write_mdf(record: "Record", file: IO[bytes]) -> None:
         file.write(made.getvalue())
 
 
-WRITERS: Mapping[str, Callable[["Record", IO[bytes]], None]] = {
+WRITERS: Mapping[str, Callable[[Record, IO[bytes]], None]] = {
     "mat": write_matlab,
     "tdms": write_tdms,
     "hdf5": write_hdf5,

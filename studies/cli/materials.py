@@ -1,7 +1,7 @@
 """`hrg materials`: the published laws of the materials, and how they compare in one geometry."""
 
 from math import inf, isnan, nan, pi
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -10,15 +10,13 @@ from shell.errors import ShellError
 from shell.material import Material, Prior, spell
 from shell.materials import read_materials
 from shell.property import PROPERTIES, Property
+from shell.resonator import Resonator
 from studies.cli.arguments import Card, Harmonic
 from studies.cli.output import answers
 from studies.errors import InputError, naming, nearest
 from studies.instrument.card import load_card
 from studies.reports.digits import plain, to_error
 from studies.results import Result, Table, row_of, rows_of
-
-if TYPE_CHECKING:
-    from shell.resonator import Resonator
 
 
 @answers("hrg.materials-list/1; hrg.materials-compared/1 with --compare")
@@ -154,7 +152,7 @@ FIGURES = (
 )
 
 
-def compare_materials(resonator: "Resonator", temperature: float, harmonic: int = 2) -> list[dict[str, Any]]:
+def compare_materials(resonator: Resonator, temperature: float, harmonic: int = 2) -> list[dict[str, Any]]:
     """Return the `FIGURES` of every law of the table at a temperature (K), by thermoelastic Q, and `remarks`; NaN where not known.
 
     A surface layer of depth d and loss φ adds 1/Q = S d φ to the thermoelastic 1/Q_te, S the share of the mode's energy per depth. Where
@@ -170,7 +168,7 @@ def compare_materials(resonator: "Resonator", temperature: float, harmonic: int 
     return sorted(rows, key=lambda row: (-np.nan_to_num(row["thermoelastic_q"]), isnan(row["frequency_Hz"])))
 
 
-def _figures(resonator: "Resonator", material: Material, T: float, harmonic: int) -> dict[str, Any]:
+def _figures(resonator: Resonator, material: Material, T: float, harmonic: int) -> dict[str, Any]:
     from shell.damping.budget import surface_cause, thermoelastic_cause
     from shell.damping.faces import Vibration
     from shell.damping.heat import Heat

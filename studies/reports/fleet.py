@@ -1,7 +1,7 @@
 """Parts of a lot: what devices of one design have in common, which differ, and control charts of their values."""
 
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -14,9 +14,6 @@ from studies.reports.diagnosis import NAMES
 from studies.reports.digits import plain
 from studies.reports.style import BLUE, ORANGE, VERMILION, panels
 from studies.results import Chapter, Column, Drawing, Facts, Figure, Sentence, Table
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 ACROSS, MOST, DATED, NAMED = 2, 8, 4, 25  # charts: side by side, in all, over the date; devices named below one
 METHOD = (
@@ -171,7 +168,7 @@ def _draw(lot: Lot, quantities: list[Quantity], by_date: bool = False) -> Drawin
         return canvas
 
 
-def _draw_chart(axis: "Axes", lot: Lot, one: Quantity, by_date: bool) -> None:
+def _draw_chart(axis: Any, lot: Lot, one: Quantity, by_date: bool) -> None:
     serials = [s for s in lot.answers if s in one.of and (not by_date or s in lot.made)]
     first = min(lot.made.values(), default=None)
     at = [(lot.made[s] - first).days if by_date and first else k for k, s in enumerate(serials)]

@@ -5,9 +5,10 @@ import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from compensation.arrays import Array
 from shell.imperfection import Imperfection, Split
@@ -17,9 +18,7 @@ from shell.outline import Outline, trace_outlines
 from shell.resonator import Resonator
 from studies.results.page import Embedded, fill_template
 
-if TYPE_CHECKING:
-    Members = np.ndarray[Any, np.dtype[np.int64]]
-
+Members = NDArray[np.int64]
 HIGHEST = 12  # wave of the departures that is drawn
 SPACING = 40  # points of the outline along the radius
 KINK = np.radians(35.0)  # where the outline turns by more than this, the shading breaks
@@ -89,9 +88,7 @@ def outline_rows(resonator: Resonator, mode: Mode, size: float) -> list[Array]:
     return [_columns(line, members, size) for one in lines for line, members in _split_at_kinks(one)]
 
 
-def _imperfect(
-    resonator: Resonator, runs: "list[tuple[Outline, Members]]", size: float, drawn: Drawn
-) -> dict[str, Any]:
+def _imperfect(resonator: Resonator, runs: list[tuple[Outline, Members]], size: float, drawn: Drawn) -> dict[str, Any]:
     """The slow axis (rad), where the axes lie on the rim, and the departures: for each wave and point its parts along r and z."""
     rim = resonator.at([resonator.length])
     found: dict[str, Any] = {
@@ -114,7 +111,7 @@ def _imperfect(
     return found
 
 
-def _columns(line: Outline, members: "Members", size: float) -> Array:
+def _columns(line: Outline, members: Members, size: float) -> Array:
     """One row for each point: r, z and their slopes, the displacement and its slope, the two parts of the energy."""
     r, z = line.r[members] / size, line.z[members] / size
     shift = line.displacement[:, members]
@@ -123,7 +120,7 @@ def _columns(line: Outline, members: "Members", size: float) -> Array:
     return np.column_stack([r, z, *slopes[:2], *shift, *slopes[2:], *line.energy[:, members]])
 
 
-def _split_at_kinks(line: Outline) -> "list[tuple[Outline, Members]]":
+def _split_at_kinks(line: Outline) -> list[tuple[Outline, Members]]:
     """Runs of points without a kink; neighbouring runs share their end point."""
     closing = np.arange(len(line.r)) if line.on_axis else np.append(np.arange(len(line.r)), 0)
     heading = np.unwrap(np.arctan2(np.diff(line.z[closing]), np.diff(line.r[closing])))

@@ -12,15 +12,14 @@ from dataclasses import dataclass
 from importlib.metadata import version
 from importlib.resources import files
 from io import BytesIO
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from urllib.parse import quote
+
+from markupsafe import Markup, escape
 
 from studies.progress import told
 from studies.results import Blocks, Chapter, Drawing, Facts, Figure, Part, Result, Sentence, Table
 from studies.results.curves import read_curves
-
-if TYPE_CHECKING:
-    from markupsafe import Markup
 
 PACKAGES = ("numpy", "scipy", "sympy", "pandas", "pyvista", "trimesh")
 OPEN = 5  # chapters; those that follow are folded
@@ -136,10 +135,8 @@ def typeset(text: str) -> str:
     return re.sub(r"(?<=\d)%", " %", re.sub(r"(?<=\de)-(?=\d)", "−", text))
 
 
-def _prose(text: str) -> "Markup":
+def _prose(text: str) -> Markup:
     """Return a paragraph, escaped, with words between backticks as code."""
-    from markupsafe import Markup, escape
-
     parts = str(text).split("`")
     if len(parts) % 2 == 0:  # an odd backtick is a character like others
         parts = [str(text)]
@@ -147,10 +144,8 @@ def _prose(text: str) -> "Markup":
     return Markup("".join(pieces))
 
 
-def _cell(text: str) -> "Markup":
+def _cell(text: str) -> Markup:
     """Return a cell, escaped, with minus signs, also in exponents, where it begins as a number."""
-    from markupsafe import Markup, escape
-
     text = str(text)
     if re.match(r"[-+±<> ]*[.\d]", text):
         text = re.sub(r"(?<=\de)([-−+]?)0+(?=\d)", r"\1", text)

@@ -8,12 +8,10 @@ from collections.abc import Iterator, Mapping
 from hashlib import blake2b, sha256
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from shell.material import Material
 from studies.files.given import shorten
-
-if TYPE_CHECKING:
-    from shell.material import Material
 
 PACKAGES = ("hrg-workbench", "numpy", "scipy", "pandas", "dask", "distributed")
 
@@ -66,7 +64,7 @@ def digest(value: Any) -> str:
     return blake2b(spell(value).encode(), digest_size=16).hexdigest()
 
 
-def spell_material(material: "Material") -> str:
+def spell_material(material: Material) -> str:
     """Return a material's laws with all their numbers, so that an edited material file changes every key."""
     properties = {
         name: {"form": p.form, "numbers": dict(p.numbers), "uncertainty": dict(p.uncertainty)}
