@@ -55,20 +55,8 @@ class Curve(ABC):
         return (float(jet.r[0]), float(jet.z[0])), (float(jet.r[1]), float(jet.z[1]))
 
     def at_length(self, s: Array) -> Jet:
-        """Position and derivatives at arc lengths s (m), by Newton's method on s(x)."""
-        x = np.interp(s, self._lengths, np.linspace(0.0, 1.0, len(self._lengths)))
-        for _ in range(8):
-            jet = self.jet(x)
-            step = (s - self._length_to(x)) / np.hypot(jet.dr, jet.dz)
-            x = x + step
-            if np.all(abs(step) < 1e-8):  # the next step is about its square
-                break
-        return self.jet(x)
-
-    @cached_property
-    def _lengths(self) -> Array:
-        """Arc lengths to equally spaced parameters, the start of Newton's method."""
-        return self._length_to(np.linspace(0.0, 1.0, 65))
+        """Position and derivatives at arc lengths s (m), which grow as x unless the curve says otherwise."""
+        return self.jet(s / self.length)
 
     def _length_to(self, x: Array) -> Array:
         points, weights = gauss(48)
@@ -98,10 +86,6 @@ class Line(Curve):
         (r, z), (r_end, z_end) = self.start, self.end
         dr, dz = np.full_like(x, r_end - r), np.full_like(x, z_end - z)
         return Jet(r + x * dr, z + x * dz, dr, dz, 0 * x, 0 * x)
-
-    def at_length(self, s: Array) -> Jet:
-        """Position and derivatives at arc lengths s (m)."""
-        return self.jet(s / self.length)
 
 
 @dataclass(frozen=True)
@@ -136,10 +120,6 @@ class Arc(Curve):
             -(turn**2) * cosine,
         )  # fmt: skip
 
-    def at_length(self, s: Array) -> Jet:
-        """Position and derivatives at arc lengths s (m)."""
-        return self.jet(s / self.length)
-
 
 @dataclass(frozen=True)
 class Hyperbola(Curve):
@@ -159,3 +139,19 @@ class Hyperbola(Curve):
         r = np.sqrt(self.radius**2 + spread * x**2)
         dr = spread * x / r
         return Jet(r, self.waist - self.height * x, dr, np.full_like(x, -self.height), (spread - dr**2) / r, 0 * x)
+
+    def at_length(self, s: Array) -> Jet:
+        """Position and derivatives at arc lengths s (m), by Newton's method on s(x)."""
+        x = np.interp(s, self._lengths, np.linspace(0.0, 1.0, len(self._lengths)))
+        for _ in range(8):
+            jet = self.jet(x)
+            step = (s - self._length_to(x)) / np.hypot(jet.dr, jet.dz)
+            x = x + step
+            if np.all(abs(step) < 1e-8):  # the next step is about its square
+                break
+        return self.jet(x)
+
+    @cached_property
+    def _lengths(self) -> Array:
+        """Arc lengths to equally spaced parameters, the start of Newton's method."""
+        return self._length_to(np.linspace(0.0, 1.0, 65))

@@ -209,8 +209,8 @@ class _Nodes:
         rows, columns = np.concatenate([k, k, k + 1, k + 1, k + 2]), np.concatenate([k, k + 1, k, k + 1, k + 2])
         return scipy.sparse.csc_matrix((np.concatenate([c, -s, s, c, one]), (rows, columns)))
 
-    def strains(self, which: Index) -> tuple[Array, Array]:
-        """Strain (elements, points, 6, 81) of elements in x, y, z and volumes (elements, points)."""
+    def slopes(self, which: Index) -> tuple[Array, Array]:
+        """∂φ_f/∂x_i of the functions of elements, (elements, points, 3, 27), and volumes (elements, points)."""
         line, w = at_gauss(nodal, 2, 3), gauss(3)[1]
         parts = [
             np.einsum("ai,bj,ck->abcijk", *(line.slopes if axis == d else line.values for axis in range(3)))
@@ -219,24 +219,19 @@ class _Nodes:
         D = np.stack([part.reshape(27, 27) for part in parts], axis=1)  # points, 3, functions
         X = self.points[self.elements[which]]
         J = np.einsum("pdf,efx->epdx", D, X)
-        g = np.linalg.solve(J, np.broadcast_to(D, (len(X), *D.shape)))
         volume = abs(np.linalg.det(J)) * np.einsum("a,b,c->abc", w, w, w).ravel()
-        B = np.zeros((len(X), 27, 6, 27, 3))
-        for row, (one, two) in enumerate(((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))):
-            B[:, :, row, :, one] += g[:, :, two]
-            if one != two:
-                B[:, :, row, :, two] += g[:, :, one]
-        return B.reshape(len(X), 27, 6, 81), volume
+        return np.linalg.solve(J, np.broadcast_to(D, (len(X), *D.shape))), volume
 
     def stiffness(self, lam: float, G: float) -> "scipy.sparse.csc_matrix":
-        """Of what is left."""
-        D = np.diag([2 * G] * 3 + [G] * 3)
-        D[:3, :3] += lam
-        B, volume = self.strains(np.flatnonzero(~self.gone))
-        size = len(B)
-        left = (np.einsum("ij,epjm->epim", D, B) * volume[:, :, None, None]).reshape(size, 27 * 6, 81)
-        K = np.matmul(np.swapaxes(B.reshape(size, 27 * 6, 81), 1, 2), left)
-        unknowns = (3 * self.elements[~self.gone][:, :, None] + np.arange(3)).reshape(size, 81)
+        """Of what is left, ∫ λ ∂_i φ_f ∂_j φ_g + G (∂_j φ_f ∂_i φ_g + δ_ij ∂_k φ_f ∂_k φ_g) dV between φ_f along i and φ_g along j."""
+        slopes, volume = self.slopes(np.flatnonzero(~self.gone))
+        size = len(slopes)
+        flat = slopes.reshape(size, 27, 81)
+        products = (np.swapaxes(flat * volume[..., None], 1, 2) @ flat).reshape(size, 3, 27, 3, 27)  # i, f, j, g
+        K = lam * products + G * np.swapaxes(products, 1, 3)
+        for i in range(3):
+            K[:, i, :, i] += G * np.einsum("ekfkg->efg", products)
+        unknowns = (3 * self.elements[~self.gone][:, None] + np.arange(3)[:, None]).reshape(size, 81)
         return assemble_elements(unknowns, K, 3 * len(self.points))
 
 
@@ -246,7 +241,7 @@ def _loads(pair: Pair, grid: _Grid, nodes: _Nodes, lam: float, G: float, rho: fl
     values, x = at_gauss(nodal, 2, 3).values, gauss(3)[0]
     functions = np.einsum("ai,bj,ck->abcijk", values, values, values).reshape(27, 27)
     gone = np.flatnonzero(nodes.gone)
-    B, volume = nodes.strains(gone)
+    slopes, volume = nodes.slopes(gone)
     i, j, k = np.unravel_index(gone, grid.gone.shape)
     loads = np.zeros((2, 3 * len(nodes.points)))
 
@@ -277,7 +272,7 @@ def _loads(pair: Pair, grid: _Grid, nodes: _Nodes, lam: float, G: float, rho: fl
                 Q[..., axis, :] = np.stack(vector, axis=-1)
             chosen = slice(9 * station, 9 * station + 9)
             weight = volume[mine, chosen].reshape(-1, 3, 3)
-            N, strain = functions[chosen].reshape(3, 3, 27), B[mine, chosen].reshape(-1, 3, 3, 6, 81)
+            N, slope = functions[chosen].reshape(3, 3, 27), slopes[mine, chosen].reshape(-1, 3, 3, 3, 27)
             for kind, (even, odd) in enumerate(((cosine, sine), (sine, -cosine))):
                 factor = np.where(np.isin(np.arange(6), COSINE), even[..., None], odd[..., None])
                 local = np.moveaxis(stress[:, at], 0, -1)[:, None] * factor
@@ -289,10 +284,8 @@ def _loads(pair: Pair, grid: _Grid, nodes: _Nodes, lam: float, G: float, rho: fl
                 layers[kind] += 2 * float(np.sum(dense * weight))
                 tensor = local[..., [[0, 3, 4], [3, 1, 5], [4, 5, 2]]]
                 turned = np.swapaxes(Q, -1, -2) @ tensor @ Q
-                flat = turned[..., [0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
-                push = np.einsum("etzc,etzcm,etz->em", flat, strain, weight)
                 force = eigenvalue * rho * (moved[..., None, :] @ Q)[..., 0, :]
-                push -= np.einsum("etzx,tzf,etz->efx", force, N, weight).reshape(len(mine), 81)
-                unknowns = (3 * nodes.elements[gone[mine]][:, :, None] + np.arange(3)).reshape(len(mine), 81)
-                np.add.at(loads[kind], unknowns, push)
+                push = np.einsum("etzij,etzjf,etz->efi", turned, slope, weight)
+                push -= np.einsum("etzi,tzf,etz->efi", force, N, weight)
+                np.add.at(loads[kind], 3 * nodes.elements[gone[mine]][:, :, None] + np.arange(3), push)
     return loads, layers, 2 * float(volume.sum())

@@ -28,7 +28,7 @@ from shell.modes import Mode
 from shell.quadrature import Array
 from shell.resonator import Resonator
 from shell.solution import Solution, total
-from shell.system import Inertia, ShellGroup, System
+from shell.system import ElementSum, ShellGroup, System
 
 STEPS = 600  # of the iteration beside vectors that are left out
 DONE = 1e-9
@@ -125,7 +125,7 @@ def settle(system: System, mode: Mode, load: Array) -> Solution:
     return Solution(system, constants, u)
 
 
-def answer_without(vectors: Array, factor: Factor, M: Inertia, load: Array, shift: float) -> Array | None:
+def answer_without(vectors: Array, factor: Factor, M: ElementSum, load: Array, shift: float) -> Array | None:
     """(A - shift M)⁻¹ f of a factor of A, M-orthonormal eigenvectors left out: u = A⁻¹ (f + shift M u), again and again."""
     heavy = M @ vectors
     f = load[:, None]

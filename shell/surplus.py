@@ -157,7 +157,7 @@ def _inner(
     strained: Array, shares: Array, moved: list[Array], answers: list[Array], weight: Array, factor: float
 ) -> Answer:
     """An `Answer` from fields at points; `factor` is what the energies count, √factor the fields."""
-    u, x = (np.stack(fields).reshape(len(fields), *fields[0].shape) for fields in (moved, answers))
+    u, x = np.stack(moved), np.stack(answers)
     heavy = (x * weight[:, :, None]).reshape(len(x), -1)
     return (
         factor * strained,

@@ -1,13 +1,14 @@
 """Elements and their matrices: groups of one kind, and the system of all of them on the free unknowns."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import islice
-from typing import ClassVar, TypeAlias
+from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
 import scipy
+from numpy.typing import NDArray
 
 from shell.blocks import Mesh, Support
 from shell.cells import CellTable, cell_mass, cell_stiffness
@@ -190,7 +191,7 @@ class System:
 
     def operators(
         self, constants: Sequence[Constants], shift: float = 0.0, over: float = 1.0
-    ) -> tuple[list[Array], "Inertia"]:
+    ) -> tuple[list[Array], "ElementSum"]:
         """Stiffness, plus `shift` (1/s²) times mass, of every element, and the mass, `over` a divisor."""
         K: list[Array] = []
         M: list[Array] = []
@@ -198,8 +199,12 @@ class System:
             stiffness, mass = group.integrals(c.lame[0] / over, c.lame[1] / over, c.rho / over, shift)
             K += [at.restrict(one) for at, one in zip(maps, stiffness, strict=True)]
             M.append(mass)
+        return K, self.sum(M)
+
+    def sum(self, blocks: Sequence[NDArray[Any]]) -> "ElementSum":
+        """The sum of the matrices of all elements, given in `blocks` for every group."""
         starts = np.cumsum([group.unknowns.size for group in self.groups[:-1]], dtype=np.intp)
-        return K, Inertia(*self._choice, starts, tuple(M))
+        return ElementSum(*self._choice, starts, tuple(blocks))
 
     @cached_property
     def _choice(self) -> "tuple[scipy.sparse.csr_matrix, scipy.sparse.csr_matrix]":
@@ -244,18 +249,28 @@ class ToFree:
 
 
 @dataclass(frozen=True, eq=False)
-class Inertia:
-    """The mass of all elements: M x = Pᵀ m P x."""
+class ElementSum:
+    """A sum over all elements, such as the mass: M x = Pᵀ m P x."""
 
     choice: "scipy.sparse.csr_matrix"  # P, from the free unknowns to those of the elements
     back: "scipy.sparse.csr_matrix"  # Pᵀ
     starts: Index  # the first rows of P of the second group and on
     # m of the elements of every group, (elements, functions, functions), the same for each component of a solid.
-    blocks: tuple[Array, ...]
+    blocks: tuple[NDArray[Any], ...]
 
-    def __matmul__(self, x: Array) -> Array:
-        """M x for several columns."""
+    def __matmul__(self, x: NDArray[Any]) -> NDArray[Any]:
+        """M x of a vector or of several columns."""
         local = self.choice @ x
         for block, rows in zip(self.blocks, np.split(local, self.starts), strict=True):
             rows[:] = (block @ rows.reshape(*block.shape[:2], -1)).reshape(rows.shape)
         return np.asarray(self.back @ local)
+
+    @property
+    def real(self) -> "ElementSum":
+        """Its real part."""
+        return replace(self, blocks=tuple(block.real for block in self.blocks))
+
+    @property
+    def imag(self) -> "ElementSum":
+        """Its imaginary part."""
+        return replace(self, blocks=tuple(block.imag for block in self.blocks))

@@ -22,7 +22,7 @@ from shell.errors import ShellError
 from shell.kernel import lame
 from shell.quadrature import Array
 from shell.sparse import Index, assemble_elements, factor_symmetric
-from shell.system import ShellGroup, SolidGroup, System
+from shell.system import ElementSum, ShellGroup, SolidGroup, System
 
 Complex = NDArray[np.complex128]
 Mask = NDArray[np.bool_]
@@ -60,59 +60,38 @@ class Radiating:
 
 @dataclass(frozen=True, eq=False)
 class RadiatingBody:
-    """Complex stiffness and mass of the elements of every group of a body and its base, and which of them belong to the base."""
+    """Complex stiffness and mass of a body with its base, and the mass of the body alone."""
 
     system: System
-    stiffness: list[Complex]
-    mass: list[Complex]
-    bases: Sequence[Mask]
+    stiffness: ElementSum
+    mass: ElementSum
+    body: ElementSum
 
     def factor(self, shift: complex) -> Callable[[Complex], Complex]:
         """The solution of (K - shift M) x = b as a function of b."""
-        elements = (one for K, M in zip(self.stiffness, self.mass, strict=True) for one in K - shift * M)
-        maps = self.system.to_free
+        parts = zip(self.stiffness.blocks, self.mass.blocks, strict=True)
+        maps, elements = self.system.to_free, [one for K, M in parts for one in K - shift * M]
         free = [at.restrict(one) for at, one in zip(maps, elements, strict=True)]
         size = self.system.constraint.shape[1]
         return factor_symmetric(assemble_elements([at.free for at in maps], free, size), 1e-3)
 
-    def local(self, v: Complex) -> list[Complex]:
-        """A vector on the unknowns of the elements of every group."""
-        raw = self.system.constraint @ v
-        return [np.asarray(raw[group.unknowns], dtype=complex) for group in self.system.groups]
-
-    def times(self, elements: list[Complex], v: Complex) -> Complex:
-        """The product of the matrix of these elements with a vector."""
-        raw = np.zeros(self.system.constraint.shape[0], dtype=complex)
-        for group, own, x in zip(self.system.groups, elements, self.local(v), strict=True):
-            np.add.at(raw, group.unknowns, (own @ x[..., None])[..., 0])
-        return np.asarray(self.system.constraint.T @ raw)
-
     def judge(self, v: Complex, eigenvalue: complex) -> Radiating:
         """Frequency and loss of an eigenvector."""
-        k_r, k_i, m_r, m_i = np.zeros(4)
-        body = 0.0
-        for K, M, base, x in zip(self.stiffness, self.mass, self.bases, self.local(v), strict=True):
-            forms = (
-                np.real(np.sum(x.conj() * (A @ x[..., None])[..., 0], axis=1)) for A in (K.real, K.imag, M.real, M.imag)
-            )
-            stiff, lossy, heavy, absorbed = forms
-            k_r, k_i, m_r, m_i = k_r + stiff.sum(), k_i + lossy.sum(), m_r + heavy.sum(), m_i + absorbed.sum()
-            body += float(heavy[~base].sum())
-        inverse_q = float((k_i * m_r - k_r * m_i) / (k_r * m_r + k_i * m_i))
-        return Radiating(float(np.sqrt(eigenvalue.real) / (2 * np.pi)), inverse_q, body / float(m_r))
+        K, M = self.stiffness, self.mass
+        k_r, k_i, m_r, m_i, body = (float(np.vdot(v, A @ v).real) for A in (K.real, K.imag, M.real, M.imag, self.body))
+        inverse_q = (k_i * m_r - k_r * m_i) / (k_r * m_r + k_i * m_i)
+        return Radiating(float(np.sqrt(eigenvalue.real) / (2 * np.pi)), inverse_q, body / m_r)
 
 
 def radiating_mode(waves: RadiatingBody, frequency: float) -> Radiating:
     """The mode nearest to a frequency (Hz) that moves the body."""
     shift = complex((2 * np.pi * frequency) ** 2)
-    start = np.random.default_rng(0).standard_normal(waves.system.constraint.shape[1]).astype(complex)
-    body = [np.where(base[:, None, None], 0.0, M) for base, M in zip(waves.bases, waves.mass, strict=True)]
-    v = waves.times(body, start)
+    v = waves.body @ np.random.default_rng(0).standard_normal(waves.system.constraint.shape[1]).astype(complex)
     for _ in range(SHIFTS):
         solve, before = waves.factor(shift), shift
         for _ in range(ITERATIONS):
-            v = solve(waves.times(waves.mass, v / np.max(abs(v))))
-            now = complex((v @ waves.times(waves.stiffness, v)) / (v @ waves.times(waves.mass, v)))
+            v = solve(waves.mass @ (v / np.max(abs(v))))
+            now = complex((v @ (waves.stiffness @ v)) / (v @ (waves.mass @ v)))
             if abs(now - before) < 1e-11 * abs(now):
                 found = waves.judge(v, now)
                 if found.body > 0.5:
@@ -126,7 +105,8 @@ def radiating_mode(waves: RadiatingBody, frequency: float) -> Radiating:
 def assemble_waves(system: System, materials: Sequence[Elastic], bases: Sequence[Mask], layer: Layer) -> RadiatingBody:
     """Stiffness and mass of body and base; `bases` says of every group which of its elements belong to the base."""
     found = [_matrices(one, materials, base, layer, system.n) for one, base in zip(system.groups, bases, strict=True)]
-    return RadiatingBody(system, [K for K, _ in found], [M for _, M in found], bases)
+    body = [np.where(base[:, None, None], 0.0, M) for base, (_, M) in zip(bases, found, strict=True)]
+    return RadiatingBody(system, *(system.sum(blocks) for blocks in (*zip(*found, strict=True), body)))
 
 
 def _matrices(

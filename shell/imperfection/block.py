@@ -18,7 +18,7 @@ from shell.elastic import Constants
 from shell.quadrature import Array
 from shell.resonator import Resonator
 from shell.sparse import Index, assemble_elements, factor_symmetric
-from shell.system import Inertia, ShellGroup, System
+from shell.system import ElementSum, ShellGroup, System
 
 PIVOTING = 0.01  # of matrices that are not definite
 
@@ -34,7 +34,7 @@ class Block:
     lifted: Array
     elements: tuple[tuple[Index, Array], ...]  # (unknowns, matrix) of K - λ M, the condensed solid parts as one element
     around: float  # ∫ cos² kθ dθ
-    mass: Inertia  # of all free unknowns, over `around`
+    mass: ElementSum  # of all free unknowns, over `around`
     kept: Array | None  # M times the pair's vector in the pair's own block
 
     @property

@@ -94,10 +94,8 @@ def answer(task: Task, explorer: Explorer, plan: WorkPlan) -> Answer:
     _refuse_infeasible(search, best)
     centre = search.x[best]
     front = _unbeaten(search, scalar, [*ends, best]) if count > 1 else [best]
-    x = search.x[best]
-    others = search.local(x, WIDE, without=best)(x[: search.task.free])[
-        0
-    ]  # what the interpolant through the others says
+    # what the interpolant through all the other designs says of the best one
+    others = search.local(centre, WIDE, without=best)(centre[: search.task.free])[0]
     foretold = search.goals.uncount(others)
     prices = _prices(search, scalar, smooth)
     values = search.values[best]
