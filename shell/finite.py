@@ -14,13 +14,12 @@ import numpy as np
 
 from shell.cells import ZERO, CellTable, R, Z
 from shell.errors import ShellError
-from shell.kernel import shell_gradients
+from shell.kernel import PAIRS, shell_gradients
 from shell.modes import Mode
 from shell.quadrature import Array, gauss
 from shell.solution import Solution
 from shell.system import Group, ShellGroup, System
 
-PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))  # of the axes, in the order of strains
 AROUND = np.array([[(i == 1) != (k == 1) for k in range(3)] for i in range(3)])  # what varies as sin nθ
 
 
@@ -114,4 +113,4 @@ def _meet(A: Array, B: Array, doubled: bool) -> Array:
 
 def _table(system: System, group: ShellGroup) -> Array:
     through = system.level.through
-    return shell_gradients(group.section, system.n, through, gauss(max(through) + 2))
+    return np.moveaxis(shell_gradients(group.section, system.n, through, gauss(max(through) + 2)[0])[0], (0, 1), (2, 3))

@@ -20,6 +20,7 @@ from shell.quadrature import Array, Basis, legendre
 
 SHEAR_CORRECTION = 5 / 6
 Orders = tuple[int, int, int]
+PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))  # of the axes, in the order of strains
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,35 +70,17 @@ class Section(MiddleSurface):
 
 
 def shell_table(section: Section, n: int, through: Orders, eta: tuple[Array, Array], along: Basis) -> StrainTable:
-    """Strains of a shell of revolution in its own frame, without approximation in z/R.
-
-    With ζ = η h/2, A = 1 + κ ζ and ρ = r + ζ n_r (the radius of the point), subscripts for derivatives:
-
-    ε_s = (u_s + κ w)/A,  ε_θ = (n v + t_r u + n_r w)/ρ,  ε_ζ = w_ζ,
-    γ_sθ = v_s/A - (n u + t_r v)/ρ,  γ_sζ = u_ζ + (w_s - κ u)/A,  γ_θζ = v_ζ - (n w + n_r v)/ρ.
-
-    Where the thickness varies, the derivative at constant ζ is ∂_s - (h'/h) η ∂_η.
+    """Strains of a shell of revolution in its own frame, without approximation in z/R: normal ∂_i u_i, shear ∂_i u_j + ∂_j u_i.
 
     u, w vary as cos nθ, v as sin nθ (for n = 0, v as 1). `section` and the polynomials `along` are at the stations, `eta` are
     thickness points on [-1, 1] with weights, `through` the degrees of the Legendre modes of u, v, w.
     """
     points, weights = eta
-    t_r, kappa, n_r, A, rho = _frame(section, points)
-    (u, v, w), (u_s, v_s, w_s), (u_zeta, v_zeta, w_zeta) = _jets(section, through, points)
-    strain = np.stack(
-        np.broadcast_arrays(
-            (u_s + kappa * w) / A,
-            (n * v + t_r * u + n_r * w) / rho,
-            w_zeta,
-            v_s / A - (n * u + t_r * v) / rho,
-            u_zeta + (w_s - kappa * u) / A,
-            v_zeta - (n * w + n_r * v) / rho,
-        ),
-        axis=2,
-    )
+    H, A_rho = shell_gradients(section, n, through, points)
+    strain = np.stack([H[i, i] if i == j else H[i, j] + H[j, i] for i, j in PAIRS], axis=2)
     share = section.ds * section.thickness / 2 * section.weight
-    volume = (A * rho)[..., 0, 0] * share[..., None] * weights
-    moved = np.stack([f[:, 0] for f in (u, v, w)])
+    volume = A_rho * share[..., None] * weights
+    moved = np.stack([f[:, 0] for f in _jets(section, through, points)[0]])
     displacement = np.broadcast_to(moved, (*section.r.shape, *moved.shape))
     naghdi = through[2] == 0
     return StrainTable(
@@ -111,22 +94,25 @@ def shell_table(section: Section, n: int, through: Orders, eta: tuple[Array, Arr
     )
 
 
-def shell_gradients(section: Section, n: int, through: Orders, eta: tuple[Array, Array]) -> Array:
-    """All derivatives of the displacements that `shell_table` has the strains of, for geometric stiffness.
+def shell_gradients(section: Section, n: int, through: Orders, points: Array) -> tuple[Array, Array]:
+    """Rows ∂_s, ∂_θ, ∂_ζ of u, v, w at heights η, (3, 3, elements, stations, points, 2, amplitudes), and A ρ there.
 
-    Rows ∂_s, ∂_θ, ∂_ζ of u, v, w in the shell's own frame, (elements, stations, 3, 3, points, 2, amplitudes):
+    With ζ = η h/2, A = 1 + κ ζ and ρ = r + ζ n_r (the radius of the point), subscripts for derivatives:
 
     (u_s + κ w)/A, v_s/A, (w_s - κ u)/A;  -(n u + t_r v)/ρ, (n v + t_r u + n_r w)/ρ, -(n w + n_r v)/ρ;  u_ζ, v_ζ, w_ζ.
+
+    Where the thickness varies, the derivative at constant ζ is ∂_s - (h'/h) η ∂_η.
     """
-    t_r, kappa, n_r, A, rho = _frame(section, eta[0])
-    (u, v, w), (u_s, v_s, w_s), by_zeta = _jets(section, through, eta[0])
-    rows = (
-        ((u_s + kappa * w) / A, v_s / A, (w_s - kappa * u) / A),
-        (-(n * u + t_r * v) / rho, (n * v + t_r * u + n_r * w) / rho, -(n * w + n_r * v) / rho),
-        by_zeta,
-    )
-    flat = np.stack(np.broadcast_arrays(*(one for row in rows for one in row)), axis=2)
-    return np.asarray(flat.reshape(*flat.shape[:2], 3, 3, *flat.shape[3:]))
+    t_r, kappa, n_r = _tall(section.tangent_r), _tall(section.curvature), _tall(section.normal_r)
+    zeta = _tall(section.thickness) * points[:, None, None] / 2
+    A, rho = 1 + kappa * zeta, _tall(section.r) + n_r * zeta
+    (u, v, w), (u_s, v_s, w_s), by_zeta = _jets(section, through, points)
+    found = np.empty((3, 3, *section.r.shape, *u.shape))
+    found[0] = (u_s + kappa * w) / A, v_s / A, (w_s - kappa * u) / A
+    found[1] = -(n * u + t_r * v) / rho, (n * v + t_r * u + n_r * w) / rho, -(n * w + n_r * v) / rho
+    for row, one in zip(found[2], by_zeta, strict=True):
+        row[:] = one
+    return found, (A * rho)[..., 0, 0]
 
 
 def lame(E: Array, nu: Array, plane_stress: bool) -> tuple[Array, Array]:
@@ -188,13 +174,6 @@ def integrate_mass(stations: Array, along: Array) -> Array:
 def _tall(per_station: Array) -> NDArray[np.float64]:
     """Give an array (elements, stations) the axes point, jet and amplitude."""
     return per_station[..., None, None, None]
-
-
-def _frame(section: Section, points: Array) -> tuple[Array, Array, Array, Array, Array]:
-    """t_r, κ, n_r of the middle surface, and A = 1 + κ ζ and ρ = r + ζ n_r at heights η."""
-    t_r, kappa, n_r = _tall(section.tangent_r), _tall(section.curvature), _tall(section.normal_r)
-    zeta = _tall(section.thickness) * points[:, None, None] / 2
-    return t_r, kappa, n_r, 1 + kappa * zeta, _tall(section.r) + n_r * zeta
 
 
 def _jets(section: Section, through: Orders, points: Array) -> tuple[list[Array], list[Array], list[Array]]:
