@@ -19,6 +19,7 @@ from shell.errors import ShellError
 from shell.scene import Scene
 
 REMEDY = "no OpenGL on this machine, so no picture could be drawn. On Debian or Ubuntu 'apt install libegl1 libgl1-mesa-dri' installs a software renderer."
+PERIOD = 1.2  # s, of a swing
 PER_FRAME = 15.0  # seconds that one frame may take before the drawing is given up
 
 View = Literal["oblique", "axis", "side"]
@@ -35,22 +36,20 @@ def render_png(scenes: Scene | Sequence[Scene], view: View = "oblique", width: i
 
 
 def render_animation(
-    scenes: Scene | Sequence[Scene], kind: Literal["webp", "gif"], view: View = "oblique", width: int = 640,
-    height: int = 520, frames: int = 24, period: float = 1.2, progress: Callable[[float], None] = lambda part: None,
+    scenes: Scene | Sequence[Scene], kind: Literal["webp", "gif"], view: View = "oblique", frames: int = 24,
+    progress: Callable[[float], None] = lambda part: None,
 ) -> bytes:  # fmt: skip
-    """Return a looping WebP or GIF of one period of the swing, which lasts `period` seconds; `progress` is told which part is drawn."""
+    """Return a looping WebP or GIF of one period of the swing; `progress` is told which part is drawn."""
     from PIL import Image
 
     swings = [float(np.cos(2 * pi * k / frames)) for k in range(frames // 2 + 1)]  # and back again
-    pictures = _draw(scenes, view, (width, height), swings, progress)
+    pictures = _draw(scenes, view, (640, 520), swings, progress)
     drawn = [Image.open(io.BytesIO(png)).convert("RGB") for png in pictures]
     drawn += drawn[frames - len(drawn) : 0 : -1]
     buffer = io.BytesIO()
     more: dict[str, Any] = {"quality": 80, "method": 4} if kind == "webp" else {"optimize": True}
-    drawn[0].save(
-        buffer, kind.upper(), save_all=True, append_images=drawn[1:], duration=round(1000 * period / frames),
-        loop=0, **more,
-    )  # fmt: skip
+    duration = round(1000 * PERIOD / frames)
+    drawn[0].save(buffer, kind.upper(), save_all=True, append_images=drawn[1:], duration=duration, loop=0, **more)
     return buffer.getvalue()
 
 

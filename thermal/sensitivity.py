@@ -57,7 +57,7 @@ def no_change(
     return NetworkChange(zero, zero, np.zeros_like, np.zeros(n), boundaries or {}, initial)
 
 
-def difference(above: Network, below: Network, step: float, time: float = 0.0) -> NetworkChange:
+def difference(above: Network, below: Network, step: float) -> NetworkChange:
     """Change from two networks of the same nodes built half a `step` above and below a value."""
 
     def capacity(temperature: Array) -> Array:
@@ -67,7 +67,7 @@ def difference(above: Network, below: Network, step: float, time: float = 0.0) -
         (above.conduction - below.conduction) / step,
         (above.radiation - below.radiation) / step,
         capacity,
-        (above.power(time) - below.power(time)) / step,
+        (above.power(0.0) - below.power(0.0)) / step,
     )
 
 

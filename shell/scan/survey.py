@@ -140,10 +140,7 @@ def fewest_points(highest: int) -> int:
     return (2 * highest + 1) * (DEGREE + 1)
 
 
-def survey(
-    points: Array, side: int, motion: RigidMotion, projector: Projector, name: str, highest: int = 12,
-    degree: int = DEGREE,
-) -> Face:  # fmt: skip
+def survey(points: Array, side: int, motion: RigidMotion, projector: Projector, name: str, highest: int = 12) -> Face:
     """The waves of the face at the height η = `side` from its points (count, 3), m, in their own frame."""
 
     def place(some: Array) -> Points:
@@ -157,21 +154,19 @@ def survey(
     low, high = max(low, 0.0), min(high, 1.0)
     if len(off) < 500 or not high - low > 0.05:
         raise ShellError(f"{name}: {len(off)} points on the face are too few to fit harmonics.")
-    waves = WaveBasis(low, high, highest, degree)
+    waves = WaveBasis(low, high, highest, DEGREE)
     dome = projector.resonator.segments[0]
     alone = len(projector.resonator.segments) == 1 and isinstance(dome, Arc) and not (motion.told[3] and motion.told[4])
     turning = (dome.first_angle, dome.last_angle) if alone and isinstance(dome, Arc) else None
     return _fit(waves, (x, theta, off), points, place, motion, name, turning)
 
 
-def survey_map(
-    position: Array, azimuth: Array, values: Array, name: str, highest: int = 12, degree: int = DEGREE
-) -> Face:
+def survey_map(position: Array, azimuth: Array, values: Array, name: str, highest: int = 12) -> Face:
     """The waves of a face from a table (positions, azimuths) of how far it stands out of the material, m; NaN for gaps."""
     low, high = float(position.min()), float(position.max())
     if high == low:
         low, high = low - 1e-6, high + 1e-6
-    waves = WaveBasis(low, high, min(highest, (len(azimuth) - 1) // 2), min(degree, max(len(position) - 2, 0)))
+    waves = WaveBasis(low, high, min(highest, (len(azimuth) - 1) // 2), min(DEGREE, max(len(position) - 2, 0)))
 
     def place(cells: NDArray[np.intp]) -> Points:
         return position[cells // len(azimuth)], azimuth[cells % len(azimuth)], values.ravel()[cells]
