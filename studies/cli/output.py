@@ -18,6 +18,7 @@ from shell.errors import ShellError
 from studies.errors import InputError
 from studies.files.given import printable
 from studies.files.paths import guarded
+from studies.files.writing import write_text
 from studies.instrument.card import SCHEMA, Instrument, load_card, save_card
 from studies.progress import Stages
 from studies.results import Result, Sentence
@@ -62,7 +63,6 @@ def answers(
                     parts = [*result.parts, *(Sentence(text, "note") for text in caveats)]
                     result = replace(result, payload=result.payload | {"caveats": caveats}, parts=parts)
                 if report is not None:
-                    from studies.files.writing import write_text
                     from studies.results.page import render_result
 
                     with Stages("the page"):

@@ -2,6 +2,7 @@
 
 import tempfile
 import weakref
+from bisect import bisect_left, bisect_right
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -55,11 +56,8 @@ class Stored:
 
     def find(self, value: float, right: bool = False) -> int:
         """Place of a value in a column that increases: rows before it, or (`right`) up to it."""
-        low, high = 0, self._rows
-        while high - low > PORTION:
-            middle = (low + high) // 2
-            low, high = (middle, high) if self.at(middle) < value else (low, middle + 1)
-        return low + int(np.searchsorted(self[low:high], value, "right" if right else "left"))
+        search = bisect_right if right else bisect_left
+        return search(range(self._rows), value, key=self.at)
 
 
 def portions(count: int) -> Iterator[slice]:

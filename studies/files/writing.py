@@ -9,6 +9,7 @@ import tempfile
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from secrets import token_hex
 from typing import IO
 
 from studies.errors import InputError
@@ -30,9 +31,9 @@ def written_whole(path: str | Path) -> Iterator[IO[bytes]]:
         special = target.exists() and not target.is_file()
         if not target.parent.is_dir():
             raise InputError(f"{path}: cannot be written: there is no folder '{target.parent}'; create it.")
-        handle, name = tempfile.mkstemp(prefix=".hrg-", dir=None if special else target.parent)
-        temporary = Path(name)
-        with os.fdopen(handle, "wb") as file:
+        folder = Path(tempfile.gettempdir()) if special else target.parent
+        with (folder / f".hrg-{token_hex(8)}").open("xb") as file:
+            temporary = Path(file.name)
             yield file
             file.flush()
             os.fsync(file.fileno())
@@ -40,7 +41,6 @@ def written_whole(path: str | Path) -> Iterator[IO[bytes]]:
             with temporary.open("rb") as whole, target.open("wb") as outlet:
                 shutil.copyfileobj(whole, outlet)
             return
-        temporary.chmod(0o666 & ~_umask())
         os.replace(temporary, target)
     except InputError:
         raise
@@ -122,9 +122,3 @@ def _spell_fast(file: IO[bytes], columns: Table) -> None:
     arrow, csv = importlib.import_module("pyarrow"), importlib.import_module("pyarrow.csv")
     table = arrow.table({name: arrow.array(values, from_pandas=True) for name, values in columns.items()})
     csv.write_csv(table, file, csv.WriteOptions(include_header=False))
-
-
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask

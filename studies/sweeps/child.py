@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from studies.errors import InputError
+from studies.instrument.card import build_instrument
 from studies.sweeps.case import Case
 
 MOST_MEMORY = 8 * 1024**3  # bytes of address space of the process
@@ -146,7 +147,6 @@ def check_function(function: str) -> str:
 
 def serve() -> None:
     """Answer requests until the parent closes the pipe (runs in the child process)."""
-    from studies.instrument.card import build_instrument
     from studies.sweeps.workers import die_with_parent
 
     function, parent, place = sys.argv[1:4]
@@ -164,7 +164,7 @@ def serve() -> None:
         pipe.send_bytes(json.dumps(greeting).encode())
         while "source" in greeting:
             asked = json.loads(pipe.recv_bytes())
-            pipe.send_bytes(json.dumps(_answer(function, call, build_instrument, asked)).encode())
+            pipe.send_bytes(json.dumps(_answer(function, call, asked)).encode())
 
 
 def _load(function: str) -> Any:
@@ -194,10 +194,10 @@ def _hash_source(call: Any) -> str:
     return blake2b(content, digest_size=16).hexdigest()
 
 
-def _answer(function: str, call: Any, build: Any, request: dict[str, Any]) -> dict[str, Any]:
+def _answer(function: str, call: Any, request: dict[str, Any]) -> dict[str, Any]:
     parameters = request.pop("parameters")
     try:
-        value = call(build(**request), parameters)
+        value = call(build_instrument(**request), parameters)
         if isinstance(value, bool) or not hasattr(value, "__float__"):
             return {"problem": f"{function} returned {value!r:.80}, not a number."}
         value = float(value)

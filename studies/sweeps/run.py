@@ -1,6 +1,7 @@
 """Run a study from spec to store: check, resume, compute, search."""
 
 import json
+import resource
 import time
 import warnings
 from collections.abc import Mapping
@@ -101,8 +102,6 @@ class Effort:
 
 def estimate_study(study: Study, workers: int | None = None) -> Effort:
     """Evaluate the nominal design here, keep nothing, and say what the whole study would take on these workers."""
-    import resource
-
     began = time.perf_counter()
     design = draw(study)
     families = choose_solver(study, design)
