@@ -33,25 +33,17 @@ class JudgedQuantity:
 
     @property
     def verdict(self) -> Verdict:
-        """Pass or fail where the whole interval does."""
+        """Pass or fail where all sizes of the value within its interval do."""
         if self.measured is None:
             return "missing"
         if self.limit is None:
             return "no limit"
-        low, high = self.sizes
+        value, *ends = self.measured.value, self.measured.low, self.measured.high
+        low, high = (value if end is None else end for end in ends)
+        least, most = 0.0 if low <= 0 <= high else min(abs(low), abs(high)), max(abs(low), abs(high))
         if self.quantity.upper:
-            return "pass" if high <= self.limit else "fail" if low > self.limit else "undecided"
-        return "pass" if low >= self.limit else "fail" if high < self.limit else "undecided"
-
-    @property
-    def sizes(self) -> tuple[float, float]:
-        """Smallest and largest size of the value within its interval."""
-        assert self.measured is not None
-        value = self.measured.value
-        low = self.measured.low if self.measured.low is not None else value
-        high = self.measured.high if self.measured.high is not None else value
-        smallest = 0.0 if low <= 0 <= high else min(abs(low), abs(high))
-        return smallest, max(abs(low), abs(high))
+            return "pass" if most <= self.limit else "fail" if least > self.limit else "undecided"
+        return "pass" if least >= self.limit else "fail" if most < self.limit else "undecided"
 
 
 @dataclass(frozen=True)

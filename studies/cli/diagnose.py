@@ -91,8 +91,7 @@ def _campaign(runs: tuple[str, ...], card: str | None, limits: Chamber | None, s
 
     instrument, records = None if card is None else load_card(card), [read_record(run) for run in runs]
     with Told("diagnosis", STAGES) as told:
-        ask = workbench.diagnose_records
-        found = ask(records, instrument, limits, told)
+        found = workbench.diagnose_records(records, instrument, limits, told)
         extended = extend(found, told) if save is not None and isinstance(found, Inference) else None
     saved = save
     if extended is not None:

@@ -13,7 +13,7 @@ from studies.errors import InputError, naming
 from studies.fits.cross_damping import CrossDampingStudy, study_cross_damping
 from studies.models import source_of
 from studies.models.kinds.cross_damping import OUTPUTS, save_cross_damping
-from studies.papers.cvg_cross_damping import SOURCES, draw_runs
+from studies.papers.cvg_cross_damping import RUNS, SOURCES, draw_runs
 from studies.record import Record, read_record
 from studies.record.one_gyro import records_of_one_gyro
 from studies.record.rest import RestData, gather_rest
@@ -93,8 +93,7 @@ def fit_cross_damping(
             ]),
             None if study.is_useful else Sentence(USELESS, "warning"), left, averaged,
             Chapter("Output before and after", [
-                Figure(lambda: draw_runs(study.runs, study.model, OUTPUTS[gathered.output], unit),
-                    "Temperature, and zero-rate output before and after compensation, 100 s averages."),
+                Figure(lambda: draw_runs(study.runs, study.model, OUTPUTS[gathered.output], unit), RUNS),
                 Table("Zero-rate output", changes,
                     f"label: Data | before: Before ({unit}) | after: After ({unit}) | improvement: Improvement .2f", HELD_OUT),
             ]),

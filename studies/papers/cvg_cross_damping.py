@@ -113,6 +113,7 @@ def count_bias_of_printed_values() -> float:
     return float(2 * np.pi * FREQUENCY * read_shape()[0])
 
 
+RUNS = "Temperature, and zero-rate output before and after compensation, 100 s averages."
 SOURCES = ("Apostolyuk V., Chikovani V., Temperature error model in Coriolis vibratory gyroscopes: eqs. (1)–(10).",)
 
 
@@ -133,9 +134,8 @@ def twin_chapters(twin: CrossDampingTwin) -> list[Chapter]:
         f" {count_bias_of_printed_values():.0f} rad/s at {FREQUENCY:g} Hz. The filter (9) itself changes the"
         f" correction by at most {twin.study.memory / unit:.2g} °/h: its time constant is less than a second, while the temperature changes over minutes."
     )
-    caption = "Temperature, and zero-rate output before and after compensation, 100 s averages."
     runs = (*twin.study.runs, twin.second)
-    picture = Figure(lambda: draw_runs(runs, twin.study.model, unit, "°/h"), caption, "Runs over time.")
+    picture = Figure(lambda: draw_runs(runs, twin.study.model, unit, "°/h"), RUNS, "Runs over time.")
     title = "CVG figures 1 and 2: cross-damping compensation"
     return [Chapter(title, [told, picture, _determinants_table(twin), Sentence(shape, "note")])]
 

@@ -79,7 +79,8 @@ class SettlingStudy:
 
 def study_settling(instrument: Instrument, hours: tuple[float, ...] = (4.0, 4.5, 5.0)) -> SettlingStudy:
     """Compute Figure 3 and the soak errors of Table 1 in the radiative and the linear network."""
-    law = _law(instrument)
+    low, high = POINTS_degC[[0, -1]] + zero_Celsius
+    law = law_of(instrument, low - 5, high + 5)
     weights = cell_weights(instrument, law)
     whole = [build_network(instrument, radiation=radiation) for radiation in (True, False)]
     networks = dict(zip(NETWORKS, (*whole, build_shell_and_stem(instrument)), strict=True))
@@ -91,8 +92,7 @@ def study_settling(instrument: Instrument, hours: tuple[float, ...] = (4.0, 4.5,
         for name in NETWORKS[:2]
     ]
     T, f = printed_table1()
-    settled = law.frequency(POINTS_degC + zero_Celsius)
-    own = _slope_and_curvature(POINTS_degC, settled)
+    own = _slope_and_curvature(POINTS_degC, law.frequency(POINTS_degC + zero_Celsius))
     return SettlingStudy(tuple(curves), tuple(soaks), *_slope_and_curvature(T, f), *own)
 
 
@@ -131,11 +131,6 @@ def _slope_and_curvature(T: Array, f: Array) -> tuple[float, float]:
     """Slope at 20 °C (ppm/°C) and curvature (ppm/°C²) of a quadratic through ln f."""
     c = np.polynomial.Polynomial.fit(T - 20.0, np.log(f), 2).convert().coef
     return float(1e6 * c[1]), float(2e6 * c[2])
-
-
-def _law(instrument: Instrument) -> FrequencyLaw:
-    low, high = POINTS_degC[[0, -1]] + zero_Celsius
-    return law_of(instrument, low - 5, high + 5)
 
 
 COLOURS = {"radiative": (style.BLUE, "-"), "linear": (style.ORANGE, "--"), "shell and stem alone": (style.GREEN, ":")}

@@ -1,12 +1,11 @@
 """Parts of the page of a bias calibration: selection of terms, coefficients with both errors, improvement, Allan deviation."""
 
 import math
-from typing import Literal
 
 import numpy as np
 
 from compensation.bias import POWERS, SELECTED_BY_THE_PAPER, TERMS, Variable
-from compensation.bias_selection import AVERAGING
+from compensation.bias_selection import AVERAGING, Method
 from compensation.memory import Memory
 from compensation.noise import FLAT
 from studies.fits.bias import BiasStudy, Judged
@@ -31,7 +30,6 @@ MOST_RUNS = 12  # that are drawn
 FEW = 40  # averages: four to each of nine terms and a constant
 MEMORY = {"lag": ("Lag behind the thermometer", "s"), "play": ("Half-width of the hysteresis", "K")}
 METHOD = {"guarded": "guarded", "paper": "as in the paper"}
-Method = Literal["guarded", "paper"]
 PATH_NOTE = (
     "The paper's selection treats all averages as independent. Drift and flicker noise correlate neighbouring averages, so this"
     " selection finds terms in pure noise. The guarded selection estimates the correlation time of the noise and divides the"

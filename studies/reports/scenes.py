@@ -117,13 +117,6 @@ def show_mode(
     surface = build_surface(resonator, mode)
     if harmonic < 1 or not instrument.is_imperfect:
         return ModeScene(instrument, T, resonator, mode, surface)
-    return _show_split(instrument, T, resonator, mode, surface, exaggerated)
-
-
-def _show_split(
-    instrument: Instrument, T: float, resonator: Resonator, mode: "Mode", surface: Surface, exaggerated: bool
-) -> ModeScene:
-    """The slower mode of the pair on its own axis, the shell with its departures exaggerated."""
     from shell.imperfection.surface import depart_surface, turn_surface
     from studies.resonator.splitting import SplitPair
 

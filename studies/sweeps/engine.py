@@ -49,13 +49,9 @@ def missing_batches(study: Study, designs: Array, store: Store, vectorised: bool
     lacking = np.ones(count, dtype=bool)
     lacking[: len(done)] = ~done[:count]
     places = np.flatnonzero(lacking)
-    parts = np.split(places, np.searchsorted(places, range(0, count, batch_size(study, vectorised))))
+    size = study.sampling.batch or (BATCH_VECTORISED if vectorised else BATCH)
+    parts = np.split(places, np.searchsorted(places, range(0, count, size)))
     return Batches(designs, deque(part for part in parts if len(part)))
-
-
-def batch_size(study: Study, vectorised: bool) -> int:
-    """Return the number of cases that are computed and kept together."""
-    return study.sampling.batch or (BATCH_VECTORISED if vectorised else BATCH)
 
 
 def hire(workers: int | None, scheduler: str | None = None) -> Workers:

@@ -157,7 +157,7 @@ class Results(Shown):
         """The columns of the table."""
         return [*self.units, "status", "remark"]
 
-    def table(self) -> "pd.DataFrame":
+    def to_frame(self) -> "pd.DataFrame":
         """Return all cases as one table; `attrs["units"]` by column."""
         import pandas as pd
 
@@ -165,6 +165,8 @@ class Results(Shown):
         table = pd.concat(frames, ignore_index=True)
         table.attrs = {"study": self.study.name, "units": self.units}
         return table
+
+    table = to_frame
 
     @property
     def judged(self) -> list[bool]:
@@ -178,10 +180,6 @@ class Results(Shown):
         for column, judged in zip(self.study.columns, self.judged, strict=True):
             units |= dict.fromkeys([column.name, *([f"{column.name}_error"] if judged else [])], column.unit)
         return units
-
-    def to_frame(self) -> "pd.DataFrame":
-        """Return `table()`, by the name that every result has."""
-        return self.table()
 
     def __repr__(self) -> str:
         return f"Results({self.study.name}: {self.done} of {self.total} cases, {len(self.failed)} failed)"

@@ -6,8 +6,7 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
-from types import TracebackType
-from typing import IO, Any, NamedTuple, Self
+from typing import IO, Any, NamedTuple
 from weakref import finalize
 
 import numpy as np
@@ -33,7 +32,7 @@ class Stretch(NamedTuple):
 
 
 class Store:
-    """An open store; a context manager that closes it and frees its lock. One that is forgotten is closed too."""
+    """An open store; one that is forgotten is closed too."""
 
     def __init__(self, file: IO[bytes], path: Path, lock: IO[str] | None = None) -> None:
         self.file, self.path = SealedFile(file), path
@@ -51,14 +50,6 @@ class Store:
         self._searched: dict[bytes, Row] = {}
         for block in self.file.scan():
             self._take(block.kind, block.at, block.content)
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     def close(self) -> None:
         """Close the file and free the lock."""

@@ -3,6 +3,7 @@
 import errno
 import io
 import warnings
+from contextlib import closing
 
 import numpy as np
 import pytest
@@ -58,7 +59,7 @@ def content_of(store):
 
 
 def make(folder, total, size):
-    with claim_store(folder) as store:
+    with closing(claim_store(folder)) as store:
         begin(store)
         assert fill(store, total, size) == total
         store.end_run("finished")
@@ -69,18 +70,18 @@ def check_damage(folder, damaged, total, size, whole):
     """A reader refuses or has less, never other cases; one run mends it for good, computing only what is lacking."""
     (folder / FILE).write_bytes(damaged)
     try:
-        with open_store(folder) as store:
+        with closing(open_store(folder)) as store:
             assert store.done.sum() < total or content_of(store) == whole
     except InputError as error:
         refused = str(error)
     else:
         refused = ""
-    with warnings.catch_warnings(record=True, action="always") as said, claim_store(folder) as store:
+    with warnings.catch_warnings(record=True, action="always") as said, closing(claim_store(folder)) as store:
         lacking = total - int(store.done.sum())
         begin(store)
         fill(store, total, size)
     assert ["computed again" in str(one.message) for one in said] == ["damaged" in refused] * bool(refused)
-    with open_store(folder) as store:
+    with closing(open_store(folder)) as store:
         assert content_of(store) == whole
         assert store.counts() == {"ok": total - len(whole[1]), "failed": len(whole[1])}
     return lacking
@@ -122,12 +123,12 @@ def test_a_write_that_was_torn_at_any_byte_is_no_damage(tmp_path):
     file, whole = make(tmp_path, 24, 8)
     for end in range(0, len(file), 5):
         (tmp_path / FILE).write_bytes(file[:end])
-        with open_store(tmp_path) as store:
+        with closing(open_store(tmp_path)) as store:
             assert not store.file.damaged
-        with claim_store(tmp_path) as store:
+        with closing(claim_store(tmp_path)) as store:
             begin(store)
             fill(store, 24, 8)
-        with open_store(tmp_path) as store:
+        with closing(open_store(tmp_path)) as store:
             assert content_of(store) == whole
 
 
@@ -167,7 +168,7 @@ def test_what_a_study_is_may_be_damaged_but_no_other_study_follows(tmp_path):
     (tmp_path / FILE).write_bytes(file[:place] + b"X" + file[place + 1 :])
     with pytest.warns(UserWarning, match="damaged"):
         claimed = claim_store(tmp_path)
-    with claimed as store:
+    with closing(claimed) as store:
         with pytest.raises(InputError, match="a study that differs"):
             store.check_same({"base": "b", "design": "another"})
         begin(store)
@@ -175,14 +176,14 @@ def test_what_a_study_is_may_be_damaged_but_no_other_study_follows(tmp_path):
 
 
 def test_of_a_case_computed_twice_the_later_counts(tmp_path):
-    with claim_store(tmp_path) as store:
+    with closing(claim_store(tmp_path)) as store:
         begin(store)
         fill(store, 24, 8)
         store.forget("failed")
         assert store.counts() == {"ok": 21}
         values = np.array([[1.0, 2.0]])
         store.add(Cases(Batch(np.array([10]), np.array([[3.0, 9.0]])), values, values, 0.1))
-    with open_store(tmp_path) as store:
+    with closing(open_store(tmp_path)) as store:
         assert store.counts() == {"ok": 22, "failed": 2}
         places, columns = (np.concatenate(parts, axis=-1) for parts in zip(*store.read([3, 4]), strict=True))
         assert places.tolist() == list(range(24))
@@ -195,7 +196,7 @@ def test_a_store_that_may_only_be_read_is_read_whatever_a_kill_has_left(tmp_path
     (tmp_path / FILE).chmod(0o444)
     tmp_path.chmod(0o555)
     try:
-        with open_store(tmp_path) as store:
+        with closing(open_store(tmp_path)) as store:
             assert store.done[:24].all()
     finally:
         tmp_path.chmod(0o755)
