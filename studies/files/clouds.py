@@ -32,13 +32,17 @@ def read_cloud(path: str | Path, unit: Unit = "mm") -> Array | FaceGrid:
     """Points (count, 3) in m from text with x, y, z, or a table: `position,0,5,10,…` (°), then a position 0 … 1 and departures in µm."""
     file = check_file(path)
     if file.suffix.lower() in MESHES:
-        return _read_mesh(file) * UNITS[unit]
-    first, skipped = _first_line(file)
-    if first.lower().startswith(GRID):
-        return _read_grid(file, skipped)
-    if not any(sign.isdigit() for sign in first):  # names of the columns
-        first, skipped = _first_line(file, skipped + 1)
-    return _read_text(file, first, skipped) * UNITS[unit]
+        points = _read_mesh(file)
+    else:
+        first, skipped = _first_line(file)
+        if first.lower().startswith(GRID):
+            return _read_grid(file, skipped)
+        if not any(sign.isdigit() for sign in first):  # names of the columns
+            first, skipped = _first_line(file, skipped + 1)
+        points = _read_text(file, first, skipped)
+    if not len(points):
+        raise InputError(f"{path}: has no points.")
+    return points * UNITS[unit]
 
 
 def _first_line(path: Path, begin: int = 0) -> tuple[str, int]:
@@ -66,10 +70,7 @@ def _read_text(path: Path, first: str, skipped: int) -> Array:
             kept.append(values[np.isfinite(values).all(axis=1)])
     except (ValueError, pd.errors.ParserError):
         raise InputError(f"{path}: is not a table of x y z: below the names of its columns each line needs three numbers; comments start with #.") from None  # fmt: skip
-    points = np.concatenate(kept)
-    if not len(points):
-        raise InputError(f"{path}: has no points.")
-    return np.asarray(points)
+    return np.concatenate(kept)
 
 
 def _read_mesh(path: Path) -> Array:
@@ -82,8 +83,6 @@ def _read_mesh(path: Path) -> Array:
     except Exception as error:
         raise InputError(f"{path}: is not a {path.suffix[1:].upper()} file, or is damaged; export it again, or give x y z text.") from error  # fmt: skip
     points = points[np.isfinite(points).all(axis=1)] if points.ndim == 2 else points[:0]
-    if not len(points):
-        raise InputError(f"{path}: has no points.")
     if path.suffix.lower() == ".stl":
         points = np.unique(points, axis=0)  # each corner stands there once per triangle
     return points

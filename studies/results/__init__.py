@@ -45,23 +45,18 @@ class Column:
 
     def write(self, row: Any) -> str:
         """Return the cell of a row: here a number becomes text; what is exact has no interval."""
-        if self.interval is not None and len({find(row, key) for key in self.interval}) == 1:
+        value, error = find(row, self.key), find(row, self.error) if self.error else None
+        ends = [find(row, key) for key in self.interval or self.within or ()]
+        if self.interval and ends[0] == ends[1]:
             return ""
-        ends = self.within or (self.interval if not self.digits else None)
-        if ends is not None:
-            keys = (self.key if self.within else ends[0], *ends)
-            if all(isinstance(find(row, key), float | int) for key in keys):
-                value, low, high = to_interval(*(float(find(row, key)) * self.scale for key in keys))
-                return value if self.within else f"{low} … {high}"
-        if self.interval is not None:
-            error = find(row, self.error) if self.error else None
-            low, high = (
-                to_error(end * self.scale, error * self.scale)[0] if error else self._number(end)
-                for end in (find(row, key) for key in self.interval)
-            )
+        if ends and (self.within or not self.digits):
+            numbers = [value if self.within else ends[0], *ends]
+            if all(isinstance(one, float | int) for one in numbers):
+                shown, low, high = to_interval(*(float(one) * self.scale for one in numbers))
+                return shown if self.within else f"{low} … {high}"
+        if self.interval:
+            low, high = (to_error(x * self.scale, error * self.scale)[0] if error else self._number(x) for x in ends)
             return f"{low} … {high}" if low else ""
-        value = find(row, self.key)
-        error = find(row, self.error) if self.error else None
         if error and isfinite(error) and isinstance(value, float | int):
             return " ± ".join(to_error(value * self.scale, error * self.scale))
         return self._number(value)
