@@ -118,33 +118,26 @@ def _command_line(words: Sequence[str]) -> "App":
 
 def _judge(error: Exception, words: Sequence[str]) -> tuple[str, int]:
     """Return the sentence that a user reads of an error, and the exit status."""
-    from cyclopts import (
-        CoercionError,
-        CycloptsError,
-        MissingArgumentError,
-        UnknownCommandError,
-        UnusedCliTokensError,
-        ValidationError,
-    )
+    import cyclopts
 
     from studies.errors import UNUSABLE_INPUT, MissingEnvironment, nearest
     from studies.files.lines import point_out
 
     match error:
-        case UnusedCliTokensError():
+        case cyclopts.UnusedCliTokensError():
             return _say_unused(error.unused_tokens or [], words), 2
-        case UnknownCommandError():  # its own words would load every command
+        case cyclopts.UnknownCommandError():  # its own words would load every command
             word = " ".join([*words[:1], *(error.unused_tokens or [])[:1]] if words[0] in GROUPS else words[:1])
             return f"unknown command '{word}'{nearest(word, (*COMMANDS, *GROUPS))}", 2
-        case MissingArgumentError() if error.argument is not None and not error.tokens_so_far:
+        case cyclopts.MissingArgumentError() if error.argument is not None and not error.tokens_so_far:
             lacking = f"{error.keyword}: its value" if error.keyword else _spell(error.argument)
             return f"{lacking} is missing. {_see(words)}", 2
-        case CoercionError() if error.token is not None and error.target_type in KINDS:
+        case cyclopts.CoercionError() if error.token is not None and error.target_type in KINDS:
             given = f"{error.token.keyword or _spell(error.argument)} {error.token.value}"
             return f"{given}: give {KINDS[error.target_type]}. {_see(words)}", 2
-        case ValidationError() if error.argument is not None and isinstance(error.__cause__, UNUSABLE_INPUT):
+        case cyclopts.ValidationError() if error.argument is not None and isinstance(error.__cause__, UNUSABLE_INPUT):
             return f"{_spell(error.argument)} {error.__cause__}", 2
-        case CycloptsError():
+        case cyclopts.CycloptsError():
             return f"{' '.join(str(error).split())} {_see(words)}", 2
         case _ if isinstance(error, UNUSABLE_INPUT):
             return point_out(str(error)), 2

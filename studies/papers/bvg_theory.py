@@ -7,12 +7,7 @@ import numpy as np
 from compensation.loop import BellResonator, read_rate_from_drive, read_rate_from_loop, scale_of_rebalance
 from compensation.motion import demodulate
 from compensation.piezo import COUNT, DRIVE_Q, PiezoRing
-from shell.bell_theory import (
-    inextensional_functions,
-    rayleigh_functions,
-    rayleigh_functions_without_factor,
-    two_pattern_model,
-)
+from shell import bell_theory
 from shell.curves import Arc
 from shell.damping.faces import shell_faces
 from shell.modes import solve_modes
@@ -52,13 +47,13 @@ def compare_bell_theory() -> BellTheory:
     resonator = instrument.resonator
     elastic = instrument.material.elastic(instrument.reference_temperature)
     patterns = (
-        ("(19) as printed", rayleigh_functions),
-        ("(19) without cos(5πφ/φ_b)", rayleigh_functions_without_factor),
-        ("solved from (17), (18)", inextensional_functions),
+        ("(19) as printed", bell_theory.rayleigh_functions),
+        ("(19) without cos(5πφ/φ_b)", bell_theory.rayleigh_functions_without_factor),
+        ("solved from (17), (18)", bell_theory.inextensional_functions),
     )
     rows = []
     for name, pattern in patterns:
-        model = two_pattern_model(resonator, elastic, pattern)
+        model = bell_theory.two_pattern_model(resonator, elastic, pattern)
         rows.append(PatternRow(name, model.frequency, model.bryan_factor, model.membrane_share))
 
     def solve(name: str, body: Resonator) -> PatternRow:

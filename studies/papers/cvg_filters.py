@@ -9,14 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from compensation import demodulated
 from compensation.arrays import Array
-from compensation.demodulated import (
-    ErrorMap,
-    map_integral_error,
-    measure_rate,
-    relate_rate_to_measured_rate,
-    respond_to_oscillating_rate,
-)
 from compensation.kalman import LinearModel, expect_mean_nis, model_gyro, noise_of_estimate, run_filter
 from compensation.motion import SensitiveElement, tune
 from compensation.spectral import high_pass_spectrum, rate_spectrum, white_spectrum
@@ -93,14 +87,14 @@ def make_pulses(step: float) -> tuple[Array, Array]:
     return time, np.where(np.floor(time / PULSE) % 2 == 1, 1.0, 0.0)
 
 
-def study_error_map(points: int = 41) -> ErrorMap:
+def study_error_map(points: int = 41) -> demodulated.ErrorMap:
     """Return figure 3 for δk in 0.9…1.1 and δζ in 0.5…1.5; the paper prints neither range nor time."""
-    return map_integral_error(np.linspace(0.9, 1.1, points), np.linspace(0.5, 1.5, points), k=K, zeta=ZETA)
+    return demodulated.map_integral_error(np.linspace(0.9, 1.1, points), np.linspace(0.5, 1.5, points), k=K, zeta=ZETA)
 
 
 def study_wiener() -> tuple[WienerCase, ...]:
     """Return (35) and (36) with the error before and after the renormalisation to G(0) W(0) = 1."""
-    gyro, rate = relate_rate_to_measured_rate(K, ZETA), rate_spectrum(SIGMA, B)
+    gyro, rate = demodulated.relate_rate_to_measured_rate(K, ZETA), rate_spectrum(SIGMA, B)
     noises = {
         "white noise, eq. (35)": white_spectrum(GAMMA, SIGMA),
         "high-pass noise, eq. (36)": high_pass_spectrum(GAMMA, SIGMA, B),
@@ -136,7 +130,7 @@ def _kalman_model(step: float) -> LinearModel:
 def _filter_wiener(case: WienerCase, generator: np.random.Generator) -> Filtered:
     """White noise of density γ²σ² has the variance γ²σ²/step in samples."""
     time, rate = make_pulses(STEP)
-    output = measure_rate(tune(K, ZETA), time, rate)
+    output = demodulated.measure_rate(tune(K, ZETA), time, rate)
     noisy = output + GAMMA * SIGMA / np.sqrt(STEP) * generator.standard_normal(len(time))
     estimate, clean = (case.renormalised.filter.simulate(time, values) for values in (noisy, output))
     return Filtered(time, rate, output, noisy, estimate, clean)
@@ -146,7 +140,7 @@ def _filter_kalman(step: float, generator: np.random.Generator) -> tuple[Filtere
     """The estimates of output and rate, and the normalised innovations squared."""
     model = _kalman_model(step)
     time, rate = make_pulses(step)
-    output = measure_rate(tune(K, ZETA), time, rate)
+    output = demodulated.measure_rate(tune(K, ZETA), time, rate)
     noisy = output + np.sqrt(MEASUREMENT_NOISE) * generator.standard_normal(len(time))
     run = run_filter(model, noisy, np.zeros(2), np.eye(2))
     clean = run_filter(model, output, np.zeros(2), np.eye(2)).states
@@ -173,7 +167,7 @@ BY_STEP = "0.0: Step (ms) ×1e3 g | 1.1: Noise of the estimate (rad/s) .4f | 0.1
 STEPS_NOTE = "Noise: standard deviation of the settled filter, from its Riccati equation. Lag errors: rms for pulses of 0.25 s. The paper gives Q per step but not the step."
 
 
-def filter_chapters(study: FilterStudy, error_map: ErrorMap) -> list[Chapter]:
+def filter_chapters(study: FilterStudy, error_map: demodulated.ErrorMap) -> list[Chapter]:
     """Return the chapters for the responses (13), (14), figure 3, the Wiener filters with figure 5, and the Kalman filter with figures 6, 7."""
     five, six, (output_noise, rate_noise) = study.figure5, study.figure6, study.settled_noise[-1]
     pulses = (
@@ -220,14 +214,14 @@ def _draw_responses() -> Drawing:
     labels = ("A(λ) / A(0) of the matched gyro", "phase (°)")
     with style.figure(2, 1, 4.6, "frequency of the rate λ/2π (Hz)", labels, sharex=True) as (made, (upper, lower)):
         for name, gyro in gyros.items():
-            amplitude, phase = respond_to_oscillating_rate(gyro, 2 * np.pi * frequency)
-            still, _ = respond_to_oscillating_rate(tuned, 0.0)
+            amplitude, phase = demodulated.respond_to_oscillating_rate(gyro, 2 * np.pi * frequency)
+            still, _ = demodulated.respond_to_oscillating_rate(tuned, 0.0)
             upper.semilogy(frequency, amplitude / still, label=name)
             lower.plot(frequency, np.degrees(np.unwrap(phase)))
         return made
 
 
-def _draw_error_map(error_map: ErrorMap) -> Drawing:
+def _draw_error_map(error_map: demodulated.ErrorMap) -> Drawing:
     """Draw figure 3, the integral error over the ratios of frequency and damping."""
     with style.figure(height=3.8, x="δk = k₂/k₁", y="δζ = ζ₂/ζ₁") as (made, axes):
         grid, levels = (error_map.frequency_ratio, error_map.damping_ratio), np.arange(-6.0, 0.51, 0.5)
@@ -238,7 +232,7 @@ def _draw_error_map(error_map: ErrorMap) -> Drawing:
         return made
 
 
-def _map_sentence(error_map: ErrorMap) -> str:
+def _map_sentence(error_map: demodulated.ErrorMap) -> str:
     """Say what the paper leaves open, and how far the error reaches in numbers."""
 
     def at(ratio: float, damping: float) -> float:

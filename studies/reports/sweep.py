@@ -11,18 +11,8 @@ from compensation.arrays import Array
 from studies.errors import UNUSABLE_INPUT, InputError
 from studies.papers.hrg import study_table
 from studies.reports import frequency, scenes
+from studies.reports import sweep_analysis as analysis
 from studies.reports import sweep_figures as figures
-from studies.reports.sweep_analysis import (
-    influence_parts,
-    main_columns,
-    number,
-    search_parts,
-    statistics_table,
-    summarise,
-    to_digits,
-    tolerance_parts,
-    yield_of,
-)
 from studies.results import Blocks, Chapter, Column, Facts, Figure, Part, Result, Sentence, Table
 from studies.sweeps.definition import StudyParameter
 from studies.sweeps.design import nominal_design
@@ -56,9 +46,9 @@ def study_result(results: Results) -> Result:
     lead = f"{done} designs ({METHODS[study.sampling.method]}) based on the card {study.instrument.name}."
     if study.note:
         lead = f"{study.note} {lead}"
-    shown = [statistics_table(results), *_over_temperature(results), *_pictures(results), _designs(results)]
+    shown = [analysis.statistics_table(results), *_over_temperature(results), *_pictures(results), _designs(results)]
     return Result(
-        summarise(results),
+        analysis.summarise(results),
         f"Study: {study.name}",
         lead,
         [
@@ -66,9 +56,9 @@ def study_result(results: Results) -> Result:
             Chapter("Definition", _asked(results)),
             Chapter("Failed cases", _failures(results)),
             Chapter("Results", shown),
-            Chapter("Influence of the parameters", influence_parts(results)),
-            Chapter("Tolerances", tolerance_parts(results)),
-            Chapter("Searches", search_parts(results, "worst-case")),
+            Chapter("Influence of the parameters", analysis.influence_parts(results)),
+            Chapter("Tolerances", analysis.tolerance_parts(results)),
+            Chapter("Searches", analysis.search_parts(results, "worst-case")),
             Chapter("Mode shapes", _shapes(results)),
             Chapter("Provenance", _provenance(results)),
         ],
@@ -77,12 +67,14 @@ def study_result(results: Results) -> Result:
 
 def _short(results: Results) -> list[Part]:
     facts = [("Designs", str(results.done), f"of {results.total}; {len(results.failed)} failed")]
-    for column in main_columns(results)[:2]:
+    for column in analysis.main_columns(results)[:2]:
         n = results.numbers[column.name]
         unit = "" if column.unit == "1" else f" {column.unit}"
-        least, greatest, nominal = (to_digits(n[key], n["deviation"] / 3) for key in ("least", "greatest", "nominal"))
+        least, greatest, nominal = (
+            analysis.to_digits(n[key], n["deviation"] / 3) for key in ("least", "greatest", "nominal")
+        )
         facts.append((column.label, f"{least} … {greatest}{unit}", f"nominal {nominal}{unit}"))
-    found = yield_of(results)
+    found = analysis.yield_of(results)
     if found is not None:
         low, high = found.low, found.high
         words = "of the designs" if low is None or high is None else f"90 % interval {_percent(low)} … {_percent(high)}"
@@ -145,7 +137,7 @@ def _at(values: NDArray[Any], places: Sequence[int]) -> Callable[[int], Any]:
 
 
 def _designs(results: Results) -> Table:
-    columns = main_columns(results)
+    columns = analysis.main_columns(results)
     places: Sequence[int] = range(len(results))
     note = "Click a heading to sort."
     if len(places) > MOST_ROWS:
@@ -174,7 +166,7 @@ def _pictures(results: Results) -> list[Part]:
     except InputError:
         limits = []
     parts: list[Part] = []
-    for column in main_columns(results):
+    for column in analysis.main_columns(results):
         n, count = results.numbers[column.name], int(np.isfinite(results.column(column.name)).sum())
         if count >= 20 and n["greatest"] > n["least"]:
             words, alt = f"Distribution of {column.label} over {count} designs.", f"Histogram of {column.label}."
@@ -213,7 +205,9 @@ def _shapes(results: Results) -> list[Part]:
     names = [name for name in study.names if name.startswith("resonator.")]
     parts: list[Part] = []
     for title, design in designs.items():
-        words = ", ".join(f"{figures.label(name, units[name])} = {number(value)}" for name, value in design.items())
+        words = ", ".join(
+            f"{figures.label(name, units[name])} = {analysis.number(value)}" for name, value in design.items()
+        )
         instrument = set_parameters(study.instrument, design, study.derived)
         parts.append(f"{title}: {words or 'as in the card'}.")
         if len(parts) > 1 or theory == "rayleigh":
@@ -251,9 +245,9 @@ def _provenance(results: Results) -> list[Part]:
 
 def _range(parameter: StudyParameter) -> str:
     if parameter.values:
-        words = ", ".join(number(value) for value in parameter.values[:8])
+        words = ", ".join(analysis.number(value) for value in parameter.values[:8])
         return words + (f", … ({len(parameter.values)})" if len(parameter.values) > 8 else "")
-    return f"{number(parameter.low)} … {number(parameter.high)}"
+    return f"{analysis.number(parameter.low)} … {analysis.number(parameter.high)}"
 
 
 def _distribution(parameter: StudyParameter) -> str:
@@ -261,5 +255,5 @@ def _distribution(parameter: StudyParameter) -> str:
         return "values"
     if parameter.distribution == "normal":
         unbounded = "" if parameter.bounded else ", unbounded"
-        return f"normal, standard deviation {number(parameter.standard_deviation)}{unbounded}"
+        return f"normal, standard deviation {analysis.number(parameter.standard_deviation)}{unbounded}"
     return parameter.distribution + (f", {parameter.count} points" if parameter.count else "")
