@@ -43,24 +43,22 @@ def fit_rough(run: BellRun) -> tuple[float, float, Array]:
     return float(null), float(1 / slope), to_scale @ covariance @ to_scale.T
 
 
-def fit_bias(temperature: ArrayLike, rough: ArrayLike, order: int = 2) -> PolynomialCurve:
+def fit_bias(temperature: ArrayLike, rough: ArrayLike) -> PolynomialCurve:
     """Fit N(T) to the rough output (°/s) of a gyro at rest, over temperature (°C): eq. (34)."""
-    return _fit_curve(temperature, rough, order, "temperature")
+    return _fit_curve(temperature, rough, "temperature")
 
 
-def fit_scale_over_rate(bias_compensated: ArrayLike, rate: ArrayLike, order: int = 2) -> PolynomialCurve:
+def fit_scale_over_rate(bias_compensated: ArrayLike, rate: ArrayLike) -> PolynomialCurve:
     """Fit the applied rate over the measured one (both °/s), at one temperature: eq. (35); its noise flattens the line by some 1e-7."""
-    return _fit_curve(bias_compensated, rate, order, "measured rate")
+    return _fit_curve(bias_compensated, rate, "measured rate")
 
 
-def fit_scale_over_temperature(
-    temperature: ArrayLike, rate_compensated: ArrayLike, rate: ArrayLike, order: int = 2
-) -> PolynomialCurve:
+def fit_scale_over_temperature(temperature: ArrayLike, rate_compensated: ArrayLike, rate: ArrayLike) -> PolynomialCurve:
     """Fit the factor that brings the output to the applied rate (°/s), over temperature (°C): eq. (36)."""
     T, measured, applied = read_columns(temperature=temperature, rate_compensated=rate_compensated, rate=rate)
     if np.any(applied == 0) or np.any(np.abs(measured) < 0.1 * np.abs(applied)):
         raise CompensationError("the scale over temperature needs an applied rate in every row of the run.")
-    return _fit_curve(T, applied / measured, order, "temperature")
+    return _fit_curve(T, applied / measured, "temperature")
 
 
 def fit_chain(
@@ -101,8 +99,8 @@ def _nothing(run: BellRun, value: float) -> PolynomialCurve:
     return PolynomialCurve(np.array([value, 0.0, 0.0]), np.zeros((3, 3)), *ends)
 
 
-def _fit_curve(x: ArrayLike, y: ArrayLike, order: int, name: str) -> PolynomialCurve:
-    fit = fit_polynomial(x, y, order, name)
+def _fit_curve(x: ArrayLike, y: ArrayLike, name: str) -> PolynomialCurve:
+    fit = fit_polynomial(x, y, 2, name)
     coefficients, covariance = fit.about(0.0, correlated_covariance(fit.regression))
     return PolynomialCurve(coefficients, covariance, float(np.min(x)), float(np.max(x)))
 

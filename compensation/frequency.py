@@ -68,13 +68,9 @@ class FrequencyFit:
         """Return df/dT in Hz/°C."""
         return self.polynomial.slope(self._within(temperature_degC, extrapolate))
 
-    def slope_ppm(self, temperature_degC: ArrayLike, *, extrapolate: bool = False) -> Array:
+    def slope_ppm(self, temperature_degC: ArrayLike) -> Array:
         """Return (df/dT) / f in ppm/°C, the TCF of HRG paper eq. (15)."""
-        return (
-            1e6
-            * self.slope(temperature_degC, extrapolate=extrapolate)
-            / self.frequency(temperature_degC, extrapolate=extrapolate)
-        )
+        return 1e6 * self.slope(temperature_degC) / self.frequency(temperature_degC)
 
     def temperature(self, frequency: ArrayLike) -> Array:
         """Return the temperature (°C) whose frequency this is: the inverse of f(T), HRG paper Table 2, at most three residuals out of range."""

@@ -1,8 +1,10 @@
 """Rational two-sided spectral densities in s, variance = ∫ S(jω) dω / 2π: stable factors, separation of causal parts."""
 
 from dataclasses import dataclass
+from functools import reduce
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
 
 from compensation.arrays import Array
@@ -92,10 +94,9 @@ def separate(numerator: Array, stable: Array, antistable: Array) -> Array:
     S, U, N = (p * scale ** np.arange(len(p) - 1, -1, -1.0) for p in (stable, antistable, numerator))
     size = n + m + 1
     matrix = np.zeros((size, size))
-    for column in range(n + 1):
-        matrix[column : column + m + 1, column] = U
-    for column in range(m):
-        matrix[column + 1 : column + n + 2, n + 1 + column] = S
+    matrix[:, : n + 1] = scipy.linalg.convolution_matrix(U, n + 1)
+    if m:
+        matrix[1:, n + 1 :] = scipy.linalg.convolution_matrix(S, m)
     right = np.zeros(size)
     right[size - len(N) :] = N
     t = np.asarray(np.linalg.solve(matrix, right)[: n + 1], dtype=float)
@@ -157,7 +158,4 @@ def _sign(polynomial: tuple[float, ...], frequency: Array) -> Array:
 
 def multiply(*polynomials: Array) -> Array:
     """Return the product of polynomials, highest power first."""
-    product = np.ones(1)
-    for polynomial in polynomials:
-        product = np.convolve(product, polynomial)
-    return product
+    return reduce(np.convolve, polynomials)
