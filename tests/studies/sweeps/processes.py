@@ -2,6 +2,7 @@
 
 import os
 import sys
+from contextlib import closing
 from pathlib import Path
 
 from studies.sweeps.opening import open_store
@@ -77,7 +78,7 @@ def rows_of(folder: Path) -> list[tuple[int, str, bytes]]:
     """Return place, status and values of the cases in a store, also while it is written."""
     if not (folder / "study.store").exists():
         return []
-    with open_store(folder) as store:
+    with closing(open_store(folder)) as store:
         if store.study is None:
             return []
         d, w = len(store.study["spec"].get("parameter", [])), len(store.judged)

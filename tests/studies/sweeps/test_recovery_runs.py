@@ -9,6 +9,7 @@ import sys
 import threading
 import time
 from collections import Counter
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -338,7 +339,7 @@ def test_failed_cases_are_computed_again_when_asked(tmp_path, functions, hrg):
     run = ("study", "run", spec, "--out", tmp_path / "out", "--workers", 1, "--allow-python", "--json")
     assert hrg(*run).returncode == 0
     nothing = np.full((1, 1), math.nan)
-    with claim_store(tmp_path / "out") as store:
+    with closing(claim_store(tmp_path / "out")) as store:
         store.begin_run({})
         batch = Batch(np.array([2]), np.array([[3.0]]))
         store.add(Cases(batch, nothing, nothing, 0.1, (Remark("failed", "a passing fault", [0]),)))
@@ -367,7 +368,7 @@ def test_other_versions_on_resuming_are_said(tmp_path, functions, hrg):
     spec = written(tmp_path, "square", 'method = "grid"', 'name = "user.x"\nvalues = [1, 2, 3]')
     run = ("study", "run", spec, "--out", tmp_path / "out", "--workers", 1, "--allow-python")
     assert "computed with" not in hrg(*run).stderr
-    with claim_store(tmp_path / "out") as store:
+    with closing(claim_store(tmp_path / "out")) as store:
         store.begin_run(json.loads(json.dumps(store.runs[-1]["provenance"]).replace(np.__version__, "1.0.0")))
     assert f"numpy 1.0.0 then, {np.__version__} now" in hrg(*run).stderr
 
