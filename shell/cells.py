@@ -14,7 +14,7 @@ from functools import cache
 import numpy as np
 
 from shell.errors import FoldedCells
-from shell.kernel import energy_weights
+from shell.kernel import PAIRS, energy_weights
 from shell.quadrature import Array, Basis, gauss, hierarchic, nodal
 from shell.sparse import Index
 
@@ -70,17 +70,19 @@ class CellTable:
 
 
 @cache
+def derivatives(n: int) -> Array:
+    """D_ijαc (3, 3, 3, 3): ∂_i u_j, i and j along r, θ, z, from the gradient α of component c."""
+    D = np.zeros((3, 3, 3, 3))
+    D[0, :, R] = D[2, :, Z] = np.eye(3)
+    D[1, :, ZERO] = [[-n, -1, 0], [1, n, 0], [0, 0, -n]]
+    return D
+
+
+@cache
 def strain_of_gradients(n: int) -> Array:
     """S_kαc (6, 3, 3): strain k from the gradient α of component c."""
-    S = np.zeros((6, 3, 3))
-    a, b, c = range(3)
-    S[0, R, a] = 1
-    S[1, ZERO, a], S[1, ZERO, b] = 1, n
-    S[2, Z, c] = 1
-    S[3, R, b], S[3, ZERO, a], S[3, ZERO, b] = 1, -n, -1
-    S[4, Z, a], S[4, R, c] = 1, 1
-    S[5, Z, b], S[5, ZERO, c] = 1, -n
-    return S
+    D = derivatives(n)
+    return np.array([D[i, j] if i == j else D[i, j] + D[j, i] for i, j in PAIRS])
 
 
 @cache

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shell.cells import ZERO, CellTable, R, Z
+from shell.cells import CellTable, derivatives
 from shell.errors import ShellError
-from shell.kernel import PAIRS, shell_gradients
+from shell.kernel import PAIRS, TENSOR, shell_gradients
 from shell.modes import Mode
 from shell.quadrature import Array, gauss
 from shell.solution import Solution
@@ -39,11 +39,8 @@ def displacement_gradients(system: System, group: Group, q: Array) -> Array:
     table: CellTable = group.table
     count, _, _, functions = table.gradients.shape
     g = table.gradients @ q.reshape(count, 1, functions, 3)  # (cells, (r, z, over r), points, component)
-    d_r, d_z, over_r = np.moveaxis(g, 1, 0)
-    a, b, c = np.moveaxis(over_r, -1, 0)
-    n = system.n
-    around = np.stack([-n * a - b, a + n * b, -n * c], axis=-1)
-    return np.asarray(np.stack([d_r, around, d_z], axis=1).transpose(0, 1, 3, 2)[:, None])
+    flat = derivatives(system.n).reshape(9, 9) @ g.transpose(0, 1, 3, 2).reshape(count, 9, -1)
+    return np.asarray(flat.reshape(count, 1, 3, 3, -1))
 
 
 def gradient_loads(system: System, group: Group, P: Array) -> Array:
@@ -53,13 +50,9 @@ def gradient_loads(system: System, group: Group, P: Array) -> Array:
         jets = np.einsum("esikp,esikpdm->esdm", weighted, _table(system, group), optimize=True)
         return np.asarray(np.einsum("dsf,esdm->efm", group.table.along, jets))
     table: CellTable = group.table
-    w = (P * table.volume[:, :, None, None])[:, 0]  # (cells, i, k, points)
-    n, (along_r, around, along_z) = system.n, (w[:, k] for k in range(3))
-    over_r = np.stack([around[:, 1] - n * around[:, 0], n * around[:, 1] - around[:, 0], -n * around[:, 2]], axis=1)
-    found = np.zeros((len(w), table.gradients.shape[3], 3))
-    for place, dual in ((R, along_r), (Z, along_z), (ZERO, over_r)):
-        found = found + np.swapaxes(table.gradients[:, place], 1, 2) @ np.swapaxes(dual, 1, 2)
-    return np.asarray(found)
+    weighted = (P * table.volume[:, :, None, None]).reshape(len(P), 9, -1)
+    dual = (derivatives(system.n).reshape(9, 9).T @ weighted).reshape(len(P), 3, 3, -1)
+    return np.asarray((np.swapaxes(table.gradients, 2, 3) @ np.swapaxes(dual, 2, 3)).sum(axis=1))
 
 
 def squared(H: Array, doubled: bool) -> Array:
@@ -89,19 +82,13 @@ class QuadraticForce:
             squares.append(squared(H, doubled))
             still = np.zeros((*group.table.volume.shape[:2], 3, group.table.volume.shape[2]))
             stretch.append(partner.table.loads(c.stress(partner.table, squares[-1]) / 2, still))
-            turn.append(gradient_loads(system, partner, _meet(tensor(stress), H, doubled)))
+            turn.append(gradient_loads(system, partner, _meet(stress[:, :, TENSOR], H, doubled)))
         return cls(system.gather(stretch), system.gather(turn), squares)
 
     @property
     def whole(self) -> Array:
         """Both terms."""
         return self.stretch + self.turn
-
-
-def tensor(stress: Array) -> Array:
-    """The symmetric tensor (…, 3, 3, points) of components (…, 6, points)."""
-    index = np.array([[0, 3, 4], [3, 1, 5], [4, 5, 2]])
-    return np.asarray(stress[:, :, index])
 
 
 def _meet(A: Array, B: Array, doubled: bool) -> Array:
@@ -113,4 +100,4 @@ def _meet(A: Array, B: Array, doubled: bool) -> Array:
 
 def _table(system: System, group: ShellGroup) -> Array:
     through = system.level.through
-    return np.moveaxis(shell_gradients(group.section, system.n, through, gauss(max(through) + 2)[0])[0], (0, 1), (2, 3))
+    return shell_gradients(group.section, system.n, through, gauss(max(through) + 2)[0])[0]

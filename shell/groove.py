@@ -22,6 +22,7 @@ from shell.cross_section import cut
 from shell.elastic import COSINE
 from shell.errors import ShellError, mm
 from shell.imperfection import Pair
+from shell.kernel import TENSOR
 from shell.quadrature import Array, at_gauss, gauss, nodal
 from shell.resonator import Resonator
 from shell.sparse import Index, assemble_elements, dissect, factor_symmetric
@@ -282,8 +283,7 @@ def _loads(pair: Pair, grid: _Grid, nodes: _Nodes, lam: float, G: float, rho: fl
                 energy = np.moveaxis((stress * e)[:, at], 0, -1)[:, None] * factor**2
                 dense = energy.sum(axis=-1) - eigenvalue * rho * (moved**2).sum(axis=-1)
                 layers[kind] += 2 * float(np.sum(dense * weight))
-                tensor = local[..., [[0, 3, 4], [3, 1, 5], [4, 5, 2]]]
-                turned = np.swapaxes(Q, -1, -2) @ tensor @ Q
+                turned = np.swapaxes(Q, -1, -2) @ local[..., TENSOR] @ Q
                 force = eigenvalue * rho * (moved[..., None, :] @ Q)[..., 0, :]
                 push = np.einsum("etzij,etzjf,etz->efi", turned, slope, weight)
                 push -= np.einsum("etzi,tzf,etz->efi", force, N, weight)

@@ -21,6 +21,7 @@ from shell.quadrature import Array, Basis, legendre
 SHEAR_CORRECTION = 5 / 6
 Orders = tuple[int, int, int]
 PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))  # of the axes, in the order of strains
+TENSOR = np.array([[0, 3, 4], [3, 1, 5], [4, 5, 2]])  # places of the components in that order
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,7 +78,7 @@ def shell_table(section: Section, n: int, through: Orders, eta: tuple[Array, Arr
     """
     points, weights = eta
     H, A_rho = shell_gradients(section, n, through, points)
-    strain = np.stack([H[i, i] if i == j else H[i, j] + H[j, i] for i, j in PAIRS], axis=2)
+    strain = np.stack([H[:, :, i, j] if i == j else H[:, :, i, j] + H[:, :, j, i] for i, j in PAIRS], axis=2)
     share = section.ds * section.thickness / 2 * section.weight
     volume = A_rho * share[..., None] * weights
     moved = np.stack([f[:, 0] for f in _jets(section, through, points)[0]])
@@ -95,7 +96,7 @@ def shell_table(section: Section, n: int, through: Orders, eta: tuple[Array, Arr
 
 
 def shell_gradients(section: Section, n: int, through: Orders, points: Array) -> tuple[Array, Array]:
-    """Rows ∂_s, ∂_θ, ∂_ζ of u, v, w at heights η, (3, 3, elements, stations, points, 2, amplitudes), and A ρ there.
+    """Rows ∂_s, ∂_θ, ∂_ζ of u, v, w at heights η, (elements, stations, 3, 3, points, 2, amplitudes), and A ρ there.
 
     With ζ = η h/2, A = 1 + κ ζ and ρ = r + ζ n_r (the radius of the point), subscripts for derivatives:
 
@@ -107,12 +108,13 @@ def shell_gradients(section: Section, n: int, through: Orders, points: Array) ->
     zeta = _tall(section.thickness) * points[:, None, None] / 2
     A, rho = 1 + kappa * zeta, _tall(section.r) + n_r * zeta
     (u, v, w), (u_s, v_s, w_s), by_zeta = _jets(section, through, points)
-    found = np.empty((3, 3, *section.r.shape, *u.shape))
-    found[0] = (u_s + kappa * w) / A, v_s / A, (w_s - kappa * u) / A
-    found[1] = -(n * u + t_r * v) / rho, (n * v + t_r * u + n_r * w) / rho, -(n * w + n_r * v) / rho
-    for row, one in zip(found[2], by_zeta, strict=True):
-        row[:] = one
-    return found, (A * rho)[..., 0, 0]
+    rows = (
+        ((u_s + kappa * w) / A, v_s / A, (w_s - kappa * u) / A),
+        (-(n * u + t_r * v) / rho, (n * v + t_r * u + n_r * w) / rho, -(n * w + n_r * v) / rho),
+        by_zeta,
+    )
+    flat = np.stack(np.broadcast_arrays(*(one for row in rows for one in row)), axis=2)
+    return flat.reshape(*flat.shape[:2], 3, 3, *flat.shape[3:]), (A * rho)[..., 0, 0]
 
 
 def lame(E: Array, nu: Array, plane_stress: bool) -> tuple[Array, Array]:

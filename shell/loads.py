@@ -19,9 +19,9 @@ import numpy as np
 from shell.cells import CellTable, Reference, tabulate_cells
 from shell.elastic import COSINE, SINE, Elastic
 from shell.errors import ShellError
-from shell.finite import displacement_gradients, solved_as_solid, tensor
+from shell.finite import displacement_gradients, solved_as_solid
 from shell.inertia import MassProperties, weigh
-from shell.kernel import StrainTable
+from shell.kernel import TENSOR, StrainTable
 from shell.modes import Mode
 from shell.prestress import expansion_shares, mean_answer, neighbour, settle
 from shell.quadrature import Array
@@ -130,7 +130,7 @@ class Loads:
                     here = here + turned
                 if here.ndim == 1:
                     continue
-                square = tensor(here).transpose(0, 1, 4, 2, 3)
+                square = here[:, :, TENSOR].transpose(0, 1, 4, 2, 3)
                 one, two, three = np.linalg.eigvalsh(square).T
                 bent = np.sqrt(((one - two) ** 2 + (two - three) ** 2 + (three - one) ** 2) / 2).T
                 for name in sorted(set(part) & set(self.counted)):
