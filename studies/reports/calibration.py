@@ -63,14 +63,10 @@ def best_known_first(payload: Mapping[str, Any]) -> list[dict[str, Any]]:
 def calibration_parts(found: Calibration, payload: Mapping[str, Any]) -> list[Chapter]:
     """Return what people read of a calibration, with the tables over rows of its payload."""
     responses = [_scaled(name, row) for name, row in payload["responses"].items()]
-    facts = [
-        (
-            f"{row['response']}, residual",
-            f"{plain(row['calibrated'])} {row['unit']}",
-            f"{plain(row['as_shipped'])} {row['unit']} as given; noise {plain(row['noise'])} {row['unit']}",
-        )
-        for row in responses
-    ]
+    facts = []
+    for row in responses:
+        given, calibrated, noise = (f"{plain(row[key])} {row['unit']}" for key in ("as_shipped", "calibrated", "noise"))
+        facts.append((f"{row['response']}, residual", calibrated, f"{given} as given; noise {noise}"))
     rows = best_known_first(payload)
     touched = [one for one in rows if one["width"] <= 0.9995 or abs(one["shift_sd"]) >= 0.005]
     rest = [one for one in rows if one not in touched]

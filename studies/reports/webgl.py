@@ -42,7 +42,7 @@ def view_modes(
 
     size = resonator.size
     pairs = zip(modes, splits or [None] * len(modes), strict=True)
-    described = [_describe(resonator, mode, size, split) for mode, split in pairs]
+    described = [_describe(resonator, mode, split) for mode, split in pairs]
     line = trace_outlines(resonator, size / SPACING)[0]
     middle = float(line.z.max() + line.z.min()) / 2
     start, rim = resonator.at([0.0]), resonator.at([resonator.length])
@@ -65,7 +65,8 @@ def view_modes(
     return Embedded(html, caption)
 
 
-def _describe(resonator: Resonator, mode: Mode, size: float, drawn: Drawn | None) -> dict[str, Any]:
+def _describe(resonator: Resonator, mode: Mode, drawn: Drawn | None) -> dict[str, Any]:
+    size = resonator.size
     outlines = trace_outlines(resonator, size / SPACING, mode)
     runs = [run for line in outlines for run in _split_at_kinks(line)]
     points = np.concatenate([_columns(line, members, size) for line, members in runs])
@@ -77,7 +78,7 @@ def _describe(resonator: Resonator, mode: Mode, size: float, drawn: Drawn | None
         "runs": [len(members) for _, members in runs],
         "points": base64.b64encode(points.astype("<f4").tobytes()).decode(),
         "most": most,
-        **(_imperfect(resonator, runs, size, drawn) if drawn else {}),
+        **(_imperfect(resonator, runs, drawn) if drawn else {}),
         "energy_legend": f"{most * 1e-12:.3g} J/m³ strain-energy density for 1 µm at the antinode",
     }
 
@@ -88,9 +89,9 @@ def outline_rows(resonator: Resonator, mode: Mode, size: float) -> list[Array]:
     return [_columns(line, members, size) for one in lines for line, members in _split_at_kinks(one)]
 
 
-def _imperfect(resonator: Resonator, runs: list[tuple[Outline, Members]], size: float, drawn: Drawn) -> dict[str, Any]:
+def _imperfect(resonator: Resonator, runs: list[tuple[Outline, Members]], drawn: Drawn) -> dict[str, Any]:
     """The slow axis (rad), where the axes lie on the rim, and the departures: for each wave and point its parts along r and z."""
-    rim = resonator.at([resonator.length])
+    rim, size = resonator.at([resonator.length]), resonator.size
     found: dict[str, Any] = {
         "axis": drawn.split.slow_axis,
         "rim": [float(rim.r[0] + rim.thickness[0] / 2) / size, float(rim.z[0]) / size],
