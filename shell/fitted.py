@@ -89,10 +89,8 @@ def _fit(position: Array, value: Array) -> _Piece:
     h = np.interp(at, position, value)
     scaled = 2 * (at - position[0]) / (position[-1] - position[0]) - 1
     degree = min(DEGREE, len(position) - 1)
-    root = np.sqrt(weight)
-    basis = series.legvander(scaled, degree)
-    coefficients = np.linalg.lstsq(basis * root[:, None], h * root, rcond=None)[0]
-    return _Piece(position, value, coefficients, at, weight, h / (basis @ coefficients) - 1)
+    coefficients = series.legfit(scaled, h, degree, w=np.sqrt(weight))
+    return _Piece(position, value, coefficients, at, weight, h / series.legval(scaled, coefficients) - 1)
 
 
 def _cut(piece: _Piece) -> list[_Piece]:
