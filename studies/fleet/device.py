@@ -16,6 +16,7 @@ from studies.inference.background import Background
 from studies.inference.diagnosis import Inference
 from studies.inference.inferred import Inferred
 from studies.inference.linear import PRICE, Term
+from studies.inference.paths import trace
 from studies.instrument.card import load_card
 from studies.instrument.units import unit_of
 from studies.record import read_record
@@ -26,8 +27,10 @@ from studies.simulation.variations import Variations, heats
 from studies.workbench import diagnose_records
 from thermal.profile import Profile
 
-SCHEMA = "hrg.fleet-device/4"
-USUAL, APART = 20.0, 5.0  # °C at which devices are compared without a common card, and kelvin to either side for slopes
+SCHEMA = "hrg.fleet-device/5"
+USUAL, APART = 20.0, 0.5  # °C at which devices are compared without a common card, and kelvin to either side for slopes
+FROM_REFERENCE = ("law.f0", "law.a", "loss.", "bias.")
+"""Values of a card that count from its reference temperature."""
 KNOWN, LITTLE = 0.5, 0.9
 """Standard deviation of a value, over that of its prior, below which its records tell it, and above which they say nothing."""
 
@@ -93,25 +96,37 @@ def diagnose_device(
         raise InputError(f"device {device.serial}: its folder has no records (*.csv).")
     records = [read_record(path) for path in device.records]
     found = diagnose_records(records, None if device.card is None else load_card(device.card), progress=progress)
-    at = USUAL + zero_Celsius if device.card is None else found.card.reference_temperature
+    at = None if device.card is None else found.card.reference_temperature
     levels = [float(np.nanmedian(record["frequency_Hz"])) for record in records if "frequency_Hz" in record]
     level = float(np.median(levels)) if levels else None
     answer = Answer(device.serial, key, found.verdict.as_dict(), level, measure(found, at), standings_of(found))
     return answer, found
 
 
-def measure(found: Inferred, temperature: float) -> dict[str, Measured]:
-    """Return settled readings about a temperature (K), and the values of the card that the records tell."""
+def measure(found: Inferred, reference: float | None) -> dict[str, Measured]:
+    """Return settled readings about the reference temperature (K) of a common card, or 20 °C, with the effects found, and the values of the card that the records tell.
+
+    Without a common card those that count from the reference of each device's own are none to compare.
+    """
+    temperature = USUAL + zero_Celsius if reference is None else reference
     problem, (_, C) = found.search.linear.problem, found.background.posterior
     priors, count = problem.priors, len(problem.priors.values)
-    u, C = found.numbers.point[:count], C[:count, :count]
+    u, first = found.numbers.point[:count], found.search.linear.count
+    C = np.delete(np.delete(C, slice(count, first), 0), slice(count, first), 1)
+    sizes = [own / term.spread for own, term in zip(found.numbers.coefficients, found.final.terms, strict=True)]
+    coordinates = np.concatenate([u, *sizes])
     card = problem.instrument_at(found.numbers.point)
     law, slopes, at = problem.law_at(card), priors.slopes(u), priors.at(u)
     each = zip(priors.values, slopes, strict=True)
-    rows: dict[str, tuple[float, Array]] = {value.name: (at[value.name], row) for value, row in each}
+    rows: dict[str, tuple[float, Array]] = {
+        value.name: (at[value.name], row)
+        for value, row in each
+        if reference is not None or not value.name.startswith(FROM_REFERENCE)
+    }
+    none = np.zeros(len(C) - count)
     varied = Variations(card, law, priors.names)
     at_three = (temperature - APART, temperature, temperature + APART)
-    settled = {T: _settled(varied, card, law, T, slopes) for T in at_three}
+    settled = {T: _settled(found, varied, card, law, T, slopes) for T in at_three}
     (low, here, high), spot = settled.values(), f"at {temperature - zero_Celsius:g} °C"
     for name, words in (("frequency_Hz", "frequency"), ("bias_deg_per_h", "bias"), ("inverse_q", "1/Q")):
         if name not in problem.responses:
@@ -128,23 +143,35 @@ def measure(found: Inferred, temperature: float) -> dict[str, Measured]:
     rows["slowest time constant (s)"] = _slowest(varied, temperature, slopes)
     out = {}
     for name, (value, J) in rows.items():
+        J = J if len(J) == len(C) else np.append(J, none)
         before, after = float(J @ J), float(J @ C @ J)
         if 0.0 < after < LITTLE**2 * before:  # the prior has its mean where u is 0
             variance = 1.0 / (1.0 / after - 1.0 / before)
-            mean = value + float(J @ u) * variance / before
+            mean = value + float(J @ coordinates) * variance / before
             out[name] = Measured(mean, float(np.sqrt(variance)), after < KNOWN**2 * before, before**0.5)
     return out
 
 
-def _settled(varied: Variations, card: Any, law: Any, T: float, slopes: Array) -> dict[str, tuple[float, Array]]:
-    """Return every response of the settled gyro and its derivatives by the independent coordinates."""
+def _settled(
+    found: Inferred, varied: Variations, card: Any, law: Any, T: float, slopes: Array
+) -> dict[str, tuple[float, Array]]:
+    """Return every response of the settled gyro, as its campaign begins, and its derivatives by the independent coordinates and those of effects."""
     time = np.array([0.0, 60.0, 120.0])
-    found = predict(card, Drive(time, "housing", Profile(time, np.full(3, T))), varied, law)
-    return {
-        name: (float(own[-1]), np.array([found.derivatives[v][name][-1] for v in varied.names]) @ slopes)
-        for name, own in found.columns.items()
-        if name in RESPONSES
-    }
+    alone = predict(card, Drive(time, "housing", Profile(time, np.full(3, T))), varied, law)
+    path, signatures = trace(card, alone, 0), found.search.signatures
+    each = list(zip(found.final.terms, found.numbers.coefficients, strict=True))
+    changes = []
+    for term, _ in each:
+        driven = all(getattr(path.states, drive) is not None for drive in term.effect.needs)
+        own = signatures.on_grid(term.effect, term.members, term.starts)(path.states, term.shape, term.response)
+        changes.append(path.changes(term.effect, own, term.response) if driven else {})
+    out = {}
+    for name in RESPONSES:
+        slope = np.array([alone.derivatives[v][name][-1] for v in varied.names]) @ slopes
+        ways = [own[name][-1] if name in own else np.zeros(len(c)) for own, (_, c) in zip(changes, each, strict=True)]
+        value = alone.columns[name][-1] + sum(way @ c for way, (_, c) in zip(ways, each, strict=True))
+        out[name] = float(value), np.concatenate([slope, *(w * t.spread for w, (t, _) in zip(ways, each, strict=True))])
+    return out
 
 
 def _slowest(varied: Variations, T: float, slopes: Array) -> tuple[float, Array]:

@@ -6,15 +6,17 @@ from concurrent.futures import Future
 import numpy as np
 import pytest
 
+from compensation.memory import follow_lag
 from studies.cli import main
 from studies.errors import InputError
 from studies.fleet.comparison import compare
-from studies.fleet.device import Answer, Measured, Standing
+from studies.fleet.device import Answer, Measured, Standing, diagnose_device
 from studies.fleet.folder import Device, read_lot
 from studies.fleet.lot import gather
 from studies.fleet.population import Population, Quantity, Scatters
 from studies.fleet.run import run_lot
 from studies.instrument.card import load_card, save_card
+from studies.record import Record, write_record
 from studies.reports import fleet as parts
 from studies.sweeps.workers import Workers
 from tests.studies.fleet.lots import make_lot
@@ -24,6 +26,23 @@ QUICK = ("time_s", "housing_temperature_degC", "frequency_Hz")
 
 def stand(score, size=1.0, sd=0.05):
     return Standing(score, size, sd, size, sd, "size")
+
+
+@pytest.mark.parametrize(("low", "high"), [(-10.0, 60.0), (0.0, 45.0)])
+def test_a_device_without_a_card_is_read_at_20_degC_with_what_was_found(low, high, tmp_path):
+    """Planted: a cubic of the frequency, which no quadratic law has, behind a lag of 600 s; ranges with middles of their own."""
+    time = np.arange(0.0, 30000.0, 30.0)
+    housing = np.interp(time, [0.0, 2000.0, 9000.0, 13000.0, 22000.0, 30000.0], [20.0, 20.0, high, high, low, low])
+    x = follow_lag(housing, 30.0, 600.0) - 20.0
+    f = 4432.0 * (1.0 + 80e-6 * x - 2e-8 * x**2 + 2e-9 * x**3)
+    f += 3e-4 * np.random.default_rng(7).standard_normal(len(time))
+    write_record(Record({"time_s": time, "housing_temperature_degC": housing, "frequency_Hz": f}), tmp_path / "run.csv")
+    answer, _ = diagnose_device(Device("A", (str(tmp_path / "run.csv"),)), "")
+    assert [cause["effect"] for cause in answer.verdict["causes"]] == ["curvature"]
+    for name, true in (("frequency at 20 °C (Hz)", 4432.0), ("slope of frequency at 20 °C (ppm/K)", 80.0)):
+        found = answer.measured[name]
+        assert abs(found.value - true) < 4.0 * found.sd
+    assert not any(name.startswith("law.a") for name in answer.measured)
 
 
 def test_a_set_of_one_device_is_closed_by_another():
