@@ -107,15 +107,8 @@ def fit_cross_damping(
     if len(rate) < order + 2:
         raise CompensationError(f"order {order} needs at least {order + 2} rows, not {len(rate)}; lower it.")
     size = float(np.max(np.abs(temperature - calibration_temperature)))
-    powers = [
-        np.concatenate(
-            [
-                simulate_bias(run.time, ((run.temperature - calibration_temperature) / size) ** i, k, zeta, g2)
-                for run in runs
-            ]
-        )
-        for i in range(order + 1)
-    ]
+    shifts = [(run.time, (run.temperature - calibration_temperature) / size) for run in runs]
+    powers = [np.concatenate([simulate_bias(t, x**i, k, zeta, g2) for t, x in shifts]) for i in range(order + 1)]
     fit = fit_linear(np.column_stack(powers), rate, [f"zeta_{i}" for i in range(order + 1)], constant=False)
     scale = size ** -np.arange(order + 1.0)
     return CrossDampingModel(

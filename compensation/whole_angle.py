@@ -85,9 +85,8 @@ def simulate_whole_angle(
                 )
             if generator is not None:
                 psi_end += noise.thermal * math.sqrt(step) * generator.standard_normal()
-                psi_end += math.sqrt(noise.command_variance(loops.sampling) * step / loops.sampling) * (
-                    generator.standard_normal()
-                )
+                pushed = math.sqrt(noise.command_variance(loops.sampling) * step / loops.sampling)
+                psi_end += pushed * generator.standard_normal()
             psi, state = psi_end, new
             total += new[at["sum"]]
         commands[n] = total / samples
@@ -98,14 +97,8 @@ def simulate_whole_angle(
     after = course.measured(psi)
     theta = measured / rows.harmonic
     turned = np.diff(np.append(theta, after / rows.harmonic)) / h
-    return LoopRun(
-        t,
-        (turned - (commanded + np.append(commanded[1:], commanded[-1])) / 2) / rows.bryan_factor,
-        commands[:, 3],
-        commands[:, 0],
-        course.start - commands[:, 1],
-        theta,
-    )
+    indicated = (turned - (commanded + np.append(commanded[1:], commanded[-1])) / 2) / rows.bryan_factor
+    return LoopRun(t, indicated, commands[:, 3], commands[:, 0], course.start - commands[:, 1], theta)
 
 
 def close_without_rate(wave: StandingWave, electronics: Electronics, loops: Loops) -> ClosedLoop:

@@ -85,12 +85,8 @@ def _fill(plotter: Any, scene: Scene, limits: tuple[float, float], first: bool) 
         moving.append((marks, scene.points[scene.antinodes], scene.displacement[scene.antinodes]))
         if first:
             axes = "   blue: slow axes   orange: fast axes" if len(scene.axes) else ""
-            plotter.add_text(
-                "red lines: nodes   black dots: antinodes   grey: undeformed" + axes,
-                position=(12, 6),
-                font_size=8,
-                color="#5b6470",
-            )
+            marked = "red lines: nodes   black dots: antinodes   grey: undeformed" + axes
+            plotter.add_text(marked, position=(12, 6), font_size=8, color="#5b6470")
     for k, line in enumerate(scene.axes):
         colour = SLOW if 2 * k < len(scene.axes) else FAST
         plotter.add_mesh(pv.lines_from_points(line), color=colour, line_width=4.0, render_lines_as_tubes=True)

@@ -116,35 +116,29 @@ def _lay_grid(resonator: Resonator, groove: Groove, n: int) -> _Grid:
     far, side, coarse = REACH[groove.face] * h, groove.width / 2, LARGEST * h
     fine = FIRST * min(groove.depth, (two - one) / (1 if at_rim else 2), side, h - groove.depth if deep < 2 else h)
     start = max(one - far, 1e-3 * end)
-    s = [*_graded(one - start, fine, 0, coarse)[::-1] * -1 + one, *(one + _graded(two - one, fine, not at_rim))[1:]]
+    s = _beside(one, _graded(one - start, fine, 0, coarse), _graded(two - one, fine, not at_rim))
     last = min(end, two + far)
     is_rim = last > end - 0.3 * h
     if not at_rim:
-        s += [*(two + _graded((end if is_rim else last) - two, fine, 0, coarse))[1:]]
-    theta = (
-        np.array(
-            [
-                *(side - _graded(side, fine, 0, coarse))[::-1],
-                *(side + _graded(r * np.pi / (2 * n) - side, fine, 0, coarse))[1:],
-            ]
-        )
-        / r
-    )
+        s = np.append(s, two + _graded((end if is_rim else last) - two, fine, 0, coarse)[1:])
+    theta = _beside(side, _graded(side, fine, 0, coarse), _graded(r * np.pi / (2 * n) - side, fine, 0, coarse)) / r
     if deep == 2:
         eta = np.linspace(-1, 1, 4)
     else:
-        bottom = 1 - deep
-        eta = np.array(
-            [*(bottom - _graded(2 - deep, fine * 2 / h, 0))[::-1], *(bottom + _graded(deep, fine * 2 / h, 0))[1:]]
-        )
+        eta = _beside(1 - deep, _graded(2 - deep, fine * 2 / h, 0), _graded(deep, fine * 2 / h, 0))
         eta = eta if upper else -eta[::-1]
-    S, middle = np.array(s), [np.convolve(x, [0.5, 0.5], "valid") for x in (np.array(s), theta, eta)]
+    middle = [np.convolve(x, [0.5, 0.5], "valid") for x in (s, theta, eta)]
     along, around = (middle[0] > one) & (middle[0] < two), middle[1] < side / r
     through = np.ones(len(eta) - 1, dtype=bool)
     if deep < 2:
         through = middle[2] > 1 - deep if upper else middle[2] < deep - 1
     gone = along[:, None, None] & around[:, None] & through
-    return _Grid(S, theta, eta, gone, is_rim or at_rim)
+    return _Grid(s, theta, eta, gone, is_rim or at_rim)
+
+
+def _beside(place: float, below: Array, above: Array) -> Array:
+    """Knots on both sides of a place, from their distances to it."""
+    return np.concatenate([(place - below)[::-1], (place + above)[1:]])
 
 
 def _graded(length: float, fine: float, both: bool | int, largest: float = np.inf) -> Array:

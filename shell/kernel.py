@@ -84,15 +84,8 @@ def shell_table(section: Section, n: int, through: Orders, eta: tuple[Array, Arr
     moved = np.stack([f[:, 0] for f in _jets(section, through, points)[0]])
     displacement = np.broadcast_to(moved, (*section.r.shape, *moved.shape))
     naghdi = through[2] == 0
-    return StrainTable(
-        strain,
-        displacement,
-        volume,
-        np.stack([along.values, along.slopes]),
-        section.position,
-        SHEAR_CORRECTION if naghdi else 1.0,
-        naghdi,
-    )
+    functions, transverse = np.stack([along.values, along.slopes]), SHEAR_CORRECTION if naghdi else 1.0
+    return StrainTable(strain, displacement, volume, functions, section.position, transverse, naghdi)
 
 
 def shell_gradients(section: Section, n: int, through: Orders, points: Array) -> tuple[Array, Array]:

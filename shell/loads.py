@@ -26,7 +26,7 @@ from shell.modes import Mode
 from shell.prestress import expansion_shares, mean_answer, neighbour, settle
 from shell.quadrature import Array
 from shell.solution import Solution, face_table, total
-from shell.system import Group, ShellGroup, System
+from shell.system import Group, System
 
 Kind = Literal["axial", "lateral", "spin", "pressure", "cooling"]
 WAVES: dict[Kind, int] = {"axial": 0, "lateral": 1, "spin": 0, "pressure": 0, "cooling": 0}
@@ -118,7 +118,7 @@ class Loads:
         """Largest stresses of the parts that are `counted` under so many units of each load at once."""
         stresses = [self._stress(kind, amount) for kind, amount in amounts.items() if amount]
         tension, mises = 0.0, (0.0, "wall")
-        for k, part in enumerate(self._parts):
+        for k, part in enumerate(group.parts for group in self._systems["axial"].groups):
             if not set(part) & set(self.counted):
                 continue
             for theta in AZIMUTHS if amounts.get("lateral") else (0.0,):
@@ -197,13 +197,6 @@ class Loads:
     @cached_property
     def _answer(self) -> Solution:
         return mean_answer(self.mode)[0]
-
-    @cached_property
-    def _parts(self) -> list[list[str]]:
-        groups = self._systems["axial"].groups
-        return [
-            ["wall"] * len(g.unknowns) if isinstance(g, ShellGroup) else list(map(str, g.mesh.parts)) for g in groups
-        ]
 
     def _stress(self, kind: Kind, amount: float) -> tuple[int, list[Array]]:
         solution, found = self.answers[kind], []

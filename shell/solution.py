@@ -149,7 +149,7 @@ class Solution:
                 found["membrane"] += membrane
                 found["bending"] += total([elastic]) - shear - membrane
             else:
-                in_stem = np.array([part == "stem" for part in group.mesh.parts])
+                in_stem = np.array(group.parts) == "stem"
                 found["stem"] += total([elastic[in_stem]])
                 found["root"] += total([elastic[~in_stem]])
                 found["kinetic_stem"] += total([kinetic[in_stem]]) * self.eigenvalue

@@ -55,6 +55,11 @@ class ShellGroup:
         return np.asarray(unknowns)
 
     @property
+    def parts(self) -> tuple[str, ...]:
+        """What part of the resonator each element belongs to."""
+        return ("wall",) * len(self.unknowns)
+
+    @property
     def axes(self) -> Array:
         """Parts of the radial and of the axial direction along tangent and normal, (r or z, tangent or normal, elements, stations, 1)."""
         t_r, t_z = self.section.tangent_r[..., None], self.section.tangent_z[..., None]
@@ -101,6 +106,11 @@ class SolidGroup:
     def spread(self, raw: Array) -> Array:
         """Unknowns (cells, size) of functions as they are in each cell."""
         return np.asarray(raw[self.unknowns] * np.repeat(self.signs, 3, axis=1))
+
+    @property
+    def parts(self) -> tuple[str, ...]:
+        """See `ShellGroup.parts`."""
+        return self.mesh.parts
 
     axes: ClassVar[Array] = np.eye(2)[:, :, None, None, None]  # see `ShellGroup.axes`; a cell's own are r and z
 

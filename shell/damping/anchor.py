@@ -15,7 +15,7 @@ from shell.patches import Patch, box, whole
 from shell.quadrature import Array, legendre
 from shell.resonator import Resonator
 from shell.solution import Solution, total
-from shell.system import SolidGroup, System
+from shell.system import System
 
 GROWTH = 6.0  # of the cells away from the stem
 PER_WAVE = 3  # cells over a shear wavelength
@@ -108,12 +108,7 @@ def _stand(mode: Mode, elastic: Elastic | VaryingElastic, base: Elastic | None, 
 
     standing = replace(root, patches=(*root.patches, *patches), held=held)
     system = assemble(resonator, replace(layout, solids=((standing, tied), *others)), n, level)
-    bases = [
-        np.array([part == "base" for part in group.mesh.parts])
-        if isinstance(group, SolidGroup)
-        else np.zeros(len(group.unknowns), dtype=bool)
-        for group in system.groups
-    ]
+    bases = [np.array(group.parts) == "base" for group in system.groups]
     return system, assemble_waves(system, (elastic, base), bases, layer)
 
 

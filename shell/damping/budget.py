@@ -141,13 +141,11 @@ def thermoelastic_cause(
 
 def bulk_cause(coefficient: float, exponent: float, relative_sd: float, source: str) -> LossCause:
     """Loss of the material's volume, φ = c f^b, f in Hz (Penn et al., Phys. Lett. A 352 (2006) 3, gr-qc/0507097)."""
-    return LossCause(
-        "bulk",
-        lambda v, T: coefficient * (v.omega(T) / (2 * np.pi)) ** exponent,
-        relative_sd,
-        source,
-        "choose another glass or alloy; anneal it",
-    )
+
+    def inverse_q(v: Vibration, T: Array) -> Array:
+        return coefficient * (v.omega(T) / (2 * np.pi)) ** exponent
+
+    return LossCause("bulk", inverse_q, relative_sd, source, "choose another glass or alloy; anneal it")
 
 
 def surface_cause(depth: float, relative_sd: float, source: str) -> LossCause:
@@ -156,13 +154,8 @@ def surface_cause(depth: float, relative_sd: float, source: str) -> LossCause:
     def inverse_q(v: Vibration, T: Array) -> Array:
         return np.full(len(T), depth * sum(face.integrate(face.energy) for face in v.surfaces) / v.strain_energy)
 
-    return LossCause(
-        "surface",
-        inverse_q,
-        relative_sd,
-        source,
-        "polish and etch the faces; subsurface grinding damage reaches deeper than the roughness",
-    )
+    advice = "polish and etch the faces; subsurface grinding damage reaches deeper than the roughness"
+    return LossCause("surface", inverse_q, relative_sd, source, advice)
 
 
 def film_causes(
@@ -174,15 +167,8 @@ def film_causes(
         check_film(film, v.thinnest)
         return np.full(len(T), film_internal_loss(film, v))
 
-    found = [
-        LossCause(
-            f"{name} film",
-            internal,
-            float(np.hypot(*relative)),
-            source,
-            "a thinner film, no film where the mode bends, or a metal with less loss",
-        )
-    ]
+    advice = "a thinner film, no film where the mode bends, or a metal with less loss"
+    found = [LossCause(f"{name} film", internal, float(np.hypot(*relative)), source, advice)]
     if film.heat is not None and heat is not None:
 
         def thermoelastic(v: Vibration, T: Array) -> Array:
@@ -190,9 +176,8 @@ def film_causes(
             return np.array([film_thermoelastic_loss(film, v, heat(float(t)), float(t)) for t in T])
 
         sd = float(np.hypot(relative[0], 0.2))  # films differ from the bulk whose constants they are given
-        found.append(
-            LossCause(f"{name} film, heat", thermoelastic, sd, source, "a thinner film, or a metal with less expansion")
-        )
+        advice = "a thinner film, or a metal with less expansion"
+        found.append(LossCause(f"{name} film, heat", thermoelastic, sd, source, advice))
     return found
 
 
@@ -208,26 +193,16 @@ def gas_cause(
     def inverse_q(v: Vibration, T: Array) -> Array:
         return np.array([gas_loss(v, gas, pressure * t / v.reference, float(t), accommodation) for t in T])
 
-    return LossCause(
-        "gas",
-        inverse_q,
-        float(np.hypot(relative_sd, model_sd)),
-        f"{gas.name} at {pressure:g} Pa, sealed",
-        "pump, bake and getter",
-    )
+    source, sd = f"{gas.name} at {pressure:g} Pa, sealed", float(np.hypot(relative_sd, model_sd))
+    return LossCause("gas", inverse_q, sd, source, "pump, bake and getter")
 
 
 def activated_cause(height: float, energy: float, peak: float, relative_sd: float, source: str) -> LossCause:
     """A Debye peak of height 1/Q at T_p (K) with an activation energy (eV)."""
     if not height >= 0:
         raise ShellError(f"the height of an activated loss must be 0 or positive, not {height:g}.")
-    return LossCause(
-        "activated",
-        lambda v, T: activated_loss(height, energy, peak, T),
-        relative_sd,
-        source,
-        "another glass (OH, alkali), or a working temperature away from the peak",
-    )
+    advice = "another glass (OH, alkali), or a working temperature away from the peak"
+    return LossCause("activated", lambda v, T: activated_loss(height, energy, peak, T), relative_sd, source, advice)
 
 
 def constant_cause(name: str, inverse_q: float, relative_sd: float, source: str, advice: str = "") -> LossCause:

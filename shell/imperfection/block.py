@@ -97,25 +97,20 @@ class Block:
 def condense(system: System, constants: tuple[Constants, ...], value: float, pair: Array | None = None) -> Block:
     """One harmonic with its solid parts condensed at λ = value; `pair` is the pair's vector in its own."""
     matrices, mass = system.operators(constants, -value)
-    numbers = system.pattern.unknowns
     around = pi * (2 if system.n == 0 else 1)
-    are_shell = [isinstance(group, ShellGroup) for group in system.groups]
-    of_shell = [mine for mine, group in zip(are_shell, system.groups, strict=True) for _ in group.unknowns]
-    shell = np.unique(np.concatenate([one for one, mine in zip(numbers, of_shell, strict=True) if mine]))
-    elements = [
-        (np.searchsorted(shell, one), around * A)
-        for one, A, mine in zip(numbers, matrices, of_shell, strict=True)
-        if mine
-    ]
+    of_shell = [isinstance(group, ShellGroup) for group in system.groups for _ in group.unknowns]
+    known = list(zip(system.pattern.unknowns, matrices, of_shell, strict=True))
+    walls, cells = ([(own, A) for own, A, mine in known if mine is kind] for kind in (True, False))
+    shell = np.unique(np.concatenate([own for own, _ in walls]))
+    elements = [(np.searchsorted(shell, own), around * A) for own, A in walls]
     shared = inside = np.zeros(0, dtype=np.intp)
     lifted = np.zeros((0, 0))
-    if not all(of_shell):
-        solid = np.unique(np.concatenate([one for one, mine in zip(numbers, of_shell, strict=True) if not mine]))
+    if cells:
+        solid = np.unique(np.concatenate([own for own, _ in cells]))
         inside, edge = np.setdiff1d(solid, shell), np.intersect1d(solid, shell)
         shared = np.searchsorted(shell, edge)
-        of_solid = [(n, A) for n, A, mine in zip(numbers, matrices, of_shell, strict=True) if not mine]
-        members, cells = zip(*of_solid, strict=True)
-        core = assemble_elements(members, cells, system.pattern.size)
+        members, stiff = zip(*cells, strict=True)
+        core = assemble_elements(members, stiff, system.pattern.size)
         coupling = core[inside][:, edge].toarray()
         lifted = -factor_symmetric(core[inside][:, inside], PIVOTING)(coupling)
         felt = core[edge][:, edge].toarray() + coupling.T @ lifted

@@ -98,16 +98,9 @@ def answer(task: Task, explorer: Explorer, plan: WorkPlan) -> Answer:
     others = search.local(centre, WIDE, without=best)(centre[: search.task.free])[0]
     foretold = search.goals.uncount(others)
     prices = _prices(search, scalar, smooth)
-    values = search.values[best]
+    values, place = search.values[best], search.goals.place
     limits = tuple(
-        Limit(
-            column,
-            sign,
-            limit,
-            shown(column, values[search.goals.place(column)]),
-            _margin(search, column, values),
-            price,
-        )
+        Limit(column, sign, limit, shown(column, values[place(column)]), _margin(search, column, values), price)
         for (column, sign, limit, _), price in zip(search.goals.limits, prices, strict=True)
     )
     spreads = spread_about(search, best) if task.keys.tolerance else ()

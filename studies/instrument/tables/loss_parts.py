@@ -9,6 +9,11 @@ from studies.schema.keys import Keys, number, says
 Positive = Annotated[float, number(above=0.0)]
 Share = Annotated[float, number(least=0.0, most=1.0)]
 Gas = Literal["air", "nitrogen", "argon", "hydrogen"]
+THICKNESS_WAVE = "relative amplitude of the circumferential wave 2n of its thickness (4θ for n = 2)"
+BULK = "of the material's own loss c f^b, f in Hz; of the loss table unless given"
+UNBALANCE = (
+    "first harmonic Σ m exp(iθ) of the rim's mass, on a stem; masses of [[imperfection.mass]] on the rim count besides"
+)
 
 
 class FilmKeys(Keys, frozen=True, kw_only=True):
@@ -23,19 +28,9 @@ class FilmKeys(Keys, frozen=True, kw_only=True):
     from_position: Annotated[Share, says("of the meridian, 0 … 1")] = 0.0
     to_position: Annotated[Share, says("likewise")] = 1.0
     coverage: Annotated[Share, says("covered share, of a pattern")] = 1.0
-    anisotropy: (
-        Annotated[
-            float,
-            number(
-                "relative amplitude of the circumferential wave 2n of its thickness (4θ for n = 2)",
-                least=0.0,
-                most=1.0,
-                relative_sd=1.0,
-                example=0.01,
-            ),
-        ]
-        | None
-    ) = None
+    anisotropy: Annotated[float, number(THICKNESS_WAVE, least=0.0, most=1.0, relative_sd=1.0, example=0.01)] | None = (
+        None
+    )
     anisotropy_angle_deg: Annotated[float, number("azimuth of its crest", sd=13.0)] = 0.0
     youngs_modulus_GPa: Annotated[Positive, says("of the film table unless given, as the next ones", example=80.0)] | None = None  # fmt: skip
     poisson_ratio: Annotated[float, number("of the film", above=-1.0, below=0.5, example=0.42)] | None = None
@@ -63,36 +58,14 @@ class LossParts(Keys, frozen=True, kw_only=True):
     pressure_Pa: Annotated[float, number("gas sealed in, at the reference temperature", least=0.0, relative_sd=0.5, example=0.001)] | None = None  # fmt: skip
     gas: Annotated[Gas, says("in the housing")] = "air"
     accommodation: Annotated[Share, says("share of molecules that leave a wall diffusely")] = 1.0
-    bulk_coefficient: (
-        Annotated[
-            float,
-            number(
-                "of the material's own loss c f^b, f in Hz; of the loss table unless given",
-                least=0.0,
-                relative_sd=0.4,
-                example=7.6e-12,
-            ),
-        ]
-        | None
-    ) = None
+    bulk_coefficient: Annotated[float, number(BULK, least=0.0, relative_sd=0.4, example=7.6e-12)] | None = None
     bulk_exponent: Annotated[float, number("b; of the loss table unless given", example=0.77)] | None = None
     surface_layer_pm: Annotated[float, number("depth times loss of the damaged surface; of the loss table unless given", least=0.0, relative_sd=0.2, example=5.2)] | None = None  # fmt: skip
     surface_treatment: Annotated[str, says("of the surface, as hrg materials NAME lists them; the best unless given", example="drawn")] | None = None  # fmt: skip
     surface_anisotropy: Annotated[float, number("wave 2n of the surface loss", least=0.0, most=1.0, relative_sd=1.0, example=0.01)] | None = None  # fmt: skip
     surface_anisotropy_angle_deg: Annotated[float, number("azimuth of its crest", sd=13.0)] = 0.0
     anchor_inverse_q: Annotated[float, number("loss through the mount", least=0.0, relative_sd=1.0, example=1e-09)] | None = None  # fmt: skip
-    unbalance_mg: (
-        Annotated[
-            float,
-            number(
-                "first harmonic Σ m exp(iθ) of the rim's mass, on a stem; masses of [[imperfection.mass]] on the rim count besides",
-                least=0.0,
-                relative_sd=0.5,
-                example=0.1,
-            ),
-        ]
-        | None
-    ) = None
+    unbalance_mg: Annotated[float, number(UNBALANCE, least=0.0, relative_sd=0.5, example=0.1)] | None = None
     unbalance_azimuth_deg: Annotated[float, number("of that mass")] = 0.0
     third_unbalance_mg: Annotated[float, number("the third, Σ m exp(3iθ); both together damp the patterns unequally", least=0.0, relative_sd=0.5, example=0.1)] | None = None  # fmt: skip
     third_unbalance_azimuth_deg: Annotated[float, number("of that mass")] = 0.0

@@ -10,24 +10,14 @@ if TYPE_CHECKING:
     from shell.material import Mount
 
 FASTEST = 1e-3  # 1/K
+BASE = "of the base that a stem ends in, or that a rim or face is joined to"
+Expansion = Annotated[float, number(BASE, least=-FASTEST, most=FASTEST, relative_sd=0.1, example=5.1e-06)]
 
 
 class MountKeys(Keys, frozen=True, kw_only=True):
     """Expansion of the base, and the temperature of the joint."""
 
-    expansion_per_K: (
-        Annotated[
-            float,
-            number(
-                "of the base that a stem ends in, or that a rim or face is joined to",
-                least=-FASTEST,
-                most=FASTEST,
-                relative_sd=0.1,
-                example=5.1e-06,
-            ),
-        ]
-        | None
-    ) = None
+    expansion_per_K: Expansion | None = None
     joined_at_degC: Annotated[float, number("where the joint is free of stress; the reference temperature unless given", least=-273.15, most=1500.0, example=20.0)] | None = None  # fmt: skip
     note: Note = ""
 

@@ -5,6 +5,8 @@ from typing import Annotated
 from studies.instrument.registry import CardTable
 from studies.schema.keys import Keys, Note, number, says
 
+COMPONENTS = "of the components of bias.damping_anisotropy along its axis and across it, which the correlations of length and axis then mean"
+
 
 class Correlations(Keys, frozen=True, kw_only=True):
     """Correlations of uncertain values."""
@@ -12,12 +14,7 @@ class Correlations(Keys, frozen=True, kw_only=True):
     names: Annotated[tuple[str, ...], says("keys of the card with an uncertainty")] = ()
     correlation: Annotated[tuple[tuple[float, ...], ...], says("of their normal coordinates")] = ()
     interval: Annotated[tuple[tuple[float, float], ...], says("90 %, in the unit of each key")] = ()
-    anisotropy_sd: Annotated[
-        tuple[float, float] | None,
-        says(
-            "of the components of bias.damping_anisotropy along its axis and across it, which the correlations of length and axis then mean"
-        ),
-    ] = None
+    anisotropy_sd: Annotated[tuple[float, float] | None, says(COMPONENTS)] = None
     frequency_level_Hz: Annotated[float, number("sd of how far the level of a further run may lie from the card's, as the runs tell it", least=0.0)] = 0.0  # fmt: skip
     bias_level_deg_per_h: Annotated[float, number("likewise", least=0.0)] = 0.0
     covered_degC: Annotated[tuple[float, float] | None, says("temperatures of the records, beyond which [law] is a guess")] = None  # fmt: skip

@@ -138,13 +138,8 @@ def compensate(model: Model, record: Record, *, extrapolate: bool) -> dict[str, 
     judged = drop_spikes(complete, record[output], record[column])
     model.check_range(column, record[column][judged], extrapolate)
     compensated = np.full(len(record), np.nan)
-    result = apply_chain(
-        chain,
-        record["time_s"][complete],
-        record[output][complete],
-        record[column][complete],
-        extrapolate=True,
-    )
+    time, raw, temperature = (record[name][complete] for name in ("time_s", output, column))
+    result = apply_chain(chain, time, raw, temperature, extrapolate=True)
     model.check_range(RATE, result.bias_compensated[judged[complete]], extrapolate)
     compensated[complete] = result.filtered
     return {f"{COMPENSATED}{RATE}": compensated}
