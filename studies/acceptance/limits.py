@@ -55,7 +55,7 @@ QUANTITIES = tuple(
         ("run_down_time_s", "12.14", "run-down time to 1/e of the amplitude", "s", RUN_DOWN, False),
         ("quality_factor", "12.14", "Q from the run-down", "", RUN_DOWN + ", and its frequency_Hz", False),
         ("bandwidth_Hz", "12.15", "bandwidth (−3 dB)", "Hz", SHAKEN, False),
-        ("delay_ms", "12.15", "output delay, up to half the bandwidth", "ms", SHAKEN),
+        ("delay_ms", "12.15", "output delay, of slow rates", "ms", SHAKEN),
         ("bias_trend_deg_per_h_per_year", "12.18", "bias drift over the records", "deg/h/year", LIFE),
     )
 )  # fmt: skip

@@ -1,65 +1,78 @@
 """What records show of a gyro in use: transfer function, angle kept without power, drift over its life."""
 
+import itertools
 import math
 from collections.abc import Sequence
 
 import numpy as np
 import scipy
+from numpy.polynomial import Polynomial
 
-from compensation.regression import fit_linear
-from studies.acceptance.measure import CONFIDENCE, YEAR, Found, Measured, of_fit, within
+from compensation.arrays import Array
+from compensation.regression import LinearFit, compare_nested, fit_linear
+from compensation.response import measure_response
+from studies.acceptance.measure import YEAR, Found, Measured, of_fit, within
 from studies.errors import InputError
 from studies.record import Record
 
-SEGMENTS = 8  # of a record, each with its own spectrum; half overlapping
 HEARD = 1e-4  # of the largest power of the applied rate, from which on a frequency is one that was applied
-COHERENT = 0.8
+TOLD = 0.1  # relative error of the response, below which a band tells it
+FEWEST = 8  # bands
+LEAST_TERMS, TERMS, RARE = 4, 7, 1e-3  # even powers, and odd ones, of the frequency: one more must pay at this level
+BEYOND = 1.25  # part of the corner up to which they are fitted
 HALF = math.sqrt(0.5)
 LEAST = 100  # rows
 
 
 def measure_transfer(record: Record) -> Found:
-    """Bandwidth and delay of the measured rate behind the applied one (12.15), from the cross-spectrum of a swept or shaken run.
+    """Bandwidth and delay of the measured rate behind the applied one (12.15), from a swept or shaken run.
 
-    H(f) = S_xy/S_xx where the applied rate has power and coherence; |H| has the relative error √((1 - γ²)/(2 γ² n)) of n segments.
+    1/H = e^{jωd} Σ_k c_k (jω)ᵏ with real c_k, of poles and a delay: the bandwidth is where |1/H|² is 2 c₀², -dφ/dω at rest is d + c₁/c₀.
     """
     time, x, y = (record[name] for name in ("time_s", "rate_deg_per_s", "measured_rate_deg_per_s"))
     step = np.diff(time)
     if len(time) < LEAST or np.ptp(step) > 1e-3 * float(np.median(step)) or not np.isfinite(x + y).all():
         raise InputError(f"{record.path}: a transfer function needs both rates in {LEAST} evenly spaced rows or more.")
-    rate, size = 1 / float(np.median(step)), max(2 * len(x) // (SEGMENTS + 1), 16)
-    f, across = scipy.signal.csd(x, y, rate, nperseg=size)
-    _, applied = scipy.signal.welch(x, rate, nperseg=size)
-    _, coherence = scipy.signal.coherence(x, y, rate, nperseg=size)
-    kept = (f > 0) & (applied > HEARD * applied[1:].max()) & (coherence > COHERENT)
-    if kept.sum() < 4:
-        raise InputError(f"{record.path}: the applied rate covers {int(kept.sum())} frequencies only; sweep it.")
-    f, H, squared = f[kept], across[kept] / applied[kept], coherence[kept]
-    gain, phase = np.abs(H), np.unwrap(np.angle(H))
-    error = np.sqrt((1 - squared) / (2 * squared * SEGMENTS))
-    start = float(np.median(gain[:3]))
-    z = float(scipy.special.ndtri(0.5 + CONFIDENCE / 2))
-
-    def falls(curve: np.ndarray) -> float | None:
-        below = np.flatnonzero(curve < HALF * start)
-        if not len(below):
-            return None
-        place = int(below[0])
-        if place == 0:
-            return float(f[0])
-        one, two = curve[place - 1], curve[place]
-        return float(f[place - 1] + (one - HALF * start) / (one - two) * (f[place] - f[place - 1]))
-
-    value, source = falls(gain), (record.path,)
+    f, H, error, applied = measure_response(x, y, 1 / float(np.median(step)))
+    kept = (applied > HEARD * applied.max()) & (error < TOLD * np.abs(H))
+    f, H, error, source = f[kept], H[kept], error[kept], (record.path,)
+    fallen = np.flatnonzero(np.abs(H) < HALF * np.median(np.abs(H[:FEWEST]))) if f.size else f
+    near = f <= (BEYOND * f[fallen[0]] if len(fallen) else np.inf)
+    if near.sum() < FEWEST:
+        raise InputError(f"{record.path}: the applied rate tells the response in {int(near.sum())} bands of frequency only; sweep it, or longer.")  # fmt: skip
+    corner = float(f[fallen[0]] if len(fallen) else f[-1])
+    f, H, weight = f[near], H[near], np.abs(H[near]) ** 2 / error[near]
+    late = float(-np.polyfit(2 * np.pi * f, np.unwrap(np.angle(H)), 1)[0])
+    inverse, u = np.exp(-2j * np.pi * f * late) / H, f / corner
+    even, odd = _fit_powers(u, inverse.real, weight, 0), _fit_powers(u, inverse.imag, weight, 1)
+    c0, c1, per = even.coefficients[0], odd.coefficients[0] / even.coefficients[0], 2 * np.pi * corner
+    sd = np.hypot(odd.standard_errors[0], c1 * even.standard_errors[0]) / abs(c0) / per
+    found = {"delay_ms": within(late + c1 / per, sd, source, odd.degrees_of_freedom, scale=1e3)}
     # where it does not fall off, the band that was applied is the least that it is
-    least = falls(gain * (1 - z * error)) or float(f[-1])
-    most = None if value is None else falls(gain * (1 + z * error))
-    found: Found = {"bandwidth_Hz": Measured(float(f[-1]) if value is None else value, least, most, source)}
-    low = f <= (value or f[-1]) / 2
-    if low.sum() >= 3:
-        fit = fit_linear(2 * np.pi * f[low][:, None], -phase[low], ["delay"])
-        found["delay_ms"] = of_fit(fit, 1, source, 1e3)
+    found["bandwidth_Hz"] = Measured(float(f[-1]), float(f[-1]), None, source)
+    if len(fallen):
+        R, S = Polynomial(even.coefficients), Polynomial(odd.coefficients)  # of u²; |1/H|² = R² + u² S²
+        excess = R**2 + Polynomial([0, 1]) * S**2 - 2 * c0**2
+        v = float(scipy.optimize.newton(excess, 1.0, excess.deriv()))
+        by_even, by_odd = 2 * R(v) * v ** np.arange(R.coef.size), 2 * v * S(v) * v ** np.arange(S.coef.size)
+        by_even[0] -= 4 * c0
+        sd = np.sqrt(by_even @ even.covariance @ by_even + by_odd @ odd.covariance @ by_odd) / abs(excess.deriv()(v))
+        free = min(even.degrees_of_freedom, odd.degrees_of_freedom)
+        found["bandwidth_Hz"] = within(np.sqrt(v), sd / 2 / np.sqrt(v), source, free, scale=corner)
     return found
+
+
+def _fit_powers(u: Array, values: Array, weight: Array, first: int) -> LinearFit:
+    """Fit every second power of u from the `first` on, as many as the data support."""
+    powers = first + 2 * np.arange(TERMS)
+    fits = [
+        fit_linear(
+            u[:, None] ** powers[:n] * weight[:, None], values * weight, [f"c{k}" for k in powers[:n]], constant=False
+        )
+        for n in range(LEAST_TERMS, min(TERMS, len(u) // 2) + 1)
+    ]
+    pays = [compare_nested(*pair).p_value < RARE for pair in itertools.pairwise(fits)]
+    return fits[max(np.flatnonzero(pays), default=-1) + 1]
 
 
 def measure_storage(record: Record) -> Found:
