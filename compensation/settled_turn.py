@@ -30,9 +30,9 @@ SETTLED, MOST = 1e-14, 60  # rad, of the azimuth from one round to the next; rou
 
 def turn_settled(
     wave: StandingWave, electronics: Electronics, time: ArrayLike, *, rate: ArrayLike = 0.0,
-    precession: ArrayLike = 0.0, angle: float = 0.0,
+    precession: ArrayLike = 0.0, angle: float = 0.0, wander: ArrayLike = 0.0,
 ) -> LoopRun:  # fmt: skip
-    """Return the output of settled loops, without noise, for a wave that `rate` and `precession` (rad/s, linear) turn from `angle`."""
+    """Return the output of settled loops for a wave that `rate` and `precession` (rad/s, linear) turn from `angle`, and `wander`, noise of the rate, each row's mean."""
     t = np.asarray(time, dtype=float)
     if t.ndim != 1 or not (np.diff(t) > 0).all():
         raise CompensationError("the times of a run must increase.")
@@ -41,7 +41,9 @@ def turn_settled(
     n = wave.harmonic
     x, y = _pickoff(electronics, n) @ [math.cos(n * angle), math.sin(n * angle)]
     off = (math.atan2(y, x) - n * angle + math.pi) % (2 * math.pi) - math.pi  # of the measured azimuth, times n
-    theta = _integrate(rows, electronics, t, turning, commanded, angle + off / n)
+    steps = np.broadcast_to(np.asarray(wander, dtype=float), t.shape)[:-1] * np.diff(t)
+    wandered = rows.bryan_factor * np.concatenate([[0.0], np.cumsum(steps)])
+    theta = _integrate(rows, electronics, t, turning, commanded, angle + off / n + wandered)
     return read_turning(rows, electronics, theta, rate=turning, precession=commanded, time=t)
 
 
@@ -103,9 +105,9 @@ def _terms(values: Array) -> Complex:
 
 
 def _integrate(
-    rows: StandingWave, electronics: Electronics, t: Array, rate: Array, command: Array, angle: float
+    rows: StandingWave, electronics: Electronics, t: Array, rate: Array, command: Array, angle: Array
 ) -> Array:
-    """The azimuth at the rows: what departs from the turn that rate and command would make alone.
+    """The azimuth at the rows: what departs from `angle` and the turn that rate and command would make alone.
 
     Rates, commands and B are straight lines between rows; the steps, one or more between two rows, are those of Simpson
     collocation,  x_m = x + h/24 (5 ẋ + 8 ẋ_m − ẋ'),  x' = x + h/6 (ẋ + 4 ẋ_m + ẋ'),  many of them solved at once in rounds.
@@ -120,9 +122,9 @@ def _integrate(
     first = np.concatenate([[0], np.cumsum(pieces)])
     # nodes and middles of the steps, in rows
     place = np.interp(np.arange(2 * first[-1] + 1), 2 * first, np.arange(len(t)))
-    time, turning, commanded = (np.interp(place, np.arange(len(t)), x) for x in (t, k * rate, command))
+    time, turning, commanded, begun = (np.interp(place, np.arange(len(t)), x) for x in (t, k * rate, command, angle))
     speeds = turning + commanded
-    swept = angle + np.concatenate([[0.0], np.cumsum(np.diff(time) * ((speeds[1:] + speeds[:-1]) / 2))])
+    swept = begun + np.concatenate([[0.0], np.cumsum(np.diff(time) * ((speeds[1:] + speeds[:-1]) / 2))])
     answers = 2 * n * (k * (np.abs(drift) @ order) + known * float((np.abs(shown) + np.abs(arriving)) @ order))
     window = np.cumsum(np.diff(time)[::2] * np.interp(place[1::2], np.arange(len(t)), answers)) // WINDOW
     edges = 2 * np.concatenate([[0], np.flatnonzero(np.diff(window)) + 1, [first[-1]]])

@@ -12,7 +12,8 @@ beside what scale the applied and the commanded turn have, and in drive, frequen
 C = Δ(1/τ) (cos 2nθ_τ, sin 2nθ_τ) − (δ + δ_d, κ + κ_d)/τ as the driven wave has it, W = Δω (cos 2nθ_ω, sin 2nθ_ω), δ and κ
 gain ratio and skew of the pick-offs, which also make the amplitude uneven that a commanded turn c (1/s) acts on, ε the phase error of the whole path. A wave that turns at one rate only cannot tell
 κ, δ and leakage from damping: turn it both ways. The drives' own gains (index d) act as damping does, and only a run-down without drive
-tells them apart; they are taken as given.
+tells them apart; they are taken as given. Drives turned by β against the pick-offs (index d again) let the nulled quadrature shift the frequency and the amplitude's drive
+turn the wave: frequency and turn show W and C turned by −nβ, and a commanded turn c needs n β c of drive more, which turning both ways takes out.
 
 Frequency and quadrature both tell W, drive and turn both C, the turn as C − ε W: columns that disagree beyond their errors widen the intervals,
 and where they disagree by more than a tenth, none is believed. Rows that their neighbours contradict count as the line between these.
@@ -38,6 +39,7 @@ LEAST_CONTRAST = 0.05  # least spread of the turn rate over its largest: below i
 SENSE = 0.1  # by which a turn may differ from what the applied rate makes, to be known as that
 FEW, ODD = 30, 6.0  # rows whose turns may be unknowns, and robust standard deviations that make one so
 LEAST_SPIKE = 1e-3  # of a column's span, by which a spike stands out
+MISALIGNED = 5e-4  # rad, usual standard deviation of the drives' misalignment to the pick-offs
 UNEVEN = np.array([0.005, 1e-3])  # usual standard deviations of gain ratio and skew (rad) of pick-offs and drives
 
 
@@ -62,12 +64,14 @@ def fit_whole_angle(
     time: ArrayLike, angle: ArrayLike, rate: ArrayLike, *, coupling: float, harmonic: int = 2,
     applied: ArrayLike = 0.0, decay: ArrayLike | None = None, frequency: ArrayLike | None = None,
     quadrature: ArrayLike | None = None, drive_gain_ratio: float = 0.0, drive_skew: float = 0.0,
-    pickoff_gain_ratio: float = 0.0, pickoff_skew: float = 0.0, late: float = 0.0, confidence: float = 0.95,
+    pickoff_gain_ratio: float = 0.0, pickoff_skew: float = 0.0, misalignment: tuple[float, float] = (0.0, MISALIGNED),
+    stiff: bool = False, late: float = 0.0, confidence: float = 0.95,
 ) -> WaveFit:  # fmt: skip
     """Fit splits, axes, gain ratio, skew and phase error to a whole-angle run: measured `angle` (rad), `rate` less the command, n k.
 
     Columns are means over rows; the angle is read `late` rows after each begins. A column that stands still, too coarse to follow the wave,
-    tells nothing. The pick-offs' gains count where the run does not tell them.
+    tells nothing. The pick-offs' gains count where the run does not tell them. `misalignment` of the drives (rad) is given with its
+    deviation; `stiff`: quadrature is nulled by a stiffness, which has none.
     """
     columns = {"angle": angle, "rate": rate}
     more = {"frequency": frequency, "quadrature": quadrature, "decay": decay}
@@ -111,11 +115,16 @@ def fit_whole_angle(
         # Where the pick-offs' gains make the amplitude rise and fall, its drive does so too; of a commanded turn it is a leak.
         y["decay"][:-1] -= (gains[0] * seen.sine - gains[1] * seen.cosine) * (harmonic * turn_rate / step - command)
     found = _modulated(seen, t, y, leaks, (leak * UNEVEN.max()) ** 2)
-    told = {name: one for name, (one, _) in found.items()} | {"rate": turned}
+    tilt = harmonic * misalignment[0], harmonic * misalignment[1]
+    told = {name: one for name, (one, _) in found.items()}
+    if "frequency" in told and not stiff:
+        told["frequency"] = _turned_back(told["frequency"], tilt, told["frequency"][0])
     if "decay" in told:
         told["decay"] = told["decay"][0] + leak * (gains + drives)[::-1] * [1, -1], told["decay"][1]
-        estimates["decay"] = found["decay"][1]
+        level, spread_of_level = found["decay"][1]
+        estimates["decay"] = level - leak * tilt[0], float(np.hypot(spread_of_level, leak * tilt[1]))
         loss = estimates["decay"][0]
+    told["rate"] = _turned_back(turned, tilt, told.get("decay", turned)[0])
     W = join_columns("frequency", ("frequency", "quadrature"), told, conflicts)[0]
     joined, epsilon = join_columns("damping", ("decay", "rate"), told, conflicts, W)
     wrong = {one.split for one in conflicts if not one.widened}
@@ -149,12 +158,14 @@ def fit_whole_angle(
     if "decay" not in estimates:
         undetermined.append("1/τ, because the drive effort (inverse_q) is not recorded, or finely enough to vary")
     if not both_ways:
-        undetermined.append("gain ratio and skew: the wave precesses at one rate only; precess it in both directions")
+        undetermined.append(
+            "gain ratio, skew and misalignment: the wave precesses at one rate only; precess it in both directions"
+        )
     if epsilon is None and not wrong:
         undetermined.append("phase error, which needs the drive effort (inverse_q) and the frequency or quadrature")
 
     def stated(values: dict[str, tuple[float, float]]) -> dict[str, Estimate]:
-        widened = _widen(estimates | values, harmonic, coupling)
+        widened = _widen(estimates | values, float(np.hypot(*tilt)), harmonic, coupling)
         return {name: Estimate.normal(*widened[name], z) for name in values}
 
     return WaveFit(
@@ -162,6 +173,12 @@ def fit_whole_angle(
         {name: stated(one) for name, one in alone.items()}, tuple(conflicts),
         {name: np.flatnonzero(rows) for name, rows in bad.items() if rows.any()},
     )  # fmt: skip
+
+
+def _turned_back(one: Told, tilt: tuple[float, float], split: Array) -> Told:
+    """What drives turned by `tilt` (rad of nθ, and its deviation) show of a split, as those of no tilt do."""
+    across = np.array([-split[1], split[0]])
+    return one[0] + tilt[0] * across, one[1] + tilt[1] ** 2 * np.outer(across, across)
 
 
 def _check_sense(turn: NDArray[np.float64], pushed: NDArray[np.float64]) -> None:
@@ -172,9 +189,12 @@ def _check_sense(turn: NDArray[np.float64], pushed: NDArray[np.float64]) -> None
         raise CompensationError("the wave turns against the applied rate, by the Bryan factor: a positive rate must turn the angle positively. Change the sign of the angle, or of applied and measured rate.")  # fmt: skip
 
 
-def _widen(estimates: dict[str, tuple[float, float]], harmonic: int, coupling: float) -> dict[str, tuple[float, float]]:
+def _widen(
+    estimates: dict[str, tuple[float, float]], tilt: float, harmonic: int, coupling: float
+) -> dict[str, tuple[float, float]]:
     """Add what formulas of first order leave out: of the size of the squares of the errors found, over 1/τ where damping is."""
-    squares = sum(estimates[name][0] ** 2 for name in ("gain_ratio", "skew", "phase_error") if name in estimates)
+    errors = [estimates[name][0] for name in ("gain_ratio", "skew", "phase_error") if name in estimates]
+    squares = float(np.sum(np.square([tilt, *errors])))
     scale = {name: estimates[name][0] for name in ("decay", "damping_split", "frequency_split") if name in estimates}
     split = scale.get("damping_split", 0.0)
     loss = scale.get("decay", split)

@@ -62,8 +62,8 @@ def fit_whole_angle(
 ) -> Result:
     """Find damping and frequency splits with their axes, gain ratio and phase error in a whole-angle run, with intervals.
 
-    The record needs time_s, pattern_angle_deg (unwrapped) and bias_deg_per_h or measured_rate_deg_per_s (the indicated rate
-    less the commanded precession). It may have inverse_q (drive effort), frequency_Hz, quadrature_V, and rate_deg_per_s if a
+    The record needs time_s, pattern_angle_deg and measured_rate_deg_per_s (the indicated rate less the commanded
+    precession) or bias_deg_per_h (that less the applied rate too). It may have inverse_q (drive effort), frequency_Hz, quadrature_V, and rate_deg_per_s if a
     rate was applied. A positive rate turns the angle positively, by the Bryan factor times the rate; where azimuth and rate are
     counted by the same hand the wave lags behind the shell, so change the sign of one. Each row holds means over its duration. Precess the wave in both directions: one direction does not determine
     the gain ratio. The phase error is that of the whole path; the gain ratio of the drives is taken from the card. Columns are
@@ -172,7 +172,9 @@ def _fit_record(
     record: Record, bryan_factor: float, volts_per_hertz: float | None, card: Instrument | None, confidence: float, late: float,
 ) -> WaveFit:  # fmt: skip
     loop = Loop() if card is None or card.loop is None else card.loop
-    rate = record[RATE] if RATE in record else record["bias_deg_per_h"] / 3600
+    applied = record.columns.get("rate_deg_per_s", 0.0)
+    rate = record[RATE] if RATE in record else applied + record["bias_deg_per_h"] / 3600
+    stated = {} if card is None else {value.name: value.sd for value in card.uncertain}
     frequency = record.columns.get("frequency_Hz")
     quadrature = decay = None
     if "quadrature_V" in record and volts_per_hertz is not None:
@@ -187,7 +189,7 @@ def _fit_record(
             np.radians(record["pattern_angle_deg"]),
             np.radians(rate),
             coupling=2 * bryan_factor,
-            applied=np.radians(record["rate_deg_per_s"]) if "rate_deg_per_s" in record else 0.0,
+            applied=np.radians(applied),
             decay=decay,
             frequency=None if frequency is None else 2 * np.pi * frequency,
             quadrature=quadrature,
@@ -195,6 +197,8 @@ def _fit_record(
             drive_skew=1e-3 * loop.drive_skew_mrad,
             pickoff_gain_ratio=loop.pickoff_gain_ratio,
             pickoff_skew=1e-3 * loop.pickoff_skew_mrad,
+            misalignment=(1e-3 * loop.misalignment_mrad, 1e-3 * stated.get("loop.misalignment_mrad", 0.5)),
+            stiff=loop.quadrature_control == "stiffness",
             late=late,
             confidence=confidence,
         )

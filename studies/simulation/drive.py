@@ -52,6 +52,7 @@ class Drive:
     start: float = 0.0  # since the start of the first run of the campaign
     moment: float | None = None  # s, POSIX: of the first row, where the record says it
     rate: Array | None = None  # array (N,), rad/s, or None: That is applied, at the rows
+    wander: Array | float = 0.0  # array (N,), rad/s: noise of the rate, means to the next row, that turns a free wave
     source: str = ""  # file that the commands and the rate are from
     # How much later (s) single jumps of the profile are, in their order from 0: between which two rows they were is all
     # that is known.

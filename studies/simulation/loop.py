@@ -189,8 +189,9 @@ def settled_columns(
     damping: NDArray[np.complex128] | None = None,
     time: Array | None = None,
     rate: ArrayLike = 0.0,
+    wander: ArrayLike = 0.0,
 ) -> dict[str, Array]:
-    """Return what the settled loops of a card record, `rate` in rad/s, without the offset and polynomial of `[bias]`."""
+    """Return what the settled loops of a card record, `rate` and `wander` in rad/s, without the offset and polynomial of `[bias]`."""
     loop, start = require_loop(instrument), float(np.radians(instrument.bias.pattern_angle_deg))
     angle = np.broadcast_to(np.asarray(start if pattern_angle is None else pattern_angle), np.shape(frequency))
     wave = wave_of(instrument, frequency, inverse_q, bryan_factor, damping=damping)
@@ -199,7 +200,7 @@ def settled_columns(
     if loop.mode == "force-rebalance":
         run = settle_rebalance(wave, electronics, rate, angle)
     elif pattern_angle is None and time is not None:
-        run = turn_settled(wave, electronics, time, rate=rate, precession=precession, angle=start)
+        run = turn_settled(wave, electronics, time, rate=rate, precession=precession, angle=start, wander=wander)
     elif pattern_angle is None or time is None:
         run = read_turning(wave, electronics, angle, rate=rate, precession=precession)
     else:  # whatever was commanded has turned it so

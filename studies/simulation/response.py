@@ -122,7 +122,7 @@ def read_out(
         free = instrument.loop.mode == "whole-angle"  # such a wave turns with all that feigns a rate
         rate_felt = applied + felt / DEG_PER_H if free else applied
         read = settled_columns(
-            instrument, frequency, inverse_q, law.bryan_factor, angle, wave, time=drive.time, rate=rate_felt
+            instrument, frequency, inverse_q, law.bryan_factor, angle, wave, drive.time, rate_felt, drive.wander
         )
         read["bias_deg_per_h"] = read["bias_deg_per_h"] - applied * DEG_PER_H + (0.0 if free else felt)
     return {"resonator_temperature_degC": warmed - zero_Celsius, **read}

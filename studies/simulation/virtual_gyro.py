@@ -1,7 +1,7 @@
 """A card and a drive become a record: the prediction of the one forward model, read with sensor, noise and rounding."""
 
 import datetime
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 from warnings import warn
 
@@ -83,6 +83,10 @@ def simulate_run(
     if instrument.loop is not None:
         frequency = float(law.frequency(instrument.reference_temperature))
         require_stable_loops(instrument, frequency, instrument.loss.inverse_q)
+    free = instrument.loop is not None and instrument.loop.mode == "whole-angle"
+    scatter = _draw_noise(levels, len(drive.time), rate, np.random.default_rng(seed))
+    if free:  # what scatters as a rate turns the wave, which all columns then follow
+        drive = replace(drive, wander=np.radians(scatter["bias_deg_per_h"] / 3600))
     tell("the run", 0.2)
     prediction = predict(instrument, drive, law=law, longest=_longest_step(drive))
     tell("the run", 0.7)
@@ -92,7 +96,6 @@ def simulate_run(
         turned = 0.0 if drive.rate is None else drive.rate
         use = find_range_use(instrument, wave, turned, drive.commands.get("pattern_angle"))
         require_range(instrument, use, turned, wave.coupling, drive.source)
-    free = instrument.loop is not None and instrument.loop.mode == "whole-angle"
     if free:  # its rate is what the azimuth does from row to row, and its other columns are means over the same time
         for name in ("frequency_Hz", "bias_deg_per_h", "inverse_q", "quadrature_V"):
             true[name] = np.append((true[name][1:] + true[name][:-1]) / 2, true[name][-1])
@@ -103,14 +106,7 @@ def simulate_run(
         columns[COLUMN["chamber"]] = drive.profile.at(drive.time) - zero_Celsius
     else:
         true["housing_temperature_degC"] = drive.profile.at(drive.time) - zero_Celsius
-    columns |= _observe(
-        true,
-        levels,
-        rate,
-        np.random.default_rng(seed),
-        sensed=drive.boundary == "chamber",
-        turns_by=prediction.law.bryan_factor if free else None,
-    )
+    columns |= _observe(true, levels, scatter, sensed=drive.boundary == "chamber", free=free)
     for name, (column, factor, power) in COMMANDS.items():
         if name in drive.commands:
             columns[column] = drive.commands[name] ** (1 / power) / factor
@@ -146,36 +142,34 @@ def _longest_step(drive: Drive) -> float:
     return min(max(FINEST, float(np.ptp(drive.time)) / MOST_STEPS), LONGEST_ROW)
 
 
-def _observe(
-    true: dict[str, Array],
-    levels: "NoiseKeys",
-    rate: float,
-    generator: np.random.Generator,
-    sensed: bool,
-    turns_by: float | None,
-) -> dict[str, Array]:
-    """Return the columns as they are read: noise and rounding, but of an imposed housing; `turns_by`: Bryan factor of a free wave."""
-    count = len(true["frequency_Hz"])
-    housing = true["housing_temperature_degC"]
-    scatter = Noise(levels.housing_white_K).draw(count, rate, generator)
-    frequency = true["frequency_Hz"] + frequency_noise(levels).draw(count, rate, generator)
-    wander = bias_noise(levels).draw(count, rate, generator)
-    bias = true["bias_deg_per_h"] + wander
-    loss = true["inverse_q"] * (1 + Noise(levels.inverse_q_white).draw(count, rate, generator))
-    read = {
-        "housing_temperature_degC": quantise(housing + scatter, levels.housing_resolution_degC) if sensed else housing,
-        "resonator_temperature_degC": true["resonator_temperature_degC"],
-        "frequency_Hz": quantise(frequency, levels.frequency_resolution_Hz),
-        "bias_deg_per_h": quantise(bias, levels.bias_resolution_deg_per_h),
-        "inverse_q": loss,
+def _draw_noise(levels: "NoiseKeys", count: int, rate: float, generator: np.random.Generator) -> dict[str, Array]:
+    """Draw the noise of the columns, of 1/Q over its size."""
+    own = {
+        "housing_temperature_degC": Noise(levels.housing_white_K),
+        "frequency_Hz": frequency_noise(levels),
+        "bias_deg_per_h": bias_noise(levels),
+        "inverse_q": Noise(levels.inverse_q_white),
+        "quadrature_V": Noise(levels.quadrature_white_V),
+        "pattern_angle_deg": Noise(levels.pattern_angle_white_deg),
     }
-    if "quadrature_V" in true:
-        read["quadrature_V"] = true["quadrature_V"] + Noise(levels.quadrature_white_V).draw(count, rate, generator)
-    if "pattern_angle_deg" in true:
-        read["pattern_angle_deg"] = true["pattern_angle_deg"]
-    if turns_by is not None:  # what scatters as a rate has turned the wave
-        angle = true["pattern_angle_deg"] + turns_by / rate / 3600 * np.cumsum(np.append(0.0, wander[:-1]))
-        read["pattern_angle_deg"] = angle + Noise(levels.pattern_angle_white_deg).draw(count, rate, generator)
+    return {name: noise.draw(count, rate, generator) for name, noise in own.items()}
+
+
+def _observe(
+    true: dict[str, Array], levels: "NoiseKeys", scatter: dict[str, Array], sensed: bool, free: bool
+) -> dict[str, Array]:
+    """Return the columns as they are read: noise and rounding, but of an imposed housing and of the azimuth of a wave that is held."""
+    housing, rounding = true["housing_temperature_degC"], levels.housing_resolution_degC
+    read = {
+        "housing_temperature_degC": quantise(housing + scatter["housing_temperature_degC"], rounding) if sensed else housing,
+        "resonator_temperature_degC": true["resonator_temperature_degC"],
+        "frequency_Hz": quantise(true["frequency_Hz"] + scatter["frequency_Hz"], levels.frequency_resolution_Hz),
+        "bias_deg_per_h": quantise(true["bias_deg_per_h"] + scatter["bias_deg_per_h"], levels.bias_resolution_deg_per_h),
+        "inverse_q": true["inverse_q"] * (1 + scatter["inverse_q"]),
+    }  # fmt: skip
+    for name in ("quadrature_V", "pattern_angle_deg"):
+        if name in true:
+            read[name] = true[name] + (scatter[name] if free or name == "quadrature_V" else 0.0)
     return read
 
 

@@ -200,6 +200,25 @@ def test_one_way_leaves_gain_ratio_open_and_says_so(gain):
     assert slow.undetermined[0].startswith("damping split and axis")
 
 
+@pytest.fixture(scope="module", params=[both_ways, lambda t: np.radians(0.5)], ids=["both ways", "one way"])
+def misaligned(request):
+    """A wave whose drives are 3 mrad off its pick-offs, and its run."""
+    wave = from_quality(4432.0, 1e6, damping_anisotropy=0.03, damping_axis=0.2, frequency_split=0.01)
+    return wave, run_of(wave, Electronics(drive=Channels(rotation=3e-3), noise=NOISE), request.param, 7, 5.0)
+
+
+def test_misaligned_drives_turn_neither_axis_nor_loss(misaligned):
+    """Taken as 0 and exact: frequency and quadrature were 145 errors apart, and of a turn one way 1/τ was 0.75 % off, 5800 errors."""
+    wave, run = misaligned
+    truth = {"decay": 1 / wave.tau, "frequency_split": wave.frequency_split, "frequency_axis": 0.0}
+    for known in ((3e-3, 1e-6), (0.0, 3e-3)):
+        fit = fit_of(run, wave, misalignment=known)
+        assert not fit.conflicts
+        for name, value in truth.items():
+            assert abs(fit.estimates[name].value - value) < 3 * fit.estimates[name].sd, name
+            assert known[1] > 1e-6 or fit.estimates[name].sd < 1e-3 * (value or 1.0), name  # knowing it is worth much
+
+
 def test_a_wave_that_turns_against_the_applied_rate_is_refused_with_the_sign_that_mends_it():
     """It once had a damping split of a fortieth of the true one, in an interval of a sixth of that."""
     time, k, harmonic = np.arange(0.0, 14400.0, 2.0), 0.27, 2

@@ -61,6 +61,18 @@ def test_what_is_missing_is_said(tmp_path, refuse):
     assert "the fit needs 90°" in refuse(["fit", "whole-angle", path, "--bryan-factor", "0.277"])
 
 
+def test_an_applied_rate_is_no_bias(tmp_path, ask):
+    """bias_deg_per_h is free of the applied rate, as measured_rate_deg_per_s is not."""
+    record = read_record(INPUTS / "wave.csv")
+    path, found = str(tmp_path / "run.csv"), []
+    still = {"rate_deg_per_s": np.full(len(record), 1e-3)}
+    for columns in ({}, still, still | {"measured_rate_deg_per_s": 1e-3 + record["bias_deg_per_h"] / 3600}):
+        write_record(record.with_columns(columns), path)
+        estimates = ask(["fit", "whole-angle", path, "--card", str(INPUTS / "wave.toml")])["estimates"]
+        found.append(estimates["bias.offset_deg_per_h"]["value"])
+    assert found == pytest.approx(found[:1] * 3, abs=1e-3)
+
+
 def test_columns_that_contradict_each_other_are_named_and_no_card_is_saved(tmp_path, capsys):
     record = read_record(INPUTS / "wave.csv")
     path, saved = str(tmp_path / "run.csv"), tmp_path / "card.toml"

@@ -110,13 +110,12 @@ def test_settled_commands_of_a_turning_wave_are_those_of_the_loops():
     assert given.rate[5:495] == pytest.approx(settled.rate[5:495], abs=1e-3 * np.std(settled.rate))
 
 
-def test_the_measured_azimuth_scatters_as_the_rate_turns_it(tmp_path):
-    """θ = ∫ k (Ω + noise) dt and white noise of the reading; a held wave's azimuth is commanded, exact."""
-    lines = (
-        CARD
-        + "[noise]\nbias_white_deg_per_rt_h = 1.0\nbias_flicker_deg_per_h = 0.0\nbias_walk_deg_per_h_per_rt_h = 0.0\n"
-    )
-    lines += "pattern_angle_white_deg = 1e-3\n"
+def test_noise_turns_the_wave_that_all_columns_follow(tmp_path):
+    """θ = ∫ k (Ω + noise) dt and white noise of the reading; the frequency is that of the turned azimuth."""
+    silent = "bias_flicker_deg_per_h = 0.0\nbias_walk_deg_per_h_per_rt_h = 0.0\n"
+    silent += "frequency_white_Hz = 0.0\nfrequency_flicker_Hz = 0.0\nfrequency_walk_Hz = 0.0\n"
+    lines = CARD.replace("split_mHz = 0.0", "split_mHz = 5.0") + "self_precession_deg_per_s = 0.05\n"
+    lines += f"[noise]\nbias_white_deg_per_rt_h = 3.0\npattern_angle_white_deg = 1e-3\n{silent}"
     chamber = "time_s,chamber_temperature_degC\n0,20\n7200,20\n"
     _, noisy = simulated(tmp_path, lines, chamber, noise=True)
     _, plain = simulated(tmp_path, lines, chamber)
@@ -124,5 +123,11 @@ def test_the_measured_azimuth_scatters_as_the_rate_turns_it(tmp_path):
     wander = noisy["bias_deg_per_h"] - plain["bias_deg_per_h"]
     step = np.median(np.diff(noisy["time_s"]))
     turned = K * np.concatenate([[0.0], np.cumsum(wander[:-1])]) * step / 3600
-    assert np.std(turned) > 5e-3
+    assert np.std(turned) > 0.3
     assert np.std(off - turned) == pytest.approx(1e-3 / np.sqrt(step), rel=0.1)
+    x = 4 * np.radians(noisy["pattern_angle_deg"])
+    X = np.stack([np.ones_like(x), np.cos(x), np.sin(x)], axis=1)
+    X, f = (X[1:] + X[:-1]) / 2, noisy["frequency_Hz"][:-1]  # means to the next row
+    b, left, *_ = np.linalg.lstsq(X, f, rcond=None)
+    assert np.hypot(*b[1:]) == pytest.approx(2.5e-3, rel=1e-3)
+    assert np.sqrt(left[0] / len(f)) < 1e-3 * 2.5e-3

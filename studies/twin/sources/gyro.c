@@ -25,6 +25,15 @@ static double polynomial(const double *p, double f, double r) {
 
 static double rounded(double value, double step) { return step > 0 ? rint(value / step) * step : value; }
 
+/* Noise of the zero-rate output over a span, deg/h. */
+static double draw_wander(Twin *w, double span) {
+    const double *p = w->p;
+    const TwinLevels of_bias = {60 * p[P_noise_bias_white_deg_per_rt_h], p[P_noise_bias_flicker_deg_per_h],
+        p[P_noise_bias_walk_deg_per_h_per_rt_h] / 60, p[P_noise_bias_turn_on_deg_per_h], p[P_noise_bias_markov_deg_per_h],
+        p[P_noise_bias_markov_s]};
+    return w->noise ? twin_draw(w, &w->of_bias, of_bias, span) : 0.0;
+}
+
 /* The columns as they are read: noise, the sensor's lag and rounding. */
 static void observe(Twin *w, double span) {
     const double *p = w->p;
@@ -36,20 +45,15 @@ static void observe(Twin *w, double span) {
     }
     const TwinLevels of_frequency = {p[P_noise_frequency_white_Hz], p[P_noise_frequency_flicker_Hz], p[P_noise_frequency_walk_Hz],
         0.0, p[P_noise_frequency_markov_Hz], p[P_noise_frequency_markov_s]};
-    const TwinLevels of_bias = {60 * p[P_noise_bias_white_deg_per_rt_h], p[P_noise_bias_flicker_deg_per_h],
-        p[P_noise_bias_walk_deg_per_h_per_rt_h] / 60, p[P_noise_bias_turn_on_deg_per_h], p[P_noise_bias_markov_deg_per_h],
-        p[P_noise_bias_markov_s]};
     out[OUT_frequency_Hz] = rounded(out[OUT_frequency_Hz] + twin_draw(w, &w->of_frequency, of_frequency, span),
         p[P_noise_frequency_resolution_Hz]);
-    const double wander = twin_draw(w, &w->of_bias, of_bias, span);
-    out[OUT_bias_deg_per_h] = rounded(out[OUT_bias_deg_per_h] + wander, p[P_noise_bias_resolution_deg_per_h]);
+    out[OUT_bias_deg_per_h] = rounded(out[OUT_bias_deg_per_h] + w->wander, p[P_noise_bias_resolution_deg_per_h]);
     out[OUT_inverse_q] *= 1 + p[P_noise_inverse_q_white] / sqrt(span) * twin_normal(w);
 #if TWIN_LOOPS
     out[OUT_quadrature_V] += p[P_noise_quadrature_white_V] / sqrt(span) * twin_normal(w);
 #endif
-#if TWIN_FREE /* what scatters as a rate has turned the wave */
-    w->wandered += w->row_time < 0 ? 0.0 : TWIN_BRYAN * span / 3600 * wander;
-    out[OUT_pattern_angle_deg] += w->wandered + p[P_noise_pattern_angle_white_deg] / sqrt(span) * twin_normal(w);
+#if TWIN_FREE
+    out[OUT_pattern_angle_deg] += p[P_noise_pattern_angle_white_deg] / sqrt(span) * twin_normal(w);
 #endif
 }
 
@@ -66,7 +70,10 @@ static void say(Twin *w, const double *said, double span) {
 }
 
 #if TWIN_FREE
-void twin_last_row(Twin *w) { say(w, w->said, w->step); }
+void twin_last_row(Twin *w) {
+    w->wander = draw_wander(w, w->step);
+    say(w, w->said, w->step);
+}
 #endif
 
 #if !TWIN_FREE
@@ -143,7 +150,8 @@ const char *twin_row(Twin *w, const TwinInput *in) {
     const double straight = TWIN_BIAS_SLOPE * excess, bent = thermal - TWIN_REFERENCE_FREQUENCY - straight;
     const double felt = polynomial(p, straight + TWIN_BIAS_BEND * bent, thermal * (slope * rate[0] + uneven)) + change[TARGET_BIAS];
     double *out = w->out, said[TWIN_SAID] = {frequency, 0.0, loss, 0.0};
-#if TWIN_FREE /* the wave turns with all that feigns a rate */
+    w->wander = draw_wander(w, span);
+#if TWIN_FREE /* the wave turns with all that feigns a rate, noise too */
     const double turned_by = applied + felt / DEG_PER_H, before = w->turning.rate + (w->held ? applied - w->applied : 0.0);
     const double command = radians(in->given[IN_PRECESSION] ? in->value[IN_PRECESSION] : p[P_loop_self_precession_deg_per_s]);
     twin_turn_freely(w, frequency, loss, wave, before, turned_by, command, span, said);

@@ -181,6 +181,7 @@ void twin_turn_freely(Twin *w, double frequency, double loss, const double *wave
     else {
         w->turning.rate = before;
         turn(w, &w->turning, &now, command, span);
+        w->azimuth += TWIN_BRYAN * radians(w->wander / 3600) * span;
     }
     w->turning = now;
     settle(w, frequency, loss, wave, rate, w->azimuth, 0.0, still);

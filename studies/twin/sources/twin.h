@@ -52,9 +52,10 @@ typedef struct Twin {
     double spare;
     int has_spare;
     TwinNoise of_frequency, of_bias;
-    /* Of a wave that turns freely: its measured azimuth (rad), what turns it, what its channels make of that, how far noise has
-     * turned it (deg); what was said of the last row; whether an input is held from a row to the next, or a straight line. */
-    double azimuth, wandered, said[TWIN_SAID], applied;
+    double wander; /* noise of the zero-rate output since the last row, deg/h */
+    /* Of a wave that turns freely: its measured azimuth (rad), what turns it, what its channels make of that; what was said of the
+     * last row; whether an input is held from a row to the next, or a straight line. */
+    double azimuth, said[TWIN_SAID], applied;
     TwinTurning turning;
     TwinComplex shown[TWIN_TERMS], arriving[TWIN_TERMS];
     int held;

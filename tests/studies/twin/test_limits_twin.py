@@ -183,19 +183,26 @@ def test_limits_wave_that_turns_freely(precession, control, folder):
 
 @pytest.mark.slow
 def test_limits_noise_turns_the_free_wave(folder):
-    """What is read as a rate has turned the azimuth by the Bryan factor times its integral; the rest is the angle's own white noise."""
-    noise = {"bias_white_deg_per_rt_h": 1.0, "bias_flicker_deg_per_h": 0.0, "bias_walk_deg_per_h_per_rt_h": 0.0}
-    noise |= {"pattern_angle_white_deg": 1e-3, "bias_resolution_deg_per_h": 0.0}
-    instrument = load_card("hrg-30mm-loops").with_table("loop", {"mode": "whole-angle"}).with_table("noise", noise)
+    """What is read as a rate has turned the azimuth by the Bryan factor times its integral, and the frequency is that of this azimuth."""
+    noise = {"bias_white_deg_per_rt_h": 3.0, "bias_flicker_deg_per_h": 0.0, "bias_walk_deg_per_h_per_rt_h": 0.0}
+    noise |= {"pattern_angle_white_deg": 1e-3, "bias_resolution_deg_per_h": 0.0, "frequency_white_Hz": 0.0}
+    noise |= {"frequency_flicker_Hz": 0.0, "frequency_walk_Hz": 0.0, "frequency_resolution_Hz": 0.0}
+    loop = {"mode": "whole-angle", "self_precession_deg_per_s": 0.05, "frequency_split_mHz": 5.0}
+    instrument = load_card("hrg-30mm-loops").with_table("loop", loop).with_table("noise", noise)
     program = compile_twin(instrument, folder / "wander")
     profile = write_profile(folder / "still.csv", {"time_s": [0.0, 7200.0], "chamber_temperature_degC": [20.0, 20.0]})
     noisy, plain = run_twin(program, profile, 2.0, 5), run_twin(program, profile, 2.0)
     wander = noisy["bias_deg_per_h"] - plain["bias_deg_per_h"]
     turned = plan_twin(instrument).constants["BRYAN"] * np.cumsum(np.append(0.0, wander[:-1])) * 2.0 / 3600
     off = noisy["pattern_angle_deg"] - plain["pattern_angle_deg"]
-    assert np.std(wander) == pytest.approx(60.0 / np.sqrt(2.0), rel=0.06)
-    assert np.std(turned) > 5e-3
+    assert np.std(wander) == pytest.approx(180.0 / np.sqrt(2.0), rel=0.06)
+    assert np.std(turned) > 0.3
     assert np.std(off - turned) == pytest.approx(1e-3 / np.sqrt(2.0), rel=0.06)
+    x = 4 * np.radians(noisy["pattern_angle_deg"])
+    X = np.stack([np.ones_like(x), np.cos(x), np.sin(x)], axis=1)
+    b, left, *_ = np.linalg.lstsq((X[1:] + X[:-1]) / 2, noisy["frequency_Hz"][:-1], rcond=None)
+    assert np.hypot(*b[1:]) == pytest.approx(2.5e-3, rel=1e-3)
+    assert np.sqrt(left[0] / len(x)) < 1e-3 * 2.5e-3
 
 
 @pytest.mark.slow
