@@ -141,8 +141,7 @@ def _parts(found: Answer, payload: dict[str, Any]) -> list[Any]:
         ]),
         Chapter("Search", [
             Figure(lambda: _draw_history(found), "Objective, and violation of the limits, of each design in the order in which they were computed."),
-            Table("Designs that could not be computed", [{"reason": reason, "designs": count} for reason, count in reasons.most_common(8)],
-                ("designs", "reason"), where="page"),
+            Table("Designs that could not be computed", reasons.most_common(8), "1: designs | 0: reason", where="page"),
         ]),
     ]  # fmt: skip
 

@@ -100,9 +100,8 @@ def status(folder: Folder) -> Result:
     found = _status(results, folder, is_running(folder))
     if found["state"] == "unfinished":
         _say_unfinished(results, folder)
-    rows = [{"item": key.replace("_", " "), "value": found[key]} for key in STATUS]
-    columns = "item | value: value .3"
-    table = Table(results.study.name, rows, columns, results.study.note)
+    rows = [(key.replace("_", " "), found[key]) for key in STATUS]
+    table = Table(results.study.name, rows, "0: item | 1: value .3", results.study.note)
     return Result(found, f"Study {results.study.name}", "Its progress.", [table, _reasons(results)])
 
 
@@ -185,8 +184,7 @@ def _status(results: Results, folder: str, running: bool) -> dict[str, Any]:
 
 
 def _reasons(results: Results) -> Table:
-    rows = [{"cases": count, "reason": reason} for reason, count in results.store.reasons(8)]
-    return Table("Failed cases", rows, ("cases", "reason"))
+    return Table("Failed cases", results.store.reasons(8), "1: cases | 0: reason")
 
 
 def _estimate_words(estimate: Effort) -> str:

@@ -72,7 +72,6 @@ def thermal(
         {"network": words, "tau": modes.time_constants[:count].tolist() + [None] * 3}
         for words, modes, count in (("whole heat path", whole, 3), ("shell and stem alone", alone, 1))
     ]
-    decisive = [{"constant": name, "effect": value} for name, value in list(influence.items())[:6]]
     return Result(
         payload,
         f"Heat path of {instrument.name}",
@@ -80,8 +79,8 @@ def thermal(
         [
             Table(f"{instrument.name}: time constants at {T0 - zero_Celsius:g} °C", constants,
                 "network | tau.0: slowest (s) .0f | tau.1: second (s) .0f | tau.2: third (s) .0f", ONE_LUMP),
-            Table("Sensitivity of the slowest time constant τ to each constant p", decisive,
-                [Column("constant", "constant", spell=name_constant), "effect: d ln τ / d ln p +.3f"]),
+            Table("Sensitivity of the slowest time constant τ to each constant p", list(influence.items())[:6],
+                [Column("0", "constant", spell=name_constant), "1: d ln τ / d ln p +.3f"]),
             Figure(lambda: _curves(transient, chamber, weights, names), "Temperatures in time."),
             Table("Temperatures (°C)" + (", with radiation" if not network.is_linear else ", linearised"),
                 rows_of(housed | temperatures), ["time_s: time (s) .0f | chamber_temperature_degC: chamber .3f", *(f"{name}: {name} .3f" for name in names)],

@@ -182,9 +182,8 @@ def _alternatives(diagnosis: "Inference", response: str) -> Iterator[Part]:
     caption = f"Baseline residual of {spoken(response)} (averages over {seen.step:.0f} s) against its inputs."
     yield Figure(lambda: pictures.residual_views(diagnosis, response), caption)
     for rivals in seen.alternatives:
-        rows = [{"name": name, "evidence": evidence} for name, evidence in rivals]
-        columns = "name: effect | evidence: evidence .1f"
-        yield Table(f"Alternatives to {rivals[0][0]}", rows, columns, note=EVIDENCE, where="page")
+        columns = "0: effect | 1: evidence .1f"
+        yield Table(f"Alternatives to {rivals[0][0]}", rivals, columns, note=EVIDENCE, where="page")
     if seen.left is not None:
         words = f"Lack of fit: strongest against {seen.left[0]}, evidence {seen.left[1]:.0f}."
         yield Sentence(words, where="page")

@@ -142,13 +142,12 @@ def fleet_parts(lot: Lot, page: Callable[[str], str] | None = None) -> list[Chap
         Figure(lambda: _draw(lot, ordered[:MOST]), caption) if ordered else None,
         Figure(lambda: _draw(lot, dated, by_date=True), "The same over the date.") if dated else None,
     ]
-    failed = [{"serial": serial, "why": why} for serial, why in lot.failed.items()]
     return [
         Chapter("The lot", [
             Sentence(headline(lot), where="terminal"), Facts(facts, "page"),
             Table("Causes", lot.shares, SHARES, "Sizes: smallest and largest of the coefficient."),
             Table("Values", ordered, VALUES, "Mean and scatter of the devices that agree with each other."),
-            Table("Devices without an answer", failed, "serial: device | why"),
+            Table("Devices without an answer", list(lot.failed.items()), "0: device | 1: why"),
         ]),
         Chapter("Control charts", charts),
         Chapter("Devices", [device_table(lot, page)]),

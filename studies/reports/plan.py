@@ -84,14 +84,13 @@ def plan_parts(plan: Plan, profiles: Sequence[str]) -> list[Chapter]:
         ("SNR 1", _noise(plan), f"noise of a row of {ROW:g} s"),
         ("Not testable", str(len(plan.invisible)), "the plan does not excite these effects"),
     ]
-    runs = [{"run": k, "chamber": words} for k, words in enumerate(profiles, 1)]
     sensors = [{"sensor": name, "count": len(pairs), "pairs": ", ".join(pairs)} for name, pairs in plan.sensors.items()]
     note = "Pairs that are confused at the smallest identified size. A sensor costs no chamber time; the most useful is listed first."
     return [
         Chapter("In short", [
             Sentence(headline(plan), where="terminal"),
             Facts(facts, "page"),
-            Table("Planned runs", runs, "run | chamber", where="page"),
+            Table("Planned runs", list(enumerate(profiles, 1)), "0: run | 1: chamber", where="page"),
             Figure(lambda: _draw(plan), "Probability (%) that each effect is identified, by its SNR; grey: larger than any published effect."),
         ]),
         Chapter("All effects", [

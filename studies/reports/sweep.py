@@ -114,12 +114,11 @@ def _asked(results: Results) -> list[Part]:
 def _failures(results: Results) -> list[Part]:
     if not results.failed.size:
         return []
-    reasons = [{"cases": count, "reason": reason} for reason, count in results.store.reasons()]
     places = results.failed[:MOST_ROWS].tolist()
     columns = (*_design_columns(results, places), Column(results.remark, "Reason"))
     return [
         Sentence("These designs have no result and are excluded from all figures on this page.", "warning"),
-        Table("Reasons", reasons, ("Cases", "Reason")),
+        Table("Reasons", results.store.reasons(), "1: Cases | 0: Reason"),
         Table("Failed designs", places, columns, sortable=True),
     ]
 
@@ -234,9 +233,8 @@ def _provenance(results: Results) -> list[Part]:
         "card": results.study.instrument.path,
         **{f"user function {name}": source for name, source in identity["functions"].items()},
     }
-    items = [{"item": item, "value": value} for item, value in facts.items()]
     return [
-        Table("Identity", items, ("Item", "Value")),
+        Table("Identity", list(facts.items()), "0: Item | 1: Value"),
         Table("Runs", runs, RUNS),
         *(f"Run {', '.join(counts)}: {words}." for words, counts in environments.items()),
         Sentence(about["spec_text"], "source") if about["spec_text"] else None,
