@@ -9,6 +9,7 @@ from compensation.arrays import Array
 
 CHANCE = 1e-3  # of a disagreement that is none
 LARGE = 0.1  # part of what columns tell, by which they disagree, beyond which one is wrong
+LEAST = 2.0  # standard deviations from which on a split has an axis
 FAR = 10.0  # standard deviations apart, from which one that a factor mends is wrong too
 Told = tuple[Array, Array]
 """Both components of a split, and their covariance."""
@@ -62,11 +63,13 @@ def join_columns(
 
 
 def polar(name: str, vector: Array, covariance: Array, harmonic: int) -> dict[str, tuple[float, float]]:
-    """Return a split and its axis from its two components, their deviations to first order."""
+    """Return a split and, unless it may be none, its axis from its two components, their deviations to first order."""
     size = float(np.hypot(*vector))
     along, across = vector / size, np.array([-vector[1], vector[0]]) / size
-    return {
-        f"{name}_split": (size, float(np.sqrt(along @ covariance @ along))),
+    split = {f"{name}_split": (size, float(np.sqrt(along @ covariance @ along)))}
+    if size < LEAST * split[f"{name}_split"][1]:
+        return split
+    return split | {
         f"{name}_axis": (
             float(np.arctan2(vector[1], vector[0])) / (2 * harmonic),
             float(np.sqrt(across @ covariance @ across)) / size / (2 * harmonic),

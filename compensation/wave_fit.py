@@ -37,6 +37,7 @@ LEAST_TURN = 2 * np.pi  # least span of x (rad): one period of what is looked fo
 LEAKS = ("leak", "leak cos", "leak sin")
 LEAST_CONTRAST = 0.05  # least spread of the turn rate over its largest: below it, turning both ways is missing
 SENSE = 0.1  # by which a turn may differ from what the applied rate makes, to be known as that
+DOUBLED = 5.0  # times as large a wave of x/2 as of x is no wave of x; of a drift it is up to 4
 FEW, ODD = 30, 6.0  # rows whose turns may be unknowns, and robust standard deviations that make one so
 LEAST_SPIKE = 1e-3  # of a column's span, by which a spike stands out
 MISALIGNED = 5e-4  # rad, usual standard deviation of the drives' misalignment to the pick-offs
@@ -58,6 +59,8 @@ class WaveFit:
     alone: dict[str, dict[str, Estimate]]  # what each column says by itself
     conflicts: tuple[Conflict, ...]
     spikes: dict[str, NDArray[np.intp]]  # rows of each column that their neighbours contradict
+    wrapped: float  # rad, where the angle was wrapped, which is undone; 0 where it was not
+    doubled: tuple[str, ...]  # columns that go as n θ rather than 2 n θ of the angle
 
 
 def fit_whole_angle(
@@ -78,13 +81,14 @@ def fit_whole_angle(
     columns |= {name: column for name, column in more.items() if column is not None and np.ptp(column)}
     t, *read = read_columns(time=time, **columns)
     step = require_regular(t, "the fit of a whole-angle run")
+    read[0], wrapped = unwrap(read[0], harmonic)
     # The angle turns by much of its span from row to row.
     bad = {name: find_spikes(y, LEAST_SPIKE * (name != "angle")) for name, y in zip(columns, read, strict=True)}
     y = {name: np.interp(t, t[~bad[name]], one[~bad[name]]) for name, one in zip(columns, read, strict=True)}
     theta, indicated = _begin_rows(y["angle"], late), y["rate"]
     x = 2 * harmonic * theta
-    if np.ptp(x) < LEAST_TURN:
-        raise CompensationError(f"the wave precesses by only {np.degrees(np.ptp(theta)):.3g}°; the fit needs {180 / harmonic:g}° or more: precess it faster or record longer.")  # fmt: skip
+    if np.ptp(x) <= LEAST_TURN:
+        raise CompensationError(f"the wave precesses by only {np.degrees(np.ptp(theta)):.3g}°; the fit needs more than {180 / harmonic:g}°: precess it faster or record longer.")  # fmt: skip
     turn_rate = np.diff(theta)
     both_ways = np.ptp(_smooth(turn_rate)) > LEAST_CONTRAST * np.max(np.abs(_smooth(turn_rate)))
     z = float(scipy.special.ndtri(0.5 + confidence / 2))
@@ -155,6 +159,8 @@ def fit_whole_angle(
             undetermined.append(f"{name} split and axis: in one direction they are not told from what uneven gains make of a commanded turn")  # fmt: skip
         elif name not in wrong:
             estimates |= own
+            if own and f"{name}_axis" not in own:
+                undetermined.append(f"{name} axis: the split is not told from none")
     if "decay" not in estimates:
         undetermined.append("1/τ, because the drive effort (inverse_q) is not recorded, or finely enough to vary")
     if not both_ways:
@@ -172,7 +178,26 @@ def fit_whole_angle(
         stated(estimates), tuple(undetermined), confidence,
         {name: stated(one) for name, one in alone.items()}, tuple(conflicts),
         {name: np.flatnonzero(rows) for name, rows in bad.items() if rows.any()},
+        wrapped, tuple(name for name, values in y.items() if name != "angle" and _is_doubled(x, values)),
     )  # fmt: skip
+
+
+def unwrap(angle: Array, harmonic: int) -> tuple[Array, float]:
+    """Return the angle (rad) as it turned, and the period of the wave, its axis or the circle within which it was wrapped (0: it was not)."""
+    for period in (np.pi / harmonic, np.pi, 2 * np.pi):
+        turned = np.unwrap(angle, period=period)
+        if np.ptp(angle) <= period < np.ptp(turned) and np.max(np.abs(np.diff(turned))) < period / 4:
+            return turned, period
+    return angle, 0.0
+
+
+def _is_doubled(x: Array, values: Array) -> bool:
+    """Tell whether a column goes around with x/2, hardly with x: angles that are n θ have been given for θ."""
+    if np.ptp(x) < 2 * LEAST_TURN:
+        return False
+    X = np.stack([np.ones_like(x), np.cos(x / 2), np.sin(x / 2), np.cos(x), np.sin(x)], axis=1)
+    b, varied = np.linalg.lstsq(X, values, rcond=None)[0], float(np.std(values))
+    return bool(np.hypot(*b[1:3]) > max(DOUBLED * np.hypot(*b[3:]), varied))
 
 
 def _turned_back(one: Told, tilt: tuple[float, float], split: Array) -> Told:

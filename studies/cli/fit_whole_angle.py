@@ -15,8 +15,10 @@ from studies.errors import InputError, naming
 from studies.instrument.card import Instrument
 from studies.instrument.tables.loop import Loop
 from studies.record import Record, read_record
+from studies.reports import style
+from studies.reports.digits import plain, to_error
 from studies.resonator.law import law_of
-from studies.results import Result, Sentence, Table
+from studies.results import Drawing, Figure, Result, Sentence, Table
 
 KEYS = {
     # estimate: key of the card, factor to its unit, name, unit
@@ -46,6 +48,8 @@ RATE = "measured_rate_deg_per_s"
 OWN = ("loops", "simulated")  # sources of records that hrg wrote, angles at the start
 KEYS_OF_CARD = tuple(key for key, *_ in KEYS.values() if key != "bias.offset_deg_per_h")
 ALONE = "The damping that the rate tells depends on the phase error: on that of the estimates, else on 0."
+DOUBLED = "{} go around once in 180° of pattern_angle_deg, not in 90°: that may be 2 θ, the electrical angle. Give the physical azimuth."
+WRAPPED = "pattern_angle_deg is wrapped at {:g}°; it counts unwrapped."
 NO_SCALE = "note: quadrature_V is not used because its scale is unknown; give --quadrature-volts-per-hertz or a card with [loop]."
 
 
@@ -92,12 +96,14 @@ def fit_whole_angle(
     found = fit_at(LATE[angle_at or "start"])
     estimates = _in_card_units(found.estimates, found, record)
     names = COLUMNS | ({"rate": RATE} if RATE in record else {})
-    wrong = any(not one.widened for one in found.conflicts)
+    wrong = bool(found.doubled) or any(not one.widened for one in found.conflicts)
     against = "its columns contradict each other" if wrong else ""
     saved = None if instrument is None else keep_card(_with_estimates(instrument, estimates), save, against)
     alone = {names[name]: _in_card_units(one, found, record) for name, one in found.alone.items()}
     left_out = {names[name]: record["time_s"][rows].tolist() for name, rows in found.spikes.items()}
     said = _contradictions(found, names)
+    if found.doubled:
+        said.append(DOUBLED.format(", ".join(names[name] for name in found.doubled)))
     payload: dict[str, object] = {"data": run, "confidence": confidence, "saved": saved, "estimates": estimates}
     payload |= {"undetermined": found.undetermined, "alone": alone, "contradictions": said, "left_out_s": left_out}
     rows = [_row(key, e) for key, e in estimates.items()]
@@ -117,10 +123,24 @@ def fit_whole_angle(
             *(Sentence(f"Not determined: {sentence}.", "warning") for sentence in found.undetermined),
             *(Sentence(_left_out(name, times), "warning") for name, times in left_out.items()),
             moved and Sentence(moved, "warning"),
+            Sentence(WRAPPED.format(degrees(found.wrapped))) if found.wrapped else None,
             Table("Each column alone", by_column, f"column | {columns}", ALONE, "everywhere" if wrong else "page"),
+            Figure(
+                lambda: _draw(record, names),
+                "Each column less its mean over the azimuth: splits go around once in 90°.",
+            ),
         ],
         status=2 * (saved != save),
     )
+
+
+def _draw(record: Record, names: dict[str, str]) -> Drawing:
+    shown = [name for key, name in names.items() if name in record and key != "angle"]
+    height, x = 0.6 + 1.5 * len(shown), "azimuth, modulo 90° (°)"
+    with style.figure(len(shown), height=height, x=x, y=shown, sharex=True, squeeze=False) as (made, axes):
+        for axis, name in zip(axes[:, 0], shown, strict=True):
+            axis.plot(record["pattern_angle_deg"] % 90.0, record[name] - record[name].mean(), ".", markersize=2)
+        return made
 
 
 def _row(key: str, estimate: dict[str, float]) -> dict[str, str | float]:
@@ -156,16 +176,17 @@ def _contradictions(found: WaveFit, names: dict[str, str]) -> list[str]:
 
 def _moved_by_the_middle(estimates: dict[str, dict[str, float]], other: dict[str, dict[str, float]]) -> str:
     """Say what would move by more than its error if the angles were those of the middle of the rows: the `other` estimates."""
-    moved = [(0.0, "", 0.0)]
+    moved = [(0.0, "")]
     for key in estimates.keys() & other.keys():
         off = other[key]["value"] - estimates[key]["value"]
         off = (off + 45) % 90 - 45 if key.endswith("axis_deg") else off
-        moved.append((abs(off) / estimates[key]["sd"], key, other[key]["value"]))
-    times, key, value = max(moved)
+        moved.append((abs(off) / estimates[key]["sd"], key))
+    times, key = max(moved)
     if times < 1:
         return ""
     name, unit = NAMES[key]
-    return f"Pattern angles count as read at the start of their rows. If they are of the middle, as means are, give --angle-at middle: {name} is then {f'{value:.4g} {unit}'.strip()} ({times:.2g} standard deviations away)."
+    here, there = (to_error(one[key]["value"], estimates[key]["sd"])[0] for one in (estimates, other))
+    return f"Pattern angles count as read at the start of their rows. If they are of the middle, as means are, give --angle-at middle: {name} is then {f'{there} {unit}'.strip()}, not {here} ({plain(times, 2)} standard deviations away)."
 
 
 def _fit_record(

@@ -200,6 +200,26 @@ def test_one_way_leaves_gain_ratio_open_and_says_so(gain):
     assert slow.undetermined[0].startswith("damping split and axis")
 
 
+@pytest.mark.parametrize("period", [90.0, 180.0, 360.0])
+def test_a_wrapped_angle_counts_unwrapped(uneven, period):
+    wave, run = uneven
+    wrapped = fit_of(replace(run, angle=run.angle % np.radians(period)), wave)
+    assert wrapped.wrapped == pytest.approx(np.radians(period))
+    for name, one in fit_of(run, wave).estimates.items():
+        off = wrapped.estimates[name].value - one.value
+        off = (off + np.pi / 4) % (np.pi / 2) - np.pi / 4 if name.endswith("_axis") else off
+        assert abs(off) < 1e-3 * one.sd, name
+
+
+def test_the_electrical_angle_is_known_by_the_columns_that_go_around_half_as_often(uneven):
+    wave, run = uneven
+    assert not fit_of(run, wave).doubled
+    found = fit_of(replace(run, angle=2 * run.angle), wave)
+    assert set(found.doubled) == {"frequency", "quadrature", "decay", "rate"}
+    assert not {"frequency_axis", "damping_axis"} & found.estimates.keys()  # of no split
+    assert any(sentence.startswith("frequency axis") for sentence in found.undetermined)
+
+
 @pytest.fixture(scope="module", params=[both_ways, lambda t: np.radians(0.5)], ids=["both ways", "one way"])
 def misaligned(request):
     """A wave whose drives are 3 mrad off its pick-offs, and its run."""
@@ -235,5 +255,5 @@ def test_a_wave_that_turns_against_the_applied_rate_is_refused_with_the_sign_tha
 
 def test_a_wave_that_hardly_turned_is_refused():
     time = np.arange(0.0, 100.0)
-    with pytest.raises(CompensationError, match=r"the wave precesses by only 10°; the fit needs 90°"):
+    with pytest.raises(CompensationError, match=r"the wave precesses by only 10°; the fit needs more than 90°"):
         fit_whole_angle(time, np.radians(10) * time / 99, 0 * time, coupling=0.554)
