@@ -231,8 +231,10 @@ def from_lock_in(time: ArrayLike, amplitudes: ArrayLike, carrier: float = 0.0) -
 
 
 def estimate_noise(values: Complex) -> float:
-    """Return the variance of white noise, summed over channels, from second differences; the median of |n|² is ln 2 times its mean."""
-    return float(np.sum(np.median(np.abs(np.diff(values, 2, axis=1)) ** 2, axis=1)) / (6 * np.log(2)))
+    """Return the variance of white noise, summed over channels, from second differences of what does not turn from row to row; the median of |n|² is ln 2 times its mean."""
+    turn = np.angle(np.vdot(values[:, :-1], values[:, 1:]))  # a line off the reference
+    still = values * np.exp(-1j * turn * np.arange(values.shape[1]))
+    return float(np.sum(np.median(np.abs(np.diff(still, 2, axis=1)) ** 2, axis=1)) / (6 * np.log(2)))
 
 
 def thin(envelope: Envelope, rows: int) -> Envelope:

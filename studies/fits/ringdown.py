@@ -30,6 +30,7 @@ from studies.instrument.card import Instrument
 from studies.record import CARTESIAN, DECAYS, PARTS, POLAR, POWERS, RAW
 
 KNOWN = ("time_s", "frequency_Hz", *DECAYS)
+FAR = 0.75  # of half of the rows a second: a line so far from the reference may be one that folds there
 # comments that hold a number, and the least that it may be
 NOTES = {"reference_frequency_Hz": 1e-3, "pressure_Pa": 0.0, "temperature_degC": -273.15}
 NOTE = re.compile(rf"^\W*({'|'.join(NOTES)})\s*:\s*(.*?)\s*$")
@@ -99,6 +100,13 @@ def read_decay(
         if expected is not None and envelope.carrier:
             _refuse_other(path, envelope.carrier, expected)
         found = analyse_decay(envelope, harmonic=harmonic)
+        rate, line = 1 / even_rows(time)[0], found.estimates["frequency_Hz"].value
+        if not raw and 2 * abs(line - envelope.carrier) > FAR * rate:
+            other = line - np.copysign(rate, line - envelope.carrier)
+            aliased = (
+                f"The line is {abs(line - envelope.carrier):.3g} Hz from the reference, near half of the {rate:.3g} rows a second: it may be the alias"
+                f" of one at {other:.8g} Hz. Set the reference nearer, or record more rows a second.",
+            )
         return _told(path, notes, replace(found, remarks=(*aliased, *found.remarks)))
 
 

@@ -452,3 +452,15 @@ def test_an_alias_whose_frequency_is_given_gives_the_resonator():
         held += inside.values()
     assert np.sqrt(np.mean(np.square(scores))) < 1.35
     assert np.mean(held) >= 0.78
+
+
+@pytest.mark.parametrize("part", [0.0, 0.6, 0.72, 0.8])
+def test_the_window_of_a_line_off_the_reference_is_the_whole_decay(part):
+    """Turns from row to row were taken for noise: of 400 s, 31 s were used where the line was 0.72 of half the rows a second away."""
+    random, time = np.random.default_rng(4), np.arange(0.0, 400.0, 0.2)
+    z = noisy(
+        draw_gyro(random).envelope(time, CARRIER, [1.0, 0.3]) * np.exp(1j * np.pi * part * time / 0.2), 1e-3, random
+    )
+    found = analyse_decay(from_lock_in(time, z, CARRIER))
+    assert found.window[1] > 0.95 * time[-1]
+    assert found.estimates["frequency_Hz"].value == pytest.approx(CARRIER + part / 0.4, abs=0.05)

@@ -243,3 +243,16 @@ def test_a_run_is_no_table_of_decays(tmp_path):
         InputError, match="chamber_temperature_degC is one of a run, and this command takes free decays"
     ):
         read_table(path)
+
+
+def test_a_line_near_half_of_the_rows_a_second_may_be_an_alias(tmp_path, ask):
+    """2.88 Hz from the reference at 5 rows a second stands at -2.12 Hz; nothing was said."""
+    t = np.arange(0.0, 200.0, 0.2)
+    for away, said in ((1.5, False), (2.88, True)):
+        z = noisy(GYRO.envelope(t, 4599.7 - away, [1.0, 0.8j]), 0.003, np.random.default_rng(1))
+        columns = {"time_s": t}
+        for part, one in zip(("cos", "sin"), z, strict=True):
+            columns[f"in_phase_{part}_V"], columns[f"out_of_phase_{part}_V"] = one.real, one.imag
+        path = write_columns(tmp_path / "far.csv", columns, [f"reference_frequency_Hz: {4599.7 - away}"])
+        (decay,) = ask(["fit", "ringdown", path])["decays"]
+        assert ("may be the alias of one at 4599.69 Hz" in " ".join(decay["remarks"])) is said
