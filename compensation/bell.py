@@ -47,8 +47,8 @@ class PolynomialCurve:
         low, high = float(np.min(x)), float(np.max(x))
         if low < self.lowest - beyond or high > self.highest + beyond:
             raise CompensationError(
-                f"the {name} runs from {low:.2f} to {high:.2f} {unit}, but the chain was fitted between "
-                f"{self.lowest:.2f} and {self.highest:.2f} {unit}; allow extrapolation or calibrate over that range."
+                f"the {name} runs from {low:.2f} to {high:.2f} {unit}, but the chain is valid from "
+                f"{self.lowest:.2f} to {self.highest:.2f} {unit}; allow extrapolation or calibrate over that range."
             )
 
 

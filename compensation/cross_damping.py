@@ -43,7 +43,7 @@ class CrossDampingModel:
     k: float  # k, zeta, g2: natural frequency (rad/s), relative damping (1) and Coriolis coefficient (1) of eq. (9)
     zeta: float
     g2: float
-    lowest: float  # lowest, highest: temperatures (°C) between which it was fitted
+    lowest: float  # lowest, highest: temperatures (°C) between which it is valid
     highest: float
     noise: float  # standard deviation (rad/s) of what the fit left
 
@@ -56,7 +56,7 @@ class CrossDampingModel:
         t, T = read_columns(time=time, temperature=temperature)
         if not extrapolate and (T.min() < self.lowest or T.max() > self.highest):
             raise CompensationError(
-                f"the temperature runs from {T.min():.2f} to {T.max():.2f} °C, but the model was fitted between {self.lowest:.2f} and {self.highest:.2f} °C; allow extrapolation or fit a wider record."
+                f"the temperature runs from {T.min():.2f} to {T.max():.2f} °C, but the model is valid from {self.lowest:.2f} to {self.highest:.2f} °C; allow extrapolation or fit a wider record."
             )
         return simulate_bias(t, self.cross_damping(T), self.k, self.zeta, self.g2)
 

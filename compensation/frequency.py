@@ -98,7 +98,7 @@ class FrequencyFit:
 
 @dataclass(frozen=True)
 class OrderComparison:
-    """Fits of rising order, the F-test of `fits[k]` against `fits[k + 1]`, and the lowest order that the next does not improve on."""
+    """Fits of rising order, the F-test of `fits[k]` against `fits[k + 1]`, and the lowest order that no higher one improves on."""
 
     fits: tuple[FrequencyFit, ...]
     against_next: tuple[FTest, ...]
@@ -127,7 +127,7 @@ def invert(curve: Callable[[Array], Array], span: tuple[float, float], frequency
     if np.any(outside):
         raise CompensationError(
             f"the frequency runs from {np.nanmin(frequency):.8g} to {np.nanmax(frequency):.8g} Hz and lies outside {low:.8g}"
-            f" to {high:.8g} Hz ({span[0]:.1f} to {span[1]:.1f} °C), over which the curve was fitted, in {100 * np.mean(outside):.1f} % of the readings; calibrate over that range."
+            f" to {high:.8g} Hz ({span[0]:.1f} to {span[1]:.1f} °C), where the curve holds, in {100 * np.mean(outside):.1f} % of the readings; calibrate over that range."
         )
     found = np.full(frequency.shape, np.nan)
     if np.any(known):
@@ -180,7 +180,7 @@ def compare_orders(
     temperature_degC: ArrayLike, frequency: ArrayLike, highest: int = 5, reference_temperature_degC: float = 0.0,
     resolution: float | None = None, level: float = 0.05,
 ) -> OrderComparison:  # fmt: skip
-    """Fit every order up to `highest` and test each against the next: F(1, m − p) = (SSE_k − SSE_{k+1}) / (SSE_{k+1} / (m − p))."""
+    """Fit every order up to `highest` and test each against higher ones: F(Δp, m − p) = ((SSE_k − SSE_l) / Δp) / (SSE_l / (m − p))."""
     readings = count_apart(temperature_degC)
     highest = min(highest, readings - 2)
     if highest < 1:
@@ -190,9 +190,14 @@ def compare_orders(
         for order in range(1, highest + 1)
     )
     tests = tuple(compare_nested(small.regression, large.regression) for small, large in pairwise(fits))
-    needed = [test.p_value < level for test in tests]
-    recommended = needed.index(False) + 1 if False in needed else highest
-    return OrderComparison(fits, tests, level, recommended)
+
+    def better(
+        own: FrequencyFit,
+    ) -> bool:  # some higher order, at the level shared among them: a law may lack the next power
+        higher = fits[own.order :]
+        return any(compare_nested(own.regression, one.regression).p_value < level / len(higher) for one in higher)
+
+    return OrderComparison(fits, tests, level, next(one.order for one in fits if not better(one)))
 
 
 def misreading_degC(one: FrequencyFit, other: FrequencyFit, temperature_degC: ArrayLike) -> Array:

@@ -155,7 +155,7 @@ class Model(ModelKeys, frozen=True, kw_only=True):
             raise InputError(f"{self.where} [[part]] {part.name}: the coefficients must be {names}, in this order.")
 
     def range_of(self, variable: str) -> tuple[float, float]:
-        """Return the lowest and highest value of a variable that the fit has seen."""
+        """Return the lowest and highest value of a variable for which the model is valid."""
         if variable not in self.validity:
             raise InputError(f"{self.where} [validity]: the range of '{variable}' is missing; add it.")
         return self.validity[variable]
@@ -168,8 +168,8 @@ class Model(ModelKeys, frozen=True, kw_only=True):
             lowest, highest = np.nanmin(values), np.nanmax(values)
             unit = f" {unit_of(variable)}".removesuffix(" 1")
             raise InputError(
-                f"{variable} runs from {lowest:.8g} to {highest:.8g}, outside {low:.8g} to {high:.8g}{unit} that the "
-                f"model was fitted to ({100 * np.mean(outside):.1f} % of the rows); calibrate over that range, or add --extrapolate."
+                f"{variable} runs from {lowest:.8g} to {highest:.8g}, outside {low:.8g} to {high:.8g}{unit}, which is what "
+                f"the model was fitted to and a little beyond ({100 * np.mean(outside):.1f} % of the rows); calibrate over that range, or add --extrapolate."
             )
 
 

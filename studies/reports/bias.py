@@ -160,7 +160,7 @@ def coefficients_table(judged: Judged, output: str) -> Table:
     unit = fit.variable.unit
     per, words = (60.0, "K/min") if unit == "°C" else (1.0, f"{unit}/s")
     (low, high), (slow, fast) = widen(*fit.state_range), (plain(per * end) for end in widen(*fit.rate_range))
-    note = f"Valid from {plain(low, 8)} to {plain(high, 8)} {unit} and from {slow} to {fast} {words}. Whiteness of the residual: θ = {fit.theta:.3f} (1: white, 0: random walk)."
+    note = f"Valid from {plain(low, 8)} to {plain(high, 8)} {unit} and from {slow} to {fast} {words}, a little beyond the data. Whiteness of the residual: θ = {fit.theta:.3f} (1: white, 0: random walk)."
     if judged.method == "guarded" and fit.theta < 0.99:
         note += " The errors include the drift of the bias."
     return Table(f"Coefficients, {METHOD[judged.method]}", rows, COEFFICIENTS, note)

@@ -5,7 +5,7 @@ import numpy as np
 from compensation.arrays import Array
 from compensation.errors import CompensationError
 from compensation.frequency import FrequencyFit, misreading_degC
-from studies.models.file import widen
+from studies.models.kinds.frequency import valid_range
 from studies.papers.hrg import FrequencyStudy
 from studies.reports import style
 from studies.reports.digits import raised
@@ -40,8 +40,8 @@ def coefficients_table(study: FrequencyStudy) -> Table:
         for k, (c, u) in enumerate(zip(study.fit.coefficients, study.fit.standard_errors, strict=True))
     ]
     columns = "name: Coefficient | value ± error: Value | Unit"
-    low, high = widen(*study.fit.temperature_range_degC)
-    note = f"With standard errors; a saved model has all digits and is valid from {low:.4g} to {high:.4g} °C."
+    low, high = valid_range(study.fit)
+    note = f"With standard errors; a saved model has all digits and is valid from {low:.4g} to {high:.4g} °C, a little beyond the data."
     return Table(f"Coefficients about T0 = {study.fit.reference_temperature_degC:g} °C", rows, columns, note)
 
 
@@ -72,6 +72,8 @@ def order_table(study: FrequencyStudy, settled: bool = False) -> Table:
 def order_sentence(study: FrequencyStudy) -> str:
     """Say which order the data support."""
     asked, order = study.orders.recommended, study.fit.order
+    if asked == order == len(study.orders.fits):
+        return f"A {name_order(order)} is needed; too few temperatures are given to test a higher order."
     if asked <= order:
         other = name_order(order + 1 if asked == order else order)
         return f"A {name_order(asked)} is sufficient: a {other} is not significantly better."

@@ -57,6 +57,16 @@ def test_a_straight_line_with_noise_asks_for_no_second_order():
     assert abs(np.mean(asked) - 0.05) < 3 * np.sqrt(0.05 * 0.95 / 300)
 
 
+def test_a_law_without_a_quadratic_part_is_a_cubic():
+    """About the middle of its range a cubic may have none: it was called a straight line, at p = 1e-4 of the cubic."""
+    rng = np.random.default_rng(8)
+    asked = [
+        compare_orders(T, 4425 + 0.37 * T + 1e-5 * (T - T.mean()) ** 3 + 2e-3 * rng.normal(size=T.size)).recommended
+        for _ in range(50)
+    ]
+    assert np.mean(np.array(asked) == 3) > 0.85
+
+
 def test_rounding_alone_passes_its_own_test():
     """Readings rounded to 0.01 Hz: χ² against resolution²/12 rejects the true order about one time in twenty."""
     rng = np.random.default_rng(9)

@@ -28,7 +28,7 @@ def save_frequency(fit: FrequencyFit, sources: tuple[ModelSource, ...], made_by:
         compensates="frequency_Hz",
         parts=(make_part("frequency", names, fit.coefficients, _units(len(names)), fit.covariance),),
         settings={REFERENCE: fit.reference_temperature_degC},
-        validity={VARIABLE: _widen(fit)},
+        validity={VARIABLE: valid_range(fit)},
         sources=sources,
         made_by=made_by,
     )
@@ -119,7 +119,7 @@ def _test_rows(model: Model) -> list[tuple[float, ...]]:
     return list(zip(T.tolist(), evaluate(model, T).tolist(), strict=True))
 
 
-def _widen(fit: FrequencyFit) -> tuple[float, float]:
+def valid_range(fit: FrequencyFit) -> tuple[float, float]:
     """Return the fitted range, wider by a twentieth on each side, but not beyond where the curve turns round."""
     low, high = fit.temperature_range_degC
     lowest, highest = widen(low, high)
