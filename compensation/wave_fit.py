@@ -128,9 +128,9 @@ def fit_whole_angle(
         level, spread_of_level = found["decay"][1]
         estimates["decay"] = level - leak * tilt[0], float(np.hypot(spread_of_level, leak * tilt[1]))
         loss = estimates["decay"][0]
-    told["rate"] = _turned_back(turned, tilt, told.get("decay", turned)[0])
+    told["rate"] = _turned_back(turned, tilt, told.get("decay", turned)[0] + loss * (gains + drives))
     W = join_columns("frequency", ("frequency", "quadrature"), told, conflicts)[0]
-    joined, epsilon = join_columns("damping", ("decay", "rate"), told, conflicts, W)
+    joined, epsilon = join_columns("damping", ("decay", "rate"), told, conflicts, None if stiff else W)
     wrong = {one.split for one in conflicts if not one.widened}
     if "damping" in wrong:  # nor is what the turn says of the gains believed
         gains, spread = card, UNEVEN
@@ -168,7 +168,9 @@ def fit_whole_angle(
             "gain ratio, skew and misalignment: the wave precesses at one rate only; precess it in both directions"
         )
     if epsilon is None and not wrong:
-        undetermined.append("phase error, which needs the drive effort (inverse_q) and the frequency or quadrature")
+        undetermined.append(
+            "phase error, which needs the drive effort (inverse_q), the frequency or quadrature, and quadrature that a force controls"
+        )
 
     def stated(values: dict[str, tuple[float, float]]) -> dict[str, Estimate]:
         widened = _widen(estimates | values, float(np.hypot(*tilt)), harmonic, coupling)
@@ -228,6 +230,8 @@ def _widen(
         widths |= {"frequency_split": scale["frequency_split"], "frequency_axis": 1 / (2 * harmonic)}
         widths["phase_error"] = loss / scale["frequency_split"]
     left_out = {name: squares * width for name, width in widths.items()}
+    uneven = float(np.linalg.norm([estimates.get(name, (0.0, 0.0))[0] for name in ("gain_ratio", "skew")]))
+    left_out |= {"gain_ratio": tilt * uneven, "skew": tilt * uneven}  # one as the other, in drives turned by it
     left_out["rate"] = np.sqrt(squares) * split / (4 * coupling)
     return {name: (value, float(np.hypot(sd, left_out.get(name, 0.0)))) for name, (value, sd) in estimates.items()}
 

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from compensation.actuators import Actuators
 from compensation.controllers import Loops
 from compensation.electronics import Channels, Electronics, LoopNoise
 from compensation.errors import CompensationError
@@ -198,6 +199,18 @@ def test_one_way_leaves_gain_ratio_open_and_says_so(gain):
     slow = run_and_fit(wave, Electronics(Channels(gain), noise=NOISE), lambda t: np.radians(-3.0), 0, seconds=300.0)
     assert "damping_split" not in slow.estimates
     assert slow.undetermined[0].startswith("damping split and axis")
+
+
+def test_a_stiffness_lets_neither_misalignment_nor_phase_error_through():
+    """Told as a force's control, the phase error was 0 with an interval that held no other."""
+    wave = from_quality(4432.0, 1e6, damping_anisotropy=0.03, damping_axis=0.2, frequency_split=0.01)
+    drive, control = Channels(rotation=3e-3, phase=0.01), Actuators(quadrature="stiffness")
+    run = run_of(wave, Electronics(drive=drive, noise=NOISE, actuators=control), both_ways, 7, 5.0)
+    fit = fit_of(run, wave, misalignment=(3e-3, 1e-6), stiff=True)
+    assert not fit.conflicts
+    assert "phase_error" not in fit.estimates
+    assert any(sentence.startswith("phase error") for sentence in fit.undetermined)
+    assert abs(fit.estimates["frequency_axis"].value) < 3 * fit.estimates["frequency_axis"].sd < 1e-3
 
 
 @pytest.mark.parametrize("period", [90.0, 180.0, 360.0])
