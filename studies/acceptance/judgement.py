@@ -8,7 +8,7 @@ from compensation.stability import AllanDeviation, NoiseCoefficients
 from studies.acceptance import measure
 from studies.acceptance.limits import QUANTITIES, Limits, TestedQuantity
 from studies.acceptance.measure import Found, Measured
-from studies.acceptance.runs import Test, sort_records
+from studies.acceptance.runs import Test, length_of, sort_records
 from studies.acceptance.service import measure_life, measure_storage, measure_transfer
 from studies.fits.ringdown import Decay
 from studies.record import Record
@@ -95,5 +95,9 @@ def judge(
         for record in sorted_runs.get(test, [])[1:]:
             used[record.path] = f"{test}, not used: only the first record of this test counts"
     used |= {decay.path: "run-down" for decay in decays}
-    used |= {record.path: "no test: its columns fit none" for record in left}
+    grown = found["inverse_q_trend_per_year"].sources if "inverse_q_trend_per_year" in found else ()
+    for record in left:
+        short = f"the output at rest is of {length_of(record):.4g} s, less than an hour"
+        none = short if output in record and "rate_deg_per_s" not in record else "its columns fit none of the tests"
+        used[record.path] = "growth of 1/Q" if record.path in grown else f"no test: {none}"
     return Acceptance(lines, used, band, allan, noise)

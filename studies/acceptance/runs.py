@@ -34,9 +34,14 @@ def test_of(record: Record, output: str) -> Test | None:
     column = temperature_column(record)
     if column is not None and np.nanmax(record[column]) - np.nanmin(record[column]) >= SPAN:
         return "temperature"
-    if output in record and record["time_s"][-1] - record["time_s"][0] >= HOUR:
+    if output in record and length_of(record) >= HOUR:
         return "drift"
     return None
+
+
+def length_of(record: Record) -> float:
+    """Return the time (s) that the rows of a record stand for, each for a step."""
+    return float(np.ptp(record["time_s"]) + np.median(np.diff(record["time_s"])))
 
 
 def temperature_column(record: Record) -> str | None:

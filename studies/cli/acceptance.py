@@ -70,7 +70,7 @@ def acceptance(card: Card, *runs: Records, limits: str | None = None, output: st
             except InputError as doubt:
                 say(f"warning: {doubt}")
         if found.used[record.path].startswith("no test"):
-            say(f"warning: {record.path} is not used: its columns fit none of the tests.")
+            say(f"warning: {record.path} is not used: {found.used[record.path].removeprefix('no test: ')}.")
     for line in lines:
         if line["limit"] is not None and line["needs"]:
             say(f"warning: {limits} limits {line['key']}, but no record gives it; it needs {line['needs']}.")

@@ -206,10 +206,29 @@ def test_a_run_down_that_does_not_decay_is_refused(folder, tmp_path, capsys):
 def test_a_record_that_shows_no_test_is_named(folder, tmp_path, capsys):
     t = np.arange(0, 500.0)
     write_record(Record({"time_s": t, "bias_deg_per_h": np.sin(t)}), tmp_path / "short.csv")
-    status, found, said = judged(capsys, tmp_path, ("short",))
+    write_record(Record({"time_s": t, "quadrature_V": np.sin(t)}), tmp_path / "other.csv")
+    status, found, said = judged(capsys, tmp_path, ("short", "other"))
     assert status == 0
-    assert "its columns fit none of the tests" in said
+    assert "short.csv is not used: the output at rest is of 500 s, less than an hour." in said
+    assert "other.csv is not used: its columns fit none of the tests." in said
     assert found["verdict"] == "incomplete"
+
+
+@pytest.mark.parametrize(("rows", "test"), [(360, "drift"), (300, "growth of 1/Q")])
+def test_an_hour_is_its_rows_and_a_record_of_loss_alone_is_used(tmp_path, capsys, rows, test):
+    """360 rows of 10 s are an hour, though the last begins after 3590 s; records that gave the growth of 1/Q were 'not used'."""
+    g, t = np.random.default_rng(1), np.arange(0, 10.0 * rows, 10.0)
+    for month in (1, 2, 3):
+        columns = {
+            "time_s": t,
+            "inverse_q": 1e-7 * month + g.normal(0, 1e-10, rows),
+            "bias_deg_per_h": g.normal(0, 1, rows),
+        }
+        start = datetime.datetime(2026, month, 1, tzinfo=datetime.UTC)
+        write_record(Record(columns, start=start), tmp_path / f"q{month}.csv")
+    _, found, said = judged(capsys, tmp_path, ("q1", "q2", "q3"))
+    assert set(found["records"].values()) == {test}
+    assert "not used" not in said
 
 
 @pytest.mark.slow
