@@ -187,13 +187,15 @@ def rigid_shapes(waves: WaveBasis, projector: Projector) -> Array:
     return np.asarray(np.linalg.lstsq(waves.along(x[inside]), shapes[inside], rcond=None)[0])
 
 
-def _sum_cells(waves: WaveBasis, rough: Array, limit: float, portions: Iterable[Points]) -> tuple[Array, int]:
-    """Over small cells: count, Σ position, Σ azimuth, Σ and Σ² of what a rough fit leaves; and how many points were used."""
+def _sum_cells(waves: WaveBasis, rough: Array, limit: float, portions: Iterable[Points]) -> tuple[Array, int, int]:
+    """Over small cells: count, Σ position, Σ azimuth, Σ and Σ² of what a rough fit leaves; how many points were used, and how many are outliers."""
     sums = np.zeros((5, ROWS * COLUMNS))
-    used = 0
+    used = outliers = 0
     for x, theta, off in portions:
-        left = off - waves.evaluate(rough, x, theta)
-        good = (abs(left) <= limit) & (x >= waves.low) & (x <= waves.high)
+        left = off - waves.evaluate(rough, np.clip(x, waves.low, waves.high), theta)
+        fits = abs(left) <= limit
+        good = fits & (x >= waves.low) & (x <= waves.high)
+        outliers += int(np.count_nonzero(~fits))
         x, theta, left = x[good], theta[good] % (2 * np.pi), left[good]
         row = np.minimum(((x - waves.low) / (waves.high - waves.low) * ROWS).astype(np.intp), ROWS - 1)
         cell = row * COLUMNS + np.minimum((theta / (2 * np.pi) * COLUMNS).astype(np.intp), COLUMNS - 1)
@@ -201,7 +203,7 @@ def _sum_cells(waves: WaveBasis, rough: Array, limit: float, portions: Iterable[
         for sum_, value in zip(sums, (np.ones(len(x)), x, theta, left, left**2), strict=True):
             sum_ += np.bincount(cell, value, ROWS * COLUMNS)
         used += len(x)
-    return sums, used
+    return sums, used, outliers
 
 
 def _fit(
@@ -210,7 +212,7 @@ def _fit(
 ) -> Face:  # fmt: skip
     rough, limit = waves.fit_roughly(*sample)
     portions = (place(points[k : k + CHUNK]) for k in range(0, len(points), CHUNK))
-    sums, used = _sum_cells(waves, rough, limit, portions)
+    sums, used, outliers = _sum_cells(waves, rough, limit, portions)
     full = sums[0] > 0
     count = sums[0, full]
     x, theta, left = sums[1:4, full] / count
@@ -235,7 +237,7 @@ def _fit(
     cells = (x, theta, left + design @ rough, count)
     return Face(
         waves, waves.complex(rough + change), inverse * variance, float(np.sqrt(variance)), len(points),
-        len(points) - used, cells, motion, turning,
+        outliers, cells, motion, turning,
     )  # fmt: skip
 
 
