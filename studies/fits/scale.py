@@ -138,6 +138,12 @@ def study_scale(records: Sequence[Record], cutoff: float | None, order: int) -> 
     sampling = float(np.median(np.diff((rest or rates).time)))
     if from_table:
         cutoff = None  # parts of a table are no even rows
+    if cutoff is not None and not 0 < cutoff < 0.5 / sampling:
+        slowest = sorted_runs[several if rest is None else list(KINDS)[1]][1]
+        raise InputError(
+            f"{slowest}: the FIR filter's cut-off of {cutoff:g} Hz is impossible at an output every {sampling:g} s;"
+            f" give --cutoff {0.4 / sampling:.3g}, or --no-filter."
+        )
     shortest = min(len(run.time) for run in there)
     if cutoff is not None and order >= shortest:
         raise InputError(f"a FIR filter of order {order} is longer than a run of {shortest} rows; lower --order.")

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, replace
 from itertools import combinations
-from math import ceil
+from math import ceil, sqrt
 
 import numpy as np
 import scipy
@@ -73,7 +73,7 @@ class ColumnSurvey:
     zeros: int = 0
     steps: tuple[Step, ...] = ()
     line: Line | None = None
-    white: float = 0.0  # Allan deviation at 1 s of the white noise that second differences show
+    white: float = 0.0  # Allan deviation at 1 s of the white noise that second differences show, rounding at least
     stability: Stability | None = None
     density: Density | None = None
 
@@ -147,6 +147,7 @@ def survey_column(name: str, time: Array, values: Array) -> ColumnSurvey:
         return found
     clean = np.where(spikes, np.nan, values)
     t, thin, width = average_evenly(time, clean)
+    rounding = 0.0 if name in COMMANDED else own.resolution / sqrt(12)
     try:
         spacing, series = unbroken(time, {name: clean}, spikes_left_out=True)
         stability = read_stability(series[name], spacing, CONFIDENCE)
@@ -156,7 +157,7 @@ def survey_column(name: str, time: Array, values: Array) -> ColumnSurvey:
         found,
         steps=find_steps(t, thin),
         line=find_line([(t, thin)], width, float(t[-1] - t[0]) / 20) if is_regular(t) else None,
-        white=white_rms(y) * float(np.sqrt(np.median(np.diff(time[known])))),
+        white=max(white_rms(y), rounding) * float(np.sqrt(np.median(np.diff(time[known])))),
         stability=stability,
         density=find_density(time, clean),
     )

@@ -321,7 +321,11 @@ def test_settled_rows():
         ([1, 2], [], "of several rates"),
         ([0, 1, 1], [], "both runs at rest"),
         ([], [], "DATA is missing"),
-        ([0, 1, 2], ["--cutoff", "200"], "200 Hz is impossible"),
+        (
+            [0, 1, 2],
+            ["--cutoff", "200"],
+            "rest.csv: the FIR filter's cut-off of 200 Hz is impossible at an output every 0.1 s; give --cutoff 4, or --no-filter.",
+        ),
     ],
 )
 def test_missing_runs_and_an_impossible_cut_off_are_named(records, files, more, words, refuse):

@@ -106,6 +106,13 @@ def test_recovery_levels_of_noise_are_read_off():
     assert found.K == pytest.approx(0.02, abs=4 * found.K_uncertainty)
 
 
+def test_limits_white_noise_is_rounding_at_least():
+    """A slow ramp in steps of 0.001 has few second differences: its noise was 5e-15, that of the computer."""
+    t = np.arange(0.0, 10000.0, 5.0)
+    found = survey_column("housing_temperature_degC", t, np.round(20 + 2e-5 * t, 3))
+    assert found.white == pytest.approx(1e-3 / np.sqrt(12) * np.sqrt(5.0), rel=1e-6)
+
+
 def test_planted_correlation_of_changes_tells_a_cause_from_a_drift():
     rng = np.random.default_rng(4)
     drift, driver = T / 400, rng.standard_normal(200).repeat(20)
