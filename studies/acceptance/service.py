@@ -5,7 +5,6 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-import scipy
 from numpy.polynomial import Polynomial
 
 from compensation.arrays import Array
@@ -19,7 +18,7 @@ HEARD = 1e-4  # of the largest power of the applied rate, from which on a freque
 TOLD = 0.1  # relative error of the response, below which a band tells it
 FEWEST = 8  # bands
 LEAST_TERMS, TERMS, RARE = 4, 7, 1e-3  # even powers, and odd ones, of the frequency: one more must pay at this level
-BEYOND = 1.25  # part of the corner up to which they are fitted
+BEYOND, SAME = 1.25, 1e-9  # part of the corner up to which they are fitted; imaginary part of a real root
 HALF = math.sqrt(0.5)
 LEAST = 100  # rows
 
@@ -53,7 +52,15 @@ def measure_transfer(record: Record) -> Found:
     if len(fallen):
         R, S = Polynomial(even.coefficients), Polynomial(odd.coefficients)  # of u²; |1/H|² = R² + u² S²
         excess = R**2 + Polynomial([0, 1]) * S**2 - 2 * c0**2
-        v = float(scipy.optimize.newton(excess, 1.0, excess.deriv()))
+        v = min(
+            (float(root.real) for root in excess.roots() if abs(root.imag) < SAME),
+            key=lambda root: abs(root - 1),
+            default=0.0,
+        )
+        if not u[0] ** 2 < v < u[-1] ** 2:
+            raise InputError(
+                f"{record.path}: noise hides where the response falls by 3 dB, near {corner:.3g} Hz; apply larger rates, or for longer."
+            )
         by_even, by_odd = 2 * R(v) * v ** np.arange(R.coef.size), 2 * v * S(v) * v ** np.arange(S.coef.size)
         by_even[0] -= 4 * c0
         sd = np.sqrt(by_even @ even.covariance @ by_even + by_odd @ odd.covariance @ by_odd) / abs(excess.deriv()(v))

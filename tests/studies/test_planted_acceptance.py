@@ -9,6 +9,7 @@ import pytest
 from studies.acceptance.measure import measure_scale, measure_temperature
 from studies.acceptance.service import measure_transfer
 from studies.cli import main
+from studies.errors import InputError
 from studies.record import Record, read_record, write_record
 from thermal.lag import lag
 
@@ -286,6 +287,26 @@ def test_intervals_of_a_swept_gyro_hold_its_bandwidth_and_delay(corner):
             slack = 2e-4 * value  # of the lag in steps
             held[key] += found[key].low - slack <= value <= found[key].high + slack
     assert min(held.values()) >= 15, held
+
+
+def test_a_response_lost_in_noise_is_refused():
+    """A bandwidth of 3 Hz in noise as large as the rate, of 20 s: told or refused in a sentence, never a number that is none."""
+    from scipy import signal
+
+    lag, refused = np.exp(-2 * np.pi * 3.0 / 200), 0
+    for seed in range(30):
+        g = np.random.default_rng(seed)
+        applied = g.normal(0, 10, 4000)
+        read = signal.lfilter([1 - lag], [1, -lag], applied) + g.normal(0, 3, applied.size)
+        columns = {"time_s": np.arange(4000) / 200, "rate_deg_per_s": applied, "measured_rate_deg_per_s": read}
+        try:
+            found = measure_transfer(Record(columns, path="noisy"))["bandwidth_Hz"]
+        except InputError:
+            refused += 1
+        else:
+            assert np.isfinite([found.value, found.low]).all()
+            assert 0.5 < found.value / 3.0 < 2.0
+    assert 0 < refused
 
 
 @pytest.mark.parametrize(
