@@ -12,6 +12,7 @@ REPEATED = 0.5  # part of the rows of a record that stand in another of the same
 PICKED = 500  # rows that are compared
 ALIKE, AS_LARGE = 0.9, 0.02
 """Correlation of the noise of two columns, and ln of its sizes: of another gyro it is scaled."""
+SAME_NOISE = "their noise is the same row by row (simulated runs need a --seed each)"
 FEWEST_ALIKE, MOST_ALIKE = 50, 20_000  # rows that show it
 
 
@@ -27,7 +28,8 @@ def drop_repeats(records: Sequence[Record]) -> tuple[list[Record], list[str]]:
         if len(record) > len(twin):
             place = next(k for k, one in enumerate(kept) if one is twin)
             kept[place], record, twin = record, twin, record
-        said.append(f"{record.path or 'a record'} repeats {twin.path or 'another'} and is left out.")
+        whole = f"{record.path or 'a record'} repeats {twin.path or 'another'} and is left out"
+        said.append(f"{whole}{': ' + SAME_NOISE if has_noise_of(record, twin) else ''}.")
     return kept, said + _overlaps(kept)
 
 
@@ -51,7 +53,7 @@ def repeats(one: Record, two: Record) -> bool:
     """Whether two records are of one run: of the shorter, most rows stand in the other too, whatever their time, or one output scatters as the other does; noise never repeats itself."""
     if one.sha256 and one.sha256 == two.sha256:
         return True
-    if len(one) == len(two) and any(_same_noise(one[key], two[key]) for key in OUTPUTS if key in one and key in two):
+    if has_noise_of(one, two):
         return True
     short, long = (dict(own.columns) for own in sorted((one, two), key=len))
     if not set(short) <= set(long):
@@ -65,6 +67,15 @@ def repeats(one: Record, two: Record) -> bool:
     columns = ([np.nan_to_num(own[name][at], nan=np.inf).tolist() for name in names] for own, at in places)
     rows, there = (set(zip(*one, strict=True)) for one in columns)
     return len(rows & there) > REPEATED * len(picked)
+
+
+def has_noise_of(one: Record, two: Record) -> bool:
+    """Whether an output of one record scatters as that of the other does, row by row, about values of its own."""
+    return len(one) == len(two) and any(
+        _same_noise(one[key], two[key]) and not np.array_equal(one[key], two[key], equal_nan=True)
+        for key in OUTPUTS
+        if key in one and key in two
+    )
 
 
 def _same_noise(one: Array, two: Array) -> bool:
