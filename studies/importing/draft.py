@@ -48,7 +48,8 @@ def draft_map(paths: Sequence[str]) -> Draft:
     ]
     if len(paths) == 1 and not is_container(paths[0]) and (table := _draft_table(paths[0])) is not None:
         lines, unused = table
-        return Draft("\n".join([*head, 'target = "table"', "", *lines]) + "\n", TABLE_TARGETS, unused)
+        doubt = "    # CHECK: no column is named as a time, so these are settled readings" if unused else ""
+        return Draft("\n".join([*head, f'target = "table"{doubt}', "", *lines]) + "\n", TABLE_TARGETS, unused)
     head.append("# step_s = 1.0    # a regular time grid; without it the times of the first file")
     files: list[list[str]] = []
     mapped: list[str] = []

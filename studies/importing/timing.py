@@ -12,7 +12,9 @@ from studies.importing.meaning import find_meanings, find_unit
 DATES = ("%Y-%m-%d", "%Y/%m/%d", "%d.%m.%Y", "%d/%m/%Y", "%m/%d/%Y", "%d.%m.%y", "%d/%m/%y", "%m/%d/%y")
 CLOCKS = ("%H:%M:%S", "%H:%M:%S.%f", "%H:%M")
 STAMPS = (*map(" ".join, itertools.product(DATES, CLOCKS)), "%m/%d/%Y %I:%M:%S %p", *CLOCKS[:2])
-TIME_WORDS = r"time|elapsed|zeit|date|datum|clock|stamp|uhr|^t$|^t\s*[ _/\[(]\s*([mµun]?s|min)\b|^t\s*[/\[(]\s*h\b"
+TIME_WORDS = (
+    r"time|epoch|unix|elapsed|zeit|date|datum|clock|stamp|uhr|^t$|^t\s*[ _/\[(]\s*([mµun]?s|min)\b|^t\s*[/\[(]\s*h\b"
+)
 UNIX_BY_SIZE = ((1e9, "unix-s"), (1e12, "unix-ms"), (1e15, "unix-us"), (1e18, "unix-ns"))
 HOUSING = "housing_temperature_degC"  # whose units no time has
 LONGEST_RUN = 1000.0  # days of a file whose times look like Excel's
