@@ -10,9 +10,9 @@ from studies.effects.effect import (
     find_effect,
     library,
 )
-from studies.effects.states import States
+from studies.effects.states import Lags, States
 
 __all__ = [
-    "Coefficient", "Effect", "Parameter", "Span", "States", "apply_effect", "apply_effects", "find_effect",
+    "Coefficient", "Effect", "Lags", "Parameter", "Span", "States", "apply_effect", "apply_effects", "find_effect",
     "library",
 ]  # fmt: skip

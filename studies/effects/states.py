@@ -10,6 +10,25 @@ from compensation.memory import follow_lag, follow_play
 
 
 @dataclass(frozen=True)
+class Lags:
+    """How the resonator takes up a change of its housing, and heat in its shell: the modes of its heat path, y = Σ w lag(x; τ), both of Σ w = 1."""
+
+    times: tuple[float, ...]  # s, the slowest first
+    housing: tuple[float, ...]
+    heat: tuple[float, ...]
+
+    @classmethod
+    def one(cls, tau: float) -> "Lags":
+        """Return a single lag."""
+        return cls((tau,), (1.0,), (1.0,))
+
+    def follow(self, values: Array, step: float, weights: Sequence[float]) -> Array:
+        """Return what follows values in the modes."""
+        parts = (w * lag(values, step, tau) for w, tau in zip(weights, self.times, strict=True) if w)
+        return np.asarray(sum(parts))
+
+
+@dataclass(frozen=True)
 class States:
     """The drives and the thermal state of one run on an even time grid."""
 
@@ -17,10 +36,9 @@ class States:
     time: Array  # (N,) array: Seconds since the start of the run, evenly spaced
     campaign_time: Array  # (N,) array: Seconds since the start of the first run
     housing: Array  # (N,) array: Temperature that drives the resonator (housing sensor, else chamber), K
-    # (N,) array: Temperature of the resonator, K: the housing's through one lag `tau`, unless something better is
-    # known.
+    # (N,) array: Temperature of the resonator, K: the housing's behind its lags, unless something better is known.
     resonator: Array
-    tau: float  # time constant of that lag, s
+    lags: Lags
     reference: float  # temperature from which polynomials count, K
     # amplitude_squared, voltage_squared, quadrature, pattern_angle: (N,) array or None: Square of the drive amplitude
     # and of the electrode bias, V²; quadrature control, V; azimuth, rad.
@@ -33,6 +51,19 @@ class States:
     before: Array | None = None
     # (N,) array or None: Rate of the resonator temperature, K/s, where a simulation knows it.
     known_rate: Array | None = None
+
+    @property
+    def tau(self) -> float:
+        """Slowest time constant of the resonator behind its housing, s."""
+        return self.lags.times[0]
+
+    def behind(self, housing: Array) -> Array:
+        """Return what the resonator makes of (a part of) the housing's temperature."""
+        return self.lags.follow(housing, self.step, self.lags.housing)
+
+    def heated(self, power: Array) -> Array:
+        """Return what it makes of heat in its shell, in units of what that settles at."""
+        return self.lags.follow(power, self.step, self.lags.heat)
 
     @property
     def step(self) -> float:

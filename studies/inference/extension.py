@@ -10,6 +10,7 @@ from compensation.arrays import Array
 from shell.constants import zero_Celsius
 from studies.diagnosis.verdict import Interval
 from studies.effects import Effect, Parameter
+from studies.effects.states import Lags
 from studies.inference.causes import parameters_of
 from studies.inference.diagnosis import Inference
 from studies.inference.heat_path import MASS
@@ -122,7 +123,7 @@ def _read_anew(found: Inference, term: Term, values: Array, k: int) -> dict[str,
     name = COLUMN[drive.boundary]
     T = found.campaign.records[found.search.linear.problem.parts[k].run][name] + zero_Celsius
     s = np.linspace(np.nanmin(T) - BEYOND, np.nanmax(T) + BEYOND, READINGS)
-    later = replace(states, run=int(term.shape[0]), time=s, housing=s, tau=0.0)
+    later = replace(states, run=int(term.shape[0]), time=s, housing=s, lags=Lags.one(0.0))
     error = term.effect.columns(later, term.shape, term.response)[:, list(term.members)] @ values
     return {name: np.interp(T, s + error, s) - zero_Celsius}
 

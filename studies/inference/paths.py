@@ -11,9 +11,8 @@ from compensation.arrays import Array
 from shell.constants import zero_Celsius
 from studies.effects import Effect
 from studies.effects.states import States
-from studies.simulation.heat_path import slowest_lag
 from studies.simulation.prediction import Prediction
-from studies.simulation.response import Temperatures, read_out
+from studies.simulation.response import Temperatures, lags_of, read_out
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
@@ -62,7 +61,7 @@ class Path:
             value[:, 1] += warmer
             rate[:, 1] += faster
             at = Temperatures(value, rate)
-            return read_out(self.instrument, found.law, found.drive, at, self.states.tau, found.damping, lossier)
+            return read_out(self.instrument, found.law, found.drive, at, self.states.lags, found.damping, lossier)
 
         below, above = read(*-change), read(*change)
         return {name: (above[name] - below[name]) / (2 * step) for name in above}
@@ -112,7 +111,7 @@ def trace(instrument: "Instrument", found: Prediction, run: int) -> Path:
         housing=np.interp(even, time, found.housing),
         resonator=np.interp(even, time, found.columns["resonator_temperature_degC"]) + zero_Celsius,
         known_rate=np.interp(even, time, found.temperatures.rate[:, 1]),
-        tau=slowest_lag(found.network, instrument.reference_temperature),
+        lags=lags_of(instrument, found.law, found.network),
         reference=instrument.reference_temperature,
         **commands,
     )

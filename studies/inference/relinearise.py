@@ -15,12 +15,13 @@ from compensation.noise import Noise
 from compensation.noise_rows import NoiseRows
 from studies.calibration.fit import CardFit, descend
 from studies.calibration.problem import State
-from studies.effects.states import States
+from studies.effects.states import Lags, States
 from studies.inference.linear import TOLD, Linear, Term, solve_posterior, split
 from studies.inference.signatures import Signatures
 from studies.simulation.drive import COLUMN, Boundary
-from studies.simulation.heat_path import build_network, slowest_lag
+from studies.simulation.heat_path import build_network
 from studies.simulation.prediction import Prediction
+from studies.simulation.response import lags_of
 from studies.simulation.variations import heats
 
 Along = Mapping[str, tuple[Array, list[int]]]
@@ -178,19 +179,21 @@ class Beside:
     def _moved(
         self, paths: Signatures, along: Sequence[Along], aside: Array, places: Sequence[int], heated: bool
     ) -> list[States]:
-        """Return the states of all runs a step of some coordinates `aside`, with the lag where the heat path may be another."""
-        problem, found, lags = self.start.problem, [], dict[Boundary, float]()
+        """Return the states of all runs a step of some coordinates `aside`, with the lags where the heat path may be another."""
+        problem, found, lags = self.start.problem, [], dict[Boundary, Lags]()
         if heated:
             card = problem.instrument_at(aside)
             for boundary in {part.drive.boundary for part in problem.parts}:
-                lags[boundary] = slowest_lag(build_network(card, boundary=boundary), card.reference_temperature)
+                network = build_network(card, boundary=boundary)
+                lags[boundary] = lags_of(card, paths.paths[0].prediction.law, network)
         for path, ways in zip(paths.paths, along, strict=True):
             states, steps = path.states, {}
             for state, (slopes, own) in ways.items():
                 step = STEP * slopes[:, np.isin(own, places)].sum(axis=1)
                 steps[state] = np.interp(states.time, path.time, step)
-            tau = lags.get(path.prediction.drive.boundary, states.tau)
-            found.append(replace(states.warmed(steps["resonator"]), housing=states.housing + steps["housing"], tau=tau))
+            anew = lags.get(path.prediction.drive.boundary, states.lags)
+            there = states.warmed(steps["resonator"])
+            found.append(replace(there, housing=states.housing + steps["housing"], lags=anew))
         return found
 
     def _rows_of(self, response: str, k: int) -> slice:

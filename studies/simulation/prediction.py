@@ -74,7 +74,7 @@ def predict(
     if drive.boundary == "housing":
         found.value[:, 0], reading = imposed.at(drive.time), drive.profile.at(drive.time)
     columns = {COLUMN["housing"]: reading - zero_Celsius}
-    columns |= read_out(instrument, law, drive, found, varied.here.lag(drive.boundary), varied.here.damping)
+    columns |= read_out(instrument, law, drive, found, varied.here.lags(drive.boundary), varied.here.damping)
     check_loss(instrument, columns["inverse_q"])
     slopes = {}
     for name in varied.names:
@@ -96,7 +96,7 @@ def predict(
         if housing_only:
             continue
         below, above = (
-            read_out(side.instrument, side.law, drive, along(side.distance), side.lag(drive.boundary), side.damping)
+            read_out(side.instrument, side.law, drive, along(side.distance), side.lags(drive.boundary), side.damping)
             for side in varied.sides(name)
         )
         step = np.ptp([side.distance for side in varied.sides(name)])

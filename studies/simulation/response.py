@@ -16,13 +16,15 @@ import numpy as np
 from compensation.arrays import Array
 from shell.constants import zero_Celsius
 from studies.effects import apply_effects
-from studies.effects.states import States
+from studies.effects.states import Lags, States
 from studies.errors import InputError, naming
 from studies.resonator.splitting import mean_shift
 from studies.simulation.drive import Drive
-from studies.simulation.heat_path import SENSOR
+from studies.simulation.heat_path import SENSOR, behind_housing
 from studies.simulation.loop import DEG_PER_H, settled_columns
 from thermal.meridian import cell_names, energy_weights
+from thermal.network import Network
+from thermal.relaxation import find_relaxation
 from thermal.sweeping import cubic
 
 if TYPE_CHECKING:
@@ -77,21 +79,39 @@ def to_cells(instrument: "Instrument", law: "FrequencyLaw", share: Array) -> Arr
     return energy_weights(cells, resonator.length * from_start - root, share)
 
 
+def lags_of(instrument: "Instrument", law: "FrequencyLaw", network: Network) -> Lags:
+    """Return the modes of the resonator behind its housing at the reference temperature: w = (c·v)(vᵀg)τ of the housing, (c·v)²τ of heat, c the cells' shares."""
+    chain = behind_housing(network) if "housing" in (node.name for node in network.nodes) else network
+    found = find_relaxation(chain, instrument.reference_temperature)
+    shares = np.ones(1) if instrument.polynomial is not None else cell_weights(instrument, law)
+    seen = shares @ found.shapes[[chain.index(name) for name in cell_names(len(shares))]]
+    weights = np.stack([found.shapes.T @ found.coupling.sum(axis=1), seen]) * seen * found.time_constants
+    weights /= weights.sum(axis=1, keepdims=True)
+    kept = np.abs(weights).max(axis=0) > LEAST_MODE
+    kept[0] = True
+    housing, heat = (weights[:, kept] / weights[:, kept].sum(axis=1, keepdims=True)).tolist()
+    return Lags(tuple(found.time_constants[kept].tolist()), tuple(housing), tuple(heat))
+
+
+LEAST_MODE = 1e-3
+"""Part that a mode of the heat path must have in what the resonator follows."""
+
+
 def read_out(
     instrument: "Instrument",
     law: "FrequencyLaw",
     drive: Drive,
     found: Temperatures,
-    tau: float,
+    lags: Lags,
     damping: "DampingLaw | None" = None,
     more_loss: float = 0.0,
 ) -> dict[str, Array]:
-    """Columns of the record, without noise: °C, Hz, deg/h, 1, and quadrature; `tau` (s) behind the housing, `more_loss` added to 1/Q."""
+    """Columns of the record, without noise: °C, Hz, deg/h, 1, and quadrature; `lags` behind the housing, `more_loss` added to 1/Q."""
     reference = instrument.reference_temperature
     housing, resonator, *uneven = found.value.T
     if instrument.polynomial is not None:
         resonator = _earlier(drive.time, resonator, found.rate[:, 1], instrument.polynomial.delay)
-    changes = _apply_effects(instrument, drive, housing, resonator, found.rate[:, 1], tau)
+    changes = _apply_effects(instrument, drive, housing, resonator, found.rate[:, 1], lags)
     warmed, rate = resonator, found.rate[:, 1]
     if "resonator_temperature" in changes:
         warmed = resonator + changes["resonator_temperature"]
@@ -151,7 +171,7 @@ def begun_in(effect: "EffectEntry", drive: Drive) -> float:
 
 
 def _apply_effects(
-    instrument: "Instrument", drive: Drive, housing: Array, resonator: Array, rate: Array, tau: float
+    instrument: "Instrument", drive: Drive, housing: Array, resonator: Array, rate: Array, lags: Lags
 ) -> Mapping[str, Array]:
     """Sum what the card's effects add to the resonator's temperature (K) and to the responses; they need even rows."""
     if not instrument.effects:
@@ -174,7 +194,7 @@ def _apply_effects(
         housing=onto(housing),
         resonator=onto(resonator),
         known_rate=onto(rate),
-        tau=tau,
+        lags=lags,
         reference=instrument.reference_temperature,
         **driven,
     )

@@ -8,12 +8,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from compensation.arrays import Array
+from studies.effects.states import Lags
 from studies.errors import InputError
 from studies.instrument.dotted import look_up
 from studies.loss.damping_law import DampingLaw, damping_law
 from studies.resonator.law import law_of, moved_law
 from studies.simulation.drive import Drive
-from studies.simulation.heat_path import SENSOR, build_network, departures, slowest_lag, with_sensor
+from studies.simulation.heat_path import SENSOR, build_network, departures, with_sensor
+from studies.simulation.response import lags_of
 from thermal.network import Network
 from thermal.profile import Profile
 from thermal.sensitivity import NetworkChange, difference, no_change
@@ -49,7 +51,7 @@ class Side:
     law: "FrequencyLaw"
     damping: DampingLaw | None
     networks: dict[str, Network] = field(default_factory=dict)
-    lags: dict[str, float] = field(default_factory=dict)
+    modes: dict[str, Lags] = field(default_factory=dict)
     sensed: dict[str, Network] = field(default_factory=dict)
     left: dict[str, dict[str, Array]] = field(default_factory=dict)
 
@@ -79,13 +81,13 @@ class Side:
             self.sensed[boundary] = with_sensor(self.network(boundary), self.instrument.noise.housing_lag_s)
         return self.sensed[boundary]
 
-    def lag(self, boundary: str) -> float:
-        """Slowest time constant (s) of the resonator behind its housing, in which effects count."""
+    def lags(self, boundary: str) -> Lags:
+        """Lags of the resonator behind its housing, through which effects reach it."""
         if not self.instrument.effects:
-            return 1.0
-        if boundary not in self.lags:
-            self.lags[boundary] = slowest_lag(self.network(boundary), self.instrument.reference_temperature)
-        return self.lags[boundary]
+            return Lags.one(1.0)
+        if boundary not in self.modes:
+            self.modes[boundary] = lags_of(self.instrument, self.law, self.network(boundary))
+        return self.modes[boundary]
 
 
 class Variations:
@@ -144,7 +146,7 @@ class Variations:
             damping = here.damping
             if damping is not None and (table in ("loss", "material", "resonator") or name in OF_WALL):
                 damping = damping_law(moved, law.lowest, law.highest)
-            known = ({}, {}) if heats(name) else (here.networks, here.lags)
+            known = ({}, {}) if heats(name) else (here.networks, here.modes)
             sides.append(Side(distance, moved, law, damping, *known))
         return sides[0], sides[1]
 

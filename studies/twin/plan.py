@@ -11,12 +11,13 @@ from compensation.arrays import Array
 from shell.constants import zero_Celsius
 from studies.effects import find_effect
 from studies.effects.effect import AROUND, spell_out
+from studies.effects.states import Lags
 from studies.errors import InputError
 from studies.instrument.registry import possible_keys
 from studies.instrument.units import unit_of
 from studies.resonator.splitting import mean_changes, reference_split
-from studies.simulation.heat_path import SENSOR, behind_housing, build_network, slowest_lag, with_sensor
-from studies.simulation.response import observed_rows
+from studies.simulation.heat_path import SENSOR, behind_housing, build_network, with_sensor
+from studies.simulation.response import lags_of, observed_rows
 from thermal.network import assemble, growing
 from thermal.resonator import describe_resonator
 
@@ -45,7 +46,7 @@ ONE = ".one"
 START = "start_s"
 """When a run begins, s since 1970 (UTC), from which effects with a date count on; before all dates, as 0 is, they begin with the run."""
 REACH = 150.0  # K on both sides of its reference, within which a polynomial law is carried
-MEMORY = 16  # numbers that one effect may remember
+MEMORY = 16, 15  # numbers that one effect may remember, and more for each lag of the resonator
 PAST = 256  # moments at which the temperature of a resonator that is late is kept, over twice its delay
 CAPACITY_STEP = 0.25  # K, of the knots of a heat capacity that varies
 
@@ -77,6 +78,13 @@ class Plan:
         "dict[str, CubicSpline]"  # over even knots (K) of "law", "heat_capacity", "loss" and the two parts of "wave"
     )
     effects: tuple[EffectRow, ...]
+    lags: Lags  # of the resonator behind its housing
+
+    @property
+    def memory(self) -> int:
+        """Numbers that one effect may remember."""
+        own, by_lag = MEMORY
+        return own + by_lag * len(self.lags.times)
 
     @property
     def turns_freely(self) -> bool:
@@ -128,8 +136,9 @@ def plan_twin(instrument: "Instrument", boundary: "Boundary" = "chamber", theory
     parameters[START] = 0.0
     rows = observed_rows(instrument, law, tuple(node.name for node in network.nodes))[1:6]
     uneven = law.uneven
+    lags = lags_of(instrument, law, build_network(instrument, boundary=boundary)) if effects else Lags.one(1.0)
     return Plan(
-        instrument, boundary, parameters, network, rows, uneven, _constants(instrument, law, boundary), splines, effects
+        instrument, boundary, parameters, network, rows, uneven, _constants(instrument, law), splines, effects, lags
     )
 
 
@@ -239,7 +248,7 @@ def _place_effects(instrument: "Instrument", parameters: dict[str, float]) -> It
         yield EffectRow(one.name, target, first, first + len(shape), one.since)
 
 
-def _constants(instrument: "Instrument", law: "FrequencyLaw", boundary: "Boundary") -> dict[str, float]:
+def _constants(instrument: "Instrument", law: "FrequencyLaw") -> dict[str, float]:
     """Numbers that are no keys of the card: the solver's, and those of imperfection and electrodes."""
     T0, polynomial = instrument.reference_temperature, instrument.polynomial
     keys = instrument.part("electrodes").keys if instrument.part("electrodes").are_charged else None
@@ -248,7 +257,6 @@ def _constants(instrument: "Instrument", law: "FrequencyLaw", boundary: "Boundar
     if instrument.is_imperfect:
         found = reference_split(instrument).split
         split = found.frequency * found.wave
-    lag = slowest_lag(build_network(instrument, boundary=boundary), T0) if instrument.effects else 1.0
     return {
         "REFERENCE": T0,
         "AROUND": AROUND,
@@ -256,7 +264,6 @@ def _constants(instrument: "Instrument", law: "FrequencyLaw", boundary: "Boundar
         "LOWEST": law.lowest,
         "HIGHEST": law.highest,
         "BRYAN": law.bryan_factor,
-        "LAG": lag,
         "DELAY": 0.0 if polynomial is None else polynomial.delay,
         "SPLIT_RE": split.real,
         "SPLIT_IM": split.imag,

@@ -12,7 +12,7 @@ from studies.effects.effect import AROUND
 from studies.models.c_source import one_line
 from studies.simulation.heat_path import LEAST_LAG, SENSOR, SENSOR_SHARE
 from studies.simulation.virtual_gyro import COMMAND_DIGITS, DIGITS
-from studies.twin.plan import EFFECTS, MEMORY, PAST, PRECESSION, START, Plan, input_starts
+from studies.twin.plan import EFFECTS, PAST, PRECESSION, START, Plan, input_starts
 from thermal.constants import Stefan_Boltzmann
 from thermal.network import Conductor, Node, Radiator
 
@@ -55,7 +55,8 @@ def card_header(plan: Plan) -> str:
         "LINKS": len(network.conductors),
         "RADIATORS": max(len(network.radiators), 1),
         "EFFECTS": max(len(plan.effects), 1),
-        "MEMORY": MEMORY * max(len(plan.effects), 1),
+        "LAGS": len(plan.lags.times),
+        "MEMORY": plan.memory * max(len(plan.effects), 1),
         "PAST": PAST if plan.constants["DELAY"] > 0.0 else 1,
         "SENSOR": nodes.index(SENSOR) if SENSOR in nodes else -1,
         "HOUSING": nodes.index("housing") if "housing" in nodes else 0,
@@ -108,8 +109,9 @@ def card_body(plan: Plan) -> str:
         return f"{{{order.index(keys.get(node.name, keys['shell']))}, {_number(here)}, {_number(math.log(warmer / here))}}}"
 
     power = network.power(0.0)
+    lags = zip(plan.lags.times, plan.lags.housing, plan.lags.heat, strict=True)
     effects = [
-        f"{{E_{one.name.replace('-', '_')}, {TARGETS.index(one.target)}, {MEMORY * k}, {one.shape}, {one.weights}, {_number(UNDATED if one.since is None else one.since)}}}"
+        f"{{E_{one.name.replace('-', '_')}, {TARGETS.index(one.target)}, {plan.memory * k}, {one.shape}, {one.weights}, {_number(UNDATED if one.since is None else one.since)}}}"
         for k, one in enumerate(plan.effects)
     ]
     nowhere = "{0, 0, 0, 0}"
@@ -138,6 +140,7 @@ def card_body(plan: Plan) -> str:
             [capacity(node) for node in network.nodes],
         ),
         _table("double", "twin_power_shares", "TWIN_NODES", [_number(v) for v in power]),
+        _table("double", "twin_lags", "TWIN_LAGS][3", [_braced([_number(v) for v in row]) for row in lags]),
         _table("double", "twin_rows", "5][TWIN_NODES", [_braced([_number(v) for v in row]) for row in plan.rows]),
         _table("double", "twin_uneven", "4", [_number(v) for v in plan.uneven]),
         _table("TwinEffect", "twin_effects", "TWIN_EFFECTS", effects or ["{E_none, 0, 0, 0, 0, 0}"]),

@@ -10,10 +10,14 @@ from studies.instrument.card import load_card
 from studies.record import Record
 from studies.resonator.law import law_of
 from studies.simulation.drive import drive_by_profile, drive_by_record
+from studies.simulation.heat_path import build_network
 from studies.simulation.prediction import law_for, predict
+from studies.simulation.response import lags_of, observed_rows
 from studies.simulation.variations import Variations
 from studies.simulation.virtual_gyro import simulate_run
-from thermal.profile import parse_profile
+from thermal.profile import Profile, parse_profile
+from thermal.relaxation import find_relaxation
+from thermal.sensitivity import respond
 
 PROFILE = parse_profile("step 20 -10 1h then ramp -10 35 1")
 TIME = np.arange(0.0, PROFILE.end, 20.0)
@@ -53,6 +57,25 @@ def measured(card, drive, law):
     sensed = predict(card, drive, law=law).columns["housing_temperature_degC"][rows]
     columns = {"time_s": TIME[rows], "housing_temperature_degC": sensed + 1e-3 * generator.standard_normal(len(rows))}
     return drive_by_record(Record(columns))
+
+
+def test_effects_reach_the_resonator_through_the_modes_of_its_heat_path(law):
+    """Against the network itself: a ramp of the housing, and the power of the drive that begins; its base and its shell are about as slow."""
+    card = load_card("hrg-30mm").with_table("thermal", {"radiation": False, "drive_power_mW": 2.0})
+    network = build_network(card, boundary="housing")
+    lags, row = lags_of(card, law, network), observed_rows(card, law, tuple(n.name for n in network.nodes))[1:2]
+    assert sum(abs(w) for w in lags.housing) > 3.0  # a single lag would be far off
+    time = np.arange(0.0, 8000.0, 5.0)
+    ramp = Profile(np.array([0.0, 1500.0, 8000.0]), 293.15 + np.array([0.0, 10.0, 4.0]))
+    rest = Profile(np.array([0.0, 8000.0]), np.full(2, 293.15))
+    driven, still = (
+        respond(replace(network, sources=()), {"housing": one}, time, row).temperature[:, 0] for one in (ramp, rest)
+    )
+    assert lags.follow(ramp.at(time) - 293.15, 5.0, lags.housing) == pytest.approx(driven - still, abs=0.02)
+    settled = np.linalg.solve(find_relaxation(network, 293.15).conductance, network.power(0.0)[: network.count])
+    begun = respond(network, {"housing": rest}, time, row, departure=-settled).temperature[:, 0]
+    power = np.concatenate([[0.0], np.ones(len(time))])
+    assert lags.follow(power, 5.0, lags.heat)[1:] == pytest.approx((begun - still) / (row @ settled), abs=0.01)
 
 
 def names_of(card, drive):

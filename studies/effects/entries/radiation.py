@@ -4,18 +4,18 @@ import numpy as np
 
 from compensation.arrays import Array
 from studies.effects.effect import AROUND, Coefficient, Effect, Parameter, Shape, Span
-from studies.effects.states import States, lag
+from studies.effects.states import States
 
 
 def columns(states: States, shape: Shape, response: str) -> Array:
-    """Heat ρ (g − 1)(T_h − T_r) reaches the resonator through its lag τ: the change of T_r over ρ.
+    """Heat ρ (g − 1)(T_h − T_r) reaches the resonator through its lags: the change of T_r over ρ.
 
-    g = (T_h + T_r)(T_h² + T_r²)/(4 T₀³) for exchange between housing and resonator, or (T_r/T₀)³ for g(T_r); τ is the lag
+    g = (T_h + T_r)(T_h² + T_r²)/(4 T₀³) for exchange between housing and resonator, or (T_r/T₀)³ for g(T_r); these are the lags
     at T₀. Where T_r is known without radiation only, `share_of_form` is the ρ at which it is solved for; at 0, T_r is
     right as it stands.
     """
     share, exchange = shape
-    housing, step, tau = states.housing, states.step, states.tau
+    housing = states.housing
     change = np.zeros_like(housing)
     for _ in range(5 if share else 1):
         state = states.resonator + share * change
@@ -24,7 +24,7 @@ def columns(states: States, shape: Shape, response: str) -> Array:
         else:
             conductance = (state / AROUND) ** 3
         feed = (conductance - 1.0) * (housing - state)
-        change = lag(np.concatenate([[0.0], feed]), step, tau)[1:]  # τ y′ = −y + feed from y = 0
+        change = states.heated(np.concatenate([[0.0], feed]))[1:]  # τ y′ = −y + feed from y = 0
     return change[:, None]
 
 

@@ -2,13 +2,13 @@
 
 from compensation.arrays import Array
 from studies.effects.effect import Coefficient, Effect, Shape
-from studies.effects.states import States, lag
+from studies.effects.states import States
 
 
 def columns(states: States, shape: Shape, response: str) -> Array:
-    """The true housing temperature is T_s + τ_s dT_s/dt; behind the resonator's lag τ that adds τ_s d lag(T_s; τ)/dt."""
-    late = lag(states.housing, states.step, states.tau)
-    return ((states.housing - late) / states.tau)[:, None]
+    """The true housing temperature is T_s + τ_s dT_s/dt; behind the resonator's lags τ that adds τ_s Σ w d lag(T_s; τ)/dt."""
+    rates = [w / tau for w, tau in zip(states.lags.housing, states.lags.times, strict=True)]
+    return (states.housing * sum(rates) - states.lags.follow(states.housing, states.step, rates))[:, None]
 
 
 EFFECT = Effect(

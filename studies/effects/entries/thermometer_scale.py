@@ -4,18 +4,18 @@ import numpy as np
 
 from compensation.arrays import Array
 from studies.effects.effect import Coefficient, Effect, Parameter, Shape, Span
-from studies.effects.states import States, lag
+from studies.effects.states import States
 
 
 def columns(states: States, shape: Shape, response: str) -> Array:
-    """The true housing temperature is T_s + Σ e_k x^k, k = 2, 3, 4, x = T_s − T₀ in units of 10 K; it then passes the lag.
+    """The true housing temperature is T_s + Σ e_k x^k, k = 2, 3, 4, x = T_s − T₀ in units of 10 K; the resonator follows that.
 
     A sensor that was exchanged or wired anew has it from one run on, with another slope, e₁, and zero, e₀.
     """
     (begin,) = shape
     x = (states.housing - states.reference) / 10.0
-    parts = [lag(x**power, states.step, states.tau) for power in (2, 3, 4, 1, 0)]
-    return np.stack(parts, axis=1) * float(states.run >= begin)
+    error = np.stack([x**power for power in (2, 3, 4, 1, 0)], axis=1)
+    return states.behind(error) * float(states.run >= begin)
 
 
 def grid(span: Span, response: str) -> list[tuple[float, ...]]:

@@ -19,6 +19,13 @@ static double lag(double *memory, double u, double h, double tau) {
     return memory[0];
 }
 
+/* What the resonator makes of a change u of its housing (way 1) or of heat in its shell (way 2). */
+static double taken_up(double *memory, double u, double h, int way) {
+    double y = 0.0;
+    for (int k = 0; k < TWIN_LAGS; ++k) y += twin_lags[k][way] * lag(memory + 3 * k, u, h, twin_lags[k][0]);
+    return y;
+}
+
 static double play(double *memory, double u, double r, double start) {
     memory[0] = memory[1] == 0.0 ? u + start * r : fmin(u + r, fmax(u - r, memory[0]));
     memory[1] = 1.0;
@@ -56,27 +63,35 @@ double twin_effect(Twin *w, const TwinEffect *e, const TwinInput *in, double h, 
     const double angle = (in->given[IN_ANGLE] ? in->value[IN_ANGLE] : w->p[P_bias_pattern_angle_deg]) * PI / 180;
     const double amplitude = in->value[IN_AMPLITUDE] * in->value[IN_AMPLITUDE], volts = in->value[IN_VOLTAGE] * in->value[IN_VOLTAGE];
     const double t = w->time + fmax(w->p[P_start_s] - e->since, 0.0); /* since its date */
-    const double tau = TWIN_LAG, quadrature = in->value[IN_QUADRATURE];
+    const double tau = twin_lags[0][0], quadrature = in->value[IN_QUADRATURE];
     const int f = e->target == TARGET_FREQUENCY;
     double *m = w->memory + e->memory, y = 0.0;
     switch (e->kind) {
     case E_second_lag: {
-        const double ratio[3] = {1.0, 1.0 / 3, 3.0}, first = lag(m + 9, housing, h, tau);
+        const double ratio[3] = {1.0, 1.0 / 3, 3.0}, first = taken_up(m + 9, housing, h, 1);
         for (int k = 0; k < 3; ++k) y += a[k] * (lag(m + 3 * k, housing, h, s[0] * ratio[k]) - first);
         return y;
     }
     case E_thermometer_scale:
         if (s[0] > 0) return 0.0;
-        for (int k = 0; k < 4; ++k) y += a[k] * lag(m + 3 * k, pow((housing - TWIN_REFERENCE) / 10, k < 3 ? k + 2 : 1), h, tau);
-        return y + a[4];
-    case E_thermometer_lag: return a[0] * (housing - lag(m, housing, h, tau)) / tau;
-    case E_self_heating: return in->given[IN_AMPLITUDE] ? a[0] * lag(m, amplitude, h, tau) : 0.0;
+        y = power_series(a, 3, (housing - TWIN_REFERENCE) / 10, 2) + a[3] * (housing - TWIN_REFERENCE) / 10 + a[4];
+        return taken_up(m, y, h, 1);
+    case E_thermometer_lag:
+        for (int k = 0; k < TWIN_LAGS; ++k) y += twin_lags[k][1] * (housing - lag(m + 3 * k, housing, h, twin_lags[k][0])) / twin_lags[k][0];
+        return a[0] * y;
+    case E_self_heating: {
+        const double ratio[3] = {0.1, 1.0 / 3, 3.0}, first = taken_up(m + 9, amplitude, h, 2);
+        y = a[0] * first;
+        for (int k = 0; k < 3; ++k) y += a[k + 1] * (lag(m + 3 * k, amplitude, h, tau * ratio[k]) - first);
+        return in->given[IN_AMPLITUDE] ? y : 0.0;
+    }
     case E_radiation:
         for (int k = 0; k < (s[0] != 0 ? 5 : 1); ++k) {
             const double state = resonator + s[0] * y, both = (housing + state) * (housing * housing + state * state);
             const double g = s[1] != 0 ? both / (4 * pow(AROUND, 3)) : pow(state / AROUND, 3);
-            m[3 * k + 2] = 1.0; /* it begins at nothing, driven by nothing */
-            y = lag(m + 3 * k, (g - 1) * (housing - state), h, tau);
+            double *own = m + 3 * TWIN_LAGS * k;
+            for (int i = 0; i < TWIN_LAGS; ++i) own[3 * i + 2] = 1.0; /* it begins at nothing, driven by nothing */
+            y = taken_up(own, (g - 1) * (housing - state), h, 2);
         }
         return a[0] * y;
     case E_clock_offset: return s[0] >= 1 ? 0.0 : -a[0] * rate;

@@ -70,6 +70,7 @@ extern const char *const twin_parameter_names[TWIN_PARAMETERS]; /* as in the car
 extern const TwinLink twin_links[TWIN_LINKS], twin_radiators[TWIN_RADIATORS];
 extern const TwinCapacity twin_capacities[TWIN_NODES];
 extern const double twin_power_shares[TWIN_NODES];
+extern const double twin_lags[TWIN_LAGS][3]; /* time constant, part of the housing, part of heat */
 extern const double twin_rows[5][TWIN_NODES]; /* resonator, and what is uneven in it */
 extern const double twin_uneven[4];
 extern const TwinSpline twin_law, twin_heat_capacity, twin_loss, twin_wave[2];

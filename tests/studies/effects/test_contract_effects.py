@@ -10,7 +10,7 @@ from msgspec.structs import fields
 import studies.diagnosis
 import studies.inference
 from studies.cli import main
-from studies.effects import Span, States, apply_effect, apply_effects, find_effect, library
+from studies.effects import Lags, Span, States, apply_effect, apply_effects, find_effect, library
 from studies.effects.states import lag
 from studies.errors import InputError
 from studies.instrument.card import load_card, save_card
@@ -26,7 +26,7 @@ def make_states(run=0):
         time + 86400.0 * run,
         housing,
         lag(housing, 60.0, 1500.0),
-        1500.0,
+        Lags.one(1500.0),
         293.15,
         amplitude_squared=1.0 + 0.2 * (time > 9000),
         voltage_squared=6400.0 + 3000.0 * (time > 12000),
@@ -122,7 +122,7 @@ def test_slow_sensor_ahead_of_its_device():
     true = 293.15 + 10.0 * np.sin(t / 3000.0)
     sensed = lag(true, 5.0, 120.0)
     states = replace(
-        make_states(), time=t, campaign_time=t, housing=sensed, resonator=lag(sensed, 5.0, 900.0), tau=900.0
+        make_states(), time=t, campaign_time=t, housing=sensed, resonator=lag(sensed, 5.0, 900.0), lags=Lags.one(900.0)
     )
     _, change = apply_effect("thermometer-lag", {"sensor_time_constant_s": 120.0}, states)
     late = t > 5000.0

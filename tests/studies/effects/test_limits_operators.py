@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from studies.effects import States, apply_effect, find_effect
+from studies.effects import Lags, States, apply_effect, find_effect
 from studies.effects.states import lag, play, remembered
 
 
@@ -40,7 +40,7 @@ def test_radiation_of_a_saved_card_solves_the_exchange_of_heat():
     share, tau, step = 0.6, 1200.0, 10.0
     time = np.arange(0.0, 20000.0, step)
     housing = 293.15 + 30.0 * np.sin(time / 2500.0)
-    states = States(0, time, time, housing, lag(housing, step, tau), tau, 285.0)
+    states = States(0, time, time, housing, lag(housing, step, tau), Lags.one(tau), 285.0)
     _, change = apply_effect(
         "radiation", {"share_of_form": share, "exchange": 1.0, "radiated_share": share}, states, "frequency_Hz"
     )
@@ -57,7 +57,7 @@ def test_radiation_of_a_saved_card_solves_the_exchange_of_heat():
 
 
 def run_of(number, time, temperature, start=0.0):
-    return States(number, time, time + start, temperature, temperature, 1.0, 293.15)
+    return States(number, time, time + start, temperature, temperature, Lags.one(1.0), 293.15)
 
 
 def test_a_loop_goes_on_in_the_next_run_where_it_ended_in_the_last():
@@ -79,7 +79,7 @@ def test_a_jump_relaxes_as_the_mean_over_each_step_of_the_grid():
 
     def states(run, spacing):
         time = spacing * (np.arange(round(4800.0 / spacing)) + 0.5)
-        return States(run, time, time, time, time, 600.0, 293.0)
+        return States(run, time, time, time, time, Lags.one(600.0), 293.0)
 
     coarse = effect.columns(states(0, step), (0.0, moment, 1.0), "frequency_Hz")
     fine = effect.columns(states(0, step / 100.0), (0.0, moment, 1.0), "frequency_Hz")

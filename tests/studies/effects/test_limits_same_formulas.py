@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from compensation.cross_damping import evaluate_cross_damping, relate_cross_damping_to_rate_when_tuned, simulate_bias
-from studies.effects import States, apply_effect
+from studies.effects import Lags, States, apply_effect
 from studies.instrument.card import load_card
 from studies.loss.damping_law import damping_law
 from studies.resonator.splitting import reference_split
@@ -32,11 +32,11 @@ def read(card, law, commands, damping=None):
     """Return what a card reads at given temperatures of its resonator."""
     value = np.stack([HOUSING, HOUSING, *np.zeros((4, len(TIME)))], axis=1)
     drive = Drive(TIME, "chamber", Profile(TIME, HOUSING), commands=commands)
-    return read_out(card, law, drive, Temperatures(value, np.zeros_like(value)), 1000.0, damping)
+    return read_out(card, law, drive, Temperatures(value, np.zeros_like(value)), Lags.one(1000.0), damping)
 
 
 def states(**drives):
-    return States(0, TIME, TIME, HOUSING, HOUSING, 1000.0, 293.15, **drives)
+    return States(0, TIME, TIME, HOUSING, HOUSING, Lags.one(1000.0), 293.15, **drives)
 
 
 def test_softening_is_that_of_the_cards_electrodes(card, law):
@@ -63,7 +63,7 @@ def test_turned_axis_is_that_of_the_cards_damping(card, law):
     value = np.tile([293.15, 293.15, 0.0, 0.0, 0.0, 0.0], (TIME.size, 1))
     drive = Drive(TIME, "chamber", Profile(TIME, np.full_like(TIME, 293.15)), commands={"pattern_angle": angle})
     found = Temperatures(value, np.zeros_like(value))
-    with_it, without = (read_out(one, law, drive, found, 1000.0) for one in (uneven, plain))
+    with_it, without = (read_out(one, law, drive, found, Lags.one(1000.0)) for one in (uneven, plain))
     drift = with_it["bias_deg_per_h"] - without["bias_deg_per_h"]
     size = np.degrees(0.02 * np.pi * with_it["frequency_Hz"][0] * 1e-7 / (4 * law.bryan_factor)) * 3600.0
     axis = np.radians(12.0)
@@ -75,7 +75,7 @@ def test_turned_axis_is_that_of_the_cards_damping(card, law):
 
 def still_states(angle):
     level = np.full_like(TIME, 293.15)
-    return States(0, TIME, TIME, level, level, 1000.0, 293.15, pattern_angle=angle)
+    return States(0, TIME, TIME, level, level, Lags.one(1000.0), 293.15, pattern_angle=angle)
 
 
 def test_axis_that_turns_with_temperature_is_an_axis_that_stands_elsewhere(card, law):
@@ -83,7 +83,7 @@ def test_axis_that_turns_with_temperature_is_an_axis_that_stands_elsewhere(card,
     angle = np.radians(np.linspace(0.0, 45.0, TIME.size))
     warm = np.full_like(TIME, 303.15)
     sized = {"rotation_deg_per_10K": 3.0, "sine_deg_per_h": 2.0}
-    turned = States(0, TIME, TIME, warm, warm, 1000.0, 293.15, pattern_angle=angle)
+    turned = States(0, TIME, TIME, warm, warm, Lags.one(1000.0), 293.15, pattern_angle=angle)
     _, change = apply_effect("axis-rotation", sized, turned)
     assert change == pytest.approx(2.0 * np.sin(4 * (angle - np.radians(3.0))), rel=1e-12)
 
@@ -126,7 +126,7 @@ def test_leak_is_the_gas_of_the_cards_budget(card):
     empty = damping_law(card.with_table("loss", parts), 270.0, 315.0)
     gas = gassed.inverse_q(HOUSING) - empty.inverse_q(HOUSING)
     day = np.full_like(TIME, 86400.0)
-    aged = States(0, TIME, day, HOUSING, HOUSING, 1000.0, 293.15)
+    aged = States(0, TIME, day, HOUSING, HOUSING, Lags.one(1000.0), 293.15)
     level = gassed.inverse_q(np.array([293.15]))[0] - empty.inverse_q(np.array([293.15]))[0]
     _, change = apply_effect("leak", {"temperature_exponent": -0.5, "growth_1_per_day": float(level)}, aged)
     # stiffness and so ω follow the temperature in the budget: 85 ppm/K
@@ -137,7 +137,7 @@ def test_a_leak_fills_up():
     """p = τ (1 − e^(−t/τ)) at a constant temperature: after ln 2 of τ half of what the first rate would bring in τ; τ → ∞: t."""
     tau = 4.0e6
     still = np.full_like(TIME, 293.15)
-    aged = States(0, TIME, np.full_like(TIME, tau * np.log(2.0)), still, still, 1000.0, 293.15)
+    aged = States(0, TIME, np.full_like(TIME, tau * np.log(2.0)), still, still, Lags.one(1000.0), 293.15)
     sized = {"temperature_exponent": 0.5, "growth_1_per_day": 1e-9}
     _, half = apply_effect("leak", {**sized, "filling_s": tau}, aged)
     _, never = apply_effect("leak", sized, aged)
