@@ -13,7 +13,7 @@ from studies.inference.linear import Term
 Moved = Callable[[Term, tuple[float, ...]], Term]
 """A term with another shape."""
 MOST_SHAPES = 400
-"""Of an effect; of a larger grid every second, third, … of the shapes that differ only in what a fit moves."""
+"""Of an effect; of a larger grid every second, third, … of the shapes that differ only in what a fit moves, of each such series as many."""
 FEW, LEADING, WIDTH = 40, 0.4, 4
 """Of effects with more shapes than FEW only the leading columns are scanned: those with a prior of at least this part of the widest."""
 FINITE = 1e3
@@ -111,17 +111,24 @@ def _steady(effect: Effect, shape: tuple[float, ...]) -> tuple[float, ...]:
 
 def chosen(effect: Effect, grid: list[tuple[float, ...]]) -> list[tuple[float, ...]]:
     """Return the shapes of a grid that are scanned."""
-    every = -(-len(grid) // MOST_SHAPES)
-    return [shape for series in _series(effect, grid) for shape in series[every // 2 :: every]]
+    every = _series(effect, grid)
+    apart = [_apart(series, len(every)) for series in every]
+    return [shape for series, step in zip(every, apart, strict=True) for shape in series[step // 2 :: step]]
+
+
+def _apart(series: Sequence[tuple[float, ...]], count: int) -> int:
+    """Which of a series are scanned, every first, second, … where each of so many has the same part of `MOST_SHAPES`."""
+    return -(-len(series) * count // MOST_SHAPES)
 
 
 def _passed(effect: Effect, grid: list[tuple[float, ...]], at: tuple[float, ...]) -> list[tuple[float, ...]]:
     """Return the shapes about a chosen one that were passed over."""
-    every = -(-len(grid) // MOST_SHAPES)
-    series = next(own for own in _series(effect, grid) if _steady(effect, own[0]) == _steady(effect, at))
+    every = _series(effect, grid)
+    series = next(own for own in every if _steady(effect, own[0]) == _steady(effect, at))
+    step = _apart(series, len(every))
     shapes = np.array(series)
     place = int(np.argmin((np.abs(shapes - at) / np.maximum(np.ptp(shapes, axis=0), 1e-300)).sum(axis=1)))
-    return series[max(place - every, 0) : place + every + 1]
+    return series[max(place - step, 0) : place + step + 1]
 
 
 def leading(effect: Effect, shapes: int) -> list[int]:
