@@ -94,8 +94,11 @@ class HeatPath:
 
     @property
     def is_late(self) -> bool:
-        """Whether the sensor of the housing is slow beyond its error."""
-        return self._is_sure(SENSOR)
+        """Whether the sensor of the housing is slow beyond its error, and no lag as slow: by 1 + s τ over 1 + s τ′, τ ≈ τ′, a path beside another one is written."""
+        if not self._is_sure(SENSOR):
+            return False
+        own, lags = self.interval(SENSOR), [self.interval(f"law.{key}") for key in LAGS[: self.lags]]
+        return self.lags == 1 or not any(own.low < lag.high and lag.low < own.high for lag in lags)
 
     def _is_sure(self, name: str) -> bool:
         """Whether a value that no card of a user states is above 0 beyond its error."""

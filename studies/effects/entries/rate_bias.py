@@ -8,12 +8,12 @@ from studies.effects.states import States, lag
 
 
 def columns(states: States, shape: Shape, response: str) -> Array:
-    """B ∝ dT_r/dt, and its product with the temperature as in HRG paper eqs. (21), (22); the same behind 5 min."""
-    late = lag(states.rate, states.step, LATE)
-    return np.stack([states.rate, states.rate * states.excess, late - states.rate], axis=1)
+    """B ∝ dT_r/dt, and its product with the temperature as in HRG paper eqs. (21), (22); the same behind 1 and 5 min."""
+    late = [lag(states.rate, states.step, time) - states.rate for time in LATE]
+    return np.stack([states.rate, states.rate * states.excess, *late], axis=1)
 
 
-LATE = 300.0  # a gradient takes its time to build up, s
+LATE = (60.0, 300.0)  # a gradient takes its time to build up, s
 
 
 EFFECT = Effect(
@@ -25,7 +25,7 @@ EFFECT = Effect(
     coefficients=(
         Coefficient("coefficient_{unit}_per_K_per_s"),
         Coefficient("product_{unit}_per_K2_per_s", (0.03,)),
-        Coefficient("late_{unit}_per_K_per_s", (0.2,)),
+        Coefficient("late_{unit}_per_K_per_s", (0.3, 0.2)),
     ),
     columns=columns,
     sizes={"bias_deg_per_h": 1000.0},

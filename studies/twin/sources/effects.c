@@ -156,10 +156,9 @@ double twin_effect(Twin *w, const TwinEffect *e, const TwinInput *in, double h, 
         return y;
     }
     case E_quadrature_leakage: return in->given[IN_QUADRATURE] ? quadrature * (a[0] + a[1] * x) : 0.0;
-    case E_rate_bias: {
-        const double late = lag(m, rate, h, 300.0);
-        return a[0] * rate + a[1] * rate * 10 * x + a[2] * (late - rate);
-    }
+    case E_rate_bias:
+        y = a[0] * rate + a[1] * rate * 10 * x;
+        return y + a[2] * (lag(m, rate, h, 60.0) - rate) + a[3] * (lag(m + 3, rate, h, 300.0) - rate);
     case E_rate_frequency: return a[0] * rate;
     default: return 0.0;
     }
