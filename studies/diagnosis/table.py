@@ -136,7 +136,7 @@ def judge_table(whole: SettledTable, card: "Instrument | None" = None) -> TableD
     elif (best is None or (lead < needed and not shaped)) and base[0] > NEIGHBOURS * near:
         said.append(words.step_sentence(base[0], near))
     elif best is None or (lead < needed and not shaped):
-        state, following = "explained" if causes else "adequate", None
+        state, following = "explained" if any(one.is_wrong_value for one in causes) else "adequate", None
         said += [words.short_sentence(forms, base[0], needed)] if lead > UNNAMED else []
     else:
         said += [words.unproven_sentence(forms, base[0], table, needed)] if lead < needed else []

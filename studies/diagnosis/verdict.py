@@ -70,6 +70,11 @@ class Cause:
         """The effect and its equals."""
         return (self.effect, *self.equivalent)
 
+    @property
+    def is_wrong_value(self) -> bool:
+        """Whether it is a value of the card that is rather wrong than not."""
+        return self.kind == "value" and self.probability >= CONSTANTS["believed"]
+
     def as_dict(self) -> dict[str, Any]:
         """Return the entry of the contract."""
         return {
@@ -255,12 +260,19 @@ def weigh(
 
 
 def wrong_values(shifts: Sequence[Shift]) -> list[Cause]:
-    """Return the card's values that the data move by more than two of their standard deviations."""
+    """Return the card's values that the data move by more than two of their standard deviations: of many, some do by chance.
+
+    That the card states too small a one has the prior odds of an effect; the data raise them to e^((z² − 1)/2)/|z| times at most.
+    """
     return [
         Cause(
             shift.parameter,
             SHOWN_IN.get(shift.parameter.partition(".")[0], "frequency_Hz"),
-            float(scipy.special.erf(abs(shift.shift_sd) / np.sqrt(2.0))),
+            float(
+                scipy.special.expit(
+                    CONSTANTS["log_prior_effect"] + (shift.shift_sd**2 - 1.0) / 2.0 - np.log(abs(shift.shift_sd))
+                )
+            ),
             (),
             {shift.parameter: Interval(shift.value, shift.low, shift.high)},
             shift.shift_sd**2,

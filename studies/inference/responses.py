@@ -35,7 +35,7 @@ def result_of(found: Inferred, name: str, causes: Sequence[Cause]) -> ResponseRe
         found.path is not None and name == found.search.linear.responses[0]
     )
     mine = [cause for cause in causes if cause.response == name and cause.kind == "physics"]
-    values = any(cause.kind == "value" and cause.response == name for cause in causes)
+    values = any(cause.is_wrong_value and cause.response == name for cause in causes)
     share = (left.share if left.significant else 1.0) if terms else None
     slow = _slow(found, name)
     verdict, remark = _judge(found, name, terms, mine, values, slow, share)

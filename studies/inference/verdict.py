@@ -40,9 +40,8 @@ def judge(found: Inferred) -> Verdict:
     causes = tuple(sorted((*wrong_values(shifts), *causes_of(found)), key=lambda cause: -cause.evidence))
     results = {name: result_of(found, name, causes) for name in found.search.linear.responses}
     results |= skipped_results(found.campaign)
-    named = tuple(
-        cause for cause in _patching(found, doubted(causes), results) if cause.probability >= CONSTANTS["member"]
-    )
+    doubtful = _patching(found, doubted(causes), results)
+    named = tuple(one for one in doubtful if one.kind == "value" or one.probability >= CONSTANTS["member"])
     told = {cause.response for cause in named}
     for name in found.search.linear.responses:
         if results[name].verdict == "not-identifiable" and name not in told:
