@@ -172,10 +172,15 @@ class Verdict:
     calibration: tuple[Shift, ...] = ()
     details: Mapping[str, Any] = field(default_factory=dict)
 
+    @property
+    def named(self) -> tuple[Cause, ...]:
+        """Causes without values of the card that chance may have moved."""
+        return tuple(one for one in self.causes if one.kind != "value" or one.is_wrong_value)
+
     def __str__(self) -> str:
         causes = "; ".join(
             f"{' or '.join(cause.names)} in {cause.response}, probability {cause.probability:.2f}"
-            for cause in self.causes
+            for cause in self.named
         )
         return f"{self.verdict}: {causes}" if causes else self.verdict
 

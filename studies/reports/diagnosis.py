@@ -53,20 +53,23 @@ def shown(column: str, value: float | None, digits: int = 3) -> str:
 
 def headline(verdict: Verdict) -> str:
     """Return the verdict in a sentence, the causes in another, and in a third what they leave that noise does not."""
-    causes = "; ".join(map(name_cause, verdict.causes))
+    causes = "; ".join(map(name_cause, verdict.named))
+    others = (one for one in verdict.causes if one not in verdict.named)
+    strayed = ", ".join(f"{display_name(one.effect)} by {one.evidence**0.5:.1f} standard deviations" for one in others)
     left = "; ".join(
         f"{spell_structure(one.left_over_input)} in {spoken(name)}"
         for name, one in verdict.responses.items()
         if causes and one.left_over == "structure" and one.verdict != "unexplained"
     )
     named = f" {causes[0].upper()}{causes[1:]}." if causes else ""
-    return _sentence(verdict) + named + (left and f" Still left: {left}.")
+    chance = f" Values of the card that moved, as some do by chance: {strayed}." if strayed else ""
+    return _sentence(verdict) + named + (left and f" Still left: {left}.") + chance
 
 
 def _sentence(verdict: Verdict) -> str:
-    removes = "the named causes remove" if len(verdict.causes) > 1 else "the named cause removes"
+    removes = "the named causes remove" if len(verdict.named) > 1 else "the named cause removes"
     if verdict.verdict == "not-identifiable" and not any(cause.equivalent for cause in verdict.causes):
-        return PARTLY if verdict.causes else UNDECIDED
+        return PARTLY if verdict.named else UNDECIDED
     return WORDS[verdict.verdict].format(removes)
 
 
@@ -196,7 +199,7 @@ def _summary(cause: Cause) -> str:
 
 def _facts(verdict: Verdict) -> list[Fact]:
     facts = [("Verdict", verdict.verdict.replace("-", " "), reason(verdict))]
-    for cause in verdict.causes[:3]:
+    for cause in verdict.named[:3]:
         names = " or ".join(cause.names)
         size = f"{shown(cause.response, cause.peak)} peak to peak in {spoken(cause.response)}"
         if cause.kind == "value":
