@@ -62,7 +62,7 @@ def headline(verdict: Verdict) -> str:
         if causes and one.left_over == "structure" and one.verdict != "unexplained"
     )
     named = f" {causes[0].upper()}{causes[1:]}." if causes else ""
-    chance = f" Values of the card that moved, as some do by chance: {strayed}." if strayed else ""
+    chance = f" Values of the card that moved, perhaps by chance: {strayed}." if strayed else ""
     return _sentence(verdict) + named + (left and f" Still left: {left}.") + chance
 
 

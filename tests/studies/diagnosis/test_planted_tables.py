@@ -266,7 +266,7 @@ def test_a_slope_within_six_standard_deviations_is_a_value_before_it_is_fahrenhe
     found = beside_card(tmp_path, np.arange(-20.0, 41.0, 10.0), f)
     text = " ".join(found.sentences)
     assert text.index("5.3 standard deviations") < text.index("If the temperatures were in °F, the slope would be 1.0")
-    assert "Temperature slope of the shear modulus in the frequency" in headline(found.verdict)
+    assert "temperature slope of the shear modulus by 3.3 standard deviations" in headline(found.verdict)
     with pytest.raises(InputError, match=r"6 standard deviations[.] If the temperatures are read in °F"):
         beside_card(tmp_path, 1.8 * np.arange(-20.0, 41.0, 10.0) + 32.0, PAPER)
 
