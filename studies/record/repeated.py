@@ -29,7 +29,8 @@ def drop_repeats(records: Sequence[Record]) -> tuple[list[Record], list[str]]:
             place = next(k for k, one in enumerate(kept) if one is twin)
             kept[place], record, twin = record, twin, record
         whole = f"{record.path or 'a record'} repeats {twin.path or 'another'} and is left out"
-        said.append(f"{whole}{': ' + SAME_NOISE if has_noise_of(record, twin) else ''}.")
+        told = has_noise_of(record, twin) and not _same_rows(record, twin)
+        said.append(f"{whole}{': ' + SAME_NOISE if told else ''}.")
     return kept, said + _overlaps(kept)
 
 
@@ -53,8 +54,11 @@ def repeats(one: Record, two: Record) -> bool:
     """Whether two records are of one run: of the shorter, most rows stand in the other too, whatever their time, or one output scatters as the other does; noise never repeats itself."""
     if one.sha256 and one.sha256 == two.sha256:
         return True
-    if has_noise_of(one, two):
-        return True
+    return has_noise_of(one, two) or _same_rows(one, two)
+
+
+def _same_rows(one: Record, two: Record) -> bool:
+    """Whether most rows of the shorter stand in the other."""
     short, long = (dict(own.columns) for own in sorted((one, two), key=len))
     if not set(short) <= set(long):
         return False
@@ -71,11 +75,7 @@ def repeats(one: Record, two: Record) -> bool:
 
 def has_noise_of(one: Record, two: Record) -> bool:
     """Whether an output of one record scatters as that of the other does, row by row, about values of its own."""
-    return len(one) == len(two) and any(
-        _same_noise(one[key], two[key]) and not np.array_equal(one[key], two[key], equal_nan=True)
-        for key in OUTPUTS
-        if key in one and key in two
-    )
+    return len(one) == len(two) and any(_same_noise(one[key], two[key]) for key in OUTPUTS if key in one and key in two)
 
 
 def _same_noise(one: Array, two: Array) -> bool:
